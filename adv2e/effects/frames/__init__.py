@@ -1,0 +1,1 @@
+"""Effects on the frames, before the pixel sees them."""

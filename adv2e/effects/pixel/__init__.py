@@ -1,0 +1,1 @@
+"""Effects inside the pixel, in signal order."""

@@ -1,0 +1,51 @@
+r"""Leak of the memorised reference: regular ON events of a pixel at rest.
+
+The reset switch leaks, so the reference falls,
+
+.. math:: \dot r = -(R_0 + R_1\,DN / 255)\, C_{on}\, \xi
+
+with R_0 = ``rate_hz``, R_1 = ``photo_rate_hz``, DN the unfiltered light and C_on that pixel's own
+ON threshold, so that a pixel at rest fires at R_0 + R_1 DN/255.  ``jitter`` is the relative
+standard deviation of the time between two leak events: xi is drawn anew after each event of the
+pixel, as 1/(1 + jitter g) with g normal and cut symmetrically, so that the mean period stays.
+
+References
+----------
+.. [1] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
+   sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848.
+.. [2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
+   CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (0.1 Hz, jitter 10 %).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adv2e.parameters import Section, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leak(Section):
+    """Leak events."""
+
+    rate_hz: float = parameter(
+        0.1,
+        unit="Hz",
+        meaning="ON events a pixel a second from junction leakage",
+        at_least=0,
+        source="v2e: 0.01-0.1 Hz",
+    )
+    photo_rate_hz: float = parameter(
+        0.0,
+        unit="Hz",
+        meaning="ON events a pixel a second from parasitic photocurrent, at white",
+        at_least=0,
+    )
+    jitter: float = parameter(
+        0.0,
+        unit="-",
+        meaning="relative standard deviation of the time between two leak events",
+        at_least=0,
+        at_most=0.3,
+        source="v2e: 0.1",
+    )

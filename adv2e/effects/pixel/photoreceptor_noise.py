@@ -1,0 +1,38 @@
+r"""Photoreceptor noise: white noise on the drive, band-limited by the low-pass itself.
+
+.. math:: dn = -w\,n\,dt + \sqrt{2 w}\,\sigma\,dW, \qquad w = 2\pi f(t)
+
+n adds to the filtered signal; sigma = ``rms`` is its standard deviation at every brightness, and
+its correlation time is that of the low-pass.  Noise events of one pixel therefore mostly alternate
+in polarity, which Poisson events do not.  The process is sampled exactly at steps of at most
+``step`` of the correlation time and is linear between them.
+
+References
+----------
+.. [1] R. Graca, T. Delbruck, "Unraveling the paradox of intensity-dependent DVS pixel noise",
+   International Image Sensor Workshop 2021, arXiv:2109.08640.
+.. [2] D. T. Gillespie, "Exact numerical simulation of the Ornstein-Uhlenbeck process and its
+   integral", Physical Review E 54, 1996, doi:10.1103/PhysRevE.54.2084.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adv2e.parameters import Section, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhotoreceptorNoise(Section):
+    """Band-limited noise of the photoreceptor."""
+
+    rms: float = parameter(
+        unit="ln", meaning="standard deviation of the filtered noise", at_least=0
+    )
+    step: float = parameter(
+        0.1,
+        unit="-",
+        meaning="longest step of the sampled noise, as a share of its correlation time",
+        above=0,
+        at_most=1,
+    )

@@ -1,0 +1,37 @@
+r"""Shot noise as a point process: background events that fall with brightness.
+
+Poisson events at the total rate
+
+.. math:: R(t) = R_s\,(1 - 0.75\,DN / 255)
+
+with R_s = ``rate_hz`` and DN the unfiltered light; half of them ON, half OFF.  Candidates come at
+the constant rate R_s from a stream of each pixel's own and are thinned by the light.
+
+References
+----------
+.. [1] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
+   CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (rate falls to a quarter at white).
+.. [2] P. A. W. Lewis, G. S. Shedler, "Simulation of nonhomogeneous Poisson processes by thinning",
+   Naval Research Logistics Quarterly 26(3), 1979, doi:10.1002/nav.3800260304.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adv2e.parameters import Section, parameter
+
+FALL_AT_WHITE = 0.75
+"""Share of the dark rate that is gone at white."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShotNoise(Section):
+    """Poisson background events."""
+
+    rate_hz: float = parameter(
+        1.0,
+        unit="Hz",
+        meaning="ON and OFF events a pixel a second in the dark",
+        at_least=0,
+    )

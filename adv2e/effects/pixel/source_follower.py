@@ -1,0 +1,24 @@
+r"""Source follower behind the photoreceptor: a second pole, the same at every brightness.
+
+.. math:: \dot z = 2\pi f_s\,(y - z)
+
+y is the output of the photoreceptor low-pass; the comparator sees z.
+
+References
+----------
+.. [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
+   contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adv2e.parameters import Section, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceFollower(Section):
+    """Second pole of the pixel."""
+
+    cutoff_hz: float = parameter(unit="Hz", meaning="corner (-3 dB)", above=0)

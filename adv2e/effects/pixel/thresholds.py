@@ -1,0 +1,44 @@
+r"""Contrast thresholds, with frozen mismatch between pixels.
+
+A pixel fires ON where its signal has risen by C_on above the reference, OFF where it has fallen by
+C_off below it.  Each pixel has its own two levels, drawn once:
+
+.. math:: C_{px} = \max(0.01,\; C + \sigma z_{px}), \qquad z \sim N(0, 1)
+
+ON and OFF independent of each other.
+
+References
+----------
+.. [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
+   contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337 (mismatch 2.1 %).
+.. [2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
+   CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (sigma 0.03, floor 0.01).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adv2e.parameters import Section, parameter
+
+FLOOR = 0.01
+"""Least threshold of a pixel [ln units]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds(Section):
+    """ON and OFF contrast thresholds."""
+
+    on: float = parameter(
+        0.2, unit="ln", meaning="rise that fires an ON event", at_least=FLOOR, source="v2e default"
+    )
+    off: float = parameter(
+        0.2, unit="ln", meaning="fall that fires an OFF event", at_least=FLOOR, source="v2e default"
+    )
+    mismatch: float = parameter(
+        0.03,
+        unit="ln",
+        meaning="standard deviation over pixels, ON and OFF independent",
+        at_least=0,
+        source="v2e default",
+    )

@@ -1,0 +1,1 @@
+"""Effects between the pixel and the file."""

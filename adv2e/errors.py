@@ -1,0 +1,50 @@
+"""Errors, and which one to raise when.
+
+``Adv2eError``
+    Anything a user can mend that needed a file looked at: a missing input, bad YAML, bad data, an
+    output that exists.  The command line shows its text as one line and exits with status 1.
+``ConfigError``
+    A configuration file or value is wrong; the text begins with the path of the key.
+``DataError``
+    An input or recording is wrong; the text begins with the file (and line, where there is one).
+``UsageError``
+    The command line alone is wrong (exit status 2), found below the layer that knows Click.
+``MissingExtraError``
+    An optional package is needed and absent; the text says which extra to install.
+
+Every text is one line that names the file, key or line and says what would be right.
+Programming errors (wrong types from our own code) stay ordinary Python exceptions.
+"""
+
+from __future__ import annotations
+
+
+class Adv2eError(Exception):
+    """A mistake that the user can mend; shown as one line, exit status 1."""
+
+    exit_status = 1
+
+
+class ConfigError(Adv2eError):
+    """A configuration key, value or file is wrong."""
+
+
+class DataError(Adv2eError):
+    """An input, recording or event file is missing or wrong."""
+
+
+class OutputError(Adv2eError):
+    """An output exists already or cannot be written."""
+
+
+class UsageError(Adv2eError):
+    """The command line alone is wrong."""
+
+    exit_status = 2
+
+
+class MissingExtraError(Adv2eError):
+    """An optional package is not installed."""
+
+    def __init__(self, what: str, extra: str) -> None:
+        super().__init__(f"{what} needs an optional package: pip install 'adv2e[{extra}]'")

@@ -1,0 +1,105 @@
+"""Declared parameters: a frozen dataclass per section, each field with unit, meaning and range.
+
+Every section of the configuration, and so every effect, derives from :class:`Section` and declares
+its keys with :func:`parameter`.  Checking, ``adv2e config``, ``adv2e effects`` and the YAML reader
+all follow from these declarations; there is no schema beside them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import MISSING, dataclass, field
+from typing import Any
+
+from adv2e.errors import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """What is known of one key besides its name, type and default."""
+
+    unit: str
+    meaning: str
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    choices: tuple[str, ...] | None = None
+    source: str = ""
+
+    def complaint(self, value: Any) -> str | None:
+        """Return what is wrong with `value`, or None."""
+        if self.choices is not None and value not in self.choices:
+            return f"must be one of {', '.join(self.choices)}, got {value!r}"
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return None
+        unit = f" {self.unit}" if self.unit not in ("", "-") else ""
+        if not math.isfinite(value):
+            return f"must be a finite number, got {value!r}"
+        if self.above is not None and not value > self.above:
+            return f"must be above {self.above:g}{unit}, got {value:g}"
+        if self.at_least is not None and not value >= self.at_least:
+            return f"must be at least {self.at_least:g}{unit}, got {value:g}"
+        if self.at_most is not None and not value <= self.at_most:
+            return f"must be at most {self.at_most:g}{unit}, got {value:g}"
+        return None
+
+
+def parameter(
+    default: Any = MISSING,
+    *,
+    unit: str,
+    meaning: str,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    choices: tuple[str, ...] | None = None,
+    source: str = "",
+) -> Any:
+    """Declare one key of a section; without `default` the key must be given."""
+    about = Parameter(
+        unit=unit,
+        meaning=meaning,
+        above=above,
+        at_least=at_least,
+        at_most=at_most,
+        choices=choices,
+        source=source,
+    )
+    return field(default=default, metadata={"parameter": about})
+
+
+def subsection(default_factory: Any, *, meaning: str, optional: bool = False) -> Any:
+    """Declare a key that holds a section of its own; `optional`: ``null`` switches it off."""
+    about = Parameter(unit="", meaning=meaning)
+    return field(
+        default_factory=default_factory, metadata={"parameter": about, "optional": optional}
+    )
+
+
+def about(owner: Any, name: str) -> Parameter:
+    """Return the declaration of key `name` of the section class or instance `owner`."""
+    for item in dataclasses.fields(owner):
+        if item.name == name:
+            declared: Parameter = item.metadata["parameter"]
+            return declared
+    raise KeyError(name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A section of the configuration: checks the declared ranges of its keys.
+
+    Raises
+    ------
+    ConfigError
+        With the name of the key, the value and what would be right.  The YAML reader puts the path
+        of the section in front.
+    """
+
+    def __post_init__(self) -> None:
+        for item in dataclasses.fields(self):
+            declared: Parameter = item.metadata["parameter"]
+            wrong = declared.complaint(getattr(self, item.name))
+            if wrong:
+                raise ConfigError(f"{item.name}: {wrong}")
