@@ -1,1 +1,57 @@
-"""The effects, one module each, by stage: frames, pixel, readout."""
+"""The effects, one module each, by stage and in signal order.
+
+A stage is a subpackage: what happens to the frames before the pixel sees them, what happens inside
+the pixel, and what happens to events on their way out.  This table is the one place that says
+which effects there are; their keys are declared in their modules.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from dataclasses import dataclass
+
+STAGES = {
+    "frames": "on the frames, before the pixel",
+    "pixel": "inside the pixel",
+    "readout": "between the pixel and the file",
+}
+"""The stages in signal order, each with what it means."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect: where its module is and which keys of the configuration are its own."""
+
+    stage: str
+    name: str
+    own_paths: tuple[str, ...] = ()
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of its keys: one section named after it, or single keys."""
+        return self.own_paths or (f"{self.stage}.{self.name}",)
+
+    def text(self) -> str:
+        """Return the docstring of its module: physics, equation, references."""
+        module = importlib.import_module(f"adv2e.effects.{self.stage}.{self.name}")
+        return inspect.getdoc(module) or ""
+
+    def summary(self) -> str:
+        """Return the first line of its docstring."""
+        return self.text().partition("\n")[0]
+
+
+EFFECTS = (
+    Effect("frames", "encoding", ("frames.encoding", "frames.full_scale")),
+    Effect("pixel", "log_response"),
+    Effect("pixel", "photoreceptor_noise"),
+    Effect("pixel", "low_pass"),
+    Effect("pixel", "source_follower"),
+    Effect("pixel", "thresholds"),
+    Effect("pixel", "refractory"),
+    Effect("pixel", "leak"),
+    Effect("pixel", "shot_noise"),
+    Effect("pixel", "hot_pixels"),
+)
+"""All effects, in signal order."""

@@ -14,6 +14,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from adv2e import rng
+from adv2e.jit import kernel
+from adv2e.kernel.workspace import S_HOT_DRAW, S_HOT_TIME, Array, Circuit
 from adv2e.parameters import Section, parameter
 
 
@@ -25,3 +28,11 @@ class HotPixels(Section):
         unit="-", meaning="share of the pixels that is hot", at_least=0, at_most=1
     )
     rate_hz: float = parameter(unit="Hz", meaning="ON events a hot pixel a second", at_least=0)
+
+
+@kernel
+def next_hot_time(i: int, circuit: Circuit, state: Array) -> None:
+    """Move hot pixel i on to its next event."""
+    state[S_HOT_DRAW, i] += 1
+    wait = rng.exponential(circuit.seed, rng.HOT_TIME, i, state[S_HOT_DRAW, i])
+    state[S_HOT_TIME, i] += wait / circuit.hot_rate

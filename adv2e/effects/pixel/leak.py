@@ -21,6 +21,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from adv2e import rng
+from adv2e.jit import inlined, kernel
+from adv2e.kernel.workspace import LEAK, LIGHT, S_LEAK_DRAW, S_LEAK_FACTOR, Array, Circuit
 from adv2e.parameters import Section, parameter
 
 
@@ -49,3 +52,22 @@ class Leak(Section):
         at_most=0.3,
         source="v2e: 0.1",
     )
+
+
+@inlined
+def leak_series(ws: Array, order: int, h: float, on: float, circuit: Circuit) -> None:
+    """Row LEAK: fall of the reference since the start of a sub-step of h us, before jitter."""
+    ws[LEAK, 0] = 0.0
+    for k in range(order):
+        ws[LEAK, k + 1] = on * h * circuit.photo_leak * ws[LIGHT, k] / (k + 1)
+    ws[LEAK, 1] += on * h * circuit.leak
+
+
+@kernel
+def next_leak_factor(i: int, circuit: Circuit, state: Array) -> float:
+    """Draw the leak speed of the cycle that now begins, relative to the nominal one."""
+    state[S_LEAK_DRAW, i] += 1
+    g = rng.normal(circuit.seed, rng.LEAK_PERIOD, i, state[S_LEAK_DRAW, i])
+    period = 1.0 + circuit.leak_jitter * min(max(g, -3.0), 3.0)
+    state[S_LEAK_FACTOR, i] = 1.0 / period
+    return 1.0 / period

@@ -17,8 +17,12 @@ References
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+from adv2e import rng
+from adv2e.jit import kernel
+from adv2e.kernel.workspace import LAG, S_NOISE, S_NOISE_DRAW, Array, Circuit
 from adv2e.parameters import Section, parameter
 
 
@@ -36,3 +40,16 @@ class PhotoreceptorNoise(Section):
         above=0,
         at_most=1,
     )
+
+
+@kernel
+def advance_noise(i: int, ws: Array, h: float, rate: float, circuit: Circuit, state: Array) -> None:
+    """Draw the noise at the end of a step of h us at corner `rate` [1/us]; add its line to LAG."""
+    before = state[S_NOISE, i]
+    decay = math.exp(-rate * h)
+    state[S_NOISE_DRAW, i] += 1
+    g = rng.normal(circuit.seed, rng.PHOTORECEPTOR, i, state[S_NOISE_DRAW, i])
+    after = decay * before + circuit.noise_rms * math.sqrt(1.0 - decay * decay) * g
+    state[S_NOISE, i] = after
+    ws[LAG, 0] += before
+    ws[LAG, 1] += after - before

@@ -19,6 +19,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from adv2e import rng
+from adv2e.jit import kernel
+from adv2e.kernel.workspace import S_SHOT_DRAW, S_SHOT_TIME, Array, Circuit
 from adv2e.parameters import Section, parameter
 
 FALL_AT_WHITE = 0.75
@@ -35,3 +38,25 @@ class ShotNoise(Section):
         meaning="ON and OFF events a pixel a second in the dark",
         at_least=0,
     )
+
+
+@kernel
+def next_candidate_time(i: int, circuit: Circuit, state: Array) -> None:
+    """Move pixel i on to its next candidate."""
+    state[S_SHOT_DRAW, i] += 1
+    wait = rng.exponential(circuit.seed, rng.SHOT_TIME, i, state[S_SHOT_DRAW, i])
+    state[S_SHOT_TIME, i] += wait / circuit.shot_rate
+
+
+@kernel
+def keep_candidate(i: int, light: float, circuit: Circuit, state: Array) -> bool:
+    """Tell whether the present candidate of pixel i becomes an event at this light [DN]."""
+    u = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[S_SHOT_DRAW, i])[0]
+    return u < 1.0 - circuit.shot_fall * light
+
+
+@kernel
+def polarity_of(i: int, circuit: Circuit, state: Array) -> int:
+    """Return the polarity of the present candidate of pixel i, 1 or -1."""
+    v = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[S_SHOT_DRAW, i])[1]
+    return 1 if v < 0.5 else -1

@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from adv2e.jit import inlined
+from adv2e.kernel.workspace import LAG, LAG2, Array, Circuit
 from adv2e.parameters import Section, parameter
 
 
@@ -22,3 +24,20 @@ class SourceFollower(Section):
     """Second pole of the pixel."""
 
     cutoff_hz: float = parameter(unit="Hz", meaning="corner (-3 dB)", above=0)
+
+
+@inlined
+def follower_series(
+    ws: Array, order: int, lag2: float, dx: float, h: float, circuit: Circuit
+) -> None:
+    """Row LAG2: power series of v = z - x from that of u = y - x in row LAG.
+
+    dv/dt = w2 (u - v) - dx/dt over a sub-step of h us.
+    """
+    ws[LAG2, 0] = lag2
+    rate = circuit.follower * h
+    for k in range(order):
+        slope = rate * (ws[LAG, k] - ws[LAG2, k])
+        if k == 0:
+            slope -= dx
+        ws[LAG2, k + 1] = slope / (k + 1)

@@ -1,0 +1,83 @@
+"""Scratch rows and the records that compiled functions share.
+
+The records are named tuples of plain arrays and numbers, of the same types whatever is switched on,
+so that switching an effect compiles nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+ORDER_MAX = 16
+"""Highest order of a power series."""
+
+# rows of the scratch array of one tile, each ORDER_MAX + 2 long
+LIGHT, LAG, LAG2, SIGNAL, LEAK, DISTANCE, LOCAL, BERNSTEIN, SAVED = range(9)
+ROWS = 9
+COLUMNS = ORDER_MAX + 2
+
+# codes of the update forms
+EXACT, FIRST_ORDER_HOLD, ZERO_ORDER_HOLD, EULER, PAPER = range(5)
+
+
+class Circuit(NamedTuple):
+    """What is the same for every pixel and interval.  Times in us, rates in 1/us, light in DN."""
+
+    update: int  # EXACT ... PAPER
+    steps: int  # K
+    filtered: bool  # whether there is a low-pass
+    dark: float  # 2 pi dark_cutoff
+    per_dn: float  # 2 pi (cutoff - dark_cutoff) / 255
+    follower: float  # 2 pi cutoff of the second pole; 0: none
+    knee: float  # log intensity at the knee; below it, light = slope x
+    slope: float  # d light / d x below the knee; 0: no knee
+    dead_time: float  # 0: none
+    leak: float  # leak events a us from junction leakage
+    photo_leak: float  # the same a us and DN
+    leak_jitter: float
+    shot_rate: float  # candidates a us
+    shot_fall: float  # share of them that is lost, a DN
+    hot_rate: float  # events of a hot pixel a us
+    noise_rms: float  # photoreceptor noise
+    noise_step: float
+    seed: int
+
+
+# rows of the state: one column a pixel; those of effects that are off, at the end, are left out
+(
+    S_X,  # log intensity at the last frame
+    S_LIGHT,  # the light it stands for [DN]
+    S_LAG,  # filtered signal minus x
+    S_REFERENCE,
+    S_HOLD,  # end of the dead time [us], -1: not in it
+    S_ON,  # thresholds
+    S_OFF,
+    S_SHOT_TIME,  # next candidate [us]
+    S_SHOT_DRAW,
+    S_HOT_TIME,
+    S_HOT_DRAW,
+    S_LAG2,  # signal behind the second pole minus x
+    S_LEAK_FACTOR,  # leak speed of this cycle
+    S_LEAK_DRAW,
+    S_NOISE,
+    S_NOISE_DRAW,
+) = range(16)
+
+
+PIXEL_BITS = 27
+"""Bits of the flat pixel index in a packed event."""
+
+
+def pack_limit_us() -> int:
+    """Longest time span of packed events [us]."""
+    return 1 << (63 - PIXEL_BITS - 1)
+
+
+def workspace() -> Array:
+    """Return the scratch array of one tile."""
+    return np.zeros((ROWS, COLUMNS))
