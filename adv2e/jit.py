@@ -7,8 +7,9 @@ a digest of all sources that hold compiled code.  It lies in the user's cache fo
 
 Compiled functions release the interpreter lock and run in ordinary threads, one tile each.
 Fast-math is off, but for one flag: ``contract`` lets a product and a sum round once (FMA), which
-halves the time of every polynomial here; sums are not reordered and NaN stays NaN.  Divisions follow
-IEEE rules (``error_model="numpy"``), because Python's check for zero keeps a loop from vectorising.
+halves the time of every polynomial here; sums are not reordered and NaN stays NaN.  Divisions
+follow IEEE rules (``error_model="numpy"``), because Python's check for zero keeps a loop from
+vectorising.
 """
 
 from __future__ import annotations
@@ -70,25 +71,35 @@ def cache_folder() -> Path:
 _FOLDER = cache_folder()
 
 
-def kernel(function: Function) -> Function:
-    """Compile `function` with the project's one set of options, cached in :func:`cache_folder`."""
+def _compile(function: Function, **options: Any) -> Function:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
         compiled: Function = numba.njit(
-            cache=True, nogil=True, error_model="numpy", fastmath={"contract"}
+            nogil=True, error_model="numpy", fastmath={"contract"}, **options
         )(function)
     finally:
         numba.config.CACHE_DIR = before
     return compiled
 
 
+def kernel(function: Function) -> Function:
+    """Compile `function`, cached in :func:`cache_folder`; it must not make arrays.
+
+    Without Numba's run-time (``_nrt``) there is no counting of references to arrays, which costs
+    more than the arithmetic of a short function.
+    """
+    return _compile(function, cache=True, _nrt=False)
+
+
+def allocating_kernel(function: Function) -> Function:
+    """Compile a `function` that makes arrays, cached likewise."""
+    return _compile(function, cache=True)
+
+
 def inlined(function: Function) -> Function:
     """Compile `function` into each of its callers: for long functions with one caller."""
-    compiled: Function = numba.njit(
-        inline="always", nogil=True, error_model="numpy", fastmath={"contract"}
-    )(function)
-    return compiled
+    return _compile(function, inline="always", _nrt=False)
 
 
 def is_cached(name: str) -> bool:

@@ -132,7 +132,6 @@ def solve_interval(
     sub-steps short enough for its series, or as one line.
     """
     exact = circuit.update == EXACT
-    plain = circuit.follower == 0.0 and circuit.noise_rms == 0.0
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     count = 1 if exact and base == xa and step == xb - xa else circuit.steps
     part = length / count
@@ -215,13 +214,17 @@ def solve_interval(
         if order == 1:
             end = ws[SIGNAL, 0] + ws[SIGNAL, 1]
             low, high = min(ws[SIGNAL, 0], end), max(ws[SIGNAL, 0], end)
-        elif plain:
+        elif circuit.noise_rms == 0.0:
             # y turns only where it meets x, see screen.py
             end = x + dx + state[S_LAG, i]
             low, high = min(x + lag, end), max(x + lag, end)
             monotone = not leaks
             if lag * state[S_LAG, i] < 0.0:
                 low, high, monotone = min(low, x), max(high, x), False
+            if circuit.follower > 0.0:
+                # z moves towards y, so it stays between where it was and where y goes
+                low, high = min(low, ws[SIGNAL, 0]), max(high, ws[SIGNAL, 0])
+                monotone = False
         if leaks:
             leak_series(ws, order, h, state[S_ON, i], circuit)
         n = events_of_series(

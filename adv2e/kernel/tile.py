@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adv2e.jit import kernel
+from adv2e.jit import allocating_kernel, kernel
 from adv2e.kernel import screen
 from adv2e.kernel.screen import STRIP
 from adv2e.kernel.solve import solve_interval
@@ -37,7 +37,7 @@ def _restore(i, state, ws):
         state[row, i] = ws[SAVED, row]
 
 
-@kernel
+@allocating_kernel
 def _grown(old, used, needed):
     """Return a longer array with the first `used` entries of the old one."""
     new = np.empty(max(2 * old.shape[0], needed + 64), old.dtype)
@@ -121,7 +121,7 @@ def _screen_strip(lo, count, i1, x1, ta, length, circuit, nodes, weights, state,
     return any_flag
 
 
-@kernel
+@allocating_kernel
 def run_tile(
     lo, hi, frames, starts, first, last, floor, circuit, nodes, weights, counts, t_base,
     state, ws, columns, flags, keys, times,

@@ -18,7 +18,17 @@ References
 
 from __future__ import annotations
 
-from adv2e.errors import ConfigError
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from adv2e.errors import ConfigError, DataError
+
+LUMA_WEIGHTS = (0.2126, 0.7152, 0.0722)
+"""Shares of red, green and blue light in luma."""
+
+_FULL_SCALES = {"uint8": 255.0, "uint16": 65535.0, "float32": 1.0, "float64": 1.0}
 
 
 def check_encoding(encoding: str) -> None:
@@ -34,3 +44,127 @@ def check_encoding(encoding: str) -> None:
     raise ConfigError(
         f"encoding: must be auto, linear, srgb or gamma:<g> (such as gamma:2.2), got {encoding!r}"
     )
+
+
+def full_scale_of(dtype: DTypeLike) -> float:
+    """Return the number that means white in frames of `dtype`: 255, 65535 or 1.0.
+
+    Raises
+    ------
+    DataError
+        For data types that have no such number.
+    """
+    name = np.dtype(dtype).name
+    if name not in _FULL_SCALES:
+        raise DataError(f"frames of {name}: give {', '.join(_FULL_SCALES)}")
+    return _FULL_SCALES[name]
+
+
+def encoding_of_images(dtype: DTypeLike, colour: bool) -> str:
+    """Return what ``encoding: auto`` means for still images and arrays: 8-bit colour is sRGB."""
+    return "srgb" if colour and np.dtype(dtype) == np.uint8 else "linear"
+
+
+def decode_values(values: NDArray[Any], encoding: str, full_scale: float) -> NDArray[Any]:
+    """Return DN = 255 light of encoded `values`, element by element, in their own float type.
+
+    Parameters
+    ----------
+    values : array of float32 or float64
+        Encoded values, at or above zero; above `full_scale` they are kept, not clipped.
+    encoding : str
+        ``linear``, ``srgb`` or ``gamma:<g>``.
+    full_scale : float
+        The value that means white.
+    """
+    if encoding == "linear":
+        # multiplied first: whole numbers of 0..255 come back as they are
+        return values * values.dtype.type(255) / values.dtype.type(full_scale)
+    value = values / values.dtype.type(full_scale)
+    if encoding == "srgb":
+        above = ((np.maximum(value, 0) + 0.055) / 1.055) ** 2.4
+        light = np.where(value <= 0.04045, value / 12.92, above)
+    else:
+        light = value ** float(encoding.partition(":")[2])
+    light *= 255
+    return light
+
+
+class LightDecoder:
+    """Turns frames as read into linear light, luma, in DN.
+
+    Parameters
+    ----------
+    encoding : str
+        ``linear``, ``srgb`` or ``gamma:<g>``; ``auto`` must be settled before.
+    full_scale : float
+        The number that means white.
+    dtype : uint8, uint16, float32 or float64
+        Data type of the frames.
+    colour : bool
+        Frames are (rows, columns, 3) RGB rather than (rows, columns).
+
+    Raises
+    ------
+    ConfigError
+        `encoding` is unknown.
+    DataError
+        `dtype` is not one of the four.
+
+    Notes
+    -----
+    Whole numbers go through a table for each channel, computed in float64 and multiplied by the
+    luma weight beforehand, so that a frame costs look-ups and two additions.
+    """
+
+    def __init__(self, encoding: str, full_scale: float, dtype: DTypeLike, colour: bool) -> None:
+        check_encoding(encoding)
+        if encoding == "auto":
+            raise ConfigError("encoding: auto must be settled by the source of the frames")
+        full_scale_of(dtype)
+        self.encoding = encoding
+        self.full_scale = full_scale
+        self.dtype = np.dtype(dtype)
+        self.colour = colour
+        self._tables: list[NDArray[np.float32]] = []
+        if self.dtype.kind == "u":
+            codes = np.arange(np.iinfo(self.dtype).max + 1, dtype=np.float64)
+            dn = decode_values(codes, encoding, full_scale)
+            weights = LUMA_WEIGHTS if colour else (1.0,)
+            self._tables = [(weight * dn).astype(np.float32) for weight in weights]
+
+    def decode(self, image: NDArray[Any]) -> NDArray[Any]:
+        """Return the light of `image`.
+
+        Parameters
+        ----------
+        image : array, (rows, columns) or (rows, columns, 3)
+            A frame as read, of the data type and colour given to the constructor.
+
+        Returns
+        -------
+        array, (rows, columns)
+            Linear light, luma [DN of 255]; float32, or float64 when the frame is float64.
+        """
+        if image.dtype != self.dtype or image.ndim != (3 if self.colour else 2):
+            raise ValueError(
+                f"a frame of {image.dtype} and shape {image.shape} for a decoder of {self.dtype},"
+                f" {'colour' if self.colour else 'grey'}"
+            )
+        if self._tables:
+            return self._look_up(image)
+        dn = decode_values(image, self.encoding, self.full_scale)
+        if not self.colour:
+            return dn
+        red, green, blue = LUMA_WEIGHTS
+        luma: NDArray[Any] = red * dn[..., 0] + green * dn[..., 1] + blue * dn[..., 2]
+        return luma
+
+    def _look_up(self, image: NDArray[Any]) -> NDArray[Any]:
+        if not self.colour:
+            return self._tables[0].take(image)
+        red, green, blue = self._tables
+        light = green.take(image[..., 1])
+        light += red.take(image[..., 0])
+        light += blue.take(image[..., 2])
+        return light

@@ -110,7 +110,7 @@ def stepped(y: float, x0: float, x1: float, a0: float, a1: float, update: int) -
 
 @kernel
 def ramp_response(y: float, x0: float, x1: float, a: float) -> float:
-    """Return the first-order response to a ramp x0..x1 at a constant corner; a: corner times length."""
+    """Return the first-order response to a ramp x0..x1; a: corner times its length."""
     decay = math.exp(-a)
     mean = 1.0 - a / 2.0 + a * a / 6.0 if a < 1e-4 else -math.expm1(-a) / a
     return decay * y + (mean - decay) * x0 + (1.0 - mean) * x1
