@@ -1,5 +1,74 @@
 """Configuration: YAML files and ``--set`` values to frozen dataclasses, strictly."""
 
-from adv2e.config.model import Config
+from __future__ import annotations
 
-__all__ = ["Config"]
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from adv2e.config.build import Key, all_keys, build, keys_of
+from adv2e.config.files import read, shipped
+from adv2e.config.merge import merge_all, parse_set
+from adv2e.config.model import Config
+from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
+from adv2e.config.yaml12 import Origin, Value
+
+__all__ = [
+    "Config",
+    "Key",
+    "all_keys",
+    "from_dict",
+    "keys_of",
+    "load_config",
+    "shipped",
+    "to_annotated_yaml",
+    "to_dict",
+    "to_yaml",
+]
+
+
+def load_config(
+    files: Sequence[str | Path] = (), sets: Sequence[str] = (), seed: int | None = None
+) -> Config:
+    """Return the defaults with `files`, then `sets`, then `seed` on top; later ones win.
+
+    Parameters
+    ----------
+    files : sequence of str or Path
+        YAML files or names of shipped configurations (:func:`shipped`).
+    sets : sequence of str
+        Single values, as in ``pixel.low_pass.cutoff_hz=100``.
+    seed : int, optional
+        Seed of all random numbers.
+
+    Raises
+    ------
+    ConfigError
+        A file is missing or wrong; the text names file, line, key and what would be right.
+    UsageError
+        One of `sets` is wrong.
+    """
+    over = [parse_set(text) for text in sets]
+    if seed is not None:
+        origin = Origin("--seed", on_command_line=True)
+        over.append(Value({"seed": Value(seed, origin)}, origin))
+    return build(Config, merge_all([*(read(name) for name in files), *over]))
+
+
+def from_dict(values: Mapping[str, Any], name: str = "") -> Config:
+    """Return the configuration that :func:`to_dict` gave `values` for, as strictly as a file.
+
+    Raises
+    ------
+    ConfigError
+        As for a file; the text begins with `name`.
+    """
+    return build(Config, _tree(values, Origin(name)))
+
+
+def _tree(values: Any, origin: Origin) -> Value:
+    if isinstance(values, Mapping):
+        return Value({str(key): _tree(item, origin) for key, item in values.items()}, origin)
+    if isinstance(values, (list, tuple)):
+        return Value([_tree(item, origin) for item in values], origin)
+    return Value(values, origin)

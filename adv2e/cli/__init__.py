@@ -1,0 +1,93 @@
+"""The command line: ``adv2e COMMAND``.  One command a module, imported when it is run."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from typing import Any
+
+import click
+
+from adv2e import __version__
+from adv2e.cli.run import flush_stdout, reporting, stopping_on_signals
+
+COMMANDS = {
+    "convert": "Turn a video or frames into events.",
+    "info": "Say what a recording or event file holds.",
+    "render": "Draw pictures and films of events.",
+    "compare": "Measure how far two event streams are apart.",
+    "config": "Show or check configurations, with the meaning of each key.",
+    "effects": "List the effects, their equations, parameters and sources.",
+    "demo": "Make a sample clip, convert it and render the events.",
+}
+"""Name of each command, which is also its module's, and what it does in one line."""
+
+
+class Program(click.Group):
+    """A group that imports a command only when it is run, and reports errors in one line."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command `cmd_name`, from the module of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"adv2e.cli.{cmd_name}")
+        found = (item for item in vars(module).values() if isinstance(item, click.Command))
+        return next(command for command in found if command.name == cmd_name)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command that `args` begin with; a mistyped one is told the nearest."""
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = difflib.get_close_matches(args[0], COMMANDS, n=1)
+            hint = f", did you mean '{near[0]}'?" if near else ""
+            raise click.UsageError(f"no such command '{args[0]}'{hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the table of commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Show the help, as an error, where there are no arguments."""
+        if not args and not ctx.resilient_parsing:
+            click.echo(ctx.get_help(), err=True)
+            ctx.exit(2)
+        return super().parse_args(ctx, args)
+
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """Parse the arguments before the command."""
+        with reporting():
+            return super().make_context(*args, **kwargs)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        with reporting(ctx):
+            return super().invoke(ctx)
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run the program; always ends with SystemExit."""
+        if len(args) < 2:
+            kwargs["prog_name"] = kwargs.get("prog_name") or "adv2e"
+        with stopping_on_signals():
+            try:
+                return super().main(*args, **kwargs)
+            finally:
+                flush_stdout()
+
+
+@click.group(
+    cls=Program,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(__version__, message="%(prog)s %(version)s")
+def main() -> None:
+    """Turn video or image sequences into event-camera (DVS) events.
+
+    'adv2e COMMAND --help' describes a command. A first try: 'adv2e demo'.
+    """

@@ -1,0 +1,73 @@
+"""``adv2e config``: show and check configurations."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from adv2e import __version__
+from adv2e.cli import options
+
+if TYPE_CHECKING:
+    from adv2e.config import Config
+
+
+class _ShowByDefault(click.Group):
+    """A group whose options without a command belong to ``show``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Put ``show`` in front where no command is named."""
+        if not args or (args[0].startswith("-") and args[0] not in ctx.help_option_names):
+            args = ["show", *args]
+        return super().parse_args(ctx, args)
+
+
+@click.group("config", cls=_ShowByDefault)
+def group() -> None:
+    r"""Show or check configurations, with the meaning of each key.
+
+    A configuration is YAML; keys it leaves out keep their defaults, and null switches an effect
+    off. Without a command: show.
+
+    \b
+    Examples:
+      adv2e config show -c v2e --set pixel.leak=null > mine.yaml
+      adv2e config check mine.yaml
+      adv2e convert clip.mp4 -c mine.yaml
+
+    Shipped, to be used by name: adv2e (the defaults), paper, v2e, vid2e, ideal, davis240c,
+    davis346.
+    """
+
+
+@group.command()
+@options.config_options
+def show(config: Config) -> None:
+    """Print the resolved configuration, with unit and meaning of each key."""
+    _print(config, "resolved configuration")
+
+
+@group.command()
+def defaults() -> None:
+    """Print the default configuration, with unit and meaning of each key."""
+    from adv2e.config import load_config
+
+    _print(load_config(), "defaults")
+
+
+@group.command()
+@click.argument("file")
+def check(file: str) -> None:
+    """Check a configuration file: exit status 0 if it is right, 1 if not."""
+    from adv2e.config import load_config
+
+    load_config([file])
+    click.echo(f"{file}: ok")
+
+
+def _print(config: Config, what: str) -> None:
+    from adv2e.config import to_annotated_yaml
+
+    click.echo(f"# adv2e {__version__}: {what}.  [unit] meaning; null: off")
+    click.echo(to_annotated_yaml(config), nl=False)

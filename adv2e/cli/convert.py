@@ -1,0 +1,114 @@
+"""``adv2e convert``: video or frames in, events out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from adv2e.cli import options
+
+if TYPE_CHECKING:
+    from adv2e.cli.options import Log
+    from adv2e.config import Config
+
+SECONDS = options.FiniteNumber(min=0)
+
+
+@click.command("convert")
+@click.argument("source", metavar="INPUT")
+@options.common_options
+@click.option("--fps", type=options.FiniteNumber(min=0, min_open=True), help="Frames a second.")
+@click.option(
+    "--timestamps",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Times of the frames [s], one a line.",
+)
+@click.option("--start", type=SECONDS, metavar="S", help="Begin S seconds after the first frame.")
+@click.option("--stop", type=SECONDS, metavar="S", help="End S seconds after the first frame.")
+@click.option(
+    "--t0",
+    type=click.Choice(["auto", "zero", "keep"]),
+    default="auto",
+    show_default=True,
+    help="Time of the first frame: zero, or as on the source's clock; auto: keep where it has one.",
+)
+@click.option(
+    "--format",
+    "format_",
+    metavar="NAME",
+    help="Format of the output, where its suffix does not say it.",
+)
+@click.option(
+    "--layout",
+    metavar="NAME",
+    help="Layout of an HDF5 output: monash, dsec, v2e, mvsec or m3ed.  [default: monash]",
+)
+@click.option(
+    "--with-frames",
+    is_flag=True,
+    help="Also store the input frames, in formats that can hold them.",
+)
+@click.option("--preview", metavar="FILE", help="Also draw the events: .mp4, .gif or .png.")
+def command(
+    source: str,
+    output: str | None,
+    overwrite: bool,
+    config: Config,
+    threads: int | None,
+    progress: bool,
+    log: Log,
+    fps: float | None,
+    timestamps: Path | None,
+    start: float | None,
+    stop: float | None,
+    t0: str,
+    format_: str | None,
+    layout: str | None,
+    with_frames: bool,
+    preview: str | None,
+) -> None:
+    r"""Turn a video or frames into events.
+
+    INPUT is a video file, a folder of images, a DAVIS240C recording (a folder or zip with
+    images.txt) or a .npy stack of frames (frames, rows, columns[, 3]).
+
+    The suffix of OUT gives the format: .txt, .zip, .h5, .npz, .aedat, .raw, .dat, .es; a path
+    without suffix is a DAVIS240C folder, '-' streams text to standard output. Without -o the
+    events go to <stem>.events.h5 in the current folder.
+
+    \b
+    Examples:
+      adv2e convert clip.mp4
+      adv2e convert clip.mp4 -o clip.txt -c davis346 --set pixel.leak=null
+      adv2e convert frames/ --fps 240 -o events.h5 --with-frames
+      adv2e convert urban.zip -o urban_simulated --preview urban.mp4
+    """
+    if fps is not None and timestamps is not None:
+        raise click.UsageError("--fps and --timestamps both give the times of the frames: keep one")
+    if start is not None and stop is not None and stop <= start:
+        raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
+    from adv2e.pipeline import convert
+
+    summary = convert(
+        source,
+        output,
+        config=config,
+        fps=fps,
+        timestamps=timestamps,
+        start_s=start,
+        stop_s=stop,
+        t0=t0,
+        format=format_,
+        layout=layout,
+        with_frames=with_frames,
+        overwrite=overwrite,
+        preview=preview,
+        threads=threads,
+        progress=progress,
+        log=log,
+    )
+    if log.level >= 0:
+        click.echo(summary.text(), err=output == "-")

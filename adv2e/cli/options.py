@@ -1,0 +1,153 @@
+"""Options that commands share: one decorator each, and what they check.
+
+Each decorator hands the command ready values: ``config`` (a Config), ``output``, ``overwrite``,
+``threads``, ``progress`` (a bool) and ``log`` (a :class:`Log`).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import click
+
+from adv2e.cli.run import VERBOSITY
+
+Body = TypeVar("Body", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Log:
+    """Tells the user something on stderr, if it was asked for."""
+
+    level: int = 0
+    """-1: quiet, 0: as usual, 1: -v, 2: -vv."""
+
+    def __call__(self, text: str, level: int = 0) -> None:
+        """Write `text`; `level` 1 only with -v, 2 only with -vv."""
+        if self.level >= level:
+            click.echo(text, err=True)
+
+
+class FiniteNumber(click.FloatRange):
+    """A number that is neither infinite nor NaN, in a range."""
+
+    name = "number"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return `value` as a float; raise BadParameter with the offending text."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number", param, ctx)
+        return number
+
+
+def config_options(body: Body) -> Body:
+    """Add -c, --set and --seed; the command gets ``config``."""
+
+    @click.option(
+        "-c",
+        "--config",
+        "config_files",
+        metavar="FILE",
+        multiple=True,
+        help="Configuration: a YAML file or the name of a shipped one (see 'adv2e config --help')."
+        " Repeatable; later ones win, key by key.",
+    )
+    @click.option(
+        "--set",
+        "sets",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="Set one key, such as pixel.low_pass.cutoff_hz=100 or pixel.leak=null. Repeatable.",
+    )
+    @click.option(
+        "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all random numbers."
+    )
+    @functools.wraps(body)
+    def with_config(
+        *args: Any,
+        config_files: tuple[str, ...],
+        sets: tuple[str, ...],
+        seed: int | None,
+        **kw: Any,
+    ) -> Any:
+        from adv2e.config import load_config
+
+        return body(*args, config=load_config(config_files, sets, seed), **kw)
+
+    return with_config  # type: ignore[return-value]
+
+
+def output_options(body: Body) -> Body:
+    """Add -o and --overwrite; the command gets ``output`` (or None) and ``overwrite``."""
+    body = click.option("--overwrite", is_flag=True, help="Replace an output that exists.")(body)
+    return click.option("-o", "--output", metavar="OUT", help="Where to write.")(body)
+
+
+def threads_option(body: Body) -> Body:
+    """Add --threads; the command gets ``threads``, None standing for every core it may use."""
+    return click.option(
+        "--threads",
+        type=click.IntRange(min=1),
+        metavar="N",
+        help="Threads to compute with; the result is the same for any number."
+        "  [default: all cores this process may use]",
+    )(body)
+
+
+def verbosity_options(body: Body) -> Body:
+    """Add -q and -v; the command gets ``log``."""
+
+    def remember(ctx: click.Context, param: click.Parameter, count: int) -> int:
+        ctx.meta[VERBOSITY] = count
+        return count
+
+    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+    @click.option(
+        "-v",
+        "--verbose",
+        count=True,
+        is_eager=True,
+        callback=remember,
+        help="Say more; -vv: also tracebacks.",
+    )
+    @functools.wraps(body)
+    def with_log(*args: Any, quiet: bool, verbose: int, **kw: Any) -> Any:
+        return body(*args, log=Log(-1 if quiet else verbose), **kw)
+
+    return with_log  # type: ignore[return-value]
+
+
+def progress_option(body: Body) -> Body:
+    """Add --progress/--no-progress; the command gets ``progress``.
+
+    Where `log` is among the command's arguments and -q was given, the default is no progress.
+    """
+
+    @click.option(
+        "--progress/--no-progress",
+        default=None,
+        help="Show a progress bar.  [default: on a terminal]",
+    )
+    @functools.wraps(body)
+    def with_progress(*args: Any, progress: bool | None, **kw: Any) -> Any:
+        if progress is None:
+            quiet = isinstance(kw.get("log"), Log) and kw["log"].level < 0
+            progress = not quiet and sys.stderr is not None and sys.stderr.isatty()
+        return body(*args, progress=progress, **kw)
+
+    return with_progress  # type: ignore[return-value]
+
+
+def common_options(body: Body) -> Body:
+    """Add all of them: the command gets config, output, overwrite, threads, progress and log."""
+    for decorator in (progress_option, verbosity_options, threads_option, output_options):
+        body = decorator(body)
+    return config_options(body)

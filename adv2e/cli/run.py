@@ -1,0 +1,149 @@
+"""Running a command: whatever ends it becomes one line on stderr and an exit status.
+
+====== ===================================================================================
+0      done
+1      a file, its content or the machine is at fault; or a bug of ours
+2      the command line alone is wrong
+129    the terminal went away (SIGHUP)
+130    interrupted (SIGINT, Ctrl-C)
+141    the reader of our standard output went away; nothing is said
+143    told to stop (SIGTERM)
+====== ===================================================================================
+
+SIGTERM and SIGHUP arrive as exceptions, so that unfinished files are removed as for any error.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+
+import click
+
+from adv2e.errors import Adv2eError
+
+VERBOSITY = "adv2e.verbosity"
+"""Key of ``click.Context.meta`` that holds how often -v was given."""
+
+_CLOSED_OUTPUT = 128 + 13  # SIGPIPE, which Windows does not name
+
+
+class Terminated(BaseException):
+    """A signal told the program to stop."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.exit_status = 128 + number
+
+
+def complain(text: str) -> None:
+    """Write one line to stderr, whatever line breaks `text` holds."""
+    with suppress(OSError):  # nobody is left to read it
+        click.echo(f"adv2e: {' '.join(text.split())}", err=True)
+
+
+@contextmanager
+def reporting(context: click.Context | None = None) -> Iterator[None]:
+    """Turn what the body raises into a line on stderr and SystemExit.
+
+    `context` knows whether -vv asked for tracebacks.
+    """
+    try:
+        yield
+    except click.exceptions.Exit:
+        raise
+    except click.ClickException as error:
+        complain(f"error: {_click_text(error)}")
+        raise SystemExit(error.exit_code) from None
+    except Adv2eError as error:
+        complain(f"error: {error}")
+        raise SystemExit(error.exit_status) from None
+    except BrokenPipeError:
+        silence_stdout()
+        raise SystemExit(_CLOSED_OUTPUT) from None
+    except OSError as error:
+        _trace(context)
+        place = f"{error.filename}: " if isinstance(error.filename, str) else ""
+        complain(f"error: {place}{error.strerror or error}")
+        raise SystemExit(1) from None
+    except (KeyboardInterrupt, click.Abort):
+        complain("interrupted")
+        raise SystemExit(128 + signal.SIGINT) from None
+    except Terminated as error:
+        complain(f"stopped by {error}")
+        raise SystemExit(error.exit_status) from None
+    except MemoryError as error:
+        _trace(context)
+        complain(f"error: not enough memory: {error}")
+        raise SystemExit(1) from None
+    except Exception as error:
+        hint = "" if _trace(context) else "; run with -vv for the traceback"
+        complain(f"error: internal error: {type(error).__name__}: {error}{hint}")
+        raise SystemExit(1) from None
+
+
+def _click_text(error: click.ClickException) -> str:
+    text = error.format_message().rstrip(".")
+    if isinstance(error, click.UsageError) and error.ctx is not None:
+        text += f" (see '{error.ctx.command_path} --help')"
+    return text
+
+
+def _trace(context: click.Context | None) -> bool:
+    """Print the traceback of the exception at hand if -vv was given."""
+    if context is None or context.meta.get(VERBOSITY, 0) < 2:
+        return False
+    traceback.print_exc()
+    return True
+
+
+@contextmanager
+def stopping_on_signals() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP raise Terminated in the body; ignored ones stay ignored."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    numbers = [getattr(signal, name) for name in names]
+    caught = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        signal.signal(number, signal.SIG_IGN)  # a second one must not stop the tidying up
+        raise Terminated(number)
+
+    for number in caught:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number in caught:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def flush_stdout() -> None:
+    """Write out what standard output still holds, with an exit status of its own if that fails."""
+    if sys.stdout is None or sys.stdout.closed:
+        return
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        silence_stdout()
+        raise SystemExit(_CLOSED_OUTPUT) from None
+    except OSError as error:
+        silence_stdout()
+        complain(f"error: standard output: {error.strerror}")
+        raise SystemExit(1) from None
+
+
+def silence_stdout() -> None:
+    """Point standard output at nothing, so that Python does not fail again when it closes it."""
+    with suppress(OSError, ValueError, AttributeError):
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, sys.stdout.fileno())
+        os.close(nothing)

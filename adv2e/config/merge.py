@@ -1,0 +1,58 @@
+"""Merging configurations: files one over the other, then ``--set`` values, then the seed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from adv2e.config.yaml12 import Origin, Value, parse
+from adv2e.errors import UsageError
+
+_PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+
+
+def merge(under: Value, over: Value) -> Value:
+    """Return `under` with the keys of `over` on top, section by section.
+
+    Everything but two mappings is replaced: ``null`` over a section switches it off, a section
+    over ``null`` switches it on.
+    """
+    if not (isinstance(under.content, dict) and isinstance(over.content, dict)):
+        return over
+    content = dict(under.content)
+    for key, value in over.content.items():
+        content[key] = merge(content[key], value) if key in content else value
+    return Value(content, under.origin)
+
+
+def merge_all(layers: Iterable[Value]) -> Value:
+    """Return all layers merged; later ones win."""
+    merged = Value({})
+    for layer in layers:
+        merged = merge(merged, layer)
+    return merged
+
+
+def parse_set(text: str) -> Value:
+    """Return the tree of one ``--set`` argument, ``KEY=VALUE`` with VALUE in YAML.
+
+    Raises
+    ------
+    UsageError
+        No ``=``, a key that is not a path of names, a value that is not YAML.
+    """
+    path, equals, written = text.partition("=")
+    path = path.strip()
+    if not equals or not _PATH.fullmatch(path):
+        raise UsageError(
+            f"--set {text}: must be KEY=VALUE, such as --set pixel.low_pass.cutoff_hz=100"
+        )
+    origin = Origin("--set", on_command_line=True)
+    return nest(path, parse(written, origin, path))
+
+
+def nest(path: str, value: Value) -> Value:
+    """Return the tree in which `value` stands at the dotted `path`."""
+    for key in reversed(path.split(".")):
+        value = Value({key: value}, value.origin)
+    return value

@@ -1,0 +1,256 @@
+"""YAML 1.2 core schema on top of PyYAML, with the place of every value.
+
+PyYAML follows YAML 1.1, where ``on`` and ``no`` are booleans (even as keys), ``12:30:00`` is a
+number and ``1e3`` is text.  Here the rules are those of the 1.2 core schema: only ``true`` and
+``false`` are booleans, ``null``, ``~`` and nothing are none, ``1e3``, ``.inf`` and ``0o17`` are
+numbers.  Keys must be text, and giving one twice is an error.
+
+References
+----------
+.. [1] YAML Ain't Markup Language, version 1.2.2, section 10.3 (core schema), https://yaml.org/spec.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+from yaml.composer import Composer
+from yaml.parser import Parser
+from yaml.reader import Reader
+from yaml.resolver import BaseResolver
+from yaml.scanner import Scanner
+
+from adv2e.errors import Adv2eError, ConfigError, UsageError
+
+Scalar = None | bool | int | float | str
+
+_TAG = "tag:yaml.org,2002:"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a value was written."""
+
+    name: str = ""
+    """File name, or the option of the command line."""
+    line: int | None = None
+    on_command_line: bool = False
+
+    def complaint(self, path: str, text: str) -> Adv2eError:
+        """Return the exception that says `text` of the key at `path` and names the place."""
+        if self.on_command_line:
+            where = self.name if self.name.lstrip("-") == path else f"{self.name} {path}"
+            return UsageError(f"{where}: {text}")
+        place = self.name if self.line is None else f"{self.name}:{self.line}"
+        return ConfigError(": ".join(part for part in (place, path, text) if part))
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value and its place: a scalar, a list, or a mapping of keys to values."""
+
+    content: Scalar | list[Value] | dict[str, Value]
+    origin: Origin = field(default_factory=Origin)
+    text: str = ""
+    """A scalar as it was written."""
+
+    def __str__(self) -> str:
+        if isinstance(self.content, dict):
+            shown = "{" + ", ".join(f"{key}: {item}" for key, item in self.content.items()) + "}"
+        elif isinstance(self.content, list):
+            shown = "[" + ", ".join(str(item) for item in self.content) + "]"
+        elif isinstance(self.content, str):
+            shown = repr(self.content)
+        else:
+            shown = self.text or scalar_text(self.content)
+        return shown if len(shown) <= 60 else shown[:57] + "..."
+
+
+class _Loader(Reader, Scanner, Parser, Composer, BaseResolver):
+    """PyYAML's reader up to the node tree, with the tags of the core schema."""
+
+    def __init__(self, text: str) -> None:
+        Reader.__init__(self, text)
+        Scanner.__init__(self)
+        Parser.__init__(self)
+        Composer.__init__(self)
+        BaseResolver.__init__(self)
+
+
+_NUMBER_START = list("-+.0123456789")
+for _tag, _pattern, _first in (
+    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
+    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", _NUMBER_START),
+    (
+        "float",
+        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
+        r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+        _NUMBER_START,
+    ),
+):
+    _Loader.add_implicit_resolver(_TAG + _tag, re.compile(f"^(?:{_pattern})$"), _first)
+
+
+def _integer(text: str) -> int:
+    base = {"0o": 8, "0x": 16}.get(text[:2], 10)
+    return int(text[2:] if base != 10 else text, base)
+
+
+def _number(text: str) -> float:
+    return float(text.replace(".", "") if text.lower().endswith(("inf", "nan")) else text)
+
+
+_SCALARS: dict[str, Callable[[str], Scalar]] = {
+    _TAG + "null": lambda text: None,
+    _TAG + "bool": lambda text: text.lower() == "true",
+    _TAG + "int": _integer,
+    _TAG + "float": _number,
+    _TAG + "str": str,
+}
+
+
+class _Builder:
+    """Turns YAML nodes into :class:`Value` trees."""
+
+    def __init__(self, origin: Origin) -> None:
+        self.origin = origin
+        self.done: dict[int, Value] = {}
+        self.open: set[int] = set()
+
+    def place(self, node: yaml.Node) -> Origin:
+        """Return the place of `node`; a command line has no lines."""
+        if self.origin.on_command_line or node.start_mark is None:
+            return self.origin
+        return Origin(self.origin.name, node.start_mark.line + 1)
+
+    def build(self, node: yaml.Node, path: str) -> Value:
+        """Return the value of `node`, which stands at the key `path`."""
+        key = id(node)
+        if key in self.done:  # an alias
+            return self.done[key]
+        if key in self.open:
+            raise self.place(node).complaint(path, "an alias (*) must not contain itself")
+        self.open.add(key)
+        content: Any
+        if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
+            content = self.mapping(node, path)
+        elif isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
+            content = [self.build(item, f"{path}[{n}]") for n, item in enumerate(node.value)]
+        else:
+            content = self.scalar(node, path)
+        text = node.value if isinstance(node, yaml.ScalarNode) else ""
+        self.done[key] = Value(content, self.place(node), text)
+        return self.done[key]
+
+    def scalar(self, node: yaml.Node, path: str) -> Scalar:
+        convert = _SCALARS.get(node.tag)
+        if convert is None or not isinstance(node, yaml.ScalarNode):
+            tag = node.tag.replace(_TAG, "!!")
+            raise self.place(node).complaint(path, f"unknown tag {tag}: write the value without it")
+        try:
+            return convert(node.value)
+        except ValueError:
+            raise self.place(node).complaint(
+                path, f"{node.value[:40]!r} is not a value of {node.tag.replace(_TAG, '!!')}"
+            ) from None
+
+    def mapping(self, node: yaml.MappingNode, path: str) -> dict[str, Value]:
+        content: dict[str, Value] = {}
+        lines: dict[str, Origin] = {}
+        for key_node, value_node in node.value:
+            place = self.place(key_node)
+            if key_node.tag != _TAG + "str":
+                written = key_node.value if isinstance(key_node, yaml.ScalarNode) else "a mapping"
+                raise place.complaint(path, f"a key must be text, got {written}")
+            key = key_node.value
+            full = f"{path}.{key}" if path else key
+            if key in content:
+                first = lines[key].line
+                where = f" (first on line {first})" if first is not None else ""
+                raise place.complaint(full, f"given twice{where}: keep one")
+            # the line of the key says more than that of a section's first entry
+            content[key] = self.relocated(self.build(value_node, full), place)
+            lines[key] = place
+        return content
+
+    @staticmethod
+    def relocated(value: Value, place: Origin) -> Value:
+        return Value(value.content, place, value.text)
+
+
+def parse(text: str, origin: Origin, path: str = "") -> Value:
+    """Return the one YAML document in `text`.
+
+    Parameters
+    ----------
+    text : str
+        YAML; nothing at all is none.
+    origin : Origin
+        What errors name: the file, or the option of the command line.
+    path : str
+        Key at which the document stands, for errors.
+
+    Raises
+    ------
+    ConfigError, UsageError
+        Not YAML, a key given twice, a key that is not text; the kind depends on `origin`.
+    """
+    try:
+        node = _compose(text)
+        return Value(None, origin) if node is None else _Builder(origin).build(node, path)
+    except yaml.reader.ReaderError as error:
+        at = _at(origin, text[: error.position].count("\n") + 1)
+        why = f"the character {chr(error.character)!r} is not allowed"
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        at = _at(origin, mark.line + 1 if mark else None)
+        why = ", ".join(part for part in (error.context, error.problem) if part)
+    except RecursionError:
+        at, why = origin, "nested too deeply"
+    raise at.complaint(path, f"not YAML: {why}")
+
+
+def _compose(text: str) -> yaml.Node | None:
+    loader = _Loader(text)
+    try:
+        return loader.get_single_node()
+    finally:
+        loader.dispose()
+
+
+def _at(origin: Origin, line: int | None) -> Origin:
+    return origin if origin.on_command_line else Origin(origin.name, line)
+
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_.:/+-]*[A-Za-z0-9_]|[A-Za-z_]")
+_WORDS_OF_1_1 = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
+
+
+def scalar_text(value: Scalar) -> str:
+    """Return `value` as YAML that reads back as the same value, under YAML 1.1 and 1.2 alike.
+
+    Floats are the shortest decimal that reads back as the same number, with a point.
+    """
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        text = repr(value)
+        if text.lstrip("-") in ("inf", "nan"):
+            return text.replace("inf", ".inf").replace("nan", ".nan")
+        mantissa, _, exponent = text.partition("e")
+        if exponent and "." not in mantissa:
+            text = f"{mantissa}.0e{exponent}"
+        return text
+    if isinstance(value, int):
+        return str(value)
+    if _PLAIN.fullmatch(value) and value.lower() not in _WORDS_OF_1_1:
+        return value
+    quoted = yaml.dump(value, default_style='"', width=float("inf"), allow_unicode=True)
+    return str(quoted).rstrip("\n")

@@ -1,0 +1,51 @@
+"""Running the command line inside the test process."""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+from typing import NamedTuple
+
+import pytest
+
+from adv2e.cli import main
+
+
+class Outcome(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def adv2e(capsys):
+    """Run ``adv2e`` with the arguments given; return its exit status, stdout and stderr."""
+
+    def run(*args):
+        with pytest.raises(SystemExit) as caught:
+            main([str(arg) for arg in args])
+        out, err = capsys.readouterr()
+        return Outcome(caught.value.code or 0, out, err)
+
+    return run
+
+
+class Summary:
+    def text(self):
+        return "the summary"
+
+
+@pytest.fixture
+def pipeline(monkeypatch):
+    """Stand in for the conversion: remembers the call, and ends as `ending` says."""
+    module = ModuleType("adv2e.pipeline")
+    module.calls = []
+    module.ending = Summary
+
+    def convert(source, output, **options):
+        module.calls.append((source, output, options))
+        return module.ending()
+
+    module.convert = convert
+    monkeypatch.setitem(sys.modules, "adv2e.pipeline", module)
+    return module

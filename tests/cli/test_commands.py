@@ -1,0 +1,218 @@
+"""The commands: help of each, what convert passes on, config, effects."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import click
+import pytest
+
+import adv2e as package
+from adv2e.cli import COMMANDS, main
+from adv2e.cli.options import Log
+from adv2e.config import Config, all_keys, load_config, shipped
+from adv2e.config.model import Pixel
+from adv2e.effects import EFFECTS, STAGES
+
+
+def test_version(adv2e):
+    assert adv2e("--version") == (0, f"adv2e {package.__version__}\n", "")
+
+
+def test_help_lists_every_command_with_a_line(adv2e):
+    outcome = adv2e("--help")
+    assert outcome.status == 0
+    for name, line in COMMANDS.items():
+        assert re.search(rf"^  {name} +{re.escape(line)}$", outcome.out, re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_and_option_has_help(name):
+    command = main.get_command(click.Context(main), name)
+    assert command.name == name
+    assert command.help
+    for option in command.params:
+        if isinstance(option, click.Option):
+            assert option.help, option.name
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_every_command_can_be_shown(adv2e, name):
+    outcome = adv2e(name, "--help")
+    assert outcome.status == 0
+    assert outcome.out.startswith(f"Usage: adv2e {name}")
+
+
+def test_convert_passes_its_options_on(adv2e, pipeline):
+    outcome = adv2e(
+        *("convert", "frames", "-o", "out.h5", "-c", "ideal", "--set", "sampling.L=3"),
+        *("--seed", "7", "--threads", "2", "--overwrite", "--progress", "--start", "0.5"),
+        *("--stop", "2", "--t0", "keep", "--timestamps", "t.txt", "--format", "h5"),
+        *("--layout", "dsec", "--with-frames", "--preview", "p.gif"),
+    )
+    assert outcome.status == 0
+    ((source, output, options),) = pipeline.calls
+    assert (source, output) == ("frames", "out.h5")
+    log = options.pop("log")
+    assert options == {
+        "config": load_config(["ideal"], ["sampling.L=3"], 7),
+        "fps": None,
+        "timestamps": Path("t.txt"),
+        "start_s": 0.5,
+        "stop_s": 2.0,
+        "t0": "keep",
+        "format": "h5",
+        "layout": "dsec",
+        "with_frames": True,
+        "overwrite": True,
+        "preview": "p.gif",
+        "threads": 2,
+        "progress": True,
+    }
+    assert log.level == 0
+
+
+def test_convert_by_default(adv2e, pipeline):
+    adv2e("convert", "clip.mp4")
+    ((source, output, options),) = pipeline.calls
+    assert (source, output) == ("clip.mp4", None)
+    assert options["config"] == Config()
+    assert options["t0"] == "auto"
+    assert options["progress"] is False  # stderr is not a terminal here
+    for name in ("fps", "timestamps", "start_s", "stop_s", "format", "layout", "threads"):
+        assert options[name] is None
+
+
+def test_progress_is_shown_on_a_terminal_unless_quiet(adv2e, pipeline, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    for args in ([], ["-q"], ["--no-progress"], ["-q", "--progress"]):
+        adv2e("convert", "clip.mp4", *args)
+    assert [call[2]["progress"] for call in pipeline.calls] == [True, False, False, True]
+
+
+def test_the_summary_stays_out_of_the_events(adv2e, pipeline):
+    assert adv2e("convert", "clip.mp4", "-o", "-") == (0, "", "the summary\n")
+
+
+def test_quiet_says_nothing(adv2e, pipeline):
+    assert adv2e("convert", "clip.mp4", "-q") == (0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("flags", "heard"), [([], "a"), (["-q"], ""), (["-v"], "ab"), (["-vv"], "abc")]
+)
+def test_verbosity_decides_what_is_said(adv2e, pipeline, flags, heard):
+    adv2e("convert", "clip.mp4", *flags)
+    log = pipeline.calls[0][2]["log"]
+    assert isinstance(log, Log)
+    said = "".join(text for level, text in enumerate("abc") if log.level >= level)
+    assert said == heard
+
+
+def test_the_log_writes_to_stderr(capsys):
+    log = Log(0)
+    log("note")
+    log("detail", 1)
+    Log(-1)("silenced")
+    assert capsys.readouterr() == ("", "note\n")
+
+
+def test_config_show_prints_the_resolved_configuration(adv2e, tmp_path):
+    args = ["-c", "v2e", "--set", "pixel.leak=null", "--seed", "4"]
+    outcome = adv2e("config", "show", *args)
+    assert outcome.status == 0
+    assert "# [Hz] corner (-3 dB) at white" in outcome.out
+    path = tmp_path / "shown.yaml"
+    path.write_text(outcome.out)
+    assert load_config([path]) == load_config(["v2e"], ["pixel.leak=null"], 4)
+
+
+def test_config_alone_is_show(adv2e):
+    assert adv2e("config").out == adv2e("config", "show").out
+    assert adv2e("config", "-c", "v2e").out == adv2e("config", "show", "-c", "v2e").out
+
+
+def test_config_defaults_has_every_key(adv2e, tmp_path):
+    out = adv2e("config", "defaults").out
+    path = tmp_path / "defaults.yaml"
+    path.write_text(out)
+    assert load_config([path]) == Config()
+    for key in all_keys():
+        assert re.search(rf"^ *(# )?{key.name}:", out, re.MULTILINE), key.path
+        assert key.about.meaning[:30] in out, key.path
+
+
+def test_config_check(adv2e, tmp_path):
+    good, bad = tmp_path / "good.yaml", tmp_path / "bad.yaml"
+    good.write_text("seed: 1\n")
+    bad.write_text("seed: x\n")
+    assert adv2e("config", "check", good) == (0, f"{good}: ok\n", "")
+    outcome = adv2e("config", "check", bad)
+    assert outcome.status == 1
+    assert outcome.err == (f"adv2e: error: {bad}:1: seed: must be a whole number, got 'x'\n")
+
+
+def test_config_help_names_what_is_shipped(adv2e):
+    out = adv2e("config", "--help").out
+    assert all(re.search(rf"\b{name}\b", out) for name in shipped())
+
+
+def test_a_mistyped_config_command_is_of_usage(adv2e):
+    outcome = adv2e("config", "chek")
+    assert outcome.status == 2
+    assert "chek" in outcome.err
+
+
+def test_effects_lists_all_by_stage_in_signal_order(adv2e):
+    out = adv2e("effects").out
+    places = [out.index(f"\n  {effect.name} ") for effect in EFFECTS]
+    assert places == sorted(places)
+    assert out.index("frames:") < out.index("pixel:")
+    assert "pixel.low_pass.cutoff_hz" in out
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_an_effect_has_a_page_with_physics_parameters_and_references(adv2e, effect):
+    outcome = adv2e("effects", effect.name)
+    assert outcome.status == 0
+    assert outcome.out.startswith(effect.summary())
+    assert "References\n----------\n.. [1] " in outcome.out
+    keys = [key for key in all_keys() if key.path.startswith(tuple(effect.paths))]
+    for key in keys:
+        if not key.is_section:
+            assert f"\n{key.path} " in outcome.out
+            assert key.about.meaning in outcome.out
+
+
+def test_the_page_gives_unit_default_range_and_source(adv2e):
+    out = adv2e("effects", "low_pass").out
+    assert re.search(r"^pixel\.low_pass\.cutoff_hz +Hz +300\.0 +above 0 +v2e default$", out, re.M)
+    assert "By default the effect is on" in out
+    out = adv2e("effects", "source_follower").out
+    assert re.search(r"^pixel\.source_follower\.cutoff_hz +Hz +must be given +above 0 ", out, re.M)
+    assert "By default the effect is off" in out
+
+
+def test_an_unknown_effect_is_of_usage_and_told_the_nearest(adv2e):
+    outcome = adv2e("effects", "lowpass")
+    assert outcome.status == 2
+    assert "did you mean 'low_pass'?" in outcome.err
+
+
+def test_the_table_of_effects_agrees_with_the_configuration():
+    sections = [
+        item.name
+        for item, key in zip(
+            dataclasses.fields(Pixel),
+            (key for key in all_keys() if re.fullmatch(r"pixel\.\w+", key.path)),
+            strict=True,
+        )
+        if key.is_section
+    ]
+    assert [effect.name for effect in EFFECTS if effect.stage == "pixel"] == sections
+    paths = {key.path for key in all_keys()}
+    for effect in EFFECTS:
+        assert effect.stage in STAGES
+        assert set(effect.paths) <= paths

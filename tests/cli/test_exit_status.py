@@ -1,0 +1,200 @@
+"""What ends a command: exit status, and one line on stderr."""
+
+from __future__ import annotations
+
+import errno
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from adv2e.cli.run import Terminated
+from adv2e.errors import DataError, MissingExtraError, UsageError
+
+
+def raising(error):
+    def ending():
+        raise error
+
+    return ending
+
+
+def test_done_is_0(adv2e, pipeline):
+    outcome = adv2e("convert", "clip.mp4")
+    assert outcome == (0, "the summary\n", "")
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (DataError("a.png: no image"), 1, "adv2e: error: a.png: no image\n"),
+        (DataError("two\n  lines"), 1, "adv2e: error: two lines\n"),
+        (UsageError("--format x: unknown"), 2, "adv2e: error: --format x: unknown\n"),
+        (MissingExtraError("aedat4", "aedat"), 1, "pip install 'adv2e[aedat]'\n"),
+        (FileNotFoundError(errno.ENOENT, "No such file", "x.h5"), 1, "error: x.h5: No such file\n"),
+        (OSError("no signature"), 1, "adv2e: error: no signature\n"),
+        (MemoryError("12 GiB"), 1, "adv2e: error: not enough memory: 12 GiB\n"),
+        (EOFError("short"), 1, "internal error: EOFError: short; run with -vv for the traceback\n"),
+        (ZeroDivisionError("a\nb"), 1, "ZeroDivisionError: a b; run with -vv for the traceback\n"),
+        (KeyboardInterrupt(), 130, "adv2e: interrupted\n"),
+        (Terminated(signal.SIGTERM), 143, "adv2e: stopped by SIGTERM\n"),
+        (BrokenPipeError(errno.EPIPE, "Broken pipe"), 141, ""),
+    ],
+)
+def test_an_error_is_one_line_and_a_status(adv2e, pipeline, error, status, line):
+    pipeline.ending = raising(error)
+    outcome = adv2e("convert", "clip.mp4")
+    assert outcome.status == status
+    assert outcome.out == ""
+    assert outcome.err.endswith(line)
+    assert outcome.err.count("\n") == (1 if line else 0)
+
+
+def test_vv_shows_the_traceback_of_a_bug(adv2e, pipeline):
+    pipeline.ending = raising(ZeroDivisionError("oops"))
+    outcome = adv2e("convert", "clip.mp4", "-vv")
+    assert outcome.status == 1
+    assert "Traceback" in outcome.err
+    assert outcome.err.endswith("adv2e: error: internal error: ZeroDivisionError: oops\n")
+
+
+def test_vv_shows_no_traceback_of_a_mistake_of_the_user(adv2e, pipeline):
+    pipeline.ending = raising(DataError("a.png: no image"))
+    assert adv2e("convert", "clip.mp4", "-vv").err == "adv2e: error: a.png: no image\n"
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (["convert"], "Missing argument 'INPUT' (see 'adv2e convert --help')"),
+        (["convert", "a", "b"], "unexpected extra argument (b)"),
+        (["convert", "a", "--bogus"], "No such option"),
+        (["convert", "a", "--threads", "0"], "Invalid value for '--threads': 0"),
+        (["convert", "a", "--threads", "-2"], "Invalid value for '--threads': -2"),
+        (["convert", "a", "--seed", "-1"], "Invalid value for '--seed'"),
+        (["convert", "a", "--seed", "1.5"], "Invalid value for '--seed'"),
+        (["convert", "a", "--set", "pixel.leak"], "--set pixel.leak: must be KEY=VALUE"),
+        (["convert", "a", "--set", "pixel.leek=null"], "did you mean 'leak'?"),
+        (["convert", "a", "--fps", "0"], "Invalid value for '--fps'"),
+        (["convert", "a", "--fps", "nan"], "nan is not a finite number"),
+        (["convert", "a", "--stop", "inf"], "inf is not a finite number"),
+        (["convert", "a", "--start", "-1"], "Invalid value for '--start'"),
+        (["convert", "a", "--start", "2", "--stop", "2"], "--stop 2 must be after --start 2"),
+        (["convert", "a", "--fps", "9", "--timestamps", "t"], "--fps and --timestamps both give"),
+        (["convert", "a", "--t0", "now"], "Invalid value for '--t0'"),
+        (["convrt", "a"], "no such command 'convrt', did you mean 'convert'?"),
+        (["--bogus"], "No such option"),
+    ],
+)
+def test_a_wrong_command_line_is_2_and_one_line(adv2e, pipeline, args, said):
+    outcome = adv2e(*args)
+    assert outcome.status == 2
+    assert outcome.err.startswith("adv2e: error: ")
+    assert said in outcome.err
+    assert outcome.err.count("\n") == 1
+    assert pipeline.calls == []
+
+
+def test_a_wrong_file_is_1(adv2e, pipeline, tmp_path):
+    path = tmp_path / "c.yaml"
+    path.write_text("seed: 1\npixel: {leek: 1}\n")
+    outcome = adv2e("convert", "a", "-c", path)
+    assert outcome.status == 1
+    assert outcome.err == (
+        f"adv2e: error: {path}:2: pixel.leek: unknown key (value 1), did you mean 'leak'?\n"
+    )
+    assert pipeline.calls == []
+
+
+def test_no_arguments_show_the_help_as_an_error(adv2e):
+    outcome = adv2e()
+    assert outcome.status == 2
+    assert "Commands:" in outcome.err
+    assert outcome.out == ""
+
+
+# What follows needs a process of its own.
+
+WAITING = """
+import pathlib, sys, time, types
+pipeline = types.ModuleType("adv2e.pipeline")
+def convert(*args, **options):
+    unfinished = pathlib.Path("unfinished")
+    unfinished.touch()
+    try:
+        print("ready", flush=True)
+        time.sleep(30)
+    finally:
+        unfinished.unlink()
+pipeline.convert = convert
+sys.modules["adv2e.pipeline"] = pipeline
+from adv2e.cli import main
+main(["convert", "clip.mp4"])
+"""
+
+
+@pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_a_signal_ends_it_tidily(tmp_path, name, status):
+    with subprocess.Popen(
+        [sys.executable, "-c", WAITING],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(getattr(signal, name))
+        _, err = process.communicate(timeout=20)
+    assert process.returncode == status
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_closed_stdout_is_141_and_quiet():
+    with subprocess.Popen(
+        [sys.executable, "-m", "adv2e", "--help"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        process.stdout.close()
+        err = process.stderr.read()
+    assert process.returncode == 141
+    assert err == b""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_a_full_disk_under_stdout_is_1_and_one_line():
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "adv2e", "--version"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            check=False,
+        )
+    assert done.returncode == 1
+    assert done.stderr.startswith(b"adv2e: error: ")
+    assert done.stderr.count(b"\n") == 1
+
+
+HELP = """
+import sys
+from adv2e.cli import main
+try:
+    main(sys.argv[1:])
+except SystemExit as stop:
+    assert not stop.code, stop.code
+heavy = {"numpy", "numba", "cv2", "h5py", "yaml", "tqdm"} & set(sys.modules)
+assert not heavy, heavy
+"""
+
+
+@pytest.mark.parametrize("args", [["--help"], ["--version"], ["convert", "--help"]])
+def test_help_imports_nothing_heavy(args):
+    done = subprocess.run(
+        [sys.executable, "-c", HELP, *args], capture_output=True, text=True, check=False
+    )
+    assert done.stderr == ""
+    assert done.returncode == 0
+    assert "adv2e" in done.stdout

@@ -1,0 +1,123 @@
+"""The configurations in configs/: they load, are what they say, and cite their numbers."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from adv2e.config import Config, all_keys, files, load_config, shipped, to_dict
+from adv2e.errors import ConfigError
+
+NAMES = ["adv2e", "davis240c", "davis346", "ideal", "paper", "v2e", "vid2e"]
+
+
+def test_these_are_shipped():
+    assert shipped() == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_loads_by_name_and_by_path(name):
+    assert load_config([name]) == load_config([files.shipped_folder() / f"{name}.yaml"])
+
+
+def test_adv2e_is_the_defaults_and_gives_every_key():
+    assert load_config(["adv2e"]) == Config()
+    tree = files.read("adv2e")
+    for key in all_keys():
+        inside = tree
+        for part in key.path.split("."):
+            if inside is not None and inside.content is not None:
+                assert part in inside.content, key.path
+                inside = inside.content[part]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_number_has_a_comment(name):
+    lines = (files.shipped_folder() / f"{name}.yaml").read_text(encoding="utf-8").splitlines()
+    bare = [line for line in lines if re.fullmatch(r"\s*\w+:\s*[-+.\d][-+.\deE]*\s*", line)]
+    assert [line for line in bare if line != "seed: 0"] == []
+
+
+@pytest.mark.parametrize("name", ["paper", "v2e", "vid2e"])
+def test_those_named_after_a_tool_say_that_they_are_not_the_tool(name):
+    head = (files.shipped_folder() / f"{name}.yaml").read_text(encoding="utf-8").split("\n\n")[0]
+    assert "in our pixel" in " ".join(head.replace("#", "").split())
+
+
+def test_paper_is_as_printed():
+    config = load_config(["paper"])
+    assert config.pixel.low_pass.update == "paper"
+    assert config.sampling.last_interval == "printed"
+    assert (config.sampling.L, config.sampling.K) == (10, 10)
+    assert config.frames.encoding == "linear"
+
+
+def test_v2e_has_the_defaults_of_its_command_line():
+    pixel = load_config(["v2e"]).pixel
+    assert (pixel.thresholds.on, pixel.thresholds.off, pixel.thresholds.mismatch) == (
+        0.2,
+        0.2,
+        0.03,
+    )
+    assert (pixel.leak.rate_hz, pixel.leak.jitter, pixel.shot_noise.rate_hz) == (0.01, 0.1, 0.001)
+    assert pixel.refractory.period_us == 500.0
+    assert pixel.low_pass.update == "euler"
+    assert pixel.low_pass.dark_cutoff_hz == pytest.approx(pixel.low_pass.cutoff_hz * 20 / 275, 1e-2)
+
+
+@pytest.mark.parametrize("name", ["vid2e", "ideal"])
+def test_these_have_neither_filter_nor_noise(name):
+    pixel = to_dict(load_config([name]).pixel)
+    on = {key for key, value in pixel.items() if isinstance(value, dict)}
+    assert on == {"log_response", "thresholds"}
+    assert pixel["thresholds"]["mismatch"] == 0.0
+
+
+def test_an_unknown_name_lists_the_names():
+    with pytest.raises(ConfigError, match=r"v2: no such file or shipped .*'v2e'\?.* adv2e, davis"):
+        load_config(["v2"])
+
+
+def test_a_shipped_name_with_suffix_is_put_right():
+    with pytest.raises(ConfigError, match=r"^v2e\.yaml: no such file \(the shipped one: -c v2e\)$"):
+        load_config(["v2e.yaml"])
+
+
+def test_a_missing_file_is_named(tmp_path):
+    path = tmp_path / "absent.yaml"
+    with pytest.raises(ConfigError, match=re.escape(f"{path}: no such file")):
+        load_config([path])
+
+
+def test_a_file_of_the_same_name_comes_before_a_shipped_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "v2e").write_text("seed: 99")
+    assert load_config(["v2e"]).seed == 99
+
+
+def test_a_folder_of_the_same_name_does_not_hide_a_shipped_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "v2e").mkdir()
+    (tmp_path / "mine").mkdir()
+    assert load_config(["v2e"]).pixel.low_pass.update == "euler"
+    with pytest.raises(ConfigError, match="mine: is a folder"):
+        load_config(["mine"])
+
+
+def test_a_file_that_is_not_text_is_refused(tmp_path):
+    path = tmp_path / "c.yaml"
+    path.write_bytes(b"seed: \xff\xfe")
+    with pytest.raises(ConfigError, match="byte 6 is not UTF-8"):
+        load_config([path])
+
+
+def test_in_an_installed_package_they_are_inside_it(tmp_path, monkeypatch):
+    package = tmp_path / "adv2e"
+    (package / "config").mkdir(parents=True)
+    monkeypatch.setattr(files, "__file__", str(package / "config" / "files.py"))
+    assert files.shipped_folder() == tmp_path / "configs"
+    (package / "configs").mkdir()
+    (package / "configs" / "only.yaml").write_text("seed: 5")
+    assert files.shipped() == ["only"]
+    assert load_config(["only"]).seed == 5
