@@ -235,7 +235,10 @@ class PixelArray:
             factors = state[workspace_rows.S_LEAK_FACTOR]
             _first_leak_factors(seed, circuit.leak_jitter, factors)
         if circuit.noise_rms > 0:
-            _first_noise(seed, circuit.noise_rms, state[workspace_rows.S_NOISE])
+            noise = state[workspace_rows.S_NOISE]
+            _first_noise(seed, circuit.noise_rms, noise)
+            if circuit.follower == 0:  # behind a second pole at rest it does not show yet
+                state[S_REFERENCE] += noise
         return state
 
     def advance(

@@ -79,14 +79,14 @@ def decode_values(values: NDArray[Any], encoding: str, full_scale: float) -> NDA
     """
     if encoding == "linear":
         # multiplied first: whole numbers of 0..255 come back as they are
-        return values * values.dtype.type(255) / values.dtype.type(full_scale)
-    value = values / values.dtype.type(full_scale)
+        return np.divide(values * 255.0, full_scale, dtype=values.dtype)
+    value = np.divide(values, full_scale, dtype=values.dtype)
     if encoding == "srgb":
-        above = ((np.maximum(value, 0) + 0.055) / 1.055) ** 2.4
-        light = np.where(value <= 0.04045, value / 12.92, above)
+        above = ((value + 0.055) / 1.055) ** 2.4
+        light: NDArray[Any] = np.where(value <= 0.04045, value / 12.92, above)
     else:
-        light = value ** float(encoding.partition(":")[2])
-    light *= 255
+        light = np.power(value, float(encoding.partition(":")[2]), dtype=values.dtype)
+    light *= 255.0
     return light
 
 

@@ -1,0 +1,94 @@
+"""Runs the compiled pixel on light given directly, and returns exact times pixel by pixel."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from reference.agreement import split_by_pixel
+
+from adv2e.config.model import (
+    HotPixels,
+    Leak,
+    LogResponse,
+    LowPass,
+    PhotoreceptorNoise,
+    Pixel,
+    Refractory,
+    Sampling,
+    ShotNoise,
+    SourceFollower,
+    Thresholds,
+)
+from adv2e.pixel import PixelArray
+
+QUIET = {"refractory": None, "leak": None, "shot_noise": None}
+"""Everything off that is on by default, but for the mismatch of thresholds."""
+
+EVERYTHING = {
+    "low_pass": LowPass(),
+    "source_follower": SourceFollower(cutoff_hz=900.0),
+    "thresholds": Thresholds(on=0.2, off=0.25, mismatch=0.03),
+    "refractory": Refractory(period_us=700.0),
+    "leak": Leak(rate_hz=5.0, photo_rate_hz=10.0, jitter=0.1),
+    "shot_noise": ShotNoise(rate_hz=20.0),
+    "photoreceptor_noise": PhotoreceptorNoise(rms=0.04, step=0.3),
+    "hot_pixels": HotPixels(fraction=0.05, rate_hz=80.0),
+}
+
+
+def quiet(**sections):
+    """Return a pixel without noise, dead time and mismatch, but for the sections given."""
+    base = {
+        **QUIET,
+        "thresholds": Thresholds(mismatch=0.0),
+        "log_response": LogResponse(linear_below=20.0, floor=0.1),
+    }
+    return Pixel(**{**base, **sections})
+
+
+def last_flags(knots, L, printed):
+    """Which intervals between `knots` frames are the last of L, with the look-ahead entry."""
+    last = np.zeros(knots, bool)
+    if printed:
+        last[: knots - 1] = (np.arange(knots - 1) + 1) % L == 0
+    return last
+
+
+def start(light, times_ns, pixel, K=10, seed=0, **options):
+    """Return the pixel array at the first frame; `light` is (knots, pixels) or (knots, h, w)."""
+    first = light[0][None] if light.ndim == 2 else light[0]
+    return PixelArray(pixel, Sampling(K=K), seed, first, times_ns[0], **options)
+
+
+def advance(array, light, times_ns, *, chunk=None, threads=1, L=1, printed=False):
+    """Return (events, exact times [us]) of all intervals, taken `chunk` at a time."""
+    frames = light[:, None, :] if light.ndim == 2 else light
+    frames = np.ascontiguousarray(frames)
+    intervals = len(frames) - 1
+    last = last_flags(len(frames), L, printed)
+    events, exact = [], []
+    with ThreadPoolExecutor(threads) as pool:
+        for a in range(0, intervals, chunk or intervals):
+            b = min(intervals, a + (chunk or intervals))
+            part = frames[a : b + 1 + (1 if printed and b < intervals else 0)]
+            events.append(array.advance(part, times_ns[a : b + 1], last[a : b + 1], pool))
+            exact.append(array.last_times)
+    return np.concatenate(events), np.concatenate(exact)
+
+
+def by_pixel(array, events, exact):
+    """Return one (events, 2) array of time [s] and polarity a pixel, from exact times."""
+    index = events["y"].astype(np.int64) * array.columns + events["x"]
+    times = (exact + array.origin_us) * 1e-6
+    return split_by_pixel(times, index, events["p"], array.pixels)
+
+
+def solve(light, times_s, pixel, **options):
+    """Return the events of `light` (knots, pixels) as one (events, 2) array a pixel."""
+    split = ("chunk", "threads", "L", "printed")
+    run = {key: options.pop(key) for key in split if key in options}
+    times_ns = [round(float(t) * 1e9) for t in times_s]
+    array = start(light, times_ns, pixel, exact_times=True, **options)
+    events, exact = advance(array, light, times_ns, **run)
+    return by_pixel(array, events, exact)

@@ -1,0 +1,109 @@
+"""Achieved rates of noise equal the requested ones within their own sampling error."""
+
+import numpy as np
+import pytest
+from harness import advance, quiet, start
+from scipy import stats
+
+from adv2e.config.model import HotPixels, Leak, PhotoreceptorNoise, Refractory, ShotNoise
+
+PIXELS = 3000
+SECONDS = 4.0
+
+
+def still(dn, pixel, seconds=SECONDS, pixels=PIXELS, frames=5, seed=3):
+    light = np.full((frames, 1, pixels), dn, np.float32)
+    times = [round(k * seconds / (frames - 1) * 1e9) for k in range(frames)]
+    array = start(light, times, pixel, seed=seed, exact_times=True)
+    return advance(array, light, times)
+
+
+def within(count, expected, sigmas=4.0):
+    return abs(count - expected) <= sigmas * np.sqrt(expected)
+
+
+@pytest.mark.parametrize("dn", [0.0, 40.0, 255.0])
+def test_shot_noise(dn):
+    pixel = quiet(shot_noise=ShotNoise(rate_hz=3.0), initial_reference="random")
+    events, _ = still(dn, pixel)
+    assert within(len(events), PIXELS * SECONDS * 3.0 * (1 - 0.75 * dn / 255))
+    assert within(events["p"].sum(), len(events) / 2)
+    times = np.sort(events["t"]) / 1e6
+    assert stats.kstest(times, stats.uniform(0, SECONDS).cdf).pvalue > 1e-3
+
+
+def test_shot_noise_loses_what_falls_into_dead_time():
+    pixel = quiet(
+        shot_noise=ShotNoise(rate_hz=100.0),
+        refractory=Refractory(period_us=2000.0),
+        initial_reference="random",
+    )
+    events, exact = still(0.0, pixel, seconds=2.0, pixels=300)
+    assert within(len(events), 300 * 2.0 * 100 / (1 + 100 * 2e-3))
+    for x in range(20):
+        assert np.diff(np.sort(exact[events["x"] == x])).min() >= 2000.0
+
+
+@pytest.mark.parametrize(("dn", "photo"), [(0.0, 0.0), (128.0, 1.5), (255.0, 1.5)])
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_leak(dn, photo, jitter):
+    rate = 2.0 + photo * dn / 255
+    leak = Leak(rate_hz=2.0, photo_rate_hz=photo, jitter=jitter)
+    events, exact = still(dn, quiet(leak=leak, initial_reference="random"))
+    assert events["p"].all()
+    # a pixel fires regularly, at a phase that is uniform over both thresholds: only the first
+    # event may take up to twice a period
+    expected = PIXELS * (SECONDS - 0.5 / rate) * rate
+    assert abs(len(events) - expected) < 4 * np.sqrt(PIXELS) + 0.01 * jitter * expected
+    index = events["x"]
+    gaps = np.concatenate([np.diff(np.sort(exact[index == x])) for x in range(400)])
+    spread = 4 * max(jitter, 0.01) / np.sqrt(gaps.size)
+    assert gaps.mean() == pytest.approx(1e6 / rate, rel=spread)
+    assert gaps.std() / gaps.mean() == pytest.approx(jitter, abs=0.02)
+
+
+def test_hot_pixels():
+    pixel = quiet(hot_pixels=HotPixels(fraction=0.1, rate_hz=20.0), initial_reference="random")
+    events, _ = still(90.0, pixel)
+    hot = np.unique(events["x"])
+    assert within(hot.size, 0.1 * PIXELS)
+    assert within(len(events), hot.size * SECONDS * 20.0)
+    assert events["p"].all()
+
+
+def test_random_reference_is_uniform_between_the_thresholds():
+    pixel = quiet(initial_reference="random")
+    light = np.full((2, 1, PIXELS), 100, np.float32)
+    array = start(light, [0], pixel)
+    offset = (array.state[0] - array.state[3]) / 0.2  # signal minus reference
+    assert stats.kstest(offset, stats.uniform(-1, 2).cdf).pvalue > 1e-3
+
+
+def test_photoreceptor_noise_has_its_rms_and_correlation():
+    """Sampled from the state at the ends of intervals, at two brightnesses."""
+    interval_ns = 500_000
+    for dn in (20.0, 255.0):
+        pixel = quiet(photoreceptor_noise=PhotoreceptorNoise(rms=0.05))
+        light = np.full((2, 1, 2000), dn, np.float32)
+        array = start(light, [0], pixel)
+        samples = []
+        for k in range(30):
+            advance(array, light, [k * interval_ns, (k + 1) * interval_ns])
+            samples.append(array.state[-2].copy())
+        noise = np.array(samples)
+        assert noise.std() == pytest.approx(0.05, rel=0.03)
+        corner = 2e-9 * np.pi * (21.8 + 278.2 * dn / 255)
+        lagged = np.mean(noise[1:] * noise[:-1]) / np.mean(noise**2)
+        assert lagged == pytest.approx(np.exp(-corner * interval_ns), abs=0.02)
+
+
+def test_photoreceptor_noise_alternates():
+    pixel = quiet(photoreceptor_noise=PhotoreceptorNoise(rms=0.08), initial_reference="random")
+    events, _ = still(128.0, pixel, seconds=0.3, pixels=200)
+    pairs = opposite = 0
+    for x in range(200):
+        p = events["p"][events["x"] == x].astype(int)
+        pairs += len(p) - 1 if len(p) else 0
+        opposite += np.count_nonzero(np.diff(p))
+    assert pairs > 500
+    assert opposite / pairs > 0.75

@@ -1,0 +1,27 @@
+import math
+
+import numpy as np
+
+from adv2e.kernel import special
+
+
+def test_exp():
+    t = np.concatenate([np.linspace(-700, 700, 4001), np.linspace(-1, 1, 2001), [0.0]])
+    error = max(abs(special.exp(v) / math.exp(v) - 1) for v in t)
+    assert error < 1e-15
+    assert special.exp(-1e9) < 1e-300
+    assert special.exp(0.0) == 1.0
+
+
+def test_log():
+    v = np.concatenate([np.geomspace(1e-12, 1e12, 4001), np.linspace(0.5, 2, 3001)])
+    error = max(abs(special.log(x) - math.log(x)) for x in v)
+    assert error < 1e-14
+    assert special.log(1.0) == 0.0
+
+
+def test_psi_has_no_cancellation():
+    z = np.concatenate([np.linspace(-1, 1, 401), [1e-9, -1e-9, 0.0]])
+    for v in z:
+        series = sum(v**k / math.factorial(k + 2) for k in range(30))
+        assert abs(special.psi(v) - series) < 2e-11

@@ -1,0 +1,197 @@
+"""The compiled pixel against the slow twin, which shares no code with it."""
+
+import numpy as np
+import pytest
+from harness import quiet, solve
+from reference.agreement import count_and_time_errors
+from reference.circuit import Circuit, Draws, merge_injected
+from reference.twin import simulate_twin
+
+from adv2e import rng
+from adv2e.config.model import (
+    HotPixels,
+    Leak,
+    LogResponse,
+    LowPass,
+    PhotoreceptorNoise,
+    Refractory,
+    ShotNoise,
+    SourceFollower,
+    Thresholds,
+)
+
+
+def moving_light(knots, pixels, seed=0, step=0.3):
+    """Return light that wanders, rests, returns to old values, and crosses the knee both ways."""
+    draw = np.random.default_rng(seed)
+    walk = np.exp(np.cumsum(draw.normal(0, step, (knots, pixels)), 0) + np.log(50))
+    walk = np.clip(walk, 0.3, 255)
+    walk[3:5, : pixels // 4] = walk[2, : pixels // 4]
+    walk[-2:, pixels // 4 : pixels // 2] = walk[0, pixels // 4 : pixels // 2]
+    walk[1, -1], walk[2, -1] = 3.0, 250.0
+    return walk.astype(np.float32).astype(np.float64)
+
+
+def check(light, times, pixel, circuit, draws=None, within_us=0.3, step_us=4.0, **options):
+    kernel = solve(light, times, pixel, **options)
+    twin = simulate_twin(light, times, circuit, draws, step_us=step_us)
+    found = count_and_time_errors(kernel, twin)
+    assert found.count_b > 50
+    assert not found.differing
+    assert found.max_dt_us < within_us
+
+
+def clock(knots, interval_s):
+    return np.round(np.arange(knots) * interval_s * 1e9) * 1e-9
+
+
+CASES = {
+    "lin-log": ({}, {}),
+    "knee at e": (
+        {"log_response": LogResponse(linear_below=np.e)},
+        {"linear_below": float(np.e)},
+    ),
+    "pure logarithm": (
+        {
+            "log_response": LogResponse(linear_below=0),
+            "low_pass": LowPass(dark_cutoff_hz=0),
+        },
+        {"linear_below": 0.0, "dark_cutoff_hz": 0.0},
+    ),
+    "no filter": ({"low_pass": None}, {"cutoff_hz": None}),
+    "second pole": (
+        {"source_follower": SourceFollower(cutoff_hz=400)},
+        {"follower_hz": 400.0},
+    ),
+    "dead time": ({"refractory": Refractory(period_us=900)}, {"dead_time_us": 900.0}),
+    "leak": (
+        {"leak": Leak(rate_hz=15, photo_rate_hz=40)},
+        {"leak_hz": 15.0, "photo_leak_hz": 40.0},
+    ),
+    "asymmetric": (
+        {"thresholds": Thresholds(on=0.13, off=0.31, mismatch=0)},
+        {"on": 0.13, "off": 0.31},
+    ),
+    "all of these": (
+        {
+            "source_follower": SourceFollower(cutoff_hz=700),
+            "refractory": Refractory(period_us=600),
+            "leak": Leak(rate_hz=15, photo_rate_hz=40),
+            "thresholds": Thresholds(on=0.13, off=0.31, mismatch=0),
+        },
+        {
+            "follower_hz": 700.0,
+            "dead_time_us": 600.0,
+            "leak_hz": 15.0,
+            "photo_leak_hz": 40.0,
+            "on": 0.13,
+            "off": 0.31,
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("interval_s", [1 / 240, 1 / 1000])
+def test_exact(name, interval_s):
+    sections, circuit = CASES[name]
+    light = moving_light(14, 32, seed=len(name))
+    check(light, clock(14, interval_s), quiet(**sections), Circuit(**circuit))
+
+
+@pytest.mark.parametrize("update", ["first_order_hold", "zero_order_hold", "euler", "paper"])
+@pytest.mark.parametrize("printed", [False, True])
+def test_stepped_forms(update, printed):
+    light = moving_light(31, 12, seed=3)
+    pixel = quiet(low_pass=LowPass(update=update), refractory=Refractory(period_us=700))
+    circuit = Circuit(update=update, K=5, L=10, printed_last_interval=printed, dead_time_us=700.0)
+    check(light, clock(31, 1 / 240), pixel, circuit, K=5, L=10, printed=printed, within_us=0.01)
+
+
+@pytest.mark.parametrize("L", [1, 10])
+def test_exact_with_the_printed_last_interval(L):
+    light = moving_light(21, 8, seed=4, step=0.1)
+    circuit = Circuit(K=4, L=L, printed_last_interval=True)
+    check(light, clock(21, 1 / 240), quiet(), circuit, K=4, L=L, printed=True)
+
+
+def shot_candidates(pixel, rate_hz, seed, end_s):
+    rows, t, draw = [], 0.0, 0
+    while True:
+        t += rng.exponential(seed, rng.SHOT_TIME, pixel, draw) / rate_hz
+        if t >= end_s:
+            return np.array(rows).reshape(-1, 3)
+        u, v = rng.uniforms(seed, rng.SHOT_KIND, pixel, draw)
+        rows.append((t, u, 1 if v < 0.5 else -1))
+        draw += 1
+
+
+def hot_times(pixel, fraction, rate_hz, seed, end_s):
+    if rng.uniforms(seed, rng.HOT_CHOICE, pixel, 0)[0] >= fraction:
+        return np.empty(0)
+    steps = [rng.exponential(seed, rng.HOT_TIME, pixel, k) for k in range(400)]
+    times = np.cumsum(steps) / rate_hz
+    return times[times < end_s]
+
+
+@pytest.mark.parametrize("dead_time", [None, 800.0])
+def test_noise_events_and_leak_jitter(dead_time):
+    """The same draws handed to both: thinning, order, dead time and references must agree."""
+    knots, pixels, seed = 25, 24, 9
+    light = moving_light(knots, pixels, seed=6, step=0.15)
+    times = clock(knots, 1 / 240)
+    pixel = quiet(
+        refractory=Refractory(period_us=dead_time) if dead_time else None,
+        leak=Leak(rate_hz=20, photo_rate_hz=10, jitter=0.2),
+        shot_noise=ShotNoise(rate_hz=150),
+        hot_pixels=HotPixels(fraction=0.3, rate_hz=200),
+    )
+    shot = [shot_candidates(i, 150.0, seed, times[-1]) for i in range(pixels)]
+    hot = [hot_times(i, 0.3, 200.0, seed, times[-1]) for i in range(pixels)]
+    assert sum(map(len, hot)) > 20
+    factors = [
+        np.array(
+            [
+                1 / (1 + 0.2 * np.clip(rng.normal(seed, rng.LEAK_PERIOD, i, k), -3, 3))
+                for k in range(200)
+            ]
+        )
+        for i in range(pixels)
+    ]
+    draws = Draws(injected=merge_injected(shot, hot), leak_factors=factors)
+    circuit = Circuit(dead_time_us=dead_time, leak_hz=20.0, photo_leak_hz=10.0)
+    check(light, times, pixel, circuit, draws, seed=seed)
+
+
+@pytest.mark.parametrize("follower_hz", [None, 500.0])
+def test_photoreceptor_noise_moves_the_signal(follower_hz):
+    """At rest the noise path is known from its draws; the twin gets it as knots."""
+    pixels, seed, rms, share = 12, 4, 0.12, 0.2
+    light = np.full((9, pixels), 80.0)
+    times = clock(9, 1 / 240)
+    interval_us = 1e6 / 240
+    corner = 2e-6 * np.pi * (21.8 + 278.2 * 80 / 255)
+    pixel = quiet(
+        photoreceptor_noise=PhotoreceptorNoise(rms=rms, step=share),
+        source_follower=SourceFollower(cutoff_hz=follower_hz) if follower_hz else None,
+    )
+    radius = 1.6 / (corner + 2e-6 * np.pi * (follower_hz or 0.0))
+    steps = int(np.ceil(interval_us / min(share / corner, radius)))
+    h = interval_us / steps
+    decay = np.exp(-corner * h)
+    knots = np.arange(8 * steps + 1) * h * 1e-6
+    paths = []
+    for i in range(pixels):
+        n = [rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)]
+        for k in range(1, knots.size):
+            g = rng.normal(seed, rng.PHOTORECEPTOR, i, k)
+            n.append(decay * n[-1] + rms * np.sqrt(1 - decay**2) * g)
+        paths.append((knots, np.array(n)))
+    kernel = solve(light, times, pixel, seed=seed)
+    twin = simulate_twin(
+        light, times, Circuit(follower_hz=follower_hz), Draws(signal_noise=paths), step_us=2.0
+    )
+    found = count_and_time_errors(kernel, twin)
+    assert found.count_b > 50
+    assert not found.differing
+    assert found.max_dt_us < 0.3
