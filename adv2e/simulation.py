@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config.model import Config
-from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images, full_scale_of
 from adv2e.errors import DataError
 from adv2e.events import Events, empty_events, sort_events
 from adv2e.pixel import PixelArray, thread_count
@@ -96,18 +96,15 @@ def _decoded(
 
 
 def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
-    scales = {"uint8": 255.0, "uint16": 65535.0, "float32": 1.0, "float64": 1.0}
     colour = image.ndim == 3
     if image.ndim not in (2, 3) or (colour and image.shape[2] != 3):
         raise DataError(
             f"frame 0: shape {image.shape}, must be (rows, columns) or (rows, columns, 3)"
         )
-    if image.dtype.name not in scales:
-        raise DataError(f"frame 0: type {image.dtype}, must be one of {', '.join(scales)}")
     encoding = config.frames.encoding
     if encoding == "auto":
-        encoding = "srgb" if colour and image.dtype == np.uint8 else "linear"
-    full_scale = config.frames.full_scale or scales[image.dtype.name]
+        encoding = encoding_of_images(image.dtype, colour)
+    full_scale = config.frames.full_scale or full_scale_of(image.dtype)
     return LightDecoder(encoding, full_scale, image.dtype, colour)
 
 

@@ -43,6 +43,15 @@ def _emit(keys, times, n, t, t_base, pixel, on):
 
 
 @kernel
+def put_found(lo, count, found_time, found_pixel, t_base, keys, times, n):
+    """Write events of a strip that begins at pixel lo: times [us], and 2 k + polarity."""
+    for j in range(count):
+        which = found_pixel[j]
+        n = _emit(keys, times, n, found_time[j], t_base, lo + which // 2, which % 2)
+    return n
+
+
+@kernel
 def _next_injected(i, now, t_end, circuit, state):
     """Kind and time of the next noise event of pixel i in [now, t_end); those before are lost."""
     kind, t = _SIGNAL_EVENT, t_end

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.jit import allocating_kernel, kernel
-from adv2e.kernel import screen
+from adv2e.kernel import batch, screen
+from adv2e.kernel.comparator import put_found
 from adv2e.kernel.screen import STRIP
 from adv2e.kernel.solve import solve_interval
 from adv2e.kernel.workspace import (
@@ -148,6 +149,11 @@ def run_tile(
     """
     n = 0
     screened = circuit.noise_rms == 0.0
+    batched = screened and circuit.update == EXACT and circuit.filtered and circuit.follower == 0.0
+    items = np.empty((batch.ROWS, batch.CAPACITY + 24))
+    keep = np.empty(STRIP, np.bool_)
+    found_time = np.empty(8 * batch.CAPACITY)
+    found_pixel = np.empty(8 * batch.CAPACITY, np.int64)
     for f in range(starts.shape[0] - 1):
         ta = starts[f]
         length = starts[f + 1] - ta
@@ -165,6 +171,24 @@ def run_tile(
             else:
                 for k in range(count):
                     flags[k] = True
+            if any_flag and one_line and batched:
+                k = 0
+                while k < count:
+                    m, k = batch.gather(
+                        k, s, count, i1, x1, columns[5], columns[6], ta, length, circuit, state,
+                        flags, items,
+                    )  # fmt: skip
+                    if m == 0:
+                        continue
+                    m = batch.solve_items(
+                        s, m, ta, length, circuit, nodes[f, : counts[f]], weights[f, : counts[f]],
+                        state, flags, items, keep, found_time, found_pixel,
+                    )  # fmt: skip
+                    if n + m > keys.shape[0]:
+                        if times.shape[0] > 0:
+                            times = _grown(times, n, n + m)
+                        keys = _grown(keys, n, n + m)
+                    n = put_found(s, m, found_time, found_pixel, t_base, keys, times, n)
             if any_flag:
                 ahead = columns[9, :count]
                 if not one_line:
