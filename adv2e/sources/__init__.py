@@ -1,0 +1,86 @@
+"""Where frames come from: video files, folders of images, DAVIS240C recordings, ``.npy`` stacks."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+
+from adv2e.errors import DataError
+from adv2e.sources.base import Frame, GivenTimes, Selection, Source
+
+__all__ = ["Frame", "Source", "open_source"]
+
+VIDEO_SUFFIXES = (
+    *(".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts"),
+    *(".wmv", ".flv", ".3gp", ".ogv", ".gif", ".y4m", ".mxf"),
+)
+"""Files that are opened as video."""
+
+OPENERS = {
+    **dict.fromkeys(VIDEO_SUFFIXES, "adv2e.sources.video"),
+    ".zip": "adv2e.sources.davis240c",
+    ".npy": "adv2e.sources.npy",
+}
+"""Module whose ``open_source(path, given, selection)`` reads files of a suffix."""
+
+
+def open_source(
+    path: str | Path,
+    *,
+    fps: float | None = None,
+    timestamps: str | Path | None = None,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    t0: str = "auto",
+) -> Source:
+    """Open an input with frames.
+
+    Parameters
+    ----------
+    path : path
+        Video file, folder of images, DAVIS240C folder or zip, or ``.npy`` stack.
+    fps : float, optional
+        Frames are at this constant rate [Hz], whatever the source says.
+    timestamps : path, optional
+        File with the time of each frame, ``t`` or ``t name`` a line, t in seconds.
+    start_s, stop_s : float, optional
+        First and last time wanted, counted from the first frame [s]; both inclusive.
+    t0 : {'auto', 'keep', 'zero'}
+        auto, keep: times on the source's own clock where there is one, else from its first frame;
+        zero: from the first frame wanted.
+
+    Returns
+    -------
+    Source
+        Its `frames` yields them, checked, as often as asked.
+
+    Raises
+    ------
+    UsageError
+        If the options contradict each other or are impossible.
+    DataError
+        If the input is missing, of an unknown kind, or wrong.
+    """
+    given = GivenTimes(fps, Path(timestamps) if timestamps is not None else None)
+    selection = Selection(start_s, stop_s, t0)
+    path = Path(path)
+    if not path.exists():
+        raise DataError(f"{path}: no such file or folder")
+    opener = importlib.import_module(_opener(path))
+    source: Source = opener.open_source(path, given, selection)
+    return source
+
+
+def _opener(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        from adv2e.sources import davis240c  # noqa: PLC0415  (needs OpenCV; most of us do not)
+
+        return f"adv2e.sources.{'davis240c' if davis240c.is_recording(path) else 'images'}"
+    if suffix in OPENERS:
+        return OPENERS[suffix]
+    known = " ".join(suffix.lstrip(".") for suffix in OPENERS)
+    raise DataError(
+        f"{path}: frames cannot be read from {suffix or 'a file without suffix'}; give a folder of"
+        f" images, a DAVIS240C folder, or a file ({known})"
+    )

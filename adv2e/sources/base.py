@@ -1,0 +1,247 @@
+"""What every source of frames is: a description, and frames in the order of time.
+
+A source states its geometry when it is opened and reads its frames one after another, as often as
+asked.  Times are integer nanoseconds.  What must hold of any source (two frames at least, times
+that increase, one size and data type, finite values) is checked here, once.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.effects.frames.encoding import encoding_of_images, full_scale_of
+from adv2e.errors import DataError, UsageError
+from adv2e.sources.times import NS_PER_S, seconds
+
+Image = NDArray[Any]
+"""(rows, columns) or (rows, columns, 3) RGB; uint8, uint16, float32 or float64."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame: its time [ns] and its image as read, colour as RGB."""
+
+    t_ns: int
+    image: Image
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A frame not loaded yet: time on the source's clock [ns], name for messages, loader."""
+
+    t_ns: int
+    label: str
+    load: Callable[[], Image]
+
+
+@dataclass(frozen=True)
+class GivenTimes:
+    """Times given by the user in place of the source's own: a rate, a file, or neither.
+
+    Raises
+    ------
+    UsageError
+        If both are given or the rate is not above zero.
+    """
+
+    fps: float | None = None
+    timestamps: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.fps is not None and self.timestamps is not None:
+            raise UsageError("--fps and --timestamps both say when the frames are; give one")
+        if self.fps is not None and not (self.fps > 0 and math.isfinite(self.fps)):
+            raise UsageError(f"--fps: must be above 0 Hz, got {self.fps:g}")
+
+    def __str__(self) -> str:
+        return f"--fps {self.fps:g}" if self.fps is not None else f"--timestamps {self.timestamps}"
+
+    def __bool__(self) -> bool:
+        return self.fps is not None or self.timestamps is not None
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which frames are wanted and where their time begins.
+
+    Parameters
+    ----------
+    start_s, stop_s : float, optional
+        First and last time wanted, counted from the source's first frame [s]; a frame at either
+        is in, so that neighbouring pieces share the frame between them.
+    t0 : {'auto', 'keep', 'zero'}
+        auto, keep: the source's own clock where there is one, else zero at the source's first
+        frame.  zero: zero at the first frame wanted.
+
+    Raises
+    ------
+    UsageError
+        If a value is impossible.
+    """
+
+    start_s: float | None = None
+    stop_s: float | None = None
+    t0: str = "auto"
+
+    def __post_init__(self) -> None:
+        for name, value in (("--start", self.start_s), ("--stop", self.stop_s)):
+            if value is not None and not (value >= 0 and math.isfinite(value)):
+                raise UsageError(f"{name}: must be seconds from the first frame, got {value:g}")
+        if self.start_s is not None and self.stop_s is not None and self.stop_s <= self.start_s:
+            raise UsageError(
+                f"--stop: must be after --start ({self.start_s:g} s), got {self.stop_s:g}"
+            )
+        if self.t0 not in ("auto", "keep", "zero"):
+            raise UsageError(f"--t0: must be auto, keep or zero, got {self.t0!r}")
+
+    @property
+    def start_ns(self) -> int:
+        """First time wanted, from the first frame [ns]."""
+        return round((self.start_s or 0) * NS_PER_S)
+
+    @property
+    def stop_ns(self) -> float:
+        """Last time wanted, from the first frame [ns]; infinite when there is none."""
+        return math.inf if self.stop_s is None else round(self.stop_s * NS_PER_S)
+
+
+class Source(ABC):
+    """Frames in the order of time, and what is known of them before they are read.
+
+    Attributes
+    ----------
+    path : str
+        What was opened.
+    kind : str
+        ``video``, ``images``, ``davis240c`` or ``npy``.
+    width, height : int
+        Columns and rows of the frames.
+    dtype : numpy.dtype
+        Data type of the frames.
+    colour : bool
+        Frames are (rows, columns, 3) RGB.
+    count : int or None
+        Frames that `frames` will yield; None where only reading tells.  For a video it is what the
+        file states, and good for showing progress.
+    has_clock : bool
+        Times are on a clock of the source's own, not counted from its first frame.
+    encoding : str
+        What ``encoding: auto`` means here, ``srgb`` or ``linear``.
+    full_scale : float
+        Number that means white, from the data type.
+    notes : list of str
+        Things to tell the user.
+    """
+
+    def __init__(self, path: Path, kind: str, selection: Selection, has_clock: bool) -> None:
+        self.path = str(path)
+        self.kind = kind
+        self.selection = selection
+        self.has_clock = has_clock
+        self.notes: list[str] = []
+        self.count: int | None = None
+
+    def _describe(self, image: Image, label: str) -> None:
+        """Take geometry, data type and meaning of the numbers from the first frame."""
+        try:
+            self.full_scale = full_scale_of(image.dtype)
+        except DataError as error:
+            raise DataError(f"{label}: {error}") from error
+        self.height, self.width = image.shape[:2]
+        self.dtype = image.dtype
+        self.colour = image.ndim == 3
+        self.encoding = encoding_of_images(image.dtype, self.colour)
+
+    @abstractmethod
+    def shots(self) -> Iterator[Shot]:
+        """Yield every frame of the source, not loaded, on the source's clock."""
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield the selected frames, times strictly increasing.
+
+        Nothing is yielded before a second frame is known to exist.
+
+        Raises
+        ------
+        DataError
+            Fewer than two frames, times that do not increase, a frame that cannot be read or
+            differs from the first in size, data type or colour, or values that are not finite.
+        """
+        chosen = self._chosen()
+        first = next(chosen)
+        second = next(chosen)
+        yield first
+        yield second
+        yield from chosen
+
+    def _chosen(self) -> Iterator[Frame]:
+        first: Shot | None = None
+        previous: Shot | None = None
+        origin: int | None = None
+        yielded = 0
+        for shot in self.shots():
+            first = first or shot
+            if previous is not None and shot.t_ns <= previous.t_ns:
+                raise DataError(
+                    f"{shot.label}: times must increase; {seconds(shot.t_ns)} s is not after"
+                    f" {seconds(previous.t_ns)} s; give --fps or --timestamps"
+                )
+            previous = shot
+            since_first = shot.t_ns - first.t_ns
+            if since_first > self.selection.stop_ns:
+                break
+            if since_first < self.selection.start_ns:
+                continue
+            if origin is None:
+                origin = self._origin(first, shot)
+            image = shot.load()
+            self._check_image(image, shot.label)
+            yielded += 1
+            yield Frame(shot.t_ns - origin, image)
+        if yielded < 2:
+            span = previous.t_ns - first.t_ns if first is not None and previous is not None else 0
+            raise self._too_few(yielded, span)
+
+    def _origin(self, first: Shot, first_chosen: Shot) -> int:
+        if self.selection.t0 == "zero":
+            return first_chosen.t_ns
+        return 0 if self.has_clock else first.t_ns
+
+    def _too_few(self, count: int, span_ns: int) -> DataError:
+        found = "no frames" if count == 0 else "a single frame"
+        if self.selection.start_s is None and self.selection.stop_s is None:
+            return DataError(f"{self.path}: {found}; at least two are needed")
+        return DataError(
+            f"{self.path}: --start and --stop leave {found} of those read up to"
+            f" {seconds(span_ns)} s; at least two are needed"
+        )
+
+    def _check_image(self, image: Image, label: str) -> None:
+        first = _description(self.width, self.height, self.dtype, self.colour)
+        this = _description(image.shape[1], image.shape[0], image.dtype, image.ndim == 3)
+        if this != first:
+            raise DataError(f"{label}: {this}, but the first frame is {first}")
+        check_values(image, label)
+
+
+def check_values(image: Image, label: str) -> None:
+    """Raise DataError if a float image holds NaN, infinite or negative values."""
+    if image.dtype.kind != "f" or image.size == 0:
+        return
+    low, high = float(image.min()), float(image.max())
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise DataError(f"{label}: pixels that are NaN or infinite; light must be a finite number")
+    if low < 0:
+        raise DataError(f"{label}: a pixel of {low:g}; light cannot be negative")
+
+
+def _description(width: int, height: int, dtype: np.dtype[Any], colour: bool) -> str:
+    return f"{dtype.name} {'colour' if colour else 'grey'} of {width}x{height}"

@@ -1,0 +1,86 @@
+"""Folders of still images, in natural order of their names, with times from beside them."""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from pathlib import Path
+
+from adv2e.errors import DataError
+from adv2e.sources.base import GivenTimes, Selection
+from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
+from adv2e.sources.opencv import IMAGE_SUFFIXES, read_image
+from adv2e.sources.times import parse_info, parse_times, read_text
+
+LISTS = {"images.txt": parse_times, "timestamps.txt": parse_times, "info.txt": parse_info}
+"""Lists of times that are looked for in the folder, then beside it: name and reader."""
+
+
+def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
+    """Return the frames of a folder of images.
+
+    Times are those given, else those of the first list found: ``images.txt`` (``t name``, of the
+    Event-Camera Dataset), ``timestamps.txt`` (one time a line, of vid2e), ``info.txt``
+    (``path t_us``, of DVS-Voltmeter), in the folder or beside it.
+
+    Raises
+    ------
+    DataError
+        No images, no times, or images and times that do not fit each other.
+    """
+    pictures = [Picture(str(f), f.name, partial(read_image, f)) for f in image_files(path)]
+    if not pictures:
+        raise _no_images(path)
+    found = _found_list(path)
+    notes: list[str] = []
+    if given:
+        shots = given_shots(given, pictures, path)
+    elif found is not None:
+        shots = listed_shots(
+            LISTS[found.name](read_text(found), str(found)), str(found), pictures, path
+        )
+        notes.append(f"times from {found}")
+        if len(shots) < len(pictures):
+            notes.append(f"{len(pictures) - len(shots)} images are not in {found} and are left out")
+    else:
+        raise DataError(
+            f"{path}: when are the frames? give --fps F or --timestamps FILE, or put one of"
+            f" {', '.join(LISTS)} there"
+        )
+    if given and found is not None:
+        notes.append(f"{given} replaces the times in {found}")
+    source = ListedSource(path, "images", shots, selection, has_clock=given.fps is None)
+    source.notes += notes
+    return source
+
+
+def image_files(folder: Path) -> list[Path]:
+    """Return the images in a folder, in natural order of their names; hidden files left out."""
+    try:
+        entries = [entry for entry in folder.iterdir() if not entry.name.startswith(".")]
+    except OSError as error:
+        raise DataError(f"{folder}: {error.strerror}") from error
+    images = [e for e in entries if e.suffix.lower() in IMAGE_SUFFIXES and e.is_file()]
+    return sorted(images, key=lambda entry: natural_key(entry.name))
+
+
+def natural_key(name: str) -> tuple[list[tuple[bool, int, str]], str]:
+    """Return a key that sorts names with their numbers as numbers: frame2 before frame10."""
+    parts = re.split(r"([0-9]+)", name)
+    return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts], name
+
+
+def _found_list(folder: Path) -> Path | None:
+    for place in (folder, folder.absolute().parent):
+        for name in LISTS:
+            if (place / name).is_file():
+                return place / name
+    return None
+
+
+def _no_images(folder: Path) -> DataError:
+    below = [entry for entry in sorted(folder.iterdir()) if entry.is_dir() and image_files(entry)]
+    if below:
+        return DataError(f"{folder}: no images in it; there are some in {below[0]}")
+    known = " ".join(suffix.lstrip(".") for suffix in IMAGE_SUFFIXES)
+    return DataError(f"{folder}: no images in it ({known})")
