@@ -1,0 +1,126 @@
+"""Events in NumPy archives: one structured array, or an array for each column.
+
+========== ======================= =================================================
+column     names                   meaning
+========== ======================= =================================================
+time       t_us                    microseconds
+           t_ns                    nanoseconds
+           t, ts, time(stamp)(s)   whole numbers: microseconds; floats: seconds
+column     x, xs                   from the left
+row        y, ys                   from the top
+polarity   p, ps, pol(arity)       ON above 0
+========== ======================= =================================================
+
+``width`` and ``height`` tell the geometry [pixels], ``adv2e`` (JSON) what wrote the file.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.errors import DataError
+from adv2e.recordings.base import Recording, described_geometry, parse_description
+from adv2e.recordings.gather import Gatherer
+
+_NAMES = {
+    "time": ("t_us", "t_ns", "t", "ts", "time", "times", "timestamp", "timestamps"),
+    "x": ("x", "xs"),
+    "y": ("y", "ys"),
+    "polarity": ("p", "ps", "pol", "polarity"),
+}
+
+
+def read_npz(path: Path) -> Recording:
+    """Return the recording in a NumPy archive.
+
+    Raises
+    ------
+    DataError
+        Not such an archive, a column is missing, or columns differ in length.
+    """
+    arrays = _load(path)
+    gatherer = Gatherer()
+    description: dict[str, Any] = {}
+    if "adv2e" in arrays:
+        text = str(arrays["adv2e"])
+        description = parse_description(text, f"{path}: adv2e", gatherer.problems)
+    columns = _columns(path, arrays)
+    t = _microseconds(path, *columns["time"], gatherer.problems)
+    x, y, p = (_whole(path, *columns[name]) for name in ("x", "y", "polarity"))
+    gatherer.add(t, x, y, p)
+    sizes: dict[str, Any] = {
+        name: arrays[name].item() for name in ("width", "height") if name in arrays
+    }
+    geometry = described_geometry(description) or described_geometry(sizes)
+    events, width, height = gatherer.finish(geometry, "the file")
+    return Recording(
+        str(path),
+        "npz",
+        width,
+        height,
+        events,
+        metadata=description,
+        problems=gatherer.problems,
+    )
+
+
+def _load(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError) as error:
+        raise DataError(f"{path}: not a NumPy archive that can be read: {error}") from error
+
+
+def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[str, NDArray[Any]]]:
+    """Return (name in the file, array) of each column."""
+    structured = [array for array in arrays.values() if array.dtype.names is not None]
+    if len(structured) == 1:
+        table = structured[0]
+        arrays = {name: table[name] for name in table.dtype.names or ()}
+    found = {}
+    for column, names in _NAMES.items():
+        name = next((name for name in names if name in arrays), None)
+        if name is None:
+            raise DataError(
+                f"{path}: no column for {column} ({', '.join(names)}); it has"
+                f" {', '.join(arrays) or 'nothing'}"
+            )
+        found[column] = (name, arrays[name])
+    shapes = {array.shape for _, array in found.values()}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 1:
+        raise DataError(f"{path}: columns must be of one length, got {sorted(shapes)}")
+    return found
+
+
+def _microseconds(path: Path, name: str, t: NDArray[Any], problems: list[str]) -> NDArray[np.int64]:
+    if t.dtype.kind == "f":
+        if not np.all(np.isfinite(t)):
+            raise DataError(f"{path}: {name} holds NaN or infinite times")
+        scale = {"t_us": 1.0, "t_ns": 1e-3}.get(name, 1e6)
+        whole = np.floor(t.astype(np.float64))
+        part = np.rint((t - whole) * scale)
+        return np.rint(whole * scale).astype(np.int64) + part.astype(np.int64)
+    t = _whole(path, name, t)
+    if name == "t_ns":
+        return (t + 500) // 1000
+    if name != "t_us":
+        problems.append(f"{name} holds whole numbers: taken as microseconds")
+    return t
+
+
+def _whole(path: Path, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
+    """Return a column of whole numbers, whatever their type."""
+    if column.dtype.kind not in "biuf":
+        raise DataError(f"{path}: {name} must hold numbers, not {column.dtype}")
+    whole = column.astype(np.int64)
+    if column.dtype.kind == "f" and not np.array_equal(whole, column):
+        raise DataError(f"{path}: {name} must hold whole numbers")
+    return whole

@@ -1,0 +1,228 @@
+"""HDF5 in the layout of ``event_utils`` and ``event_cnn_minimal`` (Monash University).
+
+=========================== ====================================================================
+/events/xs, /events/ys      int16 (uint16 where the sensor is larger), column and row
+/events/ts                  float64, seconds
+/events/ps                  bool, true is ON
+/images/image%09d           uint8 (rows, columns) or (rows, columns, 3) as BGR; attributes size,
+                            timestamp [s], timestamp_ns, type, event_idx
+=========================== ====================================================================
+
+Attributes of the root: num_events, num_pos, num_neg, duration, t0, tk, num_imgs, num_flow,
+sensor_resolution (height, width), source; and of ours layout, layout_version and adv2e (JSON).
+
+``event_idx`` is the index of the last event before the frame,
+``max(searchsorted(ts, timestamp) - 1, 0)``.
+
+References
+----------
+.. [1] T. Stoffregen et al., "Reducing the sim-to-real gap for event cameras", ECCV 2020,
+   arXiv:2003.09078; github.com/TimoStoff/event_utils, event_cnn_minimal.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.events import Events
+from adv2e.sinks.base import FileSink, to_json
+from adv2e.sinks.columns import FILTERS, ChunkedColumns, encode
+from adv2e.sinks.spool import FrameSpool, StoredFrame
+from adv2e.sinks.staging import Staging
+from adv2e.sinks.work import OrderedWork
+
+_PART = 1 << 20  # events turned to columns at once
+
+
+class MonashSink(FileSink):
+    """An HDF5 file in the layout ``monash``; its bytes follow from its content.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    width, height : int
+        Geometry [pixels].
+    description : dict
+        Content of the attribute ``adv2e``.
+    overwrite, with_frames : bool
+        Replace what exists; store frames.
+    threads : int
+        Threads that compress.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        width: int,
+        height: int,
+        description: dict[str, Any],
+        overwrite: bool,
+        with_frames: bool,
+        threads: int,
+    ) -> None:
+        staging = Staging(overwrite)
+        self._temporary = staging.file(path)
+        super().__init__(path, staging)
+        self.wants_frames = with_frames
+        self._shape = (height, width)
+        self._description = to_json(description)
+        self._threads = threads
+        self._totals = _Totals()
+        self._indices = _EventIndices()
+        self._file: h5py.File | None = None
+        self._work: OrderedWork | None = None
+        self._spool: FrameSpool | None = None
+        self._columns: ChunkedColumns | None = None
+
+    def _open(self) -> None:
+        self._work = OrderedWork(self._threads)
+        # fixed: the oldest structures, which every reader knows and which hold no times
+        self._file = h5py.File(self._temporary, "w", libver=("earliest", "v108"))
+        pixel = np.dtype(np.int16 if max(self._shape) <= 32767 else np.uint16)
+        types: dict[str, np.dtype[Any]] = {
+            "xs": pixel,
+            "ys": pixel,
+            "ts": np.dtype(np.float64),
+            "ps": np.dtype(np.bool_),
+        }
+        self._columns = ChunkedColumns(self._file.create_group("events"), types, self._work)
+        self._file.create_group("images")
+        if self.wants_frames:
+            self._spool = FrameSpool(self._temporary.parent)
+
+    def _write_events(self, events: Events) -> None:
+        assert self._columns is not None
+        for begin in range(0, events.size, _PART):
+            part = events[begin : begin + _PART]
+            seconds = part["t"] / 1e6
+            self._columns.append({"xs": part["x"], "ys": part["y"], "ts": seconds, "ps": part["p"]})
+            self._indices.add_events(seconds)
+            self._totals.add(seconds, part["p"])
+
+    def _write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
+        assert self._work is not None
+        assert self._spool is not None
+        picture = _eight_bit(image)
+        picture = picture[..., ::-1].copy() if picture.ndim == 3 else picture.copy()
+        self._indices.add_frame(t_ns / 1e9)
+        spool, shape = self._spool, picture.shape
+        self._work.submit(encode, picture, take=lambda data: spool.add(t_ns, shape, data))
+
+    def _finish(self) -> None:
+        assert self._file is not None
+        assert self._columns is not None
+        assert self._work is not None
+        self._columns.finish()
+        self._work.finish()
+        indices = self._indices.finish()
+        for number, frame in enumerate(self._spool or ()):
+            _add_image(self._file["images"], number, frame, indices[number])
+        self._file["images"].attrs["num_images"] = np.int64(len(indices))
+        attributes = self._file.attrs
+        for name, value in self._totals.attributes().items():
+            attributes[name] = value
+        attributes["num_imgs"] = np.int64(len(indices))
+        attributes["num_flow"] = np.int64(0)
+        attributes["sensor_resolution"] = np.array(self._shape, np.int64)
+        attributes["source"] = "unknown"
+        attributes["layout"] = "monash"
+        attributes["layout_version"] = "1"
+        attributes["adv2e"] = self._description
+        self._file.close()
+        if self._spool is not None:
+            self._spool.close()
+
+    def _abandon(self) -> None:
+        if self._work is not None:
+            self._work.abandon()
+        for part in (self._spool, self._file):
+            if part is not None:
+                with suppress(Exception):  # each must be closed, whatever became of the other
+                    part.close()
+
+
+def _eight_bit(image: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return the image as the 8 bit that this layout holds; 16 bit are rounded."""
+    if image.dtype == np.uint8:
+        return image
+    return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+
+
+def _add_image(group: h5py.Group, number: int, frame: StoredFrame, event_index: int) -> None:
+    image = group.create_dataset(
+        f"image{number:09d}",
+        frame.shape,
+        np.uint8,
+        chunks=frame.shape,
+        track_times=False,
+        **FILTERS,
+    )
+    image.id.write_direct_chunk((0,) * len(frame.shape), frame.data)
+    image.attrs["size"] = np.array(frame.shape, np.int64)
+    image.attrs["timestamp"] = np.float64(frame.t_ns / 1e9)
+    image.attrs["timestamp_ns"] = np.int64(frame.t_ns)
+    image.attrs["type"] = "greyscale" if len(frame.shape) == 2 else "color_bgr"
+    image.attrs["event_idx"] = np.int64(event_index)
+
+
+class _Totals:
+    """Counts and span of the events."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._on = 0
+        self._first = 0.0
+        self._last = 0.0
+
+    def add(self, seconds: NDArray[np.float64], p: NDArray[np.uint8]) -> None:
+        if not self._count:
+            self._first = float(seconds[0])
+        self._last = float(seconds[-1])
+        self._count += seconds.size
+        self._on += int(np.count_nonzero(p))
+
+    def attributes(self) -> dict[str, Any]:
+        return {
+            "num_events": np.int64(self._count),
+            "num_pos": np.int64(self._on),
+            "num_neg": np.int64(self._count - self._on),
+            "duration": np.float64(self._last - self._first),
+            "t0": np.float64(self._first),
+            "tk": np.float64(self._last),
+        }
+
+
+class _EventIndices:
+    """Finds the last event before each frame; frames may come before the events around them."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._last = -np.inf
+        self._waiting: list[float] = []
+        self._found: list[int] = []
+
+    def add_frame(self, seconds: float) -> None:
+        """Note a frame; it is settled once an event at or after its time has come."""
+        if seconds <= self._last:
+            raise ValueError("a frame must come before the events that follow it")
+        self._waiting.append(seconds)
+
+    def add_events(self, seconds: NDArray[np.float64]) -> None:
+        settled = int(np.searchsorted(self._waiting, seconds[-1], side="right"))
+        before = np.searchsorted(seconds, self._waiting[:settled], side="left")
+        self._found.extend(max(self._count + int(n) - 1, 0) for n in before)
+        del self._waiting[:settled]
+        self._count += seconds.size
+        self._last = float(seconds[-1])
+
+    def finish(self) -> list[int]:
+        """Return the index for each frame."""
+        return self._found + [max(self._count - 1, 0)] * len(self._waiting)
