@@ -1,0 +1,124 @@
+"""``adv2e compare``: how far a simulated stream is from a measured one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from adv2e.cli import options
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from adv2e.cli.options import Log
+    from adv2e.comparison.compare import Resimulation
+    from adv2e.config import Config
+    from adv2e.recordings import Recording
+    from adv2e.sources import Source
+
+
+@click.command("compare")
+@click.argument("measured", metavar="MEASURED")
+@click.argument("simulated", metavar="SIMULATED")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, with the value of each window.")
+@click.option(
+    "--window",
+    "window_s",
+    type=options.FiniteNumber(min=1e-6),
+    metavar="S",
+    help="Compare windows of S seconds."
+    "  [default: frame intervals; 0.05 where MEASURED has no frames]",
+)
+@click.option(
+    "--frames",
+    "frames_path",
+    metavar="INPUT",
+    help="Frames for the intervals and the floor of two seeds, on the clock of MEASURED."
+    "  [default: those in MEASURED]",
+)
+@options.config_options
+@options.threads_option
+@options.verbosity_options
+def command(
+    measured: str,
+    simulated: str,
+    as_json: bool,
+    window_s: float | None,
+    frames_path: str | None,
+    config: Config,
+    threads: int | None,
+    log: Log,
+) -> None:
+    r"""Measure how far two event streams are apart.
+
+    MEASURED and SIMULATED are event files of one size and on one clock. Every distance is printed
+    with its definition and with the same distance between two halves of the measured events, which
+    is about what chance alone makes. With -c, --set or --seed, and frames, also with the distance
+    between two simulations of that configuration that differ in their seed.
+
+    \b
+    Examples:
+      adv2e compare urban.zip urban_simulated.h5
+      adv2e compare urban.zip urban_simulated.h5 -c davis240c --json
+      adv2e compare measured.txt simulated.txt --window 0.02
+    """
+    from adv2e.comparison.compare import compare
+    from adv2e.recordings import read_recording
+    from adv2e.sources import open_source
+
+    ours, theirs = read_recording(measured), read_recording(simulated)
+    source = open_source(frames_path) if frames_path else None
+    times = _frame_times(source) if source else None
+    again = _resimulation(ours, source, config, threads, log) if _configured() else None
+    report = compare(ours, theirs, frame_times_ns=times, window_s=window_s, again=again)
+    for stream in (ours, theirs):
+        for problem in stream.problems:
+            log(f"{stream.path}: {problem}")
+    if as_json:
+        import json
+
+        click.echo(json.dumps(report, indent=2, allow_nan=False))
+    else:
+        from adv2e.comparison.report import text
+
+        click.echo(text(report))
+
+
+def _configured() -> bool:
+    """Tell whether a configuration was asked for on the command line."""
+    given = click.get_current_context().params
+    return bool(given["config_files"] or given["sets"] or given["seed"] is not None)
+
+
+def _frame_times(source: Source) -> NDArray[np.int64]:
+    import numpy as np
+
+    return np.array([frame.t_ns for frame in source.frames()], dtype=np.int64)
+
+
+def _resimulation(
+    measured: Recording, source: Source | None, config: Config, threads: int | None, log: Log
+) -> Resimulation:
+    """Return how to simulate the frames of `source`, or of `measured`, again."""
+    from adv2e import jit
+    from adv2e.comparison.compare import Resimulation
+    from adv2e.comparison.resimulation import resimulator
+    from adv2e.errors import DataError
+
+    if source is not None:
+        frames, encoding = source.frames, source.encoding
+    elif measured.frame_times_ns is not None:
+        stored = measured.metadata.get("source")
+        frames = measured.frames
+        encoding = stored.get("encoding", "linear") if isinstance(stored, dict) else "linear"
+    else:
+        raise DataError(
+            f"{measured.path}: holds no frames to simulate with this configuration; give them with"
+            " --frames"
+        )
+    if not jit.is_cached("run_tile"):
+        log("compiling the pixel's kernel (once; about half a minute)")
+    simulate_events = resimulator(frames, config, encoding, threads=threads)
+    return Resimulation(simulate_events, (config.seed, config.seed + 1))

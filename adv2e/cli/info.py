@@ -1,0 +1,53 @@
+"""``adv2e info``: what a recording, an event file or a video holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from adv2e.cli import options
+
+
+@click.command("info")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print JSON; all keys are always there.")
+@click.option(
+    "--fps",
+    type=options.FiniteNumber(min=0, min_open=True),
+    help="Frames a second, for images without times.",
+)
+@click.option(
+    "--timestamps",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Times of the frames [s], one a line.",
+)
+@options.verbosity_options
+def command(
+    file: Path, as_json: bool, fps: float | None, timestamps: Path | None, log: options.Log
+) -> None:
+    r"""Say what a recording or event file holds.
+
+    Tells geometry, span, counts and rates of the events, the frames, which program and seed made
+    the file where it says so, and what is odd: disorder, repeated events, gaps, hot pixels. A video
+    is read to its end.
+
+    \b
+    Examples:
+      adv2e info urban.zip
+      adv2e info clip.events.h5 --json
+      adv2e info clip.mp4
+    """
+    from adv2e.inspection.inspect import inspect
+
+    log(f"reading {file}", 1)
+    report = inspect(file, fps=fps, timestamps=timestamps)
+    if as_json:
+        import json
+
+        click.echo(json.dumps(report, indent=2, allow_nan=False))
+    else:
+        from adv2e.inspection.report import text
+
+        click.echo(text(report))

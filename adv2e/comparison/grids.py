@@ -1,0 +1,92 @@
+r"""The voxel grid ("temporal bins") of the events of one window.
+
+.. math::
+    t^*_i = (B-1)\,\frac{t_i - t_{first}}{t_{last} - t_{first}}, \qquad
+    E(k, y, x) = \sum_i s_i \max(0, 1 - |k - t^*_i|), \qquad s_i = \pm 1
+
+A window without extent is divided by 1.
+
+References
+----------
+.. [1] H. Rebecq, R. Ranftl, V. Koltun, D. Scaramuzza, "High Speed and High Dynamic Range Video
+   with an Event Camera", TPAMI 2021, doi:10.1109/TPAMI.2019.2963386.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.comparison.windows import Window
+from adv2e.events import Events
+
+Grid = NDArray[np.float64]
+"""(bins, rows, columns)."""
+
+_GAUSS = np.exp(-0.5 * np.array([1.0, 0.0, 1.0]))
+SMOOTHING = _GAUSS / _GAUSS.sum()
+"""One axis of the 3x3 Gaussian, sigma 1 pixel."""
+
+
+def signs(events: Events) -> NDArray[np.float64]:
+    """Return +1 for each ON event and -1 for each OFF event."""
+    return np.where(events["p"] > 0, 1.0, -1.0)
+
+
+def voxel_grid(events: Events, window: Window, bins: int, width: int, height: int) -> Grid:
+    """Return the signed grid of `events`, bilinear in time.
+
+    Parameters
+    ----------
+    events : Events
+        All of them inside `window`.
+    window : (first, last)
+        Times that stand for the middles of the first and of the last bin [us].
+    bins : int
+        Number of bins; with 1 all events weigh the same.
+    width, height : int
+        Columns and rows of the sensor.
+    """
+    first, last = window
+    place = (bins - 1) * (events["t"] - first) / ((last - first) or 1)
+    lower = np.minimum(place.astype(np.int64), max(bins - 2, 0))
+    share = place - lower
+    pixels = width * height
+    cell = (lower * height + events["y"]) * width + events["x"]
+    sign = signs(events)
+    grid: Grid = np.bincount(cell, sign * (1.0 - share), bins * pixels).astype(
+        np.float64, copy=False
+    )
+    if bins > 1:
+        grid += np.bincount(cell + pixels, sign * share, bins * pixels)
+    return grid.reshape(bins, height, width)
+
+
+def own_window(events: Events) -> Window:
+    """Return the times of the first and last event [us], as E2VID takes them."""
+    return (int(events["t"][0]), int(events["t"][-1])) if len(events) else (0, 0)
+
+
+def z_scored(grid: Grid) -> Grid:
+    """Return (E - mean)/deviation over the cells that are not zero; zeros stay zero.
+
+    Cells that are all equal have no deviation and are divided by 1.
+    """
+    filled = grid != 0
+    values = grid[filled]
+    scored = np.zeros_like(grid)
+    if values.size:
+        scored[filled] = (values - values.mean()) / (values.std() or 1.0)
+    return scored
+
+
+def smoothed(grid: Grid) -> Grid:
+    """Return the grid after a 3x3 Gaussian of sigma 1 pixel in space; nothing lies outside."""
+    side, middle, _ = SMOOTHING
+    rows: Grid = middle * grid
+    rows[:, 1:] += side * grid[:, :-1]
+    rows[:, :-1] += side * grid[:, 1:]
+    both: Grid = middle * rows
+    both[:, :, 1:] += side * rows[:, :, :-1]
+    both[:, :, :-1] += side * rows[:, :, 1:]
+    return both

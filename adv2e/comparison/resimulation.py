@@ -1,0 +1,58 @@
+"""A configuration and frames as a function from a seed to events, for the floor of two seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config.model import Config
+from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.events import Events
+from adv2e.simulation import events_from_light
+from adv2e.sources.base import Frame
+
+
+def resimulator(
+    frames: Callable[[], Iterable[Frame]],
+    config: Config,
+    encoding: str,
+    *,
+    threads: int | None = None,
+) -> Callable[[int], Events]:
+    """Return a function that simulates `frames` with a seed and returns sorted events.
+
+    Parameters
+    ----------
+    frames : callable
+        Starts reading the frames from the beginning, each time it is called.
+    config : Config
+        All but the seed.
+    encoding : str
+        What ``frames.encoding: auto`` means for these frames.
+    threads : int, optional
+        Default: all cores.  The events do not depend on it.
+    """
+    chosen = encoding if config.frames.encoding == "auto" else config.frames.encoding
+
+    def simulate_events(seed: int) -> Events:
+        light = _light(frames(), chosen, config.frames.full_scale)
+        chunks = events_from_light(light, replace(config, seed=seed), threads=threads)
+        return np.concatenate(list(chunks))
+
+    return simulate_events
+
+
+def _light(
+    frames: Iterable[Frame], encoding: str, full_scale: float | None
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    decoder: LightDecoder | None = None
+    for frame in frames:
+        if decoder is None:
+            dtype = frame.image.dtype
+            white = full_scale or full_scale_of(dtype)
+            decoder = LightDecoder(encoding, white, dtype, frame.image.ndim == 3)
+        yield frame.t_ns, decoder.decode(frame.image)

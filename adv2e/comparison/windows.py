@@ -1,0 +1,121 @@
+"""Over which stretches of time two recordings are compared.
+
+A window is half open, ``[start, stop)``.  Windows are the frame intervals of the measured
+recording, or, where it has no frames, pieces of one length.  Only windows that lie inside the spans
+of both streams count, so that a stream is never blamed for time that it does not cover; both
+streams are cut to them.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.errors import DataError
+from adv2e.events import Events
+
+Window = tuple[int, int]
+"""Start and stop [us], half open."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """The windows in use, in order and without gaps."""
+
+    kind: str
+    """What they are, in words."""
+    used: tuple[Window, ...]
+    total: int
+    """How many there were before those outside the spans went."""
+
+    @property
+    def start(self) -> int:
+        """Start of the first window [us]."""
+        return self.used[0][0]
+
+    @property
+    def stop(self) -> int:
+        """Stop of the last window [us]."""
+        return self.used[-1][1]
+
+    @property
+    def duration_s(self) -> float:
+        """Time that all windows cover [s]."""
+        return (self.stop - self.start) / 1e6
+
+
+def cut(events: Events, start: int, stop: int) -> Events:
+    """Return the part of the sorted `events` with start <= t < stop [us], as a view."""
+    first, last = np.searchsorted(events["t"], (start, stop))
+    return events[first:last]
+
+
+def span_of(events: Events, frame_times_ns: NDArray[np.int64] | None = None) -> Window | None:
+    """Return first and last time of the stream [us], None if there is nothing in it.
+
+    Frame times [ns], where given, belong to the span: a simulated pixel may keep still on its
+    first frames.
+    """
+    times = [events["t"][[0, -1]]] if len(events) else []
+    if frame_times_ns is not None and len(frame_times_ns):
+        times.append(to_us(frame_times_ns))
+    if not times:
+        return None
+    return int(min(t.min() for t in times)), int(max(t.max() for t in times))
+
+
+def to_us(times_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return times [ns] in whole microseconds, to the nearest."""
+    return (np.asarray(times_ns, dtype=np.int64) + 500) // 1000
+
+
+def frame_windows(frame_times_ns: NDArray[np.int64], spans: Sequence[Window]) -> Windows:
+    """Return the frame intervals that lie inside all `spans`.
+
+    Parameters
+    ----------
+    frame_times_ns : array of int64, (frames,)
+        Times of the frames [ns], increasing.
+    spans : sequence of (first, last)
+        Spans of the streams [us].
+
+    Raises
+    ------
+    DataError
+        The spans have no whole frame interval in common.
+    """
+    edges = [int(t) for t in to_us(frame_times_ns)]
+    return _inside("frame intervals", list(itertools.pairwise(edges)), spans)
+
+
+def fixed_windows(length_us: int, spans: Sequence[Window]) -> Windows:
+    """Return windows of `length_us` from the later of the two beginnings on.
+
+    Raises
+    ------
+    DataError
+        The spans have no whole window in common.
+    """
+    first, last = _common(spans)
+    starts = range(first, last - length_us + 1, length_us)
+    windows = [(start, start + length_us) for start in starts]
+    return _inside(f"windows of {length_us / 1e6:g} s", windows, spans)
+
+
+def _common(spans: Sequence[Window]) -> Window:
+    return max(span[0] for span in spans), min(span[1] for span in spans)
+
+
+def _inside(kind: str, windows: Sequence[Window], spans: Sequence[Window]) -> Windows:
+    first, last = _common(spans)
+    used = tuple(window for window in windows if first <= window[0] and window[1] <= last)
+    if not used:
+        raise DataError(
+            f"the streams share {max(0, last - first) / 1e6:g} s, which hold none of the {kind}"
+            " wholly: give shorter windows with --window, or longer streams"
+        )
+    return Windows(kind, used, len(windows))

@@ -1,0 +1,1 @@
+"""What a file holds: ``events.py`` for events, ``frames.py`` for frames, ``report.py`` for both."""

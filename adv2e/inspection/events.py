@@ -1,0 +1,102 @@
+"""What a stream of events holds, and what is odd about it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from adv2e.events import Events
+from adv2e.sources.times import seconds
+
+GAP_STEPS = 100
+"""A gap is longer than this many median steps between events, ..."""
+GAP_US = 10_000
+"""... and than this [us]: shorter pauses are ordinary, since events come in bursts."""
+HOT_FACTOR = 10
+"""A hot pixel fires more often than this many times the 99.9 % quantile of all pixels."""
+HOT_LISTED = 5
+"""Hot pixels listed by position."""
+
+
+def describe_events(events: Events, width: int, height: int) -> dict[str, Any]:
+    """Return counts, span, rates and tick of `events`; None for what a few events cannot tell.
+
+    Parameters
+    ----------
+    events : Events
+        In any order.
+    width, height : int
+        Columns and rows of the sensor.
+    """
+    count, on = len(events), int(np.count_nonzero(events["p"]))
+    first = int(events["t"].min()) if count else None
+    last = int(events["t"].max()) if count else None
+    duration_s = (last - first) / 1e6 if first is not None and last is not None else None
+    rate_hz = count / duration_s if duration_s else None
+    return {
+        "count": count,
+        "on": on,
+        "off": count - on,
+        "on_share": on / count if count else None,
+        "first_us": first,
+        "last_us": last,
+        "duration_s": duration_s,
+        "rate_hz": rate_hz,
+        "rate_per_pixel_hz": rate_hz / (width * height) if rate_hz else None,
+        "tick_us": tick_us(events),
+    }
+
+
+def tick_us(events: Events) -> int | None:
+    """Return the greatest common divisor of all time differences [us], None if there are none."""
+    if not len(events):
+        return None
+    return int(np.gcd.reduce(events["t"] - events["t"][0])) or None
+
+
+def oddities_of(events: Events, width: int, height: int) -> list[str]:
+    """Return gaps in time and hot pixels, a line each.
+
+    Parameters
+    ----------
+    events : Events
+        Sorted, all inside the sensor.
+    width, height : int
+        Columns and rows of the sensor.
+    """
+    if not len(events):
+        return []
+    return [line for line in (_gaps(events), _hot(events, width, height)) if line]
+
+
+def _gaps(events: Events) -> str:
+    steps = np.diff(events["t"])
+    moving = steps[steps > 0]
+    if not len(moving):
+        return ""
+    limit = max(GAP_US, GAP_STEPS * float(np.median(moving)))
+    gaps = np.flatnonzero(steps > limit)
+    if not len(gaps):
+        return ""
+    longest = int(np.argmax(steps))
+    return (
+        f"{_number_of(len(gaps), 'gap')} over {limit / 1000:g} ms, the longest of"
+        f" {steps[longest] / 1000:g} ms after {seconds(int(events['t'][longest]) * 1000)} s"
+    )
+
+
+def _hot(events: Events, width: int, height: int) -> str:
+    counts = np.bincount(events["y"].astype(np.int64) * width + events["x"])
+    usual = np.quantile(np.pad(counts, (0, width * height - len(counts))), 0.999)
+    hot = np.flatnonzero(counts > HOT_FACTOR * max(usual, 1.0))
+    if not len(hot):
+        return ""
+    top = hot[np.argsort(-counts[hot], kind="stable")][:HOT_LISTED]
+    listed = ", ".join(f"({i % width}, {i // width}): {counts[i]:,} events" for i in top)
+    more = f" and {len(hot) - len(top):,} more" if len(hot) > len(top) else ""
+    return f"{_number_of(len(hot), 'hot pixel')} (x, y): {listed}{more}"
+
+
+def _number_of(count: int, what: str) -> str:
+    return f"{count:,} {what}" + "s" * (count != 1)

@@ -1,0 +1,111 @@
+"""Everything that is told of one file, as one dictionary."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.inspection.events import describe_events, oddities_of
+from adv2e.inspection.frames import describe_times
+from adv2e.recordings import Recording, read_recording
+from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
+
+EVENTS = "events.txt"
+"""The file of events in a DAVIS240C folder or zip."""
+
+
+def inspect(
+    path: Path, *, fps: float | None = None, timestamps: Path | None = None
+) -> dict[str, Any]:
+    """Return what a recording, an event file or an input with frames holds, ready for JSON.
+
+    Parameters
+    ----------
+    path : Path
+        Any file or folder that can be compared or converted.
+    fps, timestamps
+        Times of frames, see :func:`adv2e.sources.open_source`; for inputs without events.
+
+    Returns
+    -------
+    dict
+        ``file``, ``layout``, ``width``, ``height``, ``events`` (None without), ``frames`` (None
+        without), ``problems``, ``notes``, ``metadata``: always all of them.
+
+    Raises
+    ------
+    DataError
+        The file is missing, of an unknown kind, or cannot be read.
+    """
+    if _has_only_frames(path):
+        return _of_source(open_source(path, fps=fps, timestamps=timestamps))
+    return _of_recording(read_recording(path))
+
+
+def _has_only_frames(path: Path) -> bool:
+    if path.is_dir():
+        return not (path / EVENTS).is_file()
+    if path.suffix.lower() == ".zip":
+        names = _members(path)
+        return "images.txt" in names and EVENTS not in names
+    return path.suffix.lower() in (*VIDEO_SUFFIXES, ".npy")
+
+
+def _members(path: Path) -> set[str]:
+    """Return the names of the files in a zip, without folders; none if it cannot be read."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return {PurePosixPath(name).name for name in archive.namelist()}
+    except (OSError, zipfile.BadZipFile):
+        return set()
+
+
+def _of_recording(recording: Recording) -> dict[str, Any]:
+    size = (recording.width, recording.height)
+    frames = None
+    if recording.frame_times_ns is not None:
+        first = next(recording.frames(), None)
+        frames = {
+            **describe_times(recording.frame_times_ns),
+            "dtype": None if first is None else first.image.dtype.name,
+            "colour": None if first is None else first.image.ndim == 3,
+        }
+    return {
+        "file": str(recording.path),
+        "layout": recording.layout,
+        "width": recording.width,
+        "height": recording.height,
+        "events": describe_events(recording.events, *size),
+        "frames": frames,
+        "problems": [*recording.problems, *oddities_of(recording.events, *size)],
+        "notes": [],
+        "metadata": recording.metadata,
+    }
+
+
+def _of_source(source: Source) -> dict[str, Any]:
+    return {
+        "file": source.path,
+        "layout": source.kind,
+        "width": source.width,
+        "height": source.height,
+        "events": None,
+        "frames": {
+            **describe_times(_times_ns(source)),
+            "dtype": source.dtype.name,
+            "colour": source.colour,
+            "encoding": source.encoding,
+            "own_clock": source.has_clock,
+        },
+        "problems": [],
+        "notes": list(source.notes),
+        "metadata": {},
+    }
+
+
+def _times_ns(source: Source) -> NDArray[np.int64]:
+    return np.array([frame.t_ns for frame in source.frames()], dtype=np.int64)

@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from adv2e.comparison import resimulation
+from adv2e.events import make_events, sort_events
+from adv2e.sinks import open_sink
+
+WIDTH, HEIGHT = 10, 8
+
+
+def some_events(seed, count=2000, last=100_000):
+    draw = np.random.default_rng(seed)
+    x, y = draw.integers(0, WIDTH, count), draw.integers(0, HEIGHT, count)
+    t = draw.choice(last, count, replace=False)
+    return sort_events(make_events(t, x, y, draw.integers(0, 2, count)))
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write events, and frames at the times given [ms], to a file."""
+
+    def write_file(name, events, frames_ms=(), width=WIDTH, metadata=None):
+        path = tmp_path / name
+        size = {"width": width, "height": HEIGHT}
+        with open_sink(path, **size, metadata=metadata or {}, with_frames=bool(frames_ms)) as sink:
+            for t_ms in frames_ms:
+                sink.write_frame(t_ms * 1_000_000, np.full((HEIGHT, width), t_ms, np.uint8))
+            sink.write_events(events)
+        return path
+
+    return write_file
+
+
+@pytest.fixture
+def pair(write):
+    measured = write("real.h5", some_events(1), range(0, 101, 20))
+    return measured, write("made.h5", some_events(2))
+
+
+@pytest.fixture
+def simulation(monkeypatch):
+    """Stand in for the simulation: events that depend on the seed, calls remembered."""
+    calls = []
+
+    def events_from_light(light, config, *, threads=None):
+        calls.append(([float(image[0, 0]) for _, image in light], config, threads))
+        yield some_events(config.seed + 100)
+
+    monkeypatch.setattr(resimulation, "events_from_light", events_from_light)
+    return calls
+
+
+def test_the_table_shows_every_distance_with_its_floor(adv2e, pair):
+    status, out, err = adv2e("compare", *pair)
+    assert (status, err) == (0, "")
+    assert "over 3 of 5 frame intervals, 0.02 to 0.08 s" in out
+    row = next(line for line in out.splitlines() if line.startswith("bins_shared_window"))
+    assert [float(value) > 0 for value in row.split()[1:]] == [True, True]
+    assert "two_seeds" not in out
+
+
+def test_json_holds_definitions_values_floors_and_windows(adv2e, pair):
+    report = json.loads(adv2e("compare", *pair, "--json").out)
+    measure = report["measures"]["relative_5_bins"]
+    assert set(measure) == {"definition", "value", "floor", "per_window"}
+    assert len(measure["per_window"]) == report["windows"]["used"] == 3
+    assert measure["floor"]["two_seeds"] is None
+    assert report["measured"]["file"].endswith("real.h5")
+
+
+def test_a_window_in_seconds_replaces_frame_intervals(adv2e, pair):
+    report = json.loads(adv2e("compare", *pair, "--json", "--window", "0.01").out)
+    assert report["windows"]["kind"] == "windows of 0.01 s"
+    assert report["windows"]["used"] == 9
+
+
+def test_a_configuration_gives_the_floor_of_two_seeds(adv2e, pair, simulation):
+    args = ("-c", "ideal", "--set", "frames.encoding=linear", "--seed", "5", "--threads", "1")
+    report = json.loads(adv2e("compare", *pair, "--json", *args).out)
+    assert report["measures"]["relative_5_bins"]["floor"]["two_seeds"] > 0
+    assert [config.seed for _, config, _ in simulation] == [5, 6]
+    assert simulation[0][0] == [0, 20, 40, 60, 80, 100]
+    assert simulation[0][2] == 1
+
+
+def test_frames_of_a_file_of_ours_keep_their_encoding(adv2e, write, simulation):
+    metadata = {"source": {"encoding": "srgb"}}
+    measured = write("first.h5", some_events(1), (0, 50, 60), metadata=metadata)
+    assert adv2e("compare", measured, measured, "-c", "adv2e").status == 0
+    assert simulation[0][0] == [
+        pytest.approx(255 * ((value / 255 + 0.055) / 1.055) ** 2.4 if value else 0)
+        for value in (0, 50, 60)
+    ]
+
+
+def test_frames_from_elsewhere_make_windows_and_floor(adv2e, write, simulation, tmp_path):
+    measured, simulated = write("real.h5", some_events(1)), write("made.h5", some_events(2))
+    np.save(tmp_path / "frames.npy", np.zeros((6, HEIGHT, WIDTH), np.uint8))
+    times = "".join(f"{0.02 * n:.6f}\n" for n in range(6))
+    (tmp_path / "frames.timestamps.txt").write_text(times)
+    files = (measured, simulated, "--frames", tmp_path / "frames.npy", "-c", "ideal")
+    report = json.loads(adv2e("compare", *files, "--json").out)
+    assert report["windows"]["edges_us"] == [20_000, 40_000, 60_000, 80_000]
+    assert len(simulation[0][0]) == 6
+
+
+def test_a_floor_of_two_seeds_without_frames_says_what_to_give(adv2e, write):
+    measured, simulated = write("real.h5", some_events(1)), write("made.h5", some_events(2))
+    status, out, err = adv2e("compare", measured, simulated, "-c", "ideal")
+    assert (status, out) == (1, "")
+    assert "real.h5: holds no frames" in err
+    assert "--frames" in err
+
+
+def test_sizes_that_differ_are_refused_in_one_line(adv2e, write, pair):
+    other = write("other.h5", some_events(2), width=WIDTH + 2)
+    status, out, err = adv2e("compare", pair[0], other)
+    assert (status, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "12x8" in err
+    assert "10x8" in err
+
+
+def test_streams_on_different_clocks_are_refused_with_their_spans(adv2e, write, pair):
+    later = some_events(2)
+    later["t"] += 1_000_000_000
+    status, _, err = adv2e("compare", pair[0], write("later.h5", later))
+    assert status == 1
+    assert err.count("\n") == 1
+    assert "spans 1000.0" in err
+
+
+@pytest.mark.parametrize("args", [["--window", "0"], ["--window", "x"], ["--set", "pixel.nope=1"]])
+def test_a_wrong_command_line_has_status_2(adv2e, pair, args):
+    assert adv2e("compare", *pair, *args).status == 2
+
+
+def test_what_is_doubtful_in_a_file_is_told_unless_quiet(adv2e, write, pair):
+    events = some_events(2)
+    doubtful = write("twice.h5", np.repeat(events, 2))
+    assert "twice.h5: 2000 events repeat" in adv2e("compare", pair[0], doubtful).err
+    assert adv2e("compare", pair[0], doubtful, "-q").err == ""
+
+
+def test_a_missing_file_has_status_1(adv2e, pair, tmp_path):
+    status, _, err = adv2e("compare", pair[0], tmp_path / "none.h5")
+    assert status == 1
+    assert "none.h5" in err

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from adv2e.comparison.grids import own_window, smoothed, voxel_grid, z_scored
+from adv2e.events import empty_events, make_events
+
+WIDTH, HEIGHT = 12, 9
+
+
+def slow_grid(events, window, bins):
+    """The definition, event by event and bin by bin."""
+    grid = np.zeros((bins, HEIGHT, WIDTH))
+    first, last = window
+    span = last - first if last != first else 1
+    for event in events:
+        place = (bins - 1) * (int(event["t"]) - first) / span
+        for k in range(bins):
+            sign = 1 if event["p"] else -1
+            grid[k, event["y"], event["x"]] += sign * max(0.0, 1.0 - abs(k - place))
+    return grid
+
+
+@pytest.mark.parametrize("bins", [1, 2, 5])
+def test_the_grid_is_that_of_the_definition(events, bins):
+    window = (0, 100_000)
+    np.testing.assert_allclose(
+        voxel_grid(events, window, bins, WIDTH, HEIGHT), slow_grid(events, window, bins), atol=1e-12
+    )
+
+
+def test_the_grid_holds_every_event_once(events):
+    grid = voxel_grid(events, own_window(events), 5, WIDTH, HEIGHT)
+    assert grid.sum() == pytest.approx(2 * events["p"].sum() - len(events))
+
+
+def test_first_and_last_event_fill_first_and_last_bin():
+    events = make_events([10, 30], [1, 2], [3, 4], [1, 0])
+    grid = voxel_grid(events, own_window(events), 5, WIDTH, HEIGHT)
+    assert grid[0, 3, 1] == 1
+    assert grid[4, 4, 2] == -1
+    assert np.abs(grid).sum() == 2
+
+
+def test_events_of_a_single_time_fall_into_the_first_bin():
+    events = make_events([7, 7], [1, 2], [3, 4], [1, 1])
+    grid = voxel_grid(events, own_window(events), 5, WIDTH, HEIGHT)
+    assert grid[0].sum() == 2
+    assert not grid[1:].any()
+
+
+def test_epoch_times_keep_their_microseconds(events):
+    later = events.copy()
+    later["t"] += 1_468_941_032_229_165
+    start = 1_468_941_032_229_165
+    np.testing.assert_array_equal(
+        voxel_grid(events, (0, 100_000), 5, WIDTH, HEIGHT),
+        voxel_grid(later, (start, start + 100_000), 5, WIDTH, HEIGHT),
+    )
+
+
+def test_no_events_make_an_empty_grid():
+    none = empty_events()
+    assert voxel_grid(none, own_window(none), 5, WIDTH, HEIGHT).shape == (5, HEIGHT, WIDTH)
+    assert not z_scored(np.zeros((5, HEIGHT, WIDTH))).any()
+
+
+def test_z_score_is_taken_over_the_cells_that_are_not_zero(events):
+    grid = voxel_grid(events[:200], (0, 100_000), 5, WIDTH, HEIGHT)
+    filled = grid != 0
+    assert 0 < filled.sum() < grid.size
+    scored = z_scored(grid)
+    assert not scored[~filled].any()
+    assert scored[filled].mean() == pytest.approx(0, abs=1e-12)
+    assert scored[filled].std() == pytest.approx(1)
+
+
+def test_z_score_of_equal_cells_is_zero_rather_than_nan():
+    grid = np.zeros((1, HEIGHT, WIDTH))
+    grid[0, 2, 2] = grid[0, 5, 5] = 3.0
+    assert not z_scored(grid).any()
+
+
+def test_smoothing_is_a_3x3_gaussian_of_sigma_1_with_nothing_outside(events):
+    grid = voxel_grid(events, (0, 100_000), 5, WIDTH, HEIGHT)
+    y, x = np.mgrid[-1:2, -1:2]
+    weights = np.exp(-(x**2 + y**2) / 2)
+    weights /= weights.sum()
+    for k in range(5):
+        expected = ndimage.convolve(grid[k], weights, mode="constant")
+        np.testing.assert_allclose(smoothed(grid)[k], expected, atol=1e-12)

@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adv2e.comparison.intervals import inter_event_times, interval_statistics
+from adv2e.events import empty_events, make_events
+
+
+def test_times_run_to_the_next_event_of_the_same_pixel_of_either_polarity():
+    events = make_events([0, 100, 500, 1600, 2000], [3, 4, 3, 3, 4], [2] * 5, [1, 1, 0, 1, 1])
+    assert sorted(inter_event_times(events, 12).tolist()) == [500, 1100, 1900]
+
+
+def test_times_are_those_of_a_loop_over_the_events(events):
+    expected, last = [], {}
+    for event in events:
+        place = (event["x"], event["y"])
+        if place in last:
+            expected.append(event["t"] - last[place])
+        last[place] = event["t"]
+    assert sorted(inter_event_times(events, 12)) == sorted(expected)
+
+
+def test_quantiles_and_short_share():
+    steps = np.arange(1, 102) * 100
+    events = make_events(np.cumsum(np.r_[0, steps]), [1] * 102, [1] * 102, [1] * 102)
+    found = interval_statistics(events, 12)
+    assert found["inter_event_us_50"] == 5_100
+    assert found["inter_event_us_01"] == 200
+    assert found["inter_event_us_99"] == 10_000
+    assert found["inter_event_share_under_1ms"] == pytest.approx(9 / 101)
+
+
+def test_pixels_that_fire_once_have_no_times():
+    events = make_events([1, 2], [1, 2], [1, 1], [1, 1])
+    assert set(interval_statistics(events, 12).values()) == {None}
+    assert set(interval_statistics(empty_events(), 12).values()) == {None}
