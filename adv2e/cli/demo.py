@@ -1,0 +1,45 @@
+"""``adv2e demo``: a first try."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from adv2e.cli import options
+
+if TYPE_CHECKING:
+    from adv2e.cli.options import Log
+    from adv2e.config import Config
+
+
+@click.command("demo")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("adv2e-demo"),
+    show_default=True,
+    metavar="DIR",
+    help="Folder to make; what an earlier demo left in it is replaced.",
+)
+@options.config_options
+@options.threads_option
+@options.progress_option
+@options.verbosity_options
+def command(output: Path, config: Config, threads: int | None, progress: bool, log: Log) -> None:
+    r"""Make a sample clip, convert it and render the events.
+
+    The clip is a textured scene with disks of high contrast that moves, rests, moves and rests.
+
+    \b
+    Examples:
+      adv2e demo
+      adv2e demo -o v2e-demo -c v2e
+    """
+    from adv2e.demo import run_demo
+
+    demo = run_demo(output, config, threads=threads, progress=progress, log=log)
+    if log.level >= 0:
+        click.echo(demo.text())

@@ -1,0 +1,135 @@
+"""``adv2e render``: pictures and films of events."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from adv2e.cli import options
+
+if TYPE_CHECKING:
+    from adv2e.cli.options import Log
+
+SECONDS = options.FiniteNumber(min=0)
+POSITIVE = options.FiniteNumber(min=0, min_open=True)
+
+
+@click.command("render")
+@click.argument("events", metavar="EVENTS")
+@options.output_options
+@options.progress_option
+@options.verbosity_options
+@click.option(
+    "--style",
+    type=click.Choice(["white", "black", "grey", "surface"]),
+    default="white",
+    show_default=True,
+    help="Colours on white or black; grey: net count, as v2e; surface: fading with age.",
+)
+@click.option("--on-color", default="red", show_default=True, help="Name or #rrggbb.")
+@click.option("--off-color", default="blue", show_default=True, help="Name or #rrggbb.")
+@click.option(
+    "--window",
+    type=POSITIVE,
+    metavar="MS",
+    help="Length of what one picture shows.  [default: in a film, up to the one before; else 20]",
+)
+@click.option("--fps", type=POSITIVE, default=30.0, show_default=True, help="Pictures a second.")
+@click.option(
+    "--speed",
+    type=POSITIVE,
+    default=1.0,
+    show_default=True,
+    help="Recorded seconds a second of film; 0.1 is ten times slower than life.",
+)
+@click.option("--start", type=SECONDS, default=0.0, metavar="S", help="Begin S seconds in.")
+@click.option("--stop", type=SECONDS, metavar="S", help="End S seconds in.")
+@click.option(
+    "--at", "at_s", type=SECONDS, multiple=True, metavar="S", help="Instant of a .png. Repeatable."
+)
+@click.option(
+    "--count",
+    type=click.IntRange(min=1, max=100),
+    default=6,
+    show_default=True,
+    help="Instants of a .png without --at, evenly spaced.",
+)
+@click.option(
+    "--beside/--no-beside",
+    "frames",
+    default=None,
+    help="Show the frames at the left of the events.  [default: if there are frames]",
+)
+@click.option(
+    "--scale",
+    type=click.IntRange(min=1, max=32),
+    help="Repeat pixels so often.  [default: panels about 640 pixels wide]",
+)
+def command(
+    events: str,
+    output: str | None,
+    overwrite: bool,
+    progress: bool,
+    log: Log,
+    style: str,
+    on_color: str,
+    off_color: str,
+    window: float | None,
+    fps: float,
+    speed: float,
+    start: float,
+    stop: float | None,
+    at_s: tuple[float, ...],
+    count: int,
+    frames: bool | None,
+    scale: int | None,
+) -> None:
+    r"""Draw pictures and films of events.
+
+    EVENTS is anything that 'adv2e info' reads. The suffix of OUT says what to make: .mp4 or .gif
+    a film, .avi a film without loss, .png a sheet of one or several instants. Times are counted
+    from the first event or frame.
+
+    \b
+    Examples:
+      adv2e render clip.events.h5 -o clip.mp4
+      adv2e render clip.events.h5 -o slow.gif --start 0.2 --stop 0.4 --speed 0.1
+      adv2e render urban.zip -o urban.png --at 1.5 --at 2.5 --window 10 --style grey
+    """
+    if output is None:
+        raise click.UsageError("-o is missing: a .mp4, .avi, .gif or .png file")
+    if stop is not None and stop <= start:
+        raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
+    from adv2e.recordings import read_recording
+    from adv2e.rendering import Style, check_suffix, parse_colour, render_recording
+
+    is_film = check_suffix(output) != ".png"
+    if at_s and is_film:
+        raise click.UsageError("--at is for a .png; --start and --stop choose the part for a film")
+    usual_ms = 1e3 * speed / fps if is_film else 20.0
+    chosen = Style(
+        name=style,
+        on=parse_colour(on_color),
+        off=parse_colour(off_color),
+        window_us=max(1, round(1e3 * (window or usual_ms))),
+    )
+    recording = read_recording(events)
+    if frames and recording.frame_times_ns is None:
+        log(f"{events}: holds no frames to show beside the events")
+    render_recording(
+        recording,
+        output,
+        style=chosen,
+        fps=fps,
+        speed=speed,
+        at_s=at_s,
+        count=count,
+        start_s=start,
+        stop_s=stop,
+        frames=frames is not False,
+        scale=scale,
+        overwrite=overwrite,
+        progress=progress,
+    )
+    log(f"{output}: written")

@@ -1,0 +1,146 @@
+"""Pictures and films of a whole recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from tqdm import tqdm
+
+from adv2e.errors import DataError
+from adv2e.rendering.preview import Preview
+from adv2e.rendering.styles import Style
+from adv2e.rendering.timeline import Caption, caption
+
+if TYPE_CHECKING:
+    from adv2e.events import Events
+    from adv2e.recordings import Recording
+
+_CHUNK = 1 << 18  # events handed on at once where no frames divide them
+
+
+def render_recording(
+    recording: Recording,
+    path: str | Path,
+    *,
+    style: Style | None = None,
+    fps: float = 30.0,
+    speed: float = 1.0,
+    at_s: Sequence[float] = (),
+    count: int = 6,
+    start_s: float = 0.0,
+    stop_s: float | None = None,
+    frames: bool = True,
+    scale: int | None = None,
+    caption: Caption = caption,
+    overwrite: bool = False,
+    progress: bool = False,
+) -> None:
+    """Write a film (.mp4, .avi, .gif) or a contact sheet (.png) of `recording`.
+
+    Parameters
+    ----------
+    recording : Recording
+    path : str or Path
+        Output.
+    at_s : sequence of float
+        Instants of a sheet [s after the first event or frame]; none: `count`, evenly spaced.
+    start_s, stop_s : float
+        Part to show [s after the first event or frame].
+    style, fps, speed, frames, scale, caption, overwrite
+        See :class:`Preview`.
+    progress : bool
+        Show a progress bar on stderr.
+
+    Raises
+    ------
+    DataError
+        The recording holds no events and no frames, or none in the part to show.
+    OutputError, UsageError
+        See :class:`Preview`.
+    """
+    begin_us, until_us = _span_us(recording)
+    lasts = f"{recording.path}: lasts {(until_us - begin_us) * 1e-6:.3f} s"
+    frames = frames and recording.frame_times_ns is not None and recording.frame_times_ns.size > 0
+    if not (recording.width and recording.height):
+        raise DataError(f"{recording.path}: nothing tells how large the sensor is")
+    first_us = begin_us + round(start_s * 1e6)
+    if stop_s is not None:
+        until_us = min(until_us, begin_us + round(stop_s * 1e6))
+    if first_us >= until_us:
+        raise DataError(f"{lasts}, nothing is left from {start_s:g} s on")
+    instants = None
+    if Path(path).suffix.lower() == ".png":
+        instants = [begin_us + round(time * 1e6) for time in sorted(at_s)]
+        if instants and instants[-1] > until_us:
+            raise DataError(f"{lasts}, the instant {max(at_s):g} s is after the end")
+        instants = instants or _even(first_us, until_us, count)
+    with Preview(
+        path,
+        recording.width,
+        recording.height,
+        style=style,
+        fps=fps,
+        speed=speed,
+        instants_us=instants,
+        start_us=first_us,
+        frames=frames,
+        scale=scale,
+        caption=lambda since_us, shown: caption(since_us + first_us - begin_us, shown),
+        overwrite=overwrite,
+    ) as preview:
+        for frame, events in _parts(recording, first_us, until_us, frames, progress):
+            if frame is not None:
+                preview.add_frame(frame.t_ns, frame.image)
+            preview.add_events(events)
+
+
+def _span_us(recording: Recording) -> tuple[int, int]:
+    """Return the time of the first event or frame, and 1 us after the last [us]."""
+    times = [recording.events["t"][[0, -1]]] if recording.events.size else []
+    if recording.frame_times_ns is not None and recording.frame_times_ns.size:
+        times.append(np.asarray(recording.frame_times_ns)[[0, -1]] // 1000)
+    if not times:
+        raise DataError(f"{recording.path}: holds no events and no frames")
+    return min(int(pair[0]) for pair in times), max(int(pair[1]) for pair in times) + 1
+
+
+def _even(first_us: int, until_us: int, count: int) -> list[int]:
+    """Return the middles of `count` equal parts."""
+    span = until_us - first_us
+    return sorted({first_us + round(span * (k + 0.5) / count) for k in range(count)})
+
+
+def _parts(
+    recording: Recording, first_us: int, until_us: int, frames: bool, progress: bool
+) -> Iterator[tuple[Any, Events]]:
+    """Yield (frame or None, the events from it up to the next), within the part to show."""
+    events = recording.events
+    begin, end = np.searchsorted(events["t"], [first_us, until_us])
+    with tqdm(total=int(end - begin), unit="event", unit_scale=True, disable=not progress) as bar:
+        for frame, next_us in _frames(recording, first_us, until_us, frames):
+            stop = max(begin, np.searchsorted(events["t"][:end], next_us))
+            yield frame, events[:0]
+            for low, high in pairwise([*range(begin, stop, _CHUNK), stop]):
+                yield None, events[low:high]
+                bar.update(high - low)
+            begin = stop
+
+
+def _frames(
+    recording: Recording, first_us: int, until_us: int, frames: bool
+) -> Iterator[tuple[Any, int]]:
+    """Yield (frame, time of the next one or end of the part); first None, if events come first."""
+    before: Any = None
+    if frames:
+        for frame in recording.frames():
+            t_us = frame.t_ns // 1000
+            if t_us >= until_us:
+                break
+            if t_us > first_us:
+                yield before, t_us
+            before = frame
+    yield before, until_us

@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from adv2e.errors import OutputError, UsageError
+from adv2e.events import empty_events, make_events
+from adv2e.rendering import Preview, Style
+from adv2e.rendering.layout import GAP
+
+EVENTS = make_events(np.arange(0, 1_000_000, 500), np.arange(2000) % 32, [0] * 2000, [1, 0] * 1000)
+
+
+def make(path, *, frames=True, **more):
+    with Preview(path, 32, 24, **more) as preview:
+        for k in range(10):
+            if frames:
+                preview.add_frame(k * 100_000_000, np.full((24, 32), 20 * k, np.uint8))
+            preview.add_events(EVENTS[200 * k : 200 * (k + 1)])
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".avi", ".gif", ".png"])
+def test_only_the_finished_file_is_left(tmp_path, suffix):
+    path = tmp_path / f"view{suffix}"
+    make(path)
+    assert list(tmp_path.iterdir()) == [path]
+    assert path.stat().st_size > 1000
+
+
+def test_film_has_the_pictures_of_its_duration(tmp_path):
+    make(tmp_path / "view.avi", fps=25)
+    video = cv2.VideoCapture(str(tmp_path / "view.avi"))
+    assert video.get(cv2.CAP_PROP_FPS) == 25
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 25
+
+
+def test_slow_film_is_longer(tmp_path):
+    make(tmp_path / "view.avi", fps=10, speed=0.5)
+    video = cv2.VideoCapture(str(tmp_path / "view.avi"))
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 20
+
+
+def test_frames_make_the_picture_wider(tmp_path):
+    make(tmp_path / "with.png", scale=4, count=1)
+    make(tmp_path / "without.png", frames=False, scale=4, count=1)
+    wide, narrow = (cv2.imread(str(tmp_path / name)).shape for name in ("with.png", "without.png"))
+    assert wide[0] == narrow[0]
+    assert wide[1] == narrow[1] + 4 * 32 + GAP
+
+
+def test_styles_reach_the_file(tmp_path):
+    make(tmp_path / "view.png", frames=False, count=1, scale=8, style=Style(name="black"))
+    assert cv2.imread(str(tmp_path / "view.png")).mean() < 60
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif", ".png"])
+def test_an_error_leaves_nothing(tmp_path, suffix):
+    with pytest.raises(ZeroDivisionError), Preview(tmp_path / f"v{suffix}", 32, 24) as preview:
+        preview.add_events(EVENTS)
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".png"])
+def test_nothing_to_draw_leaves_nothing(tmp_path, suffix):
+    with (
+        pytest.raises(OutputError, match="no events or frames to draw"),
+        Preview(tmp_path / f"view{suffix}", 32, 24) as preview,
+    ):
+        preview.add_events(empty_events())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_frames_without_any_event(tmp_path):
+    with Preview(tmp_path / "view.avi", 32, 24, fps=10) as preview:
+        for k in range(10):
+            preview.add_frame(k * 100_000_000, np.zeros((24, 32), np.uint8))
+            preview.add_events(empty_events())
+    video = cv2.VideoCapture(str(tmp_path / "view.avi"))
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 9
+
+
+def test_an_existing_file_is_kept_unless_asked(tmp_path):
+    path = tmp_path / "view.png"
+    path.write_text("mine")
+    with pytest.raises(OutputError, match="--overwrite"):
+        make(path)
+    assert path.read_text() == "mine"
+    make(path, overwrite=True)
+    assert cv2.imread(str(path)) is not None
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_error_keeps_the_old_file(tmp_path):
+    path = tmp_path / "view.mp4"
+    path.write_text("old")
+    with pytest.raises(ZeroDivisionError), Preview(path, 32, 24, overwrite=True) as preview:
+        preview.add_events(EVENTS)
+        raise ZeroDivisionError
+    assert path.read_text() == "old"
+
+
+def test_wrong_suffix_and_rate_are_found_at_once(tmp_path):
+    with pytest.raises(UsageError, match="a film ends in"):
+        Preview(tmp_path / "view.webm", 32, 24)
+    with pytest.raises(UsageError, match="at most 50"), Preview(tmp_path / "v.gif", 4, 4, fps=60):
+        pass
+    assert list(tmp_path.iterdir()) == []
