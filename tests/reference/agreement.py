@@ -68,7 +68,7 @@ def count_and_time_errors(
             total, compared = total + dt.sum(), compared + len(dt)
             if dt.max() >= worst:
                 worst, worst_pixel = float(dt.max()), i
-    mean = total / compared if compared else 0.0
+    mean = float(total) / compared if compared else 0.0
     return Agreement(count_a, count_b, left_out, differing, worst, mean, worst_pixel)
 
 

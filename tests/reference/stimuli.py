@@ -98,19 +98,26 @@ def interpolated(frames: Array, *, fps: float, L: int) -> Stimulus:
 
 
 def blinking(
-    pixels: int = 20, frames: int = 13, *, fps: float = 24.0, L: int = 10, seed: int = 1
+    pixels: int = 20,
+    frames: int = 13,
+    *,
+    fps: float = 24.0,
+    L: int = 10,
+    hold: int = 1,
+    darkest: int = 1,
+    seed: int = 1,
 ) -> Stimulus:
-    """Pixels that jump between a few whole grey levels and often come back to their first one.
+    """Pixels that jump between three whole grey levels and often come back to their first one.
 
-    Made for exact ties: a pixel that returns to its first value comes back to a multiple of its
-    threshold and, in exact arithmetic, never reaches it.
+    Each level drawn stays for `hold` of the frames.  Made for exact ties: a pixel that returns to
+    its first value comes back to its first reference and, in exact arithmetic, never reaches it.
     """
     rng = np.random.default_rng(seed)
-    levels = rng.integers(1, 256, (3, pixels))
-    choice = rng.integers(0, 3, (frames, pixels))
+    levels = rng.integers(darkest, 256, (3, pixels))
+    choice = rng.integers(0, 3, (-(-frames // hold), pixels))
     choice[0] = 0
     frames_dn = np.take_along_axis(levels, choice, axis=0).astype(np.float64)
-    return interpolated(frames_dn, fps=fps, L=L)
+    return interpolated(np.repeat(frames_dn, hold, axis=0)[:frames], fps=fps, L=L)
 
 
 def side_by_side(*stimuli: Stimulus) -> Stimulus:
