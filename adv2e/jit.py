@@ -72,14 +72,15 @@ _FOLDER = cache_folder()
 
 
 def _compile(function: Function, **options: Any) -> Function:
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_FOLDER)
+    config: Any = numba.config  # its attributes are made at run time
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(_FOLDER)
     try:
         compiled: Function = numba.njit(
             nogil=True, error_model="numpy", fastmath={"contract"}, **options
         )(function)
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before
     return compiled
 
 

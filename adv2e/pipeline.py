@@ -19,7 +19,7 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
 from adv2e.rendering import Preview
 from adv2e.simulation import events_from_light
-from adv2e.sinks import open_sink
+from adv2e.sinks import format_name, open_sink
 from adv2e.sources import open_source
 from adv2e.sources.base import Source
 
@@ -105,7 +105,7 @@ def convert(
     fps, timestamps, start_s, stop_s, t0
         See :func:`adv2e.sources.open_source`.
     format, layout, with_frames, overwrite
-        See :func:`adv2e.sinks.open_sink`.
+        See :func:`adv2e.sinks.open_sink`; DAVIS240C folders and zips always hold the frames.
     preview : str, optional
         Picture or film of the events to write beside.
     threads : int, optional
@@ -129,8 +129,6 @@ def convert(
         stop_s=stop_s,
         t0=t0,
     )
-    for note in recording.notes:
-        log(note)
     target = output or default_output(source)
     counter = _Counter()
     with ExitStack() as stack:
@@ -143,7 +141,8 @@ def convert(
                 layout=layout,
                 metadata=_metadata(config, recording),
                 overwrite=overwrite,
-                with_frames=with_frames,
+                with_frames=with_frames or _holds_frames(target, format),
+                threads=threads,
             )
         )
         view = _open_preview(preview, recording, overwrite, stack)
@@ -155,6 +154,8 @@ def convert(
             sink.write_events(events)
             if view is not None:
                 view.add_events(events)
+    for note in recording.notes:  # at the end: an error is to be the only line
+        log(note)
     return Summary(
         output=target,
         width=recording.width,
@@ -165,6 +166,11 @@ def convert(
         on=counter.on,
         seconds=time.perf_counter() - began,
     )
+
+
+def _holds_frames(target: str, format: str | None) -> bool:
+    """Tell whether the output is a whole DAVIS240C recording, to which the frames belong."""
+    return target != "-" and format_name(Path(target), format) in ("folder", "zip")
 
 
 def _metadata(config: Config, recording: Source) -> dict[str, Any]:

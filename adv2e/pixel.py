@@ -11,32 +11,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e import rng
 from adv2e.config.model import Pixel, Sampling
+from adv2e.effects.pixel.hot_pixels import fill_first_hot_times
+from adv2e.effects.pixel.leak import fill_first_factors
 from adv2e.effects.pixel.low_pass import UPDATES
-from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
-from adv2e.effects.pixel.thresholds import FLOOR
+from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
+from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE, fill_first_candidates
+from adv2e.effects.pixel.thresholds import fill_levels, fill_random_reference
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events
-from adv2e.jit import kernel
-from adv2e.kernel import screen
-from adv2e.kernel import workspace as workspace_rows
+from adv2e.kernel import batch, screen
 from adv2e.kernel.screen import NODES_MAX, STRIP
 from adv2e.kernel.tile import run_tile
 from adv2e.kernel.workspace import (
     PIXEL_BITS,
     S_HOLD,
+    S_HOT_DRAW,
+    S_HOT_TIME,
+    S_LAG2,
+    S_LEAK_DRAW,
+    S_LEAK_FACTOR,
     S_LIGHT,
+    S_NOISE,
+    S_NOISE_DRAW,
     S_OFF,
     S_ON,
     S_REFERENCE,
+    S_SHOT_DRAW,
+    S_SHOT_TIME,
     S_X,
     Circuit,
     pack_limit_us,
     workspace,
 )
 
-_NEVER = 1e300
+_NO_KNEE = 1e300
 _PER_US = 1e-6
 
 
@@ -64,7 +73,7 @@ def make_circuit(pixel: Pixel, steps: int, seed: int) -> Circuit:
         dark=corner * dark,
         per_dn=corner * (white - dark) / 255.0,
         follower=corner * follower.cutoff_hz if follower else 0.0,
-        knee=math.log(knee_dn) if knee_dn > 0 else -_NEVER,
+        knee=math.log(knee_dn) if knee_dn > 0 else -_NO_KNEE,
         slope=knee_dn / math.log(knee_dn) if knee_dn > 0 else 0.0,
         dead_time=pixel.refractory.period_us if pixel.refractory else 0.0,
         leak=leak.rate_hz * _PER_US if leak else 0.0,
@@ -83,49 +92,6 @@ def make_circuit(pixel: Pixel, steps: int, seed: int) -> Circuit:
     )
 
 
-@kernel
-def _fill_levels(seed, mean_on, mean_off, mismatch, floor, on, off):
-    for i in range(on.shape[0]):
-        a = mean_on + mismatch * rng.normal(seed, rng.ON_THRESHOLD, i, 0)
-        b = mean_off + mismatch * rng.normal(seed, rng.OFF_THRESHOLD, i, 0)
-        on[i] = a if a > floor else floor
-        off[i] = b if b > floor else floor
-
-
-@kernel
-def _fill_random_reference(seed, on, off, x, reference):
-    for i in range(x.shape[0]):
-        u = rng.uniforms(seed, rng.INITIAL_REFERENCE, i, 0)[0]
-        reference[i] = x[i] - (u * (on[i] + off[i]) - off[i])
-
-
-@kernel
-def _fill_first_times(seed, stream, rate, start, times):
-    for i in range(times.shape[0]):
-        times[i] = start + rng.exponential(seed, stream, i, 0) / rate
-
-
-@kernel
-def _fill_hot_times(seed, fraction, rate, start, never, times):
-    for i in range(times.shape[0]):
-        times[i] = never
-        if rng.uniforms(seed, rng.HOT_CHOICE, i, 0)[0] < fraction:
-            times[i] = start + rng.exponential(seed, rng.HOT_TIME, i, 0) / rate
-
-
-@kernel
-def _first_leak_factors(seed, jitter, factors):
-    for i in range(factors.shape[0]):
-        g = rng.normal(seed, rng.LEAK_PERIOD, i, 0)
-        factors[i] = 1.0 / (1.0 + jitter * min(max(g, -3.0), 3.0))
-
-
-@kernel
-def _first_noise(seed, rms, noise):
-    for i in range(noise.shape[0]):
-        noise[i] = rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)
-
-
 @lru_cache(maxsize=256)
 def _quadrature(length: float, fastest: float) -> tuple[NDArray[Any], NDArray[Any]]:
     return screen.quadrature(length, fastest)
@@ -140,6 +106,10 @@ class _Tile:
         # one row is not a multiple of a page: rows must not share cache sets
         self.columns = np.zeros((13, STRIP + 24))
         self.flags = np.zeros(STRIP, np.bool_)
+        self.items = np.zeros((batch.ROWS, batch.CAPACITY + 24))
+        self.keep = np.zeros(STRIP, np.bool_)
+        self.found_time = np.empty(8 * batch.CAPACITY)
+        self.found_pixel = np.empty(8 * batch.CAPACITY, np.int64)
         self.keys = np.empty(4096, np.int64)
         self.times = np.empty(4096 if exact_times else 0)
 
@@ -208,11 +178,11 @@ class PixelArray:
     ) -> NDArray[Any]:
         circuit = self.circuit
         used = {
-            workspace_rows.S_SHOT_DRAW: circuit.shot_rate > 0,
-            workspace_rows.S_HOT_DRAW: circuit.hot_rate > 0,
-            workspace_rows.S_LAG2: circuit.follower > 0,
-            workspace_rows.S_LEAK_DRAW: circuit.leak_jitter > 0,
-            workspace_rows.S_NOISE_DRAW: circuit.noise_rms > 0,
+            S_SHOT_DRAW: circuit.shot_rate > 0,
+            S_HOT_DRAW: circuit.hot_rate > 0,
+            S_LAG2: circuit.follower > 0,
+            S_LEAK_DRAW: circuit.leak_jitter > 0,
+            S_NOISE_DRAW: circuit.noise_rms > 0,
         }
         rows = 1 + max([S_OFF, *(row for row, on in used.items() if on)])
         state = np.zeros((rows, self.pixels))
@@ -220,23 +190,23 @@ class PixelArray:
         screen.load_strip(light, circuit, self.floor, state[S_LIGHT], state[S_X])
         levels = pixel.thresholds
         on, off = state[S_ON], state[S_OFF]
-        _fill_levels(seed, levels.on, levels.off, levels.mismatch, FLOOR, on, off)
+        fill_levels(seed, levels.on, levels.off, levels.mismatch, on, off)
         state[S_REFERENCE] = state[S_X]
         state[S_HOLD] = -1.0
         if pixel.initial_reference == "random":
-            _fill_random_reference(seed, on, off, state[S_X], state[S_REFERENCE])
+            fill_random_reference(seed, on, off, state[S_X], state[S_REFERENCE])
         if circuit.shot_rate > 0:
-            times = state[workspace_rows.S_SHOT_TIME]
-            _fill_first_times(seed, rng.SHOT_TIME, circuit.shot_rate, start, times)
+            times = state[S_SHOT_TIME]
+            fill_first_candidates(seed, circuit.shot_rate, start, times)
         if pixel.hot_pixels and circuit.hot_rate > 0:
-            share, times = pixel.hot_pixels.fraction, state[workspace_rows.S_HOT_TIME]
-            _fill_hot_times(seed, share, circuit.hot_rate, start, _NEVER, times)
+            share, times = pixel.hot_pixels.fraction, state[S_HOT_TIME]
+            fill_first_hot_times(seed, share, circuit.hot_rate, start, times)
         if circuit.leak_jitter > 0:
-            factors = state[workspace_rows.S_LEAK_FACTOR]
-            _first_leak_factors(seed, circuit.leak_jitter, factors)
+            factors = state[S_LEAK_FACTOR]
+            fill_first_factors(seed, circuit.leak_jitter, factors)
         if circuit.noise_rms > 0:
-            noise = state[workspace_rows.S_NOISE]
-            _first_noise(seed, circuit.noise_rms, noise)
+            noise = state[S_NOISE]
+            fill_first_noise(seed, circuit.noise_rms, noise)
             if circuit.follower == 0:  # behind a second pole at rest it does not show yet
                 state[S_REFERENCE] += noise
         return state
@@ -272,7 +242,8 @@ class PixelArray:
             n, tile.keys, tile.times = run_tile(
                 tile.lo, tile.hi, flat, starts, not self.started, last, self.floor,
                 self.circuit, nodes, weights, counts, t_base, self.state, tile.scratch,
-                tile.columns, tile.flags, tile.keys, tile.times,
+                tile.columns, tile.flags, tile.items, tile.keep, tile.found_time, tile.found_pixel,
+                tile.keys, tile.times,
             )  # fmt: skip
             return tile.keys[:n], tile.times[:n]
 

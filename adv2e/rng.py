@@ -40,7 +40,9 @@ _6 = np.uint64(6)
 
 
 @kernel
-def philox(c0, c1, c2, c3, k0, k1):
+def philox(
+    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64
+) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
     """Philox4x32-10: four 32-bit words (in uint64) from a counter and a key of 32-bit words."""
     for _ in range(10):
         p0 = _M0 * c0
@@ -55,7 +57,7 @@ def philox(c0, c1, c2, c3, k0, k1):
 
 
 @kernel
-def uniforms(seed, stream, pixel, draw):
+def uniforms(seed: int, stream: int, pixel: int, draw: float) -> tuple[float, float]:
     """Return two independent uniform numbers in (0, 1), 53 bits each."""
     s = np.uint64(seed)
     d = np.uint64(draw)
@@ -69,13 +71,13 @@ def uniforms(seed, stream, pixel, draw):
 
 
 @kernel
-def normal(seed, stream, pixel, draw):
+def normal(seed: int, stream: int, pixel: int, draw: float) -> float:
     """Return a standard normal number (Box and Muller)."""
     u, v = uniforms(seed, stream, pixel, draw)
     return math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)
 
 
 @kernel
-def exponential(seed, stream, pixel, draw):
+def exponential(seed: int, stream: int, pixel: int, draw: float) -> float:
     """Return an exponential number of mean 1."""
     return -math.log(uniforms(seed, stream, pixel, draw)[0])

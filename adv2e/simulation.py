@@ -25,6 +25,7 @@ from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images, full
 from adv2e.errors import DataError
 from adv2e.events import Events, empty_events, sort_events
 from adv2e.pixel import PixelArray, thread_count
+from adv2e.sources.base import check_values
 from adv2e.upsampling import make_upsampler
 
 CHUNK_BYTES = 16 << 20
@@ -89,8 +90,7 @@ def _decoded(
                 f"frame {number}: {image.dtype} {image.shape}, but the first frame is"
                 f" {first.dtype} {first.shape}"
             )
-        if image.dtype.kind == "f" and not np.all(np.isfinite(image)):
-            raise DataError(f"frame {number}: has NaN or infinite pixels")
+        check_values(image, f"frame {number}")
         assert decoder is not None
         yield t_ns, decoder.decode(image)
 

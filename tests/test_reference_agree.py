@@ -145,7 +145,7 @@ def test_noise_candidates_are_lost_in_the_dead_time_and_thinned_by_light():
     dark, bright, bright_and_hot = [1e-3, 2.5e-3], [1.9e-3], [1.2e-3, 2.5e-3]
     for events in both(at_rest([0.0, 255.0, 255.0], 5e-3), circuit, draws):
         np.testing.assert_allclose(events[0][:, 0], dark, rtol=0, atol=1e-12)
-        # at white 0.6 is above 1 - 0.75: the first is thinned out, the second fires
+        # at white a quarter is kept: the first is thinned out, the second fires
         np.testing.assert_allclose(events[1][:, 0], bright, rtol=0, atol=1e-12)
         np.testing.assert_allclose(events[2][:, 0], bright_and_hot, rtol=0, atol=1e-12)
 

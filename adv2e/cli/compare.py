@@ -51,7 +51,7 @@ def command(
     threads: int | None,
     log: Log,
 ) -> None:
-    r"""Measure how far two event streams are apart.
+    """Measure how far two event streams are apart.
 
     MEASURED and SIMULATED are event files of one size and on one clock. Every distance is printed
     with its definition and with the same distance between two halves of the measured events, which

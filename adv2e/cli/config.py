@@ -25,7 +25,7 @@ class _ShowByDefault(click.Group):
 
 @click.group("config", cls=_ShowByDefault)
 def group() -> None:
-    r"""Show or check configurations, with the meaning of each key.
+    """Show or check configurations, with the meaning of each key.
 
     A configuration is YAML; keys it leaves out keep their defaults, and null switches an effect
     off. Without a command: show.

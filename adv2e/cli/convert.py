@@ -44,12 +44,12 @@ SECONDS = options.FiniteNumber(min=0)
 @click.option(
     "--layout",
     metavar="NAME",
-    help="Layout of an HDF5 output: monash, dsec, v2e, mvsec or m3ed.  [default: monash]",
+    help="Layout of an HDF5 output.  [default: monash]",
 )
 @click.option(
     "--with-frames",
     is_flag=True,
-    help="Also store the input frames, in formats that can hold them.",
+    help="Store the input frames in HDF5 too; DAVIS240C folders and zips always hold them.",
 )
 @click.option("--preview", metavar="FILE", help="Also draw the events: .mp4, .gif or .png.")
 def command(
@@ -70,14 +70,14 @@ def command(
     with_frames: bool,
     preview: str | None,
 ) -> None:
-    r"""Turn a video or frames into events.
+    """Turn a video or frames into events.
 
     INPUT is a video file, a folder of images, a DAVIS240C recording (a folder or zip with
     images.txt) or a .npy stack of frames (frames, rows, columns[, 3]).
 
-    The suffix of OUT gives the format: .txt, .zip, .h5, .npz, .aedat, .raw, .dat, .es; a path
-    without suffix is a DAVIS240C folder, '-' streams text to standard output. Without -o the
-    events go to <stem>.events.h5 in the current folder.
+    The suffix of OUT gives the format: .txt, .h5, or .zip for a DAVIS240C recording; a path
+    without suffix is one in a folder, '-' streams text to standard output. Without -o the events
+    go to <stem>.events.h5 in the current folder.
 
     \b
     Examples:

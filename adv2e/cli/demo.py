@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @options.progress_option
 @options.verbosity_options
 def command(output: Path, config: Config, threads: int | None, progress: bool, log: Log) -> None:
-    r"""Make a sample clip, convert it and render the events.
+    """Make a sample clip, convert it and render the events.
 
     The clip is a textured scene with disks of high contrast that moves, rests, moves and rests.
 

@@ -27,7 +27,7 @@ from adv2e.cli import options
 def command(
     file: Path, as_json: bool, fps: float | None, timestamps: Path | None, log: options.Log
 ) -> None:
-    r"""Say what a recording or event file holds.
+    """Say what a recording or event file holds.
 
     Tells geometry, span, counts and rates of the events, the frames, which program and seed made
     the file where it says so, and what is odd: disorder, repeated events, gaps, hot pixels. A video

@@ -85,7 +85,7 @@ def command(
     frames: bool | None,
     scale: int | None,
 ) -> None:
-    r"""Draw pictures and films of events.
+    """Draw pictures and films of events.
 
     EVENTS is anything that 'adv2e info' reads. The suffix of OUT says what to make: .mp4 or .gif
     a film, .avi a film without loss, .png a sheet of one or several instants. Times are counted

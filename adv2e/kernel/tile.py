@@ -41,8 +41,9 @@ def _restore(i, state, ws):
 @allocating_kernel
 def _grown(old, used, needed):
     """Return a longer array with the first `used` entries of the old one."""
-    new = np.empty(max(2 * old.shape[0], needed + 64), old.dtype)
-    new[:used] = old[:used]
+    new = np.empty(2 * old.shape[0] + needed, old.dtype)
+    for k in range(used):  # a loop: assigning slices costs two seconds of compile time
+        new[k] = old[k]
     return new
 
 
@@ -125,7 +126,7 @@ def _screen_strip(lo, count, i1, x1, ta, length, circuit, nodes, weights, state,
 @allocating_kernel
 def run_tile(
     lo, hi, frames, starts, first, last, floor, circuit, nodes, weights, counts, t_base,
-    state, ws, columns, flags, keys, times,
+    state, ws, columns, flags, items, keep, found_time, found_pixel, keys, times,
 ):  # fmt: skip
     """Advance the pixels lo..hi over the intervals between neighbouring frames.
 
@@ -150,10 +151,6 @@ def run_tile(
     n = 0
     screened = circuit.noise_rms == 0.0
     batched = screened and circuit.update == EXACT and circuit.filtered and circuit.follower == 0.0
-    items = np.empty((batch.ROWS, batch.CAPACITY + 24))
-    keep = np.empty(STRIP, np.bool_)
-    found_time = np.empty(8 * batch.CAPACITY)
-    found_pixel = np.empty(8 * batch.CAPACITY, np.int64)
     for f in range(starts.shape[0] - 1):
         ta = starts[f]
         length = starts[f + 1] - ta

@@ -20,7 +20,7 @@ from adv2e.errors import OutputError, UsageError
 from adv2e.sinks.base import Sink, describe
 from adv2e.sinks.work import default_threads
 
-__all__ = ["FORMATS", "LAYOUTS", "Sink", "open_sink"]
+__all__ = ["FORMATS", "LAYOUTS", "Sink", "format_name", "open_sink"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +146,7 @@ def open_sink(
     if str(path) == "-":
         return _standard_output(format, layout)
     path = Path(path)
-    name = _format_name(path, format)
+    name = format_name(path, format)
     opening = FORMATS[name].open
     if layout is not None:
         if name != "h5":
@@ -177,7 +177,14 @@ def _standard_output(format: str | None, layout: str | None) -> Sink:
     return StandardOutput()
 
 
-def _format_name(path: Path, format: str | None) -> str:
+def format_name(path: Path, format: str | None) -> str:
+    """Return the format that was asked for by name, or by the path's suffix.
+
+    Raises
+    ------
+    UsageError, OutputError
+        There is no such format.
+    """
     if format is not None:
         if format not in FORMATS:
             raise UsageError(f"--format {format}: unknown, must be one of {', '.join(FORMATS)}")

@@ -65,9 +65,8 @@ class VideoSource(Source):
             if not capture.grab():
                 raise DataError(f"{path}: no frame in it can be decoded")
             self._describe(_load(capture, f"{path}: frame 0"), f"{path}: frame 0")
-        if (
-            self._container.stamps_ns is not None
-        ):  # counted, where FFmpeg multiplies rate and length
+        if self._container.stamps_ns is not None:
+            # counted, where FFmpeg multiplies the rate and the length of the longest track
             self._stated = len(self._container.stamps_ns)
         if selection.start_s is None and selection.stop_s is None and self._stated > 0:
             self.count = self._stated

@@ -1,9 +1,9 @@
 r"""Motion between two frames, in both directions, and how far it can be believed.
 
 The light is looked at as the pixel does, by its logarithm: g = ln(DN + 4), so that dark structure
-counts; 4 DN keep the grey levels of a nearly black frame from looking like texture.  Where more pixels follow the
-median of g_b - g_a than stay as they are, it is taken off: a change of the whole scene's brightness
-is not motion.
+counts; 4 DN keep the grey levels of a nearly black frame from looking like texture.  Where more
+pixels follow the median of g_b - g_a than stay as they are, it is taken off: a change of the whole
+scene's brightness is not motion.
 
 Optical flow (dense inverse search [1]_) is found from `a` to `b` and from `b` to `a`, at full
 resolution and without its variational smoothing, which rubs out thin structures.  Then, for both:

@@ -19,6 +19,8 @@ from adv2e.jit import kernel
 from adv2e.kernel.workspace import S_HOT_DRAW, S_HOT_TIME, Array, Circuit
 from adv2e.parameters import Section, parameter
 
+_NEVER = 1e300
+
 
 @dataclass(frozen=True, kw_only=True)
 class HotPixels(Section):
@@ -36,3 +38,14 @@ def next_hot_time(i: int, circuit: Circuit, state: Array) -> None:
     state[S_HOT_DRAW, i] += 1
     wait = rng.exponential(circuit.seed, rng.HOT_TIME, i, state[S_HOT_DRAW, i])
     state[S_HOT_TIME, i] += wait / circuit.hot_rate
+
+
+@kernel
+def fill_first_hot_times(
+    seed: int, fraction: float, rate: float, start: float, times: Array
+) -> None:
+    """Choose the hot pixels and draw their first times [us]; the others never fire."""
+    for i in range(times.shape[0]):
+        times[i] = _NEVER
+        if rng.uniforms(seed, rng.HOT_CHOICE, i, 0)[0] < fraction:
+            times[i] = start + rng.exponential(seed, rng.HOT_TIME, i, 0) / rate

@@ -71,3 +71,11 @@ def next_leak_factor(i: int, circuit: Circuit, state: Array) -> float:
     period = 1.0 + circuit.leak_jitter * min(max(g, -3.0), 3.0)
     state[S_LEAK_FACTOR, i] = 1.0 / period
     return 1.0 / period
+
+
+@kernel
+def fill_first_factors(seed: int, jitter: float, factors: Array) -> None:
+    """Draw the leak speed of every pixel's first cycle."""
+    for i in range(factors.shape[0]):
+        g = rng.normal(seed, rng.LEAK_PERIOD, i, 0)
+        factors[i] = 1.0 / (1.0 + jitter * min(max(g, -3.0), 3.0))

@@ -53,3 +53,10 @@ def advance_noise(i: int, ws: Array, h: float, rate: float, circuit: Circuit, st
     state[S_NOISE, i] = after
     ws[LAG, 0] += before
     ws[LAG, 1] += after - before
+
+
+@kernel
+def fill_first_noise(seed: int, rms: float, noise: Array) -> None:
+    """Draw the noise of every pixel at the start from its stationary distribution."""
+    for i in range(noise.shape[0]):
+        noise[i] = rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)

@@ -60,3 +60,10 @@ def polarity_of(i: int, circuit: Circuit, state: Array) -> int:
     """Return the polarity of the present candidate of pixel i, 1 or -1."""
     v = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[S_SHOT_DRAW, i])[1]
     return 1 if v < 0.5 else -1
+
+
+@kernel
+def fill_first_candidates(seed: int, rate: float, start: float, times: Array) -> None:
+    """Draw the first candidate time [us] of every pixel; rate in events a us."""
+    for i in range(times.shape[0]):
+        times[i] = start + rng.exponential(seed, rng.SHOT_TIME, i, 0) / rate

@@ -19,6 +19,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from adv2e import rng
+from adv2e.jit import kernel
+from adv2e.kernel.workspace import Array
 from adv2e.parameters import Section, parameter
 
 FLOOR = 0.01
@@ -42,3 +45,23 @@ class Thresholds(Section):
         at_least=0,
         source="v2e default",
     )
+
+
+@kernel
+def fill_levels(
+    seed: int, mean_on: float, mean_off: float, mismatch: float, on: Array, off: Array
+) -> None:
+    """Draw the thresholds of every pixel into `on` and `off`."""
+    for i in range(on.shape[0]):
+        a = mean_on + mismatch * rng.normal(seed, rng.ON_THRESHOLD, i, 0)
+        b = mean_off + mismatch * rng.normal(seed, rng.OFF_THRESHOLD, i, 0)
+        on[i] = a if a > FLOOR else FLOOR
+        off[i] = b if b > FLOOR else FLOOR
+
+
+@kernel
+def fill_random_reference(seed: int, on: Array, off: Array, x: Array, reference: Array) -> None:
+    """Draw references so that x lies uniformly between the thresholds of each pixel."""
+    for i in range(x.shape[0]):
+        u = rng.uniforms(seed, rng.INITIAL_REFERENCE, i, 0)[0]
+        reference[i] = x[i] - (u * (on[i] + off[i]) - off[i])

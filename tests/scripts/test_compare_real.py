@@ -1,0 +1,212 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from adv2e import simulate
+from adv2e.config import load_config
+from adv2e.events import make_events
+
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
+WIDTH, HEIGHT, FRAMES = 16, 12, 7
+TIMES = np.arange(FRAMES) * 0.02
+ON, OFF = 0.3, 0.15
+
+
+@pytest.fixture
+def compare_real(monkeypatch):
+    monkeypatch.syspath_prepend(SCRIPTS)
+    import compare_real
+
+    return compare_real
+
+
+def moving_waves():
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    phases = 2 * np.pi * (x / 11 + y / 17 - 12 * TIMES[:, None, None])
+    return np.rint(130 + 100 * np.sin(phases)).astype(np.uint8)
+
+
+def ideal_events(frames, on=ON, off=OFF):
+    sets = [f"pixel.thresholds.on={on}", f"pixel.thresholds.off={off}"]
+    return np.concatenate(list(simulate(frames, TIMES, load_config(["ideal"], sets), threads=1)))
+
+
+def write_recording(folder, frames, events):
+    (folder / "images").mkdir(parents=True)
+    names = [f"images/frame_{number:08d}.png" for number in range(len(frames))]
+    for name, frame in zip(names, frames, strict=True):
+        assert cv2.imwrite(str(folder / name), frame)
+    stamps = [f"{t:.9f} {name}\n" for t, name in zip(TIMES, names, strict=True)]
+    (folder / "images.txt").write_text("".join(stamps))
+    lines = [f"{e['t'] / 1e6:.9f} {e['x']} {e['y']} {e['p']}\n" for e in events]
+    (folder / "events.txt").write_text("".join(lines))
+    return folder
+
+
+@pytest.fixture
+def recording(tmp_path):
+    frames = moving_waves()
+    return write_recording(tmp_path / "waves", frames, ideal_events(frames))
+
+
+def tables(text):
+    """Return heading -> rows of cells, for every table."""
+    found = {}
+    for line in text.splitlines():
+        if line.startswith("## "):
+            heading = line[3:]
+        elif line.startswith("| "):
+            cells = [cell.strip() for cell in line.strip("|").split("|")]
+            found.setdefault(heading, []).append(cells)
+    return found
+
+
+def run(command, *arguments):
+    result = CliRunner().invoke(command.main, [*map(str, arguments), "--threads", "1"])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+def test_a_table_has_a_row_for_each_configuration_and_the_two_marks(compare_real, recording):
+    result = run(compare_real, recording, "--configs", "adv2e,ideal")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("Configurations named after a tool are that tool's parameters")
+    (heading, (names, rule, *rows)) = next(iter(tables(result.stdout).items()))
+    assert heading == "waves: thresholds as shipped"
+    assert names[:4] == ["configuration", "events", "ON share", "shared window"]
+    assert set(rule) == {"---"}
+    labels = [row[0] for row in rows]
+    assert labels == ["adv2e", "ideal †", "half split (Poisson)", "no events at all"]
+    assert {len(row) for row in rows} == {len(names)}
+    # without noise and mismatch two seeds differ only because the floor starts at random
+    for row in rows[:2]:
+        floors = [float(cell.partition("(")[2].rstrip(")")) for cell in row[3:10]]
+        assert min(floors) > 0
+    assert rows[-1][6:10] == ["1.00"] * 4
+
+
+def test_every_distance_in_the_table_is_defined_below_it(compare_real, recording):
+    text = run(compare_real, recording, "--configs", "ideal").stdout
+    names = next(iter(tables(text).values()))[0]
+    for name in names[3:-1]:
+        assert f"\n- {name}: " in text
+
+
+def test_identical_events_are_at_distance_zero(compare_real, recording):
+    from real.recording import read
+
+    real = read(str(recording))
+    sets = [f"pixel.thresholds.on={ON}", f"pixel.thresholds.off={OFF}"]
+    case = compare_real.Case("same", load_config(["ideal"], sets))
+    row = compare_real.judged(real, case, real.windows, compare_real.Run(2, 1))
+    assert set(row.values.values()) == {0.0}
+    assert min(row.floor.values()) > 0
+    inside = (real.events["t"] >= 20_000) & (real.events["t"] < real.windows.stop)
+    assert row.stream.events == inside.sum() > 100
+
+
+def test_the_floor_is_the_distance_between_seeds_relative_to_the_measured_events(
+    compare_real, recording
+):
+    from real.recording import read
+
+    from adv2e.comparison.distances import distances
+
+    real = read(str(recording))
+    config = load_config(["adv2e"], seed=3)
+    row = compare_real.judged(
+        real, compare_real.Case("a", config), real.windows, compare_real.Run(2, 1)
+    )
+    frames = moving_waves()
+    a, b = (
+        np.concatenate(list(simulate(frames, TIMES, replace(config, seed=s), threads=1)))
+        for s in (3, 4)
+    )
+    assert row.floor == distances(a, b, real.windows, WIDTH, HEIGHT, whole=real.events).values
+
+
+def test_matching_totals_finds_the_thresholds_the_events_were_made_with(compare_real, recording):
+    result = run(compare_real, recording, "--configs", "ideal", "--match-totals")
+    (_, rows), (heading, (_, _, row, *_)) = tables(result.stdout).items()
+    assert len(rows) == 5
+    assert heading == "waves: totals matched before"
+    label, on, off = row[0].split(" ")[0], *(float(row[0].split(" ")[n]) for n in (2, 4))
+    assert label == "ideal,"
+    assert on == pytest.approx(ON, rel=0.03)
+    assert off == pytest.approx(OFF, rel=0.03)
+    assert "(!)" not in row[0]
+    # the measured events begin in the first of six intervals and end in the last
+    assert "4 of 6 frame intervals, 0.02 to 0.1 s" in result.stdout
+    assert "2 of 6 frame intervals, 0.06 to 0.1 s" in result.stdout
+    assert "match from 0.02 to 0.06 s" in result.stdout
+
+
+def test_totals_that_no_threshold_gives_are_marked(compare_real):
+    from real.totals import TOLERANCE, match_totals
+
+    _, _, miss = match_totals(lambda on, off: (int(50 / on), 400), (0.2, 0.2), (100, 200))
+    assert miss == pytest.approx(1.0)
+    assert miss > TOLERANCE
+
+
+def test_events_that_no_threshold_gives_are_marked_in_the_table(compare_real, tmp_path):
+    quiet = np.full((FRAMES, HEIGHT, WIDTH), 90, np.uint8)
+    folder = write_recording(tmp_path / "quiet", quiet, ideal_events(moving_waves()))
+    result = run(compare_real, folder, "--configs", "ideal", "--match-totals")
+    first, second = (rows[2] for rows in tables(result.stdout).values())
+    assert first[1].startswith("0 / ")
+    assert first[2].startswith("- / 0.")
+    assert second[0].endswith("(!) †")
+
+
+def test_totals_that_depend_on_both_thresholds_are_matched(compare_real):
+    from real.totals import TOLERANCE, match_totals
+
+    def count(on, off):
+        return int(90_000 * on**-2.2 * off**0.4), int(70_000 * off**-1.1 * on**0.3)
+
+    on, off, miss = match_totals(count, (0.2, 0.2), count(0.63, 0.34))
+    assert miss <= TOLERANCE
+    assert (on, off) == pytest.approx((0.63, 0.34), rel=0.02)
+
+
+def test_still_pixels_keep_away_from_those_that_change(compare_real):
+    from real.recording import still_pixels, still_rate
+
+    frames = np.full((5, HEIGHT, WIDTH), 100.0, np.float32)
+    frames[1::2, 3, 2] = 110
+    frames[:, 9, 14] += np.arange(5)  # a standard deviation of 1.4
+    still = still_pixels(iter(frames))
+    expected = np.ones((HEIGHT, WIDTH), bool)
+    expected[:8, :7] = False
+    assert np.array_equal(still, expected)
+    events = make_events([1, 2, 3], [2, 14, 15], [3, 9, 11], [1, 0, 1])
+    assert still_rate(events, still, 0.5) == 2 / (136 * 0.5)
+
+
+def test_an_interpolation_goes_for_all_configurations(compare_real, recording):
+    result = run(compare_real, recording, "--configs", "ideal", "--interpolation", "linear")
+    assert "| ideal, linear † |" in result.stdout
+
+
+def test_tables_go_to_a_file_and_progress_to_stderr(compare_real, recording, tmp_path):
+    out = tmp_path / "table.md"
+    result = run(compare_real, recording, "--configs", "ideal", "--out", out)
+    assert result.stdout == ""
+    assert "waves: ideal" in result.stderr
+    assert len(tables(out.read_text())) == 1
+
+
+def test_a_folder_without_events_fails_with_one_line_and_leaves_no_file(compare_real, tmp_path):
+    folder = write_recording(tmp_path / "empty", moving_waves(), [])
+    out = tmp_path / "table.md"
+    result = run(compare_real, folder, "--out", out)
+    assert result.exit_code == 1
+    assert result.stderr.splitlines() == [f"Error: {folder}: holds no events to compare with"]
+    assert not out.exists()

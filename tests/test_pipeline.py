@@ -1,0 +1,214 @@
+"""Whole conversions through the command line: formats, the record of their making, bad input."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from adv2e.recordings import read_recording
+
+
+def picture(k, shape=(24, 32)):
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    return (120 + 100 * np.sin(0.4 * (x - 2 * k)) * np.cos(0.3 * y)).astype(np.uint8)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A small DAVIS240C recording with frames only."""
+    root = tmp_path / "recording"
+    (root / "images").mkdir(parents=True)
+    lines = []
+    for k in range(5):
+        name = f"images/frame_{k:08d}.png"
+        cv2.imwrite(str(root / name), picture(k))
+        lines.append(f"{100 + k * 0.04:.9f} {name}\n")
+    (root / "images.txt").write_text("".join(lines))
+    return root
+
+
+@pytest.fixture
+def video(tmp_path):
+    path = tmp_path / "clip.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"FFV1"), 30, (32, 24))
+    for k in range(6):
+        writer.write(cv2.cvtColor(picture(k), cv2.COLOR_GRAY2BGR))
+    writer.release()
+    return path
+
+
+def test_the_same_events_in_every_format(adv2e, folder, tmp_path):
+    outputs = [tmp_path / name for name in ("a.txt", "a.h5", "a.zip", "a")]
+    for output in outputs:
+        outcome = adv2e("convert", folder, "-o", output, "--seed", "3")
+        assert outcome.status == 0, outcome.err
+        assert "events" in outcome.out
+    events = [read_recording(path).events for path in outputs]
+    assert len(events[0]) > 300
+    # on the recording's own clock
+    assert events[0]["t"][0] > 100_000_000
+    for other in events[1:]:
+        assert other.tobytes() == events[0].tobytes()
+    # the whole recording: frames at their times
+    for path in outputs[2:]:
+        times = read_recording(path).frame_times_ns
+        assert list(times) == [100_000_000_000 + 40_000_000 * k for k in range(5)]
+
+
+def test_files_say_how_they_were_made(adv2e, folder, tmp_path):
+    for name in ("a.txt", "a.h5", "a.zip", "a"):
+        adv2e("convert", folder, "-o", tmp_path / name, "--seed", "7", "--set", "pixel.leak=null")
+    metadata = [read_recording(tmp_path / name).metadata for name in ("a.h5", "a.zip", "a")]
+    metadata.append(json.loads((tmp_path / "a.txt.json").read_text()))
+    for record in metadata:
+        assert record["seed"] == 7
+        assert record["config"]["pixel"]["leak"] is None
+        assert record["adv2e"]
+        assert record["source"]["encoding"] == "linear"
+
+
+def test_a_file_can_be_made_again_from_its_record(adv2e, folder, tmp_path):
+    adv2e("convert", folder, "-o", tmp_path / "a.txt", "--set", "pixel.low_pass.cutoff_hz=80")
+    record = json.loads((tmp_path / "a.txt.json").read_text())
+    (tmp_path / "again.yaml").write_text(json.dumps(record["config"]))
+    adv2e("convert", folder, "-o", tmp_path / "b.txt", "-c", tmp_path / "again.yaml")
+    assert (tmp_path / "a.txt").read_bytes() == (tmp_path / "b.txt").read_bytes()
+
+
+def test_video_gets_its_default_name_and_threads_change_nothing(
+    adv2e,
+    video,
+    tmp_path,
+    monkeypatch,
+):
+    monkeypatch.chdir(tmp_path)
+    assert adv2e("convert", video, "--threads", "1").status == 0
+    first = (tmp_path / "clip.events.h5").read_bytes()
+    assert adv2e("convert", video, "--threads", "3", "--overwrite").status == 0
+    assert (tmp_path / "clip.events.h5").read_bytes() == first
+    with h5py.File(tmp_path / "clip.events.h5") as file:
+        assert tuple(file.attrs["sensor_resolution"]) == (24, 32)
+
+
+def test_start_and_stop_and_preview(adv2e, video, tmp_path):
+    preview = tmp_path / "look.png"
+    outcome = adv2e(
+        "convert", video, "-o", tmp_path / "a.txt", "--start", "0.05", "--stop", "0.15",
+        "--preview", preview,
+    )  # fmt: skip
+    assert outcome.status == 0, outcome.err
+    t = read_recording(tmp_path / "a.txt").events["t"]
+    assert t.min() >= 66_000
+    assert t.max() <= 134_000
+    assert cv2.imread(str(preview)) is not None
+
+
+def test_text_to_standard_output(adv2e, video, tmp_path):
+    adv2e("convert", video, "-o", tmp_path / "a.txt")
+    command = [sys.executable, "-m", "adv2e", "convert", str(video), "-o", "-"]
+    outcome = subprocess.run(command, capture_output=True, check=True)
+    assert outcome.stdout == (tmp_path / "a.txt").read_bytes()
+    assert b"events" in outcome.stderr
+
+
+def spoil_truncated(video):
+    video.write_bytes(video.read_bytes()[: video.stat().st_size // 2])
+    return video
+
+
+def spoil_single(video):
+    single = video.with_name("single")
+    single.mkdir()
+    cv2.imwrite(str(single / "0.png"), picture(0))
+    (single / "timestamps.txt").write_text("0.0\n")
+    return single
+
+
+def spoil_nan(video):
+    path = video.with_name("nan.npy")
+    stack = np.full((4, 6, 8), 0.5, np.float32)
+    stack[2, 3, 3] = np.nan
+    np.save(path, stack)
+    (video.with_name("nan.timestamps.txt")).write_text("0\n1\n2\n3\n")
+    return path
+
+
+def spoil_sizes(video):
+    folder = video.with_name("sizes")
+    folder.mkdir()
+    for k in range(3):
+        cv2.imwrite(str(folder / f"{k}.png"), picture(k, (24, 32 + (k == 2))))
+    (folder / "timestamps.txt").write_text("0\n0.1\n0.2\n")
+    return folder
+
+
+def spoil_order(video):
+    folder = video.with_name("order")
+    folder.mkdir()
+    for k in range(3):
+        cv2.imwrite(str(folder / f"{k}.png"), picture(k))
+    (folder / "timestamps.txt").write_text("0\n0.2\n0.1\n")
+    return folder
+
+
+def spoil_missing_time(video):
+    folder = video.with_name("untimed")
+    folder.mkdir()
+    for k in range(3):
+        cv2.imwrite(str(folder / f"{k}.png"), picture(k))
+    return folder
+
+
+def spoil_empty(video):
+    folder = video.with_name("empty")
+    folder.mkdir()
+    return folder
+
+
+def spoil_gone(video):
+    return video.with_name("gone.mp4")
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        spoil_truncated, spoil_single, spoil_nan, spoil_sizes, spoil_order, spoil_missing_time,
+        spoil_empty, spoil_gone,
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("output", ["out.h5", "out.txt", "out"])
+def test_bad_input_leaves_one_line_and_no_file(adv2e, video, tmp_path, spoil, output):
+    source = spoil(video)
+    target = tmp_path / "results"
+    target.mkdir()
+    outcome = adv2e("convert", source, "-o", target / output)
+    assert outcome.status == 1
+    lines = [line for line in outcome.err.splitlines() if "compiling" not in line]
+    assert len(lines) == 1, outcome.err
+    assert source.name.split(".")[0] in lines[0]
+    assert list(target.iterdir()) == []
+
+
+def test_existing_output_is_kept_without_overwrite(adv2e, video, tmp_path):
+    target = tmp_path / "out.h5"
+    target.write_text("mine")
+    outcome = adv2e("convert", video, "-o", target)
+    assert outcome.status == 1
+    assert "--overwrite" in outcome.err
+    assert target.read_text() == "mine"
+
+
+def test_info_and_compare_take_what_convert_makes(adv2e, folder, tmp_path):
+    adv2e("convert", folder, "-o", tmp_path / "a.h5", "--with-frames")
+    adv2e("convert", folder, "-o", tmp_path / "b.zip", "--seed", "1")
+    shutil.rmtree(folder)
+    info = json.loads(adv2e("info", tmp_path / "a.h5", "--json").out)
+    assert info
+    outcome = adv2e("compare", tmp_path / "b.zip", tmp_path / "a.h5", "--json")
+    assert outcome.status == 0, outcome.err
+    assert json.loads(outcome.out)

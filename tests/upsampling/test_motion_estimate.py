@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import numpy as np
+from flow_scenes import disk, pan, pixels
+
+from adv2e.upsampling.motion import estimate_motion
+
+
+def test_motion_of_a_pan_in_both_directions():
+    there, back = estimate_motion(pan(0.0), pan(1.0))
+    inner = slice(10, -10), slice(10, -10)
+    for motion, sign in ((there, 1.0), (back, -1.0)):
+        assert np.mean(np.abs(motion.u[inner] - sign * 4.0)) < 0.1
+        assert np.mean(np.abs(motion.v[inner] + sign * 1.5)) < 0.1
+        assert np.mean(motion.score[inner] < 1.0) > 0.95
+
+
+def test_ground_about_to_be_covered_rests():
+    there, _ = estimate_motion(disk(0.0), disk(1.0))
+    x, y = pixels()
+    # in front of the disk: outside it at first, inside it by more than an edge at the end
+    covered = (np.hypot(x - 30.0, y - 32.0) > 12.5) & (np.hypot(x - 36.0, y - 32.0) < 9.5)
+    assert covered.sum() > 10
+    assert np.mean(np.abs(there.u[covered]) < 0.5) > 0.8
+    on_disk = np.hypot(x - 30.0, y - 32.0) < 8.0
+    assert np.mean(np.abs(there.u[on_disk] - 6.0)) < 0.2
+
+
+def test_nothing_is_found_in_frames_equal_to_within_one_percent():
+    a = pan(0.0)
+    rng = np.random.default_rng(1)
+    assert estimate_motion(a, (a * (1.0 + 0.005 * rng.random(a.shape))).astype(np.float32)) is None
+
+
+def test_pixels_whose_surroundings_keep_their_light_do_not_move():
+    a, b = disk(0.0), disk(1.0)
+    equal = a == b
+    equal[1:-1, 1:-1] &= np.logical_and.reduce(
+        [(a == b)[1 + j : 63 + j, 1 + i : 79 + i] for j in (-1, 0, 1) for i in (-1, 0, 1)]
+    )
+    equal[[0, -1]] = equal[:, [0, -1]] = False
+    there, back = estimate_motion(a, b)
+    seen = equal & (there.score < 100.0)
+    assert seen.sum() > 1000
+    assert not np.any(there.u[seen])
+    assert not np.any(back.v[equal & (back.score < 100.0)])

@@ -1,0 +1,128 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adv2e.upsampling.kernels import (
+    ONE_SIDED,
+    UNKNOWN,
+    compose,
+    cubic,
+    fill_lost,
+    find_lost,
+    splat,
+)
+
+
+def plane(*rows):
+    return np.array(rows, np.float32)
+
+
+def zeros(shape=(3, 5)):
+    return np.zeros(shape, np.float32)
+
+
+def test_cubic_is_exact_on_pixels_and_for_parabolas():
+    x, y = np.meshgrid(np.arange(12.0), np.arange(9.0))
+    image = 3.0 + 0.5 * x + 0.1 * x * x + 0.2 * y * y
+    assert cubic(image, 4.0, 3.0) == image[3, 4]
+    expected = 3.0 + 0.5 * 4.3 + 0.1 * 4.3**2 + 0.2 * 3.6**2
+    assert cubic(image, 4.3, 3.6) == pytest.approx(expected, abs=1e-12)
+
+
+def test_cubic_outside_is_the_border():
+    image = np.arange(20.0).reshape(4, 5)
+    assert cubic(image, -3.0, 1.0) == image[1, 0]
+    assert cubic(image, 9.0, 7.5) == image[3, 4]
+
+
+def test_cubic_overshoots_an_edge_by_at_most_a_quarter_of_the_range_around():
+    image = np.tile(plane([0, 0, 0, 100, 100, 0, 0, 0]), (5, 1))
+    assert cubic(image, 2.0 - 0.3, 2.0) == 0.0
+    peak = cubic(image, 3.5, 2.0)
+    assert peak == 100.0
+    slope = np.tile(plane([0, 0, 0, 100, 101, 0, 0, 0]), (5, 1))
+    assert cubic(slope, 3.5, 2.0) == pytest.approx(101.25)
+
+
+def test_splat_lets_the_lower_score_win_and_drops_what_leaves():
+    u, v = zeros(), zeros()
+    u[1] = [2.0, 1.0, 0.0, 0.0, 4.0]
+    score = np.full((3, 5), UNKNOWN, np.float32)
+    score[1] = [0.2, 0.1, 0.3, UNKNOWN, 0.0]
+    best, source = zeros(), np.full((3, 5), -1, np.int32)
+    splat(u, v, score, 1.0, best, source)
+    assert source[1, 2] == 5 + 1
+    assert best[1, 2] == pytest.approx(0.1)
+    reached = best < UNKNOWN
+    assert reached.sum() == 1
+
+
+def test_splat_between_pixels_reaches_the_four_around():
+    u, v = zeros(), zeros()
+    u[0, 1], v[0, 1] = 3.0, 1.0
+    score = np.full((3, 5), UNKNOWN, np.float32)
+    score[0, 1] = 0.5
+    best, source = zeros(), np.full((3, 5), -1, np.int32)
+    splat(u, v, score, 0.5, best, source)
+    assert np.argwhere(best < UNKNOWN).tolist() == [[0, 2], [0, 3], [1, 2], [1, 3]]
+
+
+def test_lost_are_those_that_do_not_come_back_or_leave():
+    u, v, ru, rv = zeros(), zeros(), zeros(), zeros()
+    u[1] = [2.0, 0.0, 0.0, 0.0, 3.0]
+    ru[1, 2] = -1.1  # short by 0.9 of 2: allowed are 1 + 0.2
+    u[2, 0] = 2.0  # nothing comes back
+    lost = np.zeros((3, 5), np.bool_)
+    find_lost(u, v, ru, rv, lost)
+    # the pixel that ru tells to go back to where nobody came from is lost in the other direction
+    assert np.argwhere(lost).tolist() == [[1, 2], [1, 4], [2, 0]]
+
+
+def test_lost_pixels_take_the_motion_over_like_light():
+    g = plane([0, 0, 0, 5, 5, 5]).repeat(2, axis=0)
+    u = plane([7, 9, 9, 9, 9, -3]).repeat(2, axis=0)
+    lost = np.array([[False, True, True, True, True, False]] * 2)
+    v, distance = zeros((2, 6)), zeros((2, 6))
+    fill_lost(u, v, lost, g, distance)
+    assert u[0].tolist() == [7, 7, 7, -3, -3, -3]
+    assert distance[0] == pytest.approx([0, 0.02, 0.04, 0.04, 0.02, 0])
+
+
+def test_lost_pixels_without_any_seen_one_stay_unknown():
+    lost = np.ones((3, 5), np.bool_)
+    u, distance = np.full((3, 5), 2.0, np.float32), zeros()
+    fill_lost(u, zeros(), lost, zeros(), distance)
+    assert np.all(distance == UNKNOWN)
+
+
+def composed(best_a, best_b, u_a=0.0, u_b=0.0, fraction=0.25):
+    """Return the middle pixel of a row where the middle pixels of both frames arrive."""
+    a, b = plane([10, 20, 30, 40, 50]), plane([100, 110, 120, 130, 140])
+    ua, ub, flat = np.full(5, u_a, np.float32), np.full(5, u_b, np.float32), zeros(5)
+    source = np.arange(5, dtype=np.int32)[None]
+    bests = (np.full((1, 5), best, np.float32) for best in (best_a, best_b))
+    out = zeros((1, 5))
+    best_of_a, best_of_b = bests
+    compose(a, b, ua, flat, best_of_a, source, ub, flat, best_of_b, source, fraction, out)
+    return float(out[0, 2])
+
+
+def test_seen_in_both_is_blended_along_the_better_motion():
+    # u = 4 from a: one pixel back in a, three on in b, which is its border
+    assert composed(0.1, 0.2, u_a=1.0, u_b=9.0) == pytest.approx(0.75 * 27.5 + 0.25 * 127.5)
+    assert composed(0.2, 0.1, u_a=9.0, u_b=-1.0) == pytest.approx(0.75 * 27.5 + 0.25 * 127.5)
+
+
+def test_seen_in_one_frame_is_taken_from_it():
+    assert composed(ONE_SIDED, UNKNOWN, u_a=1.0) == pytest.approx(27.5)
+    assert composed(UNKNOWN, ONE_SIDED, u_b=-1.0) == pytest.approx(127.5)
+
+
+def test_not_known_is_blended_in_place():
+    assert composed(UNKNOWN, UNKNOWN, u_a=1.0, u_b=1.0) == pytest.approx(0.75 * 30 + 0.25 * 120)
+
+
+def test_lost_in_both_is_blended_along_both_motions():
+    expected = 0.75 * 27.5 + 0.25 * 120
+    assert composed(ONE_SIDED, ONE_SIDED, u_a=1.0) == pytest.approx(expected)
