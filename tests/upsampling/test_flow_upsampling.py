@@ -71,20 +71,28 @@ def test_clipped_pixels_stay_to_the_bit_when_the_rest_changes_brightness():
         assert np.all(light[22:38, 32:48] == 255.0)
 
 
-def test_a_small_fast_figure_passes_over_equal_ground():
-    # wholly left its place: on the way the ground is the same in both frames
-    a, b, middle = (disk(t, start=30.0, step=16.0, radius=6.0) for t in (0.0, 1.0, 0.5))
+def test_ground_that_gets_covered_is_seen_until_then():
+    a, b = disk(0.0), disk(1.0)
+    linear, flow = (made(a, b, interpolation=i)[0] for i in ("linear", "flow"))
+    truth = disk(0.25)
+    x, y = pixels()
+    # outside the disk at a quarter of its way, inside it at the end
+    band = (np.hypot(x - 31.5, y - 32.0) > 12.5) & (np.hypot(x - 36.0, y - 32.0) < 9.5)
+    assert band.sum() > 10
+    assert np.abs(flow - truth)[band].mean() < 0.3 * np.abs(linear - truth)[band].mean()
+
+
+def test_a_fast_small_figure_that_is_not_found_fades_as_with_linear():
+    a, b = (disk(t, step=16.0, radius=6.0) for t in (0.0, 1.0))
     linear, flow = (made(a, b, L=2, interpolation=i)[0] for i in ("linear", "flow"))
-    on_the_way = np.s_[29:36, 36:41]
-    assert np.abs(linear - middle)[on_the_way].mean() > 20.0
-    assert np.abs(flow - middle)[on_the_way].mean() < 3.0
+    assert error(flow, linear) < 0.1 * error(linear, a)
 
 
 def test_a_change_of_brightness_alone_is_linear():
     a = pan(0.0)
     b = 1.25 * a
     for flow, linear in zip(made(a, b), made(a, b, interpolation="linear"), strict=True):
-        assert np.array_equal(flow, linear)
+        np.testing.assert_allclose(flow, linear, rtol=2e-3)
 
 
 def test_motion_is_found_under_a_change_of_brightness():

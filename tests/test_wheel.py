@@ -1,0 +1,35 @@
+"""The shipped configurations work from a wheel, outside the clone."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def test_wheel_holds_the_shipped_configurations(tmp_path):
+    pytest.importorskip("hatchling")
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
+    options = ["--no-deps", "--no-build-isolation"]
+    subprocess.run([*pip, "wheel", *options, "-w", str(tmp_path), str(ROOT)], check=True)
+    (wheel,) = tmp_path.glob("adv2e-*.whl")
+    target = tmp_path / "installed"
+    subprocess.run([*pip, "install", "--no-deps", "--target", str(target), str(wheel)], check=True)
+    script = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import adv2e; assert adv2e.__file__.startswith(sys.argv[1]), adv2e.__file__\n"
+        "from adv2e.config import load_config, shipped\n"
+        "for name in shipped(): load_config([name])\n"
+        "print(*shipped())\n"
+    )
+    outcome = subprocess.run(
+        [sys.executable, "-P", "-c", script, str(target)]
+        if sys.version_info >= (3, 11)
+        else [sys.executable, "-c", script, str(target)],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    names = outcome.stdout.split()
+    for name in ("adv2e", "paper", "v2e", "vid2e", "ideal", "davis240c", "davis346"):
+        assert name in names
