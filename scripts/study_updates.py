@@ -1,9 +1,9 @@
 """How far each update form is from the circuit it stands for, on edges and a ramp.
 
 Prints, for each form and K, the ratio of event counts to the exact solution's and the mean
-distance in time between events of the same number, in Markdown.  Corner proportional to light (300 Hz
-at white), pure logarithm, threshold 0.2, 24 frames a second, L = 10, no noise.  The exact form is
-itself held to a dense ODE by the tests.
+distance in time between events of the same number, in Markdown.  Corner proportional to light (300
+Hz at white), pure logarithm, threshold 0.2, 24 frames a second, L = 10, no noise.  The exact form
+is itself held to a dense ODE by the tests.
 
     python scripts/study_updates.py
 """
