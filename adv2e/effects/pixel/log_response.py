@@ -5,7 +5,9 @@ r"""Logarithmic response of the photoreceptor, with a linear foot in the dark.
 with DN = 255 light / full scale and k = ``linear_below``.  With ``linear_below: 0`` the response is
 the pure logarithm of max(DN, ``floor``).  The foot keeps one grey level of a nearly black frame
 from counting as a large contrast.  Its slope, ln(k)/k, equals that of the logarithm at the knee
-only for k = e; at k = 20 it is three times steeper just below the knee than just above it.
+only for k = e; at k = 20 it is three times steeper just below the knee than just above it.  DN are
+linear light: on video that was decoded from sRGB, 20 DN is code 80 of 255, and a third of a usual
+picture would lie on the foot, with up to three times the contrast.  The default is therefore e.
 
 References
 ----------
@@ -26,11 +28,11 @@ class LogResponse(Section):
     """Map from light to log intensity."""
 
     linear_below: float = parameter(
-        20.0,
+        2.72,
         unit="DN",
         meaning="linear below this value, logarithmic above; 0: logarithm everywhere",
         at_least=0,
-        source="v2e, lin_log threshold 20",
+        source="e: no kink at the knee; least distance in scripts/study_knee.py",
     )
     floor: float = parameter(
         0.1,
