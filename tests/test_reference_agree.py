@@ -135,8 +135,8 @@ def test_noise_candidates_are_lost_in_the_dead_time_and_thinned_by_light():
     circuit = Circuit(dead_time_us=1000.0)
     candidates = np.array(
         [
-            [1.0e-3, 0.6, 1.0],
-            [1.9e-3, 0.0, 1.0],  # 0.9 ms after the first: lost where that one fired
+            [1.0e-3, 0.26, 1.0],
+            [1.9e-3, 0.24, 1.0],  # 0.9 ms after the first: lost where that one fired
             [2.5e-3, 0.0, -1.0],
         ]
     )
@@ -299,6 +299,26 @@ def test_a_peak_just_short_of_a_level_or_just_past_it_is_a_tie():
         assert len(truth.events) == count, excess
         if ties:
             assert 0.009 < truth.valid_until < 0.01
+
+
+def test_a_filtered_peak_between_two_steps_of_the_solver_is_not_missed():
+    # constant corner a: up by r for 5 ms, then down as fast; y turns where it meets x
+    circuit = Circuit(linear_below=0.0, cutoff_hz=200.0, dark_cutoff_hz=200.0)
+    a, r, up = 2 * math.pi * 200, 40.0, 0.005
+    light = 50 * np.exp(r * np.array([0.0, up, 0.0]))[:, None]
+    top = r * (up - 1 / a + math.exp(-a * up) / a)  # y at the top of x
+    # afterwards y = x + r/a + (top - r up - r/a) e^-as, which turns at e^as = 2 - e^-a up
+    s = math.log(2 - math.exp(-a * up)) / a
+    peak = r * (up - s) + r / a + (top - r * up - r / a) * math.exp(-a * s)
+    for excess, ties, count in ((-1e-6, 0, 0), (-5e-8, 1, 0), (5e-8, 1, 1), (1e-6, 0, 1)):
+        one = dataclasses.replace(circuit, on=peak - excess, off=0.5)
+        truth = dense_truth(light, [0.0, up, 2 * up], one)[0]
+        assert len(truth.ties) == ties, excess
+        assert len(truth.events) == count, excess
+        if count:
+            # y falls short of its peak by r a t^2/2 at a time t before it
+            before_us = 1e6 * math.sqrt(2 * excess / (a * r))
+            assert (up + s) * 1e6 - truth.events[0, 0] * 1e6 == pytest.approx(before_us, rel=0.02)
 
 
 def test_a_crossing_at_a_slope_of_a_slow_leak_is_no_tie():

@@ -43,7 +43,8 @@ LARGEST_STEP = 1.0
 LARGEST_LIGHT = 1.5 * 255.0
 """Light above which a pixel is solved in any case, as the quadrature is chosen for less [DN]."""
 
-MARGIN = 1e-9
+MARGIN = 1e-8
+"""Rounding, and what is forgotten beyond REACH: e^-20 of a lag of a few e-folds [ln units]."""
 AT_REST = 1e-12
 
 REACH = 20.0

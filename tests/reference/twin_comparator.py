@@ -49,6 +49,7 @@ class Comparator:
     def follow(self, line: Line) -> None:
         """Fire all events on a line."""
         circuit = self.circuit
+        assert np.all(np.abs(line.signal_end) < 1e4), "the update diverges"
         fall = np.zeros_like(self.reference)
         if circuit.leak_hz or circuit.photo_leak_hz:
             light = 0.5 * (line.light_start + line.light_end)
