@@ -8,7 +8,7 @@ noise of dark video become events.
 
 Reference
     The chosen one: the events of a pixel with a purely logarithmic photoreceptor, x = ln max(DN,
-    floor), for the unrounded light of a made scene.
+    0.1), for the unrounded light of a made scene.
 Video
     The same frames as 8-bit sRGB codes, with normal read noise added to the code before it is
     rounded, decoded again and given to the pixel with the map under test.
@@ -238,9 +238,9 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, help="scenes made [4, with --quick 2]; at least 2")
     args = parser.parse_args()
     width, height, seeds = (64, 48, 2) if args.quick else (173, 130, 4)
-    seeds = args.seeds or seeds
-    if seeds < 2 or not args.fps >= 10:
-        parser.error("--seeds must be at least 2 (for the standard error), --fps at least 10")
+    seeds = seeds if args.seeds is None else args.seeds
+    if seeds < 2 or not 10 <= args.fps <= 1000:
+        parser.error("--seeds must be at least 2 (for the standard error), --fps 10 to 1000")
     pyplot = load_pyplot()  # before the work, so that a missing package costs no time
     setup = Setup(width, height, seeds, args.fps, args.encoding, os.cpu_count() or 1)
     scores, lights = run(setup, lambda text: print(text, file=sys.stderr, flush=True))
