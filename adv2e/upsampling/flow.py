@@ -12,14 +12,16 @@ moves over it.  Frames too small for the search (see `SMALLEST`), equal frames a
 interpolated linearly.
 
 What it cannot do: motion is straight and even within an interval; light that changes while it
-moves is blended; a texture that moves by half its period or more goes wrong, as it does for the
-eye; things smaller than their step from frame to frame are often lost and then fade as with linear.
+moves is blended; things smaller than their step from frame to frame, steps above about a fifth of
+the picture's height, and textures that repeat within a few steps are mostly not found and fade as
+with linear; the noise of dim frames is carried along, which makes more false events than blending
+it in place.  ``scripts/study_interpolation.py`` has the numbers.
 
 References
 ----------
 .. [1] S. Baker, D. Scharstein, J. P. Lewis, S. Roth, M. J. Black, R. Szeliski, "A Database and
-   Evaluation Methodology for Optical Flow", IJCV 92, 2011, doi:10.1007/s11263-010-0390-2 (3.3.2,
-   interpolation by splatting with the photometrically best on top).
+   Evaluation Methodology for Optical Flow", IJCV 92, 2011, doi:10.1007/s11263-010-0390-2
+   (interpolation by sending pixels on, the photometrically best on top).
 """
 
 from __future__ import annotations

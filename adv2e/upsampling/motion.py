@@ -1,15 +1,14 @@
 r"""Motion between two frames, in both directions, and how far it can be believed.
 
 The light is looked at as the pixel does, by its logarithm: g = ln(DN + 4), so that dark structure
-counts; 4 DN keep the grey levels of a nearly black frame from looking like texture.  Where more
-pixels follow the median of g_b - g_a than stay as they are, it is taken off: a change of the whole
-scene's brightness is not motion.
+counts; 4 DN keep the grey levels of a nearly black frame from looking like texture.  The median of
+g_b - g_a is taken off, so that a change of the whole scene's brightness is not taken for motion.
 
 Optical flow (dense inverse search [1]_) is found from `a` to `b` and from `b` to `a`, at full
 resolution and without its variational smoothing, which rubs out thin structures.  Then, for both:
 
-- **still**: where the light of the 3 x 3 pixels around has not changed at all, or by less than 1 %
-  and the flow does not explain it better, the motion is exactly 0;
+- **at rest**: where the light of the 3 x 3 pixels around is the same in both frames, the motion is
+  exactly 0;
 - **lost**: where the flow there and back does not return to within 1 px + 10 % of its length, or
   leaves the frame, or the light it leads to differs by a factor e^0.5, the pixel is not to be seen
   in the other frame (covered, or out of the frame).  It takes the motion of the seen pixel that is
@@ -42,7 +41,7 @@ SMALLEST = 32
 
 _DARK_DN = 4.0
 _LEAST_SPAN = 1.0
-_STILL = 0.01
+_LEAST_CHANGE = 0.01
 _MISMATCH_UNIT = 0.1
 _MISMATCH_MOST = 0.5
 _AROUND = (3, 3)
@@ -87,15 +86,11 @@ def estimate_motion(a: NDArray[Any], b: NDArray[Any]) -> tuple[Motion, Motion] |
         return None
     ga, gb = _log_light(a, b)
     change = np.abs(ga - gb)
-    if not np.any(change > _STILL):
+    if not np.any(change > _LEAST_CHANGE):
         return None
-    still = cv2.blur(change, _AROUND)
-    there, back = _flow(ga, gb)
     equal = cv2.erode((a == b).astype(np.uint8), np.ones(_AROUND, np.uint8)).astype(np.bool_)
-    costs = [
-        _settle(*there, ga, gb, change, still, equal),
-        _settle(*back, gb, ga, change, still, equal),
-    ]
+    there, back = _flow(ga, gb)
+    costs = [_settle(*there, ga, gb, equal), _settle(*back, gb, ga, equal)]
     found = []
     for (u, v), (ru, rv), g, cost in ((there, back, ga, costs[0]), (back, there, gb, costs[1])):
         motion = _judged(u.copy(), v.copy(), ru, rv, g, cost, change)
@@ -108,12 +103,7 @@ def estimate_motion(a: NDArray[Any], b: NDArray[Any]) -> tuple[Motion, Motion] |
 def _log_light(a: NDArray[Any], b: NDArray[Any]) -> tuple[Image, Image]:
     """Return ln(DN + 4) of both frames, the second freed of a change of the whole scene."""
     ga, gb = (np.log(np.maximum(f, 0).astype(np.float32) + np.float32(_DARK_DN)) for f in (a, b))
-    difference = gb - ga
-    common = np.median(difference)
-    at_rest, with_scene = (
-        np.count_nonzero(np.abs(difference - shift) <= _STILL) for shift in (0.0, common)
-    )
-    return ga, gb - common if with_scene > at_rest else gb
+    return ga, gb - np.median(gb - ga)
 
 
 def _flow(ga: Image, gb: Image) -> list[tuple[Image, Image]]:
@@ -136,22 +126,12 @@ def _flow(ga: Image, gb: Image) -> list[tuple[Image, Image]]:
     return flows
 
 
-def _settle(
-    u: Image,
-    v: Image,
-    here: Image,
-    there: Image,
-    change: Image,
-    still: Image,
-    equal: NDArray[np.bool_],
-) -> Image:
+def _settle(u: Image, v: Image, here: Image, there: Image, equal: NDArray[np.bool_]) -> Image:
     """Set the motion of pixels at rest to 0, in place; return the change unexplained."""
+    u[equal] = 0.0
+    v[equal] = 0.0
     cost = np.empty_like(here)
     mismatch(u, v, here, there, cost)
-    rest = equal | ((still <= _STILL) & (still <= cv2.blur(cost, _AROUND)))
-    u[rest] = 0.0
-    v[rest] = 0.0
-    cost[rest] = change[rest]
     return cost
 
 

@@ -1,13 +1,18 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from flow_scenes import clouds, disk, pan, pixels
 
+from adv2e import Config, simulate
+from adv2e.config.model import Pixel, Sampling
 from adv2e.upsampling import make_upsampler
 from adv2e.upsampling.flow import warp
-from adv2e.upsampling.motion import SMALLEST, estimate_motion
+from adv2e.upsampling.kernels import ONE_SIDED, UNKNOWN
+from adv2e.upsampling.motion import SMALLEST, Motion, estimate_motion
 
 
 def made(a, b, L=4, interpolation="flow", **options):
@@ -71,14 +76,16 @@ def test_clipped_pixels_stay_to_the_bit_when_the_rest_changes_brightness():
         assert np.all(light[22:38, 32:48] == 255.0)
 
 
-def test_ground_that_gets_covered_is_seen_until_then():
-    a, b = disk(0.0), disk(1.0)
-    linear, flow = (made(a, b, interpolation=i)[0] for i in ("linear", "flow"))
-    truth = disk(0.25)
+@pytest.mark.parametrize("forwards", [True, False])
+def test_ground_is_seen_until_it_is_covered_and_once_it_is_uncovered(forwards):
+    # outside the disk at a quarter of its way, inside it at the end; or the same backwards
     x, y = pixels()
-    # outside the disk at a quarter of its way, inside it at the end
     band = (np.hypot(x - 31.5, y - 32.0) > 12.5) & (np.hypot(x - 36.0, y - 32.0) < 9.5)
     assert band.sum() > 10
+    pair = (disk(0.0), disk(1.0)) if forwards else (disk(1.0), disk(0.0))
+    number = 0 if forwards else 2
+    linear, flow = (made(*pair, interpolation=i)[number] for i in ("linear", "flow"))
+    truth = disk(0.25)
     assert np.abs(flow - truth)[band].mean() < 0.3 * np.abs(linear - truth)[band].mean()
 
 
@@ -96,7 +103,7 @@ def test_a_change_of_brightness_alone_is_linear():
 
 
 def test_motion_is_found_under_a_change_of_brightness():
-    a, b, truth = pan(0.0), 1.25 * pan(1.0), 1.125 * pan(0.5)
+    a, b, truth = pan(0.0), 2.0 * pan(1.0), 1.5 * pan(0.5)
     flow, linear = made(a, b, L=2)[0], made(a, b, L=2, interpolation="linear")[0]
     assert error(flow, truth) < 0.25 * error(linear, truth)
 
@@ -105,6 +112,33 @@ def test_a_cut_is_linear():
     a, b = pan(0.0), clouds(7)(*pixels()).astype(np.float32)
     for flow, linear in zip(made(a, b), made(a, b, interpolation="linear"), strict=True):
         assert np.array_equal(flow, linear)
+
+
+def test_a_part_of_fine_structure_that_does_not_last_is_linear():
+    wide = (96, 192)
+    a, b = (pan(t, (3.0, 0.0), *wide) for t in (0.0, 1.0))
+    rng = np.random.default_rng(0)
+    for frame in (a, b):
+        frame[:, 96:] = 80.0 * np.exp(0.4 * rng.standard_normal((96, 96)))
+    linear, flow = (made(a, b, L=2, interpolation=i)[0] for i in ("linear", "flow"))
+    lasting, glitter = np.s_[:, :80], np.s_[16:-16, 112:-16]
+    assert np.mean(flow[glitter] == linear[glitter]) > 0.7
+    truth = pan(0.5, (3.0, 0.0), *wide)[lasting]
+    assert error(flow[lasting], truth) < 0.2 * error(linear[lasting], truth)
+
+
+def test_what_only_the_second_frame_shows_comes_from_where_it_goes():
+    a, b = np.full((40, 40), 10.0, np.float32), np.full((40, 40), 10.0, np.float32)
+    b[20:23, 30:33] = 100.0
+    known = np.full((40, 40), UNKNOWN, np.float32)
+    still = np.zeros((40, 40), np.float32)
+    there = Motion(still, still, known)
+    score = known.copy()
+    score[20:23, 30:33] = ONE_SIDED
+    back = Motion(np.where(b > 50, np.float32(-8), still), still, score)
+    light = warp(a, b, there, back, 0.25)
+    assert np.argwhere(light > 50).min(axis=0).tolist() == [20, 24]
+    assert np.argwhere(light > 50).max(axis=0).tolist() == [22, 26]
 
 
 def test_frames_smaller_than_the_search_are_linear():
@@ -163,3 +197,13 @@ def test_light_is_never_negative_and_hardly_overshoots():
     for light in made(a, b):
         assert light.min() >= 0.0
         assert light.max() <= 250.0
+
+
+def test_pixels_at_rest_fire_no_events():
+    quiet = replace(Pixel(), leak=None, shot_noise=None)
+    config = Config(sampling=Sampling(L=5, interpolation="flow"), pixel=quiet)
+    frames = [disk(t) / np.float32(255.0) for t in (0.0, 1.0, 2.0)]
+    events = np.concatenate(list(simulate(frames, [0.0, 0.03, 0.06], config, threads=1)))
+    away = np.hypot(np.maximum(np.abs(events["x"] - 36.0) - 6.0, 0.0), events["y"] - 32.0)
+    assert events.size > 1000
+    assert away.max() < 11.0 + 4.0

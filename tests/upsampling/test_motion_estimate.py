@@ -31,6 +31,18 @@ def test_nothing_is_found_in_frames_equal_to_within_one_percent():
     assert estimate_motion(a, (a * (1.0 + 0.005 * rng.random(a.shape))).astype(np.float32)) is None
 
 
+def test_ground_at_rest_hardly_moves_with_its_noise():
+    rng = np.random.default_rng(3)
+    a, b = (
+        (disk(t) * rng.uniform(0.98, 1.02, disk(t).shape)).astype(np.float32) for t in (0.0, 1.0)
+    )
+    there, back = estimate_motion(a, b)
+    x, y = pixels()
+    far = np.hypot(x - 33.0, y - 32.0) > 20.0
+    for motion in (there, back):
+        assert np.mean(np.hypot(motion.u, motion.v)[far]) < 0.1
+
+
 def test_pixels_whose_surroundings_keep_their_light_do_not_move():
     a, b = disk(0.0), disk(1.0)
     equal = a == b

@@ -68,6 +68,17 @@ def test_splat_between_pixels_reaches_the_four_around():
     assert np.argwhere(best < UNKNOWN).tolist() == [[0, 2], [0, 3], [1, 2], [1, 3]]
 
 
+@pytest.mark.parametrize("steps", [(1.4, 0.2), (1.1, 0.8)])
+def test_splat_lets_the_nearer_of_equals_win(steps):
+    # both reach column 2: from column 1 by 1.4 or 1.1, from column 2 by 0.2 or 0.8
+    u, v = zeros((1, 5)), zeros((1, 5))
+    u[0, 1:3] = steps
+    score = np.array([[UNKNOWN, 0.5, 0.5, UNKNOWN, UNKNOWN]], np.float32)
+    best, source = zeros((1, 5)), np.full((1, 5), -1, np.int32)
+    splat(u, v, score, 1.0, best, source)
+    assert source[0, 2] == (2 if steps[1] < steps[0] - 1.0 else 1)
+
+
 def test_lost_are_those_that_do_not_come_back_or_leave():
     u, v, ru, rv = zeros(), zeros(), zeros(), zeros()
     u[1] = [2.0, 0.0, 0.0, 0.0, 3.0]
