@@ -127,7 +127,8 @@ def events_from_light(
     pixel = PixelArray(config.pixel, config.sampling, config.seed, first, t_ns, threads=workers)
     with ThreadPoolExecutor(workers) if workers > 1 else nullcontext() as pool:
         order = _Order()
-        for chunk in _chunks(_interpolated(t_ns, first, source, config), config):
+        interpolated = _interpolated(t_ns, first, source, config, workers)
+        for chunk in _chunks(interpolated, config):
             events = pixel.advance(chunk.frames, chunk.times_ns, chunk.last, pool)
             end_us = (chunk.times_ns[-1] + 500) // 1000
             yield order.add(events, end_us)
@@ -135,11 +136,15 @@ def events_from_light(
 
 
 def _interpolated(
-    t_ns: int, first: NDArray[Any], source: Iterator[tuple[int, NDArray[Any]]], config: Config
+    t_ns: int,
+    first: NDArray[Any],
+    source: Iterator[tuple[int, NDArray[Any]]],
+    config: Config,
+    threads: int,
 ) -> Iterator[tuple[int, NDArray[Any], bool]]:
     """Yield (t_ns, light, ends an input interval) of all frames after interpolation."""
     count = config.sampling.L
-    upsampler = make_upsampler(config.sampling.interpolation, count)
+    upsampler = make_upsampler(config.sampling.interpolation, count, threads=threads)
     before_ns, before = t_ns, first
     yield t_ns, first, True
     number = 0

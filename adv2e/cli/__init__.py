@@ -77,8 +77,9 @@ class Program(click.Group):
         with stopping_on_signals():
             try:
                 return super().main(*args, **kwargs)
-            finally:
-                flush_stdout()
+            except SystemExit as end:
+                flush_stdout(quiet=bool(end.code))
+                raise
 
 
 @click.group(

@@ -126,8 +126,11 @@ def stopping_on_signals() -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL)
 
 
-def flush_stdout() -> None:
-    """Write out what standard output still holds, with an exit status of its own if that fails."""
+def flush_stdout(*, quiet: bool) -> None:
+    """Write out what standard output still holds, with an exit status of its own if that fails.
+
+    `quiet`: an error has been told already, and is to stay the only line.
+    """
     if sys.stdout is None or sys.stdout.closed:
         return
     try:
@@ -137,8 +140,9 @@ def flush_stdout() -> None:
         raise SystemExit(_CLOSED_OUTPUT) from None
     except OSError as error:
         silence_stdout()
-        complain(f"error: standard output: {error.strerror}")
-        raise SystemExit(1) from None
+        if not quiet:
+            complain(f"error: standard output: {error.strerror}")
+            raise SystemExit(1) from None
 
 
 def silence_stdout() -> None:
