@@ -86,7 +86,7 @@ def make_circuit(pixel: Pixel, steps: int, seed: int) -> Circuit:
             if pixel.hot_pixels and pixel.hot_pixels.fraction > 0
             else 0.0
         ),
-        noise_rms=noise.rms if noise and low_pass else 0.0,
+        noise_rms=noise.rms if noise else 0.0,
         noise_step=noise.step if noise else 0.1,
         seed=seed,
     )

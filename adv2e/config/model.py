@@ -17,6 +17,7 @@ from adv2e.effects.pixel.refractory import Refractory
 from adv2e.effects.pixel.shot_noise import ShotNoise
 from adv2e.effects.pixel.source_follower import SourceFollower
 from adv2e.effects.pixel.thresholds import Thresholds
+from adv2e.errors import ConfigError
 from adv2e.parameters import Section, parameter, subsection
 
 INTERPOLATIONS = ("linear", "flow")
@@ -104,6 +105,13 @@ class Pixel(Section):
     hot_pixels: HotPixels | None = subsection(
         _off, meaning="pixels that fire by themselves", optional=True
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.photoreceptor_noise is not None and self.low_pass is None:
+            raise ConfigError(
+                "photoreceptor_noise: is band-limited by low_pass, which is null; give both or none"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

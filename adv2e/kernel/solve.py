@@ -84,9 +84,10 @@ def _substep_length(rest, rate, rate_end, speed, circuit):
     """Length of the next sub-step: the rest, or an equal part of it short enough to converge."""
     fastest = rate if rate > rate_end else rate_end
     if circuit.filtered:
-        limit = RADIUS / (fastest + circuit.follower + speed)
+        # the small number: nothing moves in full darkness without a dark corner
+        limit = RADIUS / (fastest + circuit.follower + speed + 1e-300)
         if circuit.noise_rms > 0.0:
-            limit = min(limit, circuit.noise_step / fastest)
+            limit = min(limit, circuit.noise_step / (fastest + 1e-300))
     else:
         limit = RADIUS / (speed + 1e-300)
     if rest <= limit:

@@ -23,6 +23,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
+from adv2e.errors import ConfigError
 from adv2e.parameters import Section, about
 
 # for each section: parameters that do something here, and neutral ones (None: being absent)
@@ -103,6 +104,21 @@ def test_effects_do_not_import_each_other(name):
     for node in ast.walk(ast.parse(inspect.getsource(module))):
         if isinstance(node, ast.ImportFrom):
             assert not (node.module or "").startswith("adv2e.effects"), node.module
+
+
+def test_noise_without_the_filter_that_limits_it_is_an_error():
+    with pytest.raises(ConfigError, match="low_pass"):
+        Pixel(low_pass=None, photoreceptor_noise=PhotoreceptorNoise(rms=0.1))
+
+
+def test_full_darkness_without_a_dark_corner_is_defined():
+    pixel = quiet(
+        low_pass=LowPass(dark_cutoff_hz=0.0), photoreceptor_noise=PhotoreceptorNoise(rms=0.01)
+    )
+    light = np.zeros((3, 1, 8), np.float32)
+    light[2] = 200.0
+    times = [0, 4_000_000, 8_000_000]
+    assert len(advance(start(light, times, pixel), light, times)[0]) > 0
 
 
 def test_no_section_is_without_a_check():

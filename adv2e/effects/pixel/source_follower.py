@@ -2,7 +2,9 @@ r"""Source follower behind the photoreceptor: a second pole, the same at every b
 
 .. math:: \dot z = 2\pi f_s\,(y - z)
 
-y is the output of the photoreceptor low-pass; the comparator sees z.
+y is the output of the photoreceptor low-pass; the comparator sees z.  ``exact`` solves both poles
+together; the K-step forms of the low-pass take y as a straight line in each step, for which the
+second pole is solved exactly.
 
 References
 ----------
