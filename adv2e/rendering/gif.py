@@ -146,7 +146,7 @@ def _lzw(pixels: NDArray[np.uint8], table: NDArray[np.int32], out: NDArray[np.ui
         if not last and table[place] >> 12 == generation:
             prefix = table[place] & 4095
             continue
-        bits |= prefix << waiting
+        bits |= int(prefix) << waiting
         waiting += width
         while waiting >= 8:
             out[written] = bits & 255

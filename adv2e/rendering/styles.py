@@ -134,8 +134,8 @@ def _net_count(events: Events, width: int, height: int, t_us: int, style: Style)
     pixel = events["y"].astype(np.int64) * width + events["x"]
     sign = events["p"].astype(np.float64) * 2 - 1
     net = np.bincount(pixel, weights=sign, minlength=width * height)
-    net = np.clip(net, -GREY_CLIP, GREY_CLIP).reshape(height, width)
-    level = np.rint(255 * (net + GREY_CLIP) / (2 * GREY_CLIP)).astype(np.uint8)
+    clipped = np.clip(net, -GREY_CLIP, GREY_CLIP).reshape(height, width)
+    level = np.rint(255 * (clipped + GREY_CLIP) / (2 * GREY_CLIP)).astype(np.uint8)
     return np.repeat(level[:, :, None], 3, axis=2)
 
 
