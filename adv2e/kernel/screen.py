@@ -14,10 +14,14 @@ that is, where u changes sign; between frames x is monotone, and u = y - x obeys
 du/dtau = -u - dx/dtau, so u changes sign at most once.  Without a change y is monotone and stays
 between y_0 and y_1.  With one, say from u_0 > 0: y falls until it meets the rising x, whose value
 then is at least x_0, and rises from there; so y stays between min(x_0, y_1) and max(y_0, y_1); and
-mirrored for u_0 < 0.  Leak only lowers the reference, by a known amount over the interval.  A pixel
-whose bound stays clear of both thresholds cannot fire and is done; every other one is solved.
-Pixels with the knee inside the interval, a step above one e-fold, dead time, or a noise event due
-are always solved.
+mirrored for u_0 < 0.  On the log branch the bound is tighter: up to the turn, y'' = w'(x - y) +
+w(x' - y') has one sign where |u| < 1 (for u_0 < 0 both terms are negative; for u_0 > 0, with
+w' <= w x', it is at least w x'(1 - |u|) + w^2 |u|), so y stays beyond its tangent at the start and
+cannot meet x before that does, at s = |u_0| / (a_0 |u_0| + |dx|).
+
+Leak only lowers the reference, by a known amount over the interval.  A pixel whose bound stays
+clear of both thresholds cannot fire and is done; every other one is solved.  Pixels with the knee
+inside the interval, a step above one e-fold, dead time, or a noise event due are always solved.
 
 The margin covers rounding and the quadrature; crossings that are missed within it would be less
 than the tolerance of a tie (see :mod:`adv2e.kernel.polynomial`).
@@ -46,6 +50,8 @@ LARGEST_LIGHT = 1.5 * 255.0
 MARGIN = 1e-8
 """Rounding, and what is forgotten beyond REACH: e^-20 of a lag of a few e-folds [ln units]."""
 AT_REST = 1e-12
+STRAIGHT = 0.9
+"""Lag below which y is convex up to its turn."""
 
 REACH = 20.0
 """Corner times time beyond which the past is forgotten."""
@@ -235,16 +241,24 @@ def _step(y, x0, xs, dx, share, before, after, update, count):
 
 
 @kernel
-def hull(x0, x1, lag, lag_end, count, low, high):
+def hull(i0, x0, x1, lag, lag_end, length, circuit, count, low, high):
     """Bound of the exact signal over the interval, see the top of this module."""
+    dark = circuit.dark * length
+    per_dn = circuit.per_dn * length
     for k in range(count):
         y0 = x0[k] + lag[k]
         y1 = x1[k] + lag_end[k]
         turns = lag[k] * lag_end[k] < 0.0
         lo = y0 if y0 < y1 else y1
         hi = y0 if y0 > y1 else y1
-        lo = x0[k] if turns & (x0[k] < lo) else lo
-        hi = x0[k] if turns & (x0[k] > hi) else hi
+        away = abs(lag[k])
+        dx = x1[k] - x0[k]
+        meet = away / ((dark + per_dn * i0[k]) * away + abs(dx) + 1e-300)
+        meet = meet if meet < 1.0 else 1.0
+        on_log = (x0[k] >= circuit.knee) & (x1[k] >= circuit.knee)
+        turn = x0[k] + dx * meet if on_log & (away < STRAIGHT) else x0[k]
+        lo = turn if turns & (turn < lo) else lo
+        hi = turn if turns & (turn > hi) else hi
         low[k] = lo
         high[k] = hi
 

@@ -100,12 +100,12 @@ def _screen_strip(lo, count, i1, x1, ta, length, circuit, nodes, weights, state,
         for k in range(count):
             lag_end[k] = lag[k]
     elif not circuit.filtered:
-        screen.hull(x0, x1, lag, lag_end, count, low, high)
+        screen.hull(i0, x0, x1, lag, lag_end, length, circuit, count, low, high)
     elif circuit.update == EXACT:
         screen.end_lags(
             i0, i1, x0, x1, lag, length, circuit, nodes, weights, count, columns, lag_end
         )
-        screen.hull(x0, x1, lag, lag_end, count, low, high)
+        screen.hull(i0, x0, x1, lag, lag_end, length, circuit, count, low, high)
     else:
         screen.stepped_lags(
             i0, i1, x0, x1, lag, length, circuit, count, columns, lag_end, low, high

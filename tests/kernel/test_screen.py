@@ -70,7 +70,7 @@ def screened(pixel, x0, x1, lag, length):
     end, low, high = (np.empty(PIXELS) for _ in range(3))
     columns = np.zeros((13, screen.STRIP))
     screen.end_lags(i0, i1, x0, x1, lag, length, circuit, nodes, weights, PIXELS, columns, end)
-    screen.hull(x0, x1, lag, end, PIXELS, low, high)
+    screen.hull(i0, x0, x1, lag, end, length, circuit, PIXELS, low, high)
     return circuit, end, low, high
 
 
