@@ -20,7 +20,7 @@ from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE, fill_first_candidates
 from adv2e.effects.pixel.thresholds import fill_levels, fill_random_reference
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events
-from adv2e.kernel import batch, screen
+from adv2e.kernel import items, screen
 from adv2e.kernel.screen import NODES_MAX, STRIP
 from adv2e.kernel.tile import run_tile
 from adv2e.kernel.workspace import (
@@ -106,10 +106,10 @@ class _Tile:
         # one row is not a multiple of a page: rows must not share cache sets
         self.columns = np.zeros((13, STRIP + 24))
         self.flags = np.zeros(STRIP, np.bool_)
-        self.items = np.zeros((batch.ROWS, batch.CAPACITY + 24))
+        self.items = np.zeros((items.ROWS, items.CAPACITY + 24))
         self.keep = np.zeros(STRIP, np.bool_)
-        self.found_time = np.empty(8 * batch.CAPACITY)
-        self.found_pixel = np.empty(8 * batch.CAPACITY, np.int64)
+        self.found_time = np.empty(8 * items.CAPACITY)
+        self.found_pixel = np.empty(8 * items.CAPACITY, np.int64)
         self.keys = np.empty(4096, np.int64)
         self.times = np.empty(4096 if exact_times else 0)
 

@@ -6,5 +6,6 @@
 ``solve``       one pixel over one interval: the circuit as short power series, or K steps
 ``comparator``  events of one pixel on one such series: thresholds, dead time, leak, noise
 ``screen``      all pixels of a strip over one interval: end values, and which pixels can fire
+``batch``       the usual crossings of a strip, gathered for ``items``, which solves many at a time
 ``tile``        a tile over several intervals: screen all, solve the few that can fire
 """

@@ -144,7 +144,8 @@ def _prepare(i0, i1, x0, x1, length, circuit, count, a1, kappa, z, upto):
 
 
 @kernel
-def _quadrature(a1, kappa, z, node, weight, count, total):
+def quadrature_node(a1, kappa, z, node, weight, count, total):
+    """Add one node of the quadrature to the totals of `count` columns."""
     for k in range(count):
         t = a1[k] * node - kappa[k] * (node * node) * special.psi(z[k] * node)
         total[k] += weight * special.exp(-t)
@@ -159,7 +160,7 @@ def end_lags(i0, i1, x0, x1, lag, length, circuit, nodes, weights, count, column
     for k in range(count):
         total[k] = 0.0
     for c in range(nodes.shape[0]):
-        _quadrature(a1, kappa, z, nodes[c], weights[c], count, total)
+        quadrature_node(a1, kappa, z, nodes[c], weights[c], count, total)
     for k in range(count):
         v = upto[k]
         # tau over the whole interval from that over [0, V]: equal where V = 1, else beyond reach
