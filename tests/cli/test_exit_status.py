@@ -118,7 +118,10 @@ def test_no_arguments_show_the_help_as_an_error(adv2e):
 # What follows needs a process of its own.
 
 WAITING = """
-import pathlib, sys, time, types
+import pathlib, signal, sys, time, types
+# as in a terminal: a test run in the background may have been started with signals ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGTERM, signal.SIG_DFL)
 pipeline = types.ModuleType("adv2e.pipeline")
 def convert(*args, **options):
     unfinished = pathlib.Path("unfinished")
