@@ -18,8 +18,6 @@ EVENT_DTYPE = np.dtype([("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
 Events = NDArray[Any]
 """A structured array of ``EVENT_DTYPE``."""
 
-ON, OFF = 1, 0
-
 
 def empty_events(count: int = 0) -> Events:
     """Return an event array of `count` zeroed events."""

@@ -38,10 +38,9 @@ _ROUNDS = 3
     F_HI,  # the same at the end of the interval
     G_HI,
     S,  # present place
-    LAG_S,  # lag, light, integral of the light and distance there
+    LAG_S,  # lag, light and integral of the light there
     LIGHT_S,
     SUM_S,
-    F_S,
     ERROR,  # what the place may still be off [us]
     A1,
     KAPPA,
@@ -53,8 +52,8 @@ _ROUNDS = 3
     TAIL,  # fall, lag and light at the end of the interval
     LAG_1,
     LIGHT_1,
-) = range(28)
-ROWS = 28
+) = range(27)
+ROWS = 27
 
 
 @kernel
@@ -176,7 +175,6 @@ def _refine(items, count, length, circuit):
 def settle(items, count, length, circuit, nodes, weights):
     """Bring every item to its crossing; ERROR says which did not come."""
     _guess(items, count)
-    worst = 1.0
     for _ in range(_ROUNDS):
         evaluate(items, count, length, circuit, nodes, weights)
         _refine(items, count, length, circuit)
@@ -185,5 +183,4 @@ def settle(items, count, length, circuit, nodes, weights):
             e = items[ERROR, k]
             worst = e if not e <= worst else worst
         if worst <= TOLERANCE:
-            break
-    return worst
+            return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.jit import allocating_kernel, kernel
-from adv2e.kernel import batch, screen
+from adv2e.kernel import batch, screen, special
 from adv2e.kernel.comparator import put_found
 from adv2e.kernel.screen import STRIP
 from adv2e.kernel.solve import solve_interval
@@ -57,7 +57,7 @@ def _falls(lo, count, i0, i1, x0, x1, length, circuit, state, fall):
             dx = x1[k] - x0[k]
             on_log = min(x0[k], x1[k]) >= circuit.knee and abs(dx) <= 1.0
             z = -dx if on_log else 0.0
-            mean = i1[k] * (1.0 - dx * screen.special.psi(z)) if on_log else 0.5 * (i0[k] + i1[k])
+            mean = i1[k] * (1.0 - dx * special.psi(z)) if on_log else 0.5 * (i0[k] + i1[k])
             fall[k] = state[S_ON, lo + k] * length * (circuit.leak + circuit.photo_leak * mean)
         if circuit.leak_jitter > 0.0:
             for k in range(count):
@@ -124,6 +124,76 @@ def _screen_strip(lo, count, i1, x1, ta, length, circuit, nodes, weights, state,
 
 
 @allocating_kernel
+def _with_room(keys, times, used, needed):
+    """Return the two arrays of events, longer where they cannot hold `needed`."""
+    if needed > keys.shape[0]:
+        if times.shape[0] > 0:
+            times = _grown(times, used, needed)
+        keys = _grown(keys, used, needed)
+    return keys, times
+
+
+@allocating_kernel
+def _solve_in_batches(
+    lo, count, i1, x1, ta, length, circuit, nodes, weights, t_base, state, columns, flags, items,
+    keep, found_time, found_pixel, keys, times, n,
+):  # fmt: skip
+    """Solve the usual crossings among the flagged pixels of a strip, and clear their flags."""
+    lag_end, fall = columns[5], columns[6]
+    k = 0
+    while k < count:
+        m, k = batch.gather(
+            k, lo, count, i1, x1, lag_end, fall, ta, length, circuit, state, flags, items
+        )
+        if m > 0:
+            m = batch.solve_items(
+                lo, m, ta, length, circuit, nodes, weights, state, flags, items, keep, found_time,
+                found_pixel,
+            )  # fmt: skip
+            keys, times = _with_room(keys, times, n, n + m)
+            n = put_found(lo, m, found_time, found_pixel, t_base, keys, times, n)
+    return n, keys, times
+
+
+@kernel
+def _samples(xa, xb, ahead, begins, is_last, next_is_last):
+    """Continuity samples of an interval, as solve_interval takes them: start, base, step, end.
+
+    With the paper's last interval as printed, the samples of a last one start from its end, but
+    for the one at which the recording begins, and the interval before leads there.
+    """
+    base = xb if is_last else xa
+    start = base if not begins else xa
+    return start, base, xb - xa, ahead if next_is_last else xb
+
+
+@allocating_kernel
+def _solve_singly(
+    lo, count, x1, ahead, begins, is_last, next_is_last, ta, length, t_base, circuit, state, ws,
+    flags, keys, times, n,
+):  # fmt: skip
+    """Solve the flagged pixels of a strip one by one."""
+    for k in range(count):
+        if not flags[k]:
+            continue
+        i = lo + k
+        start, base, step, end = _samples(
+            state[S_X, i], x1[k], ahead[k], begins, is_last, next_is_last
+        )
+        _save(i, state, ws)
+        while True:
+            m = solve_interval(
+                i, start, base, step, end, ta, length, t_base, circuit, state, ws, keys, times, n
+            )
+            if m <= keys.shape[0]:
+                break
+            keys, times = _with_room(keys, times, n, m)
+            _restore(i, state, ws)
+        n = m
+    return n, keys, times
+
+
+@allocating_kernel
 def run_tile(
     lo, hi, frames, starts, first, last, floor, circuit, nodes, weights, counts, t_base,
     state, ws, columns, flags, items, keep, found_time, found_pixel, keys, times,
@@ -154,70 +224,34 @@ def run_tile(
     for f in range(starts.shape[0] - 1):
         ta = starts[f]
         length = starts[f + 1] - ta
+        node, weight = nodes[f, : counts[f]], weights[f, : counts[f]]
+        one_line = not (last[f] or last[f + 1])
         for s in range(lo, hi, STRIP):
             count = min(STRIP, hi - s)
-            i1, x1 = columns[7, :count], columns[8, :count]
+            i1, x1, ahead = columns[7, :count], columns[8, :count], columns[9, :count]
             screen.load_strip(frames[f + 1, s : s + count], circuit, floor, i1, x1)
-            one_line = not (last[f] or last[f + 1])
             any_flag = True
             if screened and one_line:
                 any_flag = _screen_strip(
-                    s, count, i1, x1, ta, length, circuit, nodes[f, : counts[f]],
-                    weights[f, : counts[f]], state, columns, flags,
-                )  # fmt: skip
+                    s, count, i1, x1, ta, length, circuit, node, weight, state, columns, flags
+                )
             else:
                 for k in range(count):
                     flags[k] = True
             if any_flag and one_line and batched:
-                k = 0
-                while k < count:
-                    m, k = batch.gather(
-                        k, s, count, i1, x1, columns[5], columns[6], ta, length, circuit, state,
-                        flags, items,
-                    )  # fmt: skip
-                    if m == 0:
-                        continue
-                    m = batch.solve_items(
-                        s, m, ta, length, circuit, nodes[f, : counts[f]], weights[f, : counts[f]],
-                        state, flags, items, keep, found_time, found_pixel,
-                    )  # fmt: skip
-                    if n + m > keys.shape[0]:
-                        if times.shape[0] > 0:
-                            times = _grown(times, n, n + m)
-                        keys = _grown(keys, n, n + m)
-                    n = put_found(s, m, found_time, found_pixel, t_base, keys, times, n)
+                n, keys, times = _solve_in_batches(
+                    s, count, i1, x1, ta, length, circuit, node, weight, t_base, state, columns,
+                    flags, items, keep, found_time, found_pixel, keys, times, n,
+                )  # fmt: skip
             if any_flag:
-                ahead = columns[9, :count]
-                if not one_line:
+                if last[f + 1]:
                     screen.load_strip(
-                        frames[f + 2 if last[f + 1] else f + 1, s : s + count],
-                        circuit, floor, columns[10, :count], ahead,
-                    )  # fmt: skip
-                for k in range(count):
-                    if flags[k]:
-                        i = s + k
-                        xa, xb = state[S_X, i], x1[k]
-                        base, step, end = xa, xb - xa, xb
-                        if not one_line:
-                            if last[f]:
-                                base = xb
-                                if not (first and f == 0):
-                                    xa = xb
-                            if last[f + 1]:
-                                end = ahead[k]
-                        _save(i, state, ws)
-                        while True:
-                            m = solve_interval(
-                                i, xa, base, step, end, ta, length, t_base, circuit, state, ws,
-                                keys, times, n,
-                            )  # fmt: skip
-                            if m <= keys.shape[0]:
-                                break
-                            if times.shape[0] > 0:
-                                times = _grown(times, n, m)
-                            keys = _grown(keys, n, m)
-                            _restore(i, state, ws)
-                        n = m
+                        frames[f + 2, s : s + count], circuit, floor, columns[10, :count], ahead
+                    )
+                n, keys, times = _solve_singly(
+                    s, count, x1, ahead, first and f == 0, last[f], last[f + 1], ta, length,
+                    t_base, circuit, state, ws, flags, keys, times, n,
+                )  # fmt: skip
             for k in range(count):
                 state[S_LIGHT, s + k] = i1[k]
                 state[S_X, s + k] = x1[k]

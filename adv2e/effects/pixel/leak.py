@@ -64,18 +64,23 @@ def leak_series(ws: Array, order: int, h: float, on: float, circuit: Circuit) ->
 
 
 @kernel
+def _factor(seed: int, jitter: float, i: int, draw: float) -> float:
+    """Leak speed of one cycle of pixel i, relative to the nominal one."""
+    g = rng.normal(seed, rng.LEAK_PERIOD, i, draw)
+    return 1.0 / (1.0 + jitter * min(max(g, -3.0), 3.0))
+
+
+@kernel
 def next_leak_factor(i: int, circuit: Circuit, state: Array) -> float:
-    """Draw the leak speed of the cycle that now begins, relative to the nominal one."""
+    """Draw the leak speed of the cycle that now begins."""
     state[S_LEAK_DRAW, i] += 1
-    g = rng.normal(circuit.seed, rng.LEAK_PERIOD, i, state[S_LEAK_DRAW, i])
-    period = 1.0 + circuit.leak_jitter * min(max(g, -3.0), 3.0)
-    state[S_LEAK_FACTOR, i] = 1.0 / period
-    return 1.0 / period
+    factor = _factor(circuit.seed, circuit.leak_jitter, i, state[S_LEAK_DRAW, i])
+    state[S_LEAK_FACTOR, i] = factor
+    return factor
 
 
 @kernel
 def fill_first_factors(seed: int, jitter: float, factors: Array) -> None:
     """Draw the leak speed of every pixel's first cycle."""
     for i in range(factors.shape[0]):
-        g = rng.normal(seed, rng.LEAK_PERIOD, i, 0)
-        factors[i] = 1.0 / (1.0 + jitter * min(max(g, -3.0), 3.0))
+        factors[i] = _factor(seed, jitter, i, 0)
