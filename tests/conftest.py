@@ -1,14 +1,30 @@
-"""Running the command line inside the test process."""
+"""Running the command line inside the test process, and an end for tests that hang."""
 
 from __future__ import annotations
 
+import signal
 import sys
+from collections.abc import Iterator
 from types import ModuleType
 from typing import NamedTuple
 
 import pytest
 
 from adv2e.cli import main
+
+LONGEST_S = 400
+"""After that a test hangs.  Where it does so is printed before; see faulthandler_timeout."""
+
+
+@pytest.fixture(autouse=True)
+def _no_test_hangs() -> Iterator[None]:
+    """Kill the test run rather than wait for a test that does not end."""
+    if not hasattr(signal, "alarm"):
+        yield
+        return
+    signal.alarm(LONGEST_S)
+    yield
+    signal.alarm(0)
 
 
 class Outcome(NamedTuple):

@@ -10,7 +10,8 @@
 143    told to stop (SIGTERM)
 ====== ===================================================================================
 
-SIGTERM and SIGHUP arrive as exceptions, so that unfinished files are removed as for any error.
+A signal removes unfinished files and ends the program where it is; see :mod:`adv2e.unfinished`.
+Where files cannot be removed like that, it arrives as an exception, and they are as for any error.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from types import FrameType
 
 import click
 
+from adv2e import unfinished
 from adv2e.errors import Adv2eError
 
 VERBOSITY = "adv2e.verbosity"
@@ -55,7 +57,8 @@ def reporting(context: click.Context | None = None) -> Iterator[None]:
     `context` knows whether -vv asked for tracebacks.
     """
     try:
-        yield
+        with _as_signalled():
+            yield
     except click.exceptions.Exit:
         raise
     except click.ClickException as error:
@@ -72,11 +75,11 @@ def reporting(context: click.Context | None = None) -> Iterator[None]:
         place = f"{error.filename}: " if isinstance(error.filename, str) else ""
         complain(f"error: {place}{error.strerror or error}")
         raise SystemExit(1) from None
-    except (KeyboardInterrupt, click.Abort):
-        complain("interrupted")
+    except (KeyboardInterrupt, click.Abort) as error:
+        complain(_last_words(error))
         raise SystemExit(128 + signal.SIGINT) from None
     except Terminated as error:
-        complain(f"stopped by {error}")
+        complain(_last_words(error))
         raise SystemExit(error.exit_status) from None
     except MemoryError as error:
         _trace(context)
@@ -86,6 +89,24 @@ def reporting(context: click.Context | None = None) -> Iterator[None]:
         hint = "" if _trace(context) else "; run with -vv for the traceback"
         complain(f"error: internal error: {type(error).__name__}: {error}{hint}")
         raise SystemExit(1) from None
+
+
+@contextmanager
+def _as_signalled() -> Iterator[None]:
+    """Let what a signal raised end the body as itself.
+
+    When a signal comes while the main thread runs compiled code, that code returns a result with
+    the exception set, and Python makes a SystemError of it, at each level.
+    """
+    try:
+        yield
+    except SystemError as error:
+        cause: BaseException | None = error
+        while isinstance(cause, SystemError):
+            cause = cause.__cause__
+        if isinstance(cause, (KeyboardInterrupt, Terminated)):
+            raise cause from None
+        raise
 
 
 def _click_text(error: click.ClickException) -> str:
@@ -105,25 +126,52 @@ def _trace(context: click.Context | None) -> bool:
 
 @contextmanager
 def stopping_on_signals() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP raise Terminated in the body; ignored ones stay ignored."""
+    """Let SIGINT, SIGTERM and SIGHUP end the program in the body; ignored ones stay ignored.
+
+    Nothing changes where the caller has handlers of its own, or is not the main thread.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    numbers = [getattr(signal, name) for name in names]
-    caught = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    usual = {
+        "SIGINT": signal.default_int_handler,
+        "SIGTERM": signal.SIG_DFL,
+        "SIGHUP": signal.SIG_DFL,
+    }
+    caught = {
+        getattr(signal, name): handler
+        for name, handler in usual.items()
+        if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is handler
+    }
 
     def stop(number: int, frame: FrameType | None) -> None:
-        signal.signal(number, signal.SIG_IGN)  # a second one must not stop the tidying up
-        raise Terminated(number)
+        for other in caught:
+            signal.signal(other, signal.SIG_IGN)  # a second one must not stop the tidying up
+        ending = KeyboardInterrupt() if number == signal.SIGINT else Terminated(number)
+        if not unfinished.remove_all():
+            raise ending
+        _say_at_once(_last_words(ending))
+        os._exit(128 + number)
 
     for number in caught:
         signal.signal(number, stop)
     try:
         yield
     finally:
-        for number in caught:
-            signal.signal(number, signal.SIG_DFL)
+        for number, handler in caught.items():
+            signal.signal(number, handler)
+
+
+def _last_words(ending: BaseException) -> str:
+    return f"stopped by {ending}" if isinstance(ending, Terminated) else "interrupted"
+
+
+def _say_at_once(text: str) -> None:
+    """Write one line to stderr past its buffer, which the main thread may be in the midst of."""
+    with suppress(OSError):
+        # over a progress bar, if there is one
+        start = "\r\x1b[K" if os.isatty(2) else ""
+        os.write(2, f"{start}adv2e: {text}\n".encode())
 
 
 def flush_stdout(*, quiet: bool) -> None:

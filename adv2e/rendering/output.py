@@ -22,14 +22,10 @@ def replacing(path: Path, overwrite: bool) -> Iterator[Path]:
     """
     staging = Staging(overwrite)
     part = staging.file(path)
-    unfinished = part.with_name(part.name + path.suffix)  # OpenCV goes by the suffix
     try:
         staging.prepare()
-        yield unfinished
-        unfinished.rename(part)
+        yield part
         staging.commit()
     except BaseException:
         staging.discard()
         raise
-    finally:
-        unfinished.unlink(missing_ok=True)

@@ -15,6 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from adv2e import unfinished
 from adv2e.errors import OutputError
 
 
@@ -44,6 +45,7 @@ class Staging:
         self._overwrite = overwrite
         self._outputs: list[_Output] = []
         self._made: list[Path] = []
+        self._committing = False
 
     def file(self, path: Path) -> Path:
         """Return the temporary name of the file `path`.
@@ -102,6 +104,7 @@ class Staging:
 
     def prepare(self) -> None:
         """Make the folders that the outputs are to lie in."""
+        unfinished.add(self)
         for output in self._outputs:
             missing = []
             above = output.final.parent
@@ -114,6 +117,7 @@ class Staging:
 
     def commit(self) -> None:
         """Give all outputs their final names; if that fails, everything is as it was."""
+        self._committing = True
         try:
             for output in self._outputs:
                 self._check_free(output)
@@ -126,6 +130,7 @@ class Staging:
             raise
         for output in self._outputs:
             _remove(output.replaced)
+        unfinished.drop(self)
 
     def _roll_back(self) -> None:
         for output in reversed(self._outputs):
@@ -146,6 +151,24 @@ class Staging:
         for folder in reversed(self._made):
             with suppress(OSError):  # something else may lie in it by now
                 folder.rmdir()
+        unfinished.drop(self)
+
+    def remove_now(self) -> bool:
+        """Remove everything temporary although it may be written to at this moment.
+
+        Not while it comes into place, which the one who does it can undo better; nor where open
+        files cannot be removed, as on Windows.
+        """
+        if self._committing:
+            return False
+        for output in self._outputs:
+            if output.temporary.is_dir():
+                # under its new name nobody adds anything to it
+                gone = output.temporary.with_name(output.temporary.name + "-")
+                output.temporary.rename(gone)
+                shutil.rmtree(gone)
+        self.discard()
+        return not any(os.path.lexists(output.temporary) for output in self._outputs)
 
 
 def _output(path: Path) -> _Output:
@@ -157,8 +180,11 @@ def _output(path: Path) -> _Output:
 
 
 def _beside(path: Path) -> Path:
-    """Return a free, hidden name in the folder of `path`; short, whatever the length of its own."""
-    return path.with_name(f".{path.name[:40]}.{secrets.token_hex(4)}.part")
+    """Return a free, hidden name in the folder of `path`; short, whatever the length of its own.
+
+    It has the suffix of `path`, by which OpenCV and others choose the format.
+    """
+    return path.with_name(f".{path.stem[:40]}.{secrets.token_hex(4)}.part{path.suffix[:20]}")
 
 
 def _remove(path: Path | None) -> None:

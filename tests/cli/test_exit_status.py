@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from processes import running_python
 
 from adv2e.cli.run import Terminated
 from adv2e.errors import DataError, MissingExtraError, UsageError
@@ -50,6 +51,23 @@ def test_an_error_is_one_line_and_a_status(adv2e, pipeline, error, status, line)
     assert outcome.out == ""
     assert outcome.err.endswith(line)
     assert outcome.err.count("\n") == (1 if line else 0)
+
+
+@pytest.mark.parametrize(
+    ("signalled", "status"), [(KeyboardInterrupt(), 130), (Terminated(signal.SIGTERM), 143)]
+)
+def test_a_signal_in_compiled_code_counts_as_the_signal(adv2e, pipeline, signalled, status):
+    def ending():
+        try:
+            raise SystemError("inner returned a result with an exception set") from signalled
+        except SystemError as error:
+            raise SystemError("outer returned a result with an exception set") from error
+
+    pipeline.ending = ending
+    outcome = adv2e("convert", "clip.mp4")
+    assert outcome.status == status
+    assert outcome.err.count("\n") == 1
+    assert "internal" not in outcome.err
 
 
 def test_vv_shows_the_traceback_of_a_bug(adv2e, pipeline):
@@ -118,40 +136,100 @@ def test_no_arguments_show_the_help_as_an_error(adv2e):
 # What follows needs a process of its own.
 
 WAITING = """
-import pathlib, signal, sys, time, types
+import pathlib, signal, sys, threading, time, types
 # as in a terminal: a test run in the background may have been started with signals ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGTERM, signal.SIG_DFL)
+from adv2e.sinks.staging import Staging
 pipeline = types.ModuleType("adv2e.pipeline")
 def convert(*args, **options):
-    unfinished = pathlib.Path("unfinished")
-    unfinished.touch()
+    staging = Staging(overwrite=False)
+    file = staging.file(pathlib.Path("made", "out.txt"))
+    folder = staging.folder(pathlib.Path("made", "out"), lambda old: None)
+    staging.prepare()
+    file.touch()
+    folder.mkdir()
+    (folder / "a.png").touch()
     try:
-        print("ready", flush=True)
-        time.sleep(30)
+        {work}
     finally:
-        unfinished.unlink()
+        staging.discard()
 pipeline.convert = convert
 sys.modules["adv2e.pipeline"] = pipeline
 from adv2e.cli import main
 main(["convert", "clip.mp4"])
 """
 
+SLEEPING = "print('ready', flush=True); time.sleep(30)"
+
+WANTED = """
+        lock = threading.Lock()
+        lock.acquire()
+        threading.Thread(target=lock.acquire).start()
+        print('ready', flush=True)
+        while True:
+            pass
+"""
+"""A thread waits for what the main thread holds, and Python at its end for the thread."""
+
+ADDING = """
+        def add():
+            while True:
+                for k in range(1000):
+                    try:
+                        (folder / str(k)).touch()
+                    except OSError:
+                        pass
+        threading.Thread(target=add, daemon=True).start()
+        time.sleep(0.1)
+        print('ready', flush=True)
+        time.sleep(30)
+"""
+"""A thread goes on making files in the folder."""
+
+COMING_INTO_PLACE = """
+        rename = pathlib.Path.rename
+        def slowly(path, target):
+            rename(path, target)
+            pathlib.Path.rename = rename
+            print('ready', flush=True)
+            time.sleep(30)
+        pathlib.Path.rename = slowly
+        staging.commit()
+"""
+
+NOT_REMOVED = """
+        Staging.remove_now = lambda staging: False  # as where open files cannot be
+        print('ready', flush=True)
+        time.sleep(30)
+"""
+
 
 @pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
-def test_a_signal_ends_it_tidily(tmp_path, name, status):
-    with subprocess.Popen(
-        [sys.executable, "-c", WAITING],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+@pytest.mark.parametrize(
+    "work",
+    [
+        pytest.param(SLEEPING, id="sleeping"),
+        pytest.param(WANTED, id="wanted"),
+        pytest.param(ADDING, id="adding"),
+        pytest.param(COMING_INTO_PLACE, id="coming into place"),
+        pytest.param(NOT_REMOVED, id="not removed"),
+    ],
+)
+def test_a_signal_ends_it_tidily(tmp_path, work, name, status):
+    script = WAITING.replace("{work}", work)
+    with running_python(script, cwd=tmp_path, text=True) as process:
         assert process.stdout.readline() == "ready\n"
         process.send_signal(getattr(signal, name))
         _, err = process.communicate(timeout=20)
     assert process.returncode == status
-    assert err.count("\n") == 1
+    assert (
+        err
+        == {
+            "SIGINT": "adv2e: interrupted\n",
+            "SIGTERM": "adv2e: stopped by SIGTERM\n",
+        }[name]
+    )
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,0 +1,46 @@
+"""What lies on the disk only while the program works on it, for a signal to remove at once.
+
+A signal can come at any instruction of the main thread, one that just took a lock among them.  An
+exception raised there leaves the lock taken, and whoever waits for the thread that wants it waits
+for ever.  So a signal ends the program where it is, as it does Git: what is listed here is removed,
+which takes no lock, and the process exits.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Protocol
+
+
+class Unfinished(Protocol):
+    """Files or folders that nobody is to find when the program has ended."""
+
+    def remove_now(self) -> bool:
+        """Remove them, whoever writes to them; tell whether all are gone."""
+
+
+_listed: dict[int, Unfinished] = {}
+
+
+def add(thing: Unfinished) -> None:
+    """Have `thing` removed if a signal comes."""
+    _listed[id(thing)] = thing
+
+
+def drop(thing: Unfinished) -> None:
+    """Forget `thing`, if it is known at all."""
+    _listed.pop(id(thing), None)
+
+
+def remove_all() -> bool:
+    """Remove everything listed; tell whether all is gone.
+
+    For signal handlers: takes no locks and raises nothing.
+    """
+    gone = True
+    for thing in list(_listed.values()):
+        removed = False
+        with suppress(OSError):
+            removed = thing.remove_now()
+        gone = gone and removed
+    return gone
