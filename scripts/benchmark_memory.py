@@ -1,0 +1,310 @@
+#!/usr/bin/env python
+"""How much memory a conversion takes, against what it may take whatever the clip.
+
+Makes its own clips, a scene in motion and a burst of about 100 million events a second, and runs
+``adv2e convert`` on each in a process of its own::
+
+    python scripts/benchmark_memory.py --quick
+    python scripts/benchmark_memory.py --size 1280x720 --format h5
+    python scripts/benchmark_memory.py --long 600
+
+``--long SECONDS`` converts that many seconds of 1280x720 at 30 frames a second instead, mostly
+still, and compares the last tenth with the first (Linux only).  Writes Markdown to standard output
+and with ``-o FILE.md`` also to that file, with the raw numbers in ``FILE.json``.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+import cv2
+from benchmarks.clips import Clip, default_folder, render, stored
+from benchmarks.machine import busy_line, machine_line
+from benchmarks.memory import Burst, Moment, count_in, stored_burst, watched
+from benchmarks.processes import Job, JobError, Log, Measured, number, run_rounds
+from benchmarks.report import table
+
+ACTION = "benchmarks.memory:convert"
+FORMATS = ("h5", "txt", "zip")
+FACTORS = (1, 10)
+SCENE, BURST = "scene", "burst"
+
+SHORT_DEAD_TIME = "pixel.refractory.period_us=200"
+"""For the burst: with the dead time as shipped, a small sensor makes fewer events than that."""
+
+ABOUT = (
+    "`adv2e convert`, as shipped, each run in a process of its own, compiled beforehand: most"
+    " memory that the process ever held (VmHWM), interpreter and libraries included. Scene: a"
+    " texture pans and turns, disks cross it. Burst: the whole field flickers, with noise, dead"
+    " time 200 us. Input: `.npy`; zip holds the frames, too."
+)
+
+
+@dataclass(frozen=True)
+class Size:
+    """A sensor, what a conversion for it may take, and the burst it is tried with.
+
+    Attributes
+    ----------
+    width, height : int
+    most_mib : float
+        Most memory [MiB].
+    burst_fps, swing : float
+        Chosen so that about 100 million events a second come out, see
+        :class:`benchmarks.memory.Burst`.
+    frames : int
+        Of either clip; a quarter, with --quick.
+    """
+
+    width: int
+    height: int
+    most_mib: float
+    burst_fps: float
+    swing: float
+    frames: int
+
+    @property
+    def name(self) -> str:
+        """Columns and rows, ``346x260``."""
+        return f"{self.width}x{self.height}"
+
+
+SIZES = (
+    Size(346, 260, 300.0, 240.0, 4.4, 64),
+    Size(1280, 720, 500.0, 30.0, 1.2, 8),
+    Size(3840, 2160, 1536.0, 30.0, 0.32, 12),
+)
+
+LONG_SIZE = SIZES[1]
+LONG_FPS = 30.0
+LONG_CYCLE = 60
+"""Frames of the long clip that differ; it goes through them to and fro."""
+
+LONG_MOVING = 0.05
+"""Share of its rows in which anything moves."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A conversion to be measured: sensor, clip, frames made of each interval, format."""
+
+    size: Size
+    clip: str
+    L: int
+    format: str
+
+    @property
+    def name(self) -> str:
+        """All four, in words."""
+        return f"{self.size.name}: {self.clip}, L = {self.L}, {self.format}"
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Where clips are kept and outputs written, length, threads."""
+
+    folder: Path
+    scratch: Path
+    quick: bool
+    threads: int | None
+
+    def clip(self, size: Size, kind: str) -> tuple[Path, float]:
+        """Return the file of a clip and its frames a second; make it if need be."""
+        frames = size.frames // 4 if self.quick else size.frames
+        shape = {"width": size.width, "height": size.height, "frames": frames}
+        if kind == SCENE:
+            return stored(Clip(**shape, fps=30.0), self.folder), 30.0
+        burst = Burst(**shape, fps=size.burst_fps, swing=size.swing)
+        return stored_burst(burst, self.folder), burst.fps
+
+    def job(self, case: Case) -> Job:
+        """Return the job of a case."""
+        clip, fps = self.clip(case.size, case.clip)
+        arguments = [
+            "convert", str(clip), "--fps", f"{fps:g}", "--overwrite", "--no-progress",
+            "-o", str(self.scratch / f"out.{case.format}"), "--set", f"sampling.L={case.L}",
+        ]  # fmt: skip
+        if case.clip == BURST:
+            arguments += ["--set", SHORT_DEAD_TIME]
+        arguments += threads_option(self.threads)
+        options = {"arguments": arguments}
+        return Job(
+            name=case.name, clip=str(clip), fps=fps, options=options, threads=self.threads,
+            action=ACTION,
+        )  # fmt: skip
+
+
+def threads_option(threads: int | None) -> list[str]:
+    """Return the option that asks for so many threads."""
+    return ["--threads", str(threads)] if threads else []
+
+
+def cases(sizes: Sequence[str], formats: Sequence[str]) -> Iterator[Case]:
+    """Yield the cases of these sizes and formats, none: of all."""
+    for size in SIZES:
+        for clip in (SCENE, BURST):
+            for L in FACTORS:
+                for format_ in FORMATS:
+                    if size.name in (sizes or [size.name]) and format_ in (formats or FORMATS):
+                        yield Case(size, clip, L, format_)
+
+
+@click.command()
+@click.option("--quick", is_flag=True, help="Short clips.")
+@click.option(
+    "--size",
+    "sizes",
+    type=click.Choice([size.name for size in SIZES]),
+    multiple=True,
+    help="Only this sensor; repeatable.",
+)
+@click.option(
+    "--format",
+    "formats",
+    type=click.Choice(FORMATS),
+    multiple=True,
+    help="Only this format; repeatable.",
+)
+@click.option("--threads", type=click.IntRange(min=1), help="[default: all cores]")
+@click.option(
+    "--long",
+    "long_s",
+    type=click.FloatRange(min=10),
+    metavar="SECONDS",
+    help="One long clip instead, to the first format named.",
+)
+@click.option("--clips", "folder", type=click.Path(file_okay=False, path_type=Path))
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE.md")
+def main(
+    quick: bool,
+    sizes: tuple[str, ...],
+    formats: tuple[str, ...],
+    threads: int | None,
+    long_s: float | None,
+    folder: Path | None,
+    output: Path | None,
+) -> None:
+    """Measure the memory of conversions."""
+    folder = folder or default_folder()
+    log = Log(partial(click.echo, err=True))
+    try:
+        with tempfile.TemporaryDirectory(prefix="adv2e-memory-") as scratch:
+            setup = Setup(folder, Path(scratch), quick, threads)
+            if long_s is None:
+                text, raw = measure(setup, list(cases(sizes, formats)), log)
+            else:
+                text, raw = measure_long(setup, long_s, (formats or FORMATS)[0])
+    except (JobError, OSError, RuntimeError) as error:
+        raise click.ClickException(str(error)) from None
+    click.echo(text)
+    if output:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        output.write_text(text + "\n", encoding="utf-8")
+        numbers = json.dumps(raw, indent=1)
+        output.with_suffix(".json").write_text(numbers + "\n", encoding="utf-8")
+    if log.failures:
+        raise click.ClickException("; ".join(log.failures))
+
+
+def measure(setup: Setup, wanted: Sequence[Case], log: Log) -> tuple[str, list[dict[str, Any]]]:
+    """Run all cases once; return the report and the raw numbers."""
+    by_name = {case.name: case for case in wanted}
+    jobs = [setup.job(case) for case in wanted]
+    found = run_rounds(jobs, 1, log, warm=jobs[:1])
+    pairs = [(by_name[one.job.name], one) for one in found]
+    text = "\n\n".join([f"# Memory\n\n{machine_line()}. {busy_line(found)}", ABOUT, report(pairs)])
+    return text, [one.as_dict() for one in found]
+
+
+def report(pairs: Sequence[tuple[Case, Measured]]) -> str:
+    """Return the table, a row a case."""
+    header = ("size, clip", "L", "to", "M events", "s", "peak MiB", "at most", "held")
+    rows = []
+    for case, one in pairs:
+        peak = one.last["peak_mib"]
+        rows.append([
+            f"{case.size.name}, {case.clip}", str(case.L), case.format,
+            number(one.last["events"] / 1e6), number(one.wall_s().median), f"{peak:.0f}",
+            f"{case.size.most_mib:.0f}", "yes" if peak <= case.size.most_mib else "NO",
+        ])  # fmt: skip
+    return table(header, rows)
+
+
+# --- one long clip --------------------------------------------------------------------------------
+
+
+def measure_long(setup: Setup, seconds: float, format_: str) -> tuple[str, dict[str, Any]]:
+    """Convert a long clip; return the report and the raw numbers."""
+    frames = round(seconds * LONG_FPS)
+    clip = long_clip(setup.scratch / "long", frames)
+    command = [
+        sys.executable, "-m", "adv2e", "convert", str(clip), "--fps", f"{LONG_FPS:g}", "--progress",
+        "-o", str(setup.scratch / f"long.{format_}"), "--set", "sampling.L=1",
+        *threads_option(setup.threads),
+    ]  # fmt: skip
+    moments, printed = watched(command)
+    about = (
+        f"{seconds:g} s of {LONG_SIZE.name} at {LONG_FPS:g} frames a second, {frames:,} frames, of"
+        f" which {100 * LONG_MOVING:g} % of the rows move, to {format_}, L = 1:"
+        f" {count_in(printed) / 1e6:,.1f} million events."
+    )
+    text = "\n\n".join(["# A long clip", f"{machine_line()}.", about, long_table(moments, frames)])
+    return text, {"frames": frames, "moments": [asdict(moment) for moment in moments]}
+
+
+def long_clip(folder: Path, frames: int) -> Path:
+    """Make a folder of so many images, which are links to a few, to and fro; return it."""
+    folder.mkdir()
+    recipe = Clip(
+        width=LONG_SIZE.width,
+        height=LONG_SIZE.height,
+        frames=min(LONG_CYCLE, frames),
+        fps=LONG_FPS,
+        moving=LONG_MOVING,
+    )
+    made = []
+    for k, frame in enumerate(render(recipe)):
+        made.append(folder / f"{k:08d}.png")
+        if not cv2.imwrite(str(made[-1]), frame):
+            raise OSError(f"{folder}: cannot write pictures there")
+    cycle = made + made[-2:0:-1]
+    for k in range(len(made), frames):
+        (folder / f"{k:08d}.png").hardlink_to(cycle[k % len(cycle)])
+    return folder
+
+
+def long_table(moments: Sequence[Moment], frames: int) -> str:
+    """Return time a frame and memory, tenth by tenth.
+
+    Raises
+    ------
+    RuntimeError
+        Too little was seen of the run.
+    """
+    rows = []
+    for tenth in range(10):
+        low, high = frames * tenth // 10, frames * (tenth + 1) // 10
+        inside = [moment for moment in moments if low < moment.frames <= high]
+        if len(inside) < 3:
+            raise RuntimeError(f"too few looks at tenth {tenth + 1} of the run: make it longer")
+        first, last = inside[0], inside[-1]
+        each = (last.seconds - first.seconds) / (last.frames - first.frames)
+        memory = [moment.rss_mib for moment in inside]
+        rows.append([
+            str(tenth + 1), number(1e3 * each), f"{statistics.median(memory):.0f}",
+            f"{max(memory):.0f}",
+        ])  # fmt: skip
+    return table(("tenth", "ms a frame", "memory, median [MiB]", "most [MiB]"), rows)
+
+
+if __name__ == "__main__":
+    main()

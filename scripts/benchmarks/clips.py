@@ -1,0 +1,226 @@
+r"""Synthetic clips for benchmarks: the same frames for the same recipe, on any machine.
+
+A periodic texture with an amplitude spectrum :math:`f^{-1.25}` and log-normal grey values pans and
+turns; disks with soft edges cross it.  Frames are 8-bit grey values in linear light and stand for
+video that is interpolated already, so that no interpolation takes part in a comparison.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.synthetic.clips import encode_srgb
+
+Array = NDArray[np.float64]
+
+_PERIOD = 1024  # pixels after which the texture repeats
+_SLOPE = 1.25  # of the amplitude spectrum
+_DARKEST, _BRIGHTEST = 6.0, 250.0
+_SPIN = 0.12  # rad/s
+_SPEED = 80.0  # px/s, what `speed` is relative to
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clip:
+    """A recipe.
+
+    Attributes
+    ----------
+    width, height, frames : int
+    fps : float
+        Frames a second.
+    seed : int
+        Of texture and disks.
+    speed : float
+        Of all motion, relative to a pan at 80 px/s.
+    contrast : float
+        Standard deviation of the logarithm of the texture, before clipping.
+    moving : float
+        Share of the rows, around the middle, in which anything moves; the rest keeps its first
+        frame.
+    """
+
+    width: int
+    height: int
+    frames: int
+    fps: float = 240.0
+    seed: int = 20260
+    speed: float = 1.0
+    contrast: float = 0.75
+    moving: float = 1.0
+
+    @property
+    def times(self) -> Array:
+        """Time of each frame [s]."""
+        return np.arange(self.frames) / self.fps
+
+    @property
+    def name(self) -> str:
+        """A file name that tells every recipe from every other."""
+        parts = [f"{self.width}x{self.height}x{self.frames}", f"{self.fps:g}fps"]
+        for field, usual in _USUAL.items():
+            value = getattr(self, field)
+            if value != usual:
+                parts.append(f"{field}{value:g}")
+        return "_".join(parts)
+
+
+_USUAL: dict[str, float] = {"seed": 20260, "speed": 1.0, "contrast": 0.75, "moving": 1.0}
+
+
+def render(clip: Clip) -> Iterator[NDArray[np.uint8]]:
+    """Yield the frames, uint8 (rows, columns)."""
+    rng = np.random.default_rng(clip.seed)
+    texture = _texture(rng, clip.contrast)
+    disks = _Disks.draw(rng, clip)
+    rows, columns = np.mgrid[: clip.height, : clip.width].astype(np.float32)
+    u, v = columns - clip.width / 2, rows - clip.height / 2
+    still: NDArray[np.uint8] | None = None
+    for time in clip.times:
+        image = _panned(texture, u, v, clip.speed, float(time))
+        disks.paint(image, float(time))
+        frame = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+        if clip.moving < 1.0:
+            still = frame if still is None else still
+            frame = _moving_rows(still, frame, clip.moving)
+        yield frame
+
+
+def _texture(rng: np.random.Generator, contrast: float) -> NDArray[np.float32]:
+    """Return periodic noise of grey values, (1024, 1024)."""
+    across, down = np.fft.rfftfreq(_PERIOD), np.fft.fftfreq(_PERIOD)
+    frequency = np.hypot(down[:, None], across[None, :])
+    frequency[0, 0] = np.inf
+    shape = frequency.shape
+    spectrum = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / frequency**_SLOPE
+    noise = np.fft.irfft2(spectrum, s=(_PERIOD, _PERIOD))
+    noise /= noise.std()
+    bright = np.exp(contrast * noise - 2.2 * contrast)  # 1 at 2.2 standard deviations
+    grey = _DARKEST + (_BRIGHTEST - _DARKEST) * bright
+    return np.clip(grey, _DARKEST, _BRIGHTEST).astype(np.float32)
+
+
+def _panned(
+    texture: NDArray[np.float32], u: Any, v: Any, speed: float, time: float
+) -> NDArray[np.float64]:
+    """Return the texture as seen at `time`: panned on a winding path, turned about the centre."""
+    t = speed * time
+    angle = _SPIN * t
+    right = _SPEED * t + 30 * np.sin(2.1 * t)
+    down = 0.6 * _SPEED * np.sin(1.3 * t)
+    x = (np.cos(angle) * u - np.sin(angle) * v + right).astype(np.float32) % _PERIOD
+    y = (np.sin(angle) * u + np.cos(angle) * v + down).astype(np.float32) % _PERIOD
+    return cv2.remap(texture, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP).astype(float)
+
+
+@dataclass(frozen=True)
+class _Disks:
+    """Disks that cross the picture, each at its own velocity."""
+
+    centre: Array
+    velocity: Array
+    radius: Array
+    grey: Array
+    speed: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, clip: Clip) -> _Disks:
+        count = max(4, clip.width * clip.height // 60000)
+        return cls(
+            centre=rng.uniform(0, 1, (count, 2)) * (clip.width, clip.height),
+            velocity=rng.normal(0, 1.2 * _SPEED, (count, 2)),
+            radius=rng.uniform(0.02, 0.06, count) * min(clip.height, 400),
+            grey=rng.choice([12.0, 40.0, 190.0, 240.0], count),
+            speed=clip.speed,
+        )
+
+    def paint(self, image: Array, time: float) -> None:
+        """Paint the disks, with an edge 1.5 pixels wide, over `image`."""
+        height, width = image.shape
+        path = self.centre + self.velocity * (self.speed * time)
+        for (x, y), radius, grey in zip(
+            path % (width + 40, height + 40) - 20, self.radius, self.grey, strict=True
+        ):
+            reach = radius + 1
+            left, right = max(0, int(x - reach)), max(0, int(x + reach) + 2)
+            top, bottom = max(0, int(y - reach)), max(0, int(y + reach) + 2)
+            part = image[top:bottom, left:right]
+            below, beside = np.mgrid[top : top + part.shape[0], left : left + part.shape[1]]
+            distance = np.hypot(beside - x, below - y) - radius
+            cover = np.clip(0.5 - distance / 1.5, 0, 1)
+            part *= 1 - cover
+            part += grey * cover
+
+
+def _moving_rows(
+    still: NDArray[np.uint8], frame: NDArray[np.uint8], share: float
+) -> NDArray[np.uint8]:
+    """Return `frame` in a band of that share of the rows around the middle, `still` elsewhere."""
+    band = round(share * len(still))
+    top = (len(still) - band) // 2
+    mixed = still.copy()
+    mixed[top : top + band] = frame[top : top + band]
+    return mixed
+
+
+def default_folder() -> Path:
+    """Return the folder for clips: in the user's cache folder."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "adv2e-benchmarks"
+
+
+def stored(clip: Clip, folder: Path) -> Path:
+    """Return the ``.npy`` file of the clip, (frames, rows, columns); make it if need be."""
+    path = folder / f"{clip.name}.npy"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder, suffix=".part", delete=False) as part:
+            np.save(part, np.stack(list(render(clip))))
+        Path(part.name).replace(path)  # whole, or not there
+        path.with_suffix(".json").write_text(json.dumps(asdict(clip), indent=1))
+    return path
+
+
+def encoded(source: Path, fps: float) -> Path:
+    """Return the clip as MP4 (codec mp4v) beside its ``.npy`` file; make it if need be.
+
+    Raises
+    ------
+    OSError
+        OpenCV cannot encode here.
+    """
+    path = source.with_suffix(".mp4")
+    if not path.exists():
+        frames = np.load(source, mmap_mode="r")
+        part = path.with_suffix(".part.mp4")
+        size = frames.shape[2], frames.shape[1]
+        codec = cv2.VideoWriter.fourcc(*"mp4v")
+        writer = cv2.VideoWriter(str(part), codec, fps, size, isColor=True)
+        if not writer.isOpened():
+            raise OSError(f"{part}: OpenCV cannot encode mp4v here")
+        for frame in frames:
+            writer.write(cv2.cvtColor(np.asarray(frame), cv2.COLOR_GRAY2BGR))
+        writer.release()
+        part.replace(path)
+    return path
+
+
+def as_srgb(path: Path) -> Path:
+    """Return the clip with its light coded as 8-bit sRGB, beside the linear one."""
+    target = path.with_name(f"{path.stem}_srgb.npy")
+    if not target.exists():
+        part = target.with_suffix(".part")
+        with part.open("wb") as file:
+            np.save(file, encode_srgb(np.arange(256))[np.load(path)])
+        part.replace(target)
+    return target
