@@ -3,7 +3,8 @@
 Numba's own cache looks only at the file that a function stands in, so a function that calls an
 edited one from another file would run as its old self.  The cache folder is therefore named after
 a digest of all sources that hold compiled code.  It lies in the user's cache folder (or below
-``NUMBA_CACHE_DIR`` where that is set), so that a read-only installation starts fast too.
+``NUMBA_CACHE_DIR`` where that is set), so that a read-only installation starts fast too.  Folders
+of other sources are removed when they have not been used for a month.
 
 Compiled functions release the interpreter lock and run in ordinary threads, one tile each.
 Fast-math is off, but for one flag: ``contract`` lets a product and a sum round once (FMA), which
@@ -16,17 +17,25 @@ from __future__ import annotations
 
 import hashlib
 import os
+import secrets
+import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core.caching import FunctionCache
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+_FunctionCache: Any = FunctionCache  # it has no types
 _PACKAGE = Path(__file__).resolve().parent
+_UNUSED_S = 30 * 24 * 3600.0
+_USE_NOTED_S = 24 * 3600.0
 
 
 def _digest() -> str:
@@ -52,7 +61,7 @@ def cache_folder() -> Path:
     """Return the folder for compiled code, made if need be; the first that can be written to."""
     bases: list[Path] = []
     if os.environ.get("NUMBA_CACHE_DIR"):
-        bases.append(Path(os.environ["NUMBA_CACHE_DIR"]))
+        bases.append(Path(os.environ["NUMBA_CACHE_DIR"]) / "adv2e")
     if os.environ.get("XDG_CACHE_HOME"):
         bases.append(Path(os.environ["XDG_CACHE_HOME"]) / "adv2e")
     if sys.platform == "win32" and os.environ.get("LOCALAPPDATA"):
@@ -64,24 +73,79 @@ def cache_folder() -> Path:
     name = f"kernels-{_digest()}"
     for base in bases:
         if _writable(base / name):
+            note_use(base / name)
             return base / name
     return Path(tempfile.mkdtemp(prefix="adv2e-"))
 
 
+def note_use(folder: Path) -> None:
+    """Remember that the code in `folder` is in use; once a day, remove what nobody has used.
+
+    A process that still runs with the code in a folder removed here has it in memory.
+    """
+    now = time.time()
+    with suppress(OSError):  # of no matter to whoever wants to compute
+        noted = folder / "used"
+        if noted.exists() and now - noted.stat().st_mtime < _USE_NOTED_S:
+            return
+        noted.touch()
+        for other in folder.parent.glob("kernels-*"):
+            last = max(path.stat().st_mtime for path in (other, *other.glob("used")))
+            if now - last > _UNUSED_S:
+                shutil.rmtree(other, ignore_errors=True)
+
+
+class _Cache(_FunctionCache):  # type: ignore[misc]
+    """Numba's cache of one function, made to bear what happens to files.
+
+    What cannot be read counts as missing, what cannot be written is not kept.  Machine code lies
+    under names that no other process gives: two processes that fill the cache at once would else
+    number the code of two signatures alike, and one of them would later run as the other.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        files = self._cache_file
+        files._data_name_pattern = files._data_name_pattern.replace(
+            "{number:d}", f"{_PROCESS}-{{number:d}}"
+        )
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Return the compiled code for a signature, or None."""
+        try:
+            return super().load_overload(signature, context)
+        except Exception:  # a file cut short may raise anything
+            return None
+
+    def save_overload(self, signature: Any, code: Any) -> None:
+        """Keep the compiled code for a signature, if that is possible."""
+        with suppress(OSError):
+            try:
+                super().save_overload(signature, code)
+            except OSError:
+                raise
+            except Exception:  # the index is damaged: begin a new one
+                self.flush()
+                super().save_overload(signature, code)
+
+
 _FOLDER = cache_folder()
+_PROCESS = secrets.token_hex(4)
 
 
-def _compile(function: Function, **options: Any) -> Function:
-    config: Any = numba.config  # its attributes are made at run time
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(_FOLDER)
-    try:
-        compiled: Function = numba.njit(
-            nogil=True, error_model="numpy", fastmath={"contract"}, **options
-        )(function)
-    finally:
-        config.CACHE_DIR = before
-    return compiled
+def _compile(function: Function, *, cache: bool = False, **options: Any) -> Function:
+    compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath={"contract"}, **options)(
+        function
+    )
+    if cache:
+        config: Any = numba.config  # its attributes are made at run time
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(_FOLDER)
+        try:
+            compiled._cache = _Cache(function)  # as the option `cache` does
+        finally:
+            config.CACHE_DIR = before
+    return compiled  # type: ignore[no-any-return]
 
 
 def kernel(function: Function) -> Function:

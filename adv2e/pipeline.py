@@ -1,9 +1,14 @@
-"""One conversion: source -> light -> events -> sink, with a summary at the end."""
+"""One conversion: source -> light -> events -> sink, with a summary at the end.
+
+With more than one thread, frames are read and decoded in a thread ahead of the pixel and events
+written in another behind it; those two are seldom busy and come on top of the threads that compute.
+With one thread, that one does everything.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,17 +16,25 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
-from adv2e import __version__, jit
+from adv2e import __version__
 from adv2e.config import Config, to_dict
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
+from adv2e.heap import return_large_blocks
+from adv2e.overlap import ReadAhead, WriteBehind
+from adv2e.pixel import is_compiled
 from adv2e.rendering import Preview
 from adv2e.simulation import events_from_light
-from adv2e.sinks import format_name, open_sink
+from adv2e.sinks import Sink, default_threads, format_name, open_sink
 from adv2e.sources import open_source
 from adv2e.sources.base import Source
+
+AHEAD_BYTES = 16 << 20
+"""Memory for frames that were decoded and not taken yet."""
+
+BEHIND_BYTES = 16 << 20
+"""Memory for events and frames that were made and not written yet."""
 
 
 @dataclass(frozen=True)
@@ -48,25 +61,71 @@ class Summary:
         )
 
 
-class _Counter:
-    """Counts frames and events as they pass."""
+_Call = Callable[..., None]
+"""Takes a cost in bytes, a function and its arguments, and calls it now or later."""
 
-    def __init__(self) -> None:
-        self.frames = 0
-        self.first_ns = 0
-        self.last_ns = 0
+
+def _call_now(_: int, function: Callable[..., None], *arguments: Any) -> None:
+    function(*arguments)
+
+
+@dataclass(frozen=True)
+class _Still:
+    """A frame: time [ns], light [DN] or grey values, and, where it is kept, what is seen of it."""
+
+    t_ns: int
+    light: NDArray[Any]
+    picture: NDArray[Any] | None
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes."""
+        return self.light.nbytes + (0 if self.picture is None else self.picture.nbytes)
+
+
+class _Output:
+    """What frames and events go to: the sink, the preview if there is one, and the counts."""
+
+    def __init__(self, sink: Sink, preview: Preview | None) -> None:
+        self._sink, self._preview = sink, preview
+        self.wants_frames = sink.wants_frames or preview is not None
         self.events = 0
         self.on = 0
 
-    def frame(self, t_ns: int) -> None:
-        if not self.frames:
-            self.first_ns = t_ns
-        self.frames += 1
-        self.last_ns = t_ns
+    def add_frame(self, t_ns: int, picture: NDArray[Any]) -> None:
+        self._sink.write_frame(t_ns, picture)
+        if self._preview is not None:
+            self._preview.add_frame(t_ns, picture)
 
-    def add(self, events: Events) -> None:
+    def add_events(self, events: Events) -> None:
         self.events += events.size
         self.on += int(np.count_nonzero(events["p"]))
+        self._sink.write_events(events)
+        if self._preview is not None:
+            self._preview.add_events(events)
+
+
+class _Passing:
+    """Frames on their way to the pixel: counts them, and hands on what is kept of them."""
+
+    def __init__(self, stills: Iterable[_Still], output: _Output, call: _Call) -> None:
+        self._stills, self._output, self._call = stills, output, call
+        self.count = 0
+        self.first_ns = 0
+        self.last_ns = 0
+
+    def light(self) -> Iterator[tuple[int, NDArray[Any]]]:
+        """Yield (t_ns, light), or grey values, of each frame."""
+        for still in self._stills:
+            self.first_ns = still.t_ns if not self.count else self.first_ns
+            self.last_ns = still.t_ns
+            self.count += 1
+            if still.picture is not None:
+                size = still.picture.nbytes
+                self._call(size, self._output.add_frame, still.t_ns, still.picture)
+            now = still.t_ns, still.light
+            del still  # with its picture
+            yield now
 
 
 def default_output(source: str) -> str:
@@ -109,7 +168,7 @@ def convert(
     preview : str, optional
         Picture or film of the events to write beside.
     threads : int, optional
-        Default: all cores.
+        Threads that compute; default: all cores.  The files do not depend on it.
     progress : bool
         Show a progress bar on stderr.
     log : callable
@@ -121,6 +180,7 @@ def convert(
         For anything wrong with input or output; then no output file is left.
     """
     began = time.perf_counter()
+    return_large_blocks()
     recording = open_source(
         source,
         fps=fps,
@@ -130,7 +190,7 @@ def convert(
         t0=t0,
     )
     target = output or default_output(source)
-    counter = _Counter()
+    workers = recording.threads = threads or default_threads()
     with ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
@@ -142,28 +202,38 @@ def convert(
                 metadata=_metadata(config, recording),
                 overwrite=overwrite,
                 with_frames=with_frames or _holds_frames(target, format),
-                threads=threads,
+                threads=workers,
             )
         )
-        view = _open_preview(preview, recording, overwrite, stack)
-        frames = _watched(recording, config, counter, sink, view, progress)
-        if not jit.is_cached("run_tile"):
+        out = _Output(sink, _open_preview(preview, recording, overwrite, stack))
+        call: _Call = _call_now
+        # a write to standard output may block until the reader pleases, and only the main thread
+        # can be interrupted in it
+        if workers > 1 and target != "-":
+            call = stack.enter_context(WriteBehind(BEHIND_BYTES)).call
+        decoder = _decoder_for(recording, config)
+        table = _table_for_the_kernel(decoder, config)
+        stills: Iterator[_Still] = _stills(recording, decoder, table is not None, out.wants_frames)
+        if workers > 1:
+            ahead = ReadAhead(stills, cost=lambda still: still.nbytes, limit=AHEAD_BYTES)
+            stills = stack.enter_context(ahead)
+        if not is_compiled(config.pixel, config.sampling):
             log("compiling the pixel's kernel (once; about half a minute)")
-        for events in events_from_light(frames, config, threads=threads):
-            counter.add(events)
-            sink.write_events(events)
-            if view is not None:
-                view.add_events(events)
+        frames = _Passing(_progress(stills, recording.count, progress), out, call)
+        for events in events_from_light(frames.light(), config, threads=workers, table=table):
+            for piece in _pieces(events):
+                call(piece.nbytes, out.add_events, piece)
+            del events, piece  # or they would stay while the next ones are made
     for note in recording.notes:  # at the end: an error is to be the only line
         log(note)
     return Summary(
         output=target,
         width=recording.width,
         height=recording.height,
-        frames=counter.frames,
-        duration_s=(counter.last_ns - counter.first_ns) * 1e-9,
-        events=counter.events,
-        on=counter.on,
+        frames=frames.count,
+        duration_s=(frames.last_ns - frames.first_ns) * 1e-9,
+        events=out.events,
+        on=out.on,
         seconds=time.perf_counter() - began,
     )
 
@@ -197,7 +267,9 @@ def _full_scale(recording: Source, config: Config) -> float:
     return config.frames.full_scale or recording.full_scale
 
 
-def _open_preview(preview: str | None, recording: Source, overwrite: bool, stack: ExitStack) -> Any:
+def _open_preview(
+    preview: str | None, recording: Source, overwrite: bool, stack: ExitStack
+) -> Preview | None:
     if preview is None:
         return None
     return stack.enter_context(
@@ -205,28 +277,60 @@ def _open_preview(preview: str | None, recording: Source, overwrite: bool, stack
     )
 
 
-def _watched(
-    recording: Source, config: Config, counter: _Counter, sink: Any, view: Any, progress: bool
-) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Yield (t_ns, light) of the source; count, store and show each frame on the way."""
-    decoder = LightDecoder(
+def _decoder_for(recording: Source, config: Config) -> LightDecoder:
+    return LightDecoder(
         _encoding(recording, config),
         _full_scale(recording, config),
         recording.dtype,
         recording.colour,
     )
-    frames = tqdm(
-        recording.frames(), total=recording.count, unit="frame", disable=not progress, leave=False
-    )
-    for frame in frames:
-        counter.frame(frame.t_ns)
-        if sink.wants_frames or view is not None:
-            image = _viewable(frame.image, _full_scale(recording, config))
-            if sink.wants_frames:
-                sink.write_frame(frame.t_ns, image)
-            if view is not None:
-                view.add_frame(frame.t_ns, image)
-        yield frame.t_ns, decoder.decode(frame.image)
+
+
+def _table_for_the_kernel(decoder: LightDecoder, config: Config) -> NDArray[np.float32] | None:
+    """Return the table with which the kernel is to decode grey frames itself; None: light it is.
+
+    A quarter of the memory traffic, but every instant looks its frames up again, and only linear
+    interpolation needs no light before.
+    """
+    sampling = config.sampling
+    once = sampling.L == 1 and sampling.interpolation == "linear"
+    return decoder.grey_table if once else None
+
+
+def _pieces(events: Events) -> Iterator[Events]:
+    """Yield the events, those of a burst in copies that are given back one by one.
+
+    Else all of them would stay until the last one is written, beside those made meanwhile.
+    """
+    if events.nbytes <= BEHIND_BYTES:
+        yield events
+        return
+    size = BEHIND_BYTES // 4 // events.itemsize
+    for begin in range(0, events.size, size):
+        yield events[begin : begin + size].copy()
+
+
+def _stills(
+    recording: Source, decoder: LightDecoder, coded: bool, keep_pictures: bool
+) -> Generator[_Still, None, None]:
+    """Yield the frames of the source: light or, `coded`, as they were read."""
+    for frame in recording.frames():
+        picture = _viewable(frame.image, decoder.full_scale) if keep_pictures else None
+        light = frame.image if coded else decoder.decode(frame.image)
+        still = _Still(frame.t_ns, light, picture)
+        # large frames fill the memory: none stays longer than it is needed
+        del frame, light, picture
+        yield still
+        del still
+
+
+def _progress(stills: Iterator[_Still], count: int | None, shown: bool) -> Iterable[_Still]:
+    """Return the frames, with a progress bar on stderr if it is to be shown."""
+    if not shown:
+        return stills
+    from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and most runs in scripts need none
+
+    return tqdm(stills, total=count, unit="frame", leave=False)
 
 
 def _viewable(image: NDArray[Any], full_scale: float) -> NDArray[Any]:

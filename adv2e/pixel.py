@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e import jit
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.pixel.hot_pixels import fill_first_hot_times
 from adv2e.effects.pixel.leak import fill_first_factors
@@ -19,10 +23,13 @@ from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE, fill_first_candidates
 from adv2e.effects.pixel.thresholds import fill_levels, fill_random_reference
 from adv2e.errors import DataError
-from adv2e.events import EVENT_DTYPE, Events
-from adv2e.kernel import items, screen
-from adv2e.kernel.screen import NODES_MAX, STRIP
-from adv2e.kernel.tile import run_tile
+from adv2e.events import EVENT_DTYPE, Events, empty_events
+from adv2e.intervals import Part
+from adv2e.kernel import order, screen, stepped
+from adv2e.kernel.exact import covers, run_exact
+from adv2e.kernel.general import run_general
+from adv2e.kernel.screen import NODES_MAX
+from adv2e.kernel.tile import frames_of, scratch
 from adv2e.kernel.workspace import (
     PIXEL_BITS,
     S_HOLD,
@@ -31,7 +38,6 @@ from adv2e.kernel.workspace import (
     S_LAG2,
     S_LEAK_DRAW,
     S_LEAK_FACTOR,
-    S_LIGHT,
     S_NOISE,
     S_NOISE_DRAW,
     S_OFF,
@@ -40,12 +46,22 @@ from adv2e.kernel.workspace import (
     S_SHOT_DRAW,
     S_SHOT_TIME,
     S_X,
+    STRIP,
     Circuit,
     pack_limit_us,
-    workspace,
 )
 
 _NO_KNEE = 1e300
+_LARGEST_SIDE = 1 << 16
+_TILE = 16 * STRIP
+"""Pixels of the largest tiles, whose frames should stay in the second level of cache."""
+
+_SORTED = 1 << 15
+"""Events that are sorted at a time."""
+
+_YIELDED = 1 << 20
+"""Events that are yielded at a time, or one slice of time's."""
+
 _PER_US = 1e-6
 
 
@@ -58,7 +74,7 @@ def thread_count(threads: int | None) -> int:
     return os.cpu_count() or 1
 
 
-def make_circuit(pixel: Pixel, steps: int, seed: int) -> Circuit:
+def make_circuit(pixel: Pixel, sampling: Sampling, seed: int) -> Circuit:
     """Return what the compiled code needs of the configuration; rates a us, corners in rad a us."""
     low_pass, follower, leak = pixel.low_pass, pixel.source_follower, pixel.leak
     knee_dn = pixel.log_response.linear_below
@@ -68,13 +84,15 @@ def make_circuit(pixel: Pixel, steps: int, seed: int) -> Circuit:
     noise = pixel.photoreceptor_noise
     return Circuit(
         update=UPDATES.index(low_pass.update) if low_pass else 0,
-        steps=steps,
+        steps=sampling.K,
+        printed=sampling.last_interval == "printed",
         filtered=low_pass is not None,
         dark=corner * dark,
         per_dn=corner * (white - dark) / 255.0,
         follower=corner * follower.cutoff_hz if follower else 0.0,
         knee=math.log(knee_dn) if knee_dn > 0 else -_NO_KNEE,
         slope=knee_dn / math.log(knee_dn) if knee_dn > 0 else 0.0,
+        floor=pixel.log_response.floor,
         dead_time=pixel.refractory.period_us if pixel.refractory else 0.0,
         leak=leak.rate_hz * _PER_US if leak else 0.0,
         photo_leak=leak.photo_rate_hz * _PER_US / 255.0 if leak else 0.0,
@@ -92,26 +110,48 @@ def make_circuit(pixel: Pixel, steps: int, seed: int) -> Circuit:
     )
 
 
+def is_compiled(pixel: Pixel, sampling: Sampling) -> bool:
+    """Tell whether the kernel that this pixel needs has been compiled before."""
+    exact = covers(make_circuit(pixel, sampling, 0))
+    return jit.is_cached("run_exact" if exact else "run_general")
+
+
 @lru_cache(maxsize=256)
 def _quadrature(length: float, fastest: float) -> tuple[NDArray[Any], NDArray[Any]]:
     return screen.quadrature(length, fastest)
 
 
-class _Tile:
-    """A range of pixels with the scratch memory of whoever works on it."""
+def _spread(count: int) -> list[int]:
+    """Return 0..count-1, neighbours far apart: a stride that shares no factor with the count."""
+    stride = next(
+        k for k in range(round(0.618 * count) or 1, 2 * count + 2) if math.gcd(k, count) == 1
+    )
+    return [k * stride % count for k in range(count)]
 
-    def __init__(self, lo: int, hi: int, exact_times: bool) -> None:
-        self.lo, self.hi = lo, hi
-        self.scratch = workspace()
-        # one row is not a multiple of a page: rows must not share cache sets
-        self.columns = np.zeros((13, STRIP + 24))
-        self.flags = np.zeros(STRIP, np.bool_)
-        self.items = np.zeros((items.ROWS, items.CAPACITY + 24))
-        self.keep = np.zeros(STRIP, np.bool_)
-        self.found_time = np.empty(8 * items.CAPACITY)
-        self.found_pixel = np.empty(8 * items.CAPACITY, np.int64)
+
+class _Worker:
+    """Memory that one thread works with."""
+
+    def __init__(self, exact_times: bool) -> None:
+        self.scratch = scratch()
         self.keys = np.empty(4096, np.int64)
         self.times = np.empty(4096 if exact_times else 0)
+
+
+class _Parted:
+    """Events of a tile, slice of time by slice."""
+
+    def __init__(self, worker: _Worker, count: int, per_us: float) -> None:
+        self.keys = np.empty(count, np.int64)
+        self.ends = np.empty(order.SLICES + 1, np.int64)
+        order.part_by_time(worker.keys, count, per_us, self.ends, self.keys)
+        self.times = worker.times[:count].copy()
+        # as they came, for the unrounded times that go with them
+        self.raw = worker.keys[: self.times.size].copy()
+
+    def of(self, first: int, last: int) -> NDArray[np.int64]:
+        """Return the events of the slices first..last, the last one not counted."""
+        return self.keys[self.ends[first] : self.ends[last]]
 
 
 class PixelArray:
@@ -135,7 +175,7 @@ class PixelArray:
     Raises
     ------
     DataError
-        More than 2^27 pixels.
+        More than 2^27 pixels, or more than 2^16 columns or rows.
     """
 
     def __init__(
@@ -152,22 +192,28 @@ class PixelArray:
     ) -> None:
         self.rows, self.columns = first.shape
         self.pixels = self.rows * self.columns
+        if max(self.rows, self.columns) > _LARGEST_SIDE:
+            raise DataError(
+                f"{self.columns}x{self.rows} pixels: events hold columns and rows below"
+                f" {_LARGEST_SIDE}"
+            )
         if self.pixels >= 1 << PIXEL_BITS:
             raise DataError(
                 f"{self.columns}x{self.rows} pixels: at most {1 << PIXEL_BITS} are supported"
             )
         self.origin_us = t_ns // 1000
-        self.circuit = make_circuit(pixel, sampling.K, seed)
-        self.floor = pixel.log_response.floor
+        self.circuit = make_circuit(pixel, sampling, seed)
         self.threads = thread_count(threads)
         self.started = False
         self.state = self._first_state(pixel, seed, first, self._relative(t_ns))
-        size = tile or max(STRIP, -(-self.pixels // (4 * self.threads)))
+        size = tile or min(_TILE, max(STRIP, -(-self.pixels // (4 * self.threads))))
         size = -(-size // STRIP) * STRIP
-        self._tiles = [
-            _Tile(lo, min(lo + size, self.pixels), exact_times)
-            for lo in range(0, self.pixels, size)
-        ]
+        tiles = [(lo, min(lo + size, self.pixels)) for lo in range(0, self.pixels, size)]
+        # neighbouring tiles tend to be alike: spread over the threads, as they end about together
+        self._tiles = [tiles[k] for k in _spread(len(tiles))]
+        self._workers: SimpleQueue[_Worker] = SimpleQueue()
+        for _ in range(self.threads):
+            self._workers.put(_Worker(exact_times))
         self.last_times = np.empty(0)
 
     def _relative(self, t_ns: int) -> float:
@@ -187,17 +233,17 @@ class PixelArray:
         rows = 1 + max([S_OFF, *(row for row, on in used.items() if on)])
         state = np.zeros((rows, self.pixels))
         light = np.ascontiguousarray(first).reshape(-1)
-        screen.load_strip(light, circuit, self.floor, state[S_LIGHT], state[S_X])
+        stepped.load_strip(light, circuit, np.empty(self.pixels), state[S_X])
         levels = pixel.thresholds
         on, off = state[S_ON], state[S_OFF]
-        fill_levels(seed, levels.on, levels.off, levels.mismatch, on, off)
+        self._over_pixels(fill_levels, seed, levels.on, levels.off, levels.mismatch, on, off)
         state[S_REFERENCE] = state[S_X]
         state[S_HOLD] = -1.0
         if pixel.initial_reference == "random":
             fill_random_reference(seed, on, off, state[S_X], state[S_REFERENCE])
         if circuit.shot_rate > 0:
             times = state[S_SHOT_TIME]
-            fill_first_candidates(seed, circuit.shot_rate, start, times)
+            self._over_pixels(fill_first_candidates, seed, circuit.shot_rate, start, times)
         if pixel.hot_pixels and circuit.hot_rate > 0:
             share, times = pixel.hot_pixels.fraction, state[S_HOT_TIME]
             fill_first_hot_times(seed, share, circuit.hot_rate, start, times)
@@ -210,6 +256,18 @@ class PixelArray:
             if circuit.follower == 0:  # behind a second pole at rest it does not show yet
                 state[S_REFERENCE] += noise
         return state
+
+    def _over_pixels(self, fill: Callable[..., None], *arguments: Any) -> None:
+        """Call `fill` for ranges of pixels, in threads: drawing for all of them takes its time."""
+        if self.threads == 1:
+            fill(0, self.pixels, *arguments)
+            return
+        borders = np.linspace(0, self.pixels, self.threads + 1).astype(int).tolist()
+        with ThreadPoolExecutor(self.threads) as pool:
+            for done in [
+                pool.submit(fill, lo, hi, *arguments) for lo, hi in itertools.pairwise(borders)
+            ]:
+                done.result()
 
     def advance(
         self,
@@ -227,35 +285,101 @@ class PixelArray:
             one more, for the look-ahead.
         times_ns : (intervals + 1)
         last : (intervals + 1,) bool
-            See :func:`adv2e.kernel.tile.run_tile`.
+            See :func:`adv2e.kernel.exact.run_exact`.
         pool : ThreadPoolExecutor, optional
             Threads to work in; none: the calling one.
         """
-        starts = np.array([self._relative(t) for t in times_ns])
+        before = np.arange(-1, frames.shape[0] - 1)
+        part = Part(frames, before, np.ones(before.size, np.float32), times_ns, last)
+        return np.concatenate([empty_events(), *self.advance_part(part, None, pool)])
+
+    def advance_part(
+        self, part: Part, table: NDArray[np.float32] | None, pool: ThreadPoolExecutor | None
+    ) -> Iterator[Events]:
+        """Yield the sorted events of a part, not too many at a time.
+
+        Parameters
+        ----------
+        part : Part
+            Frames of light [DN], or of uint8 grey values.
+        table : (256,) float32, optional
+            Light of each grey value [DN].
+        pool : ThreadPoolExecutor, optional
+            Threads to work in; none: the calling one.
+        """
+        starts = np.array([self._relative(t) for t in part.times_ns])
+        span = starts[-1] - starts[0]
         t_base = math.floor(starts[0]) - 1
-        if starts[-1] - starts[0] >= pack_limit_us() // 2:
-            raise DataError(f"{(starts[-1] - starts[0]) / 1e6:.0f} s between frames: too long")
-        flat = frames.reshape(frames.shape[0], -1)
+        if span >= pack_limit_us() // 2:
+            raise DataError(f"{span / 1e6:.0f} s between frames: too long")
+        frames = frames_of(part.frames, table)
         nodes, weights, counts = self._nodes(np.diff(starts))
+        per_us = order.SLICES / (span + 2.0)
 
-        def run(tile: _Tile) -> tuple[NDArray[Any], NDArray[Any]]:
-            n, tile.keys, tile.times = run_tile(
-                tile.lo, tile.hi, flat, starts, not self.started, last, self.floor,
-                self.circuit, nodes, weights, counts, t_base, self.state, tile.scratch,
-                tile.columns, tile.flags, tile.items, tile.keep, tile.found_time, tile.found_pixel,
-                tile.keys, tile.times,
+        advance = run_exact if covers(self.circuit) else run_general
+
+        def run(tile: tuple[int, int]) -> _Parted:
+            lo, hi = tile
+            worker = self._workers.get()
+            n, worker.keys, worker.times = advance(
+                lo, hi, frames, part.before, part.share, starts, not self.started, part.last,
+                self.circuit, nodes, weights, counts, t_base, self.state, worker.scratch,
+                worker.keys, worker.times,
             )  # fmt: skip
-            return tile.keys[:n], tile.times[:n]
+            parted = _Parted(worker, n, per_us)
+            self._workers.put(worker)
+            return parted
 
-        parts = list(pool.map(run, self._tiles) if pool else map(run, self._tiles))
+        spread = pool.map if pool else map
+        parted = list(spread(run, self._tiles))
         self.started = True
-        keys = np.concatenate([part[0] for part in parts])
-        times = np.concatenate([part[1] for part in parts])
-        if times.size:
-            order = np.argsort(keys, kind="stable")
-            self.last_times = times[order]
-        keys.sort()
-        return self._unpack(keys, t_base)
+        self._keep_times(parted)
+        yield from self._in_order(parted, t_base, pool)
+
+    def _keep_times(self, parted: list[_Parted]) -> None:
+        times = np.concatenate([tile.times for tile in parted])
+        keys = np.concatenate([tile.raw for tile in parted])
+        self.last_times = times[np.argsort(keys, kind="stable")]
+
+    def _in_order(
+        self, parted: list[_Parted], t_base: int, pool: ThreadPoolExecutor | None
+    ) -> Iterator[Events]:
+        """Yield the events of all tiles, sorted, not many more than _YIELDED at a time."""
+        ends = np.sum([tile.ends for tile in parted], axis=0)
+        first = 0
+        while first < order.SLICES:
+            last = first + 1
+            while last < order.SLICES and ends[last + 1] - ends[first] <= _YIELDED:
+                last += 1
+            yield self._sorted_slices(parted, ends, first, last, t_base, pool)
+            first = last
+
+    def _sorted_slices(
+        self,
+        parted: list[_Parted],
+        ends: NDArray[np.int64],
+        first: int,
+        last: int,
+        t_base: int,
+        pool: ThreadPoolExecutor | None,
+    ) -> Events:
+        """Return the sorted events of the slices first..last."""
+        begin = ends[first]
+        events = np.empty(int(ends[last] - begin), EVENT_DTYPE)
+        # as many slices at a time as sort in cache
+        borders = [first]
+        for s in range(first + 1, last + 1):
+            if s == last or ends[s + 1] - ends[borders[-1]] > _SORTED:
+                borders.append(s)
+
+        def sort(lo: int, hi: int) -> None:
+            keys = np.concatenate([tile.of(lo, hi) for tile in parted])
+            keys.sort()
+            t0 = self.origin_us + t_base
+            order.unpack(keys, self.columns, t0, events[ends[lo] - begin : ends[hi] - begin])
+
+        list((pool.map if pool else map)(sort, borders[:-1], borders[1:]))
+        return events
 
     def _nodes(self, lengths: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
         nodes = np.zeros((lengths.size, NODES_MAX))
@@ -270,12 +394,3 @@ class PixelArray:
             nodes[k, : node.size] = node
             weights[k, : node.size] = weight
         return nodes, weights, counts
-
-    def _unpack(self, keys: NDArray[Any], t_base: int) -> Events:
-        events = np.empty(keys.size, EVENT_DTYPE)
-        events["t"] = (keys >> (PIXEL_BITS + 1)) + (self.origin_us + t_base)
-        index = (keys >> 1) & ((1 << PIXEL_BITS) - 1)
-        events["x"] = index % self.columns
-        events["y"] = index // self.columns
-        events["p"] = keys & 1
-        return events

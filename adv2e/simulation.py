@@ -12,6 +12,7 @@ True
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
@@ -24,14 +25,9 @@ from adv2e.config.model import Config
 from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images, full_scale_of
 from adv2e.errors import DataError
 from adv2e.events import Events, empty_events, sort_events
+from adv2e.intervals import Intervals
 from adv2e.pixel import PixelArray, thread_count
 from adv2e.sources.base import check_values
-from adv2e.upsampling import make_upsampler
-
-CHUNK_BYTES = 16 << 20
-"""Memory for the frames that one call of the kernel takes."""
-
-_CHUNK_INTERVALS = 16
 
 
 def simulate(
@@ -66,33 +62,45 @@ def simulate(
         Fewer than two frames, times that do not increase, frames of different sizes or types, NaN.
     """
     config = config or Config()
-    yield from events_from_light(_decoded(frames, times, config), config, threads=threads)
+    raw = _Raw(frames, times, config)
+    yield from events_from_light(raw.light(), config, threads=threads, table=raw.table)
 
 
-def _decoded(
-    frames: Iterable[NDArray[Any]], times: Iterable[float], config: Config
-) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Yield (t_ns, light) of raw frames, checked."""
-    decoder: LightDecoder | None = None
-    first: NDArray[Any] | None = None
-    pending = iter(times)
-    for number, frame in enumerate(frames):
-        image = np.asarray(frame)
+class _Raw:
+    """Frames as given, checked, with what turns them into light."""
+
+    def __init__(
+        self, frames: Iterable[NDArray[Any]], times: Iterable[float], config: Config
+    ) -> None:
+        self._frames = enumerate(frames)
+        self._times = iter(times)
+        _, image = next(self._frames, (0, None))
+        if image is None:
+            raise DataError("no frames: at least two are needed")
+        self._first = np.asarray(image)
+        self._decoder = _decoder_for(self._first, config)
+        # decoded by the kernel, unless many instants are made of each frame
+        self.table = self._decoder.grey_table if config.sampling.L == 1 else None
+
+    def light(self) -> Iterator[tuple[int, NDArray[Any]]]:
+        """Yield (t_ns, light), or grey values for the table where there is one."""
+        yield self._checked(0, self._first)
+        for number, frame in self._frames:
+            yield self._checked(number, np.asarray(frame))
+
+    def _checked(self, number: int, image: NDArray[Any]) -> tuple[int, NDArray[Any]]:
         try:
-            t_ns = round(float(next(pending)) * 1e9)
+            t_ns = round(float(next(self._times)) * 1e9)
         except StopIteration:
             raise DataError(f"frame {number}: has no time (there are fewer times)") from None
-        if first is None:
-            first = image
-            decoder = _decoder_for(image, config)
-        elif image.shape != first.shape or image.dtype != first.dtype:
+        first = self._first
+        if image.shape != first.shape or image.dtype != first.dtype:
             raise DataError(
                 f"frame {number}: {image.dtype} {image.shape}, but the first frame is"
                 f" {first.dtype} {first.shape}"
             )
         check_values(image, f"frame {number}")
-        assert decoder is not None
-        yield t_ns, decoder.decode(image)
+        return t_ns, image if self.table is not None else self._decoder.decode(image)
 
 
 def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
@@ -109,9 +117,16 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
 
 
 def events_from_light(
-    light: Iterable[tuple[int, NDArray[Any]]], config: Config, *, threads: int | None = None
+    light: Iterable[tuple[int, NDArray[Any]]],
+    config: Config,
+    *,
+    threads: int | None = None,
+    table: NDArray[np.float32] | None = None,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
+
+    With a `table` of 256 entries [DN], the frames are grey values of 8 bits that it decodes; then
+    `sampling.L` should be 1, as every instant looks its frames up again.
 
     Raises
     ------
@@ -124,86 +139,27 @@ def events_from_light(
     except StopIteration:
         raise DataError("no frames: at least two are needed") from None
     workers = thread_count(threads)
-    pixel = PixelArray(config.pixel, config.sampling, config.seed, first, t_ns, threads=workers)
+    first_light = first if table is None else table.take(first)
+    pixel = PixelArray(
+        config.pixel, config.sampling, config.seed, first_light, t_ns, threads=workers
+    )
     with ThreadPoolExecutor(workers) if workers > 1 else nullcontext() as pool:
         order = _Order()
-        interpolated = _interpolated(t_ns, first, source, config, workers)
-        for chunk in _chunks(interpolated, config):
-            events = pixel.advance(chunk.frames, chunk.times_ns, chunk.last, pool)
-            end_us = (chunk.times_ns[-1] + 500) // 1000
-            yield order.add(events, end_us)
+        intervals = Intervals(t_ns, first, config.sampling, threads=workers)
+        for part in intervals.parts(source):
+            end_us, count = (part.times_ns[-1] + 500) // 1000, 0
+            for events in pixel.advance_part(part, table, pool):
+                count += events.size
+                yield from order.add(events, end_us)
+                del events  # or they would stay while the next ones are made
+            intervals.expect(count)
         yield order.rest()
 
 
-def _interpolated(
-    t_ns: int,
-    first: NDArray[Any],
-    source: Iterator[tuple[int, NDArray[Any]]],
-    config: Config,
-    threads: int,
-) -> Iterator[tuple[int, NDArray[Any], bool]]:
-    """Yield (t_ns, light, ends an input interval) of all frames after interpolation."""
-    count = config.sampling.L
-    upsampler = make_upsampler(config.sampling.interpolation, count, threads=threads)
-    before_ns, before = t_ns, first
-    yield t_ns, first, True
-    number = 0
-    for number, (now_ns, now) in enumerate(source, start=1):
-        if now_ns <= before_ns:
-            raise DataError(
-                f"frame {number}: its time {now_ns * 1e-9:.9f} s is not after the one before"
-                f" ({before_ns * 1e-9:.9f} s)"
-            )
-        span = now_ns - before_ns
-        for step, frame in enumerate(upsampler.between(before, now), start=1):
-            yield before_ns + (span * step + count // 2) // count, frame, step == count
-        before_ns, before = now_ns, now
-    if number == 0:
-        raise DataError("a single frame: at least two are needed")
-
-
-class _Chunk:
-    """Frames and times of a few intervals."""
-
-    def __init__(self, frames: NDArray[Any], times_ns: list[int], last: NDArray[np.bool_]) -> None:
-        self.frames, self.times_ns, self.last = frames, times_ns, last
-
-
-def _chunks(frames: Iterator[tuple[int, NDArray[Any], bool]], config: Config) -> Iterator[_Chunk]:
-    """Gather interpolated frames to chunks; neighbouring chunks share their border frame.
-
-    With the paper's last interval as printed, a chunk holds one frame more, as its samples look
-    ahead.
-    """
-    printed = config.sampling.last_interval == "printed"
-    ahead = 1 if printed else 0
-    t_ns, frame, _ = next(frames)
-    size = max(1, min(_CHUNK_INTERVALS, CHUNK_BYTES // max(1, frame.nbytes)))
-    held = np.empty((size + 1 + ahead, *frame.shape), frame.dtype)
-    times: list[int] = []
-    ends: list[bool] = []
-
-    def put(t_ns: int, frame: NDArray[Any], end: bool) -> None:
-        held[len(times)] = frame
-        times.append(t_ns)
-        ends.append(end and printed)
-
-    def chunk(intervals: int) -> _Chunk:
-        last = np.zeros(intervals + 1, np.bool_)
-        known = ends[1 : intervals + 2]
-        last[: len(known)] = known
-        return _Chunk(held[: len(times)], times[: intervals + 1], last)
-
-    put(t_ns, frame, False)
-    for item in frames:
-        put(*item)
-        if len(times) == size + 1 + ahead:
-            yield chunk(size)
-            kept = times[size:], ends[size:]
-            held[: 1 + ahead] = held[size:].copy()
-            times[:], ends[:] = kept
-    if len(times) > 1:
-        yield chunk(len(times) - 1)
+def _before(events: Events, t_us: int) -> int:
+    """Return how many of the sorted events come before a time [us]."""
+    # NumPy's search would copy the column
+    return bisect_left(range(events.size), t_us, key=lambda k: int(events["t"][k]))
 
 
 class _Order:
@@ -212,15 +168,21 @@ class _Order:
     def __init__(self) -> None:
         self._held = empty_events()
 
-    def add(self, events: Events, end_us: int) -> Events:
-        """Return what is in final order once `events`, sorted and up to about `end_us`, are in."""
+    def add(self, events: Events, end_us: int) -> Iterator[Events]:
+        """Yield what is in final order once `events`, sorted and up to about `end_us`, are in."""
         if self._held.size:
-            split = int(np.searchsorted(events["t"], self._held["t"].max(), side="right"))
+            split = _before(events, int(self._held["t"].max()) + 1)
             border = sort_events(np.concatenate([self._held, events[:split]]))
-            events = np.concatenate([border, events[split:]])
-        keep = int(np.searchsorted(events["t"], end_us, side="left"))
-        self._held = events[keep:].copy()
-        return events[:keep]
+            keep = _before(border, end_us)
+            self._held = border[keep:]
+            if keep:
+                yield border[:keep]
+            events = events[split:]
+        keep = _before(events, end_us)
+        if keep < events.size:
+            self._held = np.concatenate([self._held, events[keep:]])
+        if keep:
+            yield events[:keep]
 
     def rest(self) -> Events:
         """Return the events still held."""

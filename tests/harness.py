@@ -55,10 +55,12 @@ def last_flags(knots, L, printed):
     return last
 
 
-def start(light, times_ns, pixel, K=10, seed=0, **options):
+def start(light, times_ns, pixel, K=10, seed=0, printed=False, **options):
     """Return the pixel array at the first frame; `light` is (knots, pixels) or (knots, h, w)."""
     first = light[0][None] if light.ndim == 2 else light[0]
-    return PixelArray(pixel, Sampling(K=K), seed, first, times_ns[0], **options)
+    last = "printed" if printed else "corrected"
+    sampling = Sampling(K=K, last_interval=last)
+    return PixelArray(pixel, sampling, seed, first, times_ns[0], **options)
 
 
 def advance(array, light, times_ns, *, chunk=None, threads=1, L=1, printed=False):
@@ -89,6 +91,7 @@ def solve(light, times_s, pixel, **options):
     split = ("chunk", "threads", "L", "printed")
     run = {key: options.pop(key) for key in split if key in options}
     times_ns = [round(float(t) * 1e9) for t in times_s]
-    array = start(light, times_ns, pixel, exact_times=True, **options)
+    printed = run.get("printed", False)
+    array = start(light, times_ns, pixel, exact_times=True, printed=printed, **options)
     events, exact = advance(array, light, times_ns, **run)
     return by_pixel(array, events, exact)

@@ -2,15 +2,23 @@
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
+import threading
+import time
 
 import cv2
 import h5py
 import numpy as np
 import pytest
+from processes import running_python
 
+from adv2e import pipeline as conversion
+from adv2e.config import load_config
+from adv2e.events import empty_events
 from adv2e.recordings import read_recording
+from adv2e.simulation import events_from_light
 
 
 def picture(k, shape=(24, 32)):
@@ -212,3 +220,170 @@ def test_info_and_compare_take_what_convert_makes(adv2e, folder, tmp_path):
     outcome = adv2e("compare", tmp_path / "b.zip", tmp_path / "a.h5", "--json")
     assert outcome.status == 0, outcome.err
     assert json.loads(outcome.out)
+
+
+@pytest.mark.parametrize("begin_s", [5000, 1_700_000_000])  # beyond 2^31 us, and the time of day
+@pytest.mark.parametrize("name", ["a.txt", "a.h5", "a.zip", "a"])
+def test_late_times_stay_exact_to_the_microsecond(adv2e, tmp_path, begin_s, name):
+    frames = [picture(k) for k in range(4)]
+    times_ns = [begin_s * 10**9 + 33_333_333 * k for k in range(4)]
+    np.save(tmp_path / "stack.npy", np.stack(frames))
+    lines = [f"{t // 10**9}.{t % 10**9:09d}\n" for t in times_ns]
+    (tmp_path / "times.txt").write_text("".join(lines))
+    outcome = adv2e(
+        "convert", tmp_path / "stack.npy", "--timestamps", tmp_path / "times.txt",
+        "-o", tmp_path / name,
+    )  # fmt: skip
+    assert outcome.status == 0, outcome.err
+
+    light = [(t, frame.astype(np.float32)) for t, frame in zip(times_ns, frames, strict=True)]
+    expected = np.concatenate(list(events_from_light(light, load_config(), threads=1)))
+    assert expected["t"].min() >= begin_s * 10**6
+    assert expected["t"].max() > begin_s * 10**6 + 60_000
+    assert read_recording(tmp_path / name).events.tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "flow"])
+@pytest.mark.parametrize("L", [1, 3])
+def test_grey_frames_make_the_events_of_their_light(adv2e, tmp_path, L, interpolation):
+    """However the grey values are decoded: ahead of the pixel, or by the kernel."""
+    frames = [picture(k, (48, 64)) for k in range(4)]
+    np.save(tmp_path / "stack.npy", np.stack(frames))
+    sets = [f"sampling.L={L}", f"sampling.interpolation={interpolation}"]
+    options = [text for one in sets for text in ("--set", one)]
+    outcome = adv2e(
+        "convert", tmp_path / "stack.npy", "--fps", "10", "-o", tmp_path / "a.txt", *options
+    )
+    assert outcome.status == 0, outcome.err
+    light = [(k * 10**8, frame.astype(np.float32)) for k, frame in enumerate(frames)]
+    expected = np.concatenate(list(events_from_light(light, load_config([], sets), threads=1)))
+    assert expected.size > 1000
+    assert read_recording(tmp_path / "a.txt").events.tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("count", [0, 1, 100, 101, 1000])
+def test_a_burst_is_written_in_pieces_that_hold_no_more_than_themselves(monkeypatch, count):
+    events = empty_events(count)
+    monkeypatch.setattr(conversion, "BEHIND_BYTES", 100 * events.itemsize)
+    events["t"] = np.arange(count)
+    pieces = list(conversion._pieces(events))
+    assert np.concatenate(pieces).tobytes() == events.tobytes()
+    if count > 100:
+        assert max(piece.size for piece in pieces) == 25
+        assert not any(np.shares_memory(piece, events) for piece in pieces)
+    else:
+        assert pieces[0] is events
+
+
+@pytest.mark.parametrize("name", ["a.txt", "a.h5", "a.zip"])
+def test_files_do_not_depend_on_the_size_of_the_pieces(adv2e, folder, tmp_path, monkeypatch, name):
+    adv2e("convert", folder, "-o", tmp_path / name, "--threads", "2")
+    whole = (tmp_path / name).read_bytes()
+    monkeypatch.setattr(conversion, "BEHIND_BYTES", 2000)
+    adv2e("convert", folder, "-o", tmp_path / name, "--threads", "2", "--overwrite")
+    assert (tmp_path / name).read_bytes() == whole
+
+
+@pytest.fixture
+def long_stack(tmp_path):
+    """Frames that take minutes to convert, with many events."""
+    path = tmp_path / "long.npy"
+    stack = np.lib.format.open_memmap(path, "w+", np.uint8, (100_000, 24, 32))
+    for k in range(10):
+        stack[k::10] = picture(k)
+    stack.flush()
+    return path
+
+
+def started(source, output, *options, **more):
+    """Start a conversion in a process of its own, with signals as in a terminal."""
+    script = (
+        "import signal, sys; from adv2e.cli import main;"
+        "signal.signal(signal.SIGINT, signal.default_int_handler);"
+        "signal.signal(signal.SIGTERM, signal.SIG_DFL);"
+        "main(sys.argv[1:])"
+    )
+    arguments = ["convert", source, "--fps", "100", "-o", output, "--set", "sampling.L=1", *options]
+    return running_python(script, *arguments, **more)
+
+
+def wait_until(true, seconds=60):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("threads", ["1", "2"])
+@pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_a_signal_ends_a_conversion_without_a_trace(long_stack, tmp_path, name, status, threads):
+    target = tmp_path / "results"
+    target.mkdir()
+    with started(long_stack, target / "out.txt", "--threads", threads) as process:
+        wait_until(lambda: any(path.stat().st_size > 10**5 for path in target.glob(".out.*.txt")))
+        process.send_signal(getattr(signal, name))
+        _, err = process.communicate(timeout=20)
+    assert process.returncode == status, err
+    assert len(err.splitlines()) == 1
+    assert list(target.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_an_interrupt_ends_a_conversion_whose_reader_has_stopped_reading(long_stack):
+    with started(long_stack, "-") as process:
+        assert process.stdout.read(100).startswith(b"0.0")
+        time.sleep(1)  # the pipe is full by now
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=20) == 130
+
+
+@pytest.mark.parametrize("name", ["out.txt", "out.h5", "out.zip", "out"])
+def test_a_full_disk_ends_a_conversion_at_once(long_stack, tmp_path, name):
+    resource = pytest.importorskip("resource")
+    target = tmp_path / "results"
+    target.mkdir()
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (10**6, 10**6))
+
+    with started(long_stack, target / name, "-q", preexec_fn=limit) as process:
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    (line,) = err.decode().splitlines()
+    assert f"{target / name}: cannot be written: File too large" in line
+    assert list(target.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("threads", "output", "expected"),
+    [
+        ("1", "a.h5", set()),
+        ("1", "-", set()),
+        ("2", "a.h5", {"adv2e-read", "adv2e-write", "adv2e-sink"}),
+        ("2", "-", {"adv2e-read"}),  # a write that blocks can be interrupted in the main thread
+    ],
+)
+def test_one_thread_does_everything_where_one_is_asked_for(
+    adv2e, video, tmp_path, monkeypatch, threads, output, expected
+):
+    names = set()
+    start = threading.Thread.start
+
+    def noted(thread):
+        names.add(thread.name.split("_")[0])
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", noted)
+    monkeypatch.chdir(tmp_path)
+    assert adv2e("convert", video, "-o", output, "--threads", threads, "--no-progress").status == 0
+    ours = {name for name in names if name.startswith("adv2e-")}
+    assert ours == expected
+    if threads == "1":
+        assert names == set()
+
+
+def test_progress_counts_the_frames(adv2e, video, tmp_path):
+    outcome = adv2e("convert", video, "-o", tmp_path / "a.h5", "--progress")
+    assert outcome.status == 0
+    assert "6/6" in outcome.err or "/6 [" in outcome.err

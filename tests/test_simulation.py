@@ -8,7 +8,7 @@ import pytest
 from harness import quiet
 
 import adv2e
-from adv2e import simulation
+from adv2e import intervals, simulation
 from adv2e.config import Config
 from adv2e.config.model import Frames, Sampling
 from adv2e.errors import DataError
@@ -43,7 +43,7 @@ def test_sorted_and_the_same_for_any_chunk_and_thread_count(monkeypatch):
     assert len(whole) > 500
     assert whole.tobytes() == sort_events(whole).tobytes()
     for size in (1, 3):
-        monkeypatch.setattr(simulation, "_CHUNK_INTERVALS", size)
+        monkeypatch.setattr(intervals, "_MOST", size)
         assert run(frames(), times(), threads=2).tobytes() == whole.tobytes()
 
 
@@ -56,7 +56,7 @@ def test_printed_last_interval_for_any_chunk(monkeypatch, L):
     corrected = run(frames(), times(), Config(sampling=Sampling(L=L, K=3), pixel=config.pixel))
     assert whole.tobytes() != corrected.tobytes()
     for size in (1, 2, 5):
-        monkeypatch.setattr(simulation, "_CHUNK_INTERVALS", size)
+        monkeypatch.setattr(intervals, "_MOST", size)
         assert run(frames(), times(), config).tobytes() == whole.tobytes()
 
 

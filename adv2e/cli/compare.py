@@ -102,10 +102,10 @@ def _resimulation(
     measured: Recording, source: Source | None, config: Config, threads: int | None, log: Log
 ) -> Resimulation:
     """Return how to simulate the frames of `source`, or of `measured`, again."""
-    from adv2e import jit
     from adv2e.comparison.compare import Resimulation
     from adv2e.comparison.resimulation import resimulator
     from adv2e.errors import DataError
+    from adv2e.pixel import is_compiled
 
     if source is not None:
         frames, encoding = source.frames, source.encoding
@@ -118,7 +118,7 @@ def _resimulation(
             f"{measured.path}: holds no frames to simulate with this configuration; give them with"
             " --frames"
         )
-    if not jit.is_cached("run_tile"):
+    if not is_compiled(config.pixel, config.sampling):
         log("compiling the pixel's kernel (once; about half a minute)")
     simulate_events = resimulator(frames, config, encoding, threads=threads)
     return Resimulation(simulate_events, (config.seed, config.seed + 1))

@@ -10,7 +10,7 @@ import math
 
 from adv2e.effects.pixel.hot_pixels import next_hot_time
 from adv2e.effects.pixel.leak import next_leak_factor
-from adv2e.effects.pixel.shot_noise import keep_candidate, next_candidate_time, polarity_of
+from adv2e.effects.pixel.shot_noise import candidate_polarity, next_candidate_time
 from adv2e.jit import inlined, kernel
 from adv2e.kernel.polynomial import at_end, first_crossing, value
 from adv2e.kernel.workspace import (
@@ -28,11 +28,11 @@ from adv2e.kernel.workspace import (
     SIGNAL,
 )
 
-_SIGNAL_EVENT, _SHOT, _HOT = 0, 1, 2
+SIGNAL_EVENT, SHOT, HOT = 0, 1, 2
 
 
 @kernel
-def _emit(keys, times, n, t, t_base, pixel, on):
+def emit(keys, times, n, t, t_base, pixel, on):
     """Pack one event; past the end of the buffer it is only counted."""
     if n < keys.shape[0]:
         stamp = math.floor(t + 0.5) - t_base
@@ -42,42 +42,36 @@ def _emit(keys, times, n, t, t_base, pixel, on):
     return n + 1
 
 
-@kernel
-def put_found(lo, count, found_time, found_pixel, t_base, keys, times, n):
-    """Write events of a strip that begins at pixel lo: times [us], and 2 k + polarity."""
-    for j in range(count):
-        which = found_pixel[j]
-        n = _emit(keys, times, n, found_time[j], t_base, lo + which // 2, which % 2)
-    return n
-
-
-@kernel
-def _next_injected(i, now, t_end, circuit, state):
+@inlined
+def next_injected(i, now, t_end, circuit, state):
     """Kind and time of the next noise event of pixel i in [now, t_end); those before are lost."""
-    kind, t = _SIGNAL_EVENT, t_end
+    kind, t = SIGNAL_EVENT, t_end
     if circuit.shot_rate > 0.0:
         while state[S_SHOT_TIME, i] < now:
             next_candidate_time(i, circuit, state)
         if state[S_SHOT_TIME, i] < t:
-            kind, t = _SHOT, state[S_SHOT_TIME, i]
+            kind, t = SHOT, state[S_SHOT_TIME, i]
     if circuit.hot_rate > 0.0:
         while state[S_HOT_TIME, i] < now:
             next_hot_time(i, circuit, state)
         if state[S_HOT_TIME, i] < t:
-            kind, t = _HOT, state[S_HOT_TIME, i]
+            kind, t = HOT, state[S_HOT_TIME, i]
     return kind, t
 
 
-@kernel
-def _injected_polarity(i, kind, s, order, circuit, state, ws):
-    """Use up the injected event of pixel i: 1 ON, -1 OFF, 0 when the light thins it out."""
-    if kind == _HOT:
+@inlined
+def injected_polarity(i, kind, light, circuit, state):
+    """Return what the noise event of pixel i is: 1, -1, or 0 where the light [DN] thins it out."""
+    return 1 if kind == HOT else candidate_polarity(i, light, circuit, state)
+
+
+@inlined
+def use_up(i, kind, circuit, state):
+    """Move pixel i on to the noise event after the present one of this kind."""
+    if kind == HOT:
         next_hot_time(i, circuit, state)
-        return 1
-    kept = keep_candidate(i, value(ws, LIGHT, order, s), circuit, state)
-    polarity = polarity_of(i, circuit, state) if kept else 0
-    next_candidate_time(i, circuit, state)
-    return polarity
+    else:
+        next_candidate_time(i, circuit, state)
 
 
 @inlined
@@ -117,10 +111,10 @@ def events_of_series(
             reference += factor * value(ws, LEAK, order, s)
         state[S_HOLD, i] = -1.0
     while True:
-        kind, t_end, s_end = _SIGNAL_EVENT, tb, 1.0
+        kind, t_end, s_end = SIGNAL_EVENT, tb, 1.0
         if injected:
-            kind, t_end = _next_injected(i, ta + s * h, tb, circuit, state)
-            if kind != _SIGNAL_EVENT:
+            kind, t_end = next_injected(i, ta + s * h, tb, circuit, state)
+            if kind != SIGNAL_EVENT:
                 s_end = max(s, (t_end - ta) / h)
         for k in range(order + 1):
             ws[DISTANCE, k] = ws[SIGNAL, k]
@@ -133,15 +127,17 @@ def events_of_series(
         )
         signal_event = polarity != 0
         if not signal_event:
-            if kind == _SIGNAL_EVENT:
+            if kind == SIGNAL_EVENT:
                 break
             s_event = s_end
-            polarity = _injected_polarity(i, kind, s_end, order, circuit, state, ws)
+            light = value(ws, LIGHT, order, s_end)
+            polarity = injected_polarity(i, kind, light, circuit, state)
+            use_up(i, kind, circuit, state)
             if polarity == 0:
                 s = s_end
                 continue
         t = ta + s_event * h
-        n = _emit(keys, times, n, t, t_base, i, 1 if polarity > 0 else 0)
+        n = emit(keys, times, n, t, t_base, i, 1 if polarity > 0 else 0)
         fallen = value(ws, LEAK, order, s_event) if leaks else 0.0
         before = factor
         if jitter:

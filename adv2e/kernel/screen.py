@@ -1,4 +1,8 @@
-r"""All pixels of a strip over one interval: end values, and which pixels can fire.
+r"""The first pass of the exact circuit: all pixels of a strip over one interval.
+
+It moves every pixel to the end of the interval and tells which of them may fire on the way; only
+those are looked at again.  All of it is single precision and free of branches, one flat scratch
+array with rows at constant offsets, so that it compiles to vector instructions throughout.
 
 End value.  With s = 0..1 over the interval, v = 1 - s and u = y - x,
 
@@ -7,7 +11,12 @@ End value.  With s = 0..1 over the interval, v = 1 - s and u = y - x,
 
 where a_1 is the corner at the end times the interval, kappa = dx B T I_1, z = -dx on the log branch
 and kappa = dx B T dI/dx, z = 0 on the foot.  The integral is taken by Gauss and Legendre on [0, V],
-beyond which e^-tau no longer counts.
+beyond which e^-tau no longer counts.  An error of u by the share eps moves an event by eps / w, as
+dy/dt = -w u; so the single precision of u costs next to no time, where that of y would (a rounding
+of y by 3e-7 is 0.2 us on a ramp of 1.5 a second).  What it does cost shows where the signal creeps:
+a reference taken at the end of a dead time keeps the rounding of the lag then, up to 2e-7, which a
+leak of .02 a second takes up to ten microseconds to cross when it comes to fire, seconds later.
+For the same reason dx comes from the ratio of the two lights, not from a difference of logarithms.
 
 Bound.  dy/dt = w (x - y) with w >= 0 makes y move towards x, so y turns only where it meets x,
 that is, where u changes sign; between frames x is monotone, and u = y - x obeys
@@ -20,11 +29,13 @@ w' <= w x', it is at least w x'(1 - |u|) + w^2 |u|), so y stays beyond its tange
 cannot meet x before that does, at s = |u_0| / (a_0 |u_0| + |dx|).
 
 Leak only lowers the reference, by a known amount over the interval.  A pixel whose bound stays
-clear of both thresholds cannot fire and is done; every other one is solved.  Pixels with the knee
-inside the interval, a step above one e-fold, dead time, or a noise event due are always solved.
+clear of both thresholds by MARGIN cannot fire.  Always looked at again are pixels with the knee of
+the log map inside the interval, a step above one e-fold, light beyond what the quadrature was
+chosen for, the end of a dead time, or a noise event due.
 
-The margin covers rounding and the quadrature; crossings that are missed within it would be less
-than the tolerance of a tie (see :mod:`adv2e.kernel.polynomial`).
+The comparison is made on the distance of x from the reference, which is small, and which starts
+from double precision at every call and after every event; MARGIN holds the rounding of what is
+added to it in between.  A pixel that is looked at needlessly costs time, never an event.
 """
 
 from __future__ import annotations
@@ -36,25 +47,68 @@ from numpy.typing import NDArray
 
 from adv2e.jit import kernel
 from adv2e.kernel import special
-from adv2e.kernel.workspace import EULER, PAPER, ZERO_ORDER_HOLD
+from adv2e.kernel.workspace import STRIP
 
-STRIP = 512
 NODES_MAX = 32
 
-LARGEST_STEP = 1.0
-"""Change of log intensity above which a pixel is solved in any case [ln units]."""
+LARGEST_STEP = 0.98
+"""Change of log intensity above which a pixel is looked at in any case [ln units]."""
 
 LARGEST_LIGHT = 1.5 * 255.0
-"""Light above which a pixel is solved in any case, as the quadrature is chosen for less [DN]."""
+"""Light above which a pixel is looked at in any case, as the quadrature is chosen for less [DN]."""
 
-MARGIN = 1e-8
-"""Rounding, and what is forgotten beyond REACH: e^-20 of a lag of a few e-folds [ln units]."""
-AT_REST = 1e-12
-STRAIGHT = 0.9
-"""Lag below which y is convex up to its turn."""
+MARGIN = 1e-5
+"""Rounding of a distance in single precision over a call, with room [ln units]."""
 
 REACH = 20.0
-"""Corner times time beyond which the past is forgotten."""
+"""Corner times time beyond which the past is forgotten: e^-20 of a lag is less than a tie."""
+
+AT_REST = 1e-10
+"""Lag below which it counts as none: a tenth of a tie (:mod:`adv2e.kernel.polynomial`)."""
+
+NEVER = 1e30
+"""Distance, or time, that is not reached."""
+
+STRIDE = STRIP + 16  # one cache line more: rows must not share cache sets
+(
+    LIGHT_0,  # light at the start of the interval [DN], and at its end
+    LIGHT_1,
+    LAG_0,  # y - x
+    LAG_1,
+    AWAY_0,  # x - reference
+    AWAY_1,
+    FALL,  # fall of the reference over the interval
+    ON,  # thresholds, NEVER in dead time
+    OFF,
+    DUE,  # when something else is due: end of dead time, noise event [us since the call's start]
+    DX,  # change of log intensity
+    A1,
+    KAPPA,
+    Z,
+    UPTO,
+    TOTAL,
+    HIT,  # 1: to be looked at
+) = (row * STRIDE for row in range(17))
+SIZE = 17 * STRIDE
+
+_f = np.float32
+_ZERO, _ONE, _TINY = _f(0.0), _f(1.0), _f(1e-30)
+_REACH = _f(REACH)
+_MORE = _f(0.6)
+_AT_REST = _f(AT_REST)
+_STRAIGHT = _f(0.9)  # lag below which y is convex up to its turn
+_LARGEST_RATIO = _f(np.tanh(0.5 * LARGEST_STEP))
+_LARGEST_LIGHT = _f(LARGEST_LIGHT)
+
+
+def scratch() -> NDArray[np.float32]:
+    """Return the flat array of rows of one strip; padding beyond its pixels must be harmless."""
+    rows = np.zeros(SIZE, np.float32)
+    rows[LIGHT_0 : LIGHT_0 + STRIDE] = 1.0
+    rows[LIGHT_1 : LIGHT_1 + STRIDE] = 1.0
+    for row in (ON, OFF, DUE):
+        rows[row : row + STRIDE] = NEVER
+    return rows
 
 
 def quadrature(length: float, fastest: float) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -77,7 +131,7 @@ def quadrature(length: float, fastest: float) -> tuple[NDArray[Any], NDArray[Any
     exact = _integral(a1, 120)
     for count in range(3, NODES_MAX):
         error = np.abs(_integral(a1, count) / exact - 1.0)
-        if np.all(error <= np.maximum(worst, 1e-12)):
+        if np.all(error <= np.maximum(worst, 1e-9)):
             break
     return _nodes(count)
 
@@ -102,191 +156,153 @@ def _integral(a1: NDArray[Any], count: int) -> NDArray[Any]:
 
 
 @kernel
-def load_strip(frame, circuit, floor, light, x):
-    """Light that counts, and log intensity, of one strip of a frame [DN]."""
-    knee_dn = circuit.slope * circuit.knee
-    if circuit.slope > 0.0:
-        for k in range(frame.shape[0]):
-            v = np.float64(frame[k])
-            v = v if v > 0.0 else 0.0
-            light[k] = v
-            w = v if v > knee_dn else knee_dn
-            x[k] = special.log(w)
-        for k in range(frame.shape[0]):
-            x[k] = x[k] if light[k] >= knee_dn else light[k] / circuit.slope
-    else:
-        for k in range(frame.shape[0]):
-            v = np.float64(frame[k])
-            v = v if v > floor else floor
-            light[k] = v
-            x[k] = special.log(v)
+def is_still(rows):
+    """Tell whether no pixel's light changes over the interval."""
+    moves = 0
+    for k in range(STRIP):
+        moves += rows[LIGHT_0 + k] != rows[LIGHT_1 + k]
+    return moves == 0
 
 
 @kernel
-def _prepare(i0, i1, x0, x1, length, circuit, count, a1, kappa, z, upto):
-    """Parameters of the quadrature, one column a pixel."""
-    dark = circuit.dark * length
-    per_dn = circuit.per_dn * length
-    foot = circuit.slope * per_dn
-    knee = circuit.knee
-    for k in range(count):
-        dx = x1[k] - x0[k]
-        on_log = min(x0[k], x1[k]) >= knee
-        a = dark + per_dn * i1[k]
-        up = dx if dx > 0.0 else 0.0
-        v = REACH * (1.0 + 0.6 * up) / (a + 1e-30)
-        v = v if v < 1.0 else 1.0
-        kap = dx * per_dn * i1[k] if on_log else dx * foot
-        a1[k] = a * v
-        kappa[k] = kap * v * v
-        z[k] = -dx * v if on_log else 0.0
-        upto[k] = v
+def is_settled(rows):
+    """Tell whether every pixel's lag is gone."""
+    lags = 0
+    for k in range(STRIP):
+        lags += rows[LAG_0 + k] != _ZERO
+    return lags == 0
 
 
 @kernel
-def quadrature_node(a1, kappa, z, node, weight, count, total):
-    """Add one node of the quadrature to the totals of `count` columns."""
-    for k in range(count):
-        t = a1[k] * node - kappa[k] * (node * node) * special.psi(z[k] * node)
-        total[k] += weight * special.exp(-t)
+def _prepare(rows, dark, per_dn, knee_dn, slope, inverse_slope):
+    """Change of log intensity, and the parameters of the quadrature."""
+    foot = slope * per_dn
+    for k in range(STRIP):
+        i0 = rows[LIGHT_0 + k]
+        i1 = rows[LIGHT_1 + k]
+        change = i1 - i0
+        on_log = min(i0, i1) >= knee_dn
+        straight = change * inverse_slope
+        dx = special.log_ratio32(change / (i1 + i0 + _TINY))
+        dx = dx if on_log else straight
+        moving = per_dn * i1 if on_log else foot
+        rate = dark + per_dn * i1
+        up = dx if dx > _ZERO else _ZERO
+        v = _REACH * (_ONE + _MORE * up) / (rate + _TINY)
+        v = v if v < _ONE else _ONE
+        z = dx * v
+        rows[DX + k] = dx
+        rows[A1 + k] = rate * v
+        rows[KAPPA + k] = z * v * moving
+        rows[Z + k] = -z if on_log else _ZERO
+        rows[UPTO + k] = v
+        rows[TOTAL + k] = _ZERO
 
 
 @kernel
-def end_lags(i0, i1, x0, x1, lag, length, circuit, nodes, weights, count, columns, out):
-    """Lag y - x at the end of the interval for every pixel of a strip."""
-    a1, kappa, z = columns[0], columns[1], columns[2]
-    upto, total = columns[3], columns[4]
-    _prepare(i0, i1, x0, x1, length, circuit, count, a1, kappa, z, upto)
-    for k in range(count):
-        total[k] = 0.0
-    for c in range(nodes.shape[0]):
-        quadrature_node(a1, kappa, z, nodes[c], weights[c], count, total)
-    for k in range(count):
-        v = upto[k]
+def _node(rows, node, weight):
+    """Add one node of the quadrature."""
+    square = node * node
+    for k in range(STRIP):
+        t = rows[KAPPA + k] * square * special.psi32(rows[Z + k] * node) - rows[A1 + k] * node
+        rows[TOTAL + k] += weight * special.exp32(t)
+
+
+@kernel
+def _end_lags(rows):
+    """Row LAG_1, once the integral is known."""
+    for k in range(STRIP):
+        v = rows[UPTO + k]
         # tau over the whole interval from that over [0, V]: equal where V = 1, else beyond reach
-        t = a1[k] - kappa[k] * special.psi(z[k])
-        decay = special.exp(-t) if v >= 1.0 else 0.0
-        u = decay * lag[k] - (x1[k] - x0[k]) * v * total[k]
-        out[k] = u if abs(u) > 1e-30 else 0.0
+        t = rows[KAPPA + k] * special.psi32(rows[Z + k]) - rows[A1 + k]
+        decay = special.exp32(t)
+        decay = decay if v >= _ONE else _ZERO
+        u = decay * rows[LAG_0 + k] - rows[DX + k] * (v * rows[TOTAL + k])
+        rows[LAG_1 + k] = u if abs(u) > _AT_REST else _ZERO
 
 
 @kernel
-def _step_rates(x, circuit, part, count, rate):
-    """Corner times sub-step at log intensity x."""
-    if circuit.slope > 0.0:
-        for k in range(count):
-            foot = x[k] * circuit.slope
-            light = special.exp(x[k])
-            light = foot if x[k] < circuit.knee else light
-            rate[k] = part * (circuit.dark + circuit.per_dn * light)
-    else:
-        for k in range(count):
-            rate[k] = part * (circuit.dark + circuit.per_dn * special.exp(x[k]))
+def _flag(rows, end, dark, per_dn, knee_dn):
+    """Rows AWAY_1 and HIT: distance at the end, and which pixels are to be looked at."""
+    for k in range(STRIP):
+        i0, i1 = rows[LIGHT_0 + k], rows[LIGHT_1 + k]
+        u0, u1 = rows[LAG_0 + k], rows[LAG_1 + k]
+        dx, fall = rows[DX + k], rows[FALL + k]
+        d0 = rows[AWAY_0 + k]
+        d1 = d0 + dx
+        rows[AWAY_1 + k] = d1 + fall
+        y0, y1 = d0 + u0, d1 + u1
+        low, high = min(y0, y1), max(y0, y1)
+        size = abs(u0)
+        meet = size / ((dark + per_dn * i0) * size + abs(dx) + _TINY)
+        meet = meet if meet < _ONE else _ONE
+        meet = meet if (min(i0, i1) >= knee_dn) & (size < _STRAIGHT) else _ZERO
+        turn = d0 + dx * meet
+        turns = u0 * u1 < _ZERO
+        low = min(low, turn) if turns else low
+        high = max(high, turn) if turns else high
+        hit = (high + fall >= rows[ON + k]) | (-low >= rows[OFF + k]) | (rows[DUE + k] < end)
+        mixed = (i0 < knee_dn) != (i1 < knee_dn)
+        steep = (min(i0, i1) >= knee_dn) & (abs(i1 - i0) > _LARGEST_RATIO * (i0 + i1))
+        far = steep | (abs(dx) > _ONE) | (i1 > _LARGEST_LIGHT)
+        rows[HIT + k] = _ONE if hit | mixed | far else _ZERO
 
 
 @kernel
-def stepped_lags(i0, i1, x0, x1, lag, length, circuit, count, columns, out, low, high):
-    """End lags of the K-step forms, and the least and greatest signal at the steps' ends.
+def screen(rows, end, dark, per_dn, knee_dn, slope, nodes, weights):
+    """Move every pixel of the strip to the end of the interval and flag those that may fire.
 
-    The signal is a straight line in each step, so these bound it.
+    Parameters
+    ----------
+    rows : flat float32
+    end : float32
+        End of the interval [us], on the clock of row DUE.
+    dark, per_dn : float32
+        Corner in darkness, and for each DN, times the interval [rad].
+    knee_dn, slope : float32
+        Knee of the log map [DN], light over log intensity on the foot; 0 without a knee.
+    nodes, weights
+        Quadrature on [0, 1].
     """
-    y, before, after = columns[0], columns[1], columns[2]
-    part = length / circuit.steps
-    for k in range(count):
-        y[k] = x0[k] + lag[k]
-        low[k] = y[k]
-        high[k] = y[k]
-    _step_rates(x0, circuit, part, count, before)
-    xs, dx = columns[3], columns[4]
-    for k in range(count):
-        dx[k] = x1[k] - x0[k]
-    for step in range(1, circuit.steps + 1):
-        share = step / circuit.steps
-        if step == circuit.steps:
-            for k in range(count):
-                xs[k] = x1[k]
-        else:
-            for k in range(count):
-                xs[k] = x0[k] + dx[k] * share
-        _step_rates(xs, circuit, part, count, after)
-        _step(y, x0, xs, dx, 1.0 / circuit.steps, before, after, circuit.update, count)
-        for k in range(count):
-            v = y[k]
-            low[k] = v if v < low[k] else low[k]
-            high[k] = v if v > high[k] else high[k]
-            before[k] = after[k]
-    for k in range(count):
-        out[k] = y[k] - x1[k]
+    inverse_slope = _ONE / slope if slope > _ZERO else _ZERO
+    _prepare(rows, dark, per_dn, knee_dn, slope, inverse_slope)
+    for c in range(nodes.shape[0]):
+        _node(rows, _f(nodes[c]), _f(weights[c]))
+    _end_lags(rows)
+    _flag(rows, end, dark, per_dn, knee_dn)
 
 
 @kernel
-def _step(y, x0, xs, dx, share, before, after, update, count):
-    """One step of each pixel of a strip, as low_pass.stepped."""
-    if update == PAPER:
-        for k in range(count):
-            y[k] = special.exp(-after[k]) * y[k] + after[k] * xs[k]
-    elif update == EULER:
-        for k in range(count):
-            a = after[k] if after[k] < 1.0 else 1.0
-            y[k] = (1.0 - a) * y[k] + a * xs[k]
-    elif update == ZERO_ORDER_HOLD:
-        for k in range(count):
-            e = special.exp(-after[k])
-            y[k] = e * y[k] + (1.0 - e) * xs[k]
-    else:
-        for k in range(count):
-            a = 0.5 * (before[k] + after[k])
-            e = special.exp(-a)
-            mean = (1.0 - e) / a if a > 1e-3 else 1.0 - a / 2.0 + a * a / 6.0
-            y[k] = e * y[k] + (mean - e) * (xs[k] - dx[k] * share) + (1.0 - mean) * xs[k]
+def screen_at_rest(rows, end):
+    """As screen, where no light changes and no lag is left; tells whether any pixel is flagged."""
+    hits = 0
+    for k in range(STRIP):
+        before = rows[AWAY_0 + k]
+        away = before + rows[FALL + k]
+        rows[AWAY_1 + k] = away
+        hit = (away >= rows[ON + k]) | (-before >= rows[OFF + k]) | (rows[DUE + k] < end)
+        rows[HIT + k] = _ONE if hit else _ZERO
+        hits += 1 if hit else 0
+    for k in range(STRIP):
+        rows[LAG_1 + k] = _ZERO
+        rows[DX + k] = _ZERO
+    return hits > 0
 
 
 @kernel
-def hull(i0, x0, x1, lag, lag_end, length, circuit, count, low, high):
-    """Bound of the exact signal over the interval, see the top of this module."""
-    dark = circuit.dark * length
-    per_dn = circuit.per_dn * length
-    for k in range(count):
-        y0 = x0[k] + lag[k]
-        y1 = x1[k] + lag_end[k]
-        turns = lag[k] * lag_end[k] < 0.0
-        lo = y0 if y0 < y1 else y1
-        hi = y0 if y0 > y1 else y1
-        away = abs(lag[k])
-        dx = x1[k] - x0[k]
-        meet = away / ((dark + per_dn * i0[k]) * away + abs(dx) + 1e-300)
-        meet = meet if meet < 1.0 else 1.0
-        on_log = (x0[k] >= circuit.knee) & (x1[k] >= circuit.knee)
-        turn = x0[k] + dx * meet if on_log & (away < STRAIGHT) else x0[k]
-        lo = turn if turns & (turn < lo) else lo
-        hi = turn if turns & (turn > hi) else hi
-        low[k] = lo
-        high[k] = hi
+def flagged(rows, index):
+    """Fill `index` with the flagged pixels; returns their number."""
+    m = 0
+    for k in range(STRIP):
+        index[m] = k
+        m += 1 if rows[HIT + k] > _ZERO else 0
+    return m
 
 
 @kernel
-def rest_hull(x0, x1, lag, lag2, count, low, high):
-    """Bound for circuits that are not screened: only a pixel at rest stays where it is."""
-    for k in range(count):
-        at_rest = (x1[k] == x0[k]) & (abs(lag[k]) < AT_REST) & (abs(lag2[k]) < AT_REST)
-        low[k] = x0[k] - AT_REST if at_rest else -1e300
-        high[k] = x0[k] + AT_REST if at_rest else 1e300
-
-
-@kernel
-def flag_strip(light, x0, x1, low, high, reference, on, off, fall, knee, count, flags):
-    """Flag the pixels whose bound reaches a threshold, or that must be solved in any case."""
-    any_flag = False
-    for k in range(count):
-        below = (x0[k] < knee) != (x1[k] < knee)
-        # plain | instead of or: no branches, so that the loop vectorises
-        hit = (
-            (high[k] + fall[k] - reference[k] >= on[k] - MARGIN)
-            | (reference[k] - low[k] >= off[k] - MARGIN)
-            | below
-            | (abs(x1[k] - x0[k]) > LARGEST_STEP)
-            | (light[k] > LARGEST_LIGHT)
-        )
-        flags[k] = hit
-        any_flag |= hit
-    return any_flag
+def step_on(rows):
+    """Make the end of this interval the start of the next."""
+    for k in range(STRIP):
+        rows[LIGHT_0 + k] = rows[LIGHT_1 + k]
+        rows[LAG_0 + k] = rows[LAG_1 + k]
+        rows[AWAY_0 + k] = rows[AWAY_1 + k]

@@ -24,18 +24,23 @@ COLUMNS = ORDER_MAX + 2
 # codes of the update forms
 EXACT, FIRST_ORDER_HOLD, ZERO_ORDER_HOLD, EULER, PAPER = range(5)
 
+STRIP = 2048
+"""Pixels that are screened together: their scratch rows fit the first two levels of cache."""
+
 
 class Circuit(NamedTuple):
     """What is the same for every pixel and interval.  Times in us, rates in 1/us, light in DN."""
 
     update: int  # EXACT ... PAPER
     steps: int  # K
+    printed: bool  # whether the last interval is sampled as the paper prints it
     filtered: bool  # whether there is a low-pass
     dark: float  # 2 pi dark_cutoff
     per_dn: float  # 2 pi (cutoff - dark_cutoff) / 255
     follower: float  # 2 pi cutoff of the second pole; 0: none
     knee: float  # log intensity at the knee; below it, light = slope x
     slope: float  # d light / d x below the knee; 0: no knee
+    floor: float  # least light where there is no knee
     dead_time: float  # 0: none
     leak: float  # leak events a us from junction leakage
     photo_leak: float  # the same a us and DN
@@ -51,7 +56,6 @@ class Circuit(NamedTuple):
 # rows of the state: one column a pixel; those of effects that are off, at the end, are left out
 (
     S_X,  # log intensity at the last frame
-    S_LIGHT,  # the light it stands for [DN]
     S_LAG,  # filtered signal minus x
     S_REFERENCE,
     S_HOLD,  # end of the dead time [us], -1: not in it
@@ -66,7 +70,7 @@ class Circuit(NamedTuple):
     S_LEAK_DRAW,
     S_NOISE,
     S_NOISE_DRAW,
-) = range(16)
+) = range(15)
 
 
 PIXEL_BITS = 27

@@ -20,7 +20,7 @@ from adv2e.errors import OutputError, UsageError
 from adv2e.sinks.base import Sink, describe
 from adv2e.sinks.work import default_threads
 
-__all__ = ["FORMATS", "LAYOUTS", "Sink", "format_name", "open_sink"]
+__all__ = ["FORMATS", "LAYOUTS", "Sink", "default_threads", "format_name", "open_sink"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,15 +20,22 @@ from adv2e.sinks.work import OrderedWork
 CHUNK = 1 << 16
 """Rows of a chunk."""
 
-LEVEL = 4
-"""Level of deflate."""
+LEVEL = 1
+"""Level of deflate: half the time of level 4 for a tenth more bytes."""
 
 FILTERS: dict[str, Any] = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True}
 """Filters of a dataset whose chunks :func:`encode` makes."""
 
 
-def encode(chunk: NDArray[Any]) -> bytes:
+def encode(chunk: NDArray[Any], strategy: int = zlib.Z_DEFAULT_STRATEGY) -> bytes:
     """Return the bytes of a chunk as shuffle (bytes of equal rank together) and deflate leave it.
+
+    Parameters
+    ----------
+    chunk : array
+    strategy : int
+        What deflate looks for; :data:`zlib.Z_RLE`, runs only, takes less time where there is
+        nothing else to find.
 
     References
     ----------
@@ -36,7 +43,8 @@ def encode(chunk: NDArray[Any]) -> bytes:
     """
     flat = np.ascontiguousarray(chunk).reshape(-1)
     ranks = flat.view(np.uint8).reshape(flat.size, flat.itemsize)
-    return zlib.compress(np.ascontiguousarray(ranks.T).data, LEVEL)
+    deflate = zlib.compressobj(LEVEL, strategy=strategy)
+    return deflate.compress(np.ascontiguousarray(ranks.T).data) + deflate.flush()
 
 
 class ChunkedColumns:
@@ -100,4 +108,6 @@ class ChunkedColumns:
             dataset.resize((end,))
             dataset.id.write_direct_chunk((begin,), data)
 
-        self._work.submit(encode, buffer, take=take)
+        # bytes of whole numbers are noise or runs; only float times have more to find
+        strategy = zlib.Z_DEFAULT_STRATEGY if buffer.dtype.kind == "f" else zlib.Z_RLE
+        self._work.submit(encode, buffer, strategy, take=take)

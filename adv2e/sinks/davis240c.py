@@ -69,7 +69,7 @@ class _Davis240cSink(FileSink):
         self._lines: list[str] = []
 
     def _open(self) -> None:
-        self._frames = OrderedWork(self._threads)
+        self._frames = OrderedWork(self._threads - 1)
 
     def _write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         assert self._frames is not None
@@ -200,7 +200,7 @@ class ZipSink(_Davis240cSink):
         )
         # an archive takes one member at a time: events go straight in, frames wait
         self._events = self._archive.open("events.txt", "w", force_zip64=True)
-        self._deflating = OrderedWork(1)
+        self._deflating = OrderedWork(min(1, self._threads - 1))
         if self.wants_frames:
             self._spool = FrameSpool(self._temporary.parent)
 

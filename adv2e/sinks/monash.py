@@ -83,7 +83,7 @@ class MonashSink(FileSink):
         self._columns: ChunkedColumns | None = None
 
     def _open(self) -> None:
-        self._work = OrderedWork(self._threads)
+        self._work = OrderedWork(self._threads - 1)
         # fixed: the oldest structures, which every reader knows and which hold no times
         self._file = h5py.File(self._temporary, "w", libver=("earliest", "v108"))
         pixel = np.dtype(np.int16 if max(self._shape) <= 32767 else np.uint16)

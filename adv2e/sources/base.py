@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -139,6 +140,8 @@ class Source(ABC):
         Number that means white, from the data type.
     notes : list of str
         Things to tell the user.
+    threads : int
+        Threads that decoding may use; one, unless set otherwise before `frames`.
     """
 
     def __init__(self, path: Path, kind: str, selection: Selection, has_clock: bool) -> None:
@@ -148,6 +151,7 @@ class Source(ABC):
         self.has_clock = has_clock
         self.notes: list[str] = []
         self.count: int | None = None
+        self.threads = 1
 
     def _describe(self, image: Image, label: str) -> None:
         """Take geometry, data type and meaning of the numbers from the first frame."""
@@ -176,10 +180,9 @@ class Source(ABC):
             differs from the first in size, data type or colour, or values that are not finite.
         """
         chosen = self._chosen()
-        first = next(chosen)
-        second = next(chosen)
-        yield first
-        yield second
+        begin = deque([next(chosen), next(chosen)])
+        while begin:
+            yield begin.popleft()  # and keep none of them
         yield from chosen
 
     def _chosen(self) -> Iterator[Frame]:
@@ -202,10 +205,8 @@ class Source(ABC):
                 continue
             if origin is None:
                 origin = self._origin(first, shot)
-            image = shot.load()
-            self._check_image(image, shot.label)
             yielded += 1
-            yield Frame(shot.t_ns - origin, image)
+            yield Frame(shot.t_ns - origin, self._load(shot))
         if yielded < 2:
             span = previous.t_ns - first.t_ns if first is not None and previous is not None else 0
             raise self._too_few(yielded, span)
@@ -224,12 +225,14 @@ class Source(ABC):
             f" {seconds(span_ns)} s; at least two are needed"
         )
 
-    def _check_image(self, image: Image, label: str) -> None:
+    def _load(self, shot: Shot) -> Image:
+        image, label = shot.load(), shot.label
         first = _description(self.width, self.height, self.dtype, self.colour)
         this = _description(image.shape[1], image.shape[0], image.dtype, image.ndim == 3)
         if this != first:
             raise DataError(f"{label}: {this}, but the first frame is {first}")
         check_values(image, label)
+        return image
 
 
 def check_values(image: Image, label: str) -> None:

@@ -1,13 +1,15 @@
 """Stacks of frames in a ``.npy`` file: (frames, rows, columns) or (frames, rows, columns, 3) RGB.
 
-The file is mapped, not loaded.  Times come from the command line or from beside the file:
+Frames are read one by one.  Times come from the command line or from beside the file:
 ``<stem>_ts.npy`` (float64 seconds) or ``<stem>.timestamps.txt`` (one time [s] a line).
 """
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +31,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     stack = _open_stack(path)
     found = _found_times(path)
     pictures = [
-        Picture(f"{path}: frame {number}", None, partial(_copy, stack, number))
+        Picture(f"{path}: frame {number}", None, partial(_read, path, stack, number))
         for number in range(stack.shape[0])
     ]
     if not pictures:
@@ -53,9 +55,9 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     return source
 
 
-def _open_stack(path: Path) -> Image:
+def _open_stack(path: Path) -> np.memmap[Any, Any]:
     try:
-        stack: Image = np.load(path, mmap_mode="r", allow_pickle=False)
+        stack: np.memmap[Any, Any] = np.load(path, mmap_mode="r", allow_pickle=False)
     except (ValueError, EOFError, OSError) as error:
         raise DataError(f"{path}: not a .npy array that can be read, or cut short") from error
     shape = stack.shape
@@ -71,9 +73,22 @@ def _open_stack(path: Path) -> Image:
     return stack
 
 
-def _copy(stack: Image, number: int) -> Image:
-    # a copy in the machine's byte order, so that nothing later touches the mapped file
-    return np.array(stack[number], dtype=stack.dtype.newbyteorder("="))
+def _read(path: Path, stack: np.memmap[Any, Any], number: int) -> Image:
+    """Return a frame in the machine's byte order."""
+    native = stack.dtype.newbyteorder("=")
+    if not stack.flags.c_contiguous:  # frame by frame, it is all over the file
+        return np.array(stack[number], dtype=native, order="C")
+    # not through the mapping: what was read of it would count as memory of this process
+    shape = stack.shape[1:]
+    pixels = math.prod(shape)
+    offset = stack.offset + number * pixels * stack.itemsize
+    try:
+        image = np.fromfile(path, stack.dtype, pixels, offset=offset)
+    except OSError as error:
+        raise DataError(f"{path}: frame {number}: {error.strerror or error}") from error
+    if image.size < pixels:
+        raise DataError(f"{path}: frame {number}: cut short while it was read")
+    return image.reshape(shape).astype(native, copy=False)
 
 
 def _found_times(path: Path) -> Path | None:

@@ -26,6 +26,9 @@ _GREY_8, _GREY_16 = b"Y800", b"Y1\x00\x10"
 _RETRIES = 1000
 """How many packets after the end of a video may fail before it counts as its end."""
 
+_DECODER_PIXELS, _DECODERS = 1 << 20, 4
+"""Pixels of a frame for which one thread decodes fast enough, and the most threads."""
+
 Clock = Callable[[int, int], int]
 """Time [ns] of a frame, from its number and its own stamp since the first [ns]."""
 
@@ -117,10 +120,16 @@ class VideoSource(Source):
                 return _snapping(rate, tick_ns)
         return None
 
+    def _decoders(self) -> int:
+        # each has frames of its own, and handing work over costs more than small frames are worth
+        wanted = 1 + int(self.width * self.height) // _DECODER_PIXELS
+        return min(wanted, _DECODERS, self.threads)
+
     @contextmanager
-    def _opened(self) -> Iterator[cv2.VideoCapture]:
+    def _opened(self, threads: int = 1) -> Iterator[cv2.VideoCapture]:
         with quiet():
-            capture = cv2.VideoCapture(self.path, cv2.CAP_FFMPEG)
+            options = [cv2.CAP_PROP_N_THREADS, threads]
+            capture = cv2.VideoCapture(self.path, cv2.CAP_FFMPEG, options)
         try:
             if not capture.isOpened():
                 raise DataError(f"{self.path}: not a video that can be read, or damaged")
@@ -136,7 +145,7 @@ class VideoSource(Source):
         DataError
             If decoding stops before the end, or times given do not fit the frames.
         """
-        with self._opened() as capture:
+        with self._opened(self._decoders()) as capture:
             self._keep_grey(capture)
             number, first_ns, stamp_ns = 0, 0, 0
             while capture.grab():
@@ -151,7 +160,8 @@ class VideoSource(Source):
             self._check_end(capture, number, stamp_ns)
 
     def _check_end(self, capture: cv2.VideoCapture, count: int, last_ns: int) -> None:
-        if any(capture.grab() for _ in range(_RETRIES)):
+        complete = self._container.exact_count and count >= self._stated
+        if not complete and any(capture.grab() for _ in range(_RETRIES)):
             raise DataError(f"{self.path}: damaged after frame {count - 1}; re-encode it")
         if _ends_early(self._container, self._fps, self._stated, count, last_ns):
             raise DataError(

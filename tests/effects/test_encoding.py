@@ -6,6 +6,7 @@ import pytest
 from adv2e.effects.frames.encoding import (
     LightDecoder,
     check_encoding,
+    decode_values,
     encoding_of_images,
     full_scale_of,
 )
@@ -125,3 +126,17 @@ def test_unknown_encodings_are_refused(encoding):
 )
 def test_meaning_of_auto_for_images(dtype, colour, encoding):
     assert encoding_of_images(dtype, colour) == encoding
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_colour_by_table_agrees_with_decoding_then_weighing(dtype):
+    full_scale = full_scale_of(dtype)
+    image = np.random.default_rng(4).integers(0, full_scale, (7, 5, 3), dtype, endpoint=True)
+    image.flags.writeable = False
+    dn = decode_values(image.astype(np.float64), "srgb", full_scale)
+    expected = dn @ RGB
+    decoder = LightDecoder("srgb", full_scale, dtype, colour=True)
+    for part in (np.s_[:, :], np.s_[::-1, ::2]):  # strided, too
+        light = decoder.decode(image[part])
+        assert light.dtype == np.float32
+        np.testing.assert_allclose(light, expected[part], rtol=3e-7)

@@ -1,6 +1,7 @@
 """The exact update against the dense ODE: counts equal, every time within 1 us."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,11 +73,66 @@ def test_with_second_pole_dead_time_and_leak(fps):
     assert agreement.max_dt_us < 1.0
 
 
+@pytest.mark.parametrize("fps", [24, 240])
+@pytest.mark.parametrize("effects", [{"dead_time"}, {"leak"}, {"dead_time", "leak"}])
+def test_with_dead_time_and_leak(fps, effects):
+    circuit, sections = Circuit(), {}
+    if "dead_time" in effects:
+        circuit = replace(circuit, dead_time_us=800.0)
+        sections["refractory"] = Refractory(period_us=800.0)
+    if "leak" in effects:
+        circuit = replace(circuit, leak_hz=3.0, photo_leak_hz=6.0)
+        sections["leak"] = Leak(rate_hz=3.0, photo_rate_hz=6.0)
+    stimulus = stimuli.standard(fps, L=10, pixels=24, frames=7)
+    agreement, _ = compare(stimulus, circuit, sections)
+    assert agreement.count_b > 40
+    assert not agreement.differing
+    assert agreement.max_dt_us < 1.0
+
+
+# 8-bit pixels whose signal passes a threshold some 10 us after it has turned or has rested next to
+# it, where the root of the distance is nearly double
+RIGHT_AFTER_A_TURN = (
+    "60 56 51 50 57 68 68 68 68 67 55 48 45 40 34 32 31 31 31 31 32 33 30 27 25 24 24 22 21 21"
+    " 21 20 21 23 24 24 25 26 24 23 24 22 21 23 25 28 27 24 23",
+    "37 39 40 41 41 39 36 33 31 31 31 31 31 32 32 32 32 31 29 28 26 25 27 30 32 34 35 36 36 37"
+    " 37 37 36 37 37 37 37 37 37 37 37 38 38 39 40 40 41 41 41",
+    "48 44 42 41 42 42 42 40 38 36 33 33 33 33 32 33 34 35 36 37 38 39 39 38 38 37 38 38 39 39"
+    " 39 39 39 40 40 41 43 44 46 48 48 48 48 48 48 49 50 51 51",
+)
+
+
+def test_crossings_right_after_a_turn():
+    light = np.array([[float(v) for v in row.split()] for row in RIGHT_AFTER_A_TURN]).T
+    times = np.round(np.arange(len(light)) / 240 * 1e9) * 1e-9
+    events = solve(light.astype(np.float32), times, quiet())
+    truth, until = as_lists(dense_truth(light, times, Circuit()))
+    agreement = count_and_time_errors(events, truth, until)
+    assert not agreement.differing
+    assert agreement.max_dt_us < 0.1
+
+
 def test_turning_points_and_returns():
     """Blinking pixels: every interval turns, and levels are approached without being reached."""
     stimulus = stimuli.blinking(pixels=30, frames=12, fps=200.0, L=1)
     agreement, _ = compare(stimulus, *CIRCUITS["lin-log, dark corner"])
     assert agreement.count_b > 40
+    assert not agreement.differing
+    assert agreement.max_dt_us < 1.0
+
+
+@pytest.mark.parametrize("effects", [{}, {"refractory": Refractory(period_us=800.0)}])
+def test_flashes(effects):
+    """So many pixels step by e-folds that the whole strip's interval is cut up."""
+    rng = np.random.default_rng(4)
+    dark = rng.uniform(1.0, 20.0, 60)
+    light = np.array([dark * np.exp(rng.uniform(1.2, 2.5, 60) * (k % 2)) for k in range(5)])
+    light = light.astype(np.float32).astype(float)
+    times = np.arange(5) / 30
+    circuit = Circuit(dead_time_us=800.0 if effects else 0.0)
+    truth, until = as_lists(dense_truth(light, np.round(times * 1e9) * 1e-9, circuit))
+    agreement = count_and_time_errors(solve(light, times, quiet(**effects)), truth, until)
+    assert agreement.count_b > 500
     assert not agreement.differing
     assert agreement.max_dt_us < 1.0
 

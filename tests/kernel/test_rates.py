@@ -6,6 +6,7 @@ from harness import advance, quiet, start
 from scipy import stats
 
 from adv2e.config.model import HotPixels, Leak, PhotoreceptorNoise, Refractory, ShotNoise
+from adv2e.kernel.workspace import S_REFERENCE, S_X
 
 PIXELS = 3000
 SECONDS = 4.0
@@ -75,7 +76,7 @@ def test_random_reference_is_uniform_between_the_thresholds():
     pixel = quiet(initial_reference="random")
     light = np.full((2, 1, PIXELS), 100, np.float32)
     array = start(light, [0], pixel)
-    offset = (array.state[0] - array.state[3]) / 0.2  # signal minus reference
+    offset = (array.state[S_X] - array.state[S_REFERENCE]) / 0.2  # signal minus reference
     assert stats.kstest(offset, stats.uniform(-1, 2).cdf).pvalue > 1e-3
 
 

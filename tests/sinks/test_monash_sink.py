@@ -57,7 +57,7 @@ def test_columns_are_chunked_resizable_and_compressed_with_standard_filters(tmp_
         for column in file["events"].values():
             assert column.chunks == (65536,)
             assert column.maxshape == (None,)
-            assert (column.compression, column.compression_opts) == ("gzip", 4)
+            assert (column.compression, column.compression_opts) == ("gzip", 1)
             assert column.shuffle
 
 

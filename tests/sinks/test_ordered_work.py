@@ -1,8 +1,10 @@
 import threading
 import time
 
+import numpy as np
 import pytest
 
+from adv2e.sinks import work as work_module
 from adv2e.sinks.work import OrderedWork
 
 
@@ -56,4 +58,29 @@ def test_failure_of_a_task_reaches_the_caller():
     work.submit(int, "no number", take=lambda _: None)
     with pytest.raises(ValueError, match="no number"):
         work.finish()
+    work.abandon()
+
+
+def test_memory_of_work_ahead_is_bounded(monkeypatch):
+    monkeypatch.setattr(work_module, "PENDING_BYTES", 250)
+    work = OrderedWork(4)
+    begun, taken = [], []
+    for _ in range(20):
+        work.submit(len, np.zeros(100, np.uint8), take=taken.append)
+        begun.append(1)
+        assert len(begun) - len(taken) <= 2
+    work.submit(len, np.zeros(1000, np.uint8), take=taken.append)  # too large, so by itself
+    assert len(taken) == 20
+    work.finish()
+    assert taken == [100] * 20 + [1000]
+
+
+def test_without_threads_the_one_that_submits_works():
+    work = OrderedWork(0)
+    taken = []
+    work.submit(threading.get_ident, take=taken.append)
+    assert taken == [threading.get_ident()]
+    with pytest.raises(ValueError, match="no number"):
+        work.submit(int, "no number", take=taken.append)
+    work.finish()
     work.abandon()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,15 @@ def test_frames_come_as_often_as_asked(stack):
     assert len(first) == len(second) == source.count == 10
     assert all(isinstance(frame, Frame) for frame in first)
     assert np.array_equal(first[3].image, second[3].image)
+
+
+def test_frames_are_not_kept(stack):
+    images = []
+    for frame in open_source(stack[0], fps=10).frames():
+        images.append(weakref.ref(frame.image))
+        del frame
+        assert [image() for image in images] == [None] * len(images)
+    assert len(images) == 10
 
 
 @pytest.mark.parametrize(

@@ -141,3 +141,20 @@ def test_files_that_are_no_arrays(path, tmp_path):
         path.write_bytes(data)
         with pytest.raises(DataError, match=r"stack\.npy: not a \.npy array"):
             open_source(path, fps=10)
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_any_order_in_memory(path, picture, order):
+    stack = np.asarray(picture(0, (3, 5, 7), np.uint16), order=order)
+    frames = list(open_source(save(path, stack), fps=100).frames())
+    assert all(np.array_equal(f.image, image) for f, image in zip(frames, stack, strict=True))
+    assert all(frame.image.flags.c_contiguous for frame in frames)
+
+
+def test_a_file_cut_short_while_it_is_read(path):
+    frames = open_source(save(path, np.zeros((50, 40, 40), np.uint8)), fps=100).frames()
+    next(frames)
+    with path.open("r+b") as file:
+        file.truncate(path.stat().st_size // 2)
+    with pytest.raises(DataError, match=r"stack\.npy: frame 2\d: cut short"):
+        list(frames)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.sources import open_source
+from adv2e.sources import open_source, video
 
 
 def times_of(source):
@@ -54,6 +54,17 @@ def test_lossless_grey_comes_back_as_stored(write_video, picture, dtype, encodin
     assert (source.dtype, source.colour, source.encoding) == (dtype, False, encoding)
     assert source.full_scale == np.iinfo(dtype).max
     assert [note[:6] for note in source.notes] == (["16-bit"] if dtype == np.uint16 else [])
+
+
+def test_threads_that_decode_change_nothing(write_video, colours, monkeypatch):
+    monkeypatch.setattr(video, "_DECODER_PIXELS", 100)
+    source = open_source(write_video("clip.mp4", colours, 30, "mp4v"))
+    frames = []
+    for threads in (1, 3):
+        source.threads = threads
+        frames.append([(frame.t_ns, frame.image.tobytes()) for frame in source.frames()])
+    assert frames[0] == frames[1]
+    assert len(frames[0]) == 12
 
 
 @pytest.mark.parametrize("name", ["clip.mp4", "clip.mov", "clip.avi"])

@@ -133,6 +133,11 @@ class LightDecoder:
             weights = LUMA_WEIGHTS if colour else (1.0,)
             self._tables = [(weight * dn).astype(np.float32) for weight in weights]
 
+    @property
+    def grey_table(self) -> NDArray[np.float32] | None:
+        """Light [DN] of each grey value of 8 bits; None for other frames."""
+        return self._tables[0] if self.dtype == np.uint8 and not self.colour else None
+
     def decode(self, image: NDArray[Any]) -> NDArray[Any]:
         """Return the light of `image`.
 
@@ -163,8 +168,12 @@ class LightDecoder:
     def _look_up(self, image: NDArray[Any]) -> NDArray[Any]:
         if not self.colour:
             return self._tables[0].take(image)
+        # imported late: checking an encoding needs no compiled code
+        from adv2e.effects.frames.luma import fill_luma  # noqa: PLC0415
+
+        light = np.empty(image.shape[:2], np.float32)
+        # writable, too: one type for the compiled code
+        pixels = np.require(image, requirements=["C", "W"]).reshape(-1, 3)
         red, green, blue = self._tables
-        light = green.take(image[..., 1])
-        light += red.take(image[..., 0])
-        light += blue.take(image[..., 2])
+        fill_luma(pixels, red, green, blue, light.reshape(-1))
         return light

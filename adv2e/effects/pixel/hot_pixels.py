@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from adv2e import rng
-from adv2e.jit import kernel
+from adv2e.jit import inlined, kernel
 from adv2e.kernel.workspace import S_HOT_DRAW, S_HOT_TIME, Array, Circuit
 from adv2e.parameters import Section, parameter
 
@@ -32,7 +32,7 @@ class HotPixels(Section):
     rate_hz: float = parameter(unit="Hz", meaning="ON events a hot pixel a second", at_least=0)
 
 
-@kernel
+@inlined
 def next_hot_time(i: int, circuit: Circuit, state: Array) -> None:
     """Move hot pixel i on to its next event."""
     state[S_HOT_DRAW, i] += 1

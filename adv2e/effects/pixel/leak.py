@@ -23,7 +23,15 @@ from dataclasses import dataclass
 
 from adv2e import rng
 from adv2e.jit import inlined, kernel
-from adv2e.kernel.workspace import LEAK, LIGHT, S_LEAK_DRAW, S_LEAK_FACTOR, Array, Circuit
+from adv2e.kernel.workspace import (
+    LEAK,
+    LIGHT,
+    S_LEAK_DRAW,
+    S_LEAK_FACTOR,
+    S_ON,
+    Array,
+    Circuit,
+)
 from adv2e.parameters import Section, parameter
 
 
@@ -61,6 +69,25 @@ def leak_series(ws: Array, order: int, h: float, on: float, circuit: Circuit) ->
     for k in range(order):
         ws[LEAK, k + 1] = on * h * circuit.photo_leak * ws[LIGHT, k] / (k + 1)
     ws[LEAK, 1] += on * h * circuit.leak
+
+
+@kernel
+def fill_falls(
+    lo: int, count: int, length: float, mean: Array, circuit: Circuit, state: Array, falls: Array
+) -> None:
+    """Fall of the reference over an interval of `length` us: pixels lo.., mean light [DN]."""
+    on = state[S_ON, lo : lo + count]
+    constant, per_dn = circuit.leak * length, circuit.photo_leak * length
+    if per_dn > 0.0:
+        for k in range(count):
+            falls[k] = on[k] * (constant + per_dn * mean[k])
+    else:
+        for k in range(count):
+            falls[k] = on[k] * constant
+    if circuit.leak_jitter > 0.0:
+        factor = state[S_LEAK_FACTOR, lo : lo + count]
+        for k in range(count):
+            falls[k] *= factor[k]
 
 
 @kernel

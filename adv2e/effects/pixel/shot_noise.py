@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from adv2e import rng
-from adv2e.jit import kernel
+from adv2e.jit import inlined, kernel
 from adv2e.kernel.workspace import S_SHOT_DRAW, S_SHOT_TIME, Array, Circuit
 from adv2e.parameters import Section, parameter
 
@@ -40,7 +40,7 @@ class ShotNoise(Section):
     )
 
 
-@kernel
+@inlined
 def next_candidate_time(i: int, circuit: Circuit, state: Array) -> None:
     """Move pixel i on to its next candidate."""
     state[S_SHOT_DRAW, i] += 1
@@ -48,22 +48,19 @@ def next_candidate_time(i: int, circuit: Circuit, state: Array) -> None:
     state[S_SHOT_TIME, i] += wait / circuit.shot_rate
 
 
-@kernel
-def keep_candidate(i: int, light: float, circuit: Circuit, state: Array) -> bool:
-    """Tell whether the present candidate of pixel i becomes an event at this light [DN]."""
-    u = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[S_SHOT_DRAW, i])[0]
-    return u < 1.0 - circuit.shot_fall * light
-
-
-@kernel
-def polarity_of(i: int, circuit: Circuit, state: Array) -> int:
-    """Return the polarity of the present candidate of pixel i, 1 or -1."""
-    v = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[S_SHOT_DRAW, i])[1]
+@inlined
+def candidate_polarity(i: int, light: float, circuit: Circuit, state: Array) -> int:
+    """Return what the present candidate of pixel i becomes at this light [DN]: 1, -1, 0 nothing."""
+    u, v = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[S_SHOT_DRAW, i])
+    if u >= 1.0 - circuit.shot_fall * light:
+        return 0
     return 1 if v < 0.5 else -1
 
 
 @kernel
-def fill_first_candidates(seed: int, rate: float, start: float, times: Array) -> None:
-    """Draw the first candidate time [us] of every pixel; rate in events a us."""
-    for i in range(times.shape[0]):
+def fill_first_candidates(
+    lo: int, hi: int, seed: int, rate: float, start: float, times: Array
+) -> None:
+    """Draw the first candidate time [us] of the pixels lo..hi; rate in events a us."""
+    for i in range(lo, hi):
         times[i] = start + rng.exponential(seed, rng.SHOT_TIME, i, 0) / rate

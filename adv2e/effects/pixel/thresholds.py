@@ -49,12 +49,15 @@ class Thresholds(Section):
 
 @kernel
 def fill_levels(
-    seed: int, mean_on: float, mean_off: float, mismatch: float, on: Array, off: Array
-) -> None:
-    """Draw the thresholds of every pixel into `on` and `off`."""
-    for i in range(on.shape[0]):
-        a = mean_on + mismatch * rng.normal(seed, rng.ON_THRESHOLD, i, 0)
-        b = mean_off + mismatch * rng.normal(seed, rng.OFF_THRESHOLD, i, 0)
+    lo: int, hi: int, seed: int, mean_on: float, mean_off: float, mismatch: float, on: Array,
+    off: Array,
+) -> None:  # fmt: skip
+    """Draw the thresholds of the pixels lo..hi into `on` and `off`."""
+    for i in range(lo, hi):
+        a, b = mean_on, mean_off
+        if mismatch > 0.0:
+            a += mismatch * rng.normal(seed, rng.ON_THRESHOLD, i, 0)
+            b += mismatch * rng.normal(seed, rng.OFF_THRESHOLD, i, 0)
         on[i] = a if a > FLOOR else FLOOR
         off[i] = b if b > FLOOR else FLOOR
 

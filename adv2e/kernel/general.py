@@ -1,0 +1,139 @@
+"""Any circuit over a tile: bounds in double precision, and every pixel that may fire by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adv2e.effects.pixel.leak import fill_falls
+from adv2e.jit import allocating_kernel, kernel
+from adv2e.kernel import screen, special, stepped
+from adv2e.kernel.tile import load, solve_one
+from adv2e.kernel.workspace import EXACT, S_LAG, S_LAG2, S_OFF, S_ON, S_REFERENCE, S_X, STRIP
+
+
+@kernel
+def _load_light(frames, before, share, first, count, circuit, rows, light, x):
+    """Light and log intensity of a strip, `share` of the way from frame `before` to the next."""
+    load(frames, before, share, first, count, 0.0, rows)
+    stepped.load_strip(rows[screen.LIGHT_1 : screen.LIGHT_1 + count], circuit, light, x)
+
+
+@kernel
+def _bound(lo, count, ta, length, circuit, state, columns, falls, flags):
+    """Row 4: lag at the end; flags: which pixels may fire, by bounds in double precision."""
+    hi = lo + count
+    x0, x1 = columns[1, :count], columns[3, :count]
+    lag_end, low, high = columns[4, :count], columns[5, :count], columns[6, :count]
+    lag = state[S_LAG, lo:hi]
+    if circuit.filtered and (circuit.follower > 0.0 or circuit.update == EXACT):
+        lag2 = state[S_LAG2, lo:hi] if circuit.follower > 0.0 else lag
+        stepped.rest_hull(x0, x1, lag, lag2, count, lag_end, low, high)
+    elif not circuit.filtered:
+        stepped.line_hull(x0, x1, lag_end, count, low, high)
+    else:
+        stepped.stepped_lags(x0, x1, lag, length, circuit, count, columns[7:12], lag_end, low, high)
+    stepped.flag_strip(
+        low, high, state[S_REFERENCE, lo:hi], state[S_ON, lo:hi], state[S_OFF, lo:hi], falls,
+        count, flags,
+    )  # fmt: skip
+    stepped.flag_due(lo, count, ta + length, circuit, state, flags)
+
+
+@kernel
+def _finish_unflagged(lo, count, state, lag_end, falls, flags):
+    for k in range(count):
+        if not flags[k]:
+            state[S_LAG, lo + k] = lag_end[k]
+            state[S_REFERENCE, lo + k] -= falls[k]
+
+
+@kernel
+def _fill_falls(lo, count, length, circuit, state, columns, falls, means):
+    for k in range(count):
+        dx = columns[3, k] - columns[1, k]
+        on_log = min(columns[1, k], columns[3, k]) >= circuit.knee and abs(dx) <= 1.0
+        i0, i1 = columns[0, k], columns[2, k]
+        means[k] = i1 * (1.0 - dx * special.psi(-dx)) if on_log else 0.5 * (i0 + i1)
+    fill_falls(lo, count, length, means, circuit, state, falls)
+
+
+@kernel
+def _samples(xa, xb, ahead, begins, is_last, next_is_last):
+    """Continuity samples of an interval, as solve_interval takes them: start, base, step, end.
+
+    With the paper's last interval as printed, the samples of a last one start from its end, but
+    for the one at which the recording begins, and the interval before leads there.
+    """
+    base = xb if is_last else xa
+    start = base if not begins else xa
+    return start, base, xb - xa, ahead if next_is_last else xb
+
+
+@kernel
+def _swap(count, columns):
+    for k in range(count):
+        columns[0, k] = columns[2, k]
+        columns[1, k] = columns[3, k]
+
+
+@allocating_kernel
+def _strip(
+    lo, count, frames, before, share, starts, begins, last, circuit, t_base, state,
+    scratch, keys, times, n,
+):  # fmt: skip
+    """Advance one strip of any circuit over all intervals."""
+    columns, flags, falls = scratch.columns, scratch.flags, scratch.falls
+    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
+    rows = scratch.rows
+    _load_light(
+        frames, before[0], share[0], lo, count, circuit, rows, columns[0, :count],
+        columns[1, :count],
+    )  # fmt: skip
+    for f in range(starts.shape[0] - 1):
+        ta, length = starts[f], starts[f + 1] - starts[f]
+        _load_light(
+            frames, before[f + 1], share[f + 1], lo, count, circuit, rows, columns[2, :count],
+            columns[3, :count],
+        )  # fmt: skip
+        for k in range(count):
+            flags[k] = True
+        if circuit.noise_rms == 0.0 and not (last[f] or last[f + 1]):
+            if leaks:
+                _fill_falls(lo, count, length, circuit, state, columns, falls, scratch.means)
+            _bound(lo, count, ta, length, circuit, state, columns, falls, flags)
+            _finish_unflagged(lo, count, state, columns[4], falls, flags)
+        if last[f + 1]:
+            _load_light(
+                frames, before[f + 2], share[f + 2], lo, count, circuit, rows, columns[12, :count],
+                columns[13, :count],
+            )  # fmt: skip
+        for k in range(count):
+            if flags[k]:
+                xs, base, step, end = _samples(
+                    columns[1, k], columns[3, k], columns[13, k], begins and f == 0, last[f],
+                    last[f + 1],
+                )  # fmt: skip
+                n, keys, times = solve_one(
+                    lo + k, xs, base, step, end, ta, length, t_base, circuit, state, scratch.ws,
+                    keys, times, n,
+                )  # fmt: skip
+        _swap(count, columns)
+    for k in range(count):
+        state[S_X, lo + k] = columns[1, k]
+    return n, keys, times
+
+
+@allocating_kernel
+def run_general(
+    lo, hi, frames, before, share, starts, begins, last, circuit, nodes, weights, counts, t_base,
+    state, scratch, keys, times,
+):  # fmt: skip
+    """Advance the pixels lo..hi; see :func:`adv2e.kernel.exact.run_exact`."""
+    n = np.int64(0)
+    for s in range(lo, hi, STRIP):
+        count = min(STRIP, hi - s)
+        n, keys, times = _strip(
+            s, count, frames, before, share, starts, begins, last, circuit, t_base, state, scratch,
+            keys, times, n,
+        )  # fmt: skip
+    return n, keys, times

@@ -1,0 +1,496 @@
+"""What the lanes decide, against the dense truth: adversarial stimuli of a few intervals."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from harness import advance, by_pixel, quiet, start
+from reference.agreement import count_and_time_errors
+from reference.circuit import PURE, Circuit, Draws
+from reference.dense_ode import as_lists, find_events
+from reference.dense_signal import solve_signal, turning_points
+
+from adv2e import rng
+from adv2e.config.model import Leak, LogResponse, LowPass, Refractory, ShotNoise, Thresholds
+from adv2e.kernel import exact
+from adv2e.kernel.screen import LARGEST_STEP
+from adv2e.kernel.workspace import S_OFF, S_ON, STRIP
+
+FAR = 50.0
+"""A threshold that nothing reaches [ln units]."""
+
+
+def clock(intervals_ms):
+    """Times of the knots [s], in whole nanoseconds, from the lengths of the intervals."""
+    at = np.concatenate([[0.0], np.cumsum(intervals_ms)]) * 1e-3
+    return np.round(at * 1e9) * 1e-9
+
+
+def single(light):
+    """Light as the kernel sees it: single precision, for both sides."""
+    return np.asarray(light).astype(np.float32).astype(np.float64)
+
+
+def sections_of(circuit):
+    """Return the configuration's sections for a circuit of the reference."""
+    sections = {
+        "log_response": LogResponse(linear_below=circuit.linear_below, floor=circuit.floor),
+        "low_pass": LowPass(cutoff_hz=circuit.cutoff_hz, dark_cutoff_hz=circuit.dark_cutoff_hz),
+    }
+    if circuit.dead_time_us is not None:
+        sections["refractory"] = Refractory(period_us=circuit.dead_time_us)
+    if circuit.leak_hz or circuit.photo_leak_hz:
+        sections["leak"] = Leak(rate_hz=circuit.leak_hz, photo_rate_hz=circuit.photo_leak_hz)
+    return sections
+
+
+def fire(light, times, circuit, seed=0, **sections):
+    """Return the kernel's events, one (events, 2) array a pixel, with the circuit's thresholds."""
+    pixel = quiet(**sections_of(circuit), **sections)
+    times_ns = [round(float(t) * 1e9) for t in times]
+    array = start(light, times_ns, pixel, seed=seed, exact_times=True)
+    array.state[S_ON], array.state[S_OFF] = circuit.levels(array.pixels)
+    return by_pixel(array, *advance(array, light, times_ns))
+
+
+def check(light, times, circuit, *, paths=None, at_least=1, within_us=1.0):
+    """Compare kernel and truth; returns the truth's events."""
+    truths = find_events(paths or solve_signal(light, times, circuit), circuit)
+    truth, until = as_lists(truths)
+    found = count_and_time_errors(fire(light, times, circuit), truth, until)
+    assert sum(map(len, truth)) >= at_least
+    assert found.left_out <= found.count_b, "hardly anything to compare: ties"
+    assert not found.differing
+    assert found.max_dt_us < within_us
+    return truth
+
+
+def turns(path):
+    """Return when one pixel's signal turns [s]."""
+    pieces = zip(path.start, path.length, path.signal, strict=True)
+    return np.array(
+        [
+            t + 0.5 * (s + 1.0) * length
+            for t, length, signal in pieces
+            for s in turning_points(signal, -1.0, 1.0)
+        ]
+    )
+
+
+def dense(path, points=400):
+    """Return times [s], signal and leak of one pixel's path at many places."""
+    s = np.cos(np.linspace(math.pi, 0.0, points))
+    rows = [
+        np.column_stack(
+            [
+                t + 0.5 * (s + 1.0) * h,
+                np.polynomial.chebyshev.chebval(s, signal),
+                np.polynomial.chebyshev.chebval(s, leak),
+            ]
+        )
+        for t, h, signal, leak in zip(path.start, path.length, path.signal, path.leak, strict=True)
+    ]
+    return np.concatenate(rows)
+
+
+def tangent_level(path, polarity, on=None):
+    """Return the threshold that the distance from the reference just reaches.
+
+    The reference falls in proportion to the ON threshold, so it takes part in its own tangent:
+    y + on l = on at the most, which is on = max y / (1 - l).
+    """
+    _, y, leaked = dense(path).T
+    away = y - y[0]
+    if polarity > 0:
+        return float(np.max(away / (1.0 - leaked)))
+    return float(np.max(-(away + on * leaked)))
+
+
+def walks(seed, knots, pixels, *, lo=21.0, hi=255.0, steps=(0.02, 0.3, 0.9), rest=0.2):
+    """Light that wanders by small and large steps, rests, and returns to earlier values."""
+    draw = np.random.default_rng(seed)
+    x = np.empty((knots, pixels))
+    x[0] = draw.uniform(math.log(lo), math.log(hi), pixels)
+    for k in range(1, knots):
+        step = draw.choice(steps, pixels) * draw.standard_normal(pixels)
+        step[draw.random(pixels) < rest] = 0.0
+        x[k] = np.clip(x[k - 1] + step, math.log(lo), math.log(hi))
+        returns = draw.random(pixels) < 0.15
+        x[k, returns] = x[draw.integers(0, k), returns]
+    return single(np.exp(x))
+
+
+# --- tangents and ties ---------------------------------------------------------------------------
+
+
+def there_and_back(seed, pixels, polarity):
+    """Light that goes one way and then back, the signal turning in the last interval."""
+    draw = np.random.default_rng(seed)
+    low, high = math.log(21.0), math.log(255.0)
+    x0 = draw.uniform(low + 0.2, high - 0.2, pixels)
+    x1 = np.clip(x0 + polarity * draw.uniform(0.05, 0.9, pixels), low, high)
+    x2 = np.clip(x1 - polarity * draw.uniform(0.05, 0.9, pixels), low, high)
+    return single(np.exp([x0, x1, x2]))
+
+
+@pytest.mark.parametrize("polarity", [1, -1])
+@pytest.mark.parametrize("leak_hz", [0.0, 3.0, 30.0])
+@pytest.mark.parametrize("lengths", [(2.0, 8.0), (0.3, 33.0)])
+def test_thresholds_next_to_the_turning_point(polarity, leak_hz, lengths):
+    """What is just reached fires once, what is just missed does not: both times to 1 us."""
+    pixels = 24
+    light, times = there_and_back(5, pixels, polarity), clock(lengths)
+    circuit = Circuit(on=0.3, off=FAR, leak_hz=leak_hz)
+    paths = solve_signal(light, times, circuit)
+    level = np.array([tangent_level(path, polarity, circuit.on) for path in paths])
+    # a leak that makes up a whole threshold by itself has no tangent
+    clear = (level > 0.02) & (level < 1.0)
+    assert np.count_nonzero(clear) >= pixels // 3
+    light, level = light[:, clear], level[clear]
+    paths = [path for path, used in zip(paths, clear, strict=True) if used]
+    for short in (1e-4, 1e-5, 1e-6, 3e-7):
+        for side in (1, -1):
+            moved = level - side * short
+            near = replace(circuit, **{"on" if polarity > 0 else "off": moved})
+            reached = level.size if side > 0 else 0
+            truth = check(light, times, near, paths=paths, at_least=reached)
+            first = sum(np.any(events[:, 1] == polarity) for events in truth)
+            assert first == reached
+
+
+def test_levels_that_are_approached_and_never_reached():
+    """A grey value that lies a threshold away, as the logarithms have it, fires nothing at rest."""
+    grey = np.array([[21.0, 40.0, 100.0, 3.0, 200.0], [26.0, 64.0, 250.0, 17.0, 90.0]])
+    light, times = single(np.vstack([grey, np.repeat(grey[1:], 30, 0)])), clock([2.0] * 31)
+    step = np.abs(np.diff(np.where(grey < 20, grey * math.log(20) / 20, np.log(grey)), axis=0)[0])
+    for circuit in (Circuit(), Circuit(cutoff_hz=3000.0, dark_cutoff_hz=3000.0)):
+        level = replace(circuit, on=step, off=step)
+        assert all(len(events) == 0 for events in fire(light, times, level))
+        below = replace(circuit, on=step - 1e-4, off=step - 1e-4)
+        check(light, times, below, at_least=5)
+
+
+@pytest.mark.parametrize("dead_time_us", [None, 600.0])
+def test_returns_to_earlier_grey_values(dead_time_us):
+    """Back and forth between whole grey values: the last threshold of each way is never reached."""
+    draw = np.random.default_rng(2)
+    levels = draw.integers(1, 256, (3, 40)).astype(float)
+    light = np.repeat(levels[[0, 1, 0, 2, 1, 0]], 4, axis=0)
+    circuit = Circuit(linear_below=2.72, dead_time_us=dead_time_us)
+    truth = check(light, clock([8.0] * (len(light) - 1)), circuit, at_least=300)
+    if dead_time_us is None:
+        # every way is gone back, but for one step at most
+        assert all(abs(events[:, 1].sum()) <= 1 for events in truth)
+
+
+# --- many events in one interval -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("leak_hz", [0.0, 50.0])
+def test_more_crossings_in_one_interval_than_rounds(leak_hz):
+    x = np.log([[6.0, 30.0, 250.0, 21.0]])
+    moved = np.log([[250.0, 250.0, 6.0, 22.0]])
+    last = np.log([[240.0, 255.0, 9.0, 55.0]])
+    light, times = single(np.exp(np.vstack([x, moved, last]))), clock([0.5, 80.0])
+    circuit = Circuit(linear_below=2.72, on=0.01, off=0.011, leak_hz=leak_hz)
+    truth = check(light, times, circuit, at_least=600)
+    inside = [np.count_nonzero(events[:, 0] > times[1]) for events in truth]
+    assert sum(count > exact._ROUNDS for count in inside) >= 3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_crossings_both_ways_at_small_thresholds(seed):
+    light = walks(seed, 5, 16)
+    circuit = Circuit(on=0.01, off=0.013, dead_time_us=[None, 50.0, 700.0][seed])
+    check(light, clock([1.0, 12.0, 4.0, 40.0]), circuit, at_least=200)
+
+
+# --- dead time -----------------------------------------------------------------------------------
+
+
+def first_event(path, circuit):
+    return find_events([path], circuit)[0].events[0, 0]
+
+
+@pytest.mark.parametrize("where", ["inside", "end", "beyond", "several", "turn"])
+@pytest.mark.parametrize("leak_hz", [0.0, 20.0])
+def test_dead_times_that_end(where, leak_hz):
+    """Inside the interval, at its end, beyond it, after several, and where the signal turns."""
+    lengths = [3.0, 10.0, 10.0, 2.0, 2.0, 2.0, 20.0]
+    times = clock(lengths)
+    light = single([[60, 140, 70, 160, 160, 110, 75, 66], [180, 60, 150, 45, 45, 90, 95, 200]]).T
+    circuit = Circuit(linear_below=2.72, leak_hz=leak_hz, on=0.15, off=0.15)
+    for k, path in enumerate(solve_signal(light, times, circuit)):
+        begin = first_event(path, circuit)
+        assert begin < times[2]
+        turn = min(t for t in turns(path) if t > begin + 1e-4)
+        end = {
+            "inside": begin + 4e-3,
+            "end": times[2],
+            "beyond": times[2] + 2e-3,
+            "several": times[-2] + 1e-3,
+            "turn": turn,
+        }[where]
+        for shift_us in (-1.0, -1e-3, 0.0, 1e-3, 1.0):
+            dead = replace(circuit, dead_time_us=(end - begin) * 1e6 + shift_us)
+            check(light[:, [k]], times, dead, paths=[path], at_least=2)
+
+
+@pytest.mark.parametrize("dead_time_us", [30.0, 400.0, 4_000.0, 15_000.0, 50_000.0])
+def test_dead_times_from_short_to_longer_than_the_intervals(dead_time_us):
+    light = walks(11, 25, 24)
+    circuit = Circuit(dead_time_us=dead_time_us, on=0.05, off=0.06, leak_hz=5.0)
+    truth = check(light, clock([4.0] * 24), circuit, at_least=40)
+    for events in truth:
+        assert np.all(np.diff(events[:, 0]) * 1e6 > dead_time_us - 1e-3)
+
+
+# --- leak ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("drive", ["falls", "rests", "rises"])
+@pytest.mark.parametrize("leaks", [(5.0, 0.0), (0.0, 30.0), (40.0, 60.0)])
+def test_a_falling_signal_that_leak_brings_back(drive, leaks):
+    """It dips to the lower level, and returns: fires where it is reached, not where it is missed.
+
+    In the last interval the signal falls behind a light that falls on, rests or rises slowly.
+    """
+    draw = np.random.default_rng(8)
+    pixels = 24
+    x0 = draw.uniform(math.log(70.0), math.log(250.0), pixels)
+    x1 = x0 - draw.uniform(0.05, 0.6, pixels)
+    drift = {"falls": -0.05, "rests": 0.0, "rises": 0.05}[drive] * draw.uniform(0.1, 1, pixels)
+    light, times = single(np.exp([x0, x1, x1 + drift])), clock([1.0, 30.0])
+    circuit = Circuit(on=0.5, off=FAR, leak_hz=leaks[0], photo_leak_hz=leaks[1])
+    paths = solve_signal(light, times, circuit)
+    level = np.array([tangent_level(path, -1, circuit.on) for path in paths])
+    falls = level > 0.01  # the others never get below where they began
+    assert np.count_nonzero(falls) > pixels // 2
+    light, level = light[:, falls], level[falls]
+    paths = [path for path, used in zip(paths, falls, strict=True) if used]
+    for short in (1e-3, 1e-5, 1e-6):
+        reached = check(light, times, replace(circuit, off=level - short), paths=paths)
+        assert all(np.any(events[:, 1] < 0) for events in reached)
+        missed = find_events(paths, replace(circuit, off=level + short))
+        assert not any(np.any(truth.events[:, 1] < 0) for truth in missed)
+        check(light, times, replace(circuit, off=level + short), paths=paths, at_least=0)
+
+
+@pytest.mark.parametrize("dead_time_us", [None, 900.0])
+@pytest.mark.parametrize("leaks", [(100.0, 0.0), (0.0, 100.0), (100.0, 300.0)])
+def test_leak_that_outruns_the_signal(dead_time_us, leaks):
+    light = walks(21, 7, 20, steps=(0.01, 0.1, 0.4))
+    circuit = Circuit(
+        leak_hz=leaks[0], photo_leak_hz=leaks[1], dead_time_us=dead_time_us, on=0.1, off=0.08
+    )
+    check(light, clock([33.0, 4.0, 1.0, 33.0, 8.0, 100.0]), circuit, at_least=150)
+
+
+# --- noise events --------------------------------------------------------------------------------
+
+
+def shot_candidates(pixels, rate_hz, seed, end_s):
+    """Return the candidates of every pixel, drawn here one by one."""
+    drawn = []
+    for pixel in range(pixels):
+        rows, t = [], 0.0
+        for draw in range(10_000):
+            t += rng.exponential(seed, rng.SHOT_TIME, pixel, draw) / rate_hz
+            if t >= end_s:
+                break
+            u, v = rng.uniforms(seed, rng.SHOT_KIND, pixel, draw)
+            rows.append((t, u, 1 if v < 0.5 else -1))
+        drawn.append(np.array(rows).reshape(-1, 3))
+    return drawn
+
+
+@pytest.mark.parametrize("dead_time_us", [None, 700.0, 9_000.0])
+@pytest.mark.parametrize("leak_hz", [0.0, 30.0])
+def test_shot_noise_at_500_hz_among_signal_events(dead_time_us, leak_hz):
+    seed, rate_hz = 4, 500.0
+    light, times = walks(31, 8, 20, lo=1.0), clock([4.0, 12.0, 1.0, 33.0, 4.0, 4.0, 33.0])
+    circuit = Circuit(linear_below=2.72, dead_time_us=dead_time_us, leak_hz=leak_hz)
+    draws = Draws(injected=shot_candidates(light.shape[1], rate_hz, seed, times[-1]))
+    truth, until = as_lists(find_events(solve_signal(light, times, circuit), circuit, draws))
+    found = fire(light, times, circuit, seed=seed, shot_noise=ShotNoise(rate_hz=rate_hz))
+    agreement = count_and_time_errors(found, truth, until)
+    assert agreement.count_b > 150
+    assert not agreement.differing
+    assert agreement.max_dt_us < 1.0
+
+
+@pytest.mark.parametrize("dead_time_us", [None, 700.0])
+@pytest.mark.parametrize("dn", [0.0, 128.0])
+def test_rate_and_gaps_of_shot_noise_at_500_hz(dead_time_us, dn):
+    pixels, seconds, kept = 64, 1.0, 500.0 * (1 - 0.75 * dn / 255)
+    light, times = np.full((31, pixels), dn), np.linspace(0.0, seconds, 31)
+    circuit = Circuit(dead_time_us=dead_time_us)
+    found = fire(light, times, circuit, shot_noise=ShotNoise(rate_hz=500.0))
+    gaps = np.concatenate([np.diff(events[:, 0]) for events in found]) * 1e6
+    dead_s = (dead_time_us or 0.0) * 1e-6
+    assert gaps.min() >= dead_s * 1e6 - 1e-4  # times count from the start of the recording [s]
+    # a renewal process: a gap is the dead time and an exponential wait
+    expected = pixels * seconds * kept / (1 + kept * dead_s)
+    count = sum(map(len, found))
+    assert abs(count - expected) < 4 * math.sqrt(expected) / (1 + kept * dead_s) + pixels
+    assert np.mean(gaps) == pytest.approx(1e6 / kept + dead_s * 1e6, rel=4 / math.sqrt(count))
+
+
+# --- what the lanes leave alone ------------------------------------------------------------------
+
+BEYOND = {
+    "knee inside": (Circuit(on=0.1, off=0.07), {"lo": 3.0, "hi": 60.0, "steps": (0.1, 0.5)}),
+    "knee at e": (
+        Circuit(linear_below=math.e, on=0.05, off=0.07),
+        {"lo": 0.3, "hi": 12.0, "steps": (0.1, 0.5)},
+    ),
+    "steps above an e-fold": (
+        replace(PURE, dark_cutoff_hz=21.8),
+        {"lo": 1.0, "hi": 255.0, "steps": (0.9, 1.1, 2.5)},
+    ),
+    "steps about an e-fold": (Circuit(on=0.1), {"lo": 21.0, "steps": (0.97, 0.99, 1.01)}),
+    "brighter than white": (Circuit(), {"lo": 100.0, "hi": 4000.0, "steps": (0.3, 1.0)}),
+    "around 382 DN": (Circuit(on=0.05), {"lo": 330.0, "hi": 430.0, "steps": (0.1,)}),
+    "leak, knee and brightness": (
+        Circuit(linear_below=2.72, leak_hz=20.0, photo_leak_hz=20.0, dead_time_us=800.0),
+        {"lo": 1.0, "hi": 1000.0, "steps": (0.1, 0.9, 2.0)},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BEYOND)
+def test_light_that_lanes_do_not_take(name):
+    circuit, options = BEYOND[name]
+    light = walks(len(name), 8, 24, **options)
+    check(light, clock([4.0, 1.0, 12.0, 33.0, 4.0, 4.0, 12.0]), circuit, at_least=25)
+
+
+@pytest.mark.parametrize("dark_cutoff_hz", [5.0, 21.8])
+@pytest.mark.parametrize("leak_hz", [0.0, 10.0])
+def test_into_darkness_and_out_of_it(dark_cutoff_hz, leak_hz):
+    light = walks(2, 9, 24, lo=0.2, hi=40.0)
+    light[2, ::2] = light[5:7, ::3] = light[3:5, 1::4] = 0.0
+    circuit = Circuit(dark_cutoff_hz=dark_cutoff_hz, leak_hz=leak_hz, on=0.05, off=0.05)
+    check(light, clock([12.0] * 8), circuit, at_least=200)
+
+
+@pytest.mark.parametrize("floor", [5.0, 0.1, 0.002])
+def test_the_floor_under_a_pure_logarithm(floor):
+    light = walks(2, 9, 24, lo=0.5 * floor, hi=200.0, steps=(0.3, 2.0))
+    light[3, ::3] = 0.0
+    circuit = replace(PURE, floor=floor, dark_cutoff_hz=21.8)
+    check(light, clock([12.0] * 8), circuit, at_least=100)
+
+
+# --- everything at once --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_random_circuits_and_stimuli(seed):
+    draw = np.random.default_rng(seed)
+    lo, hi = (0.3, 900.0) if seed % 2 else (3.0, 255.0)
+    light = walks(seed, 6, 24, lo=lo, hi=hi, steps=(0.02, 0.3, 1.5))
+    circuit = Circuit(
+        on=float(draw.choice([0.02, 0.05, 0.2, 0.4])),
+        off=float(draw.choice([0.02, 0.05, 0.2, 0.4])),
+        leak_hz=float(draw.choice([0.0, 3.0, 30.0, 100.0])),
+        photo_leak_hz=float(draw.choice([0.0, 10.0, 100.0])),
+        dead_time_us=[None, 50.0, 700.0, 5_000.0][seed % 4],
+        linear_below=float(draw.choice([0.0, 2.72, 20.0])),
+        dark_cutoff_hz=float(draw.choice([1.0, 21.8])),
+        cutoff_hz=float(draw.choice([40.0, 300.0, 2000.0])),
+    )
+    check(light, clock(draw.choice([0.3, 1.0, 4.0, 12.0, 40.0], 5)), circuit, at_least=20)
+
+
+# --- strips and tiles ----------------------------------------------------------------------------
+
+CLIP = walks(7, 25, 13, lo=3.0, steps=(0.05, 0.1, 0.2))
+"""Light of 13 pixels without steps above an e-fold, which larger images repeat."""
+CLIP_NS = [k * 4_166_667 for k in range(len(CLIP))]
+
+
+LAST_BITS_US = 1e-8
+"""Machine code for many lanes and for few may round the last bits of a time differently."""
+
+SIZES = [1, 1023, 1024, 1025, STRIP - 1, STRIP, STRIP + 1, 2 * STRIP + 300]
+
+
+def repeated(light, pixels):
+    """Return which pixel of `light` each pixel of a larger image is, and that image."""
+    which = np.arange(pixels) * 5 % light.shape[1]
+    return which, light[:, which]
+
+
+def image(light, tile_size=None, **sections):
+    levels = Thresholds(on=0.08, off=0.07, mismatch=0.0)
+    leak = Leak(photo_rate_hz=8.0)
+    pixel = quiet(refractory=Refractory(), leak=leak, thresholds=levels, **sections)
+    array = start(light, CLIP_NS, pixel, tile=tile_size, exact_times=True)
+    return by_pixel(array, *advance(array, light, CLIP_NS))
+
+
+def one_by_one(light):
+    return [image(light[:, [k]])[0] for k in range(light.shape[1])]
+
+
+@pytest.mark.parametrize("pixels", SIZES)
+def test_images_give_what_their_pixels_alone_give(pixels):
+    assert np.abs(np.diff(np.log(CLIP), axis=0)).max() < LARGEST_STEP
+    alone = one_by_one(CLIP)
+    assert sum(map(len, alone)) > 50
+    which, light = repeated(CLIP, pixels)
+    found = count_and_time_errors(image(light, tile_size=STRIP), [alone[k] for k in which])
+    assert not found.differing
+    assert found.max_dt_us < LAST_BITS_US
+
+
+@pytest.mark.parametrize("pixels", SIZES)
+def test_flashes_give_what_their_pixels_alone_give(pixels):
+    """Where many pixels step at once, an interval may be cut for all: equal to 0.01 us."""
+    clip = walks(7, len(CLIP), 13, lo=2.0, steps=(0.05, 0.5, 1.2))
+    alone = one_by_one(clip)
+    which, light = repeated(clip, pixels)
+    found = count_and_time_errors(image(light, tile_size=STRIP), [alone[k] for k in which])
+    assert found.count_b >= (100 if pixels > 1 else 5)
+    assert not found.differing
+    assert found.max_dt_us < 0.01
+
+
+def test_noise_does_not_depend_on_the_size_of_the_image():
+    light = repeated(CLIP, 2 * STRIP + 300)[1]
+    whole = image(light, tile_size=STRIP, shot_noise=ShotNoise(rate_hz=100.0))
+    for part in (1, STRIP - 1, STRIP + 1):
+        cut = image(light[:, :part], shot_noise=ShotNoise(rate_hz=100.0))
+        found = count_and_time_errors(cut, whole[:part])
+        assert not found.differing
+        assert found.max_dt_us < LAST_BITS_US
+
+
+# --- faults that there were, and what single precision costs --------------------------------------
+
+
+def test_a_signal_whose_slope_is_exactly_zero():
+    """Out of full darkness, where the corner follows the light alone: nothing moves at first."""
+    light = single([[0.506, 0.3, 0.3007, 0.8838, 0.0, 1.4117]]).T
+    circuit = Circuit(linear_below=2.72, cutoff_hz=2000.0, dark_cutoff_hz=0.0, on=0.01)
+    check(light, clock([40.0, 4.0, 4.0, 4.0, 40.0]), replace(circuit, dead_time_us=700.0))
+
+
+def test_a_floor_below_a_thousandth():
+    light = single([[0.0, 0.0, 50.0, 50.0, 0.0, 0.0]]).T
+    circuit = replace(PURE, floor=1e-4, dark_cutoff_hz=21.8)
+    check(light, clock([20.0] * 5), circuit)
+
+
+def test_leak_events_long_after_an_edge():
+    """Default leak and dead time: after steps of three e-folds, the lag at the reset is rounded by
+    some 1e-7, which a leak of 0.02 a second takes microseconds to cross, seconds later.
+    """
+    draw = np.random.default_rng(0)
+    x0 = draw.uniform(math.log(21.0), math.log(255.0), 60)
+    x1 = np.clip(x0 + draw.uniform(-3.0, 3.0, 60), math.log(21.0), math.log(255.0))
+    light = single(np.exp(np.vstack([x0, x0, np.repeat(x1[None], 8, 0)])))
+    circuit = Circuit(leak_hz=0.1, dead_time_us=500.0)
+    check(light, clock([4.0] * 7 + [40.0, 12_000.0]), circuit, within_us=20.0)

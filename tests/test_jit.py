@@ -1,0 +1,175 @@
+"""The cache of compiled code, as seen by processes of their own."""
+
+import os
+import shutil
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import adv2e
+from adv2e import jit
+
+INNER = """
+from adv2e.jit import kernel
+
+@kernel
+def inner(x):
+    return x + 1
+"""
+OUTER = """
+from adv2e.inner import inner
+from adv2e.jit import kernel
+
+@kernel
+def outer(x):
+    return 10 * inner(x)
+"""
+RUN = """
+import sys
+from adv2e.outer import outer
+results = [outer(float(a) if "." in a else int(a)) for a in sys.argv[1:]]
+print(*results, sum(outer.stats.cache_hits.values()), sep=" ")
+"""
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A copy of the package with two small kernels in two files, one calling the other."""
+    copy = tmp_path / "site" / "adv2e"
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(Path(adv2e.__file__).parent, copy, ignore=ignored)
+    (copy / "inner.py").write_text(INNER)
+    (copy / "outer.py").write_text(OUTER)
+    return copy
+
+
+@pytest.fixture
+def start(package, tmp_path):
+    """Start a process that calls the outer kernel; it prints results and hits of the cache."""
+    without = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+    places = {"PYTHONPATH": str(package.parent), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    environment = {**without, **places, "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def start(*numbers, **more):
+        return subprocess.Popen(
+            [sys.executable, "-c", RUN, *map(str, numbers)],
+            env={**environment, **more},
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    return start
+
+
+def said(process):
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, err) == (0, "")
+    return out.split()
+
+
+def test_a_second_process_finds_the_code(start):
+    assert said(start(1)) == ["20", "0"]
+    assert said(start(1)) == ["20", "1"]
+
+
+def test_a_read_only_installation_is_served_and_not_touched(package, start):
+    before = {path: path.stat().st_mtime_ns for path in package.rglob("*")}
+    for path in (*before, package):
+        path.chmod(path.stat().st_mode & ~(stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH))
+    try:
+        assert said(start(1)) == ["20", "0"]
+        assert said(start(1)) == ["20", "1"]
+        assert {path: path.stat().st_mtime_ns for path in package.rglob("*")} == before
+    finally:
+        for path in (package, *before):
+            path.chmod(path.stat().st_mode | stat.S_IWUSR)
+
+
+def test_processes_that_start_at_once_do_not_disturb_each_other(start):
+    arguments = [(1,), (1.5,), (2.5, 2), (2, 2.5)]
+    results = [said(process) for process in [start(*numbers) for numbers in arguments]]
+    assert [result[:-1] for result in results] == [["20"], ["25.0"], ["35.0", "30"], ["30", "35.0"]]
+    assert said(start(1, 1.5))[:-1] == ["20", "25.0"]
+    assert said(start(1, 1.5)) == ["20", "25.0", "2"]
+
+
+def test_two_processes_never_give_one_name_to_two_codes(start, tmp_path):
+    said(start(1))
+    (index,) = tmp_path.glob("cache/**/outer.outer*.nbi")
+    empty = index.with_name("aside")
+    index.rename(empty)  # as for a process that looked before the other wrote
+    said(start(1.5))
+    names = sorted(path.name for path in index.parent.glob("outer.outer*.nbc"))
+    assert len(names) == 2
+    index.unlink()
+    empty.rename(index)
+    assert said(start(1)) == ["20", "1"]
+
+
+@pytest.mark.parametrize("suffix", ["nbc", "nbi"])
+@pytest.mark.parametrize("kept", [0, 0.5])
+def test_a_file_cut_short_is_made_again(start, tmp_path, suffix, kept):
+    said(start(1))
+    files = list(tmp_path.glob(f"cache/**/*.{suffix}"))
+    assert files
+    for path in files:
+        os.truncate(path, int(kept * path.stat().st_size))
+    assert said(start(1)) == ["20", "0"]
+    assert said(start(1)) == ["20", "1"]
+
+
+def test_a_folder_that_cannot_be_written_to_is_no_error(start, tmp_path):
+    said(start(1))
+    for path in tmp_path.glob("cache/**/adv2e_*"):  # where Numba keeps the modules of the package
+        shutil.rmtree(path)
+        path.write_text("in the way")
+    assert said(start(1)) == ["20", "0"]
+
+
+def test_code_is_compiled_again_when_what_it_calls_has_changed(package, start):
+    assert said(start(1)) == ["20", "0"]
+    (package / "inner.py").write_text(INNER.replace("x + 1", "x + 2"))
+    assert said(start(1)) == ["30", "0"]
+
+
+def test_numba_cache_dir_comes_first(start, tmp_path):
+    said(start(1, NUMBA_CACHE_DIR=str(tmp_path / "mine")))
+    assert list(tmp_path.glob("mine/adv2e/kernels-*/**/*.nbc"))
+    assert not (tmp_path / "cache").exists()
+
+
+def test_folders_that_nobody_used_for_a_month_are_removed(tmp_path):
+    now, day = time.time(), 24 * 3600
+
+    def folder(name, days, used_days=None):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "code.nbc").touch()
+        if used_days is not None:
+            (tmp_path / name / "used").touch()
+            os.utime(tmp_path / name / "used", (now - used_days * day,) * 2)
+        os.utime(tmp_path / name, (now - days * day,) * 2)
+        return tmp_path / name
+
+    mine = folder("kernels-mine", 90)
+    folder("kernels-former", 40)
+    folder("kernels-old", 90, used_days=40)
+    folder("kernels-in-use", 90, used_days=2)
+    folder("kernels-new", 0)
+    folder("others", 400)
+    jit.note_use(mine)
+    kept = ["kernels-in-use", "kernels-mine", "kernels-new", "others"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == kept
+
+    folder("kernels-late", 40)
+    jit.note_use(mine)  # looks once a day only
+    assert (tmp_path / "kernels-late").exists()
+    os.utime(mine / "used", (now - 2 * day,) * 2)
+    jit.note_use(mine)
+    assert not (tmp_path / "kernels-late").exists()
+    assert (mine / "used").stat().st_mtime > now - day
