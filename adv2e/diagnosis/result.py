@@ -1,0 +1,219 @@
+"""What a diagnosis found, as plain values: what the reports are written from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Verdict = Literal["consistent", "explained", "partly_explained", "not_identifiable", "unexplained"]
+
+Interval = tuple[float, float]
+"""Lower and upper end of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An effect that was added to the model.
+
+    Attributes
+    ----------
+    name : str
+    parameters : mapping
+        Fitted value of each key, by its path in the configuration.
+    interval : mapping
+        95 % interval of each.
+    """
+
+    name: str
+    parameters: Mapping[str, Any]
+    interval: Mapping[str, Interval]
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """An effect that was tried and not added, and why; `held_out`: misfit with it, before 1."""
+
+    name: str
+    reason: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    held_out: float | None = None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % interval, where one is known."""
+
+    value: float
+    interval: Interval | None = None
+
+
+@dataclass(frozen=True)
+class ErrorRow:
+    """One measure of distance between recording and simulation.
+
+    Attributes
+    ----------
+    name : str
+        What it measures, in a few words.
+    before, after, floor : Estimate
+        Declared model; model found; independent draws of the model found against each other.
+    """
+
+    name: str
+    before: Estimate
+    after: Estimate
+    floor: Estimate
+
+
+@dataclass(frozen=True)
+class Signature:
+    """One marker statistic on held-out data.
+
+    Attributes
+    ----------
+    name : str
+    group : str
+        What it belongs to, such as "time between events".
+    meaning : str
+        One sentence.
+    measured, before, after : float
+        Its value in the recording, and on average in the two models' simulations.
+    z_before, z_after : float
+        Distance of the recording from the simulations in their standard deviations.
+    """
+
+    name: str
+    group: str
+    meaning: str
+    measured: float
+    before: float
+    after: float
+    z_before: float
+    z_after: float
+
+
+@dataclass(frozen=True)
+class Band:
+    """A curve of many simulations: median, and the range of the middle 95 %."""
+
+    middle: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Something measured over something else, with both models.
+
+    Attributes
+    ----------
+    title, x_label, y_label : str
+        With units.
+    x : (n,) or (n + 1,)
+        Places of the points, or, one more than values, borders of bins.
+    measured : (n,)
+        NaN where there is nothing to measure.
+    before, after : Band
+    x_log, y_log : bool
+        Logarithmic axes.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    x: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    before: Band
+    after: Band
+    x_log: bool = False
+    y_log: bool = False
+
+
+@dataclass(frozen=True)
+class ResidualMap:
+    """Residual over the sensor, (rows, columns), in standard deviations; NaN: masked."""
+
+    title: str
+    before: NDArray[np.float64]
+    after: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """Smallest size of an effect that would have been seen 8 times in 10."""
+
+    name: str
+    key: str
+    size: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Masked:
+    """Data that was set aside, and the share of events in it."""
+
+    what: str
+    share: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything that a diagnosis found.
+
+    Attributes
+    ----------
+    verdict : str
+    sentence : str
+        The verdict for people.
+    recording, declared : str
+        Names of the inputs.
+    effects : list of Finding
+        In the order in which they were added.
+    alternatives : list of str
+        Effects that explain the residual as well.
+    nuisances : mapping
+        Keys that were not declared, with their fitted values.
+    rejected : list of Rejected
+    errors : list of ErrorRow
+        The first is the one that ``report.json`` gives.
+    global_p_before, global_p_after : float
+        Probability of a residual as large if nothing were missing, on held-out data.
+    signatures : list of Signature
+    curves, maps
+        The picture of the residual.
+    detectable : list of Detectable
+    masked : list of Masked
+    split : str
+        How the data were divided into parts for fitting, judging and the last look.
+    notes : list of str
+        What the reader should know besides, such as the bound of the interpolation error.
+    model : mapping
+        The configuration found, for ``model.yaml``.
+    facts : mapping
+        Small things for the end of the report: sizes, seeds, simulations, seconds, versions.
+    """
+
+    verdict: Verdict
+    sentence: str
+    recording: str
+    declared: str
+    effects: list[Finding]
+    alternatives: list[str]
+    nuisances: Mapping[str, Any]
+    rejected: list[Rejected]
+    errors: list[ErrorRow]
+    global_p_before: float
+    global_p_after: float
+    signatures: list[Signature]
+    curves: list[Curve]
+    maps: list[ResidualMap]
+    detectable: list[Detectable]
+    masked: list[Masked]
+    split: str
+    notes: list[str]
+    model: Mapping[str, Any]
+    facts: Mapping[str, str]
