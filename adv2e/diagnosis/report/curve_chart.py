@@ -1,0 +1,122 @@
+"""A curve of the recording with the two models around it, as a picture (SVG)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from adv2e.diagnosis.report import paths
+from adv2e.diagnosis.report.axes import (
+    LINE_HEIGHT,
+    Axis,
+    Floats,
+    axis_over,
+    draw_axes,
+    drawable,
+    place_text,
+    wrapped,
+)
+from adv2e.diagnosis.report.markup import Markup, join, tag
+from adv2e.diagnosis.result import Band, Curve
+
+WIDTH, _PLOT_HEIGHT = 460, 200
+_LEFT, _RIGHT, _LEGEND = 58, 14, 22
+_FEW_POINTS = 40
+"""Up to so many points are marked one by one."""
+
+_LEGENDS = (
+    ("measured", "measured", 4),
+    ("before", "before (declared model)", 94),
+    ("after", "after (model found)", 276),
+)
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The axes and the places of the points across."""
+
+    across: Axis
+    up: Axis
+    x: Floats
+
+    def line(self, values: Floats) -> str:
+        """Return the path of a curve."""
+        xs, ys = paths.points_of(self.x, self.up.place(values))
+        return paths.line(xs, ys)
+
+    def band(self, band: Band) -> str:
+        """Return the path around a band; a lower end without logarithm is below the picture."""
+        low, high = drawable(band.low), drawable(band.high)
+        if self.up.log:
+            low = np.where(low <= 0, self.up.low, low)
+        xs, lows = paths.points_of(self.x, self.up.place(low))
+        _, highs = paths.points_of(self.x, self.up.place(high))
+        return paths.band(xs, lows, highs)
+
+
+def curve_chart(curve: Curve) -> Markup:
+    """Return the picture of `curve`: measured, and median and 95 % band of either model.
+
+    Borders of bins are drawn as steps.  What cannot be drawn (no number, or none that the
+    logarithm has) leaves a gap.
+    """
+    x_label = wrapped(curve.x_label, WIDTH - _LEFT)
+    y_label = wrapped(curve.y_label, WIDTH)
+    top = _LEGEND + 14 + len(y_label) * LINE_HEIGHT
+    bottom = top + _PLOT_HEIGHT
+    frame = _frame_of(curve, top, bottom)
+    if frame is None:
+        return tag("p", "There is nothing to draw: no value is known.", class_="note")
+    content = [
+        tag("title", f"{curve.title}: {curve.y_label} against {curve.x_label}"),
+        _legend(),
+        draw_axes(frame.across, frame.up, x_label, y_label),
+    ]
+    for name, band in (("before", curve.before), ("after", curve.after)):
+        content.append(tag("path", d=frame.band(band), class_=f"band {name}"))
+    measured = drawable(curve.measured)
+    content.append(tag("path", d=frame.line(measured), class_="curve measured"))
+    content.append(_points(frame, measured))
+    for name, band in (("after", curve.after), ("before", curve.before)):
+        content.append(tag("path", d=frame.line(drawable(band.middle)), class_=f"curve {name}"))
+    height = bottom + 26 + len(x_label) * LINE_HEIGHT
+    return tag("svg", *content, viewBox=f"0 0 {WIDTH} {height}", role="img")
+
+
+def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
+    x = drawable(curve.x)
+    if curve.x_log and len(x) > len(curve.measured) and len(x) > 2 and x[0] <= 0 < x[1]:
+        # bins that begin at zero: the first is drawn as wide as the second
+        x = np.r_[x[1] ** 2 / x[2], x[1:]]
+    rows = [curve.measured]
+    for band in (curve.before, curve.after):
+        rows += [band.middle, band.low, band.high]
+    across = axis_over([x], _LEFT, WIDTH - _RIGHT, log=curve.x_log, tight=True)
+    up = axis_over([drawable(row) for row in rows], bottom, top, log=curve.y_log)
+    if across is None or up is None:
+        return None
+    return _Frame(across, up, across.place(x))
+
+
+def _points(frame: _Frame, measured: Floats) -> Markup:
+    if len(frame.x) != len(measured) or len(measured) > _FEW_POINTS:
+        return Markup()
+    places = zip(frame.x, frame.up.place(measured), strict=True)
+    return join(
+        *(
+            tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=2.5, class_="dot measured")
+            for x, y in places
+            if np.isfinite(x) and np.isfinite(y)
+        )
+    )
+
+
+def _legend() -> Markup:
+    parts = []
+    for name, text, x in _LEGENDS:
+        if name != "measured":
+            parts.append(tag("rect", x=x, y=4, width=22, height=12, class_=f"band {name}"))
+        parts.append(tag("path", d=f"M{x} 10L{x + 22} 10", class_=f"curve {name}"))
+        parts.append(place_text(x + 27, 14, text, class_="label"))
+    return join(*parts)

@@ -1,0 +1,84 @@
+"""``model.yaml``: the configuration found, with what is known of each key as comments."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from adv2e.config.yaml12 import scalar_text
+from adv2e.diagnosis.report.markup import plain
+from adv2e.diagnosis.report.quantities import interval_text, native, unit_of
+from adv2e.diagnosis.result import Diagnosis
+
+_WIDTH = 100
+
+
+def model_text(diagnosis: Diagnosis) -> str:
+    """Return the configuration found as YAML that ``adv2e convert -c`` takes.
+
+    Keys that were added, and nuisances, say so; every key that has a unit names it.
+    """
+    origins = _origins(diagnosis)
+    lines = list(_lines(native(diagnosis.model), "", 0, origins))
+    return "\n".join([*_head(diagnosis), "", *(lines or ["{}"]), ""])
+
+
+def _head(diagnosis: Diagnosis) -> list[str]:
+    texts = [
+        f"Model found by adv2e diagnose in {diagnosis.recording},"
+        f" on top of {diagnosis.declared}: {diagnosis.verdict}.",
+        diagnosis.sentence,
+        "Keys marked 'added' belong to effects that the declared model lacked; those marked"
+        " 'nuisance' were not declared and were fitted; all others are as declared.",
+    ]
+    return [
+        line
+        for text in texts
+        for line in textwrap.wrap(
+            plain(text), _WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False
+        )
+    ]
+
+
+def _origins(diagnosis: Diagnosis) -> dict[str, str]:
+    """Return for each key that was not declared where its value is from."""
+    origins = dict.fromkeys(diagnosis.nuisances, "nuisance")
+    for finding in diagnosis.effects:
+        for path in finding.parameters:
+            interval = finding.interval.get(path)
+            text = f"added: {finding.name}"
+            if interval is not None:
+                text += f", 95 % interval {interval_text(interval)}"
+            origins[path] = text
+    return origins
+
+
+def _lines(
+    values: Mapping[str, Any], path: str, depth: int, origins: Mapping[str, str]
+) -> Iterator[str]:
+    for name, value in values.items():
+        full = f"{path}.{name}" if path else name
+        # names that YAML 1.1 takes for a boolean, such as "on", are plain in YAML 1.2
+        start = f"{'  ' * depth}{name if name.isidentifier() else scalar_text(name)}:"
+        if isinstance(value, dict) and value:
+            yield f"{start}{_comment(full, origins)}"
+            yield from _lines(value, full, depth + 1, origins)
+        else:
+            yield f"{start} {_flow(value)}{_comment(full, origins)}"
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{}"
+    if isinstance(value, list):
+        return f"[{', '.join(_flow(item) for item in value)}]"
+    return scalar_text(value)
+
+
+def _comment(path: str, origins: Mapping[str, str]) -> str:
+    unit = unit_of(path)
+    notes = [f"[{unit}]"] if unit else []
+    if path in origins:
+        notes.append(origins[path])
+    return f"  # {' '.join(plain(' '.join(notes)).split())}" if notes else ""

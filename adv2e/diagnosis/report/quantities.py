@@ -1,0 +1,161 @@
+"""Numbers as people read them: significant digits, intervals, units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from adv2e.config import Key, all_keys
+from adv2e.diagnosis.result import Estimate
+from adv2e.effects import EFFECTS
+
+NOTHING = "-"
+"""Stands where there is no number."""
+
+_LARGE, _SMALL = 6, -4
+"""Decimal exponents from which, and below which, numbers are written with an exponent."""
+
+
+def native(value: Any) -> Any:
+    """Return `value` with NumPy's scalars, arrays and tuples as plain numbers and lists."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {str(key): native(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [native(item) for item in value]
+    return value
+
+
+def number_text(value: float, digits: int = 3) -> str:
+    """Return `value` with at least `digits` significant digits; whole digits are never cut off."""
+    odd = _odd_text(value)
+    if odd is not None:
+        return odd
+    exponent = _exponent(value, digits)
+    if _SMALL <= exponent < _LARGE:
+        return f"{value:,.{max(0, digits - 1 - exponent)}f}"
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    return f"{mantissa}e{int(power)}"
+
+
+def value_text(value: Any, interval: Sequence[Any] | None = None) -> str:
+    """Return the value of a key; numbers have as many digits as `interval`, if any, warrants."""
+    value = native(value)
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, list):
+        return f"[{', '.join(value_text(item) for item in value)}]"
+    if not isinstance(value, (int, float)):
+        return str(value)
+    if interval is None:
+        return number_text(value, 4)
+    return _to_place(value, _place(interval))
+
+
+def interval_text(interval: Sequence[Any] | None) -> str:
+    """Return ``low to high``, or a dash where no interval is known."""
+    if interval is None:
+        return NOTHING
+    low, high = native(interval)
+    if isinstance(low, list) or isinstance(high, list):
+        return f"{value_text(low)} to {value_text(high)}"
+    place = _place((low, high))
+    return f"{_to_place(low, place)} to {_to_place(high, place)}"
+
+
+def estimate_text(estimate: Estimate) -> str:
+    """Return value and interval, as in ``1.38 (1.30 to 1.46)``."""
+    value = value_text(estimate.value, estimate.interval)
+    if estimate.interval is None:
+        return value
+    return f"{value} ({interval_text(estimate.interval)})"
+
+
+def percent_text(share: float) -> str:
+    """Return a share as a percentage."""
+    return NOTHING if math.isnan(share) else f"{number_text(100 * share, 2)} %"
+
+
+def probability_text(p: float) -> str:
+    """Return a probability after ``p``: ``= 0.034``, or ``< 0.001`` for all that is below."""
+    if math.isnan(p):
+        return "unknown"
+    return "< 0.001" if p < 0.001 else f"= {number_text(p, 2)}"
+
+
+@lru_cache(maxsize=1)
+def _declared() -> Mapping[str, Key]:
+    return MappingProxyType({key.path: key for key in all_keys()})
+
+
+def key_named(path: str) -> Key | None:
+    """Return the declaration of the key `path`, or None for a key of a user's own effect."""
+    return _declared().get(path)
+
+
+def unit_of(path: str) -> str:
+    """Return the unit of the key `path`, empty where it has none or is not known."""
+    key = key_named(path)
+    return key.about.unit if key is not None and key.about.unit != "-" else ""
+
+
+def meaning_of(path: str) -> str:
+    """Return what the key `path` means, empty where that is not known."""
+    key = key_named(path)
+    return key.about.meaning if key is not None else ""
+
+
+def summary_of(name: str, paths: Sequence[str] = ()) -> str:
+    """Return in a line what the effect `name` is; if no module is called that, by its keys."""
+    for effect in EFFECTS:
+        if effect.name == name:
+            return effect.summary()
+    for effect in EFFECTS:
+        if any(_below(path, own) for path in paths for own in effect.paths):
+            return effect.summary()
+    return ""
+
+
+def _below(path: str, section: str) -> bool:
+    return path == section or path.startswith(f"{section}.")
+
+
+def _odd_text(value: float) -> str | None:
+    if math.isnan(value):
+        return NOTHING
+    if math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return "0" if value == 0 else None
+
+
+def _exponent(value: float, digits: int) -> int:
+    """Return the decimal exponent of `value` rounded to `digits` digits."""
+    return int(f"{value:.{digits - 1}e}".partition("e")[2])
+
+
+def _place(interval: Sequence[float]) -> int | None:
+    """Return the decimal place to which a value with that interval is given: 0 for ones."""
+    half = (interval[1] - interval[0]) / 2
+    if not (math.isfinite(half) and half > 0):
+        return None
+    return _exponent(half, 2) - 1
+
+
+def _to_place(value: float, place: int | None) -> str:
+    odd = _odd_text(value)
+    if place is None or odd is not None:
+        return odd or number_text(value, 4)
+    exponent = max(_exponent(value, 4), place)
+    if _SMALL <= exponent < _LARGE:
+        text = f"{round(value, -place):,.{max(0, -place)}f}"
+        return text[1:] if text.startswith("-") and not text.strip("-0.,") else text
+    digits = min(max(exponent - place + 1, 1), 15)
+    return number_text(value, digits)

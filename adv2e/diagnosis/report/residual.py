@@ -1,0 +1,166 @@
+"""The second half of the page: the residual in pictures and numbers, what was tried, the data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from adv2e.diagnosis.report.curve_chart import curve_chart
+from adv2e.diagnosis.report.findings import unit_text
+from adv2e.diagnosis.report.markup import Markup, join, tag
+from adv2e.diagnosis.report.quantities import (
+    NOTHING,
+    number_text,
+    percent_text,
+    unit_of,
+    value_text,
+)
+from adv2e.diagnosis.report.sensor_map import CLIP_SD, Map, colour_bar, map_image, reduction
+from adv2e.diagnosis.report.tables import Column, table
+from adv2e.diagnosis.result import Curve, Diagnosis, Rejected, ResidualMap, Signature
+
+LARGE_Z = 3.0
+"""Distances in standard deviations from here on are marked."""
+_SHOWN = 12
+"""Rows of a long table that are not folded away."""
+
+
+def curves(given: Sequence[Curve]) -> Markup:
+    """Return the curves, side by side where there is room."""
+    figures = [
+        tag("figure", tag("figcaption", curve.title), curve_chart(curve)) for curve in given
+    ]
+    return tag("div", *figures, class_="side")
+
+
+def maps(given: Sequence[ResidualMap]) -> Markup:
+    """Return the maps before and after, side by side."""
+    parts = []
+    for one in given:
+        pictures = [
+            _map(one.title, "before (declared model)", one.before),
+            _map(one.title, "after (model found)", one.after),
+        ]
+        parts.append(tag("h3", one.title))
+        parts.append(tag("div", *pictures, class_="side"))
+        note = (
+            "Measured minus simulated, in standard deviations: red where more was measured, blue"
+            " where less, grey where masked."
+        )
+        side = reduction(one.before)
+        if side > 1:
+            note += f" Each point is the mean of {side} x {side} pixels."
+        parts.append(tag("figure", colour_bar(), tag("figcaption", note, class_="note")))
+    return join(*parts)
+
+
+def _map(title: str, model: str, values: Map) -> Markup:
+    seen = values[~np.isnan(values)]
+    text = f"{model}: all masked"
+    if len(seen):
+        far = percent_text(float(np.mean(np.abs(seen) > LARGE_Z)))
+        over = percent_text(float(np.mean(np.abs(seen) > CLIP_SD)))
+        text = f"{model}: {far} beyond ±{LARGE_Z:g} sd, {over} beyond ±{CLIP_SD:g} sd"
+    image = map_image(values, f"{title}, {text}")
+    return tag("figure", tag("figcaption", text), image)
+
+
+def signatures(given: Sequence[Signature]) -> Markup:
+    """Return the marker statistics, the most telling ones first."""
+    if not given:
+        return tag("p", "None was measured.")
+    columns = [Column("signature"), Column("group")] + [
+        Column(name, number=True) for name in ("measured", "before", "after", "z before", "z after")
+    ]
+    rows = [_signature(one) for one in sorted(given, key=_rank)]
+    far = sum(abs(one.z_before) > LARGE_Z for one in given)
+    still = sum(abs(one.z_after) > LARGE_Z for one in given)
+    lead = (
+        "z: distance of the recording from the simulations, in their standard deviations. Beyond"
+        f" ±{LARGE_Z:g} (marked ▲ or ▼): {far} of {len(given)} before, {still} after."
+    )
+    caption = "Marker statistics on held-out data, by their distance before"
+    return join(tag("p", lead), table(caption, columns, rows, folded_from=_SHOWN))
+
+
+def _rank(signature: Signature) -> tuple[float, float]:
+    """Return a number that is least for the largest distance; unknown ones come last."""
+    before, after = (
+        math.inf if math.isnan(z) else -abs(z) for z in (signature.z_before, signature.z_after)
+    )
+    return before, after
+
+
+def _signature(one: Signature) -> tuple[object, ...]:
+    name = join(
+        tag("span", one.name, title=one.meaning), tag("span", one.meaning, class_="meaning")
+    )
+    values = (number_text(value) for value in (one.measured, one.before, one.after))
+    return name, one.group, *values, _z(one.z_before), _z(one.z_after)
+
+
+def _z(z: float) -> Markup | str:
+    if math.isnan(z):
+        return NOTHING
+    text = f"{z:+.1f}" if abs(z) < 1000 else number_text(z)
+    if abs(z) <= LARGE_Z:
+        return text
+    sign = "▲" if z > 0 else "▼"
+    return tag("strong", tag("span", sign, aria_hidden="true"), f" {text}", class_="large")
+
+
+def rejected(given: Sequence[Rejected]) -> Markup:
+    """Return what was tried and not added, and why."""
+    if not given:
+        return tag("p", "Nothing else was tried.")
+    columns = [
+        Column("effect"),
+        Column("why not"),
+        Column("tried with"),
+        Column("misfit with it", number=True),
+    ]
+    rows = []
+    for one in given:
+        tried = [
+            f"{path} = {value_text(value)} {unit_text(unit_of(path))}".rstrip()
+            for path, value in one.parameters.items()
+        ]
+        lines = [tag("span", text, class_="line") for text in tried] or [NOTHING]
+        held_out = NOTHING if one.held_out is None else number_text(one.held_out)
+        rows.append((one.name, one.reason, join(*lines), held_out))
+    caption = "Effects tried and not added; misfit on held-out data relative to that before"
+    return table(caption, columns, rows, folded_from=_SHOWN)
+
+
+def detectable(diagnosis: Diagnosis) -> Markup:
+    """Return how small an effect could have been to be seen."""
+    if not diagnosis.detectable:
+        return tag("p", "This was not determined.")
+    columns = [Column("effect"), Column("key"), Column("size", number=True), Column("unit")]
+    rows = [
+        (one.name, tag("code", one.key), number_text(one.size), unit_text(one.unit))
+        for one in diagnosis.detectable
+    ]
+    caption = "Smallest change of each key that would have been seen 8 times in 10"
+    return table(caption, columns, rows, folded_from=2 * _SHOWN)
+
+
+def data(diagnosis: Diagnosis) -> Markup:
+    """Return how the data were divided and what was set aside."""
+    parts = [tag("p", diagnosis.split)] if diagnosis.split else []
+    if diagnosis.masked:
+        columns = [Column("set aside"), Column("share of events", number=True)]
+        rows = [(one.what, percent_text(one.share)) for one in diagnosis.masked]
+        parts.append(table("Data that was not used", columns, rows))
+    else:
+        parts.append(tag("p", "Nothing was set aside."))
+    return join(*parts)
+
+
+def facts(diagnosis: Diagnosis) -> Markup:
+    """Return the small things."""
+    rows = list(diagnosis.facts.items())
+    columns = [Column("what"), Column("value")]
+    return table("Sizes, seeds, times and versions", columns, rows) if rows else Markup()

@@ -1,0 +1,60 @@
+"""A diagnosis in a few lines, for the terminal."""
+
+from __future__ import annotations
+
+import textwrap
+
+from adv2e.diagnosis.report.markup import plain
+from adv2e.diagnosis.report.quantities import (
+    interval_text,
+    number_text,
+    probability_text,
+    unit_of,
+    value_text,
+)
+from adv2e.diagnosis.result import Diagnosis
+
+WIDTH = 100
+_MOST_PARAMETERS = 5
+
+
+def summary_text(diagnosis: Diagnosis) -> str:
+    """Return verdict, effects, error and p before and after: under 15 lines of :data:`WIDTH`.
+
+    Where there are more parameters than that, it says how many.
+    """
+    lines = _wrapped(f"{diagnosis.verdict}: {diagnosis.sentence}", 4)
+    lines += _parameters(diagnosis)
+    if diagnosis.alternatives:
+        lines += _wrapped(f"as well: {', '.join(diagnosis.alternatives)}", 2)
+    for row in diagnosis.errors[:1]:
+        before, after, floor = (
+            number_text(estimate.value) for estimate in (row.before, row.after, row.floor)
+        )
+        lines += _wrapped(f"error {before} -> {after} (floor {floor}): {row.name}", 2)
+    before = probability_text(diagnosis.global_p_before).removeprefix("= ")
+    after = probability_text(diagnosis.global_p_after).removeprefix("= ")
+    lines.append(f"p {before} -> {after}")
+    return "\n".join(lines)
+
+
+def _wrapped(text: str, most: int) -> list[str]:
+    """Return `text` in at most `most` lines; where that cuts it, it ends in dots."""
+    return textwrap.wrap(
+        plain(text), WIDTH - 2, subsequent_indent="  ", max_lines=most, placeholder=" ..."
+    )
+
+
+def _parameters(diagnosis: Diagnosis) -> list[str]:
+    lines = []
+    for finding in diagnosis.effects:
+        for path, value in finding.parameters.items():
+            interval = finding.interval.get(path)
+            text = f"{finding.name}: {path} = {value_text(value, interval)} {unit_of(path)}"
+            if interval is not None:
+                text = f"{text.rstrip()} ({interval_text(interval)})"
+            lines += [f"  {line}" for line in _wrapped(text, 1)]
+    if len(lines) <= _MOST_PARAMETERS:
+        return lines
+    more = len(lines) - _MOST_PARAMETERS + 1
+    return [*lines[: _MOST_PARAMETERS - 1], f"  and {more} more parameters"]
