@@ -22,8 +22,8 @@ from adv2e.diagnosis.result import Band, Curve
 
 WIDTH, _PLOT_HEIGHT = 460, 200
 _LEFT, _RIGHT, _LEGEND = 58, 14, 22
-_FEW_POINTS = 40
-"""Up to so many points are marked one by one."""
+_FEW_POINTS, _MANY_POINTS = 40, 250
+"""Up to the one number, points are marked one by one; from the other on, the line is thin."""
 
 _LEGENDS = (
     ("measured", "measured", 4),
@@ -76,7 +76,8 @@ def curve_chart(curve: Curve) -> Markup:
     for name, band in (("before", curve.before), ("after", curve.after)):
         content.append(tag("path", d=frame.band(band), class_=f"band {name}"))
     measured = drawable(curve.measured)
-    content.append(tag("path", d=frame.line(measured), class_="curve measured"))
+    width = "dense" if len(measured) > _MANY_POINTS else ""
+    content.append(tag("path", d=frame.line(measured), class_=f"curve measured {width}".rstrip()))
     content.append(_points(frame, measured))
     for name, band in (("after", curve.after), ("before", curve.before)):
         content.append(tag("path", d=frame.line(drawable(band.middle)), class_=f"curve {name}"))

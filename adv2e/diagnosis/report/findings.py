@@ -117,9 +117,10 @@ def alternatives(diagnosis: Diagnosis) -> Markup:
     best = [finding.name for finding in diagnosis.effects]
     rows = []
     for name in [*best, *diagnosis.alternatives]:
-        role = "in the model found" if name in best else "as well"
-        rows.append((name, role, summary_of(name), separation_of(name) or "not known"))
-    columns = [Column("effect"), Column(""), Column("what it is"), Column("what would show it")]
+        role = "in the model found" if name in best else "explains it as well"
+        heading = join(name, tag("span", role, class_="meaning"))
+        rows.append((heading, summary_of(name), separation_of(name) or "not known"))
+    columns = [Column("effect"), Column("what it is"), Column("what would show it")]
     lead = (
         "These data do not tell the following effects apart; recordings of the kind in the last"
         " column would."

@@ -44,6 +44,15 @@ def number_text(value: float, digits: int = 3) -> str:
     return f"{mantissa}e{int(power)}"
 
 
+def short_text(value: float, digits: int = 4) -> str:
+    """Return `value` with at most `digits` significant digits, without zeros at the end."""
+    text = number_text(value, digits)
+    mantissa, mark, power = text.partition("e")
+    if "." in mantissa:
+        mantissa = mantissa.rstrip("0").rstrip(".")
+    return f"{mantissa}{mark}{power}"
+
+
 def value_text(value: Any, interval: Sequence[Any] | None = None) -> str:
     """Return the value of a key; numbers have as many digits as `interval`, if any, warrants."""
     value = native(value)
@@ -56,7 +65,7 @@ def value_text(value: Any, interval: Sequence[Any] | None = None) -> str:
     if not isinstance(value, (int, float)):
         return str(value)
     if interval is None:
-        return number_text(value, 4)
+        return short_text(value)
     return _to_place(value, _place(interval))
 
 
@@ -81,7 +90,7 @@ def estimate_text(estimate: Estimate) -> str:
 
 def percent_text(share: float) -> str:
     """Return a share as a percentage."""
-    return NOTHING if math.isnan(share) else f"{number_text(100 * share, 2)} %"
+    return NOTHING if math.isnan(share) else f"{short_text(100 * share, 2)} %"
 
 
 def probability_text(p: float) -> str:
@@ -142,20 +151,22 @@ def _exponent(value: float, digits: int) -> int:
 
 
 def _place(interval: Sequence[float]) -> int | None:
-    """Return the decimal place to which a value with that interval is given: 0 for ones."""
+    """Return the decimal place to which a value with that interval is given: 0 for ones.
+
+    Half the interval then has one or two digits.
+    """
     half = (interval[1] - interval[0]) / 2
     if not (math.isfinite(half) and half > 0):
         return None
-    return _exponent(half, 2) - 1
+    return math.floor(math.log10(half / 5))
 
 
 def _to_place(value: float, place: int | None) -> str:
     odd = _odd_text(value)
     if place is None or odd is not None:
-        return odd or number_text(value, 4)
+        return odd or short_text(value)
     exponent = max(_exponent(value, 4), place)
     if _SMALL <= exponent < _LARGE:
-        text = f"{round(value, -place):,.{max(0, -place)}f}"
-        return text[1:] if text.startswith("-") and not text.strip("-0.,") else text
-    digits = min(max(exponent - place + 1, 1), 15)
-    return number_text(value, digits)
+        # adding zero turns a zero below zero into a plain one
+        return f"{round(value, -place) + 0.0:,.{max(0, -place)}f}"
+    return number_text(value, min(max(exponent - place + 1, 1), 15))

@@ -14,6 +14,7 @@ from adv2e.diagnosis.report.quantities import (
     NOTHING,
     number_text,
     percent_text,
+    short_text,
     unit_of,
     value_text,
 )
@@ -58,13 +59,14 @@ def maps(given: Sequence[ResidualMap]) -> Markup:
 
 def _map(title: str, model: str, values: Map) -> Markup:
     seen = values[~np.isnan(values)]
-    text = f"{model}: all masked"
+    text = "all masked"
     if len(seen):
         far = percent_text(float(np.mean(np.abs(seen) > LARGE_Z)))
         over = percent_text(float(np.mean(np.abs(seen) > CLIP_SD)))
-        text = f"{model}: {far} beyond ±{LARGE_Z:g} sd, {over} beyond ±{CLIP_SD:g} sd"
-    image = map_image(values, f"{title}, {text}")
-    return tag("figure", tag("figcaption", text), image)
+        text = f"{far} beyond ±{LARGE_Z:g} sd, {over} beyond ±{CLIP_SD:g} sd"
+    image = map_image(values, f"{title}, {model}: {text}")
+    caption = tag("figcaption", model, tag("span", text, class_="meaning"))
+    return tag("figure", caption, image)
 
 
 def signatures(given: Sequence[Signature]) -> Markup:
@@ -140,7 +142,7 @@ def detectable(diagnosis: Diagnosis) -> Markup:
         return tag("p", "This was not determined.")
     columns = [Column("effect"), Column("key"), Column("size", number=True), Column("unit")]
     rows = [
-        (one.name, tag("code", one.key), number_text(one.size), unit_text(one.unit))
+        (one.name, tag("code", one.key), short_text(one.size, 3), unit_text(one.unit))
         for one in diagnosis.detectable
     ]
     caption = "Smallest change of each key that would have been seen 8 times in 10"

@@ -31,7 +31,8 @@ h2 {
 }
 h3 { font-size: 1rem; margin: 1.4em 0 0.3em; }
 p { margin: 0.5em 0; max-width: 46em; }
-p, td, th, li { overflow-wrap: anywhere; }
+p, li { overflow-wrap: anywhere; }
+td, th { overflow-wrap: break-word; }
 code { font: 0.92em ui-monospace, "SF Mono", Menlo, Consolas, monospace; }
 .note, .meaning { color: var(--soft); font-size: 0.87rem; }
 .verdict {
@@ -72,7 +73,10 @@ svg.bar { max-width: 380px; }
 svg text { font-size: 11px; fill: var(--soft); }
 svg .label { fill: var(--ink); }
 svg text.number { font-size: 12px; fill: var(--ink); }
-svg .name { font-size: 12.5px; font-weight: 600; }
+svg .name {
+  font-size: 12.5px; font-weight: 600;
+  paint-order: stroke; stroke: var(--paper); stroke-width: 5px; stroke-linejoin: round;
+}
 svg .grid { stroke: var(--line); stroke-width: 0.7; }
 svg .one { stroke: var(--soft); stroke-width: 1; stroke-dasharray: 2 3; }
 svg .axis { stroke: var(--soft); stroke-width: 1; }
@@ -84,6 +88,7 @@ svg .band { fill: var(--role); fill-opacity: 0.2; stroke: none; }
 svg .curve { fill: none; stroke: var(--role); stroke-width: 1.6; stroke-linejoin: round; }
 svg .curve.before { stroke-dasharray: 5 3; }
 svg .curve.measured { stroke-width: 2.2; }
+svg .curve.dense { stroke-width: 0.9; }
 svg .dot { fill: var(--role); }
 svg .whisker { stroke: var(--role); stroke-width: 1.6; }
 @media print {
