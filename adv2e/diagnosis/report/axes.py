@@ -50,7 +50,7 @@ class Axis:
 
     def at(self, value: float) -> float:
         """Return where one value lies."""
-        return float(self.place(np.float64(value)))
+        return float(self.place(np.asarray(value, dtype=np.float64)))
 
     def ticks(self) -> list[tuple[float, str]]:
         """Return places in the picture and labels."""

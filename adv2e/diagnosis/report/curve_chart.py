@@ -46,8 +46,9 @@ class _Frame:
         return paths.line(xs, ys)
 
     def band(self, band: Band) -> str:
-        """Return the path around a band; a lower end without logarithm is below the picture."""
-        low, high = drawable(band.low), drawable(band.high)
+        """Return the path around a band; ends beyond every number are at the picture's border."""
+        low = np.where(np.isneginf(band.low), self.up.low, drawable(band.low))
+        high = np.where(np.isposinf(band.high), self.up.high, drawable(band.high))
         if self.up.log:
             low = np.where(low <= 0, self.up.low, low)
         xs, lows = paths.points_of(self.x, self.up.place(low))

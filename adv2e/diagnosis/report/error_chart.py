@@ -32,7 +32,7 @@ def error_chart(rows: Sequence[ErrorRow]) -> Markup:
     largest = max((_largest(row) for row in rows if _has_scale(row)), default=math.nan)
     if math.isnan(largest):
         return Markup()
-    axis = Axis(0.0, 1.04 * max(1.0, largest), _START, _END)
+    axis = Axis(0.0, 1.04 * largest, _START, _END)
     parts, y = [], 6.0
     for row in rows:
         row_parts, y = _row(row, axis, y)
@@ -72,10 +72,10 @@ def _row(row: ErrorRow, axis: Axis, y: float) -> tuple[Markup, float]:
 def _mark(estimate: Estimate, unit: float, axis: Axis, y: float, role: str) -> Markup:
     parts = []
     if estimate.interval is not None and np.isfinite(estimate.interval).all():
-        ends = [axis.at(max(0.0, end / unit)) for end in estimate.interval]
+        ends = [axis.at(min(max(0.0, end / unit), axis.high)) for end in estimate.interval]
         parts.append(rule(ends[0], y, ends[1], y, f"whisker {role}"))
         parts += [rule(end, y - 4, end, y + 4, f"whisker {role}") for end in ends]
-    if math.isfinite(estimate.value):
+    if 0 <= estimate.value / unit <= axis.high:
         place = f"translate({axis.at(estimate.value / unit):.1f} {y:.1f})"
         parts.append(tag("path", d=_SHAPES[role], transform=place, class_=f"dot {role}"))
     return join(*parts)
@@ -87,6 +87,9 @@ def _has_scale(row: ErrorRow) -> bool:
 
 
 def _largest(row: ErrorRow) -> float:
-    estimates = (row.before, row.after, row.floor)
-    ends = [end for estimate in estimates for end in (estimate.value, *(estimate.interval or ()))]
-    return max(end / row.before.value for end in ends if math.isfinite(end))
+    """Return the largest number to be drawn, relative to the error before."""
+    shares = [1.0]
+    for estimate in (row.before, row.after, row.floor):
+        numbers = (estimate.value, *(estimate.interval or ()))
+        shares += [number / row.before.value for number in numbers]
+    return max(share for share in shares if math.isfinite(share))

@@ -18,7 +18,7 @@ from adv2e.diagnosis.report.quantities import (
 )
 from adv2e.diagnosis.report.separation import separation_of
 from adv2e.diagnosis.report.tables import Column, table
-from adv2e.diagnosis.result import Diagnosis, Finding
+from adv2e.diagnosis.result import Diagnosis, Finding, Interval, Rejected
 
 MARKS = {
     "consistent": ("✓", "Consistent", "nothing is missing from the declared model"),
@@ -90,7 +90,8 @@ def added(diagnosis: Diagnosis) -> Markup:
         parts.append(tag("h3", finding.name))
         if summary:
             parts.append(tag("p", summary))
-        parts.append(_parameters(finding))
+        if finding.parameters:
+            parts.append(_parameters(finding))
     return join(*parts)
 
 
@@ -105,7 +106,7 @@ def _parameters(finding: Finding) -> Markup:
     rows = []
     for path, value in finding.parameters.items():
         interval = finding.interval.get(path)
-        texts = value_text(value, interval), interval_text(interval), unit_text(unit_of(path))
+        texts = _cell(value, interval), interval_text(interval), unit_text(unit_of(path))
         rows.append((tag("code", path), *texts, meaning_of(path)))
     return table(f"Parameters of {finding.name}", columns, rows)
 
@@ -114,12 +115,14 @@ def alternatives(diagnosis: Diagnosis) -> Markup:
     """Return which effects explain the residual as well, and what would separate them."""
     if not diagnosis.alternatives:
         return tag("p", "None.")
-    best = [finding.name for finding in diagnosis.effects]
+    names = [finding.name for finding in diagnosis.effects] + diagnosis.alternatives
+    paths = _paths(diagnosis)
     rows = []
-    for name in [*best, *diagnosis.alternatives]:
-        role = "in the model found" if name in best else "explains it as well"
+    for name in dict.fromkeys(names):
+        role = "explains it as well" if name in diagnosis.alternatives else "in the model found"
         heading = join(name, tag("span", role, class_="meaning"))
-        rows.append((heading, summary_of(name), separation_of(name) or "not known"))
+        summary = summary_of(name, paths.get(name, []))
+        rows.append((heading, summary, separation_of(name) or "not known"))
     columns = [Column("effect"), Column("what it is"), Column("what would show it")]
     lead = (
         "These data do not tell the following effects apart; recordings of the kind in the last"
@@ -129,13 +132,28 @@ def alternatives(diagnosis: Diagnosis) -> Markup:
     return join(tag("p", lead), table(caption, columns, rows))
 
 
+def _paths(diagnosis: Diagnosis) -> dict[str, list[str]]:
+    """Return the keys of each effect, as far as the diagnosis names them."""
+    paths = {one.name: [one.key] for one in diagnosis.detectable}
+    trials: list[Rejected | Finding] = [*diagnosis.rejected, *diagnosis.effects]
+    for trial in trials:
+        paths.setdefault(trial.name, []).extend(trial.parameters)
+    return paths
+
+
+def _cell(value: Any, interval: Interval | None = None) -> Markup | str:
+    """Return a value; a text may take several lines, a number may not."""
+    text = value_text(value, interval)
+    return tag("span", text, class_="text") if isinstance(value, str) else text
+
+
 def nuisances(values: Mapping[str, Any]) -> Markup:
     """Return the keys that were fitted because nothing was declared of them."""
     if not values:
         return tag("p", "None: every key in use was declared or has its default.")
     columns = [Column("key"), Column("value", number=True), Column("unit"), Column("meaning")]
     rows = [
-        (tag("code", path), value_text(value), unit_text(unit_of(path)), meaning_of(path))
+        (tag("code", path), _cell(value), unit_text(unit_of(path)), meaning_of(path))
         for path, value in values.items()
     ]
     return table("Keys that were not declared, with fitted values", columns, rows)

@@ -83,7 +83,7 @@ def interval_text(interval: Sequence[Any] | None) -> str:
 def estimate_text(estimate: Estimate) -> str:
     """Return value and interval, as in ``1.38 (1.30 to 1.46)``."""
     value = value_text(estimate.value, estimate.interval)
-    if estimate.interval is None:
+    if estimate.interval is None or any(math.isnan(end) for end in estimate.interval):
         return value
     return f"{value} ({interval_text(estimate.interval)})"
 

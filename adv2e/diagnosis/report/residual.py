@@ -30,9 +30,7 @@ _SHOWN = 12
 
 def curves(given: Sequence[Curve]) -> Markup:
     """Return the curves, side by side where there is room."""
-    figures = [
-        tag("figure", tag("figcaption", curve.title), curve_chart(curve)) for curve in given
-    ]
+    figures = [tag("figure", tag("figcaption", curve.title), curve_chart(curve)) for curve in given]
     return tag("div", *figures, class_="side")
 
 
@@ -129,7 +127,7 @@ def rejected(given: Sequence[Rejected]) -> Markup:
             f"{path} = {value_text(value)} {unit_text(unit_of(path))}".rstrip()
             for path, value in one.parameters.items()
         ]
-        lines = [tag("span", text, class_="line") for text in tried] or [NOTHING]
+        lines = [tag("span", text, class_="line") for text in tried or [NOTHING]]
         held_out = NOTHING if one.held_out is None else number_text(one.held_out)
         rows.append((one.name, one.reason, join(*lines), held_out))
     caption = "Effects tried and not added; misfit on held-out data relative to that before"

@@ -68,7 +68,7 @@ def colours(values: Map) -> Picture:
 
 def reduction(values: Map) -> int:
     """Return the side of the squares of pixels that are averaged to one; 1 for usual sensors."""
-    rows, columns = values.shape
+    rows, columns = map(int, values.shape)
     return max(1, -(-rows // _MOST_ROWS), -(-columns // _MOST_COLUMNS))
 
 
@@ -120,6 +120,8 @@ def colour_bar() -> Markup:
         x = 20 + 240 * (value / CLIP_SD + 1) / 2
         sign = {-CLIP_SD: "≤ -", 0.0: "", CLIP_SD: "≥ +"}[value]
         parts.append(tag("text", f"{sign}{abs(value):g}", x=x, y=30, text_anchor="middle"))
-    parts.append(tag("rect", x=300, y=4, width=14, height=12, fill="#{:02x}{:02x}{:02x}".format(*_MASKED)))
+    parts.append(
+        tag("rect", x=300, y=4, width=14, height=12, fill="#{:02x}{:02x}{:02x}".format(*_MASKED))
+    )
     parts.append(tag("text", "masked", x=320, y=14))
     return tag("svg", *parts, viewBox="0 0 380 36", role="img", class_="bar")

@@ -58,6 +58,8 @@ thead th { border-bottom: 2px solid var(--line); }
 tbody th { font-weight: 600; min-width: 9em; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 td.number, th.number { padding-left: 10px; }
+td { min-width: 3em; }
+.number .text { white-space: normal; overflow-wrap: anywhere; }
 .meaning, .line { display: block; font-weight: 400; }
 .large { color: var(--before); white-space: nowrap; }
 details > summary { cursor: pointer; padding: 6px 0; color: var(--after); }
@@ -65,7 +67,7 @@ figure { margin: 0; min-width: 0; overflow-x: auto; }
 figcaption { font-size: 0.9rem; font-weight: 600; margin: 6px 0; }
 figcaption.note { font-weight: 400; }
 .side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(400px, 100%), 1fr)); }
-.side { gap: 18px 24px; align-items: end; margin: 10px 0; }
+.side { gap: 18px 24px; align-items: start; margin: 10px 0; }
 img.map { width: 100%; height: auto; image-rendering: pixelated; display: block; }
 svg { display: block; width: 100%; max-width: 560px; height: auto; }
 svg.wide { max-width: 100%; min-width: 560px; }
@@ -96,6 +98,7 @@ svg .whisker { stroke: var(--role); stroke-width: 1.6; }
   main { max-width: none; padding: 0; }
   h2, h3, figcaption, caption { break-after: avoid; }
   figure, tr, .verdict { break-inside: avoid; }
+  .side { grid-template-columns: 1fr 1fr; }
   svg, img { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 }
 """

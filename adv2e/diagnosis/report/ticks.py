@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -70,7 +71,7 @@ def tick_labels(ticks: Sequence[float], log: bool = False) -> list[str]:
     if not sizes:
         return ["0" for _ in ticks]
     smallest = min(sizes) if log else max(sizes)
-    if _PLAIN_FROM <= smallest and max(sizes) < _PLAIN_TO:
+    if smallest >= _PLAIN_FROM and max(sizes) < _PLAIN_TO:
         labels = [f"{tick:g}" for tick in ticks] if log else _same_decimals(ticks)
     elif log:
         labels = [_with_power(tick) for tick in ticks]
@@ -78,7 +79,7 @@ def tick_labels(ticks: Sequence[float], log: bool = False) -> list[str]:
         power = math.floor(math.log10(max(sizes)))
         scaled = _same_decimals([_times_power(tick, -power) for tick in ticks])
         labels = [
-            text if tick == 0 else f"{text}×{_power(power)}"
+            "0" if tick == 0 else f"{text}×{_power(power)}"
             for text, tick in zip(scaled, ticks, strict=True)
         ]
     return labels if len(set(labels)) == len(labels) else [repr(float(tick)) for tick in ticks]
@@ -86,7 +87,7 @@ def tick_labels(ticks: Sequence[float], log: bool = False) -> list[str]:
 
 def _same_decimals(ticks: Sequence[float]) -> list[str]:
     """Return decimals, as few as tell the ticks apart and give each to a part in a million."""
-    gap = min((b - a for a, b in zip(ticks, ticks[1:], strict=False)), default=abs(ticks[0]))
+    gap = min((b - a for a, b in itertools.pairwise(ticks)), default=abs(ticks[0]))
     for decimals in range(8):
         texts = [f"{tick:.{decimals}f}" for tick in ticks]
         if all(

@@ -1,0 +1,253 @@
+"""Pictures: every value at its place, gaps where there is none."""
+
+import base64
+import re
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from made_up_diagnosis import everything, strange
+
+from adv2e.diagnosis.report import paths
+from adv2e.diagnosis.report.axes import Axis, axis_over, drawable
+from adv2e.diagnosis.report.curve_chart import curve_chart
+from adv2e.diagnosis.report.error_chart import error_chart
+from adv2e.diagnosis.report.sensor_map import (
+    colour_bar,
+    colours,
+    map_image,
+    reduced,
+    reduction,
+)
+from adv2e.diagnosis.result import Band, Curve, ErrorRow, Estimate
+
+NAN = np.nan
+ANY = hnp.arrays(np.float64, st.integers(0, 8), elements=st.floats())
+
+
+def path_of(svg, class_):
+    """Return the points of the last path of that class, behind that of the legend, in runs."""
+    *_, data = re.findall(rf'<path d="([^"]*)" class="{class_}">', svg)
+    runs = re.findall(r"M([^MZ]*)", data)
+    return [[tuple(map(float, point.split())) for point in run.split("L")] for run in runs]
+
+
+def texts(svg, anchor):
+    """Return texts with their places."""
+    found = re.findall(rf'<text x="([-\d.]+)" y="([-\d.]+)" text-anchor="{anchor}">([^<]*)', svg)
+    return {text: (float(x), float(y)) for x, y, text in found}
+
+
+def test_axes_place_values_in_proportion():
+    axis = Axis(10, 20, 100, 200)
+    np.testing.assert_allclose(axis.place(np.array([10, 15, 20, NAN])), [100, 150, 200, NAN])
+    log = Axis(1, 100, 300, 100, log=True)
+    np.testing.assert_allclose(
+        log.place(np.array([1.0, 10, 100, 0, -1])), [300, 200, 100, NAN, NAN]
+    )
+
+
+@given(ANY, st.booleans(), st.booleans())
+def test_an_axis_shows_all_that_can_be_drawn(values, log, tight):
+    values = drawable(values)
+    shown = values[np.isfinite(values) & ((values > 0) | (not log))]
+    axis = axis_over([values], 0, 100, log=log, tight=tight)
+    if not len(shown):
+        assert axis is None
+        return
+    assert np.isfinite([axis.low, axis.high]).all()
+    assert axis.low <= shown.min() <= shown.max() <= axis.high
+    places = axis.place(shown)
+    assert (places >= -1e-6).all()
+    assert (places <= 100 + 1e-6).all()
+    assert axis.ticks()
+
+
+def test_axes_reach_down_to_a_zero_that_is_near():
+    assert axis_over([np.array([1.0, 10])], 0, 1, log=False).low == 0
+    assert axis_over([np.array([9.0, 10])], 0, 1, log=False).low > 8
+
+
+def test_lines_have_gaps_and_lone_points():
+    ys = np.array([1.0, 2, NAN, 4, NAN])
+    assert paths.line(np.arange(5.0), ys) == "M0.0 1.0L1.0 2.0M1.0 4.0L5.0 4.0"
+    assert paths.line(np.arange(0.0), np.arange(0.0)) == ""
+
+
+def test_bands_go_round_the_area():
+    path = paths.band(np.array([0.0, 1]), np.array([9.0, 8]), np.array([1.0, 2]))
+    assert path == "M0.0 1.0L1.0 2.0L1.0 8.0L0.0 9.0Z"
+
+
+def test_bins_are_steps():
+    xs, ys = paths.points_of(np.array([0.0, 1, 3]), np.array([5.0, 6]))
+    np.testing.assert_array_equal(xs, [0, 1, 1, 3])
+    np.testing.assert_array_equal(ys, [5, 5, 6, 6])
+
+
+def test_long_curves_keep_their_extremes():
+    xs = np.linspace(0, 400, 100_000)
+    ys = np.random.default_rng(0).normal(size=xs.size)
+    ys[[3000, 70_000]] = -99, 77
+    data = paths.line(xs, ys)
+    assert len(data) < 30_000
+    points = np.array([p.split() for p in re.split("[ML]", data)[1:]], dtype=float)
+    for row in (3000, 70_000):
+        (near,) = np.nonzero(points[:, 1] == ys[row])
+        assert abs(points[near, 0] - xs[row]).max() <= 0.5
+    np.testing.assert_allclose(points[[0, -1], 0], [0, 400], atol=0.5)
+
+
+def test_long_bands_keep_their_widest_places():
+    xs = np.linspace(0, 400, 50_000)
+    low, high = np.full(xs.size, 60.0), np.full(xs.size, 40.0)
+    low[123], high[4567] = 99, 3
+    data = paths.band(xs, low, high)
+    assert len(data) < 30_000
+    assert " 99.0" in data
+    assert " 3.0" in data
+
+
+def test_curves_lie_where_their_values_are():
+    x, measured = np.array([0.0, 5, 10]), np.array([1.0, NAN, 3])
+    band = Band(np.array([2.0, 2, 2]), np.array([1.0, 1, 1]), np.array([4.0, 4, 4]))
+    other = Band(band.middle + 4, band.low + 4, band.high + 4)
+    svg = curve_chart(Curve("t", "x [s]", "y [Hz]", x, measured, band, other))
+    labels = texts(svg, "end")
+    zero, four = labels["0"], labels["4"]
+    per_unit = (four[1] - zero[1]) / 4
+
+    def height(value):
+        return zero[1] - 4 + value * per_unit  # text stands 4 below the tick it names
+
+    (line,) = path_of(svg, "curve before")
+    assert [y for _, y in line] == pytest.approx([height(2)] * 3, abs=0.2)
+    (line,) = path_of(svg, "curve after")
+    assert [y for _, y in line] == pytest.approx([height(6)] * 3, abs=0.2)
+    (area,) = path_of(svg, "band before")
+    assert {round(y) for _, y in area} == {round(height(4)), round(height(1))}
+    first, last = path_of(svg, "curve measured")
+    assert first[0][1] == pytest.approx(height(1), abs=0.2)
+    assert last[0][1] == pytest.approx(height(3), abs=0.2)
+    assert svg.count("<circle") == 2
+
+
+def test_bands_that_reach_zero_end_at_the_bottom_of_a_logarithm():
+    values = np.array([10.0, 10])
+    band = Band(values, np.array([0.0, 1]), values * 2)
+    svg = curve_chart(
+        Curve("t", "x", "y", np.array([1.0, 2]), values, band, band, y_log=True)
+    )  # fmt: skip
+    (area,) = path_of(svg, "band after")
+    bottoms = sorted((y for _, y in area), reverse=True)
+    assert bottoms[0] > bottoms[1] > bottoms[2]
+    axis = re.search(r'<line x1="58.0" y1="([\d.]+)" x2="446.0" y2="\1" class="axis">', svg)
+    assert bottoms[0] == pytest.approx(float(axis[1]), abs=0.1)
+
+
+@given(ANY, st.booleans(), st.booleans(), st.booleans())
+def test_any_curve_can_be_drawn(values, bins, x_log, y_log):
+    x = np.arange(len(values) + bins, dtype=float)
+    with np.errstate(all="ignore"):
+        band = Band(values, values - 1, values + 1)
+    svg = curve_chart(Curve("t", "x", "y", x, values, band, band, x_log=x_log, y_log=y_log))
+    assert "nan" not in svg
+    assert "inf" not in svg
+
+
+def test_errors_are_drawn_relative_to_the_one_before():
+    row = ErrorRow("e", Estimate(200.0, (180.0, 230.0)), Estimate(50.0), Estimate(40.0))
+    svg = error_chart([row])
+    labels = texts(svg, "middle")
+    zero, one = labels["0.0"][0], labels["1.0"][0]
+    mark = r'transform="translate\(([\d.]+) [\d.]+\)" class="dot (\w+)"'
+    places = {role: float(x) for x, role in re.findall(mark, svg)}
+    assert places["before"] == pytest.approx(one, abs=0.1)
+    assert places["after"] == pytest.approx(zero + (one - zero) / 4, abs=0.1)
+    assert places["floor"] == pytest.approx(zero + (one - zero) / 5, abs=0.1)
+    assert svg.count('class="whisker before"') == 3
+    assert "200 (180 to 230)" in svg
+
+
+def test_errors_without_scale_are_given_as_numbers_only():
+    nothing = ErrorRow("n", Estimate(0.0), Estimate(2.5), Estimate(NAN))
+    assert error_chart([nothing]) == ""
+    svg = error_chart([*everything().errors, nothing])
+    assert "not drawn" in svg
+    assert "2.5" in svg
+    wild = ErrorRow("w", Estimate(1e-300, (-1.0, np.inf)), Estimate(1e300), Estimate(-1.0))
+    assert "inf" not in error_chart([wild]).replace("to inf", "")
+
+
+def test_all_pictures_of_odd_values_hold_numbers_only():
+    for curve in strange().curves:
+        for data in re.findall(r' (?:d|x|y|x1|y1|cx|cy)="([^"]*)"', curve_chart(curve)):
+            assert re.fullmatch(r"[-\d.MLZ ]*", data)
+
+
+def test_colours_are_blue_below_and_red_above():
+    red, green, blue = colours(np.array(2.0))
+    assert red > blue
+    red, green, blue = colours(np.array(-2.0))
+    assert blue > red
+    red, green, blue = colours(np.array(0.0))
+    assert red == green == blue == 247
+    np.testing.assert_array_equal(colours(np.array([5.0, 99, np.inf])), [(103, 0, 31)] * 3)
+    np.testing.assert_array_equal(colours(np.array([-5.0, -99, -np.inf])), [(5, 48, 97)] * 3)
+    np.testing.assert_array_equal(colours(np.array([NAN])), [(128, 128, 128)])
+
+
+def test_colours_darken_with_size():
+    brightness = colours(np.linspace(0, 5, 40)).sum(axis=1)
+    assert (np.diff(brightness.astype(int)) <= 0).all()
+    brightness = colours(np.linspace(0, -5, 40)).sum(axis=1)
+    assert (np.diff(brightness.astype(int)) <= 0).all()
+
+
+def picture(image):
+    data = re.search(r'src="data:image/png;base64,([^"]*)"', image)[1]
+    decoded = cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_COLOR)
+    return decoded[:, :, ::-1]
+
+
+def test_maps_are_enlarged_and_upright():
+    values = np.array([[-3.0, 0, NAN], [1.0, 2, 9]])
+    image = map_image(values, 'a "map"')
+    shown = picture(image)
+    factor = shown.shape[1] // 3
+    assert shown.shape == (2 * factor, 3 * factor, 3)
+    assert shown.shape[1] >= 440
+    np.testing.assert_array_equal(
+        shown, np.kron(colours(values), np.ones((factor, factor, 1), np.uint8))
+    )
+    assert 'alt="a &quot;map&quot;"' in image
+
+
+def test_large_maps_are_averaged():
+    values = np.full((4, 1000), 2.0)
+    values[:2, :3] = [[1, 2, NAN], [NAN, NAN, NAN]]
+    side = reduction(values)
+    assert side == 3
+    means = reduced(values, side)
+    assert means.shape == (2, 334)
+    assert means[0, 0] == np.mean([1, 2, 2, 2, 2])
+    assert means[1, 333] == 2.0
+    assert reduction(np.zeros((260, 346))) == 1
+    np.testing.assert_array_equal(reduced(np.full((4, 4), NAN), 2), np.full((2, 2), NAN))
+
+
+def test_the_colour_bar_names_its_ends():
+    assert {"≤ -5", "0", "≥ +5", "masked"} <= set(re.findall(r">([^<>]+)</text>", colour_bar()))
+
+
+def test_a_curve_without_numbers_says_so():
+    curve = everything().curves[0]
+    empty = np.full(len(curve.measured), NAN)
+    band = Band(empty, empty, empty)
+    text = curve_chart(replace(curve, measured=empty, before=band, after=band))
+    assert "nothing to draw" in text
+    assert "<svg" not in text

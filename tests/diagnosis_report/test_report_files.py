@@ -1,0 +1,145 @@
+"""The files of a diagnosis come into place together, and the model can be used."""
+
+from dataclasses import replace
+
+import pytest
+import yaml
+from made_up_diagnosis import MODEL, everything, nothing, strange
+
+from adv2e.config import from_dict, load_config
+from adv2e.diagnosis import report
+from adv2e.diagnosis.report import check_folder, summary_text, write_reports
+from adv2e.diagnosis.report.model_file import model_text
+from adv2e.diagnosis.report.quantities import native
+from adv2e.errors import OutputError
+
+NAMES = ["model.yaml", "report.html", "report.json"]
+
+
+def listing(folder):
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+@pytest.mark.parametrize("make", [everything, nothing, strange])
+def test_three_files_are_written(make, tmp_path):
+    write_reports(make(), tmp_path / "new" / "found")
+    assert listing(tmp_path / "new" / "found") == NAMES
+    assert listing(tmp_path) == ["new"]
+
+
+def test_an_existing_folder_is_kept(tmp_path):
+    write_reports(everything(), tmp_path / "found")
+    before = (tmp_path / "found" / "report.json").read_bytes()
+    with pytest.raises(OutputError, match="exists already; --overwrite replaces it"):
+        check_folder(tmp_path / "found")
+    with pytest.raises(OutputError, match="exists already; --overwrite replaces it"):
+        write_reports(nothing(), tmp_path / "found")
+    assert (tmp_path / "found" / "report.json").read_bytes() == before
+    check_folder(tmp_path / "found", overwrite=True)
+    write_reports(nothing(), tmp_path / "found", overwrite=True)
+    assert (tmp_path / "found" / "report.json").read_bytes() != before
+    assert listing(tmp_path) == ["found"]
+
+
+def test_a_folder_with_other_things_is_never_replaced(tmp_path):
+    (tmp_path / "thesis.txt").touch()
+    with pytest.raises(OutputError, match=r"holds thesis\.txt"):
+        write_reports(everything(), tmp_path, overwrite=True)
+    assert listing(tmp_path) == ["thesis.txt"]
+
+
+def test_a_free_name_is_left_untouched_by_the_check(tmp_path):
+    check_folder(tmp_path / "a" / "b")
+    assert listing(tmp_path) == []
+
+
+def test_what_fails_leaves_nothing(tmp_path, monkeypatch):
+    def full_disk(diagnosis):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(report.FILES, "model.yaml", full_disk)
+    with pytest.raises(OSError, match="No space"):
+        write_reports(everything(), tmp_path / "found")
+    assert listing(tmp_path) == []
+
+
+def test_errors_of_the_system_name_the_folder(tmp_path, monkeypatch):
+    monkeypatch.setitem(report.FILES, "no/such/folder.txt", lambda diagnosis: "")
+    with pytest.raises(OutputError, match="found: cannot be written: No such file"):
+        write_reports(everything(), tmp_path / "found")
+    assert listing(tmp_path) == []
+
+
+def test_the_model_is_read_back(tmp_path):
+    write_reports(everything(), tmp_path / "found")
+    config = load_config([tmp_path / "found" / "model.yaml"])
+    assert config == from_dict(native(MODEL))
+    assert config.pixel.refractory.period_us == 6012.34
+    assert config.pixel.low_pass.cutoff_hz == 187.123456
+    assert config.seed == 3
+
+
+def test_an_empty_model_is_read_back(tmp_path):
+    write_reports(nothing(), tmp_path / "found")
+    assert load_config([tmp_path / "found" / "model.yaml"]) == load_config()
+
+
+def test_hostile_names_stay_in_comments(tmp_path):
+    write_reports(strange(), tmp_path / "found")
+    config = load_config([tmp_path / "found" / "model.yaml"])
+    assert config.pixel.thresholds.on == 0.25
+    assert config.pixel.leak is None
+
+
+def test_the_model_says_where_its_values_are_from():
+    lines = {line.split(":")[0].strip(): line for line in model_text(everything()).splitlines()}
+    assert lines["period_us"].endswith("# [us] added: refractory, 95 % interval 5,500 to 6,500")
+    assert lines["cutoff_hz"].endswith("# [Hz] added: low_pass, 95 % interval 172 to 204")
+    assert lines["on"].endswith("on: 0.21  # [ln] nuisance")
+    assert lines["off"].endswith("off: 0.2  # [ln]")
+    assert lines["encoding"].endswith("# nuisance")
+    assert lines["source_follower"].strip() == "source_follower: null"
+    assert all(len(line) <= 100 for line in model_text(everything()).splitlines())
+
+
+def test_lists_are_written_in_one_line():
+    model = {"frames": {"shift_px": [0.5, -0.25]}}
+    text = model_text(replace(everything(), model=model))
+    assert yaml.safe_load(text) == model
+    assert "shift_px: [0.5, -0.25]" in text
+
+
+@pytest.mark.parametrize("make", [everything, nothing, strange])
+def test_the_summary_is_short(make):
+    lines = summary_text(make()).splitlines()
+    assert len(lines) < 15
+    assert max(map(len, lines)) <= 100
+    assert all(line.isprintable() or "\ufffd" in line for line in lines)
+
+
+def test_the_summary_says_the_result():
+    assert summary_text(everything()).splitlines() == [
+        "explained: The declared model lacks a dead time of 6.0 ms: pixels do not fire twice within"
+        " it, at",
+        "  any brightness.",
+        "  refractory: pixel.refractory.period_us = 6,010 us (5,500 to 6,500)",
+        "  low_pass: pixel.low_pass.cutoff_hz = 187 Hz (172 to 204)",
+        "as well: reset_overshoot",
+        "error 1.38 -> 0.312 (floor 0.270): distance of the streams smoothed in time (mean of 2,"
+        " 10, 50 and",
+        "  100 ms)",
+        "p < 0.001 -> 0.34",
+    ]
+
+
+def test_the_summary_counts_what_it_leaves_out():
+    diagnosis = everything()
+    many = replace(
+        diagnosis,
+        effects=diagnosis.effects * 9,
+        sentence="word " * 300,
+        alternatives=["alternative"] * 60,
+    )
+    lines = summary_text(many).splitlines()
+    assert len(lines) < 15
+    assert "  and 14 more parameters" in lines

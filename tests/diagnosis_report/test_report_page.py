@@ -1,0 +1,201 @@
+"""``report.html``: well formed, alone, escaped, and with everything in it."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from camera.catalogue import LIBRARY
+from made_up_diagnosis import HOSTILE, everything, nothing, strange
+
+from adv2e.diagnosis.report.findings import MARKS
+from adv2e.diagnosis.report.page import page
+from adv2e.diagnosis.report.separation import SEPARATIONS
+from adv2e.diagnosis.result import ResidualMap, Signature
+
+EMPTY = {"br", "img", "meta"}
+LOADING = {"src", "href", "srcset", "data", "action", "poster"}
+
+
+class Outline(HTMLParser):
+    """Checks that elements are closed in order, and collects what the tests ask for."""
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.open, self.names, self.loads, self.texts = [], [], [], []
+        self.headings, self.unnamed = [], []
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, name, attributes):
+        given = dict(attributes)
+        assert len(given) == len(attributes)
+        self.names.append(name)
+        self.loads += [given[key] for key in LOADING & set(given)]
+        if name == "img" and not given.get("alt"):
+            self.unnamed.append(name)
+        if name not in EMPTY:
+            self.open.append(name)
+
+    def handle_startendtag(self, name, attributes):
+        raise AssertionError(f"<{name}/>")
+
+    def handle_endtag(self, name):
+        assert self.open.pop() == name
+
+    def handle_data(self, data):
+        self.texts.append(data)
+        if self.open and self.open[-1] in ("h1", "h2", "h3"):
+            self.headings.append((self.open[-1], data))
+
+    @property
+    def text(self):
+        return "\n".join(self.texts)
+
+
+@pytest.fixture(scope="module")
+def full():
+    return page(everything())
+
+
+@pytest.mark.parametrize("make", [everything, nothing, strange])
+def test_the_page_is_well_formed_and_alone(make):
+    text = page(make())
+    outline = Outline(text)
+    assert text.startswith("<!DOCTYPE html>\n<html lang=")
+    assert text.isprintable() or not re.search("[\x00-\x08\x0b-\x1f]", text)
+    assert all(load.startswith("data:image/png;base64,") for load in outline.loads)
+    assert not {"link", "iframe", "object", "use", "base"} & set(outline.names)
+    assert not re.search(r"url\(|@import|xmlns", text)
+    assert outline.names.count("script") == outline.names.count("h1") == 1
+    assert not outline.unnamed
+    # every table has its caption and every picture its title
+    assert outline.names.count("table") == outline.names.count("caption")
+    assert outline.names.count("svg") == outline.names.count("title") - 1
+    assert text.encode("utf-8").decode("utf-8") == text
+    assert len(text.encode()) < 2_000_000
+
+
+def test_only_text_names_addresses_elsewhere(full):
+    assert "://" not in full
+    text = page(strange())
+    assert "http://x.y" in Outline(text).text
+    assert '="http' not in text
+
+
+def test_texts_are_shown_as_they_are():
+    shown = Outline(page(strange())).texts
+    whole = HOSTILE.replace("\x00", "\ufffd").replace("\udc80", "\ufffd")
+    assert whole in shown
+    assert shown.count(whole) >= 15
+
+
+def test_headings_come_in_order(full):
+    headings = Outline(full).headings
+    assert headings[0] == ("h1", "Diagnosis of office_zigzag.zip")
+    assert [text for level, text in headings if level == "h2"] == [
+        "Error before and after",
+        "What was added",
+        "What explains it as well",
+        "The residual before and after",
+        "Signatures",
+        "What was rejected",
+        "What could have been seen",
+        "Data",
+        "Nuisances",
+        "Notes",
+        "Facts",
+    ]
+    assert ("h3", "refractory") in headings
+
+
+def test_the_page_says_what_was_found(full):
+    text = Outline(full).text
+    for part in (
+        everything().sentence,
+        "1.38 (1.31 to 1.46)",
+        "0.312 (0.290 to 0.340)",
+        "p < 0.001",
+        "p = 0.34",
+        "Refractory period: after each event the pixel is dead",
+        "pixel.refractory.period_us",
+        "6,010",
+        "5,500 to 6,500",
+        "µs",
+        "dead time after an event",
+        SEPARATIONS["reset_overshoot"],
+        "no line in the spectrum beyond chance",
+        "frames.flicker.depth = 0.002",
+        "0.998",
+        "740",
+        "3.4 %",
+        "Blocks of 0.5 s",
+        "Interpolation between frames",
+        "simulations",
+        "412",
+        "Time between events",
+    ):
+        assert part in text
+
+
+@pytest.mark.parametrize("verdict", MARKS)
+def test_every_verdict_has_a_sign_and_a_word(verdict):
+    text = page(replace(everything(), verdict=verdict))
+    sign, word, _ = MARKS[verdict]
+    assert f'class="verdict {verdict}"' in text
+    assert f'<span aria-hidden="true">{sign}</span> {word}</span>' in text
+
+
+def test_signs_of_unlike_verdicts_differ():
+    assert len({MARKS[name][0] for name in set(MARKS) - {"consistent"}}) == 4
+
+
+def signature_names(text):
+    section = text[text.index(">Signatures<") : text.index(">What was rejected<")]
+    return re.findall(r'<span title="[^"]*">([^<]*)</span>', section), section
+
+
+def test_signatures_are_sorted_marked_and_folded(full):
+    names, section = signature_names(full)
+    wanted = sorted(everything().signatures, key=lambda one: -abs(one.z_before))
+    assert names == [one.name for one in wanted]
+    assert section.count("<details>") == 1
+    large = [z for one in wanted for z in (one.z_before, one.z_after) if abs(z) > 3]
+    assert len(re.findall("▲|▼", section)) == len(large) + 2  # and once each in words
+    assert "9 of 25 before, 1 after" in section
+    assert 'title="Where two events' in section
+
+
+def test_short_tables_are_not_folded_and_unknown_distances_come_last():
+    nan = float("nan")
+    rows = [
+        Signature(n, "g", "m", 1, 1, 1, z, 0)
+        for n, z in zip("abcd", (nan, 1, -9, nan), strict=True)
+    ]
+    names, section = signature_names(page(replace(everything(), signatures=rows)))
+    assert names == ["c", "b", "a", "d"]
+    assert "<details>" not in section
+
+
+def test_maps_of_usual_sensors_keep_the_page_small():
+    draws = np.random.default_rng(5).normal(size=(2, 260, 346))
+    maps = [ResidualMap("m", *draws), ResidualMap("n", *draws[::-1])]
+    text = page(replace(everything(), maps=maps))
+    assert len(text.encode()) < 2_000_000
+    assert "Each point is the mean of" not in text
+
+
+def test_maps_of_large_sensors_say_that_they_are_averaged():
+    values = np.zeros((720, 1280))
+    text = page(replace(everything(), maps=[ResidualMap("m", values, values)]))
+    assert "Each point is the mean of 3 x 3 pixels." in text
+
+
+def test_the_same_diagnosis_gives_the_same_page(full):
+    assert page(everything()) == full
+
+
+def test_every_effect_of_the_library_has_its_separation():
+    assert set(SEPARATIONS) == set(LIBRARY)
