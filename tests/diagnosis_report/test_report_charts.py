@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from made_up_diagnosis import everything, strange
@@ -51,6 +51,7 @@ def test_axes_place_values_in_proportion():
     )
 
 
+@settings(deadline=None)
 @given(ANY, st.booleans(), st.booleans())
 def test_an_axis_shows_all_that_can_be_drawn(values, log, tight):
     values = drawable(values)
@@ -149,6 +150,7 @@ def test_bands_that_reach_zero_end_at_the_bottom_of_a_logarithm():
     assert bottoms[0] == pytest.approx(float(axis[1]), abs=0.1)
 
 
+@settings(deadline=None)
 @given(ANY, st.booleans(), st.booleans(), st.booleans())
 def test_any_curve_can_be_drawn(values, bins, x_log, y_log):
     x = np.arange(len(values) + bins, dtype=float)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.diagnosis.report.markup import join, markup, plain, tag
@@ -74,6 +74,7 @@ def test_values_of_other_kinds():
     assert estimate_text(Estimate(2.0, (float("nan"), 3.0))) == "2"
 
 
+@settings(deadline=None)
 @given(st.floats(-1e300, 1e300, allow_subnormal=False), st.integers(1, 6))
 def test_texts_are_near_the_number(value, digits):
     near = pytest.approx(value, rel=0.51 * 10 ** (1 - digits), abs=0)
@@ -81,6 +82,7 @@ def test_texts_are_near_the_number(value, digits):
     assert float(short_text(value, digits).replace(",", "")) == near
 
 
+@settings(deadline=None)
 @given(st.floats(-1e12, 1e12), st.floats(-1e12, 1e12), st.floats(-1e12, 1e12))
 def test_values_with_intervals_are_off_by_little_of_the_interval(value, one, other):
     low, high = sorted((one, other))

@@ -5,7 +5,7 @@ import math
 from decimal import Decimal
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from adv2e.diagnosis.report.ticks import linear_ticks, log_ticks, tick_labels
@@ -63,6 +63,7 @@ def test_logarithmic_examples(low, high, ticks, labels):
     assert tick_labels(ticks, log=True) == labels
 
 
+@settings(deadline=None)
 @given(ranges())
 def test_linear_ticks_are_few_round_and_even(ends):
     low, high = ends
@@ -76,6 +77,7 @@ def test_linear_ticks_are_few_round_and_even(ends):
     assert step.normalize().as_tuple().digits in ((1,), (2,), (5,))
 
 
+@settings(deadline=None)
 @given(POSITIVE, POSITIVE)
 def test_logarithmic_ticks_are_few_and_inside(one, other):
     low, high = sorted((one, other))
@@ -86,6 +88,7 @@ def test_logarithmic_ticks_are_few_and_inside(one, other):
     assert all(low <= tick <= high for tick in ticks)
 
 
+@settings(deadline=None)
 @given(ranges(), st.booleans())
 def test_labels_say_the_number(ends, log):
     if log:

@@ -73,8 +73,8 @@ def errors(diagnosis: Diagnosis) -> Markup:
         )
     )
     explained = (
-        "Before: the declared model. After: the model found. Floor: independent draws of the model"
-        " found against each other, which no model can beat."
+        "Before: the declared model. After: the model found. Floor: independent draws of the"
+        " model found against each other: as near as it comes to itself."
     )
     parts.append(tag("p", explained, class_="note"))
     return join(*parts)
@@ -150,7 +150,7 @@ def _cell(value: Any, interval: Interval | None = None) -> Markup | str:
 def nuisances(values: Mapping[str, Any]) -> Markup:
     """Return the keys that were fitted because nothing was declared of them."""
     if not values:
-        return tag("p", "None: every key in use was declared or has its default.")
+        return tag("p", "None was fitted.")
     columns = [Column("key"), Column("value", number=True), Column("unit"), Column("meaning")]
     rows = [
         (tag("code", path), _cell(value), unit_text(unit_of(path)), meaning_of(path))
