@@ -1,6 +1,7 @@
 """The files of a diagnosis come into place together, and the model can be used."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import yaml
@@ -60,6 +61,17 @@ def test_what_fails_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setitem(report.FILES, "model.yaml", full_disk)
     with pytest.raises(OSError, match="No space"):
         write_reports(everything(), tmp_path / "found")
+    assert listing(tmp_path) == []
+
+
+def test_an_interruption_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(path, text, **options):
+        path.touch()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "write_text", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_reports(everything(), tmp_path / "new" / "found")
     assert listing(tmp_path) == []
 
 
