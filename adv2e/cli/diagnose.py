@@ -1,0 +1,110 @@
+"""``adv2e diagnose``: what a recording holds that its simulation lacks."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import click
+
+from adv2e.cli import options
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from adv2e.cli.options import Log
+    from adv2e.config import Config
+
+
+@click.command("diagnose")
+@click.argument("recording", metavar="RECORDING")
+@options.common_options
+@click.option(
+    "--without",
+    "without",
+    multiple=True,
+    metavar="EFFECT",
+    help="Leave an effect out of the library. Repeatable.",
+)
+def command(
+    recording: str,
+    config: Config,
+    output: str | None,
+    overwrite: bool,
+    without: tuple[str, ...],
+    threads: int | None,
+    progress: bool,
+    log: Log,
+) -> None:
+    """Find what a recording holds that its simulation lacks.
+
+    RECORDING holds frames and events on one clock: a DAVIS240C folder or zip, or HDF5. The
+    configuration (-c) says what is known of the camera. The events are simulated from the frames;
+    where the recording differs from all simulations by more than chance, the effect that the
+    declared model lacks is looked for, fitted, and judged on data that it was not fitted to.
+
+    DIR (-o; default: <stem>.diagnosis) gets report.html with the pictures, report.json, and
+    model.yaml, the declared model with what was found, for 'adv2e convert -c'.
+
+    \b
+    Examples:
+      adv2e diagnose recording.zip -c declared.yaml -o diagnosis
+      adv2e diagnose recording.zip -c davis346 --without flicker
+    """
+    from pathlib import Path
+
+    from adv2e.diagnosis.diagnose import diagnose
+    from adv2e.diagnosis.evidence import read_evidence
+    from adv2e.diagnosis.report import check_folder, summary_text, write_reports
+    from adv2e.pixel import is_compiled
+
+    check_names(without)
+    folder = Path(output or f"{Path(recording).stem}.diagnosis")
+    check_folder(folder, overwrite=overwrite)
+    evidence = read_evidence(recording)
+    if not is_compiled(config.pixel, config.sampling):
+        log("compiling the pixel's kernel (once; about half a minute)")
+    with _counting(progress) as count:
+        found = diagnose(
+            evidence,
+            config,
+            declared_name=", ".join(click.get_current_context().params["config_files"]),
+            without=without,
+            threads=threads,
+            progress=count,
+            log=lambda text: log(text, 1),
+        )
+    write_reports(found, folder, overwrite=overwrite)
+    log(summary_text(found))
+
+
+def check_names(names: tuple[str, ...]) -> None:
+    """Raise UsageError for an effect that the library does not have."""
+    import difflib
+
+    from adv2e.diagnosis.candidates import names as known_names
+    from adv2e.errors import UsageError
+
+    known = known_names() if names else []
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean '{near[0]}'?" if near else f"one of {', '.join(known)}"
+            raise UsageError(f"--without {name}: no such effect, {hint}")
+
+
+@contextmanager
+def _counting(shown: bool) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar of simulations done, out of those that are likely to be needed."""
+    if not shown:
+        yield lambda done, likely: None
+        return
+    from tqdm import tqdm
+
+    with tqdm(unit="simulation", leave=False) as bar:
+
+        def count(done: int, likely: int) -> None:
+            bar.total = max(likely, done)
+            bar.update(done - bar.n)
+
+        yield count

@@ -1,0 +1,407 @@
+"""The effects that may be missing, as knobs on a configuration.
+
+A candidate is an effect with the keys that are fitted for it.  Some effects have several: one key
+alone, or more of them; the plainest that does as well is taken.  An effect whose keys the
+configuration does not have is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config import Config, from_dict, to_dict
+from adv2e.config.build import all_keys
+from adv2e.parameters import Parameter
+
+Places = Sequence[float] | NDArray[np.float64]
+"""A place on each knob's scale."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One number that is fitted, and the key that it sets.
+
+    Attributes
+    ----------
+    key : str
+    low, high : float
+        Physical range.
+    log : bool
+        Fitted as its logarithm.
+    scale : float
+        Change that counts as one, for knobs that are fitted as they are.
+    part : int, optional
+        Place in a key that is a list.
+    text : str
+        How a key that is text holds the number, such as ``gamma:{}``.
+    """
+
+    key: str
+    low: float
+    high: float
+    log: bool = True
+    scale: float = 1.0
+    part: int | None = None
+    text: str = ""
+
+    def inner(self, value: float) -> float:
+        """Return where on the fitted scale `value` is."""
+        return math.log(value) if self.log else value / self.scale
+
+    def outer(self, inner: float) -> float:
+        """Return the value at a place on the fitted scale, kept in the physical range."""
+        value = math.exp(min(inner, 60.0)) if self.log else inner * self.scale
+        return min(max(value, self.low), self.high)
+
+    def at_border(self, inner: float) -> bool:
+        """Tell whether the fit has run to the end of the physical range."""
+        value = self.outer(inner)
+        return value <= self.low * (1 + 1e-9) or value >= self.high * (1 - 1e-9)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect with the keys that are fitted for it.
+
+    Attributes
+    ----------
+    name : str
+    knobs : tuple of Knob
+    probes : tuple of tuple of float
+        Values from which the fit may start.
+    extra : mapping
+        Keys that are set besides, and not fitted.
+    """
+
+    name: str
+    knobs: tuple[Knob, ...]
+    probes: tuple[tuple[float, ...], ...]
+    extra: tuple[tuple[str, Any], ...] = ()
+
+    def inner(self, values: Sequence[float]) -> list[float]:
+        """Return where on the fitted scales values of the knobs are."""
+        return [knob.inner(value) for knob, value in zip(self.knobs, values, strict=True)]
+
+    def applied(self, config: Config, inner: Places) -> Config:
+        """Return `config` with this effect."""
+        values = to_dict(config)
+        for key, value in self.extra:
+            set_key(values, key, value)
+        for knob, place in zip(self.knobs, inner, strict=True):
+            _turn(values, knob, knob.outer(place))
+        return from_dict(values, self.name)
+
+    def parameters(self, inner: Places) -> dict[str, Any]:
+        """Return the keys that this effect sets, and their values."""
+        values: dict[str, Any] = {}
+        for key, value in self.extra:
+            set_key(values, key, value)
+        for knob, place in zip(self.knobs, inner, strict=True):
+            _turn(values, knob, knob.outer(place))
+        return dict(flat(values))
+
+
+def set_key(values: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted `key` in nested mappings; a section that is null becomes one."""
+    *above, last = key.split(".")
+    for name in above:
+        if not isinstance(values.get(name), dict):
+            values[name] = {}
+        values = values[name]
+    values[last] = value
+
+
+def get_key(values: Mapping[str, Any], key: str) -> Any:
+    """Return what a dotted `key` holds, None if it or its section is absent or null."""
+    found: Any = values
+    for name in key.split("."):
+        if not isinstance(found, Mapping):
+            return None
+        found = found.get(name)
+    return found
+
+
+def flat(values: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
+    """Return nested mappings as dotted keys."""
+    result: list[tuple[str, Any]] = []
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            result += flat(value, f"{above}{name}.")
+        else:
+            result.append((f"{above}{name}", value))
+    return result
+
+
+def _turn(values: dict[str, Any], knob: Knob, value: float) -> None:
+    if knob.text:
+        set_key(values, knob.key, knob.text.format(f"{value:.6g}"))
+    elif knob.part is not None:
+        held = get_key(values, knob.key)
+        items = list(held) if isinstance(held, (list, tuple)) else [0.0, 0.0]
+        items[knob.part] = value
+        set_key(values, knob.key, items)
+    else:
+        set_key(values, knob.key, value)
+
+
+_OFF_AT_INFINITY = ("pixel.source_follower.cutoff_hz", "pixel.slew_limit.per_s")
+
+
+@lru_cache
+def _known() -> dict[str, Parameter]:
+    return {key.path: key.about for key in all_keys()}
+
+
+def about_key(key: str) -> Parameter:
+    """Return what is declared of a configuration key."""
+    return _known()[key]
+
+
+def neutral_value(config: Config, knob: Knob) -> float:
+    """Return the value of a knob at which `config` is as it was: what it holds, or nothing."""
+    held = get_key(to_dict(config), knob.key)
+    if knob.text:
+        return 1.0
+    if isinstance(held, (int, float)):
+        return float(held)
+    return math.inf if knob.key in _OFF_AT_INFINITY else 0.0
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What a look at the recording says of where fits may start.
+
+    Attributes
+    ----------
+    seconds : float
+        Length of the recording.
+    line_hz : tuple of float
+        Frequencies of the strongest lines in the rate.
+    tick_us : int
+        Largest time of which all stamps are multiples.
+    """
+
+    seconds: float
+    line_hz: tuple[float, ...]
+    tick_us: int
+
+
+def library(declared: Config, hints: Hints) -> list[Candidate]:
+    """Return all candidates for what `declared` may lack."""
+    known = _known()
+    return [one for one in _all(declared, hints) if all(key in known for key in _keys_of(one))]
+
+
+def _all(declared: Config, hints: Hints) -> list[Candidate]:
+    values = to_dict(declared)
+
+    def now(key: str, otherwise: float) -> float:
+        held = get_key(values, key)
+        return float(held) if isinstance(held, (int, float)) and held > 0 else otherwise
+
+    def times(key: str, otherwise: float, *factors: float) -> tuple[tuple[float, ...], ...]:
+        return tuple((now(key, otherwise) * factor,) for factor in factors)
+
+    made: list[Candidate] = []
+    for build in _BUILDERS:
+        made += build(now, times, values, hints)
+    return made
+
+
+def _keys_of(candidate: Candidate) -> list[str]:
+    return [knob.key for knob in candidate.knobs] + [key for key, _ in candidate.extra]
+
+
+_Now = Callable[[str, float], float]
+_Times = Callable[..., tuple[tuple[float, ...], ...]]
+
+
+def _of_the_thresholds(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
+    on = Knob("pixel.thresholds.on", 0.01, 5.0)
+    off = Knob("pixel.thresholds.off", 0.01, 5.0)
+    a, b = now(on.key, 0.2), now(off.key, 0.2)
+    drift = 0.2 / hints.seconds
+    spread = "pixel.thresholds.mismatch"
+    return [
+        Candidate("thresholds", (on,), times(on.key, 0.2, 0.8, 1.25)),
+        Candidate("thresholds", (off,), times(off.key, 0.2, 0.8, 1.25)),
+        Candidate(
+            "thresholds", (on, off), ((0.8 * a, 0.8 * b), (1.25 * a, 1.25 * b), (1.25 * a, 0.8 * b))
+        ),
+        Candidate(
+            "threshold_mismatch", (Knob(spread, 1e-3, 0.5),), times(spread, 0.02, 0.5, 2.0, 4.0)
+        ),
+        Candidate(
+            "threshold_drift",
+            (Knob("pixel.thresholds.drift_per_s", -0.9 / hints.seconds, 20.0, False, drift),),
+            ((-drift,), (drift,), (3 * drift,)),
+        ),
+    ]
+
+
+def _of_the_photoreceptor(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
+    white = Knob("pixel.low_pass.cutoff_hz", 1.0, 1e5)
+    dark = Knob("pixel.low_pass.dark_cutoff_hz", 0.05, 1e4)
+    a, b = now(white.key, 300.0), now(dark.key, 20.0)
+    return [
+        Candidate("low_pass", (white,), times(white.key, 300.0, 0.25, 0.6, 2.0)),
+        Candidate("low_pass", (dark,), times(dark.key, 20.0, 0.3, 3.0)),
+        Candidate("low_pass", (white, dark), ((0.4 * a, 0.5 * b), (2.0 * a, 2.0 * b))),
+        Candidate(
+            "dark_current",
+            (Knob("pixel.dark_current.dn", 0.02, 200.0),),
+            ((0.5,), (3.0,), (15.0,)),
+        ),
+        Candidate(
+            "source_follower",
+            (Knob("pixel.source_follower.cutoff_hz", 2.0, 1e5),),
+            ((20.0,), (60.0,), (200.0,), (600.0,)),
+        ),
+        Candidate(
+            "slew_limit",
+            (Knob("pixel.slew_limit.per_s", 0.5, 1e4),),
+            ((10.0,), (30.0,), (90.0,)),
+        ),
+        Candidate(
+            "photoreceptor_noise",
+            (Knob("pixel.photoreceptor_noise.rms", 1e-3, 0.5),),
+            tuple((f * min(now("pixel.thresholds.on", 0.2), now("pixel.thresholds.off", 0.2)),)
+                  for f in (0.12, 0.2, 0.3)),
+        ),
+    ]  # fmt: skip
+
+
+def _of_the_comparator(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
+    return [
+        Candidate(
+            "refractory",
+            (Knob("pixel.refractory.period_us", 1.0, 2e6),),
+            ((1500.0,), (5000.0,), (15000.0,)),
+        ),
+        Candidate(
+            "reset_overshoot",
+            (Knob("pixel.reset_overshoot.fraction", -0.9, 3.0, False, 0.1),),
+            ((-0.1,), (0.1,), (0.25,)),
+        ),
+        Candidate(
+            "leak", (Knob("pixel.leak.rate_hz", 1e-3, 500.0),), ((0.6,), (2.0,), (6.0,))
+        ),
+        Candidate(
+            "photo_leak",
+            (Knob("pixel.leak.photo_rate_hz", 1e-2, 1000.0),),
+            ((1.5,), (5.0,), (15.0,)),
+        ),
+        Candidate(
+            "shot_noise", (Knob("pixel.shot_noise.rate_hz", 1e-3, 500.0),),
+            ((0.3,), (3.0,), (10.0,)),
+        ),
+        Candidate(
+            "hot_pixels",
+            (
+                Knob("pixel.hot_pixels.fraction", 2e-4, 0.2),
+                Knob("pixel.hot_pixels.rate_hz", 1.0, 2e4),
+            ),
+            ((0.003, 40.0), (0.01, 150.0)),
+        ),
+        Candidate(
+            "dead_pixels", (Knob("pixel.dead_pixels.fraction", 2e-4, 0.9),), ((0.005,), (0.03,))
+        ),
+    ]  # fmt: skip
+
+
+def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
+    amplitude = Knob("readout.frame_coupling.amplitude", -2.0, 2.0, False, 0.05)
+    tau = Knob("readout.frame_coupling.tau_us", 20.0, 1e5)
+    made = [
+        Candidate(
+            "frame_coupling",
+            (amplitude, tau),
+            ((0.05, 300.0), (-0.05, 300.0), (0.05, 1200.0), (0.15, 300.0)),
+        ),
+        Candidate(
+            "readout",
+            (Knob("readout.arbiter.event_ns", 1.0, 1e6), Knob("readout.arbiter.row_ns", 1.0, 1e7)),
+            ((300.0, 3000.0), (2000.0, 10000.0), (3000.0, 30000.0)),
+        ),
+        Candidate(
+            "event_loss",
+            (Knob("readout.loss.fraction", 1e-3, 0.95, False, 0.1),),
+            ((0.05,), (0.2,), (0.45,)),
+        ),
+    ]
+    if hints.tick_us > 1:
+        tick = ("readout.tick_us", float(hints.tick_us))
+        made.append(Candidate("timestamp_tick", (), ((),), (tick,)))
+    return made
+
+
+def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
+    offset = Knob("frames.clock_offset_us", -1e6, 1e6, False, 1000.0)
+    drift = Knob("frames.clock_drift_ppm", -1e5, 1e5, False, 1000.0)
+    shift = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
+    made = [
+        Candidate(
+            "black_level",
+            (Knob("frames.black_level_dn", 0.02, 100.0),),
+            ((0.3,), (1.5,), (6.0,)),
+        ),
+        Candidate(
+            "exposure_blur", (Knob("frames.exposure_us", 100.0, 2e5),), ((4000.0,), (15000.0,))
+        ),
+        Candidate(
+            "clock_offset",
+            (offset,),
+            ((-600.0,), (600.0,), (-3000.0,), (3000.0,)),
+        ),
+        Candidate("clock_drift", (drift,), ((-1500.0,), (1500.0,), (-6000.0,), (6000.0,))),
+        Candidate(
+            "misregistration", shift, ((0.3, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.0, -0.3))
+        ),
+    ]  # fmt: skip
+    for hz in hints.line_hz:
+        depth = Knob("frames.flicker.depth", 0.005, 0.99)
+        line = ("frames.flicker.frequency_hz", float(hz))
+        made.append(Candidate("flicker", (depth,), ((0.08,), (0.25,)), (line,)))
+    made += _encodings(values)
+    return made
+
+
+def _encodings(values: Mapping[str, Any]) -> list[Candidate]:
+    declared = str(get_key(values, "frames.encoding"))
+    gamma = Knob("frames.encoding", 0.2, 5.0, text="gamma:{}")
+    if declared in ("auto", "linear"):
+        here = 1.0
+    elif declared.startswith("gamma:"):
+        here = float(declared.partition(":")[2])
+    else:
+        here = 2.2
+    return [
+        Candidate("frame_encoding", (gamma,), tuple((here * f,) for f in (0.8, 1.15, 1.5))),
+    ]
+
+
+_BUILDERS = (
+    _of_the_thresholds,
+    _of_the_photoreceptor,
+    _of_the_comparator,
+    _of_the_readout,
+    _of_the_frames,
+)
+
+
+def names() -> list[str]:
+    """Return the names of all effects that can be found."""
+    return list(dict.fromkeys(one.name for one in _all(Config(), Hints(1.0, (100.0,), 10))))
+
+
+def hints_of(times_us: np.ndarray[Any, Any], seconds: float, lines: Sequence[float]) -> Hints:
+    """Return hints from the stamps of a recording's events [us]."""
+    step = int(np.gcd.reduce(np.unique(times_us % 10_000_000))) if len(times_us) else 1
+    return Hints(seconds, tuple(lines), max(1, step))

@@ -1,0 +1,212 @@
+"""The whole diagnosis: from a recording and a declared model to what the model lacks."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e import __version__
+from adv2e.config import Config, to_dict
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.candidates import Candidate, hints_of, library
+from adv2e.diagnosis.error import error_rows, of_part
+from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.light import light_of, quantum_dn
+from adv2e.diagnosis.markers import Markers
+from adv2e.diagnosis.markers.timing import strongest_lines
+from adv2e.diagnosis.picture import Gallery
+from adv2e.diagnosis.result import Diagnosis, Finding, Rejected, Signature, Verdict
+from adv2e.diagnosis.scene import Placed, Scene
+from adv2e.diagnosis.search import LEVEL, PARTLY, Outcome, Search, State
+from adv2e.diagnosis.simulations import Laboratory, Simulator
+
+Array = NDArray[np.float64]
+
+_PILOT = 16
+_DRAWS = 12
+
+
+def diagnose(
+    evidence: Evidence,
+    declared: Config,
+    *,
+    declared_name: str = "",
+    without: Sequence[str] = (),
+    threads: int | None = None,
+    progress: Callable[[int, int], None] = lambda done, likely: None,
+    log: Callable[[str], None] = lambda text: None,
+) -> Diagnosis:
+    """Find what the declared model of a recording lacks.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    declared : Config
+        What is known of the camera.
+    declared_name : str
+        Its file, for the report.
+    without : sequence of str
+        Effects that the library is to do without.
+    threads : int, optional
+        Simulations at a time; default: all cores.  The result does not depend on it.
+    progress : callable
+        Called with the number of simulations done, and of those likely to be needed in all.
+    log : callable
+        Takes lines for people.
+
+    Returns
+    -------
+    Diagnosis
+    """
+    began = time.perf_counter()
+    light = light_of(evidence, declared)
+    scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
+    with closing(Simulator(evidence, threads or _cores(), progress)) as simulator:
+        pilot_seeds = range(10_000, 10_000 + _PILOT)
+        pilot = simulator.map(
+            lambda seed: Placed.of(simulator.stream(declared, seed), scene), pilot_seeds
+        )
+        laboratory = Laboratory(simulator, scene, Markers(scene, pilot))
+        measured = Placed.of(evidence.stream, scene)
+        observed = laboratory.markers.measure(measured)
+        hints = hints_of(
+            evidence.stream.t, evidence.seconds, strongest_lines(measured.stream, scene)
+        )
+        candidates = [one for one in library(declared, hints) if one.name not in without]
+        search = Search(laboratory, observed, declared, candidates, log)
+        outcome = search.run()
+        verdict = _verdict(search, outcome)
+        kept = outcome.state if verdict not in ("consistent", "unexplained") else search.declared
+        seeds = range(20_000, 20_000 + _DRAWS)
+        before = [Placed.of(simulator.stream(declared, seed), scene) for seed in seeds]
+        after = before
+        if kept is not search.declared:
+            after = [Placed.of(simulator.stream(kept.config, seed), scene) for seed in seeds]
+        gallery = Gallery(scene, measured, before, after)
+
+        def last(placed: Placed) -> Any:
+            return of_part(placed.stream, scene.parts, parts.LAST)
+
+        return Diagnosis(
+            verdict=verdict,
+            sentence=_sentence(verdict, kept, outcome),
+            recording=evidence.name,
+            declared=declared_name,
+            effects=[finding_of(fit) for fit in kept.fits],
+            alternatives=outcome.alternatives if kept.fits else [],
+            nuisances={},
+            rejected=_rejected(outcome, kept, candidates),
+            errors=error_rows(
+                last(measured), [last(one) for one in before], [last(one) for one in after]
+            ),
+            global_p_before=search.probability(search.declared, parts.LAST),
+            global_p_after=search.probability(kept, parts.LAST),
+            signatures=_signatures(search, observed, kept, laboratory.markers),
+            curves=gallery.curves(),
+            maps=gallery.maps(),
+            detectable=search.detectable(candidates),
+            masked=evidence.masked,
+            split=scene.parts.text(),
+            notes=evidence.notes,
+            model=to_dict(kept.config),
+            facts={
+                "sensor": f"{evidence.width}x{evidence.height}",
+                "length": f"{evidence.seconds:.3f} s",
+                "events": f"{len(evidence.stream):,}",
+                "frames": f"{len(evidence.frames):,}",
+                "simulations": f"{simulator.done:,}",
+                "time taken": f"{time.perf_counter() - began:.0f} s",
+                "adv2e": __version__,
+            },
+        )
+
+
+def _cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _verdict(search: Search, outcome: Outcome) -> Verdict:
+    if not outcome.state.fits:
+        return "consistent" if outcome.probability >= LEVEL else "unexplained"
+    if outcome.probability < LEVEL:
+        return "partly_explained" if outcome.explained >= PARTLY else "unexplained"
+    return "not_identifiable" if outcome.alternatives else "explained"
+
+
+def _sentence(verdict: Verdict, kept: State, outcome: Outcome) -> str:
+    names = " and ".join(kept.names)
+    if verdict == "consistent":
+        return (
+            "The recording is what the declared model makes: nothing is missing that can be seen."
+        )
+    if verdict == "unexplained":
+        best = " and ".join(outcome.state.names)
+        most = f" (at most {outcome.explained:.0%} of it: {best})" if best else ""
+        return f"Something is missing in the declared model that no effect known explains{most}."
+    if verdict == "partly_explained":
+        return (
+            f"The declared model lacks {names}; that explains {outcome.explained:.0%} of the"
+            " residual, and something is left."
+        )
+    if verdict == "not_identifiable":
+        others = ", ".join(outcome.alternatives)
+        return f"The declared model lacks an effect: {names}, or as well {others}."
+    return f"The declared model lacks {names}; with that, nothing is left that can be seen."
+
+
+def finding_of(fit: Fit) -> Finding:
+    """Return an effect that was added, with 95 % intervals of what was fitted."""
+    parameters = fit.candidate.parameters(fit.place)
+    interval = {}
+    spread: Any = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if fit.covariance.size else []
+    for knob, place, sd in zip(fit.candidate.knobs, fit.place, spread, strict=False):
+        name = knob.key if knob.part is None else f"{knob.key}[{knob.part}]"
+        interval[name] = (knob.outer(place - 1.96 * sd), knob.outer(place + 1.96 * sd))
+    return Finding(fit.candidate.name, parameters, interval)
+
+
+def _rejected(outcome: Outcome, kept: State, candidates: Sequence[Candidate]) -> list[Rejected]:
+    """Return the effects that were not added, in the library's order."""
+    names = list(dict.fromkeys(candidate.name for candidate in candidates))
+    held = dict(outcome.rejected)
+    if outcome.state is not kept:
+        for fit in outcome.state.fits:
+            held[fit.candidate.name] = Rejected(
+                fit.candidate.name,
+                "explains a part, but too much is left to name it",
+                fit.candidate.parameters(fit.place),
+            )
+    return [held[name] for name in names if name in held and name not in kept.names]
+
+
+def _signatures(search: Search, observed: Array, kept: State, markers: Markers) -> list[Signature]:
+    view = parts.LAST
+    before, after, scale = search.declared.models[view], kept.models[view], search.scales[view]
+    z_before, z_after = before.z(observed[view]), after.z(observed[view])
+
+    def value(mean: Array) -> Array:
+        return np.asarray(scale.mean + scale.sd * 3.0 * np.sinh(mean / 3.0))
+
+    means = value(before.mean), value(after.mean)
+    return [
+        Signature(
+            entry.name,
+            title,
+            entry.meaning,
+            float(observed[view][k]),
+            float(means[0][k]),
+            float(means[1][k]),
+            float(z_before[k]),
+            float(z_after[k]),
+        )
+        for k, (entry, title) in enumerate(zip(markers.entries, markers.titles, strict=True))
+    ]

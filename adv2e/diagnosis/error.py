@@ -1,0 +1,70 @@
+"""Distance between recording and simulations on the part of the data that is looked at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_norms
+from adv2e.diagnosis.parts import Parts
+from adv2e.diagnosis.result import ErrorRow, Estimate
+from adv2e.diagnosis.stream import Stream
+
+NAME = "distance of the signed streams, smoothed in time"
+PAIRS = 20
+"""Pairs of independent draws that the floor is the mean of."""
+
+Array = NDArray[np.float64]
+
+
+def of_part(stream: Stream, parts: Parts, part: int) -> Stream:
+    """Return the events of one part of the data."""
+    label = parts.label[parts.segment_of(stream.t), stream.pixel]
+    return stream.chosen(label == part)
+
+
+def error_rows(
+    measured: Stream, before: Sequence[Stream], after: Sequence[Stream]
+) -> list[ErrorRow]:
+    """Return the error over all scales, then at each scale.
+
+    Parameters
+    ----------
+    measured : Stream
+    before : sequence of Stream
+        Simulations of the declared model.
+    after : sequence of Stream
+        Simulations of the model found, of which the floor is made, too.
+    """
+    unit = smoothed_norms([(measured.events(), 1.0)], measured.width, SIGMAS_US)
+    to_before = np.array([_apart(measured, stream, unit) for stream in before])
+    to_after = np.array([_apart(measured, stream, unit) for stream in after])
+    between = np.array([_apart(a, b, unit) for a, b in _pairs(after)])
+    names = [NAME, *(f"{NAME} over {sigma / 1e3:g} ms" for sigma in SIGMAS_US)]
+    tables = [
+        np.column_stack([table.mean(axis=1), table]) for table in (to_before, to_after, between)
+    ]
+    return [
+        ErrorRow(name, *(_estimate(table[:, k]) for table in tables))
+        for k, name in enumerate(names)
+    ]
+
+
+def _apart(a: Stream, b: Stream, unit: Array) -> Array:
+    apart = smoothed_norms([(a.events(), 1.0), (b.events(), -1.0)], a.width, SIGMAS_US)
+    return np.asarray(apart / np.maximum(unit, 1e-12))
+
+
+def _pairs(streams: Sequence[Stream]) -> list[tuple[Stream, Stream]]:
+    """Return pairs that use every stream about as often."""
+    n = len(streams)
+    pairs = [(k, (k + gap) % n) for gap in range(1, n) for k in range(n) if k < (k + gap) % n]
+    return [(streams[a], streams[b]) for a, b in pairs[: max(PAIRS, n)]]
+
+
+def _estimate(values: Array) -> Estimate:
+    """Return the mean, and the range of the middle 95 % of the draws."""
+    low, high = np.quantile(values, [0.025, 0.975])
+    return Estimate(float(values.mean()), (float(low), float(high)))

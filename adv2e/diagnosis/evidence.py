@@ -1,0 +1,106 @@
+"""The recording that is diagnosed: frames, events, and what was set aside before anything else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.result import Masked
+from adv2e.diagnosis.stream import Stream
+from adv2e.errors import DataError
+from adv2e.events import Events
+from adv2e.recordings import read_recording
+
+LEAST_EVENTS = 1000
+"""Below that nothing can be told."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Frames and events of one recording on one clock.
+
+    Attributes
+    ----------
+    name : str
+    frames : list of (rows, columns[, 3]) arrays
+        As stored.
+    times_s : (frames,)
+        Their stamps [s].
+    stream : Stream
+        Events between the first frame and the last.
+    width, height : int
+    masked : list of Masked
+    notes : list of str
+    """
+
+    name: str
+    frames: list[NDArray[Any]]
+    times_s: NDArray[np.float64]
+    stream: Stream
+    width: int
+    height: int
+    masked: list[Masked] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def seconds(self) -> float:
+        """Length of the recording [s]."""
+        return float(self.times_s[-1] - self.times_s[0])
+
+
+def read_evidence(path: str | Path) -> Evidence:
+    """Read a recording that holds frames and events.
+
+    Raises
+    ------
+    DataError
+        It cannot be read, has no frames, fewer than three, or too few events; frames and events do
+        not overlap in time.
+    """
+    recording = read_recording(path)
+    if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
+        raise DataError(f"{path}: holds no frames, from which the events could be simulated")
+    frames, times = [], []
+    for frame in recording.frames():
+        frames.append(np.asarray(frame.image))
+        times.append(frame.t_ns * 1e-9)
+    if len(frames) < 3:
+        raise DataError(f"{path}: holds {len(frames)} frames, at least 3 are needed")
+    times_s = np.array(times)
+    if np.any(np.diff(times_s) <= 0):
+        first = int(np.argmax(np.diff(times_s) <= 0)) + 1
+        raise DataError(f"{path}: frame {first} is not later than the one before it")
+    height, width = frames[0].shape[:2]
+    if (width, height) != (recording.width, recording.height):
+        raise DataError(
+            f"{path}: frames have {width}x{height} pixels, events {recording.width}x"
+            f"{recording.height}"
+        )
+    kept, masked = _between_frames(recording.events, times_s)
+    if len(kept) < LEAST_EVENTS:
+        raise DataError(
+            f"{path}: {len(kept)} events between its first and its last frame; at least"
+            f" {LEAST_EVENTS} are needed"
+        )
+    return Evidence(
+        name=str(path),
+        frames=frames,
+        times_s=times_s,
+        stream=Stream.of(kept, width, height),
+        width=width,
+        height=height,
+        masked=masked,
+        notes=list(recording.problems),
+    )
+
+
+def _between_frames(events: Events, times_s: NDArray[np.float64]) -> tuple[Events, list[Masked]]:
+    first, last = times_s[0] * 1e6, times_s[-1] * 1e6
+    inside = (events["t"] >= first) & (events["t"] < last)
+    lost = 1.0 - float(np.count_nonzero(inside)) / max(1, len(events))
+    masked = [Masked("events before the first frame or after the last", lost)] if lost else []
+    return events[inside], masked

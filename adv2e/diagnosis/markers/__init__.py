@@ -1,0 +1,80 @@
+"""Marker statistics: numbers by which a recording can differ from its simulations.
+
+Each points to causes: numbers of events by speed and brightness to thresholds, noise and tone;
+times between events to dead time and reset; the lag to poles and clocks; and so on.  None matches
+events one to one, so noise has its place in all of them.  A group of statistics is a module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.markers.base import Entry, Group, Raw
+from adv2e.diagnosis.markers.intervals import Intervals, Runs
+from adv2e.diagnosis.markers.neighbours import Neighbours
+from adv2e.diagnosis.markers.pixels import Pixels
+from adv2e.diagnosis.markers.rates import Course, Load, Rates
+from adv2e.diagnosis.markers.stamps import Gaps, Ticks
+from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Spectrum
+from adv2e.diagnosis.scene import Placed, Scene
+
+__all__ = ["BOTH", "VIEWS", "Entry", "Markers"]
+
+BOTH = parts.COUNT
+"""The view that joins the parts for fitting and judging."""
+
+VIEWS = parts.COUNT + 1
+"""Every part of the data is a view of its own, and there is :data:`BOTH`."""
+
+
+class Markers:
+    """All groups, for one scene and one declared model.
+
+    Parameters
+    ----------
+    scene : Scene
+    pilot : sequence of Placed
+        Simulations of the declared model, from which is known what to expect.
+    """
+
+    def __init__(self, scene: Scene, pilot: Sequence[Placed]) -> None:
+        counter = Pixels(scene)
+        expected = np.mean([counter.count(placed) for placed in pilot], axis=0)
+        self.pixels = Pixels(scene, expected)
+        seconds = np.diff(scene.times_us) * 1e-6
+        events = np.mean(
+            [np.bincount(placed.interval, minlength=scene.intervals) for placed in pilot], axis=0
+        )
+        self.groups: list[Group] = [
+            Rates(),
+            Course(scene.times_us[0], scene.times_us[-1]),
+            Load(events / seconds),
+            Intervals(),
+            Intervals(at_rest=True),
+            Runs(),
+            Lag(scene),
+            Drift(scene),
+            Shift(scene),
+            Phase(scene),
+            Spectrum(scene),
+            Ticks(),
+            Gaps(),
+            Neighbours(),
+            self.pixels,
+        ]
+        self.entries: list[Entry] = [entry for group in self.groups for entry in group.entries]
+        self.least = np.array([group.least for group in self.groups for _ in group.entries])
+        self.titles: list[str] = [group.title for group in self.groups for _ in group.entries]
+
+    def measure(self, placed: Placed) -> NDArray[np.float64]:
+        """Return all statistics of a stream, (views, statistics)."""
+        columns = []
+        for group in self.groups:
+            raw: Raw = group.count(placed)
+            views = [*raw, raw[parts.FIT] + raw[parts.JUDGE]]
+            columns.append(np.array([group.values(view) for view in views]))
+        return np.concatenate(columns, axis=1)

@@ -1,0 +1,294 @@
+"""When events come after the change that makes them, and where: lag, drift of the clock, shift."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.markers.base import LIGHT_NAMES, Entry, Raw, counts, share
+from adv2e.diagnosis.scene import BRIGHTNESSES, Placed, Scene
+from adv2e.diagnosis.stream import Stream
+
+LAGS_MS = (-20.0, -8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+_PAIRS_MS = ((-2.0, 4.0), (-8.0, 16.0))
+
+
+class _Slopes:
+    """Change of log light about events, bounded so that single large steps do not decide."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        moving = np.abs(scene.slope[scene.speed > 0])
+        typical = float(np.median(moving)) if moving.size else 1.0
+        self.bounded = scene.slope / (np.abs(scene.slope) + np.float32(max(typical, 1e-6)))
+
+    def at(self, placed: Placed, lag_ms: float) -> NDArray[np.floating[Any]]:
+        """Return the change `lag_ms` before each event, in the event's direction."""
+        stream = placed.stream
+        interval = self.scene.interval_of(stream.t, lag_ms * 1e3)
+        return self.bounded[interval, stream.pixel] * (2 * stream.on - 1)
+
+
+class Lag:
+    """Mean change of light before and after an event, in the event's direction, by brightness."""
+
+    title = "lag behind the light"
+    least = 0.002
+
+    def __init__(self, scene: Scene) -> None:
+        self._slopes = _Slopes(scene)
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        return [
+            Entry(
+                f"change {lag:g} ms before, {light}",
+                f"mean change of log light {lag:g} ms before an event in its direction, bounded to"
+                f" 1, in {light} places",
+            )
+            for lag in LAGS_MS
+            for light in LIGHT_NAMES
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        number = counts(placed.part, placed.brightness, BRIGHTNESSES)
+        sums = [
+            counts(placed.part, placed.brightness, BRIGHTNESSES, self._slopes.at(placed, lag))
+            for lag in LAGS_MS
+        ]
+        return np.concatenate([number, *sums], axis=1)
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics."""
+        number = raw[:BRIGHTNESSES]
+        return share(raw[BRIGHTNESSES:].reshape(-1, BRIGHTNESSES), number).ravel()
+
+
+class Drift:
+    """Change of the lag from segment to segment of the recording."""
+
+    title = "course of the lag"
+    least = 0.002
+
+    def __init__(self, scene: Scene) -> None:
+        self._slopes = _Slopes(scene)
+        self._segments = scene.parts.segments
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        return [
+            Entry(
+                f"lag {b:g} less {a:g} ms, time {k + 1}/{self._segments}",
+                f"mean change of log light {b:g} ms before an event less that at {a:g} ms, in part"
+                f" {k + 1} of {self._segments} of the time",
+            )
+            for a, b in _PAIRS_MS
+            for k in range(self._segments)
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        columns = [counts(placed.part, placed.segment, self._segments)]
+        for a, b in _PAIRS_MS:
+            difference = self._slopes.at(placed, b) - self._slopes.at(placed, a)
+            columns.append(counts(placed.part, placed.segment, self._segments, difference))
+        return np.concatenate(columns, axis=1)
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics."""
+        number, sums = raw[: self._segments], raw[self._segments :]
+        return share(sums.reshape(-1, self._segments), number).ravel()
+
+
+class Shift:
+    """Whether the change that makes events lies beside them."""
+
+    title = "place of the change"
+    least = 0.002
+
+    _LAGS_MS = (2.0, 10.0)
+
+    def __init__(self, scene: Scene) -> None:
+        self._slopes = _Slopes(scene)
+        h, w = scene.height, scene.width
+        place = np.arange(h * w).reshape(h, w)
+        self._beside = [
+            (np.roll(place, -1, axis).ravel(), np.roll(place, 1, axis).ravel()) for axis in (1, 0)
+        ]
+        inside = np.zeros((h, w), bool)
+        inside[1:-1, 1:-1] = True
+        self._inside = inside.ravel()
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        return [
+            Entry(
+                f"change {side} of the event, {lag:g} ms before",
+                f"mean change of log light one pixel {side} of an event less that on the other"
+                f" side, {lag:g} ms before it, in its direction",
+            )
+            for lag in self._LAGS_MS
+            for side in ("right", "below")
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        stream, scene = placed.stream, self._slopes.scene
+        used = self._inside[stream.pixel]
+        pixel, part = stream.pixel[used], placed.part[used]
+        sign = 2 * stream.on[used] - 1
+        zero = np.zeros(len(part), np.int64)
+        columns = [counts(part, zero, 1)]
+        for lag in self._LAGS_MS:
+            interval = scene.interval_of(stream.t, lag * 1e3)[used]
+            for after, before in self._beside:
+                slope = self._slopes.bounded
+                beside = slope[interval, after[pixel]] - slope[interval, before[pixel]]
+                columns.append(counts(part, zero, 1, beside * sign))
+        return np.concatenate(columns, axis=1)
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics."""
+        return share(raw[1:], raw[0])
+
+
+class Phase:
+    """Numbers of events by their place between two frames."""
+
+    title = "place between frames"
+    least = 0.3
+
+    _STEPS = 10
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        return [
+            Entry(
+                f"{p} events, {where}, {k * 10}-{k * 10 + 10} % after a frame",
+                f"number of {p} events {where} in that part of the time between frames",
+            )
+            for k in range(self._STEPS)
+            for where in ("at rest", "in motion")
+            for p in ("OFF", "ON")
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        times = self._scene.times_us
+        begin = times[placed.interval]
+        phase = (placed.stream.t - begin) / (times[placed.interval + 1] - begin)
+        step = np.clip((phase * self._STEPS).astype(np.int64), 0, self._STEPS - 1)
+        cell = (step * 2 + (placed.speed > 0)) * 2 + placed.stream.on
+        return counts(placed.part, cell, self._STEPS * 4)
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics: shares of the events of their kind, relative to chance."""
+        number = raw.reshape(self._STEPS, 4)
+        whole = number.sum(axis=0)
+        return np.asarray((number - whole / self._STEPS) / np.sqrt(whole / self._STEPS + 1)).ravel()
+
+
+class Spectrum:
+    """Lines in the rate of the whole sensor, as lamps on the mains make."""
+
+    title = "lines in the rate"
+    least = 0.2
+
+    BIN_US = 1000
+    _BANDS_HZ = ((30, 90), (90, 99), (99, 101), (101, 119), (119, 121), (121, 240), (240, 490))
+
+    def __init__(self, scene: Scene) -> None:
+        self._start = scene.times_us[0]
+        self._bins = max(64, int((scene.times_us[-1] - self._start) // self.BIN_US))
+        self.hz = np.fft.rfftfreq(self._bins, self.BIN_US * 1e-6)
+        rate = 1e6 * scene.intervals / (scene.times_us[-1] - self._start)
+        # what keeps time with the frames has statistics of its own
+        self.free = np.abs(self.hz / rate - np.round(self.hz / rate)) * rate > 1.5
+        self.free |= self.hz < rate - 2.0
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        return [
+            Entry(
+                f"line in the {kind} rate, {low}-{high} Hz",
+                f"strongest line of the {kind} rate between {low} and {high} Hz over what is"
+                " beside it, as a logarithm",
+            )
+            for kind in ("total", "signed")
+            for low, high in self._BANDS_HZ
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        stream = placed.stream
+        step = ((stream.t - self._start) // self.BIN_US).astype(np.int64)
+        step = np.clip(step, 0, self._bins - 1)
+        total = counts(placed.part, step, self._bins)
+        signed = counts(placed.part, step, self._bins, 2.0 * stream.on - 1.0)
+        return np.concatenate([total, signed], axis=1)
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics."""
+        power = [self._prominence(rate) for rate in raw.reshape(2, -1)]
+        result = []
+        for line in power:
+            for low, high in self._BANDS_HZ:
+                band = line[(self.hz >= low) & (self.hz <= high) & self.free]
+                result.append(float(band.max()) if band.size else 0.0)
+        return np.array(result)
+
+    def _prominence(self, rate: Raw) -> NDArray[np.float64]:
+        """Return log power less that of the frequencies beside."""
+        window = np.hanning(self._bins)
+        power = np.abs(np.fft.rfft((rate - rate.mean()) * window)) ** 2 + 1.0
+        log = np.log(power)
+        reach = max(3, int(np.searchsorted(self.hz, 12.0)))
+        padded = np.pad(log, reach, mode="reflect")
+        around = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+        return np.asarray(log - np.median(around, axis=1))
+
+
+_LINES = 2
+_LOWEST_LINE_HZ = 30.0
+
+
+def strongest_lines(stream: Stream, scene: Scene) -> tuple[float, ...]:
+    """Return the frequencies [Hz] of the strongest lines in the rate of a stream."""
+    spectrum = Spectrum(scene)
+    start, stop = scene.times_us[0], scene.times_us[-1]
+    bins = int((stop - start) // Spectrum.BIN_US)
+    padding = 8
+    hz = np.fft.rfftfreq(padding * bins, Spectrum.BIN_US * 1e-6)
+    usable = (hz > _LOWEST_LINE_HZ) & np.interp(hz, spectrum.hz, spectrum.free).astype(bool)
+    found: list[float] = []
+    for sign in (np.ones(len(stream)), 2.0 * stream.on - 1.0):
+        step = np.minimum((stream.t - start) // Spectrum.BIN_US, bins - 1).astype(np.int64)
+        rate = np.bincount(step, sign, minlength=bins)
+        rate = (rate - rate.mean()) * np.hanning(bins)
+        power = np.log(np.abs(np.fft.rfft(rate, padding * bins)) ** 2 + 1.0)
+        beside = np.median(
+            np.lib.stride_tricks.sliding_window_view(
+                np.pad(power, 16 * padding, mode="reflect"), 32 * padding + 1
+            ),
+            axis=1,
+        )
+        line = np.where(usable, power - beside, -np.inf)
+        for _ in range(_LINES):
+            best = float(hz[np.argmax(line)])
+            line[np.abs(hz - best) < 5.0] = -np.inf
+            if all(abs(best - other) > 2.0 for other in found):
+                found.append(best)
+    return tuple(found)

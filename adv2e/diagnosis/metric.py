@@ -1,0 +1,170 @@
+r"""How far a recording is from simulations, in terms of what chance makes.
+
+Statistics are first put in deviations of the declared model and compressed,
+
+.. math:: c = 3\,\mathrm{asinh}\!\left(\frac{s - m_0}{3\,\sigma_0}\right),
+
+so that one statistic that hardly varies cannot decide alone.  A model is then a mean and a
+deviation for each, with the correlations of the declared model, shrunk towards none; what it says
+of a recording is a Gaussian likelihood (synthetic likelihood [1]_), and whether chance can make a
+misfit as large is told by simulations left out of the mean (leave-one-out).
+
+References
+----------
+.. [1] S. N. Wood, "Statistical inference for noisy nonlinear ecological dynamic systems", Nature
+   466, 2010, doi:10.1038/nature09319.
+.. [2] P. H. Westfall, S. S. Young, "Resampling-Based Multiple Testing", Wiley 1993 (the largest of
+   many statistics against the largest of each simulation).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_SHRINK = 0.5
+_LEAST_SD = 0.25
+_KNEE = 3.0
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The declared model's mean and deviation of each statistic, and their correlations.
+
+    Attributes
+    ----------
+    mean, sd : (statistics,)
+    correlation : (statistics, statistics)
+        Shrunk.
+    """
+
+    mean: Array
+    sd: Array
+    correlation: Array
+
+    @classmethod
+    def of(cls, sample: Array, least: Array) -> Scale:
+        """Return the scale of simulations, (seeds, statistics).
+
+        Parameters
+        ----------
+        sample : (seeds, statistics)
+        least : (statistics,)
+            Least deviation: what hardly varies is not known that well either.
+        """
+        mean, sd = sample.mean(axis=0), np.maximum(sample.std(axis=0, ddof=1), least)
+        scaled = _compressed((sample - mean) / sd)
+        scaled /= np.maximum(scaled.std(axis=0, ddof=1), 1e-9)
+        scaled -= scaled.mean(axis=0)
+        correlation = (1.0 - _SHRINK) * (scaled.T @ scaled) / (len(sample) - 1)
+        np.fill_diagonal(correlation, 1.0)
+        return cls(mean, sd, correlation)
+
+    def of_values(self, values: Array) -> Array:
+        """Return statistics (..., statistics) in compressed deviations."""
+        return _compressed((values - self.mean) / self.sd)
+
+    @cached_property
+    def whitening(self) -> Array:
+        """Matrix that takes compressed deviations to uncorrelated ones."""
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.correlation)))
+
+
+def _compressed(z: Array) -> Array:
+    return np.asarray(_KNEE * np.arcsinh(z / _KNEE))
+
+
+@dataclass(frozen=True)
+class Model:
+    """What simulations of one model say: mean and deviation on the scale of the declared one.
+
+    Attributes
+    ----------
+    scale : Scale
+    sample : (seeds, statistics)
+        Simulations, in compressed deviations.
+    """
+
+    scale: Scale
+    sample: Array
+
+    @classmethod
+    def of(cls, scale: Scale, sample: Array) -> Model:
+        """Return the model of simulations, (seeds, statistics) as measured."""
+        return cls(scale, scale.of_values(sample))
+
+    @cached_property
+    def mean(self) -> Array:
+        """Mean in compressed deviations."""
+        return np.asarray(self.sample.mean(axis=0))
+
+    @cached_property
+    def sd(self) -> Array:
+        """Deviation in compressed deviations, not taken for less than a quarter."""
+        return np.asarray(np.maximum(self.sample.std(axis=0, ddof=1), _LEAST_SD))
+
+    def z(self, values: Array) -> Array:
+        """Return how far measured statistics are from this model, in its deviations."""
+        inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
+        return np.asarray((self.scale.of_values(values) - self.mean) / (self.sd * inflation))
+
+    def misfit(self, values: Array) -> float:
+        """Return the mean square of the uncorrelated deviations of measured statistics."""
+        white = self.scale.whitening @ self.z(values)
+        return float(np.mean(white * white))
+
+    def log_likelihood(self, values: Array) -> float:
+        """Return the log likelihood of measured statistics, but for a constant."""
+        white = self.scale.whitening @ self.z(values)
+        return float(-0.5 * white @ white - np.log(self.sd).sum())
+
+    @cached_property
+    def _left_out(self) -> tuple[Array, Array]:
+        """Misfit and largest deviation of each simulation against all others."""
+        n = len(self.sample)
+        total, square = self.sample.sum(axis=0), (self.sample**2).sum(axis=0)
+        misfits, largest = np.empty(n), np.empty(n)
+        for k, row in enumerate(self.sample):
+            mean = (total - row) / (n - 1)
+            variance = ((square - row**2) - (n - 1) * mean**2) / (n - 2)
+            sd = np.maximum(np.sqrt(np.maximum(variance, 0.0)), _LEAST_SD)
+            z = (row - mean) / (sd * math.sqrt(1.0 + 1.0 / (n - 1)))
+            white = self.scale.whitening @ z
+            misfits[k], largest[k] = np.mean(white * white), np.abs(z).max()
+        return misfits, largest
+
+    @cached_property
+    def floor(self) -> float:
+        """Mean misfit of simulations of this very model."""
+        return float(self._left_out[0].mean())
+
+    @cached_property
+    def spread(self) -> float:
+        """Deviation of the misfit of simulations of this very model."""
+        return float(self._left_out[0].std(ddof=1))
+
+    def probability(self, values: Array) -> float:
+        """Return how often this model makes a misfit, or a largest deviation, as large.
+
+        Twice the smaller of the two probabilities, each by rank among the simulations and, beyond
+        them, by the tail of a log-normal distribution fitted to them.
+        """
+        misfits, largest = self._left_out
+        found = (_tail(misfits, self.misfit(values)), _tail(largest, np.abs(self.z(values)).max()))
+        return min(1.0, 2.0 * min(found))
+
+
+def _tail(sample: Array, value: float) -> float:
+    """Return the probability of `value` or more under the distribution of `sample`."""
+    rank = (1.0 + np.count_nonzero(sample >= value)) / (len(sample) + 1.0)
+    if value <= sample.max():
+        return float(rank)
+    log = np.log(sample)
+    z = (math.log(value) - log.mean()) / max(float(log.std(ddof=1)), 1e-6)
+    return float(min(rank, 0.5 * math.erfc(z / math.sqrt(2.0))))

@@ -1,0 +1,89 @@
+"""Events in the form that the marker statistics read, with each event's predecessor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.events import EVENT_DTYPE, Events
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Events of a sensor, sorted by time.
+
+    Attributes
+    ----------
+    t : (n,) int64
+        Time [us].
+    pixel : (n,) int32
+        Row times columns plus column.
+    on : (n,) int8
+        1: ON, 0: OFF.
+    width, height : int
+    """
+
+    t: NDArray[np.int64]
+    pixel: NDArray[np.int32]
+    on: NDArray[np.int8]
+    width: int
+    height: int
+
+    @classmethod
+    def of(cls, events: Events, width: int, height: int) -> Stream:
+        """Return sorted `events` as a stream."""
+        pixel = events["y"].astype(np.int32) * width + events["x"]
+        return cls(events["t"].copy(), pixel, events["p"].astype(np.int8), width, height)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def between(self, start_us: float, stop_us: float) -> Stream:
+        """Return the events of a span of time."""
+        lo, hi = np.searchsorted(self.t, [start_us, stop_us])
+        return Stream(self.t[lo:hi], self.pixel[lo:hi], self.on[lo:hi], self.width, self.height)
+
+    def chosen(self, which: NDArray[np.bool_]) -> Stream:
+        """Return some of the events."""
+        return Stream(self.t[which], self.pixel[which], self.on[which], self.width, self.height)
+
+    def events(self) -> Events:
+        """Return the events in the package's own form."""
+        events = np.empty(len(self), EVENT_DTYPE)
+        events["t"], events["p"] = self.t, self.on
+        events["y"], events["x"] = np.divmod(self.pixel, self.width)
+        return events
+
+    @cached_property
+    def by_pixel(self) -> NDArray[np.int64]:
+        """Order by pixel, and by time in each."""
+        # radix sort for 16-bit numbers
+        small = self.width * self.height <= 1 << 16
+        return np.argsort(self.pixel.astype(np.uint16) if small else self.pixel, kind="stable")
+
+    @cached_property
+    def since(self) -> NDArray[np.int64]:
+        """Time since the event before it in its pixel [us]; -1: there is none."""
+        order = self.by_pixel
+        t, pixel = self.t[order], self.pixel[order]
+        gap = np.full(len(self), -1, np.int64)
+        same = pixel[1:] == pixel[:-1]
+        gap[1:][same] = (t[1:] - t[:-1])[same]
+        result = np.empty_like(gap)
+        result[order] = gap
+        return result
+
+    @cached_property
+    def on_before(self) -> NDArray[np.int8]:
+        """Polarity of the event before it in its pixel; where there is none, its own."""
+        order = self.by_pixel
+        on, pixel = self.on[order], self.pixel[order]
+        before = on.copy()
+        same = pixel[1:] == pixel[:-1]
+        before[1:][same] = on[:-1][same]
+        result = np.empty_like(before)
+        result[order] = before
+        return result
