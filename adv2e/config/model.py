@@ -17,7 +17,9 @@ from adv2e.effects.pixel.log_response import LogResponse
 from adv2e.effects.pixel.low_pass import LowPass
 from adv2e.effects.pixel.photoreceptor_noise import PhotoreceptorNoise
 from adv2e.effects.pixel.refractory import Refractory
+from adv2e.effects.pixel.reset_overshoot import ResetOvershoot
 from adv2e.effects.pixel.shot_noise import ShotNoise
+from adv2e.effects.pixel.slew_limit import SlewLimit
 from adv2e.effects.pixel.source_follower import SourceFollower
 from adv2e.effects.pixel.thresholds import Thresholds
 from adv2e.effects.readout.arbiter import Arbiter
@@ -140,9 +142,15 @@ class Pixel(Section):
     low_pass: LowPass | None = subsection(
         LowPass, meaning="first pole, follows the light", optional=True
     )
+    slew_limit: SlewLimit | None = subsection(
+        _off, meaning="slew rate of the first pole", optional=True
+    )
     source_follower: SourceFollower | None = subsection(_off, meaning="second pole", optional=True)
     thresholds: Thresholds = subsection(Thresholds, meaning="contrast thresholds")
     refractory: Refractory | None = subsection(Refractory, meaning="dead time", optional=True)
+    reset_overshoot: ResetOvershoot | None = subsection(
+        _off, meaning="reference after an event", optional=True
+    )
     leak: Leak | None = subsection(Leak, meaning="leak of the reference", optional=True)
     shot_noise: ShotNoise | None = subsection(
         ShotNoise, meaning="Poisson background events", optional=True
@@ -159,6 +167,10 @@ class Pixel(Section):
         if self.photoreceptor_noise is not None and self.low_pass is None:
             raise ConfigError(
                 "photoreceptor_noise: is band-limited by low_pass, which is null; give both or none"
+            )
+        if self.slew_limit is not None and self.low_pass is None:
+            raise ConfigError(
+                "slew_limit: limits low_pass, which is null; give both or none"
             )
 
 
