@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
 from numpy.typing import ArrayLike, NDArray
 
 from adv2e.jit import kernel

@@ -44,7 +44,8 @@ def begin(hooks: Sequence[Hooks], frames: Frames, seed: int) -> Frames:
     t_ns, light = first
     for hook in hooks:
         with blamed(hook):
-            hook.begin(View(*light.shape, seed=seed, start_s=t_ns * 1e-9))
+            rows, columns = light.shape
+            hook.begin(View(rows, columns, seed, t_ns * 1e-9))
         if overrides(hook, "light"):
             frames = _light(hook, chain([(t_ns, light)], frames), light.shape)
             t_ns, light = next(frames, (t_ns, light))

@@ -97,7 +97,7 @@ class Hooks:
     ----------
     name : str
         Of the effect; its section of the configuration is ``user.<name>``.  By default the name of
-        the class in lower case with underscores.
+        the class in lower case with underscores, less ``_hooks`` at its end.
     stage : str
         ``frames``, ``pixel`` or ``readout``: the effect comes after the package's own of that
         stage, but before the tick of the time stamps, which is always last.
@@ -125,7 +125,8 @@ class Hooks:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "name" not in vars(cls):
-            cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+            words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+            cls.name = words.removesuffix("_hooks")
 
     def __init__(self, parameters: Section | None = None, /, **values: Any) -> None:
         self.parameters: Any = self.Parameters(**values) if parameters is None else parameters

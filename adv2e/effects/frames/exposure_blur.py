@@ -2,6 +2,7 @@ r"""Exposure blur: a frame is the mean of the light over its exposure.
 
 .. math:: DN_{frame}(t) = \frac{1}{T} \int_{t - T/2}^{t + T/2} DN(\tau)\, d\tau
 """
+
 from __future__ import annotations
 
 from adv2e.effects.hooks import Frames, Hooks

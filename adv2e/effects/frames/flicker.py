@@ -74,7 +74,5 @@ class FlickerHooks(Hooks):
         p = self.parameters
         # whole turns taken off first: an epoch time would lose the phase in rounding
         turns = np.remainder(times_s * p.frequency_hz, 1.0)
-        found: NDArray[np.float64] = np.log1p(
-            p.depth * np.sin(2.0 * np.pi * turns + p.phase_rad)
-        )
+        found: NDArray[np.float64] = np.log1p(p.depth * np.sin(2.0 * np.pi * turns + p.phase_rad))
         return found

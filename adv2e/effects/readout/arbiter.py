@@ -141,7 +141,7 @@ def _serve(
                 written += 1
     channel[_FREE], channel[_HEAD], channel[_ROWS] = free, head, length
     channel[_EVENTS] = pending
-    return written
+    return int(written)
 
 
 class ArbiterHooks(Hooks):
