@@ -96,7 +96,11 @@ def build(section: type[AnySection], tree: Value, path: str = "") -> AnySection:
             raise _unknown(name, value, keys, path)
         values[name] = _value(keys[name], value)
     for key in keys.values():
-        if key.default is MISSING and key.name not in values:
+        if key.default is not MISSING or key.name in values:
+            continue
+        if key.is_section:  # which of its keys must be given is said there
+            values[key.name] = build(key.kind, Value({}, tree.origin), key.path)
+        else:
             unit = f" [{key.about.unit}]" if key.about.unit not in ("", "-") else ""
             raise tree.origin.complaint(
                 key.path, f"must be given, it has no default: {key.about.meaning}{unit}"
@@ -174,6 +178,8 @@ def _keys_text(section: type[Section]) -> str:
 
 def _unknown(name: str, value: Value, keys: dict[str, Key], path: str) -> Adv2eError:
     full = f"{path}.{name}" if path else name
+    if full == "user":
+        return value.origin.complaint(full, "effects of your own need their file: --effect FILE.py")
     return value.origin.complaint(full, f"unknown key (value {value}), {_nearest(name, keys)}")
 
 

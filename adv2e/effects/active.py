@@ -19,10 +19,11 @@ from adv2e.effects.readout.arbiter import ArbiterHooks
 from adv2e.effects.readout.event_loss import EventLossHooks
 from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
 from adv2e.effects.readout.timestamp_tick import TimestampTickHooks
+from adv2e.effects.user import user_hooks
 
 
 def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
-    """Return the effects that are on in `config`, and the `extra` ones, in signal order.
+    """Return the effects that are on in `config`, and the `extra` ones besides, in signal order.
 
     Those that are not the package's own follow its own of their stage, in the order given; the
     tick of the time stamps is the last of all.
@@ -32,6 +33,7 @@ def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
         "pixel": _of_pixel(config.pixel),
         "readout": _of_readout(config.readout, config.frames) if config.readout else [],
     }
+    extra = [*user_hooks(config), *extra]
     hooks = [hook for stage in STAGES for hook in (*own[stage], *_of_stage(extra, stage))]
     if config.readout is not None and config.readout.tick_us > 0:
         hooks.append(TimestampTickHooks(config.readout.tick_us))

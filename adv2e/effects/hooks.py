@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 import re
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -103,8 +103,11 @@ class Hooks:
         stage, but before the tick of the time stamps, which is always last.
     Parameters : type
         The class of its section.
+    source : mapping
+        Name, file and SHA-256 of the code, where it was loaded from a file.
     step_us : float
-        Longest time step that resolves `drive`, `signal` and `thresholds` [us].
+        Longest time step that resolves `drive`, `signal` and `thresholds` [us]; steps are not above
+        100 us anyway.
     parameters : Section
     view : View
         Set before anything else is called.
@@ -118,6 +121,7 @@ class Hooks:
     name: ClassVar[str] = ""
     stage: ClassVar[str] = "pixel"
     Parameters: ClassVar[type[Section]] = NoParameters
+    source: ClassVar[Mapping[str, str]] = {}
 
     step_us: float = math.inf
     view: View
