@@ -15,6 +15,32 @@ from typing import Any
 from adv2e.errors import ConfigError
 
 
+@dataclass(frozen=True)
+class Fit:
+    """Where a fit looks for a parameter, in its unit.
+
+    Attributes
+    ----------
+    low, high : float
+        Least and largest value that is tried; both are values that the parameter may have.
+    start : float
+        Where the search begins when nothing is known.
+    log : bool
+        Steps are factors rather than differences; `low` is above zero then.
+    """
+
+    low: float
+    high: float
+    start: float
+    log: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.start <= self.high or self.low == self.high:
+            raise ValueError(f"low {self.low:g} <= start {self.start:g} <= high {self.high:g}")
+        if self.log and not self.low > 0:
+            raise ValueError(f"on a logarithmic scale, low must be above 0, got {self.low:g}")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
     """What is known of one key besides its name, type and default."""
@@ -26,9 +52,13 @@ class Parameter:
     at_most: float | None = None
     choices: tuple[str, ...] | None = None
     source: str = ""
+    fit: Fit | None = None
+    """How a diagnosis may fit it; None: it does not."""
 
     def complaint(self, value: Any) -> str | None:
-        """Return what is wrong with `value`, or None."""
+        """Return what is wrong with `value`, or None; each part of a tuple is checked."""
+        if isinstance(value, tuple):
+            return next(filter(None, map(self.complaint, value)), None)
         if self.choices is not None and value not in self.choices:
             return f"must be one of {', '.join(self.choices)}, got {value!r}"
         if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -55,6 +85,7 @@ def parameter(
     at_most: float | None = None,
     choices: tuple[str, ...] | None = None,
     source: str = "",
+    fit: Fit | None = None,
 ) -> Any:
     """Declare one key of a section; without `default` the key must be given."""
     about = Parameter(
@@ -65,6 +96,7 @@ def parameter(
         at_most=at_most,
         choices=choices,
         source=source,
+        fit=fit,
     )
     return field(default=default, metadata={"parameter": about})
 

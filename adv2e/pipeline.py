@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from adv2e import __version__
 from adv2e.config import Config, to_dict
 from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.effects.user import user_sources
 from adv2e.events import Events
 from adv2e.heap import return_large_blocks
 from adv2e.overlap import ReadAhead, WriteBehind
@@ -245,10 +246,12 @@ def _holds_frames(target: str, format: str | None) -> bool:
 
 def _metadata(config: Config, recording: Source) -> dict[str, Any]:
     """Return what makes the file again, apart from the input itself."""
+    own = user_sources(config)
     return {
         "adv2e": __version__,
         "config": to_dict(config),
         "seed": config.seed,
+        **({"effects": own} if own else {}),
         "source": {
             "name": Path(recording.path).name,
             "kind": recording.kind,

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e import jit
+from adv2e.additions import Additions
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.pixel.hot_pixels import fill_first_hot_times
 from adv2e.effects.pixel.leak import fill_first_factors
@@ -89,11 +90,13 @@ def make_circuit(pixel: Pixel, sampling: Sampling, seed: int) -> Circuit:
         filtered=low_pass is not None,
         dark=corner * dark,
         per_dn=corner * (white - dark) / 255.0,
+        slew=pixel.slew_limit.per_s * _PER_US if pixel.slew_limit else 0.0,
         follower=corner * follower.cutoff_hz if follower else 0.0,
         knee=math.log(knee_dn) if knee_dn > 0 else -_NO_KNEE,
         slope=knee_dn / math.log(knee_dn) if knee_dn > 0 else 0.0,
         floor=pixel.log_response.floor,
         dead_time=pixel.refractory.period_us if pixel.refractory else 0.0,
+        overshoot=pixel.reset_overshoot.fraction if pixel.reset_overshoot else 0.0,
         leak=leak.rate_hz * _PER_US if leak else 0.0,
         photo_leak=leak.photo_rate_hz * _PER_US / 255.0 if leak else 0.0,
         leak_jitter=leak.jitter if leak else 0.0,
@@ -171,6 +174,10 @@ class PixelArray:
         Pixels a tile; the events do not depend on it.
     exact_times : bool
         Keep unrounded times (`last_times`), for tests.
+    additions : Additions, optional
+        What effects outside the kernel add to the pixels.
+    method : {"auto", "dense"}
+        How the circuit is solved: the fastest way that covers it, or in steps of time.
 
     Raises
     ------
@@ -189,6 +196,8 @@ class PixelArray:
         threads: int | None = None,
         tile: int | None = None,
         exact_times: bool = False,
+        additions: Additions | None = None,
+        method: str = "auto",
     ) -> None:
         self.rows, self.columns = first.shape
         self.pixels = self.rows * self.columns

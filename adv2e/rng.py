@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from adv2e.jit import kernel
 
@@ -28,6 +29,8 @@ HOT_CHOICE = 6
 HOT_TIME = 7
 LEAK_PERIOD = 8
 PHOTORECEPTOR = 9
+DEAD_CHOICE = 10
+LOSS = 11
 
 _LOW = np.uint64(0xFFFFFFFF)
 _M0 = np.uint64(0xD2511F53)
@@ -81,3 +84,58 @@ def normal(seed: int, stream: int, pixel: int, draw: float) -> float:
 def exponential(seed: int, stream: int, pixel: int, draw: float) -> float:
     """Return an exponential number of mean 1."""
     return -math.log(uniforms(seed, stream, pixel, draw)[0])
+
+
+@kernel
+def _fill_uniforms(
+    seed: int,
+    stream: int,
+    pixels: NDArray[np.int64],
+    draws: NDArray[np.int64],
+    out: NDArray[np.float64],
+) -> None:
+    for k in range(out.shape[0]):
+        out[k] = uniforms(seed, stream, pixels[k], draws[k])[0]
+
+
+def uniform_array(
+    seed: int, stream: int, pixels: ArrayLike, draws: ArrayLike
+) -> NDArray[np.float64]:
+    """Return uniform numbers in (0, 1) for arrays of pixels and draws, broadcast to one shape."""
+    both = np.broadcast_arrays(np.asarray(pixels, np.int64), np.asarray(draws, np.int64))
+    out = np.empty(both[0].shape)
+    # writable, too: one type for the compiled code
+    flat = [np.require(part, requirements=["C", "W"]).reshape(-1) for part in both]
+    _fill_uniforms(seed, stream, flat[0], flat[1], out.reshape(-1))
+    return out
+
+
+@kernel
+def _fill_next(
+    seed: int,
+    stream: int,
+    pixels: NDArray[np.int64],
+    numbers: NDArray[np.int64],
+    out: NDArray[np.float64],
+) -> None:
+    for k in range(out.shape[0]):
+        pixel = pixels[k]
+        out[k] = uniforms(seed, stream, pixel, numbers[pixel])[0]
+        numbers[pixel] += 1
+
+
+def next_uniforms(
+    seed: int, stream: int, pixels: NDArray[np.int64], numbers: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the next uniform number in (0, 1) of each of `pixels`, in turn.
+
+    Parameters
+    ----------
+    pixels : (n,) int64
+        Pixels, as often as they draw.
+    numbers : (pixels,) int64
+        How often each pixel has drawn before; counted on.
+    """
+    out = np.empty(pixels.size)
+    _fill_next(seed, stream, np.ascontiguousarray(pixels), numbers, out)
+    return out

@@ -12,8 +12,7 @@ True
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from typing import Any
@@ -22,10 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config.model import Config
+from adv2e.effects.active import active_hooks
+from adv2e.effects.composition import additions_of, begin, changes_light, map_events
 from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images, full_scale_of
+from adv2e.effects.hooks import Frames, Hooks
 from adv2e.errors import DataError
-from adv2e.events import Events, empty_events, sort_events
+from adv2e.events import Events
 from adv2e.intervals import Intervals
+from adv2e.ordering import InOrder
 from adv2e.pixel import PixelArray, thread_count
 from adv2e.sources.base import check_values
 
@@ -35,6 +38,7 @@ def simulate(
     times: Iterable[float],
     config: Config | None = None,
     *,
+    effects: Sequence[Hooks] = (),
     threads: int | None = None,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of frames, sorted, chunk by chunk.
@@ -48,6 +52,8 @@ def simulate(
         Time of each frame [s], increasing.
     config : Config, optional
         Default: the shipped ``adv2e.yaml``.
+    effects : sequence of Hooks, optional
+        Effects of your own, besides those of the configuration.
     threads : int, optional
         Default: all cores.  The events do not depend on it.
 
@@ -63,7 +69,9 @@ def simulate(
     """
     config = config or Config()
     raw = _Raw(frames, times, config)
-    yield from events_from_light(raw.light(), config, threads=threads, table=raw.table)
+    yield from events_from_light(
+        raw.light(), config, threads=threads, table=raw.table, effects=effects
+    )
 
 
 class _Raw:
@@ -122,29 +130,59 @@ def events_from_light(
     *,
     threads: int | None = None,
     table: NDArray[np.float32] | None = None,
+    effects: Sequence[Hooks] = (),
+    method: str = "auto",
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 
     With a `table` of 256 entries [DN], the frames are grey values of 8 bits that it decodes; then
-    `sampling.L` should be 1, as every instant looks its frames up again.
+    `sampling.L` should be 1, as every instant looks its frames up again.  `effects`: see
+    :func:`simulate`; `method`: see :class:`adv2e.pixel.PixelArray`.
 
     Raises
     ------
     DataError
         Fewer than two frames, or times that do not increase.
     """
-    source = iter(light)
-    try:
-        t_ns, first = next(source)
-    except StopIteration:
-        raise DataError("no frames: at least two are needed") from None
+    hooks = active_hooks(config, effects)
+    if table is not None and changes_light(hooks):
+        light, table = _decoded(light, table), None
+    frames = begin(hooks, iter(light), config.seed)
+    yield from map_events(hooks, _pixel_events(frames, config, hooks, threads, table, method))
+
+
+def _decoded(
+    frames: Iterable[tuple[int, NDArray[Any]]], table: NDArray[np.float32]
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    for t_ns, grey in frames:
+        yield t_ns, table.take(grey)
+
+
+def _pixel_events(
+    source: Frames,
+    config: Config,
+    hooks: Sequence[Hooks],
+    threads: int | None,
+    table: NDArray[np.float32] | None,
+    method: str,
+) -> Iterator[Events]:
+    """Yield the sorted events of all pixels, as they are before the readout."""
+    t_ns, first = next(source)
     workers = thread_count(threads)
     first_light = first if table is None else table.take(first)
+    additions = additions_of(hooks)
     pixel = PixelArray(
-        config.pixel, config.sampling, config.seed, first_light, t_ns, threads=workers
+        config.pixel,
+        config.sampling,
+        config.seed,
+        first_light,
+        t_ns,
+        threads=workers,
+        additions=additions,
+        method=method,
     )
     with ThreadPoolExecutor(workers) if workers > 1 else nullcontext() as pool:
-        order = _Order()
+        order = InOrder()
         intervals = Intervals(t_ns, first, config.sampling, threads=workers)
         for part in intervals.parts(source):
             end_us, count = (part.times_ns[-1] + 500) // 1000, 0
@@ -153,38 +191,6 @@ def events_from_light(
                 yield from order.add(events, end_us)
                 del events  # or they would stay while the next ones are made
             intervals.expect(count)
+            for hook in hooks:
+                hook.passed(part.times_ns[-1] * 1e-9)
         yield order.rest()
-
-
-def _before(events: Events, t_us: int) -> int:
-    """Return how many of the sorted events come before a time [us]."""
-    # NumPy's search would copy the column
-    return bisect_left(range(events.size), t_us, key=lambda k: int(events["t"][k]))
-
-
-class _Order:
-    """Hands events on in order; those that share the last microsecond of a chunk wait."""
-
-    def __init__(self) -> None:
-        self._held = empty_events()
-
-    def add(self, events: Events, end_us: int) -> Iterator[Events]:
-        """Yield what is in final order once `events`, sorted and up to about `end_us`, are in."""
-        if self._held.size:
-            split = _before(events, int(self._held["t"].max()) + 1)
-            border = sort_events(np.concatenate([self._held, events[:split]]))
-            keep = _before(border, end_us)
-            self._held = border[keep:]
-            if keep:
-                yield border[:keep]
-            events = events[split:]
-        keep = _before(events, end_us)
-        if keep < events.size:
-            self._held = np.concatenate([self._held, events[keep:]])
-        if keep:
-            yield events[:keep]
-
-    def rest(self) -> Events:
-        """Return the events still held."""
-        rest, self._held = self._held, empty_events()
-        return rest

@@ -49,7 +49,7 @@ class FiniteNumber(click.FloatRange):
 
 
 def config_options(body: Body) -> Body:
-    """Add -c, --set and --seed; the command gets ``config``."""
+    """Add -c, --set, --seed and --effect; the command gets ``config``."""
 
     @click.option(
         "-c",
@@ -70,17 +70,31 @@ def config_options(body: Body) -> Body:
     @click.option(
         "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all random numbers."
     )
+    @click.option(
+        "--effect",
+        "effect_files",
+        metavar="FILE.py",
+        multiple=True,
+        help="Effects of your own; their parameters are user.NAME in the configuration."
+        " Repeatable.",
+    )
     @functools.wraps(body)
     def with_config(
         *args: Any,
         config_files: tuple[str, ...],
         sets: tuple[str, ...],
         seed: int | None,
+        effect_files: tuple[str, ...],
         **kw: Any,
     ) -> Any:
         from adv2e.config import load_config
 
-        return body(*args, config=load_config(config_files, sets, seed), **kw)
+        effects = []
+        if effect_files:
+            from adv2e.effects.user import load_effects
+
+            effects = [effect for name in effect_files for effect in load_effects(name)]
+        return body(*args, config=load_config(config_files, sets, seed, effects), **kw)
 
     return with_config  # type: ignore[return-value]
 

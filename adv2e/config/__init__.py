@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from adv2e.config.build import Key, all_keys, build, keys_of
 from adv2e.config.files import read, shipped
@@ -12,6 +12,9 @@ from adv2e.config.merge import merge_all, parse_set
 from adv2e.config.model import Config
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
 from adv2e.config.yaml12 import Origin, Value
+
+if TYPE_CHECKING:
+    from adv2e.effects.hooks import Hooks
 
 __all__ = [
     "Config",
@@ -28,7 +31,10 @@ __all__ = [
 
 
 def load_config(
-    files: Sequence[str | Path] = (), sets: Sequence[str] = (), seed: int | None = None
+    files: Sequence[str | Path] = (),
+    sets: Sequence[str] = (),
+    seed: int | None = None,
+    effects: Sequence[type[Hooks]] = (),
 ) -> Config:
     """Return the defaults with `files`, then `sets`, then `seed` on top; later ones win.
 
@@ -40,6 +46,9 @@ def load_config(
         Single values, as in ``pixel.low_pass.cutoff_hz=100``.
     seed : int, optional
         Seed of all random numbers.
+    effects : sequence of classes, optional
+        Effects of your own (:class:`adv2e.effects.hooks.Hooks`); each is on, and has a section
+        ``user.<name>``.
 
     Raises
     ------
@@ -52,18 +61,26 @@ def load_config(
     if seed is not None:
         origin = Origin("--seed", on_command_line=True)
         over.append(Value({"seed": Value(seed, origin)}, origin))
-    return build(Config, merge_all([*(read(name) for name in files), *over]))
+    from adv2e.effects.user import config_class  # noqa: PLC0415 - it needs the model itself
+
+    return build(config_class(effects), merge_all([*(read(name) for name in files), *over]))
 
 
-def from_dict(values: Mapping[str, Any], name: str = "") -> Config:
+def from_dict(
+    values: Mapping[str, Any], name: str = "", effects: Sequence[type[Hooks]] = ()
+) -> Config:
     """Return the configuration that :func:`to_dict` gave `values` for, as strictly as a file.
+
+    `effects`: see :func:`load_config`.
 
     Raises
     ------
     ConfigError
         As for a file; the text begins with `name`.
     """
-    return build(Config, _tree(values, Origin(name)))
+    from adv2e.effects.user import config_class  # noqa: PLC0415 - it needs the model itself
+
+    return build(config_class(effects), _tree(values, Origin(name)))
 
 
 def _tree(values: Any, origin: Origin) -> Value:

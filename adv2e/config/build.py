@@ -14,7 +14,7 @@ from dataclasses import MISSING
 from typing import Any, TypeVar
 
 from adv2e.config.model import Config
-from adv2e.config.yaml12 import Value
+from adv2e.config.yaml12 import Value, scalar_text
 from adv2e.errors import Adv2eError, ConfigError
 from adv2e.parameters import Parameter, Section
 
@@ -30,11 +30,13 @@ class Key:
     path: str
     about: Parameter
     kind: type
-    """int, float, str, bool or the class of a section."""
+    """int, float, str, bool, tuple or the class of a section."""
     optional: bool
     """Whether the value may be null."""
     default: Any
     """The value where the key is absent; MISSING: it must be given."""
+    parts: tuple[type, ...] = ()
+    """Of a tuple: the kind of each part."""
 
     @property
     def name(self) -> str:
@@ -56,11 +58,13 @@ def keys_of(section: type[Section], path: str = "") -> tuple[Key, ...]:
         if isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union:
             (kind,) = (part for part in typing.get_args(kind) if part is not type(None))
             optional = True
+        parts = typing.get_args(kind) if typing.get_origin(kind) is tuple else ()
+        kind = tuple if parts else kind
         default = item.default
         if item.default_factory is not MISSING:
             default = item.default_factory()
         full = f"{path}.{item.name}" if path else item.name
-        keys.append(Key(full, item.metadata["parameter"], kind, optional, default))
+        keys.append(Key(full, item.metadata["parameter"], kind, optional, default, parts))
     return tuple(keys)
 
 
@@ -92,7 +96,11 @@ def build(section: type[AnySection], tree: Value, path: str = "") -> AnySection:
             raise _unknown(name, value, keys, path)
         values[name] = _value(keys[name], value)
     for key in keys.values():
-        if key.default is MISSING and key.name not in values:
+        if key.default is not MISSING or key.name in values:
+            continue
+        if key.is_section:  # which of its keys must be given is said there
+            values[key.name] = build(key.kind, Value({}, tree.origin), key.path)
+        else:
             unit = f" [{key.about.unit}]" if key.about.unit not in ("", "-") else ""
             raise tree.origin.complaint(
                 key.path, f"must be given, it has no default: {key.about.meaning}{unit}"
@@ -116,7 +124,19 @@ def _value(key: Key, value: Value) -> Any:
                 key.path, f"must be {_keys_text(key.kind)}, or null, got {value}"
             )
         return build(key.kind, value, key.path)
-    return _scalar(key, value)
+    return _tuple(key, value) if key.parts else _scalar(key, value)
+
+
+def _tuple(key: Key, value: Value) -> tuple[Any, ...]:
+    if not isinstance(value.content, list) or len(value.content) != len(key.parts):
+        raise value.origin.complaint(
+            key.path, f"must be a list of {len(key.parts)} values such as"
+            f" {scalar_text(key.default)}, got {value}"
+        )  # fmt: skip
+    return tuple(
+        _scalar(dataclasses.replace(key, path=f"{key.path}[{n}]", kind=kind, parts=()), part)
+        for n, (kind, part) in enumerate(zip(key.parts, value.content, strict=True))
+    )
 
 
 def _scalar(key: Key, value: Value) -> Any:
@@ -158,6 +178,8 @@ def _keys_text(section: type[Section]) -> str:
 
 def _unknown(name: str, value: Value, keys: dict[str, Key], path: str) -> Adv2eError:
     full = f"{path}.{name}" if path else name
+    if full == "user":
+        return value.origin.complaint(full, "effects of your own need their file: --effect FILE.py")
     return value.origin.complaint(full, f"unknown key (value {value}), {_nearest(name, keys)}")
 
 

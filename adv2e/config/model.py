@@ -8,17 +8,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from adv2e.effects.frames.encoding import check_encoding
+from adv2e.effects.frames.flicker import Flicker
+from adv2e.effects.pixel.dark_current import DarkCurrent
+from adv2e.effects.pixel.dead_pixels import DeadPixels
 from adv2e.effects.pixel.hot_pixels import HotPixels
 from adv2e.effects.pixel.leak import Leak
 from adv2e.effects.pixel.log_response import LogResponse
 from adv2e.effects.pixel.low_pass import LowPass
 from adv2e.effects.pixel.photoreceptor_noise import PhotoreceptorNoise
 from adv2e.effects.pixel.refractory import Refractory
+from adv2e.effects.pixel.reset_overshoot import ResetOvershoot
 from adv2e.effects.pixel.shot_noise import ShotNoise
+from adv2e.effects.pixel.slew_limit import SlewLimit
 from adv2e.effects.pixel.source_follower import SourceFollower
 from adv2e.effects.pixel.thresholds import Thresholds
+from adv2e.effects.readout.arbiter import Arbiter
+from adv2e.effects.readout.event_loss import EventLoss
+from adv2e.effects.readout.frame_coupling import FrameCoupling
 from adv2e.errors import ConfigError
-from adv2e.parameters import Section, parameter, subsection
+from adv2e.parameters import Fit, Section, parameter, subsection
 
 INTERPOLATIONS = ("linear", "flow")
 
@@ -42,6 +50,42 @@ class Frames(Section):
         unit="-",
         meaning="number that means white; null: from the data type (255, 65535, 1.0)",
         above=0,
+    )
+    black_level_dn: float = parameter(
+        0.0,
+        unit="DN",
+        meaning="light that the decoded frames lack at every brightness",
+        fit=Fit(-20.0, 20.0, 0.0),
+    )
+    exposure_us: float = parameter(
+        0.0,
+        unit="us",
+        meaning="time over which a frame averages the light, about its own time; 0: none",
+        at_least=0,
+        fit=Fit(0.0, 50000.0, 0.0),
+    )
+    clock_offset_us: float = parameter(
+        0.0,
+        unit="us",
+        meaning="time on the camera's clock minus stamp of the frame",
+        fit=Fit(-20000.0, 20000.0, 0.0),
+    )
+    clock_drift_ppm: float = parameter(
+        0.0,
+        unit="ppm",
+        meaning="by how much the clock of the frames is slow, from the first frame on",
+        above=-1e6,
+        fit=Fit(-20000.0, 20000.0, 0.0),
+    )
+    shift_px: tuple[float, float] = parameter(
+        (0.0, 0.0),
+        unit="px",
+        meaning="[x, y]: how far the picture in the frames lies right of and below that of the"
+        " events",
+        fit=Fit(-5.0, 5.0, 0.0),
+    )
+    flicker: Flicker | None = subsection(
+        _off, meaning="light of lamps, of which the frames know nothing", optional=True
     )
 
     def __post_init__(self) -> None:
@@ -88,6 +132,9 @@ class Pixel(Section):
         " thresholds",
         choices=("settled", "random"),
     )
+    dark_current: DarkCurrent | None = subsection(
+        _off, meaning="constant light that the frames lack", optional=True
+    )
     log_response: LogResponse = subsection(LogResponse, meaning="light to log intensity")
     photoreceptor_noise: PhotoreceptorNoise | None = subsection(
         _off, meaning="band-limited noise", optional=True
@@ -95,15 +142,24 @@ class Pixel(Section):
     low_pass: LowPass | None = subsection(
         LowPass, meaning="first pole, follows the light", optional=True
     )
+    slew_limit: SlewLimit | None = subsection(
+        _off, meaning="slew rate of the first pole", optional=True
+    )
     source_follower: SourceFollower | None = subsection(_off, meaning="second pole", optional=True)
     thresholds: Thresholds = subsection(Thresholds, meaning="contrast thresholds")
     refractory: Refractory | None = subsection(Refractory, meaning="dead time", optional=True)
+    reset_overshoot: ResetOvershoot | None = subsection(
+        _off, meaning="reference after an event", optional=True
+    )
     leak: Leak | None = subsection(Leak, meaning="leak of the reference", optional=True)
     shot_noise: ShotNoise | None = subsection(
         ShotNoise, meaning="Poisson background events", optional=True
     )
     hot_pixels: HotPixels | None = subsection(
         _off, meaning="pixels that fire by themselves", optional=True
+    )
+    dead_pixels: DeadPixels | None = subsection(
+        _off, meaning="pixels that never fire", optional=True
     )
 
     def __post_init__(self) -> None:
@@ -112,11 +168,28 @@ class Pixel(Section):
             raise ConfigError(
                 "photoreceptor_noise: is band-limited by low_pass, which is null; give both or none"
             )
+        if self.slew_limit is not None and self.low_pass is None:
+            raise ConfigError("slew_limit: limits low_pass, which is null; give both or none")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Readout(Section):
-    """What happens to events between pixel and file."""
+    """What happens to events between pixel and file, and what the readout of frames does."""
+
+    frame_coupling: FrameCoupling | None = subsection(
+        _off, meaning="disturbance of the event pixels by the readout of frames", optional=True
+    )
+    arbiter: Arbiter | None = subsection(
+        _off, meaning="one channel for the events of all rows", optional=True
+    )
+    loss: EventLoss | None = subsection(_off, meaning="events lost at random", optional=True)
+    tick_us: float = parameter(
+        0.0,
+        unit="us",
+        meaning="tick of the time stamps; 0: microseconds as they are",
+        at_least=0,
+        fit=Fit(1.0, 10000.0, 1.0, log=True),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,11 +16,14 @@ _WIDTH = 100
 
 
 def to_dict(config: Section) -> dict[str, Any]:
-    """Return the configuration as nested dictionaries of numbers, texts and None."""
-    return {
-        key.name: to_dict(value) if isinstance(value, Section) else value
-        for key, value in _entries(config, "")
-    }
+    """Return the configuration as nested dictionaries of numbers, texts, lists and None."""
+    return {key.name: _plain(value) for key, value in _entries(config, "")}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Section):
+        return to_dict(value)
+    return list(value) if isinstance(value, tuple) else value
 
 
 def to_yaml(config: Config) -> str:

@@ -231,11 +231,14 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_.:/+-]*[A-Za-z0-9_]|[A-Za-z_]")
 _WORDS_OF_1_1 = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 
 
-def scalar_text(value: Scalar) -> str:
+def scalar_text(value: Scalar | tuple[Scalar, ...]) -> str:
     """Return `value` as YAML that reads back as the same value, under YAML 1.1 and 1.2 alike.
 
-    Floats are the shortest decimal that reads back as the same number, with a point.
+    Floats are the shortest decimal that reads back as the same number, with a point.  Tuples are
+    flow sequences.
     """
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(scalar_text, value))}]"
     if value is None:
         return "null"
     if isinstance(value, bool):

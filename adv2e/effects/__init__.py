@@ -21,11 +21,15 @@ STAGES = {
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect: where its module is and which keys of the configuration are its own."""
+    """One effect: where its module is and which keys of the configuration are its own.
+
+    Module and section are named as the effect, unless it says otherwise.
+    """
 
     stage: str
     name: str
     own_paths: tuple[str, ...] = ()
+    own_module: str = ""
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -34,7 +38,8 @@ class Effect:
 
     def text(self) -> str:
         """Return the docstring of its module: physics, equation, references."""
-        module = importlib.import_module(f"adv2e.effects.{self.stage}.{self.name}")
+        name = self.own_module or self.name
+        module = importlib.import_module(f"adv2e.effects.{self.stage}.{name}")
         return inspect.getdoc(module) or ""
 
     def summary(self) -> str:
@@ -44,14 +49,29 @@ class Effect:
 
 EFFECTS = (
     Effect("frames", "encoding", ("frames.encoding", "frames.full_scale")),
+    Effect("frames", "clock_drift", ("frames.clock_drift_ppm",)),
+    Effect("frames", "clock_offset", ("frames.clock_offset_us",)),
+    Effect("frames", "black_level", ("frames.black_level_dn",)),
+    Effect("frames", "exposure_blur", ("frames.exposure_us",)),
+    Effect("frames", "misregistration", ("frames.shift_px",)),
+    Effect("frames", "flicker"),
+    Effect("pixel", "dark_current"),
     Effect("pixel", "log_response"),
     Effect("pixel", "photoreceptor_noise"),
     Effect("pixel", "low_pass"),
+    Effect("pixel", "slew_limit"),
     Effect("pixel", "source_follower"),
     Effect("pixel", "thresholds"),
+    Effect("pixel", "threshold_drift", ("pixel.thresholds.drift_per_s",)),
     Effect("pixel", "refractory"),
+    Effect("pixel", "reset_overshoot"),
     Effect("pixel", "leak"),
     Effect("pixel", "shot_noise"),
     Effect("pixel", "hot_pixels"),
+    Effect("pixel", "dead_pixels"),
+    Effect("readout", "frame_coupling"),
+    Effect("readout", "readout", ("readout.arbiter",), "arbiter"),
+    Effect("readout", "event_loss", ("readout.loss",)),
+    Effect("readout", "timestamp_tick", ("readout.tick_us",)),
 )
 """All effects, in signal order."""

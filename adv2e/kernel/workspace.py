@@ -37,11 +37,13 @@ class Circuit(NamedTuple):
     filtered: bool  # whether there is a low-pass
     dark: float  # 2 pi dark_cutoff
     per_dn: float  # 2 pi (cutoff - dark_cutoff) / 255
+    slew: float  # fastest change of the first pole a us; 0: no limit
     follower: float  # 2 pi cutoff of the second pole; 0: none
     knee: float  # log intensity at the knee; below it, light = slope x
     slope: float  # d light / d x below the knee; 0: no knee
     floor: float  # least light where there is no knee
     dead_time: float  # 0: none
+    overshoot: float  # share of the threshold by which the reference goes on at an event
     leak: float  # leak events a us from junction leakage
     photo_leak: float  # the same a us and DN
     leak_jitter: float
@@ -70,7 +72,10 @@ class Circuit(NamedTuple):
     S_LEAK_DRAW,
     S_NOISE,
     S_NOISE_DRAW,
-) = range(15)
+    S_FIRST,  # signal behind the first pole, as the stepping path keeps it
+    S_SECOND,  # the same behind the second pole
+    S_BEYOND,  # where the reference goes beyond the signal at the end of the dead time
+) = range(18)
 
 
 PIXEL_BITS = 27

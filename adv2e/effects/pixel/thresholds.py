@@ -45,6 +45,11 @@ class Thresholds(Section):
         at_least=0,
         source="v2e default",
     )
+    drift_per_s: float = parameter(
+        0.0,
+        unit="1/s",
+        meaning="growth of both thresholds a second, as a share of them at the first frame",
+    )
 
 
 @kernel

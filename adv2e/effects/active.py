@@ -1,0 +1,81 @@
+"""Which effects a configuration switches on, of those that work through hooks, in signal order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from adv2e.config.model import Config, Frames, Pixel, Readout
+from adv2e.effects import STAGES
+from adv2e.effects.frames.black_level import BlackLevelHooks
+from adv2e.effects.frames.clock_drift import ClockDriftHooks
+from adv2e.effects.frames.clock_offset import ClockOffsetHooks
+from adv2e.effects.frames.exposure_blur import ExposureBlurHooks
+from adv2e.effects.frames.flicker import FlickerHooks
+from adv2e.effects.frames.misregistration import MisregistrationHooks
+from adv2e.effects.hooks import Hooks
+from adv2e.effects.pixel.dark_current import DarkCurrentHooks
+from adv2e.effects.pixel.dead_pixels import DeadPixelsHooks
+from adv2e.effects.readout.arbiter import ArbiterHooks
+from adv2e.effects.readout.event_loss import EventLossHooks
+from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
+from adv2e.effects.readout.timestamp_tick import TimestampTickHooks
+from adv2e.effects.user import user_hooks
+
+
+def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
+    """Return the effects that are on in `config`, and the `extra` ones besides, in signal order.
+
+    Those that are not the package's own follow its own of their stage, in the order given; the
+    tick of the time stamps is the last of all.
+    """
+    own = {
+        "frames": _of_frames(config.frames),
+        "pixel": _of_pixel(config.pixel),
+        "readout": _of_readout(config.readout, config.frames) if config.readout else [],
+    }
+    extra = [*user_hooks(config), *extra]
+    hooks = [hook for stage in STAGES for hook in (*own[stage], *_of_stage(extra, stage))]
+    if config.readout is not None and config.readout.tick_us > 0:
+        hooks.append(TimestampTickHooks(config.readout.tick_us))
+    return hooks
+
+
+def _of_stage(hooks: Iterable[Hooks], stage: str) -> list[Hooks]:
+    return [hook for hook in hooks if hook.stage == stage]
+
+
+def _of_frames(frames: Frames) -> list[Hooks]:
+    hooks: list[Hooks] = []
+    if frames.clock_drift_ppm:
+        hooks.append(ClockDriftHooks(frames.clock_drift_ppm))
+    if frames.clock_offset_us:
+        hooks.append(ClockOffsetHooks(frames.clock_offset_us))
+    if frames.black_level_dn:
+        hooks.append(BlackLevelHooks(frames.black_level_dn))
+    if frames.exposure_us:
+        hooks.append(ExposureBlurHooks(frames.exposure_us))
+    if any(frames.shift_px):
+        hooks.append(MisregistrationHooks(frames.shift_px))
+    if frames.flicker is not None and frames.flicker.depth:
+        hooks.append(FlickerHooks(frames.flicker))
+    return hooks
+
+
+def _of_pixel(pixel: Pixel) -> list[Hooks]:
+    hooks: list[Hooks] = []
+    if pixel.dark_current is not None and pixel.dark_current.dn:
+        hooks.append(DarkCurrentHooks(pixel.dark_current))
+    if pixel.dead_pixels is not None and pixel.dead_pixels.fraction:
+        hooks.append(DeadPixelsHooks(pixel.dead_pixels))
+    return hooks
+
+
+def _of_readout(readout: Readout, frames: Frames) -> list[Hooks]:
+    hooks: list[Hooks] = []
+    if readout.frame_coupling is not None and readout.frame_coupling.amplitude:
+        hooks.append(FrameCouplingHooks(readout.frame_coupling, 0.5 * frames.exposure_us))
+    if readout.arbiter is not None:
+        hooks.append(ArbiterHooks(readout.arbiter))
+    if readout.loss is not None and readout.loss.fraction:
+        hooks.append(EventLossHooks(readout.loss))
+    return hooks

@@ -1,0 +1,234 @@
+"""Many effects as one: their methods called in signal order, and what they return checked."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.additions import INJECTED_DTYPE, Additions
+from adv2e.effects.hooks import Frames, Hooks, Times, View
+from adv2e.errors import Adv2eError, DataError
+from adv2e.events import EVENT_DTYPE, Events
+
+Array = NDArray[Any]
+
+
+def overrides(hook: Hooks, method: str) -> bool:
+    """Tell whether `hook` has a `method` of its own."""
+    return getattr(type(hook), method) is not getattr(Hooks, method)
+
+
+def changes_light(hooks: Iterable[Hooks]) -> bool:
+    """Tell whether any of `hooks` has to see the light of the frames."""
+    return any(overrides(hook, "light") for hook in hooks)
+
+
+def begin(hooks: Sequence[Hooks], frames: Frames, seed: int) -> Frames:
+    """Tell each effect of the recording that begins; return the frames as the pixel sees them.
+
+    Raises
+    ------
+    DataError
+        No frames, or frames of another size come out of an effect.
+    """
+    first = next(frames, None)
+    if first is None:
+        raise DataError("no frames: at least two are needed")
+    t_ns, light = first
+    for hook in hooks:
+        with blamed(hook):
+            rows, columns = light.shape
+            hook.begin(View(rows, columns, seed, t_ns * 1e-9))
+        if overrides(hook, "light"):
+            frames = _light(hook, chain([(t_ns, light)], frames), light.shape)
+            t_ns, light = next(frames, (t_ns, light))
+    return chain([(t_ns, light)], frames)
+
+
+def _light(hook: Hooks, frames: Frames, shape: tuple[int, ...]) -> Frames:
+    source = _Watched(frames)
+    with blamed(hook, source):
+        for t_ns, light in hook.light(source):
+            if np.shape(light) != shape:
+                raise DataError(
+                    f"effect {hook.name}: light: a frame of shape {np.shape(light)},"
+                    f" must be {shape} as before it"
+                )
+            yield t_ns, light
+
+
+def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
+    """Return what the effects add inside the pixel, as one; None: nothing."""
+    of = {
+        name: [hook for hook in hooks if overrides(hook, name)]
+        for name in ("drive", "signal", "thresholds", "inject")
+    }
+    if not any(of.values()):
+        return None
+    timed = [hook for name in ("drive", "signal", "thresholds") for hook in of[name]]
+    levels = of["thresholds"]
+    return Additions(
+        step_us=min((hook.step_us for hook in timed), default=np.inf),
+        drive=_sum(of["drive"], "drive") if of["drive"] else None,
+        signal=_sum(of["signal"], "signal") if of["signal"] else None,
+        on=_product(levels, 0) if levels else None,
+        off=_product(levels, 1) if levels else None,
+        inject=_merge(of["inject"]) if of["inject"] else None,
+    )
+
+
+def _sum(hooks: Sequence[Hooks], method: str) -> Callable[[Times], Array]:
+    def total(times_s: Times) -> Array:
+        values = [_timed(hook, method, times_s, lambda found: found, 0.0) for hook in hooks]
+        return _combined(np.add, values)
+
+    return total
+
+
+def _product(hooks: Sequence[Hooks], which: int) -> Callable[[Times], Array]:
+    def total(times_s: Times) -> Array:
+        values = [
+            _timed(hook, "thresholds", times_s, lambda pair: pair[which], 1.0) for hook in hooks
+        ]
+        for hook, value in zip(hooks, values, strict=True):
+            if not np.all(value > 0):
+                raise DataError(
+                    f"effect {hook.name}: thresholds: a factor of {np.min(value):g}, must be"
+                    " above 0"
+                )
+        return _combined(np.multiply, values)
+
+    return total
+
+
+def _timed(
+    hook: Hooks, method: str, times_s: Times, part: Callable[[Any], Any], neutral: float
+) -> Array:
+    """Return what a method gives at `times_s`: (n,) or (n, pixels), finite."""
+    with blamed(hook):
+        found = getattr(hook, method)(times_s)
+        if found is None:
+            return np.full(times_s.size, neutral)
+        value = np.asarray(part(found), np.float64)
+    wanted = [(times_s.size,), (times_s.size, hook.view.rows, hook.view.columns)]
+    if value.shape not in wanted:
+        raise DataError(
+            f"effect {hook.name}: {method}: shape {value.shape}, must be {wanted[0]} or"
+            f" {wanted[1]}: one value a time, or one a time and pixel"
+        )
+    if not np.all(np.isfinite(value)):
+        raise DataError(f"effect {hook.name}: {method}: values that are NaN or infinite")
+    return value.reshape(times_s.size, -1) if value.ndim == 3 else value
+
+
+def _combined(combine: Callable[[Array, Array], Array], values: Sequence[Array]) -> Array:
+    if any(value.ndim == 2 for value in values):
+        values = [value if value.ndim == 2 else value[:, None] for value in values]
+    total = values[0]
+    for value in values[1:]:
+        total = combine(total, value)
+    return total
+
+
+def _merge(hooks: Sequence[Hooks]) -> Callable[[float, float], Array]:
+    def merged(start_s: float, stop_s: float) -> Array:
+        parts = [_injected(hook, start_s, stop_s) for hook in hooks]
+        if len(parts) == 1:
+            return parts[0]
+        together = np.concatenate(parts)
+        return together[np.argsort(together["t"], kind="stable")]
+
+    return merged
+
+
+def _injected(hook: Hooks, start_s: float, stop_s: float) -> Array:
+    with blamed(hook):
+        found = np.asarray(hook.inject(start_s, stop_s))
+    if found.dtype != INJECTED_DTYPE or found.ndim != 1:
+        raise DataError(
+            f"effect {hook.name}: inject: an array of {found.dtype} and shape {found.shape}, must"
+            " be (n,) of INJECTED_DTYPE"
+        )
+    times = found["t"]
+    inside = (times >= start_s) & (times < stop_s)
+    if not (np.all(inside) and np.all(times[1:] >= times[:-1])):
+        raise DataError(
+            f"effect {hook.name}: inject: times must be sorted and from {start_s:.6f} s to before"
+            f" {stop_s:.6f} s"
+        )
+    if np.any(found["x"] >= hook.view.columns) or np.any(found["y"] >= hook.view.rows):
+        raise DataError(
+            f"effect {hook.name}: inject: x must be below {hook.view.columns} and y below"
+            f" {hook.view.rows}"
+        )
+    return found
+
+
+def map_events(hooks: Iterable[Hooks], chunks: Iterable[Events]) -> Iterator[Events]:
+    """Yield the events that leave the last of the effects."""
+    chunks = iter(chunks)
+    for hook in hooks:
+        if overrides(hook, "events"):
+            chunks = _events(hook, chunks)
+    return chunks
+
+
+def _events(hook: Hooks, chunks: Iterator[Events]) -> Iterator[Events]:
+    last = -np.inf
+    source = _Watched(chunks)
+    with blamed(hook, source):
+        for events in hook.events(source):
+            if not isinstance(events, np.ndarray) or events.dtype != EVENT_DTYPE:
+                raise DataError(f"effect {hook.name}: events: must yield arrays of EVENT_DTYPE")
+            if events.size:
+                times = events["t"]
+                if times[0] < last or np.any(times[1:] < times[:-1]):
+                    raise DataError(f"effect {hook.name}: events: times must not decrease")
+                last = times[-1]
+            yield events
+            del events  # or they would stay while the next ones are made
+
+
+class _Watched:
+    """An iterator that remembers what went wrong before it, which is no fault of who reads it."""
+
+    def __init__(self, source: Iterator[Any]) -> None:
+        self._source = source
+        self.error: Exception | None = None
+
+    def __iter__(self) -> _Watched:
+        return self
+
+    def __next__(self) -> Any:
+        try:
+            return next(self._source)
+        except StopIteration:
+            raise
+        except Exception as error:
+            self.error = error
+            raise
+
+
+@contextmanager
+def blamed(hook: Hooks, source: _Watched | None = None) -> Iterator[None]:
+    """Turn what goes wrong in code that is not the package's own into an error that says where."""
+    try:
+        yield
+    except Adv2eError:
+        raise
+    except Exception as error:
+        own = type(hook).__module__
+        if own.startswith("adv2e.") or (source is not None and error is source.error):
+            raise
+        file = str(getattr(sys.modules.get(own), "__file__", ""))
+        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+        where = f"{file}:{lines[-1]}: " if lines else ""
+        text = " ".join(str(error).split())
+        raise DataError(f"{where}effect {hook.name}: {type(error).__name__}: {text}") from error

@@ -1,0 +1,35 @@
+r"""Clock offset: the frames are stamped late or early against the events.
+
+.. math:: t = s + d
+
+with s the stamp of a frame, t the time on the camera's clock, the one of the events, and d =
+``frames.clock_offset_us``: above 0, stamps are early and the events belonging to a frame come
+later than it says.  Frames are moved before anything else, so events come out on the camera's
+clock.  Usual causes: stamps of the start or end of an exposure in place of its middle, or a
+computer's clock.
+
+References
+----------
+.. [1] J. Delmerico, T. Cieslewski, H. Rebecq, M. Faessler, D. Scaramuzza, "Are We Ready for
+   Autonomous Drone Racing? The UZH-FPV Drone Racing Dataset", ICRA 2019,
+   doi:10.1109/ICRA.2019.8793887 (offsets between clocks are estimated).
+"""
+
+from __future__ import annotations
+
+from adv2e.effects.hooks import Frames, Hooks
+
+
+class ClockOffsetHooks(Hooks):
+    """Moves all frames by `offset_us`."""
+
+    stage = "frames"
+
+    def __init__(self, offset_us: float) -> None:
+        super().__init__()
+        self._offset_ns = round(offset_us * 1e3)
+
+    def light(self, frames: Frames) -> Frames:
+        """Yield the frames at their times."""
+        for t_ns, light in frames:
+            yield t_ns + self._offset_ns, light

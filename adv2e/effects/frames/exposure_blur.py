@@ -1,0 +1,252 @@
+r"""Exposure blur: a frame is the mean of the light over its exposure, the events are sharp.
+
+.. math:: DN_{frame}(t) = \frac{1}{T} \int_{t - T/2}^{t + T/2} DN(\tau)\, d\tau
+
+with T = ``frames.exposure_us`` and t the time of the frame, the middle of its exposure.  The pixel
+sees the light itself, so what the exposure took away is put back: the light at the times of the
+frames is sought whose means are the frames.  Changes faster than 1/T are not in the frames and
+cannot come back; noise of the frames grows with what does.
+
+With B the matrix of the mean over the exposure, its rows having sum 1 and the variance T^2/12 of
+the exposure, ten steps of the Richardson-Lucy iteration are taken from the frames themselves,
+
+.. math:: y \leftarrow y \cdot \frac{B^T (DN_{frame} / B y)}{B^T 1},
+
+which stays positive and, with so few steps, leaves noise alone.  It goes through the sequence in
+blocks, each solved with a margin of at least two exposures before and behind it.
+
+References
+----------
+.. [1] W. H. Richardson, "Bayesian-Based Iterative Method of Image Restoration", JOSA 62(1), 1972,
+   doi:10.1364/JOSA.62.000055.
+.. [2] L. B. Lucy, "An iterative technique for the rectification of observed distributions",
+   Astronomical Journal 79, 1974, doi:10.1086/111605.
+.. [3] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency
+   Global Shutter Spatiotemporal Vision Sensor", IEEE JSSC 49(10), 2014,
+   doi:10.1109/JSSC.2014.2342715 (frames integrate, events do not).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.effects.hooks import Frames, Hooks
+from adv2e.jit import kernel
+
+Array = NDArray[np.float64]
+
+_ITERATIONS = 10
+_LEAST_DN = 0.05
+"""Light below this counts as this: what is zero would stay zero."""
+
+_MARGIN_EXPOSURES = 2.0
+_MARGIN_FRAMES = 6
+_BLOCK_EXPOSURES = 4.0
+_BLOCK_FRAMES = 12
+_STRIP = 1024
+"""Pixels that are solved at a time."""
+
+
+def means(times: Array, exposure: float) -> Array:
+    """Return the matrix that takes light at `times` to its means over exposures about them.
+
+    Parameters
+    ----------
+    times : (n,)
+        Increasing.
+    exposure : float
+        In the unit of `times`.
+
+    Returns
+    -------
+    (n, n)
+        Rows with sum 1 and, inside, with the variance of the exposure: a mixture of the means over
+        light that is constant about each time, and over light that is linear between them.
+    """
+    steps, lines = _means_of_steps(times, exposure), _means_of_lines(times, exposure)
+    squared = (times[None, :] - times[:, None]) ** 2
+    narrow, wide = (steps * squared).sum(axis=1), (lines * squared).sum(axis=1)
+    way = np.where(wide > narrow, wide - narrow, 1.0)
+    share = np.clip((exposure**2 / 12.0 - narrow) / way, 0.0, 1.0)[:, None]
+    return np.asarray((1.0 - share) * steps + share * lines)
+
+
+def _means_of_steps(times: Array, exposure: float) -> Array:
+    """Of light that is constant up to half-way between two times."""
+    middles = 0.5 * (times[1:] + times[:-1])
+    ends = np.concatenate([[-np.inf], middles, [np.inf]])
+    first, last = times[:, None] - 0.5 * exposure, times[:, None] + 0.5 * exposure
+    covered = np.minimum(ends[None, 1:], last) - np.maximum(ends[None, :-1], first)
+    return np.asarray(np.clip(covered, 0.0, None) / exposure)
+
+
+def _means_of_lines(times: Array, exposure: float) -> Array:
+    """Of light that is linear between the times, and constant beyond them."""
+
+    def antiderivative(at: Array) -> Array:
+        # of the hat about each time: (at, times)
+        hats = np.zeros((at.size, times.size))
+        for j, time in enumerate(times):
+            before = times[j - 1] if j else time
+            behind = times[j + 1] if j + 1 < times.size else time
+            rise, fall = time - before, behind - time
+            up = np.clip(at - before, 0.0, rise)
+            down = np.clip(at - time, 0.0, fall)
+            hats[:, j] = down
+            if rise:
+                hats[:, j] += up * up / (2.0 * rise)
+            else:
+                hats[:, j] += np.minimum(at - time, 0.0)
+            if fall:
+                hats[:, j] -= down * down / (2.0 * fall)
+            else:
+                hats[:, j] += np.maximum(at - time, 0.0)
+        return hats
+
+    half = 0.5 * exposure
+    found = antiderivative(times + half) - antiderivative(times - half)
+    return np.asarray(found / exposure)
+
+
+@kernel
+def _sharpen(
+    blurred: NDArray[Any],
+    first: NDArray[Any],
+    last: NDArray[Any],
+    weights: NDArray[Any],
+    norm: NDArray[Any],
+    iterations: int,
+    light: NDArray[Any],
+    mean: NDArray[Any],
+    factor: NDArray[Any],
+) -> None:
+    """Iterate over a strip of pixels.
+
+    Parameters
+    ----------
+    blurred : (n, pixels)
+        Frames [DN], above zero.
+    first, last : (n,) int
+        Where the weights of each row are not zero.
+    weights : (n, n), norm : (n,)
+        Rows, and sums of the columns.
+    iterations : int
+    light : (n, pixels)
+        In: where to begin.  Out: the light.
+    mean, factor : (pixels,), (n, pixels)
+        Memory to work in.
+    """
+    n, pixels = blurred.shape
+    for _ in range(iterations):
+        factor[:] = 0.0
+        for k in range(n):
+            mean[:] = 0.0
+            for j in range(first[k], last[k]):
+                weight, row = weights[k, j], light[j]
+                for p in range(pixels):
+                    mean[p] += weight * row[p]
+            now = blurred[k]
+            for p in range(pixels):
+                mean[p] = now[p] / mean[p]
+            for j in range(first[k], last[k]):
+                weight, row = weights[k, j], factor[j]
+                for p in range(pixels):
+                    row[p] += weight * mean[p]
+        for k in range(n):
+            row, now, scale = light[k], factor[k], norm[k]
+            for p in range(pixels):
+                row[p] *= now[p] * scale
+
+
+def sharpened(
+    frames: list[NDArray[Any]], times: Array, exposure: float, begin: int, end: int
+) -> list[NDArray[Any]]:
+    """Return the light at the times begin..end of frames that average it over an exposure.
+
+    Parameters
+    ----------
+    frames : list of (rows, columns)
+        The frames of a block with its margins [DN].
+    times : (frames,)
+    exposure : float
+        In the unit of `times`.
+    begin, end : int
+        Which of them are wanted.
+    """
+    matrix = means(times, exposure)
+    used = matrix > 0.0
+    first = used.argmax(axis=1)
+    last = matrix.shape[1] - used[:, ::-1].argmax(axis=1)
+    dtype = frames[0].dtype
+    weights, norm = matrix.astype(dtype), (1.0 / matrix.sum(axis=0)).astype(dtype)
+    made = [np.empty_like(frame) for frame in frames[begin:end]]
+    pixels = frames[0].size
+    for lo in range(0, pixels, _STRIP):
+        hi = min(lo + _STRIP, pixels)
+        blurred = np.stack([frame.reshape(-1)[lo:hi] for frame in frames])
+        np.maximum(blurred, dtype.type(_LEAST_DN), out=blurred)
+        light, factor = blurred.copy(), np.empty_like(blurred)
+        mean = np.empty(hi - lo, dtype)
+        _sharpen(blurred, first, last, weights, norm, _ITERATIONS, light, mean, factor)
+        for frame, row in zip(made, light[begin:end], strict=True):
+            frame.reshape(-1)[lo:hi] = row
+    return made
+
+
+class ExposureBlurHooks(Hooks):
+    """Puts back what an exposure of `exposure_us` took away."""
+
+    stage = "frames"
+
+    def __init__(self, exposure_us: float) -> None:
+        super().__init__()
+        self._exposure = exposure_us * 1e3
+
+    def light(self, frames: Frames) -> Frames:
+        """Yield the light at the times of the frames, a block at a time."""
+        held: list[tuple[int, NDArray[Any]]] = []
+        done = 0  # of those held: the margin before the block
+        for t_ns, light in frames:
+            held.append((t_ns, np.ascontiguousarray(light)))
+            end = self._block_end(held, done)
+            if end:
+                yield from self._block(held, done, end)
+                keep = self._first_of_margin(held, end)
+                del held[:keep]
+                done = end - keep
+        yield from self._block(held, done, len(held))
+
+    def _block_end(self, held: list[tuple[int, NDArray[Any]]], begin: int) -> int:
+        """Return where the block that starts at `begin` ends, 0 while frames are missing."""
+        start, newest = held[begin][0] if begin < len(held) else held[-1][0], held[-1][0]
+        span = _BLOCK_EXPOSURES * self._exposure
+        for end in range(begin + _BLOCK_FRAMES, len(held) - _MARGIN_FRAMES + 1):
+            last = held[end - 1][0]
+            if last - start >= span:
+                enough = newest - last >= _MARGIN_EXPOSURES * self._exposure
+                return end if enough else 0
+        return 0
+
+    def _first_of_margin(self, held: list[tuple[int, NDArray[Any]]], begin: int) -> int:
+        """Return the first frame that the block starting at `begin` needs before it."""
+        first = max(0, begin - _MARGIN_FRAMES)
+        while first > 0 and held[begin][0] - held[first][0] < _MARGIN_EXPOSURES * self._exposure:
+            first -= 1
+        return first
+
+    def _block(self, held: list[tuple[int, NDArray[Any]]], begin: int, end: int) -> Frames:
+        """Yield the frames begin..end of those held, sharpened."""
+        if begin == end:
+            return
+        origin = held[0][0]
+        times = np.array([t_ns - origin for t_ns, _ in held], np.float64)
+        frames = [light for _, light in held]
+        if len(frames) == 1:
+            yield held[0]
+            return
+        made = sharpened(frames, times, self._exposure, begin, end)
+        for (t_ns, _), light in zip(held[begin:end], made, strict=True):
+            yield t_ns, light

@@ -1,0 +1,78 @@
+r"""Flicker: light of lamps on the mains, of which the frames know nothing.
+
+.. math:: DN' = DN\,(1 + m \sin(2\pi f t + \varphi))
+
+with t on the camera's clock [s], f = ``frequency_hz`` that of the light (twice the mains for a lamp
+without rectifier), m = ``depth``, phi = ``phase_rad``.  It swings many times from frame to frame,
+so it is not put on the frames but added to the log intensity x between them, as
+ln(1 + m sin(2 pi f t + phi)).  That is exact where the response is logarithmic; on the linear foot
+(below ``pixel.log_response.linear_below``) the swing is that of the logarithm, too large by
+DN-dependent amounts, and with dark current or light given by other effects behind it the swing is
+that of the sum.  The corner of the low-pass does not follow the flicker: over a period its mean is
+the same, and what is left is of second order in m.
+
+References
+----------
+.. [1] Z. Wang, D. Yuan, Y. Ng, R. Mahony, "A Linear Comb Filter for Event Flicker Removal",
+   ICRA 2022, arXiv:2205.08090 (100 or 120 Hz).
+.. [2] IEEE Std 1789-2015, doi:10.1109/IEEESTD.2015.7118618 (depth: 1 to 40 per cent).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.effects.hooks import Hooks, Times
+from adv2e.parameters import Fit, Section, parameter
+
+_STEPS_PER_PERIOD = 100
+"""A straight line over a step is then off by less than 0.0005 m, some us of event time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flicker(Section):
+    """Light that swings."""
+
+    frequency_hz: float = parameter(
+        unit="Hz",
+        meaning="frequency of the light: 100 or 120 for lamps on the mains",
+        above=0,
+        at_most=1e5,
+        fit=Fit(20.0, 1000.0, 100.0, log=True),
+    )
+    depth: float = parameter(
+        unit="-",
+        meaning="amplitude of the swing, relative to the mean light",
+        at_least=0,
+        at_most=0.99,
+        fit=Fit(0.005, 0.9, 0.1, log=True),
+    )
+    phase_rad: float = parameter(
+        0.0,
+        unit="rad",
+        meaning="phase of the sine at time zero of the camera's clock",
+        fit=Fit(-math.pi, math.pi, 0.0),
+    )
+
+
+class FlickerHooks(Hooks):
+    """Adds the swing to the drive."""
+
+    stage = "frames"
+    Parameters = Flicker
+
+    def __init__(self, parameters: Flicker) -> None:
+        super().__init__(parameters)
+        self.step_us = 1e6 / (_STEPS_PER_PERIOD * parameters.frequency_hz)
+
+    def drive(self, times_s: Times) -> NDArray[np.float64]:
+        """Return the logarithm of the swing, (n,)."""
+        p = self.parameters
+        # whole turns taken off first: an epoch time would lose the phase in rounding
+        turns = np.remainder(times_s * p.frequency_hz, 1.0)
+        found: NDArray[np.float64] = np.log1p(p.depth * np.sin(2.0 * np.pi * turns + p.phase_rad))
+        return found

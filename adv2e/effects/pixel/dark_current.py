@@ -1,0 +1,45 @@
+r"""Dark current: a constant light that the frames know nothing of.
+
+.. math:: DN' = DN + d
+
+with d = ``dn`` [DN of 255].  The photodiode cannot tell dark current from photocurrent: logarithm,
+corner of the low-pass, leak by light and shot noise all see the sum.  It bounds contrast and lag in
+the dark.
+
+References
+----------
+.. [1] R. Graca, B. McReynolds, T. Delbruck, "Shining light on the DVS pixel: A tutorial and
+   discussion about biasing and optimization", CVPR Workshops 2023, arXiv:2304.04706.
+.. [2] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
+   sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848 (doubles every 6 to 8 degrees).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adv2e.effects.hooks import Frames, Hooks
+from adv2e.parameters import Fit, Section, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class DarkCurrent(Section):
+    """A constant light."""
+
+    dn: float = parameter(
+        unit="DN",
+        meaning="light that the dark current equals",
+        at_least=0,
+        fit=Fit(0.01, 50.0, 2.0, log=True),
+    )
+
+
+class DarkCurrentHooks(Hooks):
+    """Adds the constant to the light."""
+
+    Parameters = DarkCurrent
+
+    def light(self, frames: Frames) -> Frames:
+        """Yield the frames with the constant."""
+        for t_ns, light in frames:
+            yield t_ns, light + light.dtype.type(self.parameters.dn)

@@ -1,0 +1,53 @@
+"""Dead pixels: a few pixels never fire.
+
+Each pixel is dead with probability ``fraction``, drawn once from seed and pixel.  Nothing comes
+from it, whatever its light; events of a dead pixel do not reach the readout.
+
+References
+----------
+.. [1] EMVA Standard 1288, release 4.0, 2021, https://www.emva.org/standards-technology/emva-1288
+   (defect pixels).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from adv2e import rng
+from adv2e.effects.hooks import Hooks, View
+from adv2e.events import Events
+from adv2e.parameters import Fit, Section, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeadPixels(Section):
+    """Pixels that never fire."""
+
+    fraction: float = parameter(
+        unit="-",
+        meaning="share of the pixels that is dead",
+        at_least=0,
+        at_most=1,
+        fit=Fit(0.0, 0.2, 0.01),
+    )
+
+
+class DeadPixelsHooks(Hooks):
+    """Drops the events of dead pixels."""
+
+    Parameters = DeadPixels
+
+    def begin(self, view: View) -> None:
+        """Draw the dead pixels."""
+        super().begin(view)
+        pixels = np.arange(view.rows * view.columns)
+        drawn = rng.uniform_array(view.seed, rng.DEAD_CHOICE, pixels, 0)
+        self._alive = (drawn >= self.parameters.fraction).reshape(view.rows, view.columns)
+
+    def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
+        """Yield the events of the other pixels."""
+        for events in chunks:
+            yield events[self._alive[events["y"], events["x"]]]

@@ -1,0 +1,40 @@
+r"""Drift of the contrast thresholds, as biases and temperature change.
+
+.. math:: C(t) = C\,(1 + d\,t)
+
+for both thresholds of every pixel, with d = ``pixel.thresholds.drift_per_s`` and t the time since
+the first frame.  The leak keeps its speed, which is set by the thresholds at the start.
+
+References
+----------
+.. [1] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
+   sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848.
+.. [2] R. Graca, B. McReynolds, T. Delbruck, "Shining light on the DVS pixel: a tutorial and
+   discussion about biasing and optimization", CVPR Workshops 2023,
+   doi:10.1109/CVPRW59228.2023.00423 (thresholds are ratios of bias currents).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.errors import ConfigError
+
+
+def drift_factors(since_s: NDArray[np.float64], per_s: float) -> NDArray[np.float64]:
+    """Return the factor on all thresholds at times since the first frame [s], (n,).
+
+    Raises
+    ------
+    ConfigError
+        The thresholds reach zero within these times.
+    """
+    factors = 1.0 + per_s * since_s
+    if np.any(factors <= 0.0):
+        raise ConfigError(
+            f"pixel.thresholds.drift_per_s: {per_s:g} 1/s takes the thresholds to zero"
+            f" {-1.0 / per_s:.3g} s after the first frame, within the recording; must be above"
+            f" {-1.0 / float(np.max(since_s)):.3g}"
+        )
+    return factors

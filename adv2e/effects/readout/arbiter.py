@@ -1,0 +1,203 @@
+"""Arbiter: events wait for their row to be read out.
+
+One channel serves the rows one after another: when it is free it takes the row that has waited
+longest, needs ``row_ns`` to select it, latches all requests that the row then has, and sends them
+out from left to right, one each ``event_ns``.  Events are stamped as they leave.  A pixel whose
+event still waits cannot ask again: its further events are lost, which is how the readout saturates,
+at columns / (row_ns + columns event_ns) events a nanosecond and below.  The pixel does not know
+that it waits: its dead time runs from the event.
+
+References
+----------
+.. [1] K. A. Boahen, "Point-to-point connectivity between neuromorphic chips using address events",
+   IEEE TCAS II 47(5), 2000, doi:10.1109/82.842110.
+.. [2] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency
+   Global Shutter Spatiotemporal Vision Sensor", IEEE JSSC 49(10), 2014,
+   doi:10.1109/JSSC.2014.2342715 (12 million events a second).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.effects.hooks import Hooks, View
+from adv2e.events import Events, empty_events, make_events, sort_events
+from adv2e.jit import kernel
+from adv2e.ordering import InOrder
+from adv2e.parameters import Fit, Section, parameter
+
+_NOBODY = -1
+
+# entries of the record of a channel
+_FREE, _HEAD, _ROWS, _EVENTS = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arbiter(Section):
+    """One channel for the events of all rows."""
+
+    event_ns: float = parameter(
+        unit="ns",
+        meaning="time that an event takes",
+        at_least=0,
+        source="Brandli et al.: 83 ns (12 million events a second)",
+        fit=Fit(20.0, 20000.0, 200.0, log=True),
+    )
+    row_ns: float = parameter(
+        unit="ns",
+        meaning="time that the selection of a row takes",
+        at_least=0,
+        fit=Fit(20.0, 100000.0, 1000.0, log=True),
+    )
+
+
+@kernel
+def _serve(
+    time: NDArray[Any],
+    pixel: NDArray[Any],
+    polarity: NDArray[Any],
+    known: float,
+    row_us: float,
+    event_us: float,
+    columns: int,
+    channel: NDArray[Any],
+    queue: NDArray[Any],
+    asked: NDArray[Any],
+    waiting: NDArray[Any],
+    left: NDArray[Any],
+    out_time: NDArray[Any],
+    out_pixel: NDArray[Any],
+    out_polarity: NDArray[Any],
+) -> int:
+    """Take events in, and serve rows as long as all requests before their latch are known.
+
+    Parameters
+    ----------
+    time, pixel, polarity : (n,)
+        Events in order, times [us]; all of them are taken in.
+    known : float
+        Time before which no further event will come [us].
+    channel : (4,)
+        When the channel is free; first row of the queue, rows in it, events that wait.
+    queue : (rows,) int
+        Rows that wait, in a ring, in the order of their first requests.
+    asked : (rows,)
+        Time of the first request of each row that waits; below zero infinity: it does not.
+    waiting : (pixels,) int8
+        Polarity of the event that waits, or -1.
+    left : (pixels,)
+        When the last event of each pixel went out.
+
+    Returns
+    -------
+    int
+        Events written to the outputs.
+    """
+    rows = queue.shape[0]
+    arrived = np.int64(0)
+    count = time.shape[0]
+    head, length = np.int64(channel[_HEAD]), np.int64(channel[_ROWS])
+    free, pending = channel[_FREE], channel[_EVENTS]
+    written = np.int64(0)
+    while arrived < count or length > 0:
+        if length == 0 and time[arrived] <= left[pixel[arrived]]:
+            arrived += 1  # lost, and nothing waits
+            continue
+        request = asked[queue[head]] if length > 0 else time[arrived]
+        latch = max(free, request) + row_us
+        while arrived < count and time[arrived] <= latch:
+            place = pixel[arrived]
+            if time[arrived] > left[place]:
+                row = place // columns
+                if asked[row] == -np.inf:
+                    asked[row] = time[arrived]
+                    queue[(head + length) % rows] = row
+                    length += 1
+                if waiting[place] == _NOBODY:
+                    waiting[place] = polarity[arrived]
+                    pending += 1.0
+            arrived += 1
+        if latch >= known:
+            break  # others may still ask before it
+        row = queue[head]
+        head = (head + 1) % rows
+        length -= 1
+        asked[row] = -np.inf
+        free = latch
+        for place in range(row * columns, (row + 1) * columns):
+            if waiting[place] != _NOBODY:
+                free += event_us
+                left[place] = free
+                out_time[written] = free
+                out_pixel[written] = place
+                out_polarity[written] = waiting[place]
+                waiting[place] = _NOBODY
+                pending -= 1.0
+                written += 1
+    channel[_FREE], channel[_HEAD], channel[_ROWS] = free, head, length
+    channel[_EVENTS] = pending
+    return int(written)
+
+
+class ArbiterHooks(Hooks):
+    """Sends the events through one channel."""
+
+    stage = "readout"
+    Parameters = Arbiter
+
+    def begin(self, view: View) -> None:
+        """Empty the channel."""
+        super().begin(view)
+        self._channel = np.array([-np.inf, 0.0, 0.0, 0.0])
+        self._queue = np.empty(view.rows, np.int64)
+        self._asked = np.full(view.rows, -np.inf)
+        self._waiting = np.full(view.rows * view.columns, _NOBODY, np.int8)
+        self._left = np.full(view.rows * view.columns, -np.inf)
+        # counted from the first frame: an epoch time would lose nanoseconds in rounding
+        self._origin_us = round(view.start_s * 1e6)
+
+    def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
+        """Yield the events as they leave the channel."""
+        order = InOrder()
+        for events in chunks:
+            if not events.size:
+                continue
+            served = self._served(events, float(events["t"][-1] - self._origin_us))
+            if served.size:
+                yield from order.add(sort_events(served), int(served["t"][-1]))
+        yield from order.add(sort_events(self._served(empty_events(), np.inf)), _FAR_US)
+
+    def _served(self, events: Events, known_us: float) -> Events:
+        """Return what leaves the channel before `known_us`, in that order."""
+        most = events.size + int(self._channel[_EVENTS])
+        times, pixels = np.empty(most), np.empty(most, np.int64)
+        polarities = np.empty(most, np.int8)
+        count = _serve(
+            (events["t"] - self._origin_us).astype(np.float64),
+            events["y"].astype(np.int64) * self.view.columns + events["x"],
+            events["p"].astype(np.int8),
+            known_us,
+            self.parameters.row_ns * 1e-3,
+            self.parameters.event_ns * 1e-3,
+            self.view.columns,
+            self._channel,
+            self._queue,
+            self._asked,
+            self._waiting,
+            self._left,
+            times,
+            pixels,
+            polarities,
+        )
+        stamps = np.rint(times[:count]).astype(np.int64) + self._origin_us
+        y, x = np.divmod(pixels[:count], self.view.columns)
+        return make_events(stamps, x, y, polarities[:count])
+
+
+_FAR_US = np.iinfo(np.int64).max
+"""Later than any event."""

@@ -1,0 +1,54 @@
+"""Event loss: events that the readout drops at random.
+
+Each event is lost with probability ``fraction``, whatever happens to the others: the simplest model
+of full buffers between sensor and computer.  The n-th event of a pixel has a draw of its own.
+
+References
+----------
+.. [1] G. Gallego et al., "Event-based Vision: A Survey", IEEE TPAMI 44(1), 2022, arXiv:1904.08405
+   (bandwidth of the readout).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from adv2e import rng
+from adv2e.effects.hooks import Hooks, View
+from adv2e.events import Events
+from adv2e.parameters import Fit, Section, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class EventLoss(Section):
+    """Events lost at random."""
+
+    fraction: float = parameter(
+        unit="-",
+        meaning="probability with which an event is lost",
+        at_least=0,
+        at_most=1,
+        fit=Fit(0.0, 0.9, 0.1),
+    )
+
+
+class EventLossHooks(Hooks):
+    """Drops events."""
+
+    stage = "readout"
+    Parameters = EventLoss
+
+    def begin(self, view: View) -> None:
+        """Start the numbers of the events of each pixel at 0."""
+        super().begin(view)
+        self._numbers = np.zeros(view.rows * view.columns, np.int64)
+
+    def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
+        """Yield the events that are kept."""
+        for events in chunks:
+            pixels = events["y"].astype(np.int64) * self.view.columns + events["x"]
+            drawn = rng.next_uniforms(self.view.seed, rng.LOSS, pixels, self._numbers)
+            yield events[drawn >= self.parameters.fraction]

@@ -1,0 +1,66 @@
+r"""Timestamp tick: the clock that stamps the events is coarser than a microsecond.
+
+.. math:: t' = q\,\lceil t / q \rceil
+
+with q = ``readout.tick_us``: an event gets the next tick, never an earlier one.  0 leaves the
+microseconds as they are.  Ticks are multiples of q since time zero of the camera's clock, rounded
+to microseconds.
+
+References
+----------
+.. [1] E. Mueggler, H. Rebecq, G. Gallego, T. Delbruck, D. Scaramuzza, "The Event-Camera Dataset and
+   Simulator", IJRR 36(2), 2017, doi:10.1177/0278364917691115 (stamps as drivers and messages give
+   them).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.effects.hooks import Hooks
+from adv2e.events import Events, sort_events
+from adv2e.ordering import InOrder
+
+
+def ticked(times_us: NDArray[np.int64], tick_us: float) -> NDArray[np.int64]:
+    """Return the tick at or after each time [us]."""
+    if float(tick_us).is_integer():
+        tick = int(tick_us)
+        return -(-times_us // tick) * tick
+    ticks = np.ceil(times_us / tick_us - 1e-9)
+    return np.rint(ticks * tick_us).astype(np.int64)
+
+
+def estimate(times_us: NDArray[np.int64]) -> int:
+    """Return the tick that all differences between times are multiples of [us]; 0: no two differ.
+
+    Parameters
+    ----------
+    times_us : (n,) int64
+        Time stamps, in any order.
+    """
+    return int(np.gcd.reduce(np.unique(np.diff(np.unique(times_us))))) if times_us.size > 1 else 0
+
+
+class TimestampTickHooks(Hooks):
+    """Stamps events with ticks of `tick_us`."""
+
+    stage = "readout"
+
+    def __init__(self, tick_us: float) -> None:
+        super().__init__()
+        self._tick_us = tick_us
+
+    def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
+        """Yield the events at their ticks; those of the last tick wait for others of it."""
+        order = InOrder()
+        for events in chunks:
+            if not events.size:
+                continue
+            stamped = events.copy()
+            stamped["t"] = ticked(events["t"], self._tick_us)
+            yield from order.add(sort_events(stamped), int(stamped["t"][-1]))
+        yield order.rest()

@@ -1,0 +1,158 @@
+"""Effects of the user's own: classes loaded from a file, and their sections of the configuration.
+
+A configuration that knows them is of a class made for them: that of all configurations with one
+more section, ``user``, and in it a section for each effect, named after it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import inspect
+import re
+import sys
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from adv2e.config.model import Config
+from adv2e.effects import STAGES
+from adv2e.effects.hooks import Hooks
+from adv2e.errors import ConfigError
+from adv2e.parameters import Section, subsection
+
+METHODS = ("light", "drive", "signal", "thresholds", "inject", "events")
+"""The methods of which an effect overrides one at least."""
+
+
+def load_effects(path: str | Path) -> list[type[Hooks]]:
+    """Return the effects that the Python file at `path` defines, in the order written.
+
+    Raises
+    ------
+    ConfigError
+        The file is missing, is not Python, fails when it runs, or what it defines is no effect;
+        the text names the file and, where there is one, the line.
+    """
+    path = Path(path)
+    try:
+        source = path.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror or error}") from None
+    digest = hashlib.sha256(source).hexdigest()
+    module = _run(path, source, f"adv2e_effect_{digest[:16]}")
+    found = [
+        item
+        for item in vars(module).values()
+        if isinstance(item, type) and issubclass(item, Hooks) and item.__module__ == module.__name__
+    ]
+    if not found:
+        raise ConfigError(
+            f"{path}: defines no effect, which is a class derived from adv2e.effects.hooks.Hooks"
+        )
+    for effect in found:
+        wrong = _complaint(effect)
+        if wrong:
+            raise ConfigError(f"{path}:{_line(effect, source)}: class {effect.__name__}: {wrong}")
+        effect.source = {"name": effect.name, "file": path.name, "sha256": digest}
+    return found
+
+
+def _run(path: Path, source: bytes, name: str) -> ModuleType:
+    module = ModuleType(name)
+    module.__file__ = str(path)
+    # annotations of dataclasses are looked up there
+    sys.modules[name] = module
+    try:
+        exec(compile(source, str(path), "exec"), vars(module))
+    except SyntaxError as error:
+        raise ConfigError(f"{path}:{error.lineno or 1}: not Python: {error.msg}") from None
+    except Exception as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if frame.filename == str(path)]
+        text = " ".join(str(error).split())
+        raise ConfigError(
+            f"{path}:{lines[-1] if lines else 1}: {type(error).__name__}: {text}"
+        ) from error
+    return module
+
+
+def _line(effect: type[Hooks], source: bytes) -> int:
+    found = re.search(rf"^class\s+{effect.__name__}\b".encode(), source, re.MULTILINE)
+    return source[: found.start()].count(b"\n") + 1 if found else 1
+
+
+def _complaint(effect: type[Hooks]) -> str | None:
+    """Return what is wrong with an effect, or None."""
+    if not re.fullmatch(r"[a-z]\w*", effect.name):
+        return f"name: must be lower-case letters, digits and underscores, got {effect.name!r}"
+    if effect.stage not in STAGES:
+        return f"stage: must be one of {', '.join(STAGES)}, got {effect.stage!r}"
+    if not any(getattr(effect, name) is not getattr(Hooks, name) for name in METHODS):
+        return f"changes nothing: it must define one of {', '.join(METHODS)}"
+    section = effect.Parameters
+    if not (isinstance(section, type) and issubclass(section, Section)):
+        return "Parameters: must be a class derived from adv2e.parameters.Section"
+    if "__dataclass_fields__" not in vars(section):
+        return f"Parameters: {section.__name__} must be a dataclass(frozen=True, kw_only=True)"
+    for item in dataclasses.fields(section):
+        if "parameter" not in item.metadata:
+            return f"Parameters: {item.name} must be declared with parameter(unit=, meaning=)"
+    return None
+
+
+def config_class(effects: Sequence[type[Hooks]]) -> type[Config]:
+    """Return the class of configurations with a section ``user.<name>`` for each of `effects`.
+
+    An effect is on, with the defaults of its parameters, unless the configuration says otherwise.
+
+    Raises
+    ------
+    ConfigError
+        Two of them have the same name.
+    """
+    if not effects:
+        return Config
+    by_name: dict[str, type[Hooks]] = {}
+    for effect in effects:
+        if effect.name in by_name:
+            raise ConfigError(f"user.{effect.name}: two effects have this name: rename one")
+        by_name[effect.name] = effect
+    fields = [
+        (name, effect.Parameters | None, _declared(effect)) for name, effect in by_name.items()
+    ]
+    user = dataclasses.make_dataclass(
+        "User", fields, bases=(Section,), frozen=True, kw_only=True, namespace={"effects": by_name}
+    )
+    needed = any(field.default_factory is MISSING for _, _, field in fields)
+    declared = subsection(MISSING if needed else user, meaning="effects of your own")
+    return dataclasses.make_dataclass(
+        "Config", [("user", user, declared)], bases=(Config,), frozen=True, kw_only=True
+    )
+
+
+def _declared(effect: type[Hooks]) -> Any:
+    section = effect.Parameters
+    needed = any(
+        item.default is MISSING and item.default_factory is MISSING
+        for item in dataclasses.fields(section)
+    )
+    meaning = (inspect.getdoc(effect) or effect.name).partition("\n")[0]
+    return subsection(MISSING if needed else section, meaning=meaning, optional=True)
+
+
+def user_hooks(config: Config) -> list[Hooks]:
+    """Return the effects of the user's own that are on in `config`."""
+    user = getattr(config, "user", None)
+    if user is None:
+        return []
+    sections = ((effect, getattr(user, name)) for name, effect in type(user).effects.items())
+    return [effect(section) for effect, section in sections if section is not None]
+
+
+def user_sources(config: Config) -> list[Mapping[str, str]]:
+    """Return name, file and SHA-256 of each effect of the user's own that is on in `config`."""
+    return [type(hook).source for hook in user_hooks(config) if type(hook).source]

@@ -1,0 +1,52 @@
+"""Events that come nearly in order, handed on in order."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator
+
+import numpy as np
+
+from adv2e.events import Events, empty_events, sort_events
+
+
+def _before(events: Events, t_us: int) -> int:
+    """Return how many of the sorted events come before a time [us]."""
+    # NumPy's search would copy the column
+    return bisect_left(range(events.size), t_us, key=lambda k: int(events["t"][k]))
+
+
+class InOrder:
+    """Hands events on in order; those at and after the time up to which all are known wait."""
+
+    def __init__(self) -> None:
+        self._held = empty_events()
+
+    def add(self, events: Events, end_us: int) -> Iterator[Events]:
+        """Yield what is in its place for good once `events` are in.
+
+        Parameters
+        ----------
+        events : (n,) array of EVENT_DTYPE
+            Sorted; none before the `end_us` of the last call.
+        end_us : int
+            No event before this time will come any more [us].
+        """
+        if self._held.size:
+            split = _before(events, int(self._held["t"].max()) + 1)
+            border = sort_events(np.concatenate([self._held, events[:split]]))
+            keep = _before(border, end_us)
+            self._held = border[keep:]
+            if keep:
+                yield border[:keep]
+            events = events[split:]
+        keep = _before(events, end_us)
+        if keep < events.size:
+            self._held = np.concatenate([self._held, events[keep:]])
+        if keep:
+            yield events[:keep]
+
+    def rest(self) -> Events:
+        """Return the events still held."""
+        rest, self._held = self._held, empty_events()
+        return rest
