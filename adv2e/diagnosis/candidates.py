@@ -58,7 +58,7 @@ class Knob:
     def outer(self, inner: float) -> float:
         """Return the value at a place on the fitted scale, kept in the physical range."""
         value = math.exp(min(inner, 60.0)) if self.log else inner * self.scale
-        return min(max(value, self.low), self.high)
+        return float(min(max(value, self.low), self.high))
 
     def at_border(self, inner: float) -> bool:
         """Tell whether the fit has run to the end of the physical range."""
