@@ -47,6 +47,11 @@ class Evidence:
     notes: list[str] = field(default_factory=list)
 
     @property
+    def times_ns(self) -> list[int]:
+        """Stamps of the frames [ns]."""
+        return [round(t * 1e9) for t in self.times_s.tolist()]
+
+    @property
     def seconds(self) -> float:
         """Length of the recording [s]."""
         return float(self.times_s[-1] - self.times_s[0])

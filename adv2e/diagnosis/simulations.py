@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.stream import Stream
 from adv2e.events import empty_events
-from adv2e.simulation import simulate
+from adv2e.simulation import events_from_light
 
 Result = TypeVar("Result")
+
+_KEPT = 4  # sets of decoded frames
 
 
 class Simulator:
@@ -40,6 +45,8 @@ class Simulator:
     ) -> None:
         self._evidence, self._progress = evidence, progress
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
+        self._decoded: dict[Any, NDArray[np.float32]] = {}
+        self._lock = threading.Lock()
         self.done = 0
         self.likely = 0
 
@@ -50,14 +57,24 @@ class Simulator:
     def stream(self, config: Config, seed: int) -> Stream:
         """Return the events of one simulation, cut to the time of the frames."""
         evidence = self._evidence
-        chunks = simulate(
-            evidence.frames, evidence.times_s, dataclasses.replace(config, seed=seed), threads=1
-        )
+        light = zip(evidence.times_ns, self._light(config), strict=True)
+        chunks = events_from_light(light, dataclasses.replace(config, seed=seed), threads=1)
         events = np.concatenate([empty_events(), *chunks])
         self.done += 1
         self._progress(self.done, self.likely)
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
+
+    def _light(self, config: Config) -> NDArray[np.float32]:
+        """Return the light of the frames, decoded once for each way to read their numbers."""
+        frames = config.frames
+        key = (frames.encoding, frames.full_scale)
+        with self._lock:
+            if key not in self._decoded:
+                while len(self._decoded) >= _KEPT:
+                    del self._decoded[next(iter(self._decoded))]
+                self._decoded[key] = light_of(self._evidence, config)
+            return self._decoded[key]
 
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""

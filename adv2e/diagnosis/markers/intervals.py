@@ -36,7 +36,9 @@ class Intervals:
     def __init__(self, *, at_rest: bool = False) -> None:
         self._at_rest = at_rest
         borders = _REST_MS if at_rest else BORDERS_MS
-        self._borders_us = np.round(np.array(borders) * 1e3).astype(np.int64)
+        borders_us = np.round(np.array(borders) * 1e3).astype(np.int64)
+        self._longest_us = borders_us[-1]
+        self._bin_of = np.searchsorted(borders_us, np.arange(self._longest_us + 1), "right")
         self._texts = _bins_text(borders)
 
     @cached_property
@@ -59,7 +61,7 @@ class Intervals:
         used = stream.since >= 0
         if self._at_rest:
             used &= placed.speed == STILL
-        gap = np.searchsorted(self._borders_us, stream.since[used], "right")
+        gap = self._bin_of[np.minimum(stream.since[used], self._longest_us)]
         cell = gap * 4 + stream.on[used] * 2 + stream.on_before[used]
         return counts(placed.part[used], cell, len(self._texts) * 4)
 

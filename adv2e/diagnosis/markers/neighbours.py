@@ -4,38 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.markers.base import Entry, Raw, counts, stabilised
+from adv2e.diagnosis.markers.counting import since_neighbours
 from adv2e.diagnosis.scene import Placed
-from adv2e.jit import kernel
 
 _BORDERS_US = (100, 300, 1_000, 3_000, 10_000, 30_000, 100_000)
-
-
-@kernel
-def _since_neighbours(t: Any, pixel: Any, on: Any, width: int, last: Any, since: Any) -> None:
-    """Fill `since` with times to the latest event of four neighbours; `last` holds (pixels, 2)."""
-    pixels = last.shape[0]
-    for k in range(t.shape[0]):
-        i = pixel[k]
-        column = i % width
-        for same in range(2):
-            p = on[k] if same else 1 - on[k]
-            latest = np.int64(-(1 << 60))
-            if column > 0:
-                latest = max(latest, last[i - 1, p])
-            if column < width - 1:
-                latest = max(latest, last[i + 1, p])
-            if i >= width:
-                latest = max(latest, last[i - width, p])
-            if i + width < pixels:
-                latest = max(latest, last[i + width, p])
-            since[k, same] = t[k] - latest
-        last[i, on[k]] = t[k]
 
 
 class Neighbours:
@@ -65,7 +42,7 @@ class Neighbours:
         stream = placed.stream
         since = np.empty((len(stream), 2), np.int64)
         last = np.full((stream.width * stream.height, 2), -(1 << 60), np.int64)
-        _since_neighbours(stream.t, stream.pixel, stream.on, stream.width, last, since)
+        since_neighbours(stream.t, stream.pixel, stream.on, stream.width, last, since)
         cells = len(_BORDERS_US) + 1
         return np.concatenate(
             [

@@ -8,10 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.diagnosis import parts
 from adv2e.diagnosis.markers.base import Entry, Raw, counts, share, stabilised
+from adv2e.diagnosis.markers.counting import count_gaps
 from adv2e.diagnosis.scene import Placed
 
 TICKS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
+_ON_TICK = np.array([[t % tick == 0 for tick in TICKS_US] for t in range(TICKS_US[-1])], float)
 _GAPS_US = (1, 2, 3, 5, 8, 12, 20, 40, 80, 160)
 _NEAR_US = (3, 12, 40, 160)
 
@@ -32,11 +35,10 @@ class Ticks:
 
     def count(self, placed: Placed) -> Raw:
         """Return the sums of a stream, (parts, numbers)."""
-        t = placed.stream.t
-        zero = np.zeros(len(t), np.int64)
-        columns = [counts(placed.part, zero, 1)]
-        columns += [counts(placed.part, zero, 1, (t % tick == 0)) for tick in TICKS_US]
-        return np.concatenate(columns, axis=1)
+        # all ticks divide the largest one
+        rest = placed.stream.t % TICKS_US[-1]
+        number = counts(placed.part, rest, TICKS_US[-1])
+        return np.concatenate([number.sum(axis=1)[:, None], number @ _ON_TICK], axis=1)
 
     def values(self, raw: Raw) -> NDArray[np.float64]:
         """Return the statistics."""
@@ -71,17 +73,14 @@ class Gaps:
 
     def count(self, placed: Placed) -> Raw:
         """Return the sums of a stream, (parts, numbers)."""
-        stream, part = placed.stream, placed.part[1:]
-        gap = np.diff(stream.t)
-        row = stream.pixel // stream.width
-        same = row[1:] == row[:-1]
-        columns = [counts(part, np.searchsorted(_GAPS_US, gap, "right"), len(_GAPS_US) + 1)]
-        for n in _NEAR_US:
-            near = gap < n
-            zero = np.zeros(int(near.sum()), np.int64)
-            columns.append(counts(part[near], zero, 1))
-            columns.append(counts(part[near], zero, 1, same[near]))
-        return np.concatenate(columns, axis=1)
+        stream = placed.stream
+        gaps = np.zeros((parts.COUNT, len(_GAPS_US) + 1))
+        rows = np.zeros((parts.COUNT, len(_NEAR_US), 2))
+        count_gaps(
+            stream.t, stream.pixel, placed.part, stream.width,
+            np.array(_GAPS_US), np.array(_NEAR_US), gaps, rows,
+        )  # fmt: skip
+        return np.concatenate([gaps, rows.reshape(parts.COUNT, -1)], axis=1)
 
     def values(self, raw: Raw) -> NDArray[np.float64]:
         """Return the statistics."""

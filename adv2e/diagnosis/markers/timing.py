@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.diagnosis import parts
 from adv2e.diagnosis.markers.base import LIGHT_NAMES, Entry, Raw, counts, share
+from adv2e.diagnosis.markers.counting import sum_slopes, sum_slopes_beside
 from adv2e.diagnosis.scene import BRIGHTNESSES, Placed, Scene
 from adv2e.diagnosis.stream import Stream
 
@@ -26,11 +27,19 @@ class _Slopes:
         typical = float(np.median(moving)) if moving.size else 1.0
         self.bounded = scene.slope / (np.abs(scene.slope) + np.float32(max(typical, 1e-6)))
 
-    def at(self, placed: Placed, lag_ms: float) -> NDArray[np.floating[Any]]:
-        """Return the change `lag_ms` before each event, in the event's direction."""
+    def sums(
+        self, placed: Placed, cell: NDArray[np.int64], cells: int, lags_ms: Sequence[float]
+    ) -> Raw:
+        """Return the change before events, in their direction, summed: (parts, lags x cells)."""
         stream = placed.stream
-        interval = self.scene.interval_of(stream.t, lag_ms * 1e3)
-        return self.bounded[interval, stream.pixel] * (2 * stream.on - 1)
+        lags = 1e3 * np.array(lags_ms)
+        sums = np.zeros((len(lags), parts.COUNT * cells))
+        sum_slopes(
+            stream.t, stream.pixel, stream.on, placed.part * cells + cell,
+            self.scene.times_us, lags, self.bounded, sums,
+        )  # fmt: skip
+        by_part = sums.reshape(len(lags), parts.COUNT, cells).swapaxes(0, 1)
+        return np.ascontiguousarray(by_part).reshape(parts.COUNT, -1)
 
 
 class Lag:
@@ -58,11 +67,8 @@ class Lag:
     def count(self, placed: Placed) -> Raw:
         """Return the sums of a stream, (parts, numbers)."""
         number = counts(placed.part, placed.brightness, BRIGHTNESSES)
-        sums = [
-            counts(placed.part, placed.brightness, BRIGHTNESSES, self._slopes.at(placed, lag))
-            for lag in LAGS_MS
-        ]
-        return np.concatenate([number, *sums], axis=1)
+        sums = self._slopes.sums(placed, placed.brightness, BRIGHTNESSES, LAGS_MS)
+        return np.concatenate([number, sums], axis=1)
 
     def values(self, raw: Raw) -> NDArray[np.float64]:
         """Return the statistics."""
@@ -95,16 +101,16 @@ class Drift:
 
     def count(self, placed: Placed) -> Raw:
         """Return the sums of a stream, (parts, numbers)."""
-        columns = [counts(placed.part, placed.segment, self._segments)]
-        for a, b in _PAIRS_MS:
-            difference = self._slopes.at(placed, b) - self._slopes.at(placed, a)
-            columns.append(counts(placed.part, placed.segment, self._segments, difference))
-        return np.concatenate(columns, axis=1)
+        number = counts(placed.part, placed.segment, self._segments)
+        lags = [lag for pair in _PAIRS_MS for lag in pair]
+        sums = self._slopes.sums(placed, placed.segment, self._segments, lags)
+        return np.concatenate([number, sums], axis=1)
 
     def values(self, raw: Raw) -> NDArray[np.float64]:
         """Return the statistics."""
-        number, sums = raw[: self._segments], raw[self._segments :]
-        return share(sums.reshape(-1, self._segments), number).ravel()
+        number = raw[: self._segments]
+        sums = raw[self._segments :].reshape(len(_PAIRS_MS), 2, self._segments)
+        return share(sums[:, 1] - sums[:, 0], number).ravel()
 
 
 class Shift:
@@ -117,14 +123,6 @@ class Shift:
 
     def __init__(self, scene: Scene) -> None:
         self._slopes = _Slopes(scene)
-        h, w = scene.height, scene.width
-        place = np.arange(h * w).reshape(h, w)
-        self._beside = [
-            (np.roll(place, -1, axis).ravel(), np.roll(place, 1, axis).ravel()) for axis in (1, 0)
-        ]
-        inside = np.zeros((h, w), bool)
-        inside[1:-1, 1:-1] = True
-        self._inside = inside.ravel()
 
     @cached_property
     def entries(self) -> Sequence[Entry]:
@@ -142,18 +140,15 @@ class Shift:
     def count(self, placed: Placed) -> Raw:
         """Return the sums of a stream, (parts, numbers)."""
         stream, scene = placed.stream, self._slopes.scene
-        used = self._inside[stream.pixel]
-        pixel, part = stream.pixel[used], placed.part[used]
-        sign = 2 * stream.on[used] - 1
-        zero = np.zeros(len(part), np.int64)
-        columns = [counts(part, zero, 1)]
-        for lag in self._LAGS_MS:
-            interval = scene.interval_of(stream.t, lag * 1e3)[used]
-            for after, before in self._beside:
-                slope = self._slopes.bounded
-                beside = slope[interval, after[pixel]] - slope[interval, before[pixel]]
-                columns.append(counts(part, zero, 1, beside * sign))
-        return np.concatenate(columns, axis=1)
+        x, y = stream.pixel % scene.width, stream.pixel // scene.width
+        used = (x > 0) & (y > 0) & (x < scene.width - 1) & (y < scene.height - 1)
+        number = np.bincount(placed.part[used], minlength=parts.COUNT)
+        sums = np.zeros((2 * len(self._LAGS_MS), parts.COUNT))
+        sum_slopes_beside(
+            stream.t, stream.pixel, stream.on, placed.part, scene.width, scene.height,
+            scene.times_us, 1e3 * np.array(self._LAGS_MS), self._slopes.bounded, sums,
+        )  # fmt: skip
+        return np.concatenate([number[:, None], sums.T], axis=1)
 
     def values(self, raw: Raw) -> NDArray[np.float64]:
         """Return the statistics."""
