@@ -15,8 +15,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.jit import kernel
+from adv2e.kernel import special
 
 # Streams: one for each kind of draw; never renumber, or old seeds give other events.
 ON_THRESHOLD = 1
@@ -28,6 +30,7 @@ HOT_CHOICE = 6
 HOT_TIME = 7
 LEAK_PERIOD = 8
 PHOTORECEPTOR = 9
+PHOTORECEPTOR_STEPS = 10
 
 _LOW = np.uint64(0xFFFFFFFF)
 _M0 = np.uint64(0xD2511F53)
@@ -81,3 +84,52 @@ def normal(seed: int, stream: int, pixel: int, draw: float) -> float:
 def exponential(seed: int, stream: int, pixel: int, draw: float) -> float:
     """Return an exponential number of mean 1."""
     return -math.log(uniforms(seed, stream, pixel, draw)[0])
+
+
+_SIN = (1.0, -1 / 6, 1 / 120, -1 / 5040, 1 / 362880, -1 / 39916800)
+_COS = (1.0, -1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800, 1 / 479001600)
+_HALF_PI = 0.5 * math.pi
+
+
+@kernel
+def _cos_sin(turns: float) -> tuple[float, float]:
+    """Cosine and sine of 2 pi turns, 0 <= turns <= 1, good to 1e-11, for loops over pixels."""
+    quarter = np.floor(4.0 * turns + 0.5)
+    t = (4.0 * turns - quarter) * _HALF_PI
+    g = t * t
+    s = _SIN[2] + g * (_SIN[3] + g * (_SIN[4] + g * _SIN[5]))
+    s = t * (_SIN[0] + g * (_SIN[1] + g * s))
+    c = _COS[3] + g * (_COS[4] + g * (_COS[5] + g * _COS[6]))
+    c = _COS[0] + g * (_COS[1] + g * (_COS[2] + g * c))
+    odd = (quarter == 1.0) | (quarter == 3.0)
+    x, y = (s, c) if odd else (c, s)
+    x = -x if (quarter == 1.0) | (quarter == 2.0) else x
+    y = -y if (quarter == 2.0) | (quarter == 3.0) else y
+    return x, y
+
+
+@kernel
+def normals_of_four(
+    seed: int, stream: int, first: int, count: int, block: int, out: NDArray[np.float64]
+) -> None:
+    """Draw four standard normal numbers for each of the pixels first.. into `out`, (4, count..).
+
+    One block of Philox and two pairs of Box and Muller a pixel, from uniforms of 32 bits: tails
+    end at 6.8.
+    """
+    s, d = np.uint64(seed), np.uint64(block)
+    low, high, k0, k1 = d & _LOW, d >> _32, s & _LOW, s >> _32
+    scale = 1.0 / 4294967296.0
+    a, b, c, e = out[0], out[1], out[2], out[3]
+    for k in range(count):
+        w0, w1, w2, w3 = philox(
+            np.uint64(first + k) & _LOW, np.uint64(stream), low, high, k0, k1
+        )
+        r = math.sqrt(-2.0 * special.log((np.float64(w0) + 0.5) * scale))
+        x, y = _cos_sin((np.float64(w1) + 0.5) * scale)
+        a[k] = r * x
+        b[k] = r * y
+        r = math.sqrt(-2.0 * special.log((np.float64(w2) + 0.5) * scale))
+        x, y = _cos_sin((np.float64(w3) + 0.5) * scale)
+        c[k] = r * x
+        e[k] = r * y
