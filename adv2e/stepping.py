@@ -119,9 +119,7 @@ class Stepping:
             )  # fmt: skip
             yield run, self._injected(times[0], times[-1])
 
-    def _cuts(
-        self, pieces: int, steps: NDArray[np.int64]
-    ) -> Iterator[tuple[int, int, int, int]]:
+    def _cuts(self, pieces: int, steps: NDArray[np.int64]) -> Iterator[tuple[int, int, int, int]]:
         """Yield first interval and step, and those before which they end, of runs of blocks."""
         most = max(1, _VALUES // max(1, self._width))
         begin, taken, border = (0, 0), 0, (0, 0)

@@ -121,9 +121,7 @@ class Pixel(Section):
                 "photoreceptor_noise: is band-limited by low_pass, which is null; give both or none"
             )
         if self.slew_limit is not None and self.low_pass is None:
-            raise ConfigError(
-                "slew_limit: limits low_pass, which is null; give both or none"
-            )
+            raise ConfigError("slew_limit: limits low_pass, which is null; give both or none")
 
 
 @dataclass(frozen=True, kw_only=True)

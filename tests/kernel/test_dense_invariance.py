@@ -1,4 +1,4 @@
-"""The stepping path gives the same bytes for any division of the work, and what must always hold."""
+"""The stepping path: the same bytes for any division of the work, and what must always hold."""
 
 import numpy as np
 import pytest
@@ -92,7 +92,10 @@ def test_noise_does_not_depend_on_other_effects():
     noisy = {key: EVERYTHING[key] for key in ("shot_noise", "hot_pixels")}
     plain = run(quiet(**noisy), light)
     assert len(plain) > 20
-    for more in ({"slew_limit": NEW["slew_limit"]}, {"reset_overshoot": ResetOvershoot(fraction=0.0)}):
+    for more in (
+        {"slew_limit": NEW["slew_limit"]},
+        {"reset_overshoot": ResetOvershoot(fraction=0.0)},
+    ):
         assert run(quiet(**{**noisy, **more}), light).tobytes() == plain.tobytes()
 
 
