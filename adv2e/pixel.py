@@ -23,16 +23,19 @@ from adv2e.effects.pixel.low_pass import UPDATES
 from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE, fill_first_candidates
 from adv2e.effects.pixel.thresholds import fill_levels, fill_random_reference
-from adv2e.errors import DataError
+from adv2e.errors import DataError, UsageError
 from adv2e.events import EVENT_DTYPE, Events, empty_events
 from adv2e.intervals import Part
 from adv2e.kernel import order, screen, stepped
+from adv2e.kernel.dense import run_dense
 from adv2e.kernel.exact import covers, run_exact
 from adv2e.kernel.general import run_general
 from adv2e.kernel.screen import NODES_MAX
-from adv2e.kernel.tile import frames_of, scratch
+from adv2e.kernel.tile import Frames, frames_of, scratch
 from adv2e.kernel.workspace import (
     PIXEL_BITS,
+    S_BEYOND,
+    S_FIRST,
     S_HOLD,
     S_HOT_DRAW,
     S_HOT_TIME,
@@ -44,6 +47,7 @@ from adv2e.kernel.workspace import (
     S_OFF,
     S_ON,
     S_REFERENCE,
+    S_SECOND,
     S_SHOT_DRAW,
     S_SHOT_TIME,
     S_X,
@@ -51,6 +55,7 @@ from adv2e.kernel.workspace import (
     Circuit,
     pack_limit_us,
 )
+from adv2e.stepping import Stepping
 
 _NO_KNEE = 1e300
 _LARGEST_SIDE = 1 << 16
@@ -113,10 +118,23 @@ def make_circuit(pixel: Pixel, sampling: Sampling, seed: int) -> Circuit:
     )
 
 
+METHODS = ("auto", "dense")
+"""How the circuit is solved: by the fastest way that covers it, or in steps of time."""
+
+
+def _driver(pixel: Pixel, circuit: Circuit, additions: Additions | None, method: str) -> str:
+    """Return the name of the compiled function that advances these pixels."""
+    if method not in METHODS:
+        raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
+    new = circuit.slew > 0 or circuit.overshoot != 0 or pixel.thresholds.drift_per_s != 0
+    if method == "dense" or additions is not None or new:
+        return "run_dense"
+    return "run_exact" if covers(circuit) else "run_general"
+
+
 def is_compiled(pixel: Pixel, sampling: Sampling) -> bool:
     """Tell whether the kernel that this pixel needs has been compiled before."""
-    exact = covers(make_circuit(pixel, sampling, 0))
-    return jit.is_cached("run_exact" if exact else "run_general")
+    return jit.is_cached(_driver(pixel, make_circuit(pixel, sampling, 0), None, "auto"))
 
 
 @lru_cache(maxsize=256)
@@ -144,13 +162,15 @@ class _Worker:
 class _Parted:
     """Events of a tile, slice of time by slice."""
 
-    def __init__(self, worker: _Worker, count: int, per_us: float) -> None:
+    def __init__(
+        self, keys: NDArray[np.int64], times: NDArray[np.float64], count: int, per_us: float
+    ) -> None:
         self.keys = np.empty(count, np.int64)
         self.ends = np.empty(order.SLICES + 1, np.int64)
-        order.part_by_time(worker.keys, count, per_us, self.ends, self.keys)
-        self.times = worker.times[:count].copy()
+        order.part_by_time(keys, count, per_us, self.ends, self.keys)
+        self.times = times[:count].copy()
         # as they came, for the unrounded times that go with them
-        self.raw = worker.keys[: self.times.size].copy()
+        self.raw = keys[: self.times.size].copy()
 
     def of(self, first: int, last: int) -> NDArray[np.int64]:
         """Return the events of the slices first..last, the last one not counted."""
@@ -214,7 +234,14 @@ class PixelArray:
         self.circuit = make_circuit(pixel, sampling, seed)
         self.threads = thread_count(threads)
         self.started = False
+        self._driver = _driver(pixel, self.circuit, additions, method)
         self.state = self._first_state(pixel, seed, first, self._relative(t_ns))
+        if self._driver == "run_dense":
+            self._stepping = Stepping(
+                self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
+                self.origin_us, self._relative(t_ns),
+            )  # fmt: skip
+            self._first_steps()
         size = tile or min(_TILE, max(STRIP, -(-self.pixels // (4 * self.threads))))
         size = -(-size // STRIP) * STRIP
         tiles = [(lo, min(lo + size, self.pixels)) for lo in range(0, self.pixels, size)]
@@ -239,6 +266,8 @@ class PixelArray:
             S_LEAK_DRAW: circuit.leak_jitter > 0,
             S_NOISE_DRAW: circuit.noise_rms > 0,
         }
+        if self._driver == "run_dense":
+            used[S_BEYOND] = True
         rows = 1 + max([S_OFF, *(row for row, on in used.items() if on)])
         state = np.zeros((rows, self.pixels))
         light = np.ascontiguousarray(first).reshape(-1)
@@ -265,6 +294,13 @@ class PixelArray:
             if circuit.follower == 0:  # behind a second pole at rest it does not show yet
                 state[S_REFERENCE] += noise
         return state
+
+    def _first_steps(self) -> None:
+        """Rows of the state that only the stepping path has; all poles are at rest."""
+        drive, signal = self._stepping.first_added()
+        self.state[S_FIRST] = self.state[S_X] + drive
+        self.state[S_SECOND] = self.state[S_FIRST]
+        self.state[S_REFERENCE] += drive + signal
 
     def _over_pixels(self, fill: Callable[..., None], *arguments: Any) -> None:
         """Call `fill` for ranges of pixels, in threads: drawing for all of them takes its time."""
@@ -322,10 +358,25 @@ class PixelArray:
         if span >= pack_limit_us() // 2:
             raise DataError(f"{span / 1e6:.0f} s between frames: too long")
         frames = frames_of(part.frames, table)
-        nodes, weights, counts = self._nodes(np.diff(starts))
         per_us = order.SLICES / (span + 2.0)
+        advance = self._advance_dense if self._driver == "run_dense" else self._advance_whole
+        parted = advance(part, frames, starts, t_base, per_us, pool)
+        self.started = True
+        self._keep_times(parted)
+        yield from self._in_order(parted, t_base, pool)
 
-        advance = run_exact if covers(self.circuit) else run_general
+    def _advance_whole(
+        self,
+        part: Part,
+        frames: Frames,
+        starts: NDArray[Any],
+        t_base: int,
+        per_us: float,
+        pool: ThreadPoolExecutor | None,
+    ) -> list[_Parted]:
+        """Return the events of all tiles, solved interval by interval."""
+        nodes, weights, counts = self._nodes(np.diff(starts))
+        advance = run_exact if self._driver == "run_exact" else run_general
 
         def run(tile: tuple[int, int]) -> _Parted:
             lo, hi = tile
@@ -335,15 +386,47 @@ class PixelArray:
                 self.circuit, nodes, weights, counts, t_base, self.state, worker.scratch,
                 worker.keys, worker.times,
             )  # fmt: skip
-            parted = _Parted(worker, n, per_us)
+            parted = _Parted(worker.keys, worker.times, n, per_us)
             self._workers.put(worker)
             return parted
 
-        spread = pool.map if pool else map
-        parted = list(spread(run, self._tiles))
-        self.started = True
-        self._keep_times(parted)
-        yield from self._in_order(parted, t_base, pool)
+        return list((pool.map if pool else map)(run, self._tiles))
+
+    def _advance_dense(
+        self,
+        part: Part,
+        frames: Frames,
+        starts: NDArray[Any],
+        t_base: int,
+        per_us: float,
+        pool: ThreadPoolExecutor | None,
+    ) -> list[_Parted]:
+        """Return the events of all tiles, in steps of time."""
+        found: list[list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = []
+        for steps, injected in self._stepping.runs(starts, part.last):
+            arguments = (
+                frames, part.before, part.share, starts, not self.started, part.last,
+                self.circuit, steps, injected, t_base, self.state,
+            )  # fmt: skip
+
+            def run(
+                tile: tuple[int, int], arguments: tuple[Any, ...] = arguments
+            ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+                worker = self._workers.get()
+                n, worker.keys, worker.times = run_dense(
+                    *tile, *arguments, worker.scratch, worker.keys, worker.times
+                )
+                events = worker.keys[:n].copy(), worker.times[:n].copy()
+                self._workers.put(worker)
+                return events
+
+            found.append(list((pool.map if pool else map)(run, self._tiles)))
+        parted = []
+        for tile in zip(*found, strict=True):
+            keys = np.concatenate([keys for keys, _ in tile])
+            times = np.concatenate([times for _, times in tile])
+            parted.append(_Parted(keys, times, keys.size, per_us))
+        return parted
 
     def _keep_times(self, parted: list[_Parted]) -> None:
         times = np.concatenate([tile.times for tile in parted])

@@ -17,7 +17,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from adv2e.jit import kernel
+from adv2e.jit import inlined, kernel
+from adv2e.kernel import special
 
 # Streams: one for each kind of draw; never renumber, or old seeds give other events.
 ON_THRESHOLD = 1
@@ -29,8 +30,9 @@ HOT_CHOICE = 6
 HOT_TIME = 7
 LEAK_PERIOD = 8
 PHOTORECEPTOR = 9
-DEAD_CHOICE = 10
-LOSS = 11
+PHOTORECEPTOR_STEPS = 10
+DEAD_CHOICE = 11
+LOSS = 12
 
 _LOW = np.uint64(0xFFFFFFFF)
 _M0 = np.uint64(0xD2511F53)
@@ -38,8 +40,7 @@ _M1 = np.uint64(0xCD9E8D57)
 _W0 = np.uint64(0x9E3779B9)
 _W1 = np.uint64(0xBB67AE85)
 _32 = np.uint64(32)
-_5 = np.uint64(5)
-_6 = np.uint64(6)
+_2, _3, _4, _5, _6, _7, _8, _9 = (np.uint64(k) for k in range(2, 10))
 
 
 @kernel
@@ -57,6 +58,32 @@ def philox(
         k0 = (k0 + _W0) & _LOW
         k1 = (k1 + _W1) & _LOW
     return c0, c1, c2, c3
+
+
+@kernel
+def _round(
+    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64
+) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
+    p0 = np.uint64(_M0 * c0)
+    p1 = np.uint64(_M1 * c2)
+    return (p1 >> _32) ^ c1 ^ k0, p1 & _LOW, (p0 >> _32) ^ c3 ^ k1, p0 & _LOW
+
+
+@inlined
+def _philox_unrolled(
+    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64
+) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
+    """As philox, written out so that a loop over pixels vectorises."""
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 & _LOW, k1 + _W1 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _2 & _LOW, k1 + _W1 * _2 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _3 & _LOW, k1 + _W1 * _3 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _4 & _LOW, k1 + _W1 * _4 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _5 & _LOW, k1 + _W1 * _5 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _6 & _LOW, k1 + _W1 * _6 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _7 & _LOW, k1 + _W1 * _7 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _8 & _LOW, k1 + _W1 * _8 & _LOW)
+    return _round(c0, c1, c2, c3, k0 + _W0 * _9 & _LOW, k1 + _W1 * _9 & _LOW)
 
 
 @kernel
@@ -139,3 +166,52 @@ def next_uniforms(
     out = np.empty(pixels.size)
     _fill_next(seed, stream, np.ascontiguousarray(pixels), numbers, out)
     return out
+
+
+_SIN = (1.0, -1 / 6, 1 / 120, -1 / 5040, 1 / 362880, -1 / 39916800)
+_COS = (1.0, -1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800, 1 / 479001600)
+_HALF_PI = 0.5 * math.pi
+
+
+@kernel
+def _cos_sin(turns: float) -> tuple[float, float]:
+    """Cosine and sine of 2 pi turns, 0 <= turns <= 1, good to 1e-11, for loops over pixels."""
+    quarter = np.floor(4.0 * turns + 0.5)
+    t = (4.0 * turns - quarter) * _HALF_PI
+    g = t * t
+    s = _SIN[2] + g * (_SIN[3] + g * (_SIN[4] + g * _SIN[5]))
+    s = t * (_SIN[0] + g * (_SIN[1] + g * s))
+    c = _COS[3] + g * (_COS[4] + g * (_COS[5] + g * _COS[6]))
+    c = _COS[0] + g * (_COS[1] + g * (_COS[2] + g * c))
+    odd = (quarter == 1.0) | (quarter == 3.0)
+    x, y = (s, c) if odd else (c, s)
+    x = -x if (quarter == 1.0) | (quarter == 2.0) else x
+    y = -y if (quarter == 2.0) | (quarter == 3.0) else y
+    return x, y
+
+
+@kernel
+def normals_of_four(
+    seed: int, stream: int, first: int, count: int, block: int, out: NDArray[np.float64]
+) -> None:
+    """Draw four standard normal numbers for each of the pixels first.. into `out`, (4, count..).
+
+    One block of Philox and two pairs of Box and Muller a pixel, from uniforms of 32 bits: tails
+    end at 6.8.
+    """
+    s, d = np.uint64(seed), np.uint64(block)
+    low, high, k0, k1 = d & _LOW, d >> _32, s & _LOW, s >> _32
+    scale = 1.0 / 4294967296.0
+    a, b, c, e = out[0], out[1], out[2], out[3]
+    for k in range(count):
+        w0, w1, w2, w3 = _philox_unrolled(
+            np.uint64(first + k) & _LOW, np.uint64(stream), low, high, k0, k1
+        )
+        r = math.sqrt(-2.0 * special.log((np.float64(w0) + 0.5) * scale))
+        x, y = _cos_sin((np.float64(w1) + 0.5) * scale)
+        a[k] = r * x
+        b[k] = r * y
+        r = math.sqrt(-2.0 * special.log((np.float64(w2) + 0.5) * scale))
+        x, y = _cos_sin((np.float64(w3) + 0.5) * scale)
+        c[k] = r * x
+        e[k] = r * y

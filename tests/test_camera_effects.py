@@ -62,6 +62,6 @@ def test_adding_the_effect_brings_the_events_of_the_camera(name, tmp_path):
     camera = camera_with(hidden)
     without = errors(camera, package(camera, {}, tmp_path / "without.yaml"))
     found = errors(camera, package(camera, hidden, tmp_path / "with.yaml"))
-    print(name, without, found, found/without)
+    print(name, without, found, found / without)
     assert np.mean(found) < left * np.mean(without)
     assert np.mean(found) < 0.15

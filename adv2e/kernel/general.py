@@ -12,7 +12,7 @@ from adv2e.kernel.workspace import EXACT, S_LAG, S_LAG2, S_OFF, S_ON, S_REFERENC
 
 
 @kernel
-def _load_light(frames, before, share, first, count, circuit, rows, light, x):
+def load_light(frames, before, share, first, count, circuit, rows, light, x):
     """Light and log intensity of a strip, `share` of the way from frame `before` to the next."""
     load(frames, before, share, first, count, 0.0, rows)
     stepped.load_strip(rows[screen.LIGHT_1 : screen.LIGHT_1 + count], circuit, light, x)
@@ -58,7 +58,7 @@ def _fill_falls(lo, count, length, circuit, state, columns, falls, means):
 
 
 @kernel
-def _samples(xa, xb, ahead, begins, is_last, next_is_last):
+def samples(xa, xb, ahead, begins, is_last, next_is_last):
     """Continuity samples of an interval, as solve_interval takes them: start, base, step, end.
 
     With the paper's last interval as printed, the samples of a last one start from its end, but
@@ -85,13 +85,13 @@ def _strip(
     columns, flags, falls = scratch.columns, scratch.flags, scratch.falls
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     rows = scratch.rows
-    _load_light(
+    load_light(
         frames, before[0], share[0], lo, count, circuit, rows, columns[0, :count],
         columns[1, :count],
     )  # fmt: skip
     for f in range(starts.shape[0] - 1):
         ta, length = starts[f], starts[f + 1] - starts[f]
-        _load_light(
+        load_light(
             frames, before[f + 1], share[f + 1], lo, count, circuit, rows, columns[2, :count],
             columns[3, :count],
         )  # fmt: skip
@@ -103,13 +103,13 @@ def _strip(
             _bound(lo, count, ta, length, circuit, state, columns, falls, flags)
             _finish_unflagged(lo, count, state, columns[4], falls, flags)
         if last[f + 1]:
-            _load_light(
+            load_light(
                 frames, before[f + 2], share[f + 2], lo, count, circuit, rows, columns[12, :count],
                 columns[13, :count],
             )  # fmt: skip
         for k in range(count):
             if flags[k]:
-                xs, base, step, end = _samples(
+                xs, base, step, end = samples(
                     columns[1, k], columns[3, k], columns[13, k], begins and f == 0, last[f],
                     last[f + 1],
                 )  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.jit import allocating_kernel, kernel
-from adv2e.kernel import batch, lanes, screen
+from adv2e.kernel import batch, dense_rows, lanes, screen
 from adv2e.kernel.solve import solve_interval
 from adv2e.kernel.workspace import S_LAG, SAVED, STRIP, workspace
 
@@ -32,6 +32,8 @@ class Scratch(NamedTuple):
     flags: NDArray[np.bool_]
     falls: NDArray[np.float64]
     means: NDArray[np.float64]
+    dense: NDArray[np.float64]  # of the stepping path
+    normals: NDArray[np.float64]
 
 
 class Frames(NamedTuple):
@@ -67,6 +69,8 @@ def scratch() -> Scratch:
         flags=np.zeros(STRIP, np.bool_),
         falls=np.zeros(STRIP),
         means=np.zeros(STRIP),
+        dense=dense_rows.scratch(),
+        normals=dense_rows.normals(),
     )
 
 

@@ -60,3 +60,9 @@ def fill_first_noise(seed: int, rms: float, noise: Array) -> None:
     """Draw the noise of every pixel at the start from its stationary distribution."""
     for i in range(noise.shape[0]):
         noise[i] = rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)
+
+
+@kernel
+def fill_normals(seed: int, first: int, count: int, block: int, normals: Array) -> None:
+    """Draw the normal numbers of four steps in time, (4, count..), for the pixels first.. ."""
+    rng.normals_of_four(seed, rng.PHOTORECEPTOR_STEPS, first, count, block, normals)

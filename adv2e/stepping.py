@@ -1,0 +1,199 @@
+"""Steps of the stepping path, and what is added to the pixels at them.
+
+How long a step of ``exact`` may be follows from what :mod:`adv2e.kernel.dense_signal` leaves out.
+The cubic through values and slopes at both ends of a step of h departs from the signal by at most
+h^4 y''''/384: with a corner of w, by u (w h)^4/384 for a lag u, which is a time of h (w h)^3/384,
+0.1 us for w h = 1/2 at 300 Hz, and less for a faster corner.  The change of the corner over the
+step counts in second order, terms of c (w h)^2 with c its change over the step.  What leak, noise
+or courses add is a line or a cubic within each step.  Two crossings of the same threshold by a
+signal that turns between the ends are found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.additions import INJECTED_DTYPE, Additions, Course, values_of
+from adv2e.effects.pixel.threshold_drift import drift_factors
+from adv2e.errors import DataError
+from adv2e.kernel.dense import BLOCK, Run
+from adv2e.kernel.dense_events import Injected, injected_of
+from adv2e.kernel.workspace import EXACT, Circuit
+
+LONGEST_US = 100.0
+"""Longest step."""
+
+_SHARE = 0.5
+"""Longest step as a share of the shortest time constant."""
+
+_FEWEST, _SHORT_US = 4, 10.0
+"""Steps of an interval, unless they are shorter than this: the light may grow by e-folds in it."""
+
+_VALUES = 1 << 22
+"""Values of a course that are in memory at a time, unless one block of steps has more."""
+
+_NONE = np.zeros((0, 1))
+_NO_INDEX = np.zeros(0, np.int64)
+_NOTHING = Injected(np.zeros(0), np.zeros(0, np.bool_), _NO_INDEX, _NO_INDEX)
+
+
+def steps_of(length_us: float, circuit: Circuit, step_us: float = math.inf) -> int:
+    """Return how many steps ``exact`` makes of a straight piece of x, `length_us` long."""
+    limit = min(LONGEST_US, step_us)
+    fastest = max(circuit.dark + 255.0 * circuit.per_dn, circuit.dark)
+    if circuit.filtered:
+        limit = min(limit, _SHARE / fastest if fastest > 0 else limit)
+        if circuit.noise_rms > 0.0:
+            limit = min(limit, circuit.noise_step / fastest if fastest > 0 else limit)
+    if circuit.follower > 0.0:
+        limit = min(limit, _SHARE / circuit.follower)
+    few = min(_FEWEST, math.ceil(length_us / _SHORT_US))
+    return max(1, few, math.ceil(length_us / limit))
+
+
+class Stepping:
+    """Runs of the stepping path through a recording.
+
+    Parameters
+    ----------
+    circuit : Circuit
+    pixels, columns : int
+    additions : Additions, optional
+    drift_per_s : float
+        Of the thresholds.
+    origin_us : int
+        Time that the pixel array counts from, on the recording's clock.
+    start_us : float
+        Time of the first frame, from there.
+    """
+
+    def __init__(
+        self, circuit: Circuit, pixels: int, columns: int, additions: Additions | None,
+        drift_per_s: float, origin_us: int, start_us: float,
+    ) -> None:  # fmt: skip
+        self._circuit, self._pixels, self._columns = circuit, pixels, columns
+        self._additions = additions
+        self._drift, self._origin, self._start = drift_per_s, origin_us, start_us
+        self._step_us = additions.step_us if additions else math.inf
+        at = np.array([start_us])
+        widths = (self._course(name, at).shape[1] for name in ("drive", "signal", "on", "off"))
+        self._width = sum(width for width in widths if width > 1)
+
+    def first_added(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return drive and signal that are added at the first frame, (1,) or (pixels,)."""
+        at = np.array([self._start])
+        return _at_first(self._course("drive", at)), _at_first(self._course("signal", at))
+
+    def runs(
+        self, starts: NDArray[np.float64], last: NDArray[np.bool_]
+    ) -> Iterator[tuple[Run, Injected]]:
+        """Yield the runs over the intervals between `starts` [us].
+
+        Raises
+        ------
+        ConfigError
+            Thresholds that drift to zero.
+        DataError
+            Courses or injected events that are none.
+        """
+        circuit = self._circuit
+        lengths = np.diff(starts)
+        pieces = circuit.steps if circuit.update != EXACT or circuit.printed else 1
+        exact = circuit.update == EXACT
+        steps = np.array(
+            [steps_of(v / pieces, circuit, self._step_us) if exact else 1 for v in lengths],
+            np.int64,
+        )
+        for first, first_step, stop, stop_step in self._cuts(pieces, steps):
+            times = _instants(starts, pieces * steps, first, first_step, stop, stop_step)
+            run = Run(
+                first=first, first_step=first_step, last=stop, last_step=stop_step, pieces=pieces,
+                steps=steps, drive=self._course("drive", times),
+                signal=self._course("signal", times), on=self._factors("on", times),
+                off=self._factors("off", times),
+            )  # fmt: skip
+            yield run, self._injected(times[0], times[-1])
+
+    def _cuts(self, pieces: int, steps: NDArray[np.int64]) -> Iterator[tuple[int, int, int, int]]:
+        """Yield first interval and step, and those before which they end, of runs of blocks."""
+        most = max(1, _VALUES // max(1, self._width))
+        begin, taken, border = (0, 0), 0, (0, 0)
+        for f, of_piece in enumerate(steps.tolist()):
+            for start, stop in _blocks(pieces, of_piece):
+                if taken and taken + stop - start > most:
+                    yield (*begin, *border)
+                    begin, taken = (f, start), 0
+                taken += stop - start
+                border = (f + 1, stop)
+        yield (*begin, *border)
+
+    def _course(self, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a course at times since the origin [us], without rows if there is none."""
+        course: Course | None = getattr(self._additions, name, None)
+        if course is None:
+            return _NONE
+        above = 0.0 if name in ("on", "off") else -math.inf
+        return values_of(course, name, self._seconds(times), self._pixels, above=above)
+
+    def _factors(self, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the factors on a threshold, drift and course together."""
+        factors = self._course(name, times)
+        if self._drift == 0.0:
+            return factors
+        drift = drift_factors((times - self._start) * 1e-6, self._drift)[:, None]
+        return drift * factors if factors.size else drift
+
+    def _injected(self, t0_us: float, t1_us: float) -> Injected:
+        """Return the events that are injected in a run."""
+        if self._additions is None or self._additions.inject is None:
+            return _NOTHING
+        t0, t1 = (float(t) for t in self._seconds(np.array([t0_us, t1_us])))
+        found = np.asarray(self._additions.inject(t0, t1))
+        if found.dtype.names is None or not {"t", "x", "y", "p"} <= set(found.dtype.names):
+            raise DataError(f"inject: must return an array of {INJECTED_DTYPE}, got {found.dtype}")
+        times = np.asarray(found["t"], np.float64)
+        x, y = found["x"].astype(np.int64), found["y"].astype(np.int64)
+        if not np.all((x < self._columns) & (y < self._pixels // self._columns)):
+            raise DataError("inject: events outside of the picture")
+        if not (np.all(np.diff(times) >= 0) and np.all((times >= t0) & (times < t1))):
+            raise DataError(f"inject: times must be sorted, from {t0:.6f} s to below {t1:.6f} s")
+        at = times * 1e6 - self._origin
+        return injected_of(at, y * self._columns + x, found["p"] > 0, self._pixels)
+
+    def _seconds(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (times + self._origin) * 1e-6
+
+
+def _at_first(values: NDArray[np.float64]) -> NDArray[Any]:
+    return values[0] if values.size else np.zeros(1)
+
+
+def _blocks(pieces: int, steps: int) -> Iterator[tuple[int, int]]:
+    """Yield the blocks of an interval: first step, and the one after the last."""
+    if steps == 1:
+        for start in range(0, pieces, BLOCK):
+            yield start, min(start + BLOCK, pieces)
+        return
+    for piece in range(pieces):
+        for start in range(0, steps, BLOCK):
+            yield piece * steps + start, piece * steps + min(start + BLOCK, steps)
+
+
+def _instants(
+    starts: NDArray[np.float64], totals: NDArray[np.int64], first: int, first_step: int, stop: int,
+    stop_step: int,
+) -> NDArray[np.float64]:  # fmt: skip
+    """Return the start of a run and the end of each of its steps, since the origin [us]."""
+    parts = []
+    for f in range(first, stop):
+        total = int(totals[f])
+        low = first_step if f == first else 0
+        high = stop_step if f == stop - 1 else total
+        steps = np.arange(low if f == first else 1, high + 1)
+        parts.append(starts[f] + (starts[f + 1] - starts[f]) * (steps / total))
+    return np.concatenate(parts)
