@@ -26,7 +26,6 @@ from adv2e.kernel.dense_rows import (
     AHEAD,
     BASE,
     DRIVEN1,
-    DUE,
     FIRST,
     INPUT1,
     LEAK_ON,
@@ -46,6 +45,7 @@ from adv2e.kernel.dense_rows import (
     WIDTH,
     XA,
     XB,
+    DUE,
 )
 from adv2e.kernel.general import load_light, samples
 from adv2e.kernel.tile import with_room

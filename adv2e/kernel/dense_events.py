@@ -208,7 +208,9 @@ def _next_noise(i, now, t_end, circuit, injected, state):
     """Kind and time of the next noise event of pixel i in [now, t_end); those before are lost."""
     kind, t = next_injected(i, now, t_end, circuit, state)
     if injected.next.shape[0] > 0:
-        while injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < now:
+        while (
+            injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < now
+        ):
             injected.next[i] += 1
         if injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < t:
             kind, t = ADDED_EVENT, injected.times[injected.next[i]]
@@ -265,7 +267,9 @@ def fire(
         s_end = 1.0 if kind == SIGNAL_EVENT else max(s, (t_end - ta) / h)
         d0 = c0 - reference
         d1, d2, d3 = c1 + factor * l1, c2 + factor * l2, c3 + factor * l3
-        up = first_reach(d0 - on_level * on0 - TIE, d1 - on_level * (on1 - on0), d2, d3, s, s_end)
+        up = first_reach(
+            d0 - on_level * on0 - TIE, d1 - on_level * (on1 - on0), d2, d3, s, s_end
+        )
         down = first_reach(
             -d0 - off_level * off0 - TIE, -d1 - off_level * (off1 - off0), -d2, -d3, s, s_end
         )
