@@ -71,7 +71,9 @@ def values_of(
     values = np.asarray(course(times_s), np.float64)
     n = times_s.size
     if values.shape not in {(n,), (n, pixels)}:
-        raise DataError(f"{name}: shape {values.shape} at {n} times, must be ({n},) or ({n}, {pixels})")
+        raise DataError(
+            f"{name}: shape {values.shape} at {n} times, must be ({n},) or ({n}, {pixels})"
+        )
     if not np.all(np.isfinite(values) & (values > above)):
         limit = f" above {above:g}" if above > -np.inf else ""
         raise DataError(f"{name}: all values must be finite numbers{limit}")

@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
+from functools import lru_cache, partial
 from queue import SimpleQueue
 from typing import Any
 
@@ -16,19 +16,20 @@ from numpy.typing import NDArray
 
 from adv2e import jit
 from adv2e.additions import Additions
+from adv2e.circuit import driver_of, make_circuit
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.pixel.hot_pixels import fill_first_hot_times
 from adv2e.effects.pixel.leak import fill_first_factors
-from adv2e.effects.pixel.low_pass import UPDATES
 from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
-from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE, fill_first_candidates
+from adv2e.effects.pixel.shot_noise import fill_first_candidates
 from adv2e.effects.pixel.thresholds import fill_levels, fill_random_reference
-from adv2e.errors import DataError, UsageError
+from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events, empty_events
 from adv2e.intervals import Part
 from adv2e.kernel import order, screen, stepped
-from adv2e.kernel.dense import run_dense
-from adv2e.kernel.exact import covers, run_exact
+from adv2e.kernel.dense import Run, run_dense
+from adv2e.kernel.dense_events import Injected
+from adv2e.kernel.exact import run_exact
 from adv2e.kernel.general import run_general
 from adv2e.kernel.screen import NODES_MAX
 from adv2e.kernel.tile import Frames, frames_of, scratch
@@ -52,12 +53,10 @@ from adv2e.kernel.workspace import (
     S_SHOT_TIME,
     S_X,
     STRIP,
-    Circuit,
     pack_limit_us,
 )
 from adv2e.stepping import Stepping
 
-_NO_KNEE = 1e300
 _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP
 """Pixels of the largest tiles, whose frames should stay in the second level of cache."""
@@ -68,7 +67,7 @@ _SORTED = 1 << 15
 _YIELDED = 1 << 20
 """Events that are yielded at a time, or one slice of time's."""
 
-_PER_US = 1e-6
+_Arrays = tuple[NDArray[np.int64], NDArray[np.float64]]
 
 
 def thread_count(threads: int | None) -> int:
@@ -80,61 +79,10 @@ def thread_count(threads: int | None) -> int:
     return os.cpu_count() or 1
 
 
-def make_circuit(pixel: Pixel, sampling: Sampling, seed: int) -> Circuit:
-    """Return what the compiled code needs of the configuration; rates a us, corners in rad a us."""
-    low_pass, follower, leak = pixel.low_pass, pixel.source_follower, pixel.leak
-    knee_dn = pixel.log_response.linear_below
-    corner = 2.0 * math.pi * _PER_US
-    dark = low_pass.dark_cutoff_hz if low_pass else 0.0
-    white = low_pass.cutoff_hz if low_pass else 0.0
-    noise = pixel.photoreceptor_noise
-    return Circuit(
-        update=UPDATES.index(low_pass.update) if low_pass else 0,
-        steps=sampling.K,
-        printed=sampling.last_interval == "printed",
-        filtered=low_pass is not None,
-        dark=corner * dark,
-        per_dn=corner * (white - dark) / 255.0,
-        slew=pixel.slew_limit.per_s * _PER_US if pixel.slew_limit else 0.0,
-        follower=corner * follower.cutoff_hz if follower else 0.0,
-        knee=math.log(knee_dn) if knee_dn > 0 else -_NO_KNEE,
-        slope=knee_dn / math.log(knee_dn) if knee_dn > 0 else 0.0,
-        floor=pixel.log_response.floor,
-        dead_time=pixel.refractory.period_us if pixel.refractory else 0.0,
-        overshoot=pixel.reset_overshoot.fraction if pixel.reset_overshoot else 0.0,
-        leak=leak.rate_hz * _PER_US if leak else 0.0,
-        photo_leak=leak.photo_rate_hz * _PER_US / 255.0 if leak else 0.0,
-        leak_jitter=leak.jitter if leak else 0.0,
-        shot_rate=pixel.shot_noise.rate_hz * _PER_US if pixel.shot_noise else 0.0,
-        shot_fall=FALL_AT_WHITE / 255.0,
-        hot_rate=(
-            pixel.hot_pixels.rate_hz * _PER_US
-            if pixel.hot_pixels and pixel.hot_pixels.fraction > 0
-            else 0.0
-        ),
-        noise_rms=noise.rms if noise else 0.0,
-        noise_step=noise.step if noise else 0.1,
-        seed=seed,
-    )
-
-
-METHODS = ("auto", "dense")
-"""How the circuit is solved: by the fastest way that covers it, or in steps of time."""
-
-
-def _driver(pixel: Pixel, circuit: Circuit, additions: Additions | None, method: str) -> str:
-    """Return the name of the compiled function that advances these pixels."""
-    if method not in METHODS:
-        raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
-    new = circuit.slew > 0 or circuit.overshoot != 0 or pixel.thresholds.drift_per_s != 0
-    if method == "dense" or additions is not None or new:
-        return "run_dense"
-    return "run_exact" if covers(circuit) else "run_general"
-
-
-def is_compiled(pixel: Pixel, sampling: Sampling) -> bool:
+def is_compiled(pixel: Pixel, sampling: Sampling, additions: Additions | None = None) -> bool:
     """Tell whether the kernel that this pixel needs has been compiled before."""
-    return jit.is_cached(_driver(pixel, make_circuit(pixel, sampling, 0), None, "auto"))
+    circuit = make_circuit(pixel, sampling, 0)
+    return jit.is_cached(driver_of(pixel, circuit, additions, "auto"))
 
 
 @lru_cache(maxsize=256)
@@ -234,7 +182,7 @@ class PixelArray:
         self.circuit = make_circuit(pixel, sampling, seed)
         self.threads = thread_count(threads)
         self.started = False
-        self._driver = _driver(pixel, self.circuit, additions, method)
+        self._driver = driver_of(pixel, self.circuit, additions, method)
         self.state = self._first_state(pixel, seed, first, self._relative(t_ns))
         if self._driver == "run_dense":
             self._stepping = Stepping(
@@ -402,25 +350,23 @@ class PixelArray:
         pool: ThreadPoolExecutor | None,
     ) -> list[_Parted]:
         """Return the events of all tiles, in steps of time."""
-        found: list[list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = []
-        for steps, injected in self._stepping.runs(starts, part.last):
-            arguments = (
-                frames, part.before, part.share, starts, not self.started, part.last,
-                self.circuit, steps, injected, t_base, self.state,
+
+        def run(steps: Run, injected: Injected, tile: tuple[int, int]) -> _Arrays:
+            lo, hi = tile
+            worker = self._workers.get()
+            n, worker.keys, worker.times = run_dense(
+                lo, hi, frames, part.before, part.share, starts, not self.started, part.last,
+                self.circuit, steps, injected, t_base, self.state, worker.scratch, worker.keys,
+                worker.times,
             )  # fmt: skip
+            events = worker.keys[:n].copy(), worker.times[:n].copy()
+            self._workers.put(worker)
+            return events
 
-            def run(
-                tile: tuple[int, int], arguments: tuple[Any, ...] = arguments
-            ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-                worker = self._workers.get()
-                n, worker.keys, worker.times = run_dense(
-                    *tile, *arguments, worker.scratch, worker.keys, worker.times
-                )
-                events = worker.keys[:n].copy(), worker.times[:n].copy()
-                self._workers.put(worker)
-                return events
-
-            found.append(list((pool.map if pool else map)(run, self._tiles)))
+        found = [
+            list((pool.map if pool else map)(partial(run, *these), self._tiles))
+            for these in self._stepping.runs(starts, part.last)
+        ]
         parted = []
         for tile in zip(*found, strict=True):
             keys = np.concatenate([keys for keys, _ in tile])

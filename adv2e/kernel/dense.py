@@ -26,6 +26,7 @@ from adv2e.kernel.dense_rows import (
     AHEAD,
     BASE,
     DRIVEN1,
+    DUE,
     FIRST,
     INPUT1,
     LEAK_ON,
@@ -45,7 +46,6 @@ from adv2e.kernel.dense_rows import (
     WIDTH,
     XA,
     XB,
-    DUE,
 )
 from adv2e.kernel.general import load_light, samples
 from adv2e.kernel.tile import with_room
@@ -205,7 +205,7 @@ def _level(course, m, i):
 
 @kernel
 def _screen_step(lo, count, n, m, end, h, circuit, run, rows):
-    """Number of pixels that may fire in step m of a run."""
+    """Return how many pixels may fire in step m of a run; marks them."""
     on, off = 1.0, 1.0
     if run.on.shape[1] > 1:
         events.step_thresholds(count, lo, run.on, m + 1, ON, ON_STEP, rows)
@@ -222,7 +222,7 @@ def _screen_step(lo, count, n, m, end, h, circuit, run, rows):
 def _fire_step(
     lo, n, m, ta, h, share, t_base, circuit, run, injected, state, scratch, keys, times, number
 ):  # fmt: skip
-    """Fire the events of step m of a run, which begins at ta us; returns their number and arrays."""
+    """Fire the events of step m of a run, which begins at ta us."""
     rows, pixels = scratch.dense, scratch.pixels
     for c in range(events.gather(n, rows, pixels)):
         k = pixels[c]

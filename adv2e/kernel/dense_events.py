@@ -208,9 +208,7 @@ def _next_noise(i, now, t_end, circuit, injected, state):
     """Kind and time of the next noise event of pixel i in [now, t_end); those before are lost."""
     kind, t = next_injected(i, now, t_end, circuit, state)
     if injected.next.shape[0] > 0:
-        while (
-            injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < now
-        ):
+        while injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < now:
             injected.next[i] += 1
         if injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < t:
             kind, t = ADDED_EVENT, injected.times[injected.next[i]]
@@ -236,8 +234,8 @@ def fire(
     """Fire the events of pixel k of a strip, i of the state, in the step [ta, ta + h] us.
 
     levels: factors on the ON threshold at both ends of the step, on OFF likewise; share: of its
-    piece that the step takes.  Returns the number of events so far, and whether there was room for all; if not, the
-    next call goes on.
+    piece that the step takes.  Returns the number of events so far, and whether there was room for
+    all; if not, the next call goes on.
     """
     on0, on1, off0, off1 = levels
     tb = ta + h
@@ -267,9 +265,7 @@ def fire(
         s_end = 1.0 if kind == SIGNAL_EVENT else max(s, (t_end - ta) / h)
         d0 = c0 - reference
         d1, d2, d3 = c1 + factor * l1, c2 + factor * l2, c3 + factor * l3
-        up = first_reach(
-            d0 - on_level * on0 - TIE, d1 - on_level * (on1 - on0), d2, d3, s, s_end
-        )
+        up = first_reach(d0 - on_level * on0 - TIE, d1 - on_level * (on1 - on0), d2, d3, s, s_end)
         down = first_reach(
             -d0 - off_level * off0 - TIE, -d1 - off_level * (off1 - off0), -d2, -d3, s, s_end
         )

@@ -193,7 +193,7 @@ def no_noise(n, rows):
 
 @inlined
 def second_pole_weights(b, line):
-    """What decay, both values and both slopes at its input do to the second pole in a step.
+    """Return what the second pole keeps, and takes of values and slopes at its input, in a step.
 
     b is its corner times the step; with `line` the input is a line, its slopes do not count.
     """

@@ -19,7 +19,9 @@ from adv2e.config.model import (
     PhotoreceptorNoise,
     Pixel,
     Refractory,
+    ResetOvershoot,
     ShotNoise,
+    SlewLimit,
     SourceFollower,
     Thresholds,
 )
@@ -30,9 +32,11 @@ from adv2e.parameters import Section, about
 CASES = {
     "log_response": (LogResponse(linear_below=60.0), LogResponse(linear_below=20.0, floor=0.5)),
     "low_pass": (LowPass(cutoff_hz=120.0), LowPass()),
+    "slew_limit": (SlewLimit(per_s=20.0), None),
     "source_follower": (SourceFollower(cutoff_hz=300.0), None),
     "thresholds": (Thresholds(mismatch=0.05), Thresholds(mismatch=0.0)),
     "refractory": (Refractory(period_us=3000.0), Refractory(period_us=1e-9)),
+    "reset_overshoot": (ResetOvershoot(fraction=0.2), ResetOvershoot(fraction=0.0)),
     "leak": (Leak(rate_hz=30.0, jitter=0.1), Leak(rate_hz=0.0)),
     "shot_noise": (ShotNoise(rate_hz=50.0), ShotNoise(rate_hz=0.0)),
     "photoreceptor_noise": (PhotoreceptorNoise(rms=0.08), PhotoreceptorNoise(rms=0.0)),
@@ -109,6 +113,22 @@ def test_effects_do_not_import_each_other(name):
 def test_noise_without_the_filter_that_limits_it_is_an_error():
     with pytest.raises(ConfigError, match="low_pass"):
         Pixel(low_pass=None, photoreceptor_noise=PhotoreceptorNoise(rms=0.1))
+
+
+def test_a_slew_limit_without_the_filter_that_it_limits_is_an_error():
+    with pytest.raises(ConfigError, match=r"slew_limit: .*low_pass"):
+        Pixel(low_pass=None, slew_limit=SlewLimit(per_s=40.0))
+
+
+def test_an_overshoot_of_a_whole_threshold_is_an_error():
+    with pytest.raises(ConfigError, match=r"fraction: must be at most 0\.9"):
+        ResetOvershoot(fraction=1.0)
+
+
+def test_drift_does_something_and_is_none_by_default():
+    drifting = quiet(thresholds=Thresholds(mismatch=0.0, drift_per_s=4.0))
+    assert events(drifting).tobytes() != events(quiet()).tobytes()
+    assert Thresholds().drift_per_s == 0.0
 
 
 def test_full_darkness_without_a_dark_corner_is_defined():

@@ -1,11 +1,11 @@
-"""Effects of the stepping path against differences in steps of 1 us, which share no code with it."""
+"""Effects of the stepping path against plain differences in steps of 1 us."""
 
 import numpy as np
 import pytest
 from harness import quiet, solve
 from reference.agreement import count_and_time_errors
-from reference.twin import light_of, log_of
 from reference.circuit import Circuit
+from reference.twin import light_of, log_of
 
 from adv2e.additions import INJECTED_DTYPE, Additions
 from adv2e.config.model import (
@@ -62,7 +62,9 @@ class Truth:
         """Return (events, 2) a pixel; `noise`: (time [s], pixel, polarity), sorted."""
         factors = np.ones_like(self.at) if factor is None else factor(self.at)
         return [
-            self._of(i, on * factors, off * factors, dead_s, overshoot, [n for n in noise if n[1] == i])
+            self._of(
+                i, on * factors, off * factors, dead_s, overshoot, [n for n in noise if n[1] == i]
+            )
             for i in range(self.signal.shape[1])
         ]
 
@@ -191,7 +193,7 @@ def wave(share, frequency):
 
 @pytest.mark.parametrize("wide", [False, True])
 def test_drive_signal_and_thresholds_that_change(wide):
-    """Courses for all pixels alike, and one a pixel; the first frame is not at rest without them."""
+    """Courses for all pixels alike, and one a pixel."""
     shape = np.linspace(0.5, 1.5, LIGHT.shape[1]) if wide else np.ones(1)
 
     def course(values):
@@ -245,9 +247,7 @@ WRONG = {
     "not finite": (Additions(step_us=50.0, signal=lambda t: t * np.nan), "signal: all values"),
     "zero": (Additions(step_us=50.0, on=lambda t: 0.0 * t), "on: all values .* above 0"),
     "outside": (
-        Additions(
-            step_us=50.0, inject=lambda a, b: np.array([(a, 900, 0, 1)], INJECTED_DTYPE)
-        ),
+        Additions(step_us=50.0, inject=lambda a, b: np.array([(a, 900, 0, 1)], INJECTED_DTYPE)),
         "outside of the picture",
     ),
     "late": (
