@@ -14,6 +14,7 @@ import sys
 import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -93,7 +94,7 @@ def _complaint(effect: type[Hooks]) -> str | None:
         return f"stage: must be one of {', '.join(STAGES)}, got {effect.stage!r}"
     if not any(getattr(effect, name) is not getattr(Hooks, name) for name in METHODS):
         return f"changes nothing: it must define one of {', '.join(METHODS)}"
-    section = effect.Parameters
+    section: Any = effect.Parameters  # whatever the file says
     if not (isinstance(section, type) and issubclass(section, Section)):
         return "Parameters: must be a class derived from adv2e.parameters.Section"
     if "__dataclass_fields__" not in vars(section):
@@ -114,6 +115,11 @@ def config_class(effects: Sequence[type[Hooks]]) -> type[Config]:
     ConfigError
         Two of them have the same name.
     """
+    return _config_class(tuple(effects))
+
+
+@lru_cache(maxsize=64)
+def _config_class(effects: tuple[type[Hooks], ...]) -> type[Config]:
     if not effects:
         return Config
     by_name: dict[str, type[Hooks]] = {}

@@ -8,11 +8,11 @@ frames is sought whose means are the frames.  Changes faster than 1/T are not in
 cannot come back; noise of the frames grows with what does.
 
 With B the matrix of the mean over the exposure, its rows having sum 1 and the variance T^2/12 of
-the exposure, ten steps of the Richardson-Lucy iteration are taken from the frames themselves,
+the exposure, twenty steps of the Richardson-Lucy iteration are taken from the frames themselves,
 
 .. math:: y \leftarrow y \cdot \frac{B^T (DN_{frame} / B y)}{B^T 1},
 
-which stays positive and, with so few steps, leaves noise alone.  It goes through the sequence in
+which stays positive and, with so few steps, hardly follows noise.  It goes through the sequence in
 blocks, each solved with a margin of at least two exposures before and behind it.
 
 References
@@ -38,7 +38,7 @@ from adv2e.jit import kernel
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 10
+_ITERATIONS = 20
 _LEAST_DN = 0.05
 """Light below this counts as this: what is zero would stay zero."""
 
@@ -63,52 +63,38 @@ def means(times: Array, exposure: float) -> Array:
     Returns
     -------
     (n, n)
-        Rows with sum 1 and, inside, with the variance of the exposure: a mixture of the means over
-        light that is constant about each time, and over light that is linear between them.
+        Rows with sum 1 and the variance of the exposure: a mixture of the means over light that is
+        constant about each time, and over light that is linear between them.  Towards both ends the
+        exposures are cut, on both sides alike, to what lies between the first and the last time.
     """
-    steps, lines = _means_of_steps(times, exposure), _means_of_lines(times, exposure)
+    widths = np.minimum(exposure, 2.0 * np.minimum(times - times[0], times[-1] - times))
+    first, last = (times - 0.5 * widths)[:, None], (times + 0.5 * widths)[:, None]
+    middles = 0.5 * (times[1:] + times[:-1])
+    steps = _covered(first, last, np.append(times[0], middles), np.append(middles, times[-1]))
+    lines = _under_hats(last, times) - _under_hats(first, times)
+    open_ = widths > 0.0
+    scale = np.where(open_, widths, 1.0)[:, None]
+    steps, lines = steps / scale, lines / scale
     squared = (times[None, :] - times[:, None]) ** 2
     narrow, wide = (steps * squared).sum(axis=1), (lines * squared).sum(axis=1)
     way = np.where(wide > narrow, wide - narrow, 1.0)
-    share = np.clip((exposure**2 / 12.0 - narrow) / way, 0.0, 1.0)[:, None]
-    return np.asarray((1.0 - share) * steps + share * lines)
+    share = np.clip((widths**2 / 12.0 - narrow) / way, 0.0, 1.0)[:, None]
+    mixed = (1.0 - share) * steps + share * lines
+    return np.asarray(np.where(open_[:, None], mixed, np.eye(times.size)))
 
 
-def _means_of_steps(times: Array, exposure: float) -> Array:
-    """Of light that is constant up to half-way between two times."""
-    middles = 0.5 * (times[1:] + times[:-1])
-    ends = np.concatenate([[-np.inf], middles, [np.inf]])
-    first, last = times[:, None] - 0.5 * exposure, times[:, None] + 0.5 * exposure
-    covered = np.minimum(ends[None, 1:], last) - np.maximum(ends[None, :-1], first)
-    return np.asarray(np.clip(covered, 0.0, None) / exposure)
+def _covered(first: Array, last: Array, starts: Array, ends: Array) -> Array:
+    """Return how much of first..last lies in each span, (n, spans)."""
+    return np.asarray(np.clip(np.minimum(ends, last) - np.maximum(starts, first), 0.0, None))
 
 
-def _means_of_lines(times: Array, exposure: float) -> Array:
-    """Of light that is linear between the times, and constant beyond them."""
-
-    def antiderivative(at: Array) -> Array:
-        # of the hat about each time: (at, times)
-        hats = np.zeros((at.size, times.size))
-        for j, time in enumerate(times):
-            before = times[j - 1] if j else time
-            behind = times[j + 1] if j + 1 < times.size else time
-            rise, fall = time - before, behind - time
-            up = np.clip(at - before, 0.0, rise)
-            down = np.clip(at - time, 0.0, fall)
-            hats[:, j] = down
-            if rise:
-                hats[:, j] += up * up / (2.0 * rise)
-            else:
-                hats[:, j] += np.minimum(at - time, 0.0)
-            if fall:
-                hats[:, j] -= down * down / (2.0 * fall)
-            else:
-                hats[:, j] += np.maximum(at - time, 0.0)
-        return hats
-
-    half = 0.5 * exposure
-    found = antiderivative(times + half) - antiderivative(times - half)
-    return np.asarray(found / exposure)
+def _under_hats(at: Array, times: Array) -> Array:
+    """Return the integral up to `at` (n, 1) of the hat function about each of `times` (m,)."""
+    steps = np.diff(times)
+    before, behind = np.append(1.0, steps), np.append(steps, 1.0)
+    up = np.clip(at - (times - before), 0.0, before)
+    down = np.clip(at - times, 0.0, behind)
+    return np.asarray(up * up / (2.0 * before) + down - down * down / (2.0 * behind))
 
 
 @kernel

@@ -3,9 +3,10 @@ r"""Misregistration: the picture in the frames lies beside the one that the even
 .. math:: DN(x, y) = DN_{frame}(x + d_x,\; y + d_y)
 
 with (d_x, d_y) = ``frames.shift_px``, how far the picture in the frames lies to the right of, and
-below, where the event pixels see it [px].  Parts of a pixel are interpolated by cubic convolution
-(Keys), held between the two neighbours so that dark pixels beside bright ones stay above zero;
-beyond the edge the outermost pixels are repeated.
+below, where the event pixels see it [px].  Parts of a pixel are interpolated by the six-point cubic
+convolution of Keys (of fourth order) on the logarithm of the light, which is what the pixel
+responds to: contrast moves as it is, and dark pixels beside bright ones stay above zero.  Light
+below 0.05 DN counts as that.  Beyond the edge the outermost pixels are repeated.
 
 References
 ----------
@@ -23,30 +24,39 @@ from numpy.typing import NDArray
 
 from adv2e.effects.hooks import Frames, Hooks
 
+_LEAST_DN = 0.05
 
-def shifted(light: NDArray[Any], by: float, axis: int) -> NDArray[Any]:
-    """Return `light` (rows, columns) taken `by` pixels further along `axis`."""
-    count = light.shape[axis]
+
+def _weight(distance: float) -> float:
+    """Return the weight of a pixel at a distance [px]."""
+    d = abs(distance)
+    if d < 1.0:
+        return 1.0 + d * d * (4.0 / 3.0 * d - 7.0 / 3.0)
+    if d < 2.0:
+        return 2.5 + d * (-59.0 / 12.0 + d * (3.0 - 7.0 / 12.0 * d))
+    return -1.5 + d * (1.75 + d * (-2.0 / 3.0 + d / 12.0)) if d < 3.0 else 0.0
+
+
+def _moved(values: NDArray[Any], by: float, axis: int) -> NDArray[Any]:
+    """Return `values` (rows, columns) taken `by` pixels further along `axis`."""
+    count = values.shape[axis]
     whole = math.floor(by)
-    f = by - whole
-
-    def taken(step: int) -> NDArray[Any]:
+    part = by - whole
+    total = np.zeros_like(values)
+    for step in range(-2, 4) if part else (0,):
         where = np.clip(np.arange(count) + whole + step, 0, count - 1)
-        return light.take(where, axis)
+        # a Python float keeps float32
+        total += _weight(part - step) * values.take(where, axis)
+    return total
 
-    if f == 0.0:
-        return taken(0)
-    # in the type of the light: a Python float keeps float32
-    weights = (
-        f * (-0.5 + f * (1.0 - 0.5 * f)),
-        1.0 + f * f * (-2.5 + 1.5 * f),
-        f * (0.5 + f * (2.0 - 1.5 * f)),
-        f * f * (-0.5 + 0.5 * f),
-    )
-    near = taken(0), taken(1)
-    value = weights[0] * taken(-1) + weights[1] * near[0]
-    value += weights[2] * near[1] + weights[3] * taken(2)
-    return np.clip(value, np.minimum(*near), np.maximum(*near))
+
+def shifted(light: NDArray[Any], shift_px: tuple[float, float]) -> NDArray[Any]:
+    """Return the light at each pixel's place plus `shift_px`, (x, y)."""
+    x, y = shift_px
+    if x == math.floor(x) and y == math.floor(y):
+        return _moved(_moved(light, y, 0), x, 1)
+    logarithm = np.log(np.maximum(light, light.dtype.type(_LEAST_DN)))
+    return np.asarray(np.exp(_moved(_moved(logarithm, y, 0), x, 1)))
 
 
 class MisregistrationHooks(Hooks):
@@ -56,9 +66,9 @@ class MisregistrationHooks(Hooks):
 
     def __init__(self, shift_px: tuple[float, float]) -> None:
         super().__init__()
-        self._x, self._y = shift_px
+        self._shift_px = shift_px
 
     def light(self, frames: Frames) -> Frames:
         """Yield the frames where the event pixels see them."""
         for t_ns, light in frames:
-            yield t_ns, shifted(shifted(light, self._y, 0), self._x, 1)
+            yield t_ns, shifted(light, self._shift_px)
