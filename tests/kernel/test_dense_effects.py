@@ -39,7 +39,7 @@ def compare(found, truth, *, least=60):
     times = [abs(a[:, 0] - b[:, 0]) for a, b in zip(found, truth, strict=True) if len(a) == len(b)]
     apart = 1e6 * np.concatenate(times)
     assert np.median(apart) < 0.2
-    assert apart.max() < 3.0
+    assert apart.max() < 1.0
 
 
 LIGHT = moving_light(11, 20, seed=5)
