@@ -245,10 +245,10 @@ class PixelArray:
 
     def _first_steps(self) -> None:
         """Rows of the state that only the stepping path has; all poles are at rest."""
-        drive, signal = self._stepping.first_added()
-        self.state[S_FIRST] = self.state[S_X] + drive
-        self.state[S_SECOND] = self.state[S_FIRST]
-        self.state[S_REFERENCE] += drive + signal
+        driven = self._stepping.first_driven(self.state[S_X])
+        self.state[S_FIRST] = driven
+        self.state[S_SECOND] = driven
+        self.state[S_REFERENCE] += driven - self.state[S_X] + self._stepping.first_signal()
 
     def _over_pixels(self, fill: Callable[..., None], *arguments: Any) -> None:
         """Call `fill` for ranges of pixels, in threads: drawing for all of them takes its time."""
