@@ -365,7 +365,7 @@ class PixelArray:
 
         found = [
             list((pool.map if pool else map)(partial(run, *these), self._tiles))
-            for these in self._stepping.runs(starts, part.last)
+            for these in self._stepping.runs(part, frames, starts)
         ]
         parted = []
         for tile in zip(*found, strict=True):

@@ -205,3 +205,15 @@ def test_additions_of_nothing_change_nothing():
     one, two = (by_pixel(array, *advance(array, light, times_ns)) for array in arrays)
     assert sum(map(len, one)) > 100
     assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
+
+
+def test_light_beyond_white_is_followed_as_fast():
+    """Thirty times white: a corner of 9 kHz."""
+    light = np.exp(np.random.default_rng(0).uniform(0, 9, (12, 40))).astype(np.float32)
+    times = clock(12, 1e-3)
+    found = count_and_time_errors(
+        solve(light, times, quiet(), method="dense"), solve(light, times, quiet())
+    )
+    assert found.count_b > 1000
+    assert not found.differing
+    assert found.max_dt_us < 1.0
