@@ -211,8 +211,10 @@ def test_the_table_of_effects_agrees_with_the_configuration():
         )
         if key.is_section
     ]
-    own = [effect for effect in EFFECTS if effect.stage == "pixel" and not effect.own_paths]
-    assert [effect.name for effect in own] == sections
+    with_sections = [
+        effect.name for effect in EFFECTS if effect.stage == "pixel" and not effect.own_paths
+    ]
+    assert with_sections == sections
     paths = {key.path for key in all_keys()}
     for effect in EFFECTS:
         assert effect.stage in STAGES
