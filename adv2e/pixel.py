@@ -245,11 +245,11 @@ class PixelArray:
 
     def _first_steps(self) -> None:
         """Rows of the state that only the stepping path has; all poles are at rest."""
-        drive, signal = self._stepping.first_added()
         state, circuit = self.state, self.circuit
-        state[S_FIRST] = state[S_X] + drive
-        state[S_SECOND] = state[S_FIRST]
-        state[S_REFERENCE] += drive + signal
+        driven = self._stepping.first_driven(state[S_X])
+        state[S_FIRST] = driven
+        state[S_SECOND] = driven
+        state[S_REFERENCE] += driven - state[S_X] + self._stepping.first_signal()
         if circuit.noise_rms > 0 and circuit.follower > 0:
             # the noise was there before the first frame: a second pole without it, and references
             # in the middle of its course, would take seconds to forget that

@@ -47,6 +47,9 @@ _FEWEST, _SHORT_US = 4, 10.0
 _VALUES = 1 << 22
 """Values of a course that are in memory at a time, unless one block of steps has more."""
 
+_COURSES = ("gain", "drive", "signal", "on", "off")
+_ABOVE_ZERO = ("gain", "on", "off")
+
 _NONE = np.zeros((0, 1))
 _NO_INDEX = np.zeros(0, np.int64)
 _NOTHING = Injected(np.zeros(0), np.zeros(0, np.bool_), _NO_INDEX, _NO_INDEX)
@@ -107,13 +110,23 @@ class Stepping:
         self._drift, self._origin, self._start = drift_per_s, origin_us, start_us
         self._step_us = additions.step_us if additions else math.inf
         at = np.array([start_us])
-        widths = (self._course(name, at).shape[1] for name in ("drive", "signal", "on", "off"))
+        widths = (self._course(name, at).shape[1] for name in _COURSES)
         self._width = sum(width for width in widths if width > 1)
 
-    def first_added(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return drive and signal that are added at the first frame, (1,) or (pixels,)."""
-        at = np.array([self._start])
-        return _at_first(self._course("drive", at)), _at_first(self._course("signal", at))
+    def first_driven(self, x: NDArray[np.float64]) -> NDArray[Any]:
+        """Return what drives the poles at the first frame, whose log intensity is `x` (pixels,)."""
+        at, circuit = np.array([self._start]), self._circuit
+        gain = self._course("gain", at)
+        if gain.size:
+            light = gain[0] * np.where(x < circuit.knee, x * circuit.slope, np.exp(x))
+            foot = light < math.exp(circuit.knee)
+            below = light / (circuit.slope or 1.0)
+            x = np.where(foot, below, np.log(np.where(foot, 1.0, light)))
+        return np.asarray(x + _at_first(self._course("drive", at)))
+
+    def first_signal(self) -> NDArray[Any]:
+        """Return what is added to the signal at the first frame, (1,) or (pixels,)."""
+        return _at_first(self._course("signal", np.array([self._start])))
 
     def runs(self, part: Part, frames: Frames, starts: NDArray[np.float64]) -> Iterator[_Planned]:
         """Yield the runs over the intervals of a part, and the events that are injected in each.
@@ -145,7 +158,7 @@ class Stepping:
             times = _instants(starts, pieces * steps, first, first_step, stop, stop_step)
             run = Run(
                 first=first, first_step=first_step, last=stop, last_step=stop_step, pieces=pieces,
-                steps=steps, drive=self._course("drive", times),
+                steps=steps, gain=self._course("gain", times), drive=self._course("drive", times),
                 signal=self._course("signal", times), on=self._factors("on", times),
                 off=self._factors("off", times),
             )  # fmt: skip
@@ -169,7 +182,7 @@ class Stepping:
         course: Course | None = getattr(self._additions, name, None)
         if course is None:
             return _NONE
-        above = 0.0 if name in ("on", "off") else -math.inf
+        above = 0.0 if name in _ABOVE_ZERO else -math.inf
         return values_of(course, name, self._seconds(times), self._pixels, above=above)
 
     def _factors(self, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
