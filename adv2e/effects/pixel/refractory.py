@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,5 +24,10 @@ class Refractory(Section):
     """Dead time after each event."""
 
     period_us: float = parameter(
-        500.0, unit="us", meaning="dead time after an event", above=0, source="v2e default 0.5 ms"
+        500.0,
+        unit="us",
+        meaning="dead time after an event",
+        above=0,
+        source="v2e default 0.5 ms",
+        fit=Fit(10.0, 50000.0, 500.0, log=True),
     )
