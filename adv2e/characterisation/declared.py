@@ -32,7 +32,7 @@ class Declared:
     written: Mapping[str, Any]
 
     def held(self, path: str, neutral: float | None) -> float | None:
-        """Return the number written for a key; `neutral` where there is none, or its section is off.
+        """Return the number written for a key; `neutral` where none is, or its section is off.
 
         Defaults of this program are no knowledge of a camera, so that a key which is not written
         stands for the effect being absent.

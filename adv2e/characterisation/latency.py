@@ -6,9 +6,9 @@ its slope limited to s; a second pole follows the first:
 .. math:: \dot y = \max(-s, \min(s, w_1 (x - y))), \qquad \dot z = w_2 (y - z)
 
 One pole alone crosses C at :math:`-\ln(1 - C/S)/w_1`, so that with a corner proportional to the
-light the latency is proportional to 1/E.  Two poles have no closed form; the root is found.  At rest
-before the step the reference is the signal, so no other part of the pixel (dead time, leak) plays a
-part in the first event.
+light the latency is proportional to 1/E.  Two poles have no closed form; the root is found.  At
+rest before the step the reference is the signal, so no other part of the pixel (dead time, leak)
+plays a part in the first event.
 
 References
 ----------

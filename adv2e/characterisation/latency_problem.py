@@ -120,6 +120,11 @@ class LatencyProblem:
         latency = 1e6 * time + (value(OFFSET, 0.0) or 0.0)
         return np.log(np.minimum(latency, np.exp(NEVER)))
 
+    @property
+    def neutral(self) -> dict[str, float]:
+        """Keys that this model has at a value other than the default, where not written."""
+        return {} if DARK_CUTOFF in self._declared.written else {DARK_CUTOFF: 0.0}
+
     def _thresholds(self, values: Mapping[str, float]) -> Array:
         by_group = np.array([self._threshold(k, values) for k in range(len(self._groups))])
         return by_group[self._group]

@@ -1,9 +1,10 @@
-"""Which effects a table asks for: models of increasing size, judged on what they were not fitted to.
+"""Which effects a table asks for: models of increasing size, judged on light held out.
 
 The declared model is rejected where its misfit is larger than 95 in 100 of those of tables drawn
-from it.  Only then are effects added: of all sets of one effect, then two, then three, the one with
-the least held-out error, if that is lower than before by more than the standard error of the
-difference over the light levels held out.  Other sets of that size that fit as well are look-alikes.
+from it.  Only then are effects added: of all sets of one effect, then two, then three, the one
+with the least held-out error, if that is lower than before by more than the standard error of the
+difference over the light levels held out.  Other sets of that size that fit as well are
+look-alikes.
 """
 
 from __future__ import annotations
@@ -183,9 +184,7 @@ class Selector:
             )
         assert after.p is not None
         explained = after.p >= SIGNIFICANT
-        if not explained and (
-            after.error**2 > (1.0 - SKILL) * min(before.error, constant) ** 2
-        ):
+        if not explained and (after.error**2 > (1.0 - SKILL) * min(before.error, constant) ** 2):
             refused = self._refused(before, sets, [], before)
             return Selection(before, before, "unexplained", [], refused, constant)
         rivals = [m for m in sets[len(after.effects)] if m.effects != after.effects]
@@ -272,9 +271,7 @@ class Selector:
             chosen: Array = gap[rows]
             return chosen
 
-        lower_, upper_ = (
-            np.log([getattr(f, side) for f in free]) for side in ("lower", "upper")
-        )
+        lower_, upper_ = (np.log([getattr(f, side) for f in free]) for side in ("lower", "upper"))
         return fit(residuals, starts, lower_, upper_, tolerance)
 
     def _constant(self) -> float:

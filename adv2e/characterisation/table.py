@@ -115,7 +115,9 @@ class Table:
         found = [same(text) for text in self.texts(column)]
         if not any(found):
             there = ", ".join(sorted(set(self.texts(column)))[:12])
-            raise DataError(f"{self.name}: {option}: no row has {column} = {value} (there: {there})")
+            raise DataError(
+                f"{self.name}: {option}: no row has {column} = {value} (there: {there})"
+            )
         return found
 
 
