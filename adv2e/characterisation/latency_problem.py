@@ -117,8 +117,9 @@ class LatencyProblem:
             None if follower is None else 2.0 * np.pi * follower,
             value(SLEW, None),
         )
-        latency = 1e6 * time + (value(OFFSET, 0.0) or 0.0)
-        return np.log(np.minimum(latency, np.exp(NEVER)))
+        latency: Array = 1e6 * time + (value(OFFSET, 0.0) or 0.0)
+        logs: Array = np.log(np.minimum(latency, np.exp(NEVER)))
+        return logs
 
     @property
     def neutral(self) -> dict[str, float]:

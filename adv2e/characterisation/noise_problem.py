@@ -73,7 +73,7 @@ class NoiseProblem:
         self._kinds = [kind for kind, _ in cells]
         rows = np.array([k for _, k in cells])
         self._duration = data.duration_s[rows]
-        rate = np.array([self._rate(data, kind, k) for kind, k in cells])
+        rate = np.array([self._rate(data, kind, int(k)) for kind, k in cells])
         watched = data.pixels[rows] * data.duration_s[rows]
         smallest = rate[rate > 0].min() if (rate > 0).any() else 1.0
         self.floor = np.where(np.isnan(watched), 0.1 * smallest, 1.0 / watched)
@@ -130,7 +130,8 @@ class NoiseProblem:
             "off_share": rates.off,
         }
         rate = np.array([by_kind[kind][k] for k, kind in enumerate(self._kinds)])
-        return np.log(rate + self.floor)
+        logs: Array = np.log(rate + self.floor)
+        return logs
 
     def _sources(self, values: Mapping[str, float]) -> NoisySources:
         held, pixel = self._declared.held, self._declared.config.pixel

@@ -2,14 +2,16 @@
 
 The declared model is rejected where its misfit is larger than 95 in 100 of those of tables drawn
 from it.  Only then are effects added: of all sets of one effect, then two, then three, the one
-with the least held-out error, if that is lower than before by more than the standard error of the
-difference over the light levels held out.  Other sets of that size that fit as well are
+with the least held-out error, if that is lower than before by more than the best of as many useless
+ones would be by chance, sqrt(2 ln n) standard errors of the difference over the light levels held
+out.  Other sets of that size that fit as well are
 look-alikes.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -23,6 +25,8 @@ Array = NDArray[np.float64]
 
 MOST_EFFECTS = 3
 SIGNIFICANT = 0.05
+LOOK_ALIKE = 9.0
+"""Difference in the sum of squares, in units of its spread: three standard errors."""
 SKILL = 0.5
 """Least share of the error of a constant that a model must be free of on held-out levels."""
 
@@ -161,7 +165,7 @@ class Selector:
             sets[size] = found
             best = min(found, key=lambda model: model.error)
             self._tick(f"{size}: {' + '.join(best.names)}, held-out error {best.error:.3f}")
-            if not lower(best, current):
+            if not lower(best, current, len(found)):
                 continue
             current = replace(best, p=self.drawn(best).p)
             assert current.p is not None
@@ -187,21 +191,28 @@ class Selector:
         if not explained and (after.error**2 > (1.0 - SKILL) * min(before.error, constant) ** 2):
             refused = self._refused(before, sets, [], before)
             return Selection(before, before, "unexplained", [], refused, constant)
-        rivals = [m for m in sets[len(after.effects)] if m.effects != after.effects]
-        alternatives = []
-        for rival in rivals:
-            if explained:
-                close = lower(rival, before) and self.drawn(rival).p >= SIGNIFICANT
-            else:
-                close = lower(rival, before) and not lower(after, rival)
-            if close:
-                alternatives.append(rival)
+        alternatives = [
+            rival
+            for rival in sets[len(after.effects)]
+            if rival.effects != after.effects
+            and lower(rival, before, 1)
+            and self._as_well(rival, after)
+        ]
         if alternatives:
             verdict = "not_identifiable"
         else:
             verdict = "explained" if explained else "partly_explained"
         refused = self._refused(before, sets, alternatives, after)
         return Selection(before, after, verdict, alternatives, refused, constant)
+
+    def _as_well(self, rival: Model, best: Model) -> bool:
+        """Whether a rival's misfit is larger by no more than chance makes, 997 times in 1000.
+
+        Misfits are relative to that which the best leaves, should it be above the stated errors.
+        """
+        freedom = max(int(self._fitted.sum()) - len(best.free), 1)
+        spread = max(1.0, best.fit.sum_of_squares / freedom)
+        return (rival.fit.sum_of_squares - best.fit.sum_of_squares) / spread <= LOOK_ALIKE
 
     def _refused(
         self, before: Model, sets: dict[int, list[Model]], alternatives: list[Model], after: Model
@@ -214,7 +225,7 @@ class Selector:
                 if model.effects == after.effects or model in alternatives:
                     continue
                 ratio = f"held-out error {model.error:.3f}, declared {before.error:.3f}"
-                if not lower(model, before):
+                if not lower(model, before, 1):
                     reason = f"does not lower it by more than its standard error: {ratio}"
                 elif after is before:
                     reason = f"leaves too much, or predicts no better than a constant: {ratio}"
@@ -290,10 +301,17 @@ class Selector:
         return float(np.sqrt(np.mean(errors)))
 
 
-def lower(model: Model, than: Model) -> bool:
-    """Whether the held-out error is lower by more than the standard error of the difference."""
+def lower(model: Model, than: Model, best_of: int) -> bool:
+    """Whether the held-out error is lower by more than the standard error of the difference.
+
+    `best_of`: how many useless ones there might be of which this is the luckiest, whose gain is
+    some sqrt(2 ln n) standard errors.
+    """
     gain = than.errors - model.errors
-    return bool(gain.mean() > gain.std(ddof=1) / np.sqrt(gain.size)) if gain.size > 1 else False
+    if gain.size < 2:
+        return False
+    needed = max(1.0, math.sqrt(2.0 * math.log(best_of)))
+    return bool(gain.mean() > needed * gain.std(ddof=1) / math.sqrt(gain.size))
 
 
 def _starts(free: tuple[Free, ...]) -> list[Array]:

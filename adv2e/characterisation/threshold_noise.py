@@ -96,5 +96,4 @@ def _stationary(chain: Array) -> Array:
     balance = np.vstack([chain.T - np.eye(len(chain)), np.ones(len(chain))])
     right = np.zeros(len(chain) + 1)
     right[-1] = 1.0
-    share: Array = np.linalg.lstsq(balance, right, rcond=None)[0]
-    return share
+    return np.asarray(np.linalg.lstsq(balance, right, rcond=None)[0], dtype=np.float64)
