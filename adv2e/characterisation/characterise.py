@@ -224,7 +224,8 @@ def _errors(chosen: Selection, problem: Problem) -> list[ErrorRow]:
     floor = float(np.sqrt((problem.error**2).mean()))
     held = f"root mean square of ln(measured/predicted) {problem.what}, on light held out"
     rows = [_row(held, chosen.before.error, chosen.after.error, floor)]
-    for k, level in enumerate(np.unique(problem.level[_held(problem)])):
+    levels = np.unique(problem.level[_held(problem)])
+    for k, level in enumerate(levels if levels.size > 1 else ()):
         light = float(problem.light[problem.level == level][0])
         before, after = (float(m.errors[k] ** 0.5) for m in (chosen.before, chosen.after))
         rows.append(_row(f"the same, at {problem.light_label} {light:g}", before, after, floor))

@@ -102,8 +102,10 @@ class LatencyProblem:
         def value(key: str, neutral: float | None) -> float | None:
             return values[key] if key in values else held(key, neutral)
 
-        cutoff, dark = value(CUTOFF, 0.0) or 0.0, value(DARK_CUTOFF, 0.0) or 0.0
-        stray = value(DARK_CURRENT, 0.0) or 0.0
+        def number(key: str) -> float:
+            return value(key, 0.0) or 0.0
+
+        cutoff, dark, stray = number(CUTOFF), number(DARK_CUTOFF), number(DARK_CURRENT)
         bright = 255.0 * light / self._white
         dim = bright * np.exp(-self._contrast)
         step = np.log((bright + stray) / (dim + stray))
@@ -117,9 +119,8 @@ class LatencyProblem:
             None if follower is None else 2.0 * np.pi * follower,
             value(SLEW, None),
         )
-        latency: Array = 1e6 * time + (value(OFFSET, 0.0) or 0.0)
-        logs: Array = np.log(np.minimum(latency, np.exp(NEVER)))
-        return logs
+        latency = 1e6 * time + number(OFFSET)
+        return np.asarray(np.minimum(np.log(latency), NEVER), dtype=np.float64)
 
     @property
     def neutral(self) -> dict[str, float]:

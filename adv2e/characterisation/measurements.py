@@ -24,6 +24,7 @@ Noise tables
 ``on_median_hz``, ``off_...``   median over the pixels
 ``on_share``, ``off_share``     share of the pixels with at least one event
 ``pixels``, ``duration_s``      how many pixels were watched, and how long
+``least_hz``                    least rate that would have shown; default: 1/(pixels duration)
 =============================== ==================================================================
 """
 
@@ -90,7 +91,7 @@ class Noise:
     unit : str
     rates : mapping of str to (rows,)
         By column: ``on_rate_hz`` and so on.
-    pixels, duration_s : (rows,)
+    pixels, duration_s, least_hz : (rows,)
         NaN where the table gives none.
     """
 
@@ -99,6 +100,7 @@ class Noise:
     rates: dict[str, Array]
     pixels: Array
     duration_s: Array
+    least_hz: Array
 
 
 def measurements_of(table: Table) -> Latencies | Noise:
@@ -203,4 +205,5 @@ def _noise(table: Table, light: Array, unit: str) -> Noise:
     duration = table.numbers("duration_s", above=0.0) if "duration_s" in table.columns else nothing
     if any(name.endswith("_share") for name in rates) and np.isnan(duration).any():
         raise DataError(f"{table.name}: a share needs the column duration_s, in every row")
-    return Noise(light, unit, rates, pixels, duration)
+    least = table.numbers("least_hz", above=0.0) if "least_hz" in table.columns else nothing
+    return Noise(light, unit, rates, pixels, duration, least)

@@ -36,9 +36,9 @@ _OUT_OF_REACH = {
 class NoiseProblem:
     """Noise rates against light; see :class:`adv2e.characterisation.problem.Problem`.
 
-    What is compared is ln(rate + floor), the floor being the rate that one event in the table makes
-    (a tenth of its smallest rate where it does not say how long how many pixels were watched), so
-    that a rate of 0 counts as what it is: less than can be seen.  Light is scaled so that `white`
+    What is compared is ln(rate + floor), the floor being the least rate that would have shown:
+    as the table says, or that of one event (a tenth of the smallest rate where the table does not
+    say how many pixels were watched for how long), so that a rate of 0 counts as what it is.  Light is scaled so that `white`
     is 255 DN.
 
     Parameters
@@ -76,7 +76,8 @@ class NoiseProblem:
         rate = np.array([self._rate(data, kind, int(k)) for kind, k in cells])
         watched = data.pixels[rows] * data.duration_s[rows]
         smallest = rate[rate > 0].min() if (rate > 0).any() else 1.0
-        self.floor = np.where(np.isnan(watched), 0.1 * smallest, 1.0 / watched)
+        floor = np.where(np.isnan(watched), 0.1 * smallest, 1.0 / watched)
+        self.floor = np.where(np.isnan(data.least_hz[rows]), floor, data.least_hz[rows])
         self.measured = np.log(rate + self.floor)
         self.light = data.light[rows]
         self.level = levels_of(data.light)[rows]

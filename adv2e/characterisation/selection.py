@@ -59,8 +59,8 @@ class Model:
     fit : Fit
         To all rows that are not kept for judging.
     errors : (levels,)
-        Mean square of ln(measured/predicted) on each level when it was held out, each row by the
-        square of its standard error.
+        Mean square of ln(measured/predicted) on each level when it was held out, each row weighted
+        by the inverse square of its standard error; on each row where all are of one level.
     p : float or None
         Probability of such a misfit; None where not asked for.
     """
@@ -139,6 +139,8 @@ class Selector:
         self._fitted = fitted
         held = problem.judged if problem.judged.any() else fitted
         self._units = [held & (problem.level == k) for k in np.unique(problem.level[held])]
+        if len(self._units) == 1:  # judged at one level: its rows
+            self._units = [np.arange(held.size) == k for k in np.flatnonzero(held)]
         self._folds = [
             fitted & ~unit if not problem.judged.any() else fitted for unit in self._units
         ]

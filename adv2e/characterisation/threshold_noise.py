@@ -93,7 +93,8 @@ def _landing(level: Array, dead_time: float) -> Array:
 
 
 def _stationary(chain: Array) -> Array:
-    balance = np.vstack([chain.T - np.eye(len(chain)), np.ones(len(chain))])
-    right = np.zeros(len(chain) + 1)
+    balance = chain.T - np.eye(len(chain))
+    balance[-1] = 1.0  # one equation follows from the others; the shares add up to 1
+    right = np.zeros(len(chain))
     right[-1] = 1.0
-    return np.asarray(np.linalg.lstsq(balance, right, rcond=None)[0], dtype=np.float64)
+    return np.asarray(np.linalg.solve(balance, right), dtype=np.float64)
