@@ -26,7 +26,7 @@ from adv2e.config import Config, from_dict
 from adv2e.diagnosis.result import Diagnosis
 from adv2e.errors import Adv2eError, DataError
 
-COARSEST = 0.2
+COARSEST = 0.05
 """Medians whose reading error is above this share of them are left out."""
 CONTRASTS = (0.5, 1.0, 2.0, 3.0)
 DEFAULT = ["lens=none", "bias=0"]
@@ -93,11 +93,8 @@ def verdicts(measured: Table, seed: int) -> str:
             for contrast in CONTRASTS if judged != other else (1.0,):
                 found = one(measured, fitted, judged, contrast, seed)
                 rows.append([fitted, judged, f"{contrast:g}", *cells_of(found)])
-    head = (
-        "fitted,judged on,step [ln],verdict,effect,value (95 %),as well,error before,after".split(
-            ","
-        )
-    )
+    head = ["fitted", "judged on", "step [ln]", "verdict", "effect", "value (95 %)", "as well"]
+    head += ["error before", "after"]
     return table(head, rows)
 
 

@@ -38,8 +38,8 @@ class NoiseProblem:
 
     What is compared is ln(rate + floor), the floor being the least rate that would have shown:
     as the table says, or that of one event (a tenth of the smallest rate where the table does not
-    say how many pixels were watched for how long), so that a rate of 0 counts as what it is.  Light is scaled so that `white`
-    is 255 DN.
+    say how many pixels were watched for how long), so that a rate of 0 counts as what it is.
+    Light is scaled so that `white` is 255 DN.
 
     Parameters
     ----------

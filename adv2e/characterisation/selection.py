@@ -168,7 +168,9 @@ class Selector:
             best = min(found, key=lambda model: model.error)
             self._tick(f"{size}: {' + '.join(best.names)}, held-out error {best.error:.3f}")
             if not lower(best, current, len(found)):
-                continue
+                if size > 1:
+                    break
+                continue  # two effects may hide each other
             current = replace(best, p=self.drawn(best).p)
             assert current.p is not None
             if current.p >= SIGNIFICANT:
@@ -317,7 +319,8 @@ def lower(model: Model, than: Model, best_of: int) -> bool:
 
 
 def _starts(free: tuple[Free, ...]) -> list[Array]:
-    """Return starts: all combinations of those of each parameter."""
-    if not free:
-        return [np.empty(0)]
-    return [np.log(start) for start in itertools.product(*(f.starts for f in free))]
+    """Return starts: all parameters at their first ones, at their second ones, and so on."""
+    count = max((len(f.starts) for f in free), default=1)
+    return [
+        np.log(np.array([f.starts[min(k, len(f.starts) - 1)] for f in free])) for k in range(count)
+    ]

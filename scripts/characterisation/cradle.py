@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ def still_rates(folder: Path) -> list[dict[str, float]]:
         at = part["y"].astype(np.int64) * grey.shape[1] + part["x"]
         counts[polarity] = np.bincount(at, minlength=grey.size).reshape(grey.shape)
     rows = []
-    for low, high in zip(EDGES_DN[:-1], EDGES_DN[1:], strict=True):
+    for low, high in itertools.pairwise(EDGES_DN):
         inside = real.still & (grey >= low) & (grey < high)
         if inside.sum() < FEWEST:
             continue

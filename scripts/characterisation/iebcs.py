@@ -56,7 +56,7 @@ class Level:
         return 0.5 * (low + high) / self.duration_s
 
     def median_hz(self, polarity: str) -> float:
-        """Return the rate of the median pixel; from the share of pixels where it has no interval."""
+        """Return the rate of the median pixel; from `typical_hz` where it has no interval."""
         middle = float(np.median(self.intervals[polarity]))
         return (middle + 1.0) / self.duration_s if middle > 0 else self.typical_hz(polarity)
 
