@@ -93,15 +93,22 @@ def measured_rates(levels: list[Level]) -> str:
 
 
 def per_pixel(levels: list[Level]) -> str:
-    """Return how ON intervals are spread over the pixels: measured, and v2e's parameters."""
+    """Return how ON intervals are spread over the pixels: measured, and simulated.
+
+    Simulated with v2e's parameters, and with leak, shot noise and one hot pixel in a hundred that
+    meet this level's own mean and median.
+    """
     rows = []
-    config = load_config([DECLARED], ["pixel.refractory=null", "sampling.L=1"])
     white = max(level.lux for level in levels)
     for level in levels:
-        events = still(config, 255.0 * level.lux / white, level.duration_s)
-        part = events[events["p"] == 1]
-        counts = np.bincount(part["y"] * SIDE + part["x"].astype(np.int64), minlength=SIDE**2)
-        streams = {"measured": level.intervals["on"], "v2e": np.maximum(counts - 1, 0)}
+        streams = {"measured": level.intervals["on"]}
+        for name, sets in (("v2e", []), ("rates of this level", fitted_here(level, white))):
+            config = load_config([DECLARED], ["sampling.L=1", *sets])
+            events = still(config, 255.0 * level.lux / white, level.duration_s)
+            part = events[events["p"] == 1]
+            at = part["y"].astype(np.int64) * SIDE + part["x"]
+            counts = np.bincount(at, minlength=SIDE**2)
+            streams[name] = np.maximum(counts - 1, 0)
         for name, intervals in streams.items():
             quantiles = np.quantile(intervals, (0.5, 0.9, 0.99, 1.0))
             rows.append(
@@ -115,6 +122,20 @@ def per_pixel(levels: list[Level]) -> str:
             )
     head = ["light [lux]", "", "pixels with any", "median", "90 %", "99 %", "most", "busiest 1 %"]
     return table(head, rows)
+
+
+def fitted_here(level: Level, white: float) -> list[str]:
+    """Return the keys that give a level its own rates."""
+    off, on = level.median_hz("off"), level.median_hz("on")
+    shot = 2.0 * off / (1.0 - 0.75 * level.lux / white)
+    hot = max(level.mean_hz("on") - on, 0.0) / 0.01
+    leak = max(on - off, 0.0) if on > 2.0 * off else 0.0  # beside more noise leak hardly shows
+    return [
+        f"pixel.leak.rate_hz={leak:.6f}",
+        f"pixel.shot_noise.rate_hz={shot:.6f}",
+        "pixel.hot_pixels.fraction=0.01",
+        f"pixel.hot_pixels.rate_hz={hot:.6f}",
+    ]
 
 
 def rotations(measured: Table, seed: int) -> Iterator[str]:

@@ -89,7 +89,7 @@ class _Response:
                 newton = time - (value - level) / slope
             inside = (newton > low) & (newton < high)
             after = np.where(inside, newton, 0.5 * (low + high))
-            done = np.abs(after - time) <= 1e-10 * time
+            done = np.abs(after - time) <= 1e-9 * time
             time = after
             if done.all():
                 break

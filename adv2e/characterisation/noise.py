@@ -35,6 +35,10 @@ from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 Array = NDArray[np.float64]
 
 
+_RMS_STEP = 0.02
+"""Step of ln(rms) at which rates of photoreceptor noise are computed; between, interpolated."""
+
+
 @dataclass(frozen=True)
 class NoisySources:
     """What makes noise events in a pixel; rates in Hz, 0 standing for none.
@@ -109,11 +113,23 @@ def _crossings(sources: NoisySources, light: Array) -> tuple[Array, Array]:
     if sources.rms <= 0.0:
         return on, off
     corner = sources.dark_cutoff_hz + (sources.cutoff_hz - sources.dark_cutoff_hz) * light
-    shift = SAMPLING_SHIFT * np.sqrt(2.0 * sources.noise_step)
-    levels = sources.on / sources.rms + shift, sources.off / sources.rms + shift
     for k, w in enumerate(2.0 * np.pi * corner):
-        dead = w * sources.dead_time_s
-        a, b = event_rates(*levels, float(dead))
+        dead = float(w * sources.dead_time_s)
+        a, b = _tabulated(sources, dead)
         free = 1.0 - (a + b) * dead  # the caller takes the dead time out again
         on[k], off[k] = w * a / free, w * b / free
     return on, off
+
+
+def _tabulated(sources: NoisySources, dead: float) -> tuple[float, float]:
+    """Return ON and OFF events a correlation time, between rms values at which they are kept."""
+    place = np.log(sources.rms) / _RMS_STEP
+    below = int(np.floor(place))
+    shift = SAMPLING_SHIFT * np.sqrt(2.0 * sources.noise_step)
+    ends = []
+    for number in (below, below + 1):
+        rms = float(np.exp(number * _RMS_STEP))
+        ends.append(event_rates(sources.on / rms + shift, sources.off / rms + shift, dead))
+    first, second = np.log(np.maximum(ends, 1e-300))
+    a, b = np.exp(first + (place - below) * (second - first))
+    return float(a), float(b)

@@ -135,6 +135,7 @@ class Selector:
         self._seed = seed
         self._draws = draws
         self._tick = tick
+        self._drawn: dict[tuple[Candidate, ...], Draws] = {}
         fitted = ~problem.judged
         self._fitted = fitted
         held = problem.judged if problem.judged.any() else fitted
@@ -256,6 +257,11 @@ class Selector:
 
     def drawn(self, model: Model) -> Draws:
         """Fit the model to tables drawn from it: normal errors about its logarithms."""
+        if model.effects not in self._drawn:
+            self._drawn[model.effects] = self._draw(model)
+        return self._drawn[model.effects]
+
+    def _draw(self, model: Model) -> Draws:
         rng = np.random.default_rng([self._seed, len(model.effects)])
         ideal = self._predict(model.free, model.fit.logs)
         logs = np.empty((self._draws, len(model.free)))

@@ -33,7 +33,7 @@ SAMPLING_SHIFT = 0.5826
 """-zeta(1/2)/sqrt(2 pi): how far sampling moves a level, in standard deviations of one step."""
 
 _REACH = 5.0
-_PLACES = np.linspace(-_REACH, _REACH, 101)
+_PLACES = np.linspace(-_REACH, _REACH, 61)
 _FARTHEST = 12.0
 _FINE = np.linspace(-_FARTHEST, _FARTHEST, 4801)
 

@@ -45,6 +45,8 @@ class Level:
         A pixel without an interval had one event or none.
         """
         share = float((self.intervals[polarity] > 0).mean())
+        if share == 0.0:
+            return 0.0
         low, high = 0.0, 50.0
         for _ in range(60):
             middle = 0.5 * (low + high)
