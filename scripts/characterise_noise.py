@@ -31,9 +31,10 @@ DECLARED = "v2e"
 OPEN = 0.25
 """Relative error of a rate for what intervals leave open: the length, pixels without one."""
 SIDE = 50
+CHECK_S = 2.0
 CHECKED = (
-    ("leak 0.1 + 0.2 l", ("pixel.leak.rate_hz=0.1", "pixel.leak.photo_rate_hz=0.2")),
-    ("leak 1, shot noise 2", ("pixel.leak.rate_hz=1", "pixel.shot_noise.rate_hz=2")),
+    ("leak 2 + 6 l", ("pixel.leak.rate_hz=2", "pixel.leak.photo_rate_hz=6")),
+    ("leak 3, shot noise 4", ("pixel.leak.rate_hz=3", "pixel.shot_noise.rate_hz=4")),
     ("photoreceptor noise 0.06", ("pixel.photoreceptor_noise.rms=0.06",)),
 )
 
@@ -185,9 +186,9 @@ def closed_forms(measured: Table) -> str:
         assert isinstance(problem, NoiseProblem)
         for share in (0.1, 1.0):
             rates = problem.rates({}, np.array([share * 3000.0]))
-            events = still(config, 255.0 * share, 8.0)
-            on = np.count_nonzero(events["p"] == 1) / SIDE**2 / 8.0
-            off = np.count_nonzero(events["p"] == 0) / SIDE**2 / 8.0
+            events = still(config, 255.0 * share, CHECK_S)
+            on = np.count_nonzero(events["p"] == 1) / SIDE**2 / CHECK_S
+            off = np.count_nonzero(events["p"] == 0) / SIDE**2 / CHECK_S
             formula = f"{rates.on_mean[0]:.3g} / {rates.off[0]:.3g}"
             rows.append([name, f"{share:g}", formula, f"{on:.3g} / {off:.3g}"])
     return table(["effects [Hz]", "light", "formula ON / OFF", "simulated ON / OFF"], rows)

@@ -129,7 +129,8 @@ class LatencyProblem:
 
     def _thresholds(self, values: Mapping[str, float]) -> Array:
         by_group = np.array([self._threshold(k, values) for k in range(len(self._groups))])
-        return by_group[self._group]
+        each: Array = by_group[self._group]
+        return each
 
     def _threshold(self, group: int, values: Mapping[str, float]) -> float:
         key = self._threshold_key(group)
