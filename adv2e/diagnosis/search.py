@@ -182,7 +182,9 @@ class Search:
             factor = float(np.sqrt(seen / strength))
             neutral = neutral_value(declared, knob)
             size = value / factor if np.isinf(neutral) else neutral + factor * (value - neutral)
-            result.append(Detectable(candidate.name, knob.key, size, about_key(knob.key).unit))
+            result.append(
+                Detectable(candidate.name, knob.key, size, about_key(declared, knob.key).unit)
+            )
         return result
 
     def _trials(self, state: State) -> list[Trial]:
