@@ -11,7 +11,6 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -156,7 +155,6 @@ def _turn(values: dict[str, Any], knob: Knob, value: float) -> None:
 _OFF_AT_INFINITY = ("pixel.source_follower.cutoff_hz", "pixel.slew_limit.per_s")
 
 
-@lru_cache
 def _known(section: type[Config]) -> dict[str, Parameter]:
     return {key.path: key.about for key in all_keys(section)}
 
