@@ -31,11 +31,12 @@ MOST_EFFECTS = 4
 PARTLY = 0.8
 """Share of the residual that effects must explain to be named when something is left."""
 
-_MANY, _SOME = 160, 48
+_MANY, _SOME = 100, 32
 _FINALISTS = 6
 _FAR = 2.0
 _TRIED = 3
-_ROUNDS = 4
+_SEEDS = 6
+_ROUNDS = 3
 _CLOSE = 3.0
 _QUIET = 2.5
 _SIGNATURE = 12
@@ -206,8 +207,7 @@ class Search:
         far = _FAR * fits[0].misfit + _FAR * len(self._observed[BOTH])
         self._dismiss([fit for fit in fits[:_FINALISTS] if fit.misfit > far], nothing)
         fits = [fit for fit in fits[:_FINALISTS] if fit.misfit <= far]
-        for _ in range(2):
-            fitter.improve(fits, (3, 4, 5, 6))
+        fitter.improve(fits, (3, 4, 5))
         sample = self._laboratory.many([fit.config for fit in fits], range(1, _SOME + 1))
         trials = [self._trial(fit, rows) for fit, rows in zip(fits, sample, strict=True)]
         trials.sort(key=lambda trial: -trial.score)
@@ -293,8 +293,8 @@ class Search:
         joint = _joined(fits, self.declared.config)
         fitter = Fitter(self._laboratory, self.scales[view], self._observed[view], view, sd)
         for _ in range(_ROUNDS):
-            fitter.improve([joint], range(11, 21), 0.08)
-            if joint.moved < 0.01:
+            fitter.improve([joint], range(11, 11 + _SEEDS), 0.08)
+            if joint.moved < 0.015:
                 break
         return joint, _parted(joint, fits)
 
