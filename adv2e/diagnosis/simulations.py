@@ -58,7 +58,9 @@ class Simulator:
         """Return the events of one simulation, cut to the time of the frames."""
         evidence = self._evidence
         light = zip(evidence.times_ns, self._light(config), strict=True)
-        chunks = events_from_light(light, dataclasses.replace(config, seed=seed), threads=1)
+        chunks = events_from_light(
+            light, dataclasses.replace(config, seed=seed), threads=1, method=_method(config)
+        )
         events = np.concatenate([empty_events(), *chunks])
         self.done += 1
         self._progress(self.done, self.likely)
@@ -79,6 +81,14 @@ class Simulator:
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""
         return list(self._pool.map(work, *columns))
+
+
+def _method(config: Config) -> str:
+    """Return how to solve the pixel: in steps where solving it exactly takes far longer."""
+    pixel = config.pixel
+    slow = pixel.source_follower is not None or pixel.photoreceptor_noise is not None
+    exact = pixel.low_pass is not None and pixel.low_pass.update == "exact"
+    return "dense" if slow and exact else "auto"
 
 
 class Laboratory:
