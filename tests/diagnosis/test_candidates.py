@@ -12,7 +12,6 @@ from adv2e.config import Config, load_config, shipped, to_dict
 from adv2e.diagnosis.candidates import (
     Candidate,
     Hints,
-    Knob,
     about_key,
     flat,
     get_key,

@@ -104,7 +104,9 @@ def test_whitening_takes_the_correlation_away():
 def test_correlations_are_shrunk_by_half():
     draw = np.random.default_rng(7)
     base = draw.normal(size=(4000, 1))
-    sample = np.hstack([base, base + 0.01 * draw.normal(size=(4000, 1)), draw.normal(size=(4000, 1))])
+    sample = np.hstack(
+        [base, base + 0.01 * draw.normal(size=(4000, 1)), draw.normal(size=(4000, 1))]
+    )
     correlation = Scale.of(sample, np.full(3, 1e-6)).correlation
     np.testing.assert_allclose(np.diag(correlation), 1.0)
     assert correlation[0, 1] == pytest.approx(0.5, abs=0.01)

@@ -246,6 +246,4 @@ def test_pixels(stream):
     where, expected = placed(stream, SCENE), np.zeros((PARTS, 2, 2, WIDTH * HEIGHT))
     for t, pixel, on, part in events(where):
         expected[part, min(1, t // 100_000), on, pixel] += 1
-    same(
-        Pixels(SCENE).count(where), np.hstack([expected.reshape(PARTS, -1), np.eye(PARTS)])
-    )
+    same(Pixels(SCENE).count(where), np.hstack([expected.reshape(PARTS, -1), np.eye(PARTS)]))
