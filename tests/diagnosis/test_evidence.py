@@ -46,7 +46,7 @@ def grey(shape=(HEIGHT, WIDTH), kind=np.uint8):
 
 
 def complaint(adv2e, folder):
-    """Return what `adv2e diagnose` says of a recording; it must be one line, and nothing be left."""
+    """Return what `adv2e diagnose` says of a recording: one line; and nothing is left."""
     status, out, err = adv2e("diagnose", folder, "-o", folder.parent / "found", "--threads", 1)
     assert (status, out) == (1, "")
     assert err.count("\n") == 1

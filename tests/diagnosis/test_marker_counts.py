@@ -1,6 +1,7 @@
 """What the groups of statistics count, against plain loops over the events."""
 
 import bisect
+import itertools
 
 import numpy as np
 from hypothesis import given, settings
@@ -213,7 +214,7 @@ def test_gaps(stream):
     where = placed(stream, SCENE)
     gaps, near = np.zeros((PARTS, 11)), np.zeros((PARTS, 4, 2))
     listed = list(events(where))
-    for (t0, pixel0, *_), (t, pixel, _, part) in zip(listed, listed[1:], strict=False):
+    for (t0, pixel0, *_), (t, pixel, _, part) in itertools.pairwise(listed):
         gap = t - t0
         gaps[part, sum(gap >= border for border in (1, 2, 3, 5, 8, 12, 20, 40, 80, 160))] += 1
         for n, reach in enumerate((3, 12, 40, 160)):
