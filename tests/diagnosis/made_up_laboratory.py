@@ -51,6 +51,8 @@ class MadeUpLaboratory:
         Deviations by which one unit of response moves all statistics together.
     alike : mapping
         Keys with the pattern of another.
+    curvature : float
+        How far responses are from proportional.
     """
 
     def __init__(self, strength=20.0, alike=None, curvature=0.0):

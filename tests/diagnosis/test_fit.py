@@ -187,8 +187,9 @@ def test_what_has_no_knob_is_probed_and_stays():
 def test_deviations_given_weigh_the_statistics():
     laboratory = MadeUpLaboratory()
     observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=1"]), 5000)[VIEW]
-    plain, half = fitter_of(laboratory, observed), fitter_of(
-        laboratory, observed, sd=np.full(STATISTICS, 2.0)
+    plain, half = (
+        fitter_of(laboratory, observed),
+        fitter_of(laboratory, observed, sd=np.full(STATISTICS, 2.0)),
     )
     assert half.misfit(Config(), (1, 2)) == pytest.approx(plain.misfit(Config(), (1, 2)) / 4)
 
