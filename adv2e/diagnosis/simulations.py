@@ -88,7 +88,7 @@ def _method(config: Config) -> str:
     """Return how to solve the pixel: in steps where solving it exactly takes far longer."""
     pixel = config.pixel
     slow = pixel.source_follower is not None or pixel.photoreceptor_noise is not None
-    exact = pixel.low_pass is not None and pixel.low_pass.update == "exact"
+    exact = pixel.low_pass is None or pixel.low_pass.update == "exact"
     return "dense" if slow and exact else "auto"
 
 
