@@ -106,11 +106,11 @@ def was_off(config, key):
 def test_every_key_is_declared_with_a_unit():
     for one in library(Config(), HINTS):
         for knob in one.knobs:
-            assert about_key(knob.key).unit
-    assert about_key("pixel.refractory.period_us").unit == "us"
-    assert about_key("pixel.low_pass.cutoff_hz").unit == "Hz"
-    assert about_key("frames.shift_px").unit == "px"
-    assert about_key("readout.tick_us").unit == "us"
+            assert about_key(Config(), knob.key).unit
+    assert about_key(Config(), "pixel.refractory.period_us").unit == "us"
+    assert about_key(Config(), "pixel.low_pass.cutoff_hz").unit == "Hz"
+    assert about_key(Config(), "frames.shift_px").unit == "px"
+    assert about_key(Config(), "readout.tick_us").unit == "us"
 
 
 def test_effects_may_have_several_forms():

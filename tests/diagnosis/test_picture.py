@@ -57,7 +57,7 @@ def test_times_between_events_are_counted():
 def test_rates_are_per_pixel_and_second():
     number, expected = 0.0, 0.0
     for where, moving in (("in motion", True), ("at rest", False)):
-        for name, on in (("ON", 1), ("OFF", 0)):
+        for name in ("ON", "OFF"):
             curve = CURVES[f"Rate against brightness, {where}, {name}"]
             for k in range(3):
                 place = ((SCENE.speed != STILL) == moving) & (SCENE.brightness == k)

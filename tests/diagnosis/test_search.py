@@ -117,6 +117,12 @@ def test_two_effects_are_both_found(period, rate):
         assert finding_of(fit).interval
 
 
+def refitted(search, fits):
+    """Return the model with all `fits`, fitted together."""
+    joint, fits = search._fitted(fits, search.declared.models[BOTH].sd, BOTH)
+    return search._state(joint.config, fits)
+
+
 def test_backward_drops_what_the_others_do_without():
     laboratory = MadeUpLaboratory()
     observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
@@ -125,7 +131,7 @@ def test_backward_drops_what_the_others_do_without():
     for name, value in (("dark_current", 0.05), ("leak", 4.0)):
         (one,) = candidates(name)
         fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
-    state = search._polished(tuple(fits), search.declared.models[BOTH].sd)
+    state = refitted(search, tuple(fits))
     assert state.names == ("dark_current", "leak")
     assert search._backward(state).names == ("leak",)
     assert "not needed" in search.rejected["dark_current"].reason
@@ -139,7 +145,7 @@ def test_backward_keeps_what_is_needed():
     for name, value in (("refractory", 2500.0), ("leak", 4.0)):
         (one,) = candidates(name)
         fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
-    state = search._polished(tuple(fits), search.declared.models[BOTH].sd)
+    state = refitted(search, tuple(fits))
     assert search._backward(state) is state
 
 
