@@ -64,7 +64,8 @@ class Knob:
     def at_border(self, inner: float) -> bool:
         """Tell whether the fit has run to the end of the physical range."""
         value = self.outer(inner)
-        return value <= self.low * (1 + 1e-9) or value >= self.high * (1 - 1e-9)
+        low, high = 1e-9 * abs(self.low), 1e-9 * abs(self.high)
+        return value <= self.low + low or value >= self.high - high
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,12 @@ def _turn(values: dict[str, Any], knob: Knob, value: float) -> None:
         set_key(values, knob.key, value)
 
 
-_OFF_AT_INFINITY = ("pixel.source_follower.cutoff_hz", "pixel.slew_limit.per_s")
+_OFF_AT_INFINITY = (
+    "pixel.low_pass.cutoff_hz",
+    "pixel.low_pass.dark_cutoff_hz",
+    "pixel.source_follower.cutoff_hz",
+    "pixel.slew_limit.per_s",
+)
 
 
 def _known(section: type[Config]) -> dict[str, Parameter]:
@@ -205,7 +211,9 @@ def neutral_value(config: Config, knob: Knob) -> float:
     """Return the value of a knob at which `config` is as it was: what it holds, or nothing."""
     held = get_key(to_dict(config), knob.key)
     if knob.text:
-        return 1.0
+        return _exponent(str(held))
+    if knob.part is not None and isinstance(held, (list, tuple)):
+        held = held[knob.part]
     if isinstance(held, (int, float)):
         return float(held)
     return math.inf if knob.key in _OFF_AT_INFINITY else 0.0
@@ -288,7 +296,7 @@ def _of_the_photoreceptor(now: _Now, times: _Times, values: Any, hints: Hints) -
     white = Knob("pixel.low_pass.cutoff_hz", 1.0, 1e5)
     dark = Knob("pixel.low_pass.dark_cutoff_hz", 0.05, 1e4)
     a, b = now(white.key, 300.0), now(dark.key, 20.0)
-    return [
+    made = [
         Candidate("low_pass", (white,), times(white.key, 300.0, 0.25, 0.6, 2.0)),
         Candidate("low_pass", (dark,), times(dark.key, 20.0, 0.3, 3.0)),
         Candidate("low_pass", (white, dark), ((0.4 * a, 0.5 * b), (2.0 * a, 2.0 * b))),
@@ -302,6 +310,12 @@ def _of_the_photoreceptor(now: _Now, times: _Times, values: Any, hints: Hints) -
             (Knob("pixel.source_follower.cutoff_hz", 2.0, 1e5),),
             ((20.0,), (60.0,), (200.0,), (600.0,)),
         ),
+    ]
+    if get_key(values, "pixel.low_pass") is None:  # the others act on it
+        return made
+    least = min(now("pixel.thresholds.on", 0.2), now("pixel.thresholds.off", 0.2))
+    return [
+        *made,
         Candidate(
             "slew_limit",
             (Knob("pixel.slew_limit.per_s", 0.5, 1e4),),
@@ -310,10 +324,9 @@ def _of_the_photoreceptor(now: _Now, times: _Times, values: Any, hints: Hints) -
         Candidate(
             "photoreceptor_noise",
             (Knob("pixel.photoreceptor_noise.rms", 1e-3, 0.5),),
-            tuple((f * min(now("pixel.thresholds.on", 0.2), now("pixel.thresholds.off", 0.2)),)
-                  for f in (0.12, 0.2, 0.3)),
+            tuple((f * least,) for f in (0.12, 0.2, 0.3)),
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _of_the_comparator(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
@@ -325,7 +338,7 @@ def _of_the_comparator(now: _Now, times: _Times, values: Any, hints: Hints) -> l
         ),
         Candidate(
             "reset_overshoot",
-            (Knob("pixel.reset_overshoot.fraction", -0.9, 3.0, False, 0.1),),
+            (Knob("pixel.reset_overshoot.fraction", -0.9, 0.9, False, 0.1),),
             ((-0.1,), (0.1,), (0.25,)),
         ),
         Candidate(
@@ -412,17 +425,18 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
 
 
 def _encodings(values: Mapping[str, Any]) -> list[Candidate]:
-    declared = str(get_key(values, "frames.encoding"))
+    here = _exponent(str(get_key(values, "frames.encoding")))
     gamma = Knob("frames.encoding", 0.2, 5.0, text="gamma:{}")
-    if declared in ("auto", "linear"):
-        here = 1.0
-    elif declared.startswith("gamma:"):
-        here = float(declared.partition(":")[2])
-    else:
-        here = 2.2
     return [
         Candidate("frame_encoding", (gamma,), tuple((here * f,) for f in (0.8, 1.15, 1.5))),
     ]
+
+
+def _exponent(encoding: str) -> float:
+    """Return the exponent that an encoding has, or is about as steep as."""
+    if encoding.startswith("gamma:"):
+        return float(encoding.partition(":")[2])
+    return 2.2 if encoding == "srgb" else 1.0
 
 
 _BUILDERS = (
@@ -441,5 +455,6 @@ def names() -> list[str]:
 
 def hints_of(times_us: np.ndarray[Any, Any], seconds: float, lines: Sequence[float]) -> Hints:
     """Return hints from the stamps of a recording's events [us]."""
-    step = int(np.gcd.reduce(np.unique(times_us % 10_000_000))) if len(times_us) else 1
+    # of the times themselves, not of differences: ticks count from zero
+    step = int(np.gcd.reduce(times_us)) if len(times_us) else 1
     return Hints(seconds, tuple(lines), max(1, step))

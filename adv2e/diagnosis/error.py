@@ -28,7 +28,7 @@ def of_part(stream: Stream, parts: Parts, part: int) -> Stream:
 def error_rows(
     measured: Stream, before: Sequence[Stream], after: Sequence[Stream]
 ) -> list[ErrorRow]:
-    """Return the error over all scales, then at each scale.
+    """Return the error over all scales, then at each scale; NaN if nothing was measured.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def error_rows(
 
 def _apart(a: Stream, b: Stream, unit: Array) -> Array:
     apart = smoothed_norms([(a.events(), 1.0), (b.events(), -1.0)], a.width, SIGMAS_US)
-    return np.asarray(apart / np.maximum(unit, 1e-12))
+    return np.asarray(apart / np.where(unit > 0.0, unit, np.nan))
 
 
 def _pairs(streams: Sequence[Stream]) -> list[tuple[Stream, Stream]]:

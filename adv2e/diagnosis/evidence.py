@@ -64,7 +64,8 @@ def read_evidence(path: str | Path) -> Evidence:
     ------
     DataError
         It cannot be read, has no frames, fewer than three, or too few events; frames and events do
-        not overlap in time.
+        not overlap in time; frames are out of order, not all alike, or of another size than the
+        events.
     """
     recording = read_recording(path)
     if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
@@ -79,6 +80,7 @@ def read_evidence(path: str | Path) -> Evidence:
     if np.any(np.diff(times_s) <= 0):
         first = int(np.argmax(np.diff(times_s) <= 0)) + 1
         raise DataError(f"{path}: frame {first} is not later than the one before it")
+    _check_alike(path, frames)
     height, width = frames[0].shape[:2]
     if (width, height) != (recording.width, recording.height):
         raise DataError(
@@ -101,6 +103,23 @@ def read_evidence(path: str | Path) -> Evidence:
         masked=masked,
         notes=list(recording.problems),
     )
+
+
+def _check_alike(path: str | Path, frames: list[NDArray[Any]]) -> None:
+    first = frames[0]
+    for number, frame in enumerate(frames):
+        if (frame.shape, frame.dtype) != (first.shape, first.dtype):
+            raise DataError(
+                f"{path}: frame {number} is {_form(frame)}, frame 0 is {_form(first)}; all must be"
+                " alike"
+            )
+        if frame.dtype.kind == "f" and not np.all(np.isfinite(frame)):
+            raise DataError(f"{path}: frame {number} has values that are no finite numbers")
+
+
+def _form(frame: NDArray[Any]) -> str:
+    height, width = frame.shape[:2]
+    return f"{width}x{height} {'colour' if frame.ndim == 3 else 'grey'} {frame.dtype}"
 
 
 def _between_frames(events: Events, times_s: NDArray[np.float64]) -> tuple[Events, list[Masked]]:

@@ -165,6 +165,7 @@ def _tail(sample: Array, value: float) -> float:
     rank = (1.0 + np.count_nonzero(sample >= value)) / (len(sample) + 1.0)
     if value <= sample.max():
         return float(rank)
-    log = np.log(sample)
+    # without chance in the model, nothing is left over in its simulations
+    log = np.log(np.maximum(sample, 1e-9))
     z = (math.log(value) - log.mean()) / max(float(log.std(ddof=1)), 1e-6)
     return float(min(rank, 0.5 * math.erfc(z / math.sqrt(2.0))))

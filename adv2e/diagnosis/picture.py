@@ -140,6 +140,8 @@ class Gallery:
 
     def _lags(self, placed: Placed) -> Array:
         scene, stream = self._scene, placed.stream
+        if not len(stream):
+            return np.full(len(LAGS_MS), np.nan)
         sign = 2.0 * stream.on - 1.0
         values = []
         for lag in LAGS_MS:

@@ -172,6 +172,8 @@ class Search:
         for candidate in candidates:
             if candidate.knobs:
                 mildest.setdefault(candidate.name, candidate)
+        if not mildest:
+            return []
         declared = self.declared.config
         configs = [one.applied(declared, one.inner(one.probes[0])) for one in mildest.values()]
         idle, *means = fitter.whites([declared, *configs], (1, 2))
@@ -194,6 +196,8 @@ class Search:
             self._laboratory, self.scales[parts.FIT], self._observed[parts.FIT], parts.FIT
         )
         left = [one for one in self._candidates if one.name not in state.names]
+        if not left:
+            return []
         fits = fitter.probe(left, state.config, (1, 2))
         nothing = fitter.misfit(state.config, (1, 2))
         fitter.improve(fits, (1, 2))

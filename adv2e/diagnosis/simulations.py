@@ -46,7 +46,7 @@ class Simulator:
         self._evidence, self._progress = evidence, progress
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
         self._decoded: dict[Any, NDArray[np.float32]] = {}
-        self._lock = threading.Lock()
+        self._lock, self._counting = threading.Lock(), threading.Lock()
         self.done = 0
         self.likely = 0
 
@@ -62,8 +62,9 @@ class Simulator:
             light, dataclasses.replace(config, seed=seed), threads=1, method=_method(config)
         )
         events = np.concatenate([empty_events(), *chunks])
-        self.done += 1
-        self._progress(self.done, self.likely)
+        with self._counting:
+            self.done += 1
+            self._progress(self.done, self.likely)
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
 
@@ -87,7 +88,7 @@ def _method(config: Config) -> str:
     """Return how to solve the pixel: in steps where solving it exactly takes far longer."""
     pixel = config.pixel
     slow = pixel.source_follower is not None or pixel.photoreceptor_noise is not None
-    exact = pixel.low_pass is not None and pixel.low_pass.update == "exact"
+    exact = pixel.low_pass is None or pixel.low_pass.update == "exact"
     return "dense" if slow and exact else "auto"
 
 

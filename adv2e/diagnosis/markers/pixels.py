@@ -116,9 +116,14 @@ class Pixels:
 
 
 def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    if not a.size:  # nothing is beside the pixels of a single column
+        return 0.0
     return float(np.mean(np.clip(a, -10, 10) * np.clip(b, -10, 10)))
 
 
 def _slope(values: NDArray[np.float64], over: NDArray[np.float64]) -> float:
     centred = over - over.mean()
-    return float(np.sum(np.clip(values, -10, 10) * centred) / np.sum(centred * centred))
+    spread = float(np.sum(centred * centred))
+    if spread < 1e-9:  # all pixels are as far to a side as any other
+        return 0.0
+    return float(np.sum(np.clip(values, -10, 10) * centred)) / spread

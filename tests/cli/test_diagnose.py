@@ -1,0 +1,234 @@
+"""``adv2e diagnose``: options, exit status, and whole runs on a tiny recording."""
+
+import dataclasses
+import json
+import shutil
+
+import numpy as np
+import pytest
+from camera import Camera, patchwork
+from camera.settings import BENCH
+
+from adv2e import load_config, simulate
+from adv2e.diagnosis import diagnose as whole
+from adv2e.diagnosis import evidence, report, search
+from adv2e.diagnosis.candidates import names
+from adv2e.sinks import open_sink
+
+FILES = ["model.yaml", "report.html", "report.json"]
+TRIED = ("refractory", "leak", "event_loss")
+WITHOUT = [part for name in names() if name not in TRIED for part in ("--without", name)]
+SIZE, DEAD_US = (32, 24), 20_000.0
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    """Return a folder with a recording of a longer dead time, and one that is as declared."""
+    folder = tmp_path_factory.mktemp("recordings")
+    camera = Camera(
+        patchwork(SIZE, seed=6), BENCH, hidden={"pixel": {"refractory": {"period_us": DEAD_US}}},
+        size=SIZE, duration_s=0.3, fps=100.0, step_us=50.0,
+    )  # fmt: skip
+    camera.record(folder / "dead.zip")
+    shutil.copy(folder / "dead.declared.yaml", folder / "none.declared.yaml")
+    config = load_config([folder / "none.declared.yaml"], seed=123_456)
+    frames = list(camera.frames())
+    images, stamps = [one.image for one in frames], [one.stamp for one in frames]
+    sizes = {"width": SIZE[0], "height": SIZE[1]}
+    with open_sink(folder / "none.zip", **sizes, metadata={}, with_frames=True) as sink:
+        for image, stamp in zip(images, stamps, strict=True):
+            sink.write_frame(round(stamp * 1e9), image)
+        for events in simulate(images, stamps, config):
+            sink.write_events(events)
+    return folder
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Simulate less often than a diagnosis that is to be believed."""
+    monkeypatch.setattr(search, "_MANY", 40)
+    monkeypatch.setattr(search, "_SOME", 16)
+    monkeypatch.setattr(whole, "_PILOT", 4)
+    monkeypatch.setattr(whole, "_DRAWS", 4)
+
+
+def found(adv2e, recordings, name, out, *options):
+    status, stdout, err = adv2e(
+        "diagnose", recordings / f"{name}.zip", "-c", recordings / f"{name}.declared.yaml",
+        "-o", out, *WITHOUT, *options,
+    )  # fmt: skip
+    assert (status, stdout) == (0, "")
+    assert sorted(path.name for path in out.iterdir()) == FILES
+    return json.loads((out / "report.json").read_text("utf-8")), err
+
+
+def test_a_missing_effect_is_named_whatever_the_threads(adv2e, recordings, short, tmp_path):
+    reports = []
+    for threads in (1, 2):
+        out = tmp_path / str(threads)
+        made, err = found(adv2e, recordings, "dead", out, "--threads", threads)
+        assert f"{made['verdict']}: The declared model lacks refractory" in err
+        reports.append(made)
+    for made in reports:
+        assert made["facts"].pop("time taken")
+    assert json.dumps(reports[0]) == json.dumps(reports[1])
+    first = (tmp_path / "1" / "model.yaml").read_bytes()
+    assert first == (tmp_path / "2" / "model.yaml").read_bytes()
+
+    made = reports[0]
+    assert made["verdict"] in ("explained", "partly_explained")
+    (effect,) = made["effects"]
+    assert effect["name"] == "refractory"
+    key = "pixel.refractory.period_us"
+    assert effect["parameters"][key] == pytest.approx(DEAD_US, rel=0.05)
+    low, high = effect["interval"][key]
+    assert low < effect["parameters"][key] < high
+    error = made["error"]
+    assert error["held_out"] is True
+    assert error["after"] < 0.6 * error["before"]
+    assert error["after"] < 1.3 * error["floor"]
+    assert made["global_p"]["before"] < 1e-6 < made["global_p"]["after"]
+    assert {one["name"] for one in made["rejected"]} <= set(TRIED) - {"refractory"}
+    model = load_config([tmp_path / "1" / "model.yaml"])
+    assert model.pixel.refractory.period_us == pytest.approx(effect["parameters"][key], rel=1e-3)
+    declared = load_config([recordings / "dead.declared.yaml"])
+    held = dataclasses.replace(model.pixel, refractory=declared.pixel.refractory)
+    assert held == declared.pixel
+
+
+def test_a_camera_as_declared_is_consistent(adv2e, recordings, short, tmp_path):
+    made, err = found(adv2e, recordings, "none", tmp_path / "out")
+    assert made["verdict"] == "consistent"
+    assert "consistent: The recording is what the declared model makes" in err
+    assert (made["effects"], made["alternatives"], made["nuisances"]) == ([], [], {})
+    assert made["error"]["before"] == made["error"]["after"]
+    assert made["global_p"]["before"] == made["global_p"]["after"] > 0.01
+    z = np.array([one["z_after"] for one in made["signatures"]], float)
+    assert len(z) > 200
+    assert np.sqrt(np.mean(z**2)) < 2.0
+    model = load_config([tmp_path / "out" / "model.yaml"])
+    assert model == load_config([recordings / "none.declared.yaml"])
+
+
+def test_an_effect_that_does_not_exist(adv2e, tmp_path):
+    status, out, err = adv2e("diagnose", tmp_path / "a.zip", "--without", "refractry")
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "--without refractry: no such effect, did you mean 'refractory'?" in err
+
+
+def test_an_effect_like_no_other(adv2e, tmp_path):
+    status, _, err = adv2e("diagnose", tmp_path / "a.zip", "--without", "xyzzy")
+    assert status == 2
+    assert "one of thresholds, " in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["a.zip", "b.zip"],
+        ["a.zip", "--threads", "0"],
+        ["a.zip", "--set", "pixel.lek=null"],
+        ["a.zip", "--without"],
+        ["a.zip", "--nonsense"],
+    ],
+)
+def test_a_wrong_command_line(adv2e, arguments):
+    status, out, err = adv2e("diagnose", *arguments)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+
+
+def test_a_wrong_configuration(adv2e, tmp_path):
+    (tmp_path / "declared.yaml").write_text("pixel: {thresholds: {on: -1}}\n")
+    status, _, err = adv2e("diagnose", "a.zip", "-c", tmp_path / "declared.yaml")
+    assert status == 1
+    assert "pixel.thresholds.on" in err
+    assert err.count("\n") == 1
+
+
+def test_an_existing_folder_is_found_before_anything_is_read(adv2e, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "report.json").write_text("{}")
+    arguments = ["diagnose", tmp_path / "nowhere.zip", "-o", tmp_path / "out"]
+    status, _, err = adv2e(*arguments)
+    assert status == 1
+    assert f"{tmp_path / 'out'}: exists already; --overwrite replaces it" in err
+    status, _, err = adv2e(*arguments, "--overwrite")
+    assert status == 1
+    assert "nowhere.zip: no such file" in err
+    assert (tmp_path / "out" / "report.json").read_text() == "{}"
+
+
+def test_other_things_are_never_replaced(adv2e, tmp_path):
+    (tmp_path / "thesis.txt").touch()
+    status, _, err = adv2e("diagnose", "a.zip", "-o", tmp_path, "--overwrite")
+    assert status == 1
+    assert "thesis.txt" in err
+    assert (tmp_path / "thesis.txt").exists()
+
+
+def test_the_help_names_the_options(adv2e):
+    status, out, _ = adv2e("diagnose", "--help")
+    assert status == 0
+    for option in ("--without", "--config", "--overwrite", "--threads", "--output", "--seed"):
+        assert option in out
+
+
+@pytest.fixture
+def made_up(monkeypatch, tmp_path):
+    """Stand in for reading and diagnosing; returns the calls, and what there was to tell."""
+    calls = []
+
+    def read(path):
+        return path
+
+    def write(found, folder, *, overwrite):
+        calls.append(folder)
+
+    def diagnose(recording, config, *, progress, log, **options):
+        calls.append({"recording": recording, "config": config, **options})
+        log("a step")
+        progress(3, 10)
+        progress(10, 5)
+
+    monkeypatch.setattr(evidence, "read_evidence", read)
+    monkeypatch.setattr(whole, "diagnose", diagnose)
+    monkeypatch.setattr(report, "write_reports", write)
+    monkeypatch.setattr(report, "summary_text", lambda found: "the summary")
+    monkeypatch.chdir(tmp_path)
+    return calls
+
+
+def test_options_arrive(adv2e, made_up, tmp_path):
+    (tmp_path / "mine.yaml").write_text("pixel: {leak: null}\n")
+    outcome = adv2e(
+        "diagnose", "a.zip", "-c", "davis346", "-c", "mine.yaml", "--threads", 3, "--seed", 4,
+        "--without", "flicker", "--without", "leak", "--set", "pixel.refractory.period_us=7",
+    )  # fmt: skip
+    assert outcome.status == 0
+    call, folder = made_up
+    assert (call["recording"], call["threads"]) == ("a.zip", 3)
+    assert call["without"] == ("flicker", "leak")
+    assert call["declared_name"] == "davis346, mine.yaml"
+    assert call["config"].pixel.leak is None
+    assert call["config"].pixel.refractory.period_us == 7.0
+    assert call["config"].seed == 4
+    assert str(folder) == "a.diagnosis"
+    assert outcome.err.splitlines()[-1] == "the summary"
+
+
+@pytest.mark.parametrize(
+    ("options", "lines"), [([], ["the summary"]), (["-v"], ["a step", "the summary"]), (["-q"], [])]
+)
+def test_what_is_said(adv2e, made_up, options, lines):
+    outcome = adv2e("diagnose", "a.zip", *options)
+    said = [line for line in outcome.err.splitlines() if not line.startswith("compiling")]
+    assert (outcome.status, outcome.out, said) == (0, "", lines)
+
+
+def test_progress_may_exceed_what_was_thought_likely(adv2e, made_up):
+    outcome = adv2e("diagnose", "a.zip", "--progress", "-q")
+    assert outcome.status == 0
+    assert "simulation" in outcome.err

@@ -1,0 +1,97 @@
+"""A laboratory without simulations: statistics are smooth functions of the keys, and noise."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from types import SimpleNamespace
+
+import numpy as np
+
+from adv2e.config import Config, to_dict
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.candidates import Hints, get_key, library
+from adv2e.diagnosis.markers import BOTH, VIEWS
+
+STATISTICS = 40
+HINTS = Hints(1.0, (100.0,), 1)
+
+RESPONSES = {
+    "pixel.refractory.period_us": lambda value: np.log(value / 500.0),
+    "pixel.leak.rate_hz": lambda value: np.sqrt(value) - np.sqrt(0.1),
+    "pixel.shot_noise.rate_hz": lambda value: np.sqrt(value) - 1.0,
+    "pixel.dark_current.dn": lambda value: np.log1p(value or 0.0),
+    "readout.loss.fraction": lambda value: 5.0 * (value or 0.0),
+    "pixel.thresholds.on": lambda value: 4.0 * np.log(value / 0.2),
+    "pixel.thresholds.off": lambda value: 4.0 * np.log(value / 0.2),
+}
+"""What a key does to statistics: how much of its own pattern; nothing at its default."""
+
+EFFECTS = ("refractory", "leak", "shot_noise", "dark_current", "event_loss", "thresholds")
+
+
+def candidates(*names):
+    """Return those candidates of the library that the laboratory knows."""
+    return [one for one in library(Config(), HINTS) if one.name in (names or EFFECTS)]
+
+
+@lru_cache(maxsize=4096)
+def noise(seed: int):
+    """Return the noise of one simulation, (views, statistics)."""
+    z = np.random.default_rng([seed, 77]).normal(size=(VIEWS, STATISTICS))
+    z[BOTH] = (z[parts.FIT] + z[parts.JUDGE]) / np.sqrt(2.0)
+    return z
+
+
+class MadeUpLaboratory:
+    """Stands in for :class:`adv2e.diagnosis.simulations.Laboratory`.
+
+    Parameters
+    ----------
+    strength : float
+        Deviations by which one unit of response moves all statistics together.
+    alike : mapping
+        Keys with the pattern of another.
+    curvature : float
+        How far responses are from proportional.
+    """
+
+    def __init__(self, strength=20.0, alike=None, curvature=0.0):
+        draw = np.random.default_rng(5)
+        self.patterns = {}
+        for key in RESPONSES:
+            pattern = draw.normal(size=STATISTICS)
+            self.patterns[key] = strength * pattern / np.linalg.norm(pattern)
+        for key, other in (alike or {}).items():
+            self.patterns[key] = self.patterns[other]
+        self.curvature = curvature
+        self._means = {}
+        self.simulator = SimpleNamespace(done=0, likely=0)
+        self.markers = SimpleNamespace(least=np.full(STATISTICS, 0.01))
+
+    def mean(self, config):
+        """Return what is expected of a configuration, (statistics,)."""
+        if config not in self._means:
+            self._means[config] = self._mean(config)
+        return self._means[config]
+
+    def _mean(self, config):
+        values = to_dict(config)
+        total = np.zeros(STATISTICS)
+        for key, response in RESPONSES.items():
+            size = response(get_key(values, key))
+            total += (size + self.curvature * size * abs(size)) * self.patterns[key]
+        return total
+
+    def measure(self, config, seed, beyond=0.0):
+        """Return statistics, (views, statistics); `beyond` is what no key makes."""
+        self.simulator.done += 1
+        mean = self.mean(config) + beyond
+        views = np.repeat(mean[None], VIEWS, axis=0)
+        views[BOTH] *= np.sqrt(2.0)
+        return views + noise(seed)
+
+    def ensemble(self, config, seeds):
+        return np.array([self.measure(config, seed) for seed in seeds])
+
+    def many(self, configs, seeds):
+        return np.array([self.ensemble(config, seeds) for config in configs])

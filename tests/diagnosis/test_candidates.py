@@ -1,0 +1,273 @@
+"""The library of effects: every candidate makes a configuration; scales of the knobs."""
+
+import math
+
+import numpy as np
+import pytest
+from camera.catalogue import LIBRARY
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adv2e.config import Config, load_config, shipped, to_dict
+from adv2e.diagnosis.candidates import (
+    Candidate,
+    Hints,
+    about_key,
+    flat,
+    get_key,
+    hints_of,
+    library,
+    names,
+    neutral_value,
+    set_key,
+)
+
+HINTS = Hints(0.3, (100.0, 63.5), 10)
+CONFIGS = [None, *shipped()]
+
+
+def configuration(name):
+    return load_config([name] if name else [])
+
+
+def changed(config, other):
+    """Return the keys by which two configurations differ, with the values of the second."""
+    before = dict(flat(to_dict(config)))
+    return {key: value for key, value in flat(to_dict(other)) if before.get(key) != value}
+
+
+def test_the_library_has_the_effects_of_the_catalogue():
+    assert set(names()) == set(LIBRARY)
+    assert len(names()) == len(set(names()))
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_every_candidate_applies_at_every_probe(name):
+    declared = configuration(name)
+    for one in library(declared, HINTS):
+        assert one.probes
+        for probe in one.probes:
+            config = one.applied(declared, one.inner(probe))
+            assert isinstance(config, Config)
+            found = one.parameters(one.inner(probe))
+            touched = changed(declared, config)
+            assert touched, (one.name, probe)
+            for key, value in touched.items():
+                if key in found:
+                    assert found[key] == value or found[key] == pytest.approx(value)
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_every_candidate_applies_at_the_ends_of_its_ranges(name):
+    declared = configuration(name)
+    for one in library(declared, HINTS):
+        for far in (-1e9, 1e9):
+            config = one.applied(declared, [far] * len(one.knobs))
+            for key, value in one.parameters([far] * len(one.knobs)).items():
+                assert get_key(to_dict(config), key) == value
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_probes_lie_within_the_ranges(name):
+    for one in library(configuration(name), HINTS):
+        for probe in one.probes:
+            for knob, value in zip(one.knobs, probe, strict=True):
+                assert knob.low < value < knob.high, (one.name, knob.key)
+                assert not knob.at_border(knob.inner(value))
+
+
+def test_without_a_low_pass_there_is_nothing_that_acts_on_it():
+    found = {one.name for one in library(configuration("ideal"), HINTS)}
+    assert {"photoreceptor_noise", "slew_limit"}.isdisjoint(found)
+    assert "low_pass" in found
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_a_candidate_changes_its_own_keys_only(name):
+    declared = configuration(name)
+    for one in library(declared, HINTS):
+        config = one.applied(declared, one.inner(one.probes[0]))
+        own = {knob.key for knob in one.knobs} | {key for key, _ in one.extra}
+        for key in set(changed(declared, config)) - own:
+            assert was_off(declared, key), (one.name, key)
+            assert any(mine.startswith(key.rpartition(".")[0]) for mine in own), (one.name, key)
+
+
+def was_off(config, key):
+    """Tell whether a section that `key` is in was null, so that it is new with its default."""
+    held = to_dict(config)
+    for name in key.split(".")[:-1]:
+        held = held[name]
+        if held is None:
+            return True
+    return False
+
+
+def test_every_key_is_declared_with_a_unit():
+    for one in library(Config(), HINTS):
+        for knob in one.knobs:
+            assert about_key(Config(), knob.key).unit
+    assert about_key(Config(), "pixel.refractory.period_us").unit == "us"
+    assert about_key(Config(), "pixel.low_pass.cutoff_hz").unit == "Hz"
+    assert about_key(Config(), "frames.shift_px").unit == "px"
+    assert about_key(Config(), "readout.tick_us").unit == "us"
+
+
+def test_effects_may_have_several_forms():
+    forms = [one for one in library(Config(), HINTS) if one.name == "thresholds"]
+    assert sorted(len(one.knobs) for one in forms) == [1, 1, 2]
+    lines = [one for one in library(Config(), HINTS) if one.name == "flicker"]
+    assert [dict(one.extra)["frames.flicker.frequency_hz"] for one in lines] == [100.0, 63.5]
+
+
+@pytest.mark.parametrize(("tick", "there"), [(1, False), (2, True), (500, True)])
+def test_ticks_are_a_candidate_where_all_stamps_have_one(tick, there):
+    made = library(Config(), Hints(1.0, (), tick))
+    found = [one for one in made if one.name == "timestamp_tick"]
+    assert len(found) == there
+    for one in found:
+        assert one.applied(Config(), []).readout.tick_us == tick
+        assert one.parameters([]) == {"readout.tick_us": float(tick)}
+
+
+# --- hints ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tick", [1, 7, 30, 64, 300, 1000])
+@pytest.mark.parametrize("start", [0, 9_999_000, 1_467_939_975_000_000])
+def test_the_tick_of_stamps(tick, start):
+    draw = np.random.default_rng(tick)
+    t = tick * (start // tick + np.sort(draw.integers(0, 10_000, 500)))
+    assert hints_of(t, 1.0, ()).tick_us == tick
+
+
+def test_stamps_that_say_nothing_of_a_tick():
+    assert hints_of(np.array([], np.int64), 1.0, ()).tick_us == 1
+    assert hints_of(np.array([0], np.int64), 1.0, (50.0,)) == Hints(1.0, (50.0,), 1)
+
+
+# --- knobs ---------------------------------------------------------------------------------------
+
+KNOBS = {(knob.key, knob.part): knob for one in library(Config(), HINTS) for knob in one.knobs}
+knobs = st.sampled_from(list(KNOBS.values()))
+
+
+@given(knobs, st.floats(0.0, 1.0))
+def test_inner_and_outer_are_inverse(knob, place):
+    if knob.log:
+        value = math.exp(math.log(knob.low) + place * math.log(knob.high / knob.low))
+    else:
+        value = knob.low + place * (knob.high - knob.low)
+    value = min(max(value, knob.low), knob.high)
+    assert knob.outer(knob.inner(value)) == pytest.approx(value, rel=1e-9, abs=1e-12)
+
+
+@given(knobs, st.floats(-1e12, 1e12))
+def test_outer_stays_in_the_range(knob, inner):
+    value = knob.outer(inner)
+    assert knob.low <= value <= knob.high
+    if value in (knob.low, knob.high):
+        assert knob.at_border(inner)
+    elif min(value - knob.low, knob.high - value) > 1e-6 * (knob.high - knob.low):
+        assert not knob.at_border(inner)
+
+
+@given(knobs)
+def test_both_ends_are_borders_and_the_middle_is_not(knob):
+    assert knob.at_border(knob.inner(knob.low))
+    assert knob.at_border(knob.inner(knob.high))
+    middle = (knob.inner(knob.low) + knob.inner(knob.high)) / 2
+    assert not knob.at_border(middle)
+
+
+@given(knobs, st.floats(-20, 20), st.floats(0.001, 5))
+def test_outer_grows_with_inner(knob, inner, more):
+    assert knob.outer(inner) <= knob.outer(inner + more)
+
+
+def test_scale_is_the_change_that_counts_as_one():
+    knob = KNOBS["frames.clock_offset_us", None]
+    assert knob.outer(knob.inner(200.0) + 1.0) == pytest.approx(200.0 + knob.scale)
+    knob = KNOBS["pixel.leak.rate_hz", None]
+    assert knob.outer(knob.inner(2.0) + 1.0) == pytest.approx(2.0 * math.e)
+
+
+def test_parts_of_a_list_are_set_one_by_one():
+    right, below = KNOBS["frames.shift_px", 0], KNOBS["frames.shift_px", 1]
+    declared = load_config([], ["frames.shift_px=[0.5, -1]"])
+    one = Candidate("misregistration", (below,), ((0.0,),))
+    assert one.applied(declared, one.inner((2.0,))).frames.shift_px == (0.5, 2.0)
+    both = Candidate("misregistration", (right, below), ((0.0, 0.0),))
+    assert both.parameters(both.inner((1.5, -2.0))) == {"frames.shift_px": [1.5, -2.0]}
+    assert declared.frames.shift_px == (0.5, -1.0)
+
+
+def test_a_knob_may_be_part_of_a_text():
+    one = Candidate("frame_encoding", (KNOBS["frames.encoding", None],), ((1.0,),))
+    assert one.applied(Config(), one.inner((1.25,))).frames.encoding == "gamma:1.25"
+    assert one.parameters(one.inner((2.0,))) == {"frames.encoding": "gamma:2"}
+
+
+# --- neutral values ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("key", "part", "sets", "value"),
+    [
+        ("pixel.refractory.period_us", None, [], 500.0),
+        ("pixel.refractory.period_us", None, ["pixel.refractory=null"], 0.0),
+        ("pixel.thresholds.on", None, ["pixel.thresholds.on=0.31"], 0.31),
+        ("pixel.source_follower.cutoff_hz", None, [], math.inf),
+        ("pixel.slew_limit.per_s", None, [], math.inf),
+        ("pixel.low_pass.cutoff_hz", None, [], 300.0),
+        ("pixel.low_pass.cutoff_hz", None, ["pixel.low_pass=null"], math.inf),
+        ("pixel.low_pass.dark_cutoff_hz", None, ["pixel.low_pass=null"], math.inf),
+        ("frames.shift_px", 0, [], 0.0),
+        ("frames.shift_px", 1, ["frames.shift_px=[1, -2.5]"], -2.5),
+        ("frames.encoding", None, ["frames.encoding=linear"], 1.0),
+        ("frames.encoding", None, ["frames.encoding=gamma:1.8"], 1.8),
+        ("frames.encoding", None, ["frames.encoding=srgb"], 2.2),
+        ("pixel.dead_pixels.fraction", None, [], 0.0),
+    ],
+)
+def test_the_value_of_a_knob_at_which_nothing_changes(key, part, sets, value):
+    assert neutral_value(load_config([], sets), KNOBS[key, part]) == value
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_with_neutral_values_the_configuration_stays_as_it_was(name):
+    declared = configuration(name)
+    if not declared.frames.encoding.startswith("gamma:"):
+        declared = load_config([name] if name else [], ["frames.encoding=gamma:1"])
+    values = to_dict(declared)
+    tried = 0
+    for one in library(declared, HINTS):
+        if one.extra or any(get_key(values, knob.key) is None for knob in one.knobs):
+            continue
+        neutral = [neutral_value(declared, knob) for knob in one.knobs]
+        if all(k.low <= value <= k.high for k, value in zip(one.knobs, neutral, strict=True)):
+            for key, now in changed(declared, one.applied(declared, one.inner(neutral))).items():
+                assert now == pytest.approx(get_key(values, key), rel=1e-9), key
+            tried += 1
+    assert tried > 5
+
+
+# --- nested keys ---------------------------------------------------------------------------------
+
+paths = st.lists(st.sampled_from("abc"), min_size=1, max_size=3).map(".".join)
+
+
+@given(paths, paths, st.integers())
+def test_keys_are_set_and_found(first, second, value):
+    values = {}
+    set_key(values, first, 1)
+    set_key(values, second, value)
+    assert get_key(values, second) == value
+    assert (second, value) in flat(values)
+
+
+def test_a_section_that_is_null_becomes_one():
+    values = {"pixel": None}
+    assert get_key(values, "pixel.leak.rate_hz") is None
+    set_key(values, "pixel.leak.rate_hz", 3.0)
+    assert values == {"pixel": {"leak": {"rate_hz": 3.0}}}

@@ -1,0 +1,90 @@
+"""The distance between recording and simulations, and its floor."""
+
+import numpy as np
+import pytest
+from made_up_streams import HEIGHT, WIDTH, random_stream, stream_of
+
+from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_errors
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.error import NAME, PAIRS, _pairs, error_rows, of_part
+from adv2e.diagnosis.parts import Parts
+
+MEASURED = random_stream(600, 1)
+BEFORE = [random_stream(600, seed) for seed in range(10, 16)]
+AFTER = [random_stream(500, seed) for seed in range(20, 28)]
+
+
+def distance(measured, simulated, whole=None):
+    whole = None if whole is None else whole.events()
+    return smoothed_errors(measured.events(), simulated.events(), WIDTH, whole=whole)
+
+
+def test_errors_are_those_of_the_comparison():
+    rows = error_rows(MEASURED, BEFORE, AFTER)
+    for column, streams in (("before", BEFORE), ("after", AFTER)):
+        table = np.array([distance(MEASURED, stream) for stream in streams])
+        assert getattr(rows[0], column).value == pytest.approx(table.mean())
+        for k in range(len(SIGMAS_US)):
+            estimate = getattr(rows[1 + k], column)
+            assert estimate.value == pytest.approx(table[:, k].mean())
+            low, high = np.quantile(table[:, k], [0.025, 0.975])
+            assert estimate.interval == pytest.approx((low, high))
+
+
+def test_the_floor_is_between_draws_in_units_of_the_measured():
+    rows = error_rows(MEASURED, BEFORE, AFTER)
+    table = np.array([distance(a, b, MEASURED) for a, b in _pairs(AFTER)])
+    assert rows[0].floor.value == pytest.approx(table.mean())
+    assert rows[3].floor.value == pytest.approx(table[:, 2].mean())
+
+
+def test_rows_are_the_mean_and_every_scale():
+    names = [row.name for row in error_rows(MEASURED, BEFORE, AFTER)]
+    assert names[0] == NAME
+    scales = [name.rpartition(" over ")[2] for name in names[1:]]
+    assert scales == ["2 ms", "10 ms", "50 ms", "100 ms"]
+
+
+def test_a_model_like_the_recording_is_at_the_floor():
+    draws = [random_stream(600, seed) for seed in range(30, 42)]
+    row = error_rows(MEASURED, BEFORE, draws)[0]
+    assert row.after.value == pytest.approx(row.floor.value, rel=0.1)
+
+
+def test_no_distance_to_itself():
+    row = error_rows(MEASURED, [MEASURED], [MEASURED, MEASURED])[0]
+    assert (row.before.value, row.after.value, row.floor.value) == (0.0, 0.0, 0.0)
+
+
+def test_no_events_at_all_are_at_the_distance_one():
+    nothing = random_stream(0)
+    row = error_rows(MEASURED, [nothing], [nothing, nothing])[0]
+    assert row.before.value == pytest.approx(1.0)
+    assert row.floor.value == 0.0
+
+
+def test_without_a_measured_event_there_is_no_distance():
+    for row in error_rows(random_stream(0), BEFORE, AFTER):
+        for estimate in (row.before, row.after, row.floor):
+            assert np.isnan(estimate.value)
+
+
+@pytest.mark.parametrize("count", [2, 3, 7, 8, 12, 30])
+def test_pairs_are_of_different_streams_and_use_all_of_them(count):
+    streams = [stream_of([k], [0], [0], [1]) for k in range(count)]
+    found = [tuple(sorted((int(a.t[0]), int(b.t[0])))) for a, b in _pairs(streams)]
+    assert len(set(found)) == len(found)
+    assert all(a != b for a, b in found)
+    assert len(found) == min(count * (count - 1) // 2, max(PAIRS, count))
+    assert set(np.ravel(found)) == set(range(count))
+
+
+def test_the_parts_of_a_stream():
+    division = Parts.of(WIDTH, HEIGHT, 0.0, 200_000.0)
+    pieces = [of_part(MEASURED, division, part) for part in range(parts.COUNT)]
+    assert sum(map(len, pieces)) == len(MEASURED)
+    for part, piece in enumerate(pieces):
+        for t, pixel in zip(piece.t.tolist(), piece.pixel.tolist(), strict=True):
+            assert division.label[t // 50_000, pixel] == part
+        assert np.all(np.diff(piece.t) >= 0)
+    assert len(of_part(random_stream(0), division, parts.LAST)) == 0

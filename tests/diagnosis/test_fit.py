@@ -1,0 +1,201 @@
+"""Fits on statistics that are smooth functions of the keys: truth, borders, covariance."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from made_up_laboratory import STATISTICS, MadeUpLaboratory, candidates
+
+from adv2e.config import Config, load_config
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.fit import Fit, Fitter
+from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.metric import Scale
+
+VIEW = parts.FIT
+
+
+def fitter_of(laboratory, observed, view=VIEW, sd=None):
+    sample = laboratory.ensemble(Config(), range(2001, 2121))[:, view]
+    return Fitter(laboratory, Scale.of(sample, laboratory.markers.least), observed, view, sd)
+
+
+def only(name, forms=None):
+    found = [one for one in candidates(name) if forms is None or len(one.knobs) == forms]
+    return found[0]
+
+
+def fitted(laboratory, truth, candidate, seed=5000, steps=5, seeds=(1, 2, 3, 4)):
+    fitter = fitter_of(laboratory, laboratory.measure(truth, seed)[VIEW])
+    (fit,) = fitter.probe([candidate], Config(), seeds)
+    for _ in range(steps):
+        fitter.improve([fit], seeds)
+    return fit
+
+
+@pytest.mark.parametrize("curvature", [0.0, 0.3])
+@pytest.mark.parametrize(
+    ("name", "sets", "value"),
+    [
+        ("refractory", "pixel.refractory.period_us=2600", 2600.0),
+        ("leak", "pixel.leak.rate_hz=3.4", 3.4),
+        ("dark_current", "pixel.dark_current.dn=1.2", 1.2),
+        ("event_loss", "readout.loss.fraction=0.31", 0.31),
+    ],
+)
+def test_the_truth_is_found(name, sets, value, curvature):
+    candidate = only(name)
+    fit = fitted(MadeUpLaboratory(curvature=curvature), load_config([], [sets]), candidate)
+    (knob,), (place,) = candidate.knobs, fit.place
+    sd = float(np.sqrt(fit.covariance[0, 0]))
+    assert abs(place - knob.inner(value)) < 4 * sd
+    assert knob.outer(place) == pytest.approx(value, rel=0.15)
+    assert fit.misfit < 2 * STATISTICS
+    assert not fit.at_border
+
+
+def test_two_knobs_are_found_together():
+    truth = load_config([], ["pixel.thresholds.on=0.26", "pixel.thresholds.off=0.17"])
+    fit = fitted(MadeUpLaboratory(), truth, only("thresholds", 2))
+    assert fit.config.pixel.thresholds.on == pytest.approx(0.26, rel=0.05)
+    assert fit.config.pixel.thresholds.off == pytest.approx(0.17, rel=0.05)
+    assert fit.covariance.shape == (2, 2)
+    assert fit.derivative.shape == (STATISTICS, 2)
+
+
+@pytest.mark.parametrize("view", [parts.JUDGE, BOTH])
+def test_a_fit_sees_its_view_only(view):
+    laboratory = MadeUpLaboratory()
+    observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=3"]), 5000)
+    fitter = fitter_of(laboratory, observed[view], view)
+    (fit,) = fitter.probe([only("leak")], Config(), (1, 2))
+    for _ in range(4):
+        fitter.improve([fit], (1, 2))
+    assert fit.config.pixel.leak.rate_hz == pytest.approx(3.0, rel=0.15)
+
+
+class QuickThresholds(Candidate):
+    """The thresholds, set without checks of the whole configuration."""
+
+    def applied(self, config, inner):
+        on, off = (knob.outer(place) for knob, place in zip(self.knobs, inner, strict=True))
+        thresholds = dataclasses.replace(config.pixel.thresholds, on=on, off=off)
+        return dataclasses.replace(
+            config, pixel=dataclasses.replace(config.pixel, thresholds=thresholds)
+        )
+
+
+def test_the_covariance_is_that_of_repeated_draws():
+    laboratory = MadeUpLaboratory()
+    truth = load_config([], ["pixel.thresholds.on=0.25", "pixel.thresholds.off=0.22"])
+    slow = only("thresholds", 2)
+    candidate = QuickThresholds(slow.name, slow.knobs, slow.probes)
+    place = candidate.inner((0.3, 0.1))
+    assert candidate.applied(truth, place) == slow.applied(truth, place)
+    places, spreads = [], []
+    for k in range(40):
+        seeds = range(100 + 3 * k, 103 + 3 * k)
+        fit = fitted(laboratory, truth, candidate, 6000 + k, steps=3, seeds=seeds)
+        places.append(fit.place)
+        spreads.append(np.diag(fit.covariance))
+    stated = np.sqrt(np.mean(spreads, axis=0))
+    seen = np.std(places, axis=0, ddof=1)
+    # the deviation of forty draws is itself known to a ninth
+    np.testing.assert_allclose(seen / stated, 1.0, atol=0.3)
+    off = np.mean(places, axis=0) - candidate.inner((0.25, 0.22))
+    assert np.all(np.abs(off) < 4 * stated / np.sqrt(40))
+
+
+@pytest.mark.parametrize(("truth", "end"), [(4000.0, "high"), (30.0, "low")])
+def test_a_fit_stays_in_its_range(truth, end):
+    knob = Knob("pixel.refractory.period_us", 200.0, 1500.0)
+    candidate = Candidate("refractory", (knob,), ((300.0,), (1000.0,)))
+    config = load_config([], [f"pixel.refractory.period_us={truth}"])
+    fit = fitted(MadeUpLaboratory(), config, candidate, steps=6)
+    assert fit.at_border
+    assert fit.config.pixel.refractory.period_us == pytest.approx(getattr(knob, end))
+    assert knob.inner(knob.low) - 1e-9 <= fit.place[0] <= knob.inner(knob.high) + 1e-9
+
+
+def test_a_fit_leaves_the_end_of_its_range():
+    knob = Knob("pixel.refractory.period_us", 200.0, 8000.0)
+    for start in (200.0, 8000.0):
+        candidate = Candidate("refractory", (knob,), ((start,),))
+        truth = load_config([], ["pixel.refractory.period_us=1200"])
+        fit = fitted(MadeUpLaboratory(), truth, candidate, steps=7)
+        assert fit.config.pixel.refractory.period_us == pytest.approx(1200.0, rel=0.1)
+
+
+def test_a_negative_end_is_a_border():
+    knob = Knob("frames.clock_offset_us", -2000.0, 2000.0, False, 500.0)
+    candidate = Candidate("clock_offset", (knob,), ((0.0,),))
+    for place, there in ((-4.0, True), (4.0, True), (-3.9, False), (0.0, False)):
+        assert Fit(candidate, Config(), np.array([place])).at_border == there
+
+
+def test_the_best_probe_is_where_a_fit_begins():
+    laboratory = MadeUpLaboratory()
+    truth = load_config([], ["pixel.refractory.period_us=14000"])
+    fitter = fitter_of(laboratory, laboratory.measure(truth, 5000)[VIEW])
+    leak, refractory = only("leak"), only("refractory")
+    fits = fitter.probe([leak, refractory], Config(), (1, 2))
+    assert [fit.candidate for fit in fits] == [leak, refractory]
+    assert fits[1].place.tolist() == refractory.inner((15000.0,))
+    assert fits[1].misfit < fits[0].misfit
+    assert fits[1].misfit == pytest.approx(fitter.misfit(fits[1].config, (1, 2)))
+
+
+def test_a_step_never_makes_it_worse():
+    laboratory = MadeUpLaboratory(curvature=0.5)
+    truth = load_config([], ["pixel.leak.rate_hz=8", "pixel.shot_noise.rate_hz=0.5"])
+    fitter = fitter_of(laboratory, laboratory.measure(truth, 5000)[VIEW])
+    fits = fitter.probe(candidates(), Config(), (1, 2))
+    for _ in range(4):
+        before = [fit.misfit for fit in fits]
+        fitter.improve(fits, (1, 2))
+        for fit, misfit in zip(fits, before, strict=True):
+            assert fit.misfit <= misfit + 1e-6
+            assert fit.misfit == pytest.approx(fitter.misfit(fit.config, (1, 2)))
+
+
+def test_many_fits_move_as_one_alone():
+    laboratory = MadeUpLaboratory()
+    truth = load_config([], ["pixel.leak.rate_hz=4"])
+    fitter = fitter_of(laboratory, laboratory.measure(truth, 5000)[VIEW])
+    together = fitter.probe(candidates(), Config(), (1, 2))
+    alone = [dataclasses.replace(fit) for fit in together]
+    fitter.improve(together, (1, 2))
+    for fit, single in zip(together, alone, strict=True):
+        fitter.improve([single], (1, 2))
+        np.testing.assert_allclose(fit.place, single.place)
+        assert fit.misfit == pytest.approx(single.misfit)
+
+
+def test_what_has_no_knob_is_probed_and_stays():
+    laboratory = MadeUpLaboratory()
+    candidate = Candidate("timestamp_tick", (), ((),), (("readout.tick_us", 10.0),))
+    fitter = fitter_of(laboratory, laboratory.measure(Config(), 5000)[VIEW])
+    (fit,) = fitter.probe([candidate], Config(), (1, 2))
+    fitter.improve([fit], (1, 2))
+    assert fit.place.shape == (0,)
+    assert fit.config.readout.tick_us == 10.0
+    assert np.isfinite(fit.misfit)
+    assert not fit.at_border
+
+
+def test_deviations_given_weigh_the_statistics():
+    laboratory = MadeUpLaboratory()
+    observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=1"]), 5000)[VIEW]
+    plain, half = (
+        fitter_of(laboratory, observed),
+        fitter_of(laboratory, observed, sd=np.full(STATISTICS, 2.0)),
+    )
+    assert half.misfit(Config(), (1, 2)) == pytest.approx(plain.misfit(Config(), (1, 2)) / 4)
+
+
+def test_the_same_seeds_give_the_same_fit():
+    truth = load_config([], ["pixel.leak.rate_hz=4"])
+    one, two = (fitted(MadeUpLaboratory(), truth, only("leak")) for _ in range(2))
+    np.testing.assert_array_equal(one.place, two.place)
+    np.testing.assert_array_equal(one.covariance, two.covariance)

@@ -1,0 +1,129 @@
+"""Curves and maps of a residual: shapes, labels, and numbers where there are data."""
+
+import numpy as np
+import pytest
+from made_up_streams import HEIGHT, STOP_US, WIDTH, placed, random_stream, scene_of, some_scene
+
+from adv2e.diagnosis.picture import Gallery
+from adv2e.diagnosis.scene import STILL
+
+SCENE = some_scene(seed=5)
+MEASURED = placed(random_stream(800, 1), SCENE)
+BEFORE = [placed(random_stream(400, seed), SCENE) for seed in range(10, 15)]
+AFTER = [placed(random_stream(800, seed), SCENE) for seed in range(20, 25)]
+GALLERY = Gallery(SCENE, MEASURED, BEFORE, AFTER)
+CURVES = {curve.title: curve for curve in GALLERY.curves()}
+
+
+def test_titles_are_unique_and_axes_have_labels():
+    assert len(CURVES) == len(GALLERY.curves()) >= 8
+    for curve in CURVES.values():
+        assert curve.x_label
+        assert curve.y_label
+
+
+@pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES.keys())
+def test_a_curve_has_places_or_borders_that_increase(curve):
+    n = len(curve.measured)
+    assert len(curve.x) in (n, n + 1)
+    assert np.all(np.diff(curve.x) > 0)
+    assert not curve.x_log or curve.x[0] > 0
+    for band in (curve.before, curve.after):
+        assert band.middle.shape == band.low.shape == band.high.shape == (n,)
+        assert np.all(band.low <= band.middle)
+        assert np.all(band.middle <= band.high)
+
+
+@pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES.keys())
+def test_there_is_a_number_wherever_there_are_data(curve):
+    assert np.all(np.isfinite(curve.measured))
+    assert np.all(np.isfinite(curve.before.middle))
+
+
+def test_times_between_events_are_counted():
+    stream, total = MEASURED.stream, 0
+    for text, same in (("same", True), ("other", False)):
+        curve = CURVES[f"Time between events of a pixel, {text} polarity"]
+        used = (stream.since >= 0) & ((stream.on == stream.on_before) == same)
+        assert curve.measured.sum() == np.count_nonzero(used)
+        k = np.searchsorted(curve.x, 30.0, "right") - 1
+        low, high = curve.x[k : k + 2] * 1e3
+        inside = used & (stream.since >= low) & (stream.since < high)
+        assert curve.measured[k] == np.count_nonzero(inside)
+        total += int(curve.measured.sum())
+    assert total == np.count_nonzero(stream.since >= 0)
+
+
+def test_rates_are_per_pixel_and_second():
+    number, expected = 0.0, 0.0
+    for where, moving in (("in motion", True), ("at rest", False)):
+        for name in ("ON", "OFF"):
+            curve = CURVES[f"Rate against brightness, {where}, {name}"]
+            for k in range(3):
+                place = ((SCENE.speed != STILL) == moving) & (SCENE.brightness == k)
+                seconds = 0.01 * np.count_nonzero(place)
+                number += curve.measured[k] * seconds
+        expected = len(MEASURED.stream)
+    assert number == pytest.approx(expected)
+    curve = CURVES["Rate against speed"]
+    seconds = 0.01 * np.bincount(SCENE.speed.ravel(), minlength=4)
+    assert np.sum(curve.measured * seconds) == pytest.approx(len(MEASURED.stream))
+
+
+def test_the_course_is_a_rate_of_the_whole_sensor():
+    curve = CURVES["Course"]
+    assert curve.x[0] == 0.0
+    assert curve.x[-1] == pytest.approx(STOP_US * 1e-6)
+    assert np.sum(curve.measured * np.diff(curve.x)) == pytest.approx(len(MEASURED.stream))
+    # half the events, half the rate
+    assert curve.before.middle.mean() == pytest.approx(curve.after.middle.mean() / 2, rel=0.2)
+
+
+def test_the_place_between_frames_is_of_still_places():
+    curve = CURVES["Place between two frames, at rest"]
+    still = MEASURED.stream.t[MEASURED.speed == STILL] % 10_000
+    np.testing.assert_array_equal(curve.measured, np.bincount(still // 1000, minlength=10))
+
+
+def test_light_about_events_follows_them():
+    up = scene_of(np.exp(0.05 * np.arange(21))[:, None, None] * np.full((1, 12, 16), 30.0))
+    on = placed(random_stream(300, 3), up)
+    on.stream.on[:] = 1
+    curve = next(c for c in Gallery(up, on, [on], [on]).curves() if "Light before" in c.title)
+    np.testing.assert_allclose(curve.measured, 5.0, rtol=1e-3)
+
+
+def test_maps_are_of_the_sensor():
+    maps = GALLERY.maps()
+    assert [one.title.split()[0] for one in maps] == ["ON", "OFF"]
+    for one in maps:
+        assert one.before.shape == one.after.shape == (HEIGHT, WIDTH)
+        assert np.all(np.isfinite(one.before))
+        assert one.before.mean() > one.after.mean() + 0.3
+
+
+def test_maps_count_the_excess():
+    twice = placed(random_stream(300, 3), SCENE)
+    found = Gallery(SCENE, twice, [twice, twice], [placed(random_stream(0), SCENE)]).maps()
+    for one, on in zip(found, (1, 0), strict=True):
+        assert np.all(one.before == 0.0)
+        pixel = twice.stream.pixel[twice.stream.on == on]
+        number = np.bincount(pixel, minlength=WIDTH * HEIGHT).reshape(HEIGHT, WIDTH)
+        np.testing.assert_array_equal(one.after, number)
+
+
+def test_simulations_without_events_are_drawn():
+    nothing = [placed(random_stream(0), SCENE)] * 2
+    for curve in Gallery(SCENE, MEASURED, nothing, AFTER).curves():
+        assert np.all(np.isfinite(curve.measured))
+        assert np.all(np.isfinite(curve.after.middle))
+
+
+def test_classes_that_no_place_has_are_gaps():
+    still = scene_of(np.full((21, HEIGHT, WIDTH), 40.0, np.float32))
+    events = placed(random_stream(200, 2), still)
+    curves = {c.title: c for c in Gallery(still, events, [events], [events]).curves()}
+    speed = curves["Rate against speed"].measured
+    assert np.isfinite(speed[0])
+    assert np.all(np.isnan(speed[1:]))
+    assert np.all(np.isnan(curves["Rate against brightness, in motion, ON"].measured))

@@ -1,0 +1,212 @@
+"""The search for what is missing, on a laboratory without simulations."""
+
+import math
+
+import numpy as np
+import pytest
+from made_up_laboratory import EFFECTS, STATISTICS, MadeUpLaboratory, candidates
+
+from adv2e.config import Config, load_config
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.diagnose import _verdict, finding_of
+from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.search import LEVEL, PARTLY, Search
+
+RECORDING = 70_000
+
+
+def searched(truth=(), laboratory=None, library=None, beyond=0.0, seed=RECORDING, declared=None):
+    laboratory = laboratory or MadeUpLaboratory()
+    observed = laboratory.measure(load_config([], truth), seed, beyond)
+    library = candidates() if library is None else library
+    search = Search(laboratory, observed, declared or Config(), library)
+    return search, search.run()
+
+
+def outside(size):
+    """Return a change of statistics that no effect makes, nor all of them together."""
+    laboratory = MadeUpLaboratory()
+    patterns = np.array(list(laboratory.patterns.values()))
+    draw = np.random.default_rng(11).normal(size=STATISTICS)
+    draw -= np.linalg.pinv(patterns) @ (patterns @ draw)
+    return size * draw / np.linalg.norm(draw)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_nothing_missing_is_consistent(seed):
+    search, outcome = searched(seed=RECORDING + seed)
+    assert _verdict(search, outcome) == "consistent"
+    assert outcome.state is search.declared
+    assert outcome.state.names == ()
+    assert outcome.probability >= LEVEL
+    assert (outcome.alternatives, outcome.rejected) == ([], {})
+
+
+@pytest.mark.parametrize(
+    ("name", "sets", "value"),
+    [
+        ("refractory", "pixel.refractory.period_us=1500", 1500.0),
+        ("leak", "pixel.leak.rate_hz=2.5", 2.5),
+        ("dark_current", "pixel.dark_current.dn=2", 2.0),
+        ("event_loss", "readout.loss.fraction=0.2", 0.2),
+        ("thresholds", "pixel.thresholds.off=0.26", 0.26),
+    ],
+)
+def test_one_effect_is_named(name, sets, value):
+    search, outcome = searched([sets])
+    assert outcome.state.names == (name,)
+    assert _verdict(search, outcome) == "explained"
+    finding = finding_of(outcome.state.fits[0])
+    (key,) = (key for key in finding.parameters if key == sets.partition("=")[0])
+    low, high = finding.interval[key]
+    assert low < finding.parameters[key] < high
+    assert finding.parameters[key] == pytest.approx(value, rel=0.15)
+    assert low * 0.9 < value < high * 1.1
+    assert outcome.explained == pytest.approx(1.0, abs=0.1)
+    assert name not in outcome.rejected
+    assert set(outcome.rejected) <= set(EFFECTS)
+    assert all(one.reason for one in outcome.rejected.values())
+
+
+def test_of_the_forms_of_an_effect_the_plainest_that_does_is_taken():
+    _, outcome = searched(["pixel.thresholds.on=0.27"])
+    (fit,) = outcome.state.fits
+    assert [knob.key for knob in fit.candidate.knobs] == ["pixel.thresholds.on"]
+    _, outcome = searched(["pixel.thresholds.on=0.27", "pixel.thresholds.off=0.15"])
+    (fit,) = outcome.state.fits
+    assert len(fit.candidate.knobs) == 2
+
+
+def test_effects_that_look_alike_are_alternatives():
+    laboratory = MadeUpLaboratory(alike={"pixel.leak.rate_hz": "pixel.shot_noise.rate_hz"})
+    search, outcome = searched(["pixel.leak.rate_hz=4"], laboratory)
+    found = {*outcome.state.names, *outcome.alternatives}
+    assert found == {"leak", "shot_noise"}
+    assert len(outcome.state.names) == len(outcome.alternatives) == 1
+    assert _verdict(search, outcome) == "not_identifiable"
+
+
+def test_what_no_effect_makes_is_not_explained():
+    search, outcome = searched(beyond=outside(25.0))
+    assert outcome.probability < LEVEL
+    assert _verdict(search, outcome) == "unexplained"
+    assert set(outcome.rejected) | set(outcome.state.names) == set(EFFECTS)
+
+
+def test_an_effect_beside_something_unknown_is_a_part():
+    search, outcome = searched(["pixel.refractory.period_us=8000"], beyond=outside(12.0))
+    assert outcome.state.names[0] == "refractory"
+    assert outcome.probability < LEVEL
+    assert outcome.explained >= PARTLY
+    assert _verdict(search, outcome) == "partly_explained"
+
+
+@pytest.mark.parametrize(("period", "rate"), [(5000.0, 1.0), (900.0, 1.0), (15_000.0, 0.7)])
+def test_two_effects_are_both_found(period, rate):
+    truth = [f"pixel.refractory.period_us={period}", f"pixel.leak.rate_hz={rate}"]
+    search, outcome = searched(truth)
+    assert set(outcome.state.names) == {"refractory", "leak"}
+    assert _verdict(search, outcome) == "explained"
+    config = outcome.state.config
+    assert config.pixel.refractory.period_us == pytest.approx(period, rel=0.1)
+    assert config.pixel.leak.rate_hz == pytest.approx(rate, rel=0.2)
+    for fit in outcome.state.fits:
+        assert fit.covariance.shape == (1, 1)
+        assert finding_of(fit).interval
+
+
+def refitted(search, fits):
+    """Return the model with all `fits`, fitted together."""
+    joint, fits = search._fitted(fits, search.declared.models[BOTH].sd, BOTH)
+    return search._state(joint.config, fits)
+
+
+def test_backward_drops_what_the_others_do_without():
+    laboratory = MadeUpLaboratory()
+    observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
+    search = Search(laboratory, observed, Config(), candidates())
+    fits = []
+    for name, value in (("dark_current", 0.05), ("leak", 4.0)):
+        (one,) = candidates(name)
+        fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
+    state = refitted(search, tuple(fits))
+    assert state.names == ("dark_current", "leak")
+    assert search._backward(state).names == ("leak",)
+    assert "not needed" in search.rejected["dark_current"].reason
+
+
+def test_backward_keeps_what_is_needed():
+    truth = load_config([], ["pixel.leak.rate_hz=4", "pixel.refractory.period_us=2500"])
+    laboratory = MadeUpLaboratory()
+    search = Search(laboratory, laboratory.measure(truth, RECORDING), Config(), candidates())
+    fits = []
+    for name, value in (("refractory", 2500.0), ("leak", 4.0)):
+        (one,) = candidates(name)
+        fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
+    state = refitted(search, tuple(fits))
+    assert search._backward(state) is state
+
+
+def test_what_is_left_out_of_the_library_is_not_named():
+    library = [one for one in candidates() if one.name != "refractory"]
+    search, outcome = searched(["pixel.refractory.period_us=6000"], library=library)
+    assert "refractory" not in (*outcome.state.names, *outcome.rejected)
+    assert _verdict(search, outcome) == "unexplained"
+
+
+def test_an_empty_library_explains_nothing():
+    search, outcome = searched(["pixel.refractory.period_us=6000"], library=[])
+    assert _verdict(search, outcome) == "unexplained"
+    assert outcome.rejected == {}
+    assert search.detectable([]) == []
+
+
+def test_a_fit_at_the_end_of_its_range_is_not_taken():
+    knob = Knob("pixel.leak.rate_hz", 1e-3, 2.0)
+    library = [Candidate("leak", (knob,), ((0.5,), (1.0,)))]
+    search, outcome = searched(["pixel.leak.rate_hz=2.6"], library=library)
+    assert outcome.state.names == ()
+    assert "end of the physical range" in outcome.rejected["leak"].reason
+    assert _verdict(search, outcome) == "unexplained"
+
+
+def test_the_declared_model_is_the_ground():
+    declared = load_config([], ["pixel.leak.rate_hz=2"])
+    search, outcome = searched(["pixel.leak.rate_hz=2"], declared=declared)
+    assert _verdict(search, outcome) == "consistent"
+    _, outcome = searched(["pixel.leak.rate_hz=0.2"], declared=declared)
+    assert outcome.state.names == ("leak",)
+    assert outcome.state.config.pixel.leak.rate_hz == pytest.approx(0.2, rel=0.4)
+
+
+def test_the_same_recording_has_the_same_result():
+    one, two = (searched(["pixel.leak.rate_hz=4"])[1] for _ in range(2))
+    assert one.state.config == two.state.config
+    assert one.probability == two.probability
+    assert one.rejected == two.rejected
+
+
+def test_chance_alone_gains_less_than_it_may():
+    laboratory = MadeUpLaboratory()
+    search, outcome = searched(["pixel.leak.rate_hz=1"], laboratory)
+    before = search.declared.models[parts.JUDGE]
+    after = outcome.state.models[parts.JUDGE]
+    limit = search._chance_gain(before, after)
+    gains = [
+        after.log_likelihood(row[parts.JUDGE]) - before.log_likelihood(row[parts.JUDGE])
+        for row in laboratory.ensemble(Config(), range(80_000, 80_300))
+    ]
+    assert np.mean(np.array(gains) > limit) < 0.02
+
+
+def test_what_would_have_been_seen():
+    search, _ = searched()
+    found = {one.name: one for one in search.detectable(candidates())}
+    assert set(found) == set(EFFECTS)
+    assert found["refractory"].unit == "us"
+    assert found["refractory"].key == "pixel.refractory.period_us"
+    assert 500.0 < found["refractory"].size < 1500.0
+    assert 0.0 < found["event_loss"].size < 0.05
+    assert all(math.isfinite(one.size) for one in found.values())
