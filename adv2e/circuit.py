@@ -62,6 +62,8 @@ def driver_of(pixel: Pixel, circuit: Circuit, additions: Additions | None, metho
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
     new = circuit.slew > 0 or circuit.overshoot != 0 or pixel.thresholds.drift_per_s != 0
-    if method == "dense" or additions is not None or new:
+    # the series of the general path need a first pole before the second
+    alone = circuit.follower > 0 and not circuit.filtered
+    if method == "dense" or additions is not None or new or alone:
         return "run_dense"
     return "run_exact" if covers(circuit) else "run_general"

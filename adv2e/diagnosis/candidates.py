@@ -348,6 +348,7 @@ def _of_the_comparator(now: _Now, times: _Times, values: Any, hints: Hints) -> l
             "photo_leak",
             (Knob("pixel.leak.photo_rate_hz", 1e-2, 1000.0),),
             ((1.5,), (5.0,), (15.0,)),
+            (("pixel.leak.rate_hz", 0.0),) if get_key(values, "pixel.leak") is None else (),
         ),
         Candidate(
             "shot_noise", (Knob("pixel.shot_noise.rate_hz", 1e-3, 500.0),),

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _SHRINK = 0.5
-_LEAST_SD = 0.25
+_LEAST_SD = 0.5
 _KNEE = 3.0
 
 
@@ -106,7 +106,7 @@ class Model:
 
     @cached_property
     def sd(self) -> Array:
-        """Deviation in compressed deviations, not taken for less than a quarter."""
+        """Deviation in compressed deviations, not taken for less than half."""
         return np.asarray(np.maximum(self.sample.std(axis=0, ddof=1), _LEAST_SD))
 
     def z(self, values: Array) -> Array:

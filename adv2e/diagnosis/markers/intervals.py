@@ -31,7 +31,7 @@ class Intervals:
     """Histogram of the time since the pixel's event before, by the pair of polarities."""
 
     title = "time between events of a pixel"
-    least = 0.3
+    least = 0.6
 
     def __init__(self, *, at_rest: bool = False) -> None:
         self._at_rest = at_rest
@@ -74,7 +74,7 @@ class Runs:
     """How far into a run of one polarity events are: what a reset changes from event to event."""
 
     title = "runs of one polarity"
-    least = 0.3
+    least = 0.6
 
     _LONGEST_GAP_US = 50_000
     _PLACES = ("1st", "2nd", "3rd", "4th", "5th-6th", "7th-9th", "10th or later")

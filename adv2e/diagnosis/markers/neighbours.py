@@ -19,7 +19,7 @@ class Neighbours:
     """Histogram of the time since an event of a neighbouring pixel."""
 
     title = "neighbouring pixels"
-    least = 0.3
+    least = 0.6
 
     @cached_property
     def entries(self) -> Sequence[Entry]:

@@ -24,7 +24,7 @@ class Rates:
     """Numbers of events by speed, brightness and polarity."""
 
     title = "number of events"
-    least = 0.3
+    least = 0.6
 
     @cached_property
     def entries(self) -> Sequence[Entry]:
@@ -53,7 +53,7 @@ class Course:
     """Numbers of events over the time of the recording."""
 
     title = "course in time"
-    least = 0.3
+    least = 0.6
 
     def __init__(self, start_us: float, stop_us: float, steps: int = 6) -> None:
         self._borders = np.linspace(start_us, stop_us, steps + 1)[1:-1]
@@ -87,7 +87,7 @@ class Load:
     """Numbers of events when few and when many come from the whole sensor."""
 
     title = "load of the readout"
-    least = 0.3
+    least = 0.6
 
     def __init__(self, rate_hz: NDArray[np.float64], steps: int = 5) -> None:
         """`rate_hz`: (frame intervals,) events a second that the declared model makes."""

@@ -159,7 +159,7 @@ class Phase:
     """Numbers of events by their place between two frames."""
 
     title = "place between frames"
-    least = 0.3
+    least = 0.6
 
     _STEPS = 10
 
