@@ -35,6 +35,8 @@ class Additions:
     ----------
     step_us : float
         Longest step that resolves the courses [us].
+    gain : Course, optional
+        Factors on the light between the frames, above 0; corner, leak and shot noise follow them.
     drive : Course, optional
         Added to the log intensity before the poles [ln units].  The corner of the low-pass, leak
         and shot noise follow the light without it.
@@ -47,6 +49,7 @@ class Additions:
     """
 
     step_us: float
+    gain: Course | None = None
     drive: Course | None = None
     signal: Course | None = None
     on: Course | None = None

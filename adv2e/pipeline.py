@@ -24,9 +24,8 @@ from adv2e.effects.user import user_sources
 from adv2e.events import Events
 from adv2e.heap import return_large_blocks
 from adv2e.overlap import ReadAhead, WriteBehind
-from adv2e.pixel import is_compiled
 from adv2e.rendering import Preview
-from adv2e.simulation import events_from_light
+from adv2e.simulation import events_from_light, is_compiled
 from adv2e.sinks import Sink, default_threads, format_name, open_sink
 from adv2e.sources import open_source
 from adv2e.sources.base import Source
@@ -218,7 +217,7 @@ def convert(
         if workers > 1:
             ahead = ReadAhead(stills, cost=lambda still: still.nbytes, limit=AHEAD_BYTES)
             stills = stack.enter_context(ahead)
-        if not is_compiled(config.pixel, config.sampling):
+        if not is_compiled(config):
             log("compiling the pixel's kernel (once; about half a minute)")
         frames = _Passing(_progress(stills, recording.count, progress), out, call)
         for events in events_from_light(frames.light(), config, threads=workers, table=table):

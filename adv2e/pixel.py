@@ -245,10 +245,16 @@ class PixelArray:
 
     def _first_steps(self) -> None:
         """Rows of the state that only the stepping path has; all poles are at rest."""
-        drive, signal = self._stepping.first_added()
-        self.state[S_FIRST] = self.state[S_X] + drive
-        self.state[S_SECOND] = self.state[S_FIRST]
-        self.state[S_REFERENCE] += drive + signal
+        state, circuit = self.state, self.circuit
+        driven = self._stepping.first_driven(state[S_X])
+        state[S_FIRST] = driven
+        state[S_SECOND] = driven
+        state[S_REFERENCE] += driven - state[S_X] + self._stepping.first_signal()
+        if circuit.noise_rms > 0 and circuit.follower > 0:
+            # the noise was there before the first frame: a second pole without it, and references
+            # in the middle of its course, would take seconds to forget that
+            state[S_SECOND] += state[S_NOISE]
+            state[S_REFERENCE] += state[S_NOISE]
 
     def _over_pixels(self, fill: Callable[..., None], *arguments: Any) -> None:
         """Call `fill` for ranges of pixels, in threads: drawing for all of them takes its time."""
@@ -365,7 +371,7 @@ class PixelArray:
 
         found = [
             list((pool.map if pool else map)(partial(run, *these), self._tiles))
-            for these in self._stepping.runs(starts, part.last)
+            for these in self._stepping.runs(part, frames, starts)
         ]
         parted = []
         for tile in zip(*found, strict=True):

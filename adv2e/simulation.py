@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e import pixel
 from adv2e.config.model import Config
 from adv2e.effects.active import active_hooks
 from adv2e.effects.composition import additions_of, begin, changes_light, map_events
@@ -72,6 +73,11 @@ def simulate(
     yield from events_from_light(
         raw.light(), config, threads=threads, table=raw.table, effects=effects
     )
+
+
+def is_compiled(config: Config) -> bool:
+    """Tell whether the code that a simulation needs has been compiled before."""
+    return pixel.is_compiled(config.pixel, config.sampling, additions_of(active_hooks(config)))
 
 
 class _Raw:
@@ -171,7 +177,7 @@ def _pixel_events(
     workers = thread_count(threads)
     first_light = first if table is None else table.take(first)
     additions = additions_of(hooks)
-    pixel = PixelArray(
+    array = PixelArray(
         config.pixel,
         config.sampling,
         config.seed,
@@ -186,7 +192,7 @@ def _pixel_events(
         intervals = Intervals(t_ns, first, config.sampling, threads=workers)
         for part in intervals.parts(source):
             end_us, count = (part.times_ns[-1] + 500) // 1000, 0
-            for events in pixel.advance_part(part, table, pool):
+            for events in array.advance_part(part, table, pool):
                 count += events.size
                 yield from order.add(events, end_us)
                 del events  # or they would stay while the next ones are made

@@ -1,7 +1,12 @@
 """What the README shows works as it stands."""
 
+import hashlib
+import json
 import re
 from pathlib import Path
+
+import numpy as np
+import pytest
 
 from adv2e.cli import COMMANDS
 from adv2e.config import load_config
@@ -14,7 +19,7 @@ def blocks(language):
 
 
 def test_python_example_runs(capsys):
-    (example,) = blocks("python")
+    example = blocks("python")[0]
     exec(compile(example, "README.md", "exec"), {})
     assert "(" in capsys.readouterr().out
 
@@ -26,6 +31,30 @@ def test_configuration_example_loads(tmp_path):
     config = load_config([path], ["pixel.leak=null"], seed=7)
     assert config.pixel.photoreceptor_noise.rms == 0.05
     assert config.pixel.leak is None
+
+
+def test_effect_of_ones_own_runs(adv2e, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (example,) = (text for text in blocks("python") if "class Echo" in text)
+    Path("echo.py").write_text(example)
+    levels = np.tile(np.array([20, 40, 80, 160, 80, 40], np.uint8), 3)
+    np.save("clip.npy", np.repeat(levels, 12 * 9).reshape(18, 9, 12))
+    given = ("convert", "clip.npy", "--fps", "200", "-q", "--effect", "echo.py")
+    events = {}
+    for share in ("0", "0.25"):
+        outcome = adv2e(*given, "-o", f"{share}.txt", "--set", f"user.echo.share={share}")
+        assert outcome == (0, "", "")
+        events[share] = Path(f"{share}.txt").read_text("ascii").splitlines()
+    assert len(events["0.25"]) / len(events["0"]) == pytest.approx(1.25, abs=0.05)
+    assert set(events["0"]) < set(events["0.25"])
+    times = [float(line.split()[0]) for line in events["0.25"]]
+    assert times == sorted(times)
+    kept = json.loads(Path("0.25.txt.json").read_text("utf-8"))
+    assert kept["config"]["user"] == {"echo": {"share": 0.25, "delay_us": 5000.0}}
+    (source,) = kept["effects"]
+    digest = hashlib.sha256(example.encode()).hexdigest()
+    assert source == {"name": "echo", "file": "echo.py", "sha256": digest}
+    assert "delay_us: 5000.0" in adv2e("config", "show", "--effect", "echo.py").out
 
 
 def test_commands_exist():

@@ -105,7 +105,7 @@ def _resimulation(
     from adv2e.comparison.compare import Resimulation
     from adv2e.comparison.resimulation import resimulator
     from adv2e.errors import DataError
-    from adv2e.pixel import is_compiled
+    from adv2e.simulation import is_compiled
 
     if source is not None:
         frames, encoding = source.frames, source.encoding
@@ -118,7 +118,7 @@ def _resimulation(
             f"{measured.path}: holds no frames to simulate with this configuration; give them with"
             " --frames"
         )
-    if not is_compiled(config.pixel, config.sampling):
+    if not is_compiled(config):
         log("compiling the pixel's kernel (once; about half a minute)")
     simulate_events = resimulator(frames, config, encoding, threads=threads)
     return Resimulation(simulate_events, (config.seed, config.seed + 1))

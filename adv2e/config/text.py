@@ -68,11 +68,20 @@ def _lines(section: Section, path: str, depth: int) -> Iterator[tuple[str, str]]
             yield f"{indent}{key.name}: {{}}", _note(key)
         elif key.is_section:
             yield f"{indent}{key.name}: null", f"{_note(key)}; off"
-            for inner in keys_of(key.kind):
-                default = "" if inner.default is MISSING else f" {scalar_text(inner.default)}"
-                yield f"{indent}  # {inner.name}:{default}", _note(inner)
+            yield from _lines_off(key, indent + "  # ")
         else:
             yield f"{indent}{key.name}: {scalar_text(value)}", _note(key)
+
+
+def _lines_off(section: Key, indent: str) -> Iterator[tuple[str, str]]:
+    """Yield the keys of a section that is off, and of those in it."""
+    for key in keys_of(section.kind):
+        if key.is_section:
+            yield f"{indent}{key.name}: null", f"{_note(key)}; off"
+            yield from _lines_off(key, indent + "  ")
+        else:
+            default = "" if key.default is MISSING else f" {scalar_text(key.default)}"
+            yield f"{indent}{key.name}:{default}", _note(key)
 
 
 def _is_comment(line: str) -> bool:

@@ -19,6 +19,8 @@ from adv2e.events import EVENT_DTYPE, Events
 
 Array = NDArray[Any]
 
+_TIMED = ("gain", "drive", "signal", "thresholds")
+
 
 def overrides(hook: Hooks, method: str) -> bool:
     """Tell whether `hook` has a `method` of its own."""
@@ -67,19 +69,19 @@ def _light(hook: Hooks, frames: Frames, shape: tuple[int, ...]) -> Frames:
 def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
     """Return what the effects add inside the pixel, as one; None: nothing."""
     of = {
-        name: [hook for hook in hooks if overrides(hook, name)]
-        for name in ("drive", "signal", "thresholds", "inject")
+        name: [hook for hook in hooks if overrides(hook, name)] for name in (*_TIMED, "inject")
     }
     if not any(of.values()):
         return None
-    timed = [hook for name in ("drive", "signal", "thresholds") for hook in of[name]]
-    levels = of["thresholds"]
+    timed = [hook for name in _TIMED for hook in of[name]]
+    gains, levels = of["gain"], of["thresholds"]
     return Additions(
         step_us=min((hook.step_us for hook in timed), default=np.inf),
+        gain=_product(gains, "gain", lambda found: found) if gains else None,
         drive=_sum(of["drive"], "drive") if of["drive"] else None,
         signal=_sum(of["signal"], "signal") if of["signal"] else None,
-        on=_product(levels, 0) if levels else None,
-        off=_product(levels, 1) if levels else None,
+        on=_product(levels, "thresholds", lambda pair: pair[0]) if levels else None,
+        off=_product(levels, "thresholds", lambda pair: pair[1]) if levels else None,
         inject=_merge(of["inject"]) if of["inject"] else None,
     )
 
@@ -92,16 +94,15 @@ def _sum(hooks: Sequence[Hooks], method: str) -> Callable[[Times], Array]:
     return total
 
 
-def _product(hooks: Sequence[Hooks], which: int) -> Callable[[Times], Array]:
+def _product(
+    hooks: Sequence[Hooks], method: str, part: Callable[[Any], Any]
+) -> Callable[[Times], Array]:
     def total(times_s: Times) -> Array:
-        values = [
-            _timed(hook, "thresholds", times_s, lambda pair: pair[which], 1.0) for hook in hooks
-        ]
+        values = [_timed(hook, method, times_s, part, 1.0) for hook in hooks]
         for hook, value in zip(hooks, values, strict=True):
             if not np.all(value > 0):
                 raise DataError(
-                    f"effect {hook.name}: thresholds: a factor of {np.min(value):g}, must be"
-                    " above 0"
+                    f"effect {hook.name}: {method}: a factor of {np.min(value):g}, must be above 0"
                 )
         return _combined(np.multiply, values)
 

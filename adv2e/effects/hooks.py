@@ -5,6 +5,8 @@ path, and by default changes nothing there:
 
 ============== ===================================================================================
 light          the light of the frames, and their times
+gain           factors on the light at any time, between the frames too; corner, leak and shot
+               noise follow them
 drive          added to the log intensity x, before the poles (the corner does not follow it)
 signal         added to the signal behind all poles
 thresholds     factors on the ON and OFF thresholds
@@ -16,8 +18,8 @@ Its parameters are a section (:mod:`adv2e.parameters`) with units, ranges and, f
 diagnosis may fit, where to look (:class:`adv2e.parameters.Fit`).
 
 Events must not depend on how a sequence is cut into chunks or spread over threads: random numbers
-are functions of what they are for (:meth:`View.uniforms`), and `drive`, `signal` and `thresholds`
-are functions of time, which may be asked for in any order.
+are functions of what they are for (:meth:`View.uniforms`), and `gain`, `drive`, `signal` and
+`thresholds` are functions of time, which may be asked for in any order.
 """
 
 from __future__ import annotations
@@ -106,8 +108,8 @@ class Hooks:
     source : mapping
         Name, file and SHA-256 of the code, where it was loaded from a file.
     step_us : float
-        Longest time step that resolves `drive`, `signal` and `thresholds` [us]; steps are not above
-        100 us anyway.
+        Longest time step that resolves `gain`, `drive`, `signal` and `thresholds` [us]; steps are
+        not above 100 us anyway.
     parameters : Section
     view : View
         Set before anything else is called.
@@ -145,6 +147,10 @@ class Hooks:
         It may hold back as many as it needs, and must not write into those it is given.
         """
         return frames
+
+    def gain(self, times_s: Times) -> NDArray[Any] | None:
+        """Return factors on the light, (n,) or (n, rows, columns), above 0."""
+        return None
 
     def drive(self, times_s: Times) -> NDArray[Any] | None:
         """Return what is added to the log intensity [ln], (n,) or (n, rows, columns)."""

@@ -25,7 +25,7 @@ from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError
 from adv2e.parameters import Section, subsection
 
-METHODS = ("light", "drive", "signal", "thresholds", "inject", "events")
+METHODS = ("light", "gain", "drive", "signal", "thresholds", "inject", "events")
 """The methods of which an effect overrides one at least."""
 
 

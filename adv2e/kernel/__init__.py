@@ -11,6 +11,9 @@
 ``exact``       the exact circuit over a tile: screen, batch, and the rest one by one
 ``stepped``     screens for all other circuits
 ``general``     all other circuits over a tile
+``dense``       any circuit over a tile, in steps of time: what acts on the pixels from outside, and
+                effects that the others do not have; ``dense_rows``, ``dense_signal`` and
+                ``dense_events`` are its parts
 ``tile``        what the two drivers share
 ``order``       packed events into order
 
@@ -30,6 +33,8 @@ pixels that may fire (7 to 13 %)     40 each in lanes: 9 evaluating the integral
                                      polynomial, the rest gathering, deciding and writing back
 a pixel by itself                    1,000 to 3,000: the knee between two frames, and the odd step
                                      of an e-fold; 0.6 % of such pixels cost as much as all others
+a step of all pixels, ``dense``      5 to 9, of which poles 2 to 3, photoreceptor noise 2 and
+                                     screening 1; 0.5 us more for an event
 sorting and unpacking                6 an event
 ==================================== ===========================================================
 

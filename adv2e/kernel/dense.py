@@ -80,6 +80,7 @@ class Run(NamedTuple):
     last_step: int
     pieces: int  # of an interval
     steps: NDArray[np.int64]  # of a piece of each interval
+    gain: NDArray[np.float64]
     drive: NDArray[np.float64]
     signal: NDArray[np.float64]
     on: NDArray[np.float64]
@@ -165,6 +166,9 @@ def _next_instant(n, rows):
 def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, normals, rows):
     """Signal of a strip over step m of a run, of h us, that ends at `share` of its piece."""
     signal.advance_light(n, share, half, circuit, rows)
+    if run.gain.shape[0] > 0:
+        signal.change_middle(lo, count, run.gain, m, rows)
+        signal.change_light(lo, count, run.gain, m + 1, circuit, rows)
     if run.drive.shape[0] > 0:
         signal.add_course(n, lo, count, run.drive, m + 1, DRIVEN1, rows)
     if circuit.slew > 0.0:
@@ -281,6 +285,8 @@ def _strip(
                 _take_piece(n, j // steps, run.pieces, rows)
             if r % BLOCK == 0:
                 signal.begin_block(n, r / steps, half, circuit, rows)
+                if run.gain.shape[0] > 0:
+                    signal.change_light(lo, count, run.gain, m, circuit, rows)
                 if run.drive.shape[0] > 0:
                     signal.add_course(n, lo, count, run.drive, m, DRIVEN1, rows)
             _make_step(

@@ -101,6 +101,31 @@ def add_course(n, lo, count, course, m, row, rows):
 
 
 @kernel
+def change_light(lo, count, course, m, circuit, rows):
+    """Put the factors of instant m of a course on the light at the end of a step, and on its x."""
+    knee_dn = math.exp(circuit.knee)
+    wide = course.shape[1] > 1
+    for k in range(count):
+        factor = course[m, lo + k] if wide else course[m, 0]
+        light = rows[LIGHT1 + k]
+        changed = factor * light
+        rows[LIGHT1 + k] = changed
+        if changed < knee_dn:
+            rows[DRIVEN1 + k] = changed / circuit.slope
+        else:
+            rows[DRIVEN1 + k] = special.log(changed)
+
+
+@kernel
+def change_middle(lo, count, course, m, rows):
+    """Put the factors half-way between instants m and m + 1 of a course on the light there."""
+    wide = course.shape[1] > 1
+    for k in range(count):
+        i = lo + k if wide else 0
+        rows[LIGHTM + k] *= 0.5 * (course[m, i] + course[m + 1, i])
+
+
+@kernel
 def first_pole_exact(n, h, circuit, rows):
     """Advance row FIRST by a step of h us; its slopes; and the pole's DECAY."""
     constant, per_dn = circuit.dark * h, circuit.per_dn * h

@@ -220,8 +220,8 @@ def full_config():
             "pixel.hot_pixels={fraction: 1e-05, rate_hz: 1e22}",
             "pixel.photoreceptor_noise={rms: 0.1}",
             "pixel.refractory=null",
-            "readout={}",
-            "frames={encoding: 'gamma:2.2', full_scale: 1023}",
+            "readout={arbiter: {event_ns: 100, row_ns: 1e3}, tick_us: 1.5}",
+            "frames={encoding: 'gamma:2.2', full_scale: 1023, shift_px: [0.5, -1]}",
         ]
     )
 
@@ -249,7 +249,9 @@ def test_to_dict_holds_plain_values():
     values = to_dict(full_config())
     assert values["pixel"]["hot_pixels"] == {"fraction": 1e-05, "rate_hz": 1e22}
     assert values["pixel"]["refractory"] is None
-    assert values["readout"] == {}
+    assert values["readout"]["arbiter"] == {"event_ns": 100.0, "row_ns": 1000.0}
+    assert values["readout"]["loss"] is None
+    assert values["frames"]["shift_px"] == [0.5, -1.0]
     assert list(values) == [item.name for item in dataclasses.fields(Config)]
 
 
@@ -263,3 +265,17 @@ def test_the_annotated_form_gives_unit_and_meaning():
     assert "cutoff_hz: 300.0          # [Hz] corner (-3 dB) at white\n" in text
     assert "# second pole; off\n    # cutoff_hz:              # [Hz] corner (-3 dB)\n" in text
     assert all(len(line) <= 100 for line in text.splitlines())
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("3", r"must be a list of 2 values such as \[0.0, 0.0\], got 3"),
+        ("[1]", r"must be a list of 2 values such as \[0.0, 0.0\], got \[1\]"),
+        ("[1, x]", r"frames\.shift_px\[1\]: must be a number \[px\], got 'x'"),
+        ("[1, .inf]", r"frames\.shift_px: must be a finite number, got inf"),
+    ],
+)
+def test_a_list_of_numbers_is_checked_part_by_part(value, text):
+    with pytest.raises(UsageError, match=text):
+        load_config(sets=[f"frames.shift_px={value}"])

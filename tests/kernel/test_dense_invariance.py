@@ -1,5 +1,10 @@
 """The stepping path: the same bytes for any division of the work, and what must always hold."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from harness import EVERYTHING, QUIET, advance, quiet, solve, start
@@ -97,6 +102,47 @@ def test_noise_does_not_depend_on_other_effects():
         {"reset_overshoot": ResetOvershoot(fraction=0.0)},
     ):
         assert run(quiet(**{**noisy, **more}), light).tobytes() == plain.tobytes()
+
+
+_PLAIN = """
+import numpy as np, sys
+sys.path[:0] = [{tests!r}, {tests!r} + "/kernel"]
+from harness import EVERYTHING, advance, start
+from test_dense_invariance import NEW
+from adv2e.additions import Additions
+from adv2e.config.model import Pixel, LowPass
+draw = np.random.default_rng(2)
+light = np.exp(draw.uniform(1, 5.5, (3, 3, 4))).astype(np.float32)
+times = [0, 2_000_000, 4_000_000]
+added = Additions(step_us=100.0, drive=lambda t: 0.1 * np.sin(900 * t), on=lambda t: 1 + 9 * t)
+everything = {{**EVERYTHING, **NEW}}
+for sections, additions in (
+    ({{}}, None), (everything, None), (everything, added),
+    ({{**NEW, "low_pass": LowPass(update="paper")}}, added),
+):
+    array = start(
+        light, times, Pixel(**sections), exact_times=True, method="dense", additions=additions
+    )
+    events, exact = advance(array, light, times)
+    print(len(events), *(f"{{t:.4f}}" for t in exact), *events["p"], *events["x"], *events["y"])
+"""
+
+
+def test_compiled_equals_plain_python():
+    script = _PLAIN.format(tests=str(Path(__file__).resolve().parents[1]))
+    outcome = [
+        subprocess.run(
+            [sys.executable, "-W", "error", "-c", script],
+            env={**os.environ, **extra},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split()
+        for extra in ({}, {"NUMBA_DISABLE_JIT": "1"})
+    ]
+    compiled, plain = (np.array(words, float) for words in outcome)
+    assert compiled.size > 100
+    assert np.allclose(compiled, plain, rtol=0, atol=1e-3)
 
 
 lights = st.lists(

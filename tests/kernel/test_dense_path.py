@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from camera.helpers import seen, still
+from differences import STEP_S, Truth
 from harness import advance, by_pixel, quiet, solve, start
 from reference import stimuli
 from reference.agreement import count_and_time_errors
-from reference.circuit import Circuit, Draws
+from reference.circuit import Circuit
 from reference.dense_ode import as_lists, dense_truth
-from reference.twin import simulate_twin
 from test_dense import CIRCUITS, WITH_EFFECTS
 from test_twin import CASES, check, clock, moving_light
 
@@ -114,34 +115,62 @@ def test_noise_events_and_leak_are_those_of_the_solved_path(name):
 
 @pytest.mark.parametrize("follower_hz", [None, 500.0])
 def test_photoreceptor_noise_moves_the_signal(follower_hz):
-    """At rest the noise path is known from its draws; the twin gets it as knots."""
+    """At rest the noise is known from its draws: a line between its knots, behind both poles."""
     pixels, seed, rms = 12, 4, 0.12
-    light, times = np.full((9, pixels), 80.0), clock(9, 1 / 240)
+    light, times = np.full((9, pixels), 80.0), np.arange(9) * 0.004
     corner = 2 * np.pi * (21.8 + 278.2 * 80 / 255)
     pixel = quiet(
         photoreceptor_noise=PhotoreceptorNoise(rms=rms, step=0.2),
         source_follower=SourceFollower(cutoff_hz=follower_hz) if follower_hz else None,
     )
-    steps = steps_of(1e6 / 240, make_circuit(pixel, Sampling(), seed))
-    knots = np.arange(8 * steps + 1) / (240 * steps)
-    decay = np.exp(-corner / (240 * steps))
+    steps = steps_of(4000.0, make_circuit(pixel, Sampling(), seed))
     drawn = np.empty((-(-8 * steps // 4), 4, pixels))
     for block, four in enumerate(drawn):
         rng.normals_of_four(seed, rng.PHOTORECEPTOR_STEPS, 0, pixels, block, four)
     drawn = drawn.reshape(-1, pixels)
-    paths = []
-    for i in range(pixels):
-        n = [rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)]
-        for k in range(knots.size - 1):
-            n.append(decay * n[-1] + rms * np.sqrt(1 - decay**2) * drawn[k, i])
-        paths.append((knots, np.array(n)))
-    stepped = solve(light, times, pixel, seed=seed, method="dense")
-    draws = Draws(signal_noise=paths)
-    twin = simulate_twin(light, times, Circuit(follower_hz=follower_hz), draws, step_us=2.0)
-    found = count_and_time_errors(stepped, twin)
+    decay = np.exp(-corner * 0.004 / steps)
+    knots = np.empty((8 * steps + 1, pixels))
+    knots[0] = [rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0) for i in range(pixels)]
+    for k in range(8 * steps):
+        knots[k + 1] = decay * knots[k] + rms * np.sqrt(1 - decay**2) * drawn[k]
+    fine = np.arange(round(times[-1] / STEP_S) + 1) * STEP_S
+    at = np.arange(8 * steps + 1) * (0.004 / steps)
+    signal = np.stack([np.interp(fine, at, n) for n in knots.T], axis=1)
+    if follower_hz:
+        b = 2 * np.pi * follower_hz * STEP_S
+        z = signal.copy()
+        for k in range(len(z) - 1):
+            z[k + 1] = z[k] + b / (1 + b / 2) * (0.5 * (signal[k] + signal[k + 1]) - z[k])
+        signal = z
+    found = count_and_time_errors(
+        solve(light, times, pixel, seed=seed, method="dense"), Truth(signal).events()
+    )
     assert found.count_b > 30
     assert not found.differing
     assert found.max_dt_us < 0.5
+
+
+@pytest.mark.parametrize("follower_hz", [None, 300.0])
+def test_photoreceptor_noise_makes_as_many_events_as_the_camera_has(follower_hz):
+    follower = {"cutoff_hz": follower_hz} if follower_hz else None
+    dead = {"period_us": 500.0}
+    given = {
+        "photoreceptor_noise": {"rms": 0.08},
+        "source_follower": follower,
+        "refractory": dead,
+    }
+    stream = seen(still(60.0), hidden={"pixel": given}, size=(25, 20), duration_s=0.3, step_us=50.0)
+    pixel = quiet(
+        log_response=LogResponse(linear_below=0),
+        low_pass=LowPass(dark_cutoff_hz=20.0),
+        photoreceptor_noise=PhotoreceptorNoise(rms=0.08),
+        source_follower=SourceFollower(**follower) if follower else None,
+        refractory=Refractory(**dead),
+    )
+    light, times = np.full((4, 500), 60.0), np.arange(4) * 0.1
+    events = sum(map(len, solve(light, times, pixel, seed=1, method="dense")))
+    assert events > 3000
+    assert events == pytest.approx(len(stream.time), rel=0.06)
 
 
 def test_normals_are_normal_and_independent():
@@ -205,3 +234,15 @@ def test_additions_of_nothing_change_nothing():
     one, two = (by_pixel(array, *advance(array, light, times_ns)) for array in arrays)
     assert sum(map(len, one)) > 100
     assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
+
+
+def test_light_beyond_white_is_followed_as_fast():
+    """Thirty times white: a corner of 9 kHz."""
+    light = np.exp(np.random.default_rng(0).uniform(0, 9, (12, 40))).astype(np.float32)
+    times = clock(12, 1e-3)
+    found = count_and_time_errors(
+        solve(light, times, quiet(), method="dense"), solve(light, times, quiet())
+    )
+    assert found.count_b > 1000
+    assert not found.differing
+    assert found.max_dt_us < 1.0

@@ -63,9 +63,10 @@ def means(times: Array, exposure: float) -> Array:
     Returns
     -------
     (n, n)
-        Rows with sum 1 and the variance of the exposure: a mixture of the means over light that is
-        constant about each time, and over light that is linear between them.  Towards both ends the
-        exposures are cut, on both sides alike, to what lies between the first and the last time.
+        Rows with sum 1 and, as near as it comes, the variance of the exposure: a mixture of the
+        means over light that is constant about each time, and over light that is linear between.
+        Towards both ends the exposures are cut, on both sides alike, to what lies between the first
+        and the last time.
     """
     widths = np.minimum(exposure, 2.0 * np.minimum(times - times[0], times[-1] - times))
     first, last = (times - 0.5 * widths)[:, None], (times + 0.5 * widths)[:, None]

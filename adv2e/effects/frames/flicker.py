@@ -3,13 +3,10 @@ r"""Flicker: light of lamps on the mains, of which the frames know nothing.
 .. math:: DN' = DN\,(1 + m \sin(2\pi f t + \varphi))
 
 with t on the camera's clock [s], f = ``frequency_hz`` that of the light (twice the mains for a lamp
-without rectifier), m = ``depth``, phi = ``phase_rad``.  It swings many times from frame to frame,
-so it is not put on the frames but added to the log intensity x between them, as
-ln(1 + m sin(2 pi f t + phi)).  That is exact where the response is logarithmic; on the linear foot
-(below ``pixel.log_response.linear_below``) the swing is that of the logarithm, too large by
-DN-dependent amounts, and with dark current or light given by other effects behind it the swing is
-that of the sum.  The corner of the low-pass does not follow the flicker: over a period its mean is
-the same, and what is left is of second order in m.
+without rectifier), m = ``depth``, phi = ``phase_rad``.  It swings many times
+from frame to frame, so it is not put on the frames but on the light between them; logarithm, corner
+of the low-pass, leak and shot noise all see it.  Light that other effects give (dark current) is
+taken to swing with it.
 
 References
 ----------
@@ -60,7 +57,7 @@ class Flicker(Section):
 
 
 class FlickerHooks(Hooks):
-    """Adds the swing to the drive."""
+    """Puts the swing on the light."""
 
     stage = "frames"
     Parameters = Flicker
@@ -69,10 +66,9 @@ class FlickerHooks(Hooks):
         super().__init__(parameters)
         self.step_us = 1e6 / (_STEPS_PER_PERIOD * parameters.frequency_hz)
 
-    def drive(self, times_s: Times) -> NDArray[np.float64]:
-        """Return the logarithm of the swing, (n,)."""
+    def gain(self, times_s: Times) -> NDArray[np.float64]:
+        """Return the factors on the light, (n,)."""
         p = self.parameters
         # whole turns taken off first: an epoch time would lose the phase in rounding
         turns = np.remainder(times_s * p.frequency_hz, 1.0)
-        found: NDArray[np.float64] = np.log1p(p.depth * np.sin(2.0 * np.pi * turns + p.phase_rad))
-        return found
+        return np.asarray(1.0 + p.depth * np.sin(2.0 * np.pi * turns + p.phase_rad))

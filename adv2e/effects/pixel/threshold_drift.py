@@ -10,8 +10,8 @@ References
 .. [1] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
    sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848.
 .. [2] R. Graca, B. McReynolds, T. Delbruck, "Shining light on the DVS pixel: a tutorial and
-   discussion about biasing and optimization", CVPR Workshops 2023,
-   doi:10.1109/CVPRW59228.2023.00423 (thresholds are ratios of bias currents).
+   discussion about biasing and optimization", CVPR Workshops 2023, arXiv:2304.04706 (thresholds
+   follow from biases).
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ r"""Frame coupling: the readout of a frame disturbs the event pixels of the same
 is added to the signal of all pixels behind all poles, with A = ``amplitude`` [ln], tau = ``tau_us``
 and t_f the times at which frames were read out: the end of each exposure, that is the time of the
 frame on the camera's clock (after clock offset and drift) plus half of ``frames.exposure_us``.
-The leap at t_f is spread over the time step that holds it, a sixteenth of tau at most.
+The pixels are at rest at the first frame.  The leap is spread over the time step that it ends or
+lies in, a twelfth of tau at most.
 
 References
 ----------
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 from adv2e.effects.hooks import Frames, Hooks, Times, View
 from adv2e.parameters import Fit, Section, parameter
 
-_STEPS_PER_TAU = 16
+_STEPS_PER_TAU = 12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,10 +79,12 @@ class FrameCouplingHooks(Hooks):
     def signal(self, times_s: Times) -> NDArray[np.float64]:
         """Return the disturbance, (n,)."""
         readouts, sums = np.array(self._readouts), np.array(self._sums)
-        last = np.searchsorted(readouts, times_s, "left") - 1
+        # at a readout itself the leap has happened, so that its height is met by a step's end
+        last = np.searchsorted(readouts, times_s, "right") - 1
         waited = np.maximum(times_s - readouts[last], 0.0)
         left = sums[last] * np.exp(-waited / (self.parameters.tau_us * 1e-6))
-        return np.where(last >= 0, self.parameters.amplitude * left, 0.0)
+        begun = (last >= 0) & (times_s > self.view.start_s)
+        return np.where(begun, self.parameters.amplitude * left, 0.0)
 
     def passed(self, time_s: float) -> None:
         """Forget the readouts that no later time needs."""

@@ -1,0 +1,146 @@
+"""Equations of the effects of the readout, by hand and beside the brute-force camera."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from camera.photoreceptor import frame_coupling
+from camera.readout import Stream
+from camera.readout import arbiter as camera_arbiter
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from adv2e.effects.hooks import View
+from adv2e.effects.pixel.dead_pixels import DeadPixels, DeadPixelsHooks
+from adv2e.effects.readout.arbiter import Arbiter, ArbiterHooks
+from adv2e.effects.readout.event_loss import EventLoss, EventLossHooks
+from adv2e.effects.readout.frame_coupling import FrameCoupling, FrameCouplingHooks
+from adv2e.effects.readout.timestamp_tick import TimestampTickHooks, estimate, ticked
+from adv2e.events import make_events, sort_events
+
+ROWS, COLUMNS = 12, 10
+
+
+def out_of(hook, events, cuts=(), start_s=0.0, seed=0):
+    """Return the events that come out of `hook`, `events` cut into chunks."""
+    hook.begin(View(ROWS, COLUMNS, seed, start_s))
+    parts = list(hook.events(iter(np.split(events, list(cuts)))))
+    return np.concatenate(parts) if parts else events[:0]
+
+
+def bursts(seed, count=4000, span_us=20_000):
+    """Return sorted events, many at the same time and in the same row."""
+    rng = np.random.default_rng(seed)
+    t = np.sort(rng.choice(rng.integers(0, span_us, count // 4), count))
+    columns = rng.integers(0, COLUMNS, count), rng.integers(0, ROWS, count)
+    return sort_events(make_events(t, *columns, rng.integers(0, 2, count)))
+
+
+@pytest.mark.parametrize(("event_ns", "row_ns"), [(500, 3000), (3000, 0), (0, 20000), (2000, 9000)])
+@pytest.mark.parametrize("start_s", [0.0, 1_468_941_032.0])
+def test_arbiter_is_that_of_the_camera(event_ns, row_ns, start_s):
+    events = bursts(3)
+    shifted = events.copy()
+    shifted["t"] += round(start_s * 1e6)
+    found = out_of(
+        ArbiterHooks(Arbiter(event_ns=event_ns, row_ns=row_ns)), shifted, (7, 900, 2500), start_s
+    )
+    # in microseconds: what comes at the same time as a latch must not hang on rounding
+    stream = Stream(
+        events["t"].astype(float),
+        events["y"].astype(np.int64) * COLUMNS + events["x"],
+        np.where(events["p"], 1, -1).astype(np.int64),
+    )
+    wanted = camera_arbiter(stream, COLUMNS, event_ns * 1e-3, row_ns * 1e-3)
+    y, x = np.divmod(wanted.pixel, COLUMNS)
+    stamps = np.rint(wanted.time) + round(start_s * 1e6)
+    again = sort_events(make_events(stamps, x, y, wanted.polarity > 0))
+    assert len(again) < len(events)
+    assert found.tobytes() == again.tobytes()
+
+
+def test_arbiter_serves_the_row_that_waited_longest_from_left_to_right():
+    # row 5 asks first and is selected at 10 us; what asks until then goes with it
+    events = make_events([0, 2, 9, 11], [7, 1, 3, 0], [5, 2, 5, 5], [1, 1, 0, 1])
+    found = out_of(ArbiterHooks(Arbiter(event_ns=1000.0, row_ns=10_000.0)), events)
+    # 3 and 7 of row 5 leave at 11 and 12 us, row 2 at 23 us, the rest of row 5 at 34 us
+    assert found["t"].tolist() == [11, 12, 23, 34]
+    assert found["x"].tolist() == [3, 7, 1, 0]
+    assert found["y"].tolist() == [5, 5, 2, 5]
+    assert found["p"].tolist() == [0, 1, 1, 1]
+
+
+def test_a_pixel_that_waits_cannot_ask_again():
+    events = make_events([0, 1, 11, 12], [4] * 4, [4] * 4, [1, 0, 0, 1])
+    found = out_of(ArbiterHooks(Arbiter(event_ns=1000.0, row_ns=10_000.0)), events)
+    assert found["t"].tolist() == [11, 23]
+    assert found["p"].tolist() == [1, 1]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 1000), st.lists(st.integers(0, 300), max_size=6))
+def test_arbiter_does_not_depend_on_chunks(seed, cuts):
+    events = bursts(seed, 300, 900)
+    hook = ArbiterHooks(Arbiter(event_ns=700.0, row_ns=2500.0))
+    whole = out_of(hook, events)
+    assert out_of(hook, events, sorted(cuts)).tobytes() == whole.tobytes()
+    assert whole.tobytes() == sort_events(whole).tobytes()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 1000), st.lists(st.integers(0, 300), max_size=6), st.floats(0.3, 40.0))
+def test_ticks_do_not_depend_on_chunks_and_are_never_early(seed, cuts, tick_us):
+    events = bursts(seed, 300, 900)
+    whole = out_of(TimestampTickHooks(tick_us), events)
+    assert out_of(TimestampTickHooks(tick_us), events, sorted(cuts)).tobytes() == whole.tobytes()
+    assert whole.tobytes() == sort_events(whole).tobytes()
+    late = ticked(events["t"], tick_us) - events["t"]
+    assert late.min() >= -0.5
+    assert late.max() < tick_us + 0.5
+
+
+def test_ticks_by_hand_and_what_they_are_known_by():
+    times = np.array([0, 1, 249, 250, 251, 1001], np.int64)
+    assert ticked(times, 250.0).tolist() == [0, 250, 250, 250, 500, 1250]
+    assert ticked(times, 62.5).tolist() == [0, 62, 250, 250, 312, 1062]
+    assert estimate(ticked(times, 250.0)) == 250
+    assert estimate(ticked(np.arange(0, 10**6, 977), 40.0)) == 40
+    assert estimate(np.array([5, 5])) == 0
+    assert estimate(np.array([], np.int64)) == 0
+
+
+def test_loss_takes_its_share_and_draws_by_pixel():
+    events = bursts(1, 40_000, 2_000_000)
+    hook = EventLossHooks(EventLoss(fraction=0.25))
+    kept = out_of(hook, events)
+    assert len(kept) / len(events) == pytest.approx(0.75, abs=0.01)
+    assert out_of(hook, events, (1, 5000, 5001)).tobytes() == kept.tobytes()
+    assert out_of(hook, events, seed=1).tobytes() != kept.tobytes()
+    one = events[events["x"] == 3]
+    assert out_of(hook, one).tobytes() == kept[kept["x"] == 3].tobytes()
+    assert len(out_of(EventLossHooks(EventLoss(fraction=1.0)), events)) == 0
+
+
+def test_dead_pixels_are_silent_and_the_others_as_they_were():
+    events = bursts(2, 20_000, 100_000)
+    found = out_of(DeadPixelsHooks(DeadPixels(fraction=0.3)), events)
+    pixels = events["y"].astype(int) * COLUMNS + events["x"]
+    left = np.unique(found["y"].astype(int) * COLUMNS + found["x"])
+    assert 0.5 < len(left) / (ROWS * COLUMNS) < 0.9
+    assert found.tobytes() == events[np.isin(pixels, left)].tobytes()
+
+
+def test_coupling_is_that_of_the_camera_but_at_the_readouts_themselves():
+    readouts = np.array([0.0, 0.002, 0.004, 0.0061])
+    hook = FrameCouplingHooks(FrameCoupling(amplitude=0.1, tau_us=800.0), delay_us=200.0)
+    hook.begin(View(2, 2, 0, 0.0))
+    frames = [(round(t * 1e9), np.zeros((2, 2))) for t in readouts]
+    assert [t for t, _ in hook.light(iter(frames))] == [t for t, _ in frames]
+    times = np.linspace(0.0, 0.012, 997)
+    wanted = frame_coupling(0.1, 800e-6, readouts + 200e-6, times)
+    np.testing.assert_allclose(hook.signal(times), wanted, atol=1e-9)
+    assert hook.signal(np.array([0.0002, 0.0062]))[0] == pytest.approx(0.1)
+    hook.passed(0.005)
+    later = times[times >= 0.005]
+    np.testing.assert_allclose(hook.signal(later), wanted[times >= 0.005], atol=1e-9)
+    assert len(hook._readouts) == 2
