@@ -179,7 +179,7 @@ def left_out_table(lines: Sequence[Line]) -> str:
     )
     text = (
         f"A name was accepted with nothing left to explain: {share(accepted, len(lines))}; of"
-        f" these, {alike} are the same thing under another key"
+        f" these, with the same thing under another key: {alike}"
         f" ({', '.join(' / '.join(pair) for pair in SAME)})."
     )
     return f"{text}\n\n{_strangers(lines)}"

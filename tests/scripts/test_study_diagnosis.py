@@ -343,7 +343,7 @@ def test_the_report_counts_what_happened(parts):
     assert "0 of 49" in row(text, "an effect named")
     assert "shot_noise" in row(text, "echo")
     assert "1 of 2: 50.0%" in text.partition("left out of the library")[2]
-    assert "1 are the same thing under another key" in text
+    assert "the same thing under another key: 1" in text
     assert "| 49 of 100 |" in row(text, "nothing")
     assert f"20 of {len(LIBRARY)}" in row(text, "library")
 
