@@ -1,0 +1,198 @@
+#!/usr/bin/env python
+"""How often ``adv2e diagnose`` names what a recording holds and its declared model lacks.
+
+Recordings come from the brute-force camera of the tests, which shares no code with adv2e; what they
+hold is hidden from the diagnosis.  Kinds of recordings:
+
+nothing         the camera is just as declared: how often is anything found?
+library         one effect that adv2e knows: is it named, and fitted?
+leave-one-out   the same, with the effect left out of adv2e's library: is a wrong name given?
+outside         one effect that adv2e does not know
+pairs           two effects at once
+
+::
+
+    python scripts/study_diagnosis.py run results
+    python scripts/study_diagnosis.py run results --kinds library --sizes middle --shard 3/16
+    python scripts/study_diagnosis.py report results -o tables
+
+``run`` adds a line of JSON for each case to a file in its folder and skips what is there already
+from the same commit, so that it can be stopped at any time; all kinds and effects come in turn.
+``report`` writes Markdown tables and a figure from what there is.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import partial
+from pathlib import Path
+
+import click
+from study_diagnosis_parts.cases import KINDS, SIZES, Case, Plan, shard
+from study_diagnosis_parts.results import ENDING, append, finished, identity, latest, read
+
+from adv2e.errors import Adv2eError
+
+ALL = ",".join
+
+
+class Names(click.ParamType):
+    """Names out of a list, with commas between them."""
+
+    name = "names"
+
+    def __init__(self, known: tuple[str, ...]) -> None:
+        self.known = known
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """Return the names, in the order of the list."""
+        if isinstance(value, tuple):
+            return value
+        names = str(value).split(",")
+        for name in names:
+            if name not in self.known:
+                self.fail(f"{name!r}: none of {', '.join(self.known)}", param, ctx)
+        return tuple(name for name in self.known if name in names)
+
+
+class Shard(click.ParamType):
+    """``I/N``: the I-th of N parts."""
+
+    name = "I/N"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Return both numbers."""
+        if isinstance(value, tuple):
+            return value
+        number, _, count = str(value).partition("/")
+        if number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
+            return int(number), int(count)
+        return self.fail(f"{value!r}: must be I/N with I from 1 to N, such as 3/16", param, ctx)
+
+
+@click.group()
+def main() -> None:
+    """Study how often 'adv2e diagnose' is right."""
+
+
+@main.command("run")
+@click.argument("folder", type=click.Path(file_okay=False, path_type=Path))
+@click.option("--kinds", type=Names(KINDS), default=ALL(KINDS), show_default=True)
+@click.option("--sizes", type=Names(SIZES), default=ALL(SIZES), show_default=True)
+@click.option("--only", multiple=True, metavar="EFFECT", help="Only with this effect. Repeatable.")
+@click.option("--shard", "part", type=Shard(), default="1/1", show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--repeats", type=click.IntRange(min=1), default=1, show_default=True)
+@click.option("--nothing", type=click.IntRange(min=0), default=100, show_default=True)
+@click.option("--size", metavar="WxH", default="48x36", show_default=True, help="Sensor.")
+@click.option("--seconds", type=click.FloatRange(min=0.1), default=0.8, show_default=True)
+@click.option("--fps", type=click.FloatRange(min=10.0), default=500.0, show_default=True)
+@click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True)
+@click.option("--most", type=click.IntRange(min=1), help="Stop after so many cases.")
+@click.option("-v", "verbose", is_flag=True, help="Show what competes.")
+def run(
+    folder: Path,
+    kinds: tuple[str, ...],
+    sizes: tuple[str, ...],
+    only: tuple[str, ...],
+    part: tuple[int, int],
+    seed: int,
+    repeats: int,
+    nothing: int,
+    size: str,
+    seconds: float,
+    fps: float,
+    threads: int,
+    most: int | None,
+    verbose: bool,
+) -> None:
+    """Record and diagnose the cases that FOLDER does not have yet."""
+    from study_diagnosis_parts import run as running  # noqa: PLC0415 - it loads the simulator
+    from study_diagnosis_parts.camera import catalogue  # noqa: PLC0415
+
+    say = partial(click.echo, err=True)
+    width, height = _size(size)
+    setup = running.Setup(width, height, seconds, fps)
+    known = running.library_names()
+    lacking = [name for name in catalogue.LIBRARY if name not in known]
+    if lacking:
+        say(f"not in adv2e's library, skipped: {', '.join(lacking)}")
+    for name in only:
+        if name not in (*catalogue.LIBRARY, *catalogue.OUTSIDE):
+            raise click.BadParameter(
+                f"{name!r}: the camera has no such effect", param_hint="--only"
+            )
+    plan = Plan(
+        kinds, sizes, [name for name in catalogue.LIBRARY if name in known], only, repeats,
+        nothing, seed,
+    )  # fmt: skip
+    commit = running.commit()
+    done = finished(read(folder))
+
+    def is_done(case: Case) -> bool:
+        stub = {"key": case.key, "study_seed": seed, "setup": vars(setup), "commit": commit}
+        return identity(stub) in done
+
+    cases = shard(plan.cases(), *part)
+    left = [case for case in cases if not is_done(case)]
+    say(f"commit {commit}: {len(left)} of {len(cases)} cases left")
+    path = folder / f"{part[0]}-of-{part[1]}{ENDING}"
+    for number, case in enumerate(left[:most], 1):
+        say(f"[{number}/{len(left)}] {case.key}, scene {case.scene(seed)}")
+        log = (lambda text: say(f"    {text}")) if verbose else (lambda text: None)
+        line = running.diagnosed(case, setup, seed, threads, log)
+        append(path, {**line, "commit": commit, "lacking": lacking})
+        say(f"    {_said(line)}")
+
+
+@main.command("report")
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), required=True)
+@click.option("--commit", help="Cases of this commit.  [default: of the last case finished]")
+def report(folder: Path, output: Path, commit: str | None) -> None:
+    """Write tables and a figure of the cases in FOLDER to -o DIR: diagnosis.md, diagnosis.png."""
+    from study_diagnosis_parts.figure import draw  # noqa: PLC0415
+    from study_diagnosis_parts.tables import report as tables  # noqa: PLC0415
+    from study_knee_report import load_pyplot  # noqa: PLC0415
+
+    lines = latest(read(folder))
+    if not lines:
+        raise click.ClickException(f"{folder}: no finished cases in it; 'run' makes them")
+    commits = Counter(line["commit"] for line in lines)
+    chosen = commit or max(lines, key=lambda line: line["ended"])["commit"]
+    if chosen not in commits:
+        held = ", ".join(f"{name} ({count})" for name, count in commits.items())
+        raise click.BadParameter(f"{chosen!r}: none of {held}", param_hint="--commit")
+    wanted = [line for line in lines if line["commit"] == chosen]
+    try:
+        pyplot = load_pyplot()
+    except Adv2eError as error:
+        raise click.ClickException(str(error)) from None
+    output.mkdir(parents=True, exist_ok=True)
+    text = tables(wanted, chosen)
+    (output / "diagnosis.md").write_text(text, encoding="utf-8")
+    draw(pyplot, wanted, output / "diagnosis.png")
+    click.echo(text)
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if width.isdecimal() and height.isdecimal() and min(int(width), int(height)) >= 8:
+        return int(width), int(height)
+    raise click.BadParameter(f"{text!r}: must be as 48x36, at least 8x8", param_hint="--size")
+
+
+def _said(line: dict[str, object]) -> str:
+    if "failed" in line:
+        return f"failed: {line['failed']}"
+    found = ", ".join(one["name"] for one in line["found"]) or "nothing"
+    others = f" (or {', '.join(line['alternatives'])})" if line["alternatives"] else ""
+    return f"{line['verdict']}: {found}{others}, {line['seconds']['diagnosis']} s"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,256 @@
+"""Tables of the study, in Markdown."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+
+from study_diagnosis_parts import scoring
+from study_diagnosis_parts.camera import catalogue
+from study_diagnosis_parts.cases import (
+    KINDS,
+    LEFT_OUT,
+    LIBRARY,
+    MIDDLE,
+    NOTHING,
+    OUTSIDE,
+    PAIRS,
+    SAME,
+    SIZES,
+    Plan,
+)
+from study_diagnosis_parts.results import Line
+
+LEVEL = 0.01
+"""Probability at which the global test says that something is missing."""
+
+_SIZES = ("none", *SIZES)
+
+
+def report(lines: Sequence[Line], commit: str) -> str:
+    """Return all tables of one commit's cases."""
+    parts = [
+        f"# `adv2e diagnose` on an undeclared effect\n\nCommit {commit}. {_how(lines)}",
+        "## How much was run\n\n" + progress_table(lines),
+        "## Effects in the library, middle size: pooled\n\n" + pooled_table(lines),
+        "## Nothing missing: false alarms\n\n" + alarm_table(lines),
+        *_by_size("Effects in the library", lines, LIBRARY, effect_table),
+        *_by_size("Effect left out of the library", lines, LEFT_OUT, left_out_table),
+        *_by_size("Effects outside the library", lines, OUTSIDE, outside_table),
+        *_by_size("Two effects", lines, PAIRS, pair_table),
+    ]
+    failures = failure_list(lines)
+    if failures:
+        parts.append("## What went wrong, and what competed\n\n" + failures)
+    return "\n\n".join(parts) + "\n"
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table; all columns but the first are numbers."""
+    ruler = ["---", *(["---:"] * (len(header) - 1))]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in [header, ruler, *rows])
+
+
+def share(hits: int, count: int) -> str:
+    """Return a count, its share and the 95 % interval of that."""
+    if not count:
+        return "0 of 0"
+    low, high = scoring.interval(hits, count)
+    return f"{hits} of {count}: {hits / count:.1%} ({low:.1%} to {high:.1%})"
+
+
+def _of(lines: Iterable[Line], kind: str, size: str | None = None) -> list[Line]:
+    return [one for one in lines if one["kind"] == kind and size in (None, one["size"])]
+
+
+def _by_size(
+    title: str, lines: Sequence[Line], kind: str, made: Callable[[Sequence[Line]], str]
+) -> list[str]:
+    return [
+        f"## {title}: {size} size\n\n{made(_of(lines, kind, size))}"
+        for size in SIZES
+        if _of(lines, kind, size)
+    ]
+
+
+def _how(lines: Sequence[Line]) -> str:
+    setups = Counter(
+        "{width}x{height} px, {seconds:g} s, {fps:g} frames a second".format(**one["setup"])
+        for one in lines
+    )
+    lacking = sorted({name for one in lines for name in one["lacking"]})
+    text = f"Recordings: {'; '.join(f'{what} ({n})' for what, n in setups.items())}."
+    done = [one for one in lines if "failed" not in one]
+    if done:
+        each = scoring.median([one["seconds"]["diagnosis"] for one in done])
+        made = scoring.median([one["seconds"]["recording"] for one in done])
+        many = scoring.median([one["simulations"] for one in done])
+        load = scoring.median([one["load"] for one in done])
+        threads = ", ".join(str(n) for n in sorted({one["threads"] for one in done}))
+        text += (
+            f" Median of a recording: {each:.0f} s for the diagnosis, {many:.0f} simulations,"
+            f" {threads} thread(s), load of the machine {load:.1f}; {made:.0f} s to record it."
+        )
+    if lacking:
+        text += f" Not in the library yet, so not studied: {', '.join(lacking)}."
+    return text
+
+
+def progress_table(lines: Sequence[Line]) -> str:
+    """Return how many cases of each kind and size there are, of those of a full study."""
+    known = [name for name in catalogue.LIBRARY if not any(name in one["lacking"] for one in lines)]
+    planned = Counter((case.kind, case.size) for case in Plan(KINDS, SIZES, known).cases())
+    run = Counter((one["kind"], one["size"]) for one in lines if "failed" not in one)
+    rows = []
+    for kind in KINDS:
+        cells = [
+            f"{run[kind, size]} of {planned[kind, size]}" if planned[kind, size] else ""
+            for size in _SIZES
+        ]
+        rows.append([kind, *cells])
+    return table(("kind", "-", *SIZES), rows)
+
+
+def pooled_table(lines: Sequence[Line]) -> str:
+    """Return the targets over all effects of the library at the middle size."""
+    pool = [one for one in _of(lines, LIBRARY, MIDDLE) if "failed" not in one]
+    kinds = [scoring.outcome(one) for one in pool]
+    named = [one for one, kind in zip(pool, kinds, strict=True) if kind in scoring.NAMED]
+    near = [flag for one in named if (flag := scoring.is_near(one)) is not None]
+    covered = [flag for one in named for flag in scoring.covered(one)]
+    rows = [
+        ("named, or among look-alikes", share(len(named), len(pool)), "9 in 10 or more"),
+        (
+            "wrong name accepted",
+            share(sum(kind in scoring.MISNAMED for kind in kinds), len(pool)),
+            "1 in 20 or fewer",
+        ),
+        ("named: parameters within 10 %", share(sum(near), len(near)), ""),
+        ("named: truth in the 95 % interval, by key", share(sum(covered), len(covered)), ""),
+        (
+            "named: held-out error at most 1.1 of its floor",
+            share(sum(map(scoring.is_at_floor, named)), len(named)),
+            "",
+        ),
+    ]
+    return table(("", "count, share (95 %)", "wanted"), rows)
+
+
+def alarm_table(lines: Sequence[Line]) -> str:
+    """Return how often something was found where nothing was missing."""
+    quiet = [one for one in _of(lines, NOTHING) if "failed" not in one]
+    alarms = sum(scoring.outcome(one) == scoring.ALARM for one in quiet)
+    low = sum(one["global_p"]["before"] < LEVEL for one in quiet)
+    named = sum(bool(one["found"]) for one in quiet)
+    rows = [
+        (f"global test on the last part below {LEVEL:.0%}", share(low, len(quiet))),
+        ("any verdict but consistent", share(alarms, len(quiet))),
+        ("an effect named", share(named, len(quiet))),
+    ]
+    return table(("", "count, share (95 %)"), rows)
+
+
+def effect_table(lines: Sequence[Line]) -> str:
+    """Return what became of each effect that the library has, and how well it was fitted."""
+    header = ("effect", *scoring.OF_ONE, "worst parameter", "error / floor", "named")
+    rows = []
+    for name, group in _grouped(lines):
+        errors = [max(found.values()) for one in group if (found := scoring.parameter_errors(one))]
+        raised = [
+            one["error"]["after"] / max(one["error"]["floor"], 1e-12)
+            for one in group
+            if "failed" not in one
+        ]
+        rows.append([
+            name, *_counts(group, scoring.OF_ONE),
+            f"{100 * max(errors):.1f} %" if errors else "",
+            f"{max(raised):.2f}" if raised else "",
+            _names(group),
+        ])  # fmt: skip
+    return table(header, rows)
+
+
+def left_out_table(lines: Sequence[Line]) -> str:
+    """Return what was said where the true name was not to be had."""
+    accepted = sum(scoring.outcome(one) == scoring.WRONG for one in lines)
+    alike = sum(
+        scoring.outcome(one) == scoring.WRONG and bool(_neighbours(one) & _given(one))
+        for one in lines
+    )
+    text = (
+        f"A name was accepted with nothing left to explain: {share(accepted, len(lines))}; of"
+        f" these, with the same thing under another key: {alike}"
+        f" ({', '.join(' / '.join(pair) for pair in SAME)})."
+    )
+    return f"{text}\n\n{_strangers(lines)}"
+
+
+def outside_table(lines: Sequence[Line]) -> str:
+    """Return what was said of effects that the library does not have."""
+    accepted = sum(scoring.outcome(one) == scoring.WRONG for one in lines)
+    text = f"A name was accepted with nothing left to explain: {share(accepted, len(lines))}."
+    return f"{text}\n\n{_strangers(lines)}"
+
+
+def pair_table(lines: Sequence[Line]) -> str:
+    """Return what became of two effects at once."""
+    rows = [
+        [name, *_counts(group, scoring.OF_PAIRS), _names(group)] for name, group in _grouped(lines)
+    ]
+    total = ["all", *_counts(lines, scoring.OF_PAIRS), ""]
+    return table(("effects", *scoring.OF_PAIRS, "named"), [*rows, total])
+
+
+def failure_list(lines: Sequence[Line]) -> str:
+    """Return each case that went wrong, with what the search said."""
+    parts = []
+    for one in lines:
+        kind = scoring.outcome(one)
+        if kind in (scoring.CLEAR, *scoring.NAMED, scoring.BOTH):
+            continue
+        if one["kind"] in (OUTSIDE, LEFT_OUT) and kind in (scoring.UNEXPLAINED, scoring.MISSED):
+            continue
+        hidden = ", ".join(f"{key} = {value}" for key, value in one["hidden"].items())
+        said = [one["failed"]] if "failed" in one else [scoring.names(one) or one["verdict"]]
+        parts.append(
+            f"**{one['key']}** (scene {one['scene']}; {hidden or 'as declared'}): {kind}\n\n```\n"
+            + "\n".join([*said, *one["log"]])
+            + "\n```"
+        )
+    return "\n\n".join(parts)
+
+
+def _neighbours(line: Line) -> set[str]:
+    true = set(line["effects"])
+    return {name for pair in SAME if true & set(pair) for name in pair} - true
+
+
+def _given(line: Line) -> set[str]:
+    return {*(one["name"] for one in line["found"]), *line["alternatives"]}
+
+
+def _strangers(lines: Sequence[Line]) -> str:
+    rows = [
+        [name, *_counts(group, scoring.OF_STRANGERS), _names(group)]
+        for name, group in _grouped(lines)
+    ]
+    total = ["all", *_counts(lines, scoring.OF_STRANGERS), ""]
+    return table(("effect", *scoring.OF_STRANGERS, "named"), [*rows, total])
+
+
+def _grouped(lines: Sequence[Line]) -> list[tuple[str, list[Line]]]:
+    """Return the lines of each set of effects, in the catalogue's order."""
+    order = (*catalogue.LIBRARY, *catalogue.OUTSIDE)
+    held: dict[tuple[str, ...], list[Line]] = {}
+    for one in sorted(lines, key=lambda one: [order.index(name) for name in one["effects"]]):
+        held.setdefault(tuple(one["effects"]), []).append(one)
+    return [(" + ".join(names), group) for names, group in held.items()]
+
+
+def _counts(lines: Sequence[Line], outcomes: Sequence[str]) -> list[str]:
+    found = Counter(scoring.outcome(one) for one in lines)
+    return [str(found[kind]) if found[kind] else "" for kind in outcomes]
+
+
+def _names(lines: Sequence[Line]) -> str:
+    return "; ".join(dict.fromkeys(name for one in lines if (name := scoring.names(one))))
