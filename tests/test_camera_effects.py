@@ -106,5 +106,4 @@ def test_readout_of_frames_makes_as_many_events_as_long_after_it_as_in_the_camer
     recorded = after_readouts(measured(camera))
     without = after_readouts(package(camera, {}, tmp_path / "without.yaml"))
     found = after_readouts(package(camera, hidden, tmp_path / "with.yaml"))
-    print(recorded, found, without)
     assert np.abs(found - recorded).sum() < 0.25 * np.abs(without - recorded).sum()

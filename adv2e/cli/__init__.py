@@ -21,6 +21,7 @@ COMMANDS = {
     "render": "Draw pictures and films of events.",
     "compare": "Measure how far two event streams are apart.",
     "diagnose": "Find what a recording holds that its simulation lacks.",
+    "characterise": "Name the effect that tables of latency or noise ask for.",
     "config": "Show or check configurations, with the meaning of each key.",
     "effects": "List the effects, their equations, parameters and sources.",
     "demo": "Make a sample clip, convert it and render the events.",

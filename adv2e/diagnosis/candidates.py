@@ -7,10 +7,10 @@ configuration does not have is left out.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config, from_dict, to_dict
 from adv2e.config.build import all_keys
+from adv2e.effects.hooks import Hooks
 from adv2e.parameters import Parameter
 
 Places = Sequence[float] | NDArray[np.float64]
@@ -96,7 +97,7 @@ class Candidate:
             set_key(values, key, value)
         for knob, place in zip(self.knobs, inner, strict=True):
             _turn(values, knob, knob.outer(place))
-        return from_dict(values, self.name)
+        return from_dict(values, self.name, list(user_effects(config).values()))
 
     def parameters(self, inner: Places) -> dict[str, Any]:
         """Return the keys that this effect sets, and their values."""
@@ -154,14 +155,50 @@ def _turn(values: dict[str, Any], knob: Knob, value: float) -> None:
 _OFF_AT_INFINITY = ("pixel.source_follower.cutoff_hz", "pixel.slew_limit.per_s")
 
 
-@lru_cache
-def _known() -> dict[str, Parameter]:
-    return {key.path: key.about for key in all_keys()}
+def _known(section: type[Config]) -> dict[str, Parameter]:
+    return {key.path: key.about for key in all_keys(section)}
 
 
-def about_key(key: str) -> Parameter:
-    """Return what is declared of a configuration key."""
-    return _known()[key]
+def about_key(config: Config, key: str) -> Parameter:
+    """Return what is declared of a key of a configuration."""
+    return _known(type(config))[key]
+
+
+def user_effects(config: Config) -> Mapping[str, type[Hooks]]:
+    """Return the effects of the user's own that a configuration has sections for, by name."""
+    user = getattr(config, "user", None)
+    return {} if user is None else type(user).effects
+
+
+def without_user_effects(config: Config) -> Config:
+    """Return the configuration with all effects of the user's own switched off."""
+    effects = user_effects(config)
+    if not effects:
+        return config
+    values = to_dict(config)
+    values["user"] = dict.fromkeys(effects)
+    return from_dict(values, "user", list(effects.values()))
+
+
+def _of_the_user(config: Config) -> list[Candidate]:
+    """Return the effects of the user's own: the parameters that say where they may be fitted."""
+    made = []
+    for name, effect in user_effects(config).items():
+        knobs, starts = [], []
+        for item in dataclasses.fields(effect.Parameters):
+            fit = item.metadata["parameter"].fit
+            if fit is None or item.type in ("bool", bool):
+                continue
+            scale = (fit.high - fit.low) / 10.0
+            knobs.append(Knob(f"user.{name}.{item.name}", fit.low, fit.high, fit.log, scale))
+            starts.append(fit.start)
+        milder = [knob.outer(knob.inner(v) - 1.0) for knob, v in zip(knobs, starts, strict=True)]
+        more = [knob.outer(knob.inner(v) + 1.0) for knob, v in zip(knobs, starts, strict=True)]
+        probes = [tuple(starts)]
+        for k in range(len(knobs)):
+            probes += [(*starts[:k], other[k], *starts[k + 1 :]) for other in (milder, more)]
+        made.append(Candidate(name, tuple(knobs), tuple(dict.fromkeys(probes))))
+    return made
 
 
 def neutral_value(config: Config, knob: Knob) -> float:
@@ -195,8 +232,9 @@ class Hints:
 
 def library(declared: Config, hints: Hints) -> list[Candidate]:
     """Return all candidates for what `declared` may lack."""
-    known = _known()
-    return [one for one in _all(declared, hints) if all(key in known for key in _keys_of(one))]
+    known = _known(type(declared))
+    built_in = [one for one in _all(declared, hints) if all(key in known for key in _keys_of(one))]
+    return [*built_in, *_of_the_user(declared)]
 
 
 def _all(declared: Config, hints: Hints) -> list[Candidate]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from adv2e import __version__
 from adv2e.config import Config, to_dict
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.candidates import Candidate, hints_of, library
+from adv2e.diagnosis.candidates import Candidate, hints_of, library, without_user_effects
 from adv2e.diagnosis.error import error_rows, of_part
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.fit import Fit
@@ -49,7 +49,8 @@ def diagnose(
     ----------
     evidence : Evidence
     declared : Config
-        What is known of the camera.
+        What is known of the camera.  Effects of the user's own, for which it has sections, are
+        candidates as the built-in ones are.
     declared_name : str
         Its file, for the report.
     without : sequence of str
@@ -66,6 +67,7 @@ def diagnose(
     Diagnosis
     """
     began = time.perf_counter()
+    declared = without_user_effects(declared)
     light = light_of(evidence, declared)
     scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
     with closing(Simulator(evidence, threads or _cores(), progress)) as simulator:
@@ -76,9 +78,8 @@ def diagnose(
         laboratory = Laboratory(simulator, scene, Markers(scene, pilot))
         measured = Placed.of(evidence.stream, scene)
         observed = laboratory.markers.measure(measured)
-        hints = hints_of(
-            evidence.stream.t, evidence.seconds, strongest_lines(measured.stream, scene)
-        )
+        lines = strongest_lines(measured.stream, [one.stream for one in pilot], scene)
+        hints = hints_of(evidence.stream.t, evidence.seconds, lines)
         candidates = [one for one in library(declared, hints) if one.name not in without]
         search = Search(laboratory, observed, declared, candidates, log)
         outcome = search.run()

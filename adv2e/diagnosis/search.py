@@ -8,7 +8,7 @@ make what is left, or nothing holds.  Then backward: what is no longer needed is
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,8 @@ PARTLY = 0.8
 _MANY, _SOME = 160, 48
 _FINALISTS = 6
 _FAR = 2.0
+_TRIED = 3
+_ROUNDS = 4
 _CLOSE = 3.0
 _QUIET = 2.5
 _SIGNATURE = 12
@@ -61,8 +63,6 @@ class Trial:
     fit: Fit
     models: tuple[Model, ...]
     score: float
-    gain: float
-    objections: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -142,13 +142,10 @@ class Search:
             if state.fits:
                 self._laboratory.simulator.likely += _likely(self._candidates, 0)
             trials = self._trials(state)
-            chosen = next((trial for trial in trials if not trial.objections), None)
-            if chosen is None:
+            grown = self._first_that_holds(state, trials)
+            if grown is None:
                 break
-            state = self._grown(state, chosen)
-            simulator = self._laboratory.simulator
-            simulator.likely = max(simulator.likely, simulator.done + 50)
-            alternatives = self._alike(chosen, trials)
+            state, alternatives = grown
             probability = self.probability(state)
             self._log(f"added {', '.join(state.names)}: probability {probability:.2g}")
         if len(state.fits) > 1:
@@ -185,7 +182,9 @@ class Search:
             factor = float(np.sqrt(seen / strength))
             neutral = neutral_value(declared, knob)
             size = value / factor if np.isinf(neutral) else neutral + factor * (value - neutral)
-            result.append(Detectable(candidate.name, knob.key, size, about_key(knob.key).unit))
+            result.append(
+                Detectable(candidate.name, knob.key, size, about_key(declared, knob.key).unit)
+            )
         return result
 
     def _trials(self, state: State) -> list[Trial]:
@@ -210,18 +209,13 @@ class Search:
         for _ in range(2):
             fitter.improve(fits, (3, 4, 5, 6))
         sample = self._laboratory.many([fit.config for fit in fits], range(1, _SOME + 1))
-        trials = [self._trial(fit, rows, state) for fit, rows in zip(fits, sample, strict=True)]
+        trials = [self._trial(fit, rows) for fit, rows in zip(fits, sample, strict=True)]
         trials.sort(key=lambda trial: -trial.score)
         for trial in trials:
             name = trial.fit.candidate.name
-            self._log(
-                f"  {name} {trial.fit.candidate.parameters(trial.fit.place)}: score"
-                f" {trial.score:.0f}, gain {trial.gain:.0f}; {'; '.join(trial.objections) or 'ok'}"
-            )
-            reason = "; ".join(trial.objections) or "explains less than what was added"
-            self.rejected[name] = Rejected(
-                name, reason, trial.fit.candidate.parameters(trial.fit.place)
-            )
+            parameters = trial.fit.candidate.parameters(trial.fit.place)
+            self._log(f"  {name} {parameters}: score {trial.score:.0f}")
+            self.rejected[name] = Rejected(name, "others explain more", parameters)
         return trials
 
     def _dismiss(self, fits: Sequence[Fit], nothing: float) -> None:
@@ -233,28 +227,51 @@ class Search:
                 name, f"{what} where others do more", fit.candidate.parameters(fit.place)
             )
 
-    def _trial(self, fit: Fit, sample: Array, state: State) -> Trial:
+    def _trial(self, fit: Fit, sample: Array) -> Trial:
         models = self._models(sample)
-        judge = parts.JUDGE
-        observed = self._observed[judge]
-        gain = models[judge].log_likelihood(observed) - state.models[judge].log_likelihood(observed)
         score = models[BOTH].log_likelihood(self._observed[BOTH]) - len(fit.candidate.knobs)
-        trial = Trial(fit, models, score, gain)
-        trial.objections = self._objections(trial, state)
-        return trial
+        return Trial(fit, models, score)
 
-    def _objections(self, trial: Trial, state: State) -> list[str]:
-        """Return why a candidate is not to be added."""
-        judge = parts.JUDGE
-        before, after = state.models[judge], trial.models[judge]
+    def _first_that_holds(
+        self, state: State, trials: Sequence[Trial]
+    ) -> tuple[State, list[str]] | None:
+        """Return the model with the best candidate that holds, and what cannot be told from it.
+
+        The fit is brought to its end on the data for fitting, then judged on other data, and only
+        then fitted to both.
+        """
+        tried: set[str] = set()
+        for trial in trials[:_TRIED]:
+            name = trial.fit.candidate.name
+            if name in tried:
+                continue
+            tried.add(name)
+            fits = (*state.fits, trial.fit)
+            fitted, fits = self._fitted(fits, trial.models[parts.FIT].sd, parts.FIT)
+            sample = self._laboratory.ensemble(fitted.config, range(1, _SOME + 1))
+            models = self._models(sample)
+            objections = self._objections(fitted, models[parts.JUDGE], state.models[parts.JUDGE])
+            parameters = fits[-1].candidate.parameters(fits[-1].place)
+            self._log(f"  {name} {parameters}: {'; '.join(objections) or 'holds'}")
+            if objections:
+                self.rejected[name] = Rejected(name, "; ".join(objections), parameters)
+                continue
+            fitted, fits = self._fitted(fits, models[BOTH].sd, BOTH)
+            return self._state(fitted.config, fits), self._alike(trial, trials)
+        return None
+
+    def _objections(self, fit: Fit, after: Model, before: Model) -> list[str]:
+        """Return why a model is not to be taken for the one before it."""
+        observed = self._observed[parts.JUDGE]
+        gain = after.log_likelihood(observed) - before.log_likelihood(observed)
         found = []
-        if trial.gain < self._chance_gain(before, after):
+        if gain < self._chance_gain(before, after):
             found.append("what it gains on data it was not fitted to, chance could gain")
-        if trial.fit.at_border:
+        if fit.at_border:
             found.append("its fit runs to the end of the physical range")
-        signature = np.abs(self.scales[judge].whitening @ (after.mean - before.mean))
-        own = np.argsort(-signature)[:_SIGNATURE]
-        z = after.z(self._observed[judge])[own]
+        change = np.abs(self.scales[parts.JUDGE].whitening @ (after.mean - before.mean))
+        own = np.argsort(-change)[:_SIGNATURE]
+        z = after.z(observed)[own]
         loud = float(np.sqrt(np.mean(z * z)))
         if loud > _QUIET:
             found.append(f"what it changes most still stands out by {loud:.1f} deviations")
@@ -271,34 +288,29 @@ class Search:
         gain += np.log(before.sd).sum() - np.log(after.sd).sum()
         return float(max(gain.mean() + 3.0 * gain.std(), 3.0))
 
-    def _grown(self, state: State, trial: Trial) -> State:
-        """Return the model with the candidate, all effects fitted again on the joined parts."""
-        fits = (*state.fits, trial.fit)
-        return self._polished(fits, trial.models[BOTH].sd)
-
-    def _polished(self, fits: tuple[Fit, ...], sd: Array) -> State:
+    def _fitted(self, fits: tuple[Fit, ...], sd: Array, view: int) -> tuple[Fit, tuple[Fit, ...]]:
+        """Return all effects fitted together in a view of the data, joined and one by one."""
         joint = _joined(fits, self.declared.config)
-        fitter = Fitter(self._laboratory, self.scales[BOTH], self._observed[BOTH], BOTH, sd)
-        for _ in range(3):
+        fitter = Fitter(self._laboratory, self.scales[view], self._observed[view], view, sd)
+        for _ in range(_ROUNDS):
             fitter.improve([joint], range(11, 21), 0.08)
-        fits = _parted(joint, fits)
-        return self._state(joint.config, fits)
+            if joint.moved < 0.01:
+                break
+        return joint, _parted(joint, fits)
 
     def _alike(self, chosen: Trial, trials: Sequence[Trial]) -> list[str]:
         """Return the effects that cannot be told from the chosen one."""
-        names = []
-        for trial in trials:
-            name = trial.fit.candidate.name
-            close = trial.score > chosen.score - _CLOSE
-            if close and not trial.objections and name != chosen.fit.candidate.name:
-                names.append(name)
-        return sorted(set(names))
+        names = {
+            trial.fit.candidate.name for trial in trials if trial.score > chosen.score - _CLOSE
+        }
+        return sorted(names - {chosen.fit.candidate.name})
 
     def _backward(self, state: State) -> State:
         """Drop effects without which the others, fitted again, do as well."""
         for fit in state.fits[:-1]:
             rest = tuple(other for other in state.fits if other is not fit)
-            without = self._polished(rest, state.models[BOTH].sd)
+            fitted, rest = self._fitted(rest, state.models[BOTH].sd, BOTH)
+            without = self._state(fitted.config, rest)
             loss = state.models[BOTH].log_likelihood(self._observed[BOTH]) - without.models[
                 BOTH
             ].log_likelihood(self._observed[BOTH])

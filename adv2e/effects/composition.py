@@ -68,9 +68,7 @@ def _light(hook: Hooks, frames: Frames, shape: tuple[int, ...]) -> Frames:
 
 def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
     """Return what the effects add inside the pixel, as one; None: nothing."""
-    of = {
-        name: [hook for hook in hooks if overrides(hook, name)] for name in (*_TIMED, "inject")
-    }
+    of = {name: [hook for hook in hooks if overrides(hook, name)] for name in (*_TIMED, "inject")}
     if not any(of.values()):
         return None
     timed = [hook for name in _TIMED for hook in of[name]]

@@ -101,6 +101,13 @@ def test_says_what_it_is(name):
         declared = about(section, field.name)
         assert declared.unit, field.name
         assert declared.meaning, field.name
+        fit = declared.fit
+        if fit is not None:
+            assert declared.complaint(fit.low) is declared.complaint(fit.high) is None
+    # what is known of a circuit, not measured, is nothing to fit
+    fitted = {f.name for f in dataclasses.fields(section) if about(section, f.name).fit is not None}
+    given = {"linear_below", "floor", "update", "jitter", "step"}
+    assert fitted | given >= {f.name for f in dataclasses.fields(section)}
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -12,7 +12,9 @@ from adv2e import intervals, load_config, simulate
 from adv2e.config import all_keys
 from adv2e.effects import EFFECTS
 from adv2e.effects.active import active_hooks
+from adv2e.effects.frames import flicker
 from adv2e.effects.hooks import Hooks
+from adv2e.effects.pixel import refractory
 from adv2e.events import sort_events
 
 # effect: (values that do something here, neutral ones)
@@ -111,3 +113,43 @@ def test_neutral_hooks_change_nothing_and_are_not_called():
     found = np.concatenate(list(simulate(frames(), TIMES, config, effects=[Nothing()])))
     assert found.tobytes() == plain.tobytes()
     assert not active_hooks(config)
+
+
+def test_converting_a_file_gives_what_simulating_its_frames_does(adv2e, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.save("clip.npy", np.stack(list(frames())))
+    sets = ["sampling.L=1", *(case[0] for case in CASES.values())]
+    options = [part for text in sets for part in ("--set", text)]
+    outcome = adv2e("convert", "clip.npy", "--fps", "500", "-q", "-o", "out.txt", *options)
+    assert outcome == (0, "", "")
+    config = load_config([], sets)
+    found = np.concatenate(list(simulate(frames(), [k / 500 for k in range(COUNT)], config)))
+    lines = [f"{t // 10**6}.{t % 10**6:06d}000 {x} {y} {p}" for t, x, y, p in found.tolist()]
+    assert (tmp_path / "out.txt").read_text("ascii").splitlines() == lines
+    assert len(lines) > 100
+
+
+def test_frequency_of_flicker_is_seen_in_the_rate():
+    def found(*sets):
+        t = np.arange(501) / 500
+        y, x = np.mgrid[:12, :16]
+        moving = (
+            (110 + 90 * np.sin(0.5 * (x - 0.1 * k)) * np.cos(0.4 * y)).astype(np.uint8)
+            for k in range(t.size)
+        )
+        config = load_config([], ["sampling.L=1", *sets])
+        events = np.concatenate(list(simulate(moving, t, config)))
+        return flicker.estimate(events["t"][events["p"] == 1])
+
+    frequency, strength = found("frames.flicker={frequency_hz: 118.3, depth: 0.25}")
+    assert frequency == pytest.approx(118.3, abs=0.5)
+    assert strength > 200
+    assert found()[1] < 50
+    assert flicker.estimate(np.zeros(1, np.int64)) == (0.0, 0.0)
+
+
+def test_dead_time_is_seen_in_the_shortest_intervals():
+    fast = events("pixel.refractory.period_us=1700", "pixel.thresholds={on: 0.05, off: 0.05}")
+    pixels = fast["y"].astype(np.int64) * COLUMNS + fast["x"]
+    assert 1699 <= refractory.estimate(fast["t"], pixels) < 1850
+    assert refractory.estimate(fast["t"][:1], pixels[:1]) == 0.0

@@ -258,32 +258,46 @@ class Spectrum:
 
 _LINES = 2
 _LOWEST_LINE_HZ = 30.0
+_PADDING = 8
 
 
-def strongest_lines(stream: Stream, scene: Scene) -> tuple[float, ...]:
-    """Return the frequencies [Hz] of the strongest lines in the rate of a stream."""
+def lines(stream: Stream, scene: Scene) -> list[tuple[float, float]]:
+    """Return the strongest lines in the rate of a stream, the strongest first.
+
+    Returns
+    -------
+    list of (frequency [Hz], height)
+        The height is the logarithm of the power over what is beside it.
+    """
     spectrum = Spectrum(scene)
     start, stop = scene.times_us[0], scene.times_us[-1]
     bins = int((stop - start) // Spectrum.BIN_US)
-    padding = 8
-    hz = np.fft.rfftfreq(padding * bins, Spectrum.BIN_US * 1e-6)
-    usable = (hz > _LOWEST_LINE_HZ) & np.interp(hz, spectrum.hz, spectrum.free).astype(bool)
-    found: list[float] = []
+    hz = np.fft.rfftfreq(_PADDING * bins, Spectrum.BIN_US * 1e-6)
+    usable = (hz > _LOWEST_LINE_HZ) & (np.interp(hz, spectrum.hz, spectrum.free) > 0.5)
+    reach = 16 * _PADDING
+    step = np.minimum((stream.t - start) // Spectrum.BIN_US, bins - 1).astype(np.int64)
+    found: list[tuple[float, float]] = []
     for sign in (np.ones(len(stream)), 2.0 * stream.on - 1.0):
-        step = np.minimum((stream.t - start) // Spectrum.BIN_US, bins - 1).astype(np.int64)
         rate = np.bincount(step, sign, minlength=bins)
         rate = (rate - rate.mean()) * np.hanning(bins)
-        power = np.log(np.abs(np.fft.rfft(rate, padding * bins)) ** 2 + 1.0)
-        beside = np.median(
-            np.lib.stride_tricks.sliding_window_view(
-                np.pad(power, 16 * padding, mode="reflect"), 32 * padding + 1
-            ),
-            axis=1,
+        power = np.log(np.abs(np.fft.rfft(rate, _PADDING * bins)) ** 2 + 1.0)
+        around = np.lib.stride_tricks.sliding_window_view(
+            np.pad(power, reach, mode="reflect"), 2 * reach + 1
         )
-        line = np.where(usable, power - beside, -np.inf)
+        height = np.where(usable, power - np.median(around, axis=1), -np.inf)
         for _ in range(_LINES):
-            best = float(hz[np.argmax(line)])
-            line[np.abs(hz - best) < 5.0] = -np.inf
-            if all(abs(best - other) > 2.0 for other in found):
-                found.append(best)
-    return tuple(found)
+            best = int(np.argmax(height))
+            if all(abs(hz[best] - other) > 2.0 for other, _ in found):
+                found.append((float(hz[best]), float(height[best])))
+            height[np.abs(hz - hz[best]) < 5.0] = -np.inf
+    return sorted(found, key=lambda line: -line[1])
+
+
+def strongest_lines(stream: Stream, pilot: Sequence[Stream], scene: Scene) -> tuple[float, ...]:
+    """Return the frequencies [Hz] of the lines of a stream that stand out of simulations' lines.
+
+    At least the strongest one is returned, whatever it is worth.
+    """
+    usual = max(lines(one, scene)[0][1] for one in pilot)
+    first, *others = lines(stream, scene)
+    return (first[0], *(hz for hz, height in others if height > usual))

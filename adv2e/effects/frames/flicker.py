@@ -72,3 +72,40 @@ class FlickerHooks(Hooks):
         # whole turns taken off first: an epoch time would lose the phase in rounding
         turns = np.remainder(times_s * p.frequency_hz, 1.0)
         return np.asarray(1.0 + p.depth * np.sin(2.0 * np.pi * turns + p.phase_rad))
+
+
+def estimate(
+    times_us: NDArray[np.int64], low_hz: float = 40.0, high_hz: float = 1000.0
+) -> tuple[float, float]:
+    """Return the frequency of the strongest line in the rate of events, and how strong it is.
+
+    Parameters
+    ----------
+    times_us : (n,) int64
+        Times of events of one polarity: ON and OFF come half a period apart.
+    low_hz, high_hz : float
+        Where to look; `low_hz` above what the scene does by itself.
+
+    Returns
+    -------
+    frequency_hz, strength : float
+        Strength is the power of the line over the median between the two frequencies: about 10 by
+        chance, hundreds where there is flicker.  Zeros where the recording is too short to tell.
+    """
+    if times_us.size < 2:
+        return 0.0, 0.0
+    since = times_us - times_us.min()
+    bins = max(1, int(since.max() * 1e-6 * 4.0 * high_hz))
+    length_s = (float(since.max()) + 1.0) * 1e-6
+    rate, _ = np.histogram(since, bins, (0.0, length_s * 1e6))
+    spectrum = np.abs(np.fft.rfft((rate - rate.mean()) * np.hanning(bins))) ** 2
+    at = np.arange(spectrum.size) / length_s
+    inside = np.flatnonzero((at >= low_hz) & (at <= high_hz))
+    if inside.size < 8:
+        return 0.0, 0.0
+    k = int(inside[np.argmax(spectrum[inside])])
+    median = float(np.median(spectrum[inside]))
+    # the centre of the line, which the window makes some bins wide
+    near = np.arange(max(k - 2, 0), min(k + 3, spectrum.size))
+    centre = float(np.average(at[near], weights=spectrum[near] + 1e-300))
+    return centre, float(spectrum[k]) / median if median > 0 else 0.0

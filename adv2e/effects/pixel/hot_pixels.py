@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from adv2e import rng
 from adv2e.jit import inlined, kernel
 from adv2e.kernel.workspace import S_HOT_DRAW, S_HOT_TIME, Array, Circuit
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 _NEVER = 1e300
 
@@ -27,9 +27,18 @@ class HotPixels(Section):
     """Pixels that fire by themselves."""
 
     fraction: float = parameter(
-        unit="-", meaning="share of the pixels that is hot", at_least=0, at_most=1
+        unit="-",
+        meaning="share of the pixels that is hot",
+        at_least=0,
+        at_most=1,
+        fit=Fit(1e-4, 0.1, 5e-3, log=True),
     )
-    rate_hz: float = parameter(unit="Hz", meaning="ON events a hot pixel a second", at_least=0)
+    rate_hz: float = parameter(
+        unit="Hz",
+        meaning="ON events a hot pixel a second",
+        at_least=0,
+        fit=Fit(1.0, 1000.0, 50.0, log=True),
+    )
 
 
 @inlined

@@ -32,7 +32,7 @@ from adv2e.kernel.workspace import (
     Array,
     Circuit,
 )
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,12 +45,14 @@ class Leak(Section):
         meaning="ON events a pixel a second from junction leakage",
         at_least=0,
         source="v2e: 0.01-0.1 Hz",
+        fit=Fit(0.0, 20.0, 0.1),
     )
     photo_rate_hz: float = parameter(
         0.0,
         unit="Hz",
         meaning="ON events a pixel a second from parasitic photocurrent, at white",
         at_least=0,
+        fit=Fit(0.0, 50.0, 0.0),
     )
     jitter: float = parameter(
         0.0,

@@ -46,7 +46,7 @@ from adv2e.kernel.workspace import (
     Array,
     Circuit,
 )
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 UPDATES = ("exact", "first_order_hold", "zero_order_hold", "euler", "paper")
 
@@ -56,7 +56,12 @@ class LowPass(Section):
     """First-order low-pass of the photoreceptor."""
 
     cutoff_hz: float = parameter(
-        300.0, unit="Hz", meaning="corner (-3 dB) at white", above=0, source="v2e default"
+        300.0,
+        unit="Hz",
+        meaning="corner (-3 dB) at white",
+        above=0,
+        source="v2e default",
+        fit=Fit(5.0, 5000.0, 300.0, log=True),
     )
     dark_cutoff_hz: float = parameter(
         21.8,
@@ -64,6 +69,7 @@ class LowPass(Section):
         meaning="corner at zero light; linear in light between the two",
         at_least=0,
         source="v2e: 300 Hz (0 + 20)/275",
+        fit=Fit(0.5, 500.0, 20.0, log=True),
     )
     update: str = parameter(
         "exact", unit="-", meaning="how the filter's equation is solved", choices=UPDATES

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from adv2e import rng
 from adv2e.jit import kernel
 from adv2e.kernel.workspace import LAG, S_NOISE, S_NOISE_DRAW, Array, Circuit
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +31,10 @@ class PhotoreceptorNoise(Section):
     """Band-limited noise of the photoreceptor."""
 
     rms: float = parameter(
-        unit="ln", meaning="standard deviation of the filtered noise", at_least=0
+        unit="ln",
+        meaning="standard deviation of the filtered noise",
+        at_least=0,
+        fit=Fit(0.002, 0.2, 0.03, log=True),
     )
     step: float = parameter(
         0.1,

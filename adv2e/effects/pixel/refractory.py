@@ -16,7 +16,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from adv2e.parameters import Section, parameter
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.parameters import Fit, Section, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,5 +27,32 @@ class Refractory(Section):
     """Dead time after each event."""
 
     period_us: float = parameter(
-        500.0, unit="us", meaning="dead time after an event", above=0, source="v2e default 0.5 ms"
+        500.0,
+        unit="us",
+        meaning="dead time after an event",
+        above=0,
+        source="v2e default 0.5 ms",
+        fit=Fit(10.0, 50000.0, 500.0, log=True),
     )
+
+
+def estimate(times_us: NDArray[np.int64], pixels: NDArray[np.int64], share: float = 1e-3) -> float:
+    """Return the dead time that intervals between events of the same pixel suggest [us].
+
+    Parameters
+    ----------
+    times_us, pixels : (n,) int64
+        Time and pixel of each event, in any order.
+    share : float
+        Of the intervals that are taken for mistakes of the readout: those shorter than the result.
+
+    Returns
+    -------
+    float
+        0 where no pixel has two events.  Never below the true dead time but for that share, and
+        far above it where pixels are seldom driven so fast.
+    """
+    order = np.lexsort((times_us, pixels))
+    same = np.diff(pixels[order]) == 0
+    apart = np.diff(times_us[order])[same]
+    return float(np.quantile(apart, share, method="lower")) if apart.size else 0.0

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,4 +33,5 @@ class ResetOvershoot(Section):
         meaning="share of the threshold by which the new reference is carried on",
         above=-1,
         at_most=0.9,
+        fit=Fit(-0.5, 0.9, 0.0),
     )

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from adv2e import rng
 from adv2e.jit import inlined, kernel
 from adv2e.kernel.workspace import S_SHOT_DRAW, S_SHOT_TIME, Array, Circuit
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 FALL_AT_WHITE = 0.75
 """Share of the dark rate that is gone at white."""
@@ -37,6 +37,7 @@ class ShotNoise(Section):
         unit="Hz",
         meaning="ON and OFF events a pixel a second in the dark",
         at_least=0,
+        fit=Fit(0.01, 50.0, 1.0, log=True),
     )
 
 

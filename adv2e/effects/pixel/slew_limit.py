@@ -37,7 +37,7 @@ from adv2e.kernel.dense_rows import (
     SLOPE1,
 )
 from adv2e.kernel.workspace import EXACT, Array, Circuit
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 _PIECES = 16
 """Parts of a step in which the limit sets in or ends."""
@@ -47,7 +47,12 @@ _PIECES = 16
 class SlewLimit(Section):
     """Limited slew rate of the first pole."""
 
-    per_s: float = parameter(unit="ln/s", meaning="fastest change of the filtered signal", above=0)
+    per_s: float = parameter(
+        unit="ln/s",
+        meaning="fastest change of the filtered signal",
+        above=0,
+        fit=Fit(2.0, 2000.0, 50.0, log=True),
+    )
 
 
 @kernel

@@ -18,14 +18,19 @@ from dataclasses import dataclass
 
 from adv2e.jit import inlined
 from adv2e.kernel.workspace import LAG, LAG2, Array, Circuit
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
 class SourceFollower(Section):
     """Second pole of the pixel."""
 
-    cutoff_hz: float = parameter(unit="Hz", meaning="corner (-3 dB)", above=0)
+    cutoff_hz: float = parameter(
+        unit="Hz",
+        meaning="corner (-3 dB)",
+        above=0,
+        fit=Fit(5.0, 5000.0, 200.0, log=True),
+    )
 
 
 @inlined

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from adv2e import rng
 from adv2e.jit import kernel
 from adv2e.kernel.workspace import Array
-from adv2e.parameters import Section, parameter
+from adv2e.parameters import Fit, Section, parameter
 
 FLOOR = 0.01
 """Least threshold of a pixel [ln units]."""
@@ -33,10 +33,20 @@ class Thresholds(Section):
     """ON and OFF contrast thresholds."""
 
     on: float = parameter(
-        0.2, unit="ln", meaning="rise that fires an ON event", at_least=FLOOR, source="v2e default"
+        0.2,
+        unit="ln",
+        meaning="rise that fires an ON event",
+        at_least=FLOOR,
+        source="v2e default",
+        fit=Fit(0.05, 1.0, 0.2, log=True),
     )
     off: float = parameter(
-        0.2, unit="ln", meaning="fall that fires an OFF event", at_least=FLOOR, source="v2e default"
+        0.2,
+        unit="ln",
+        meaning="fall that fires an OFF event",
+        at_least=FLOOR,
+        source="v2e default",
+        fit=Fit(0.05, 1.0, 0.2, log=True),
     )
     mismatch: float = parameter(
         0.03,
@@ -44,11 +54,13 @@ class Thresholds(Section):
         meaning="standard deviation over pixels, ON and OFF independent",
         at_least=0,
         source="v2e default",
+        fit=Fit(0.0, 0.2, 0.03),
     )
     drift_per_s: float = parameter(
         0.0,
         unit="1/s",
         meaning="growth of both thresholds a second, as a share of them at the first frame",
+        fit=Fit(-0.9, 2.0, 0.0),
     )
 
 

@@ -1,0 +1,65 @@
+"""The declared model: a configuration, and which of its keys were written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from adv2e.config import Config, load_config
+from adv2e.config.files import read
+from adv2e.config.merge import merge_all, parse_set
+from adv2e.config.yaml12 import Value
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What is known of the camera.
+
+    Attributes
+    ----------
+    name : str
+        Names of the files, for reports.
+    config : Config
+        The written keys on top of the defaults.
+    written : mapping of str to value
+        The keys that were written, by path; they are held.
+    """
+
+    name: str
+    config: Config
+    written: Mapping[str, Any]
+
+    def held(self, path: str, neutral: float | None) -> float | None:
+        """Return the number written for a key; `neutral` where none is, or its section is off.
+
+        Defaults of this program are no knowledge of a camera, so that a key which is not written
+        stands for the effect being absent.
+        """
+        value = self.written.get(path)
+        return neutral if value is None else float(value)
+
+
+def read_declared(
+    files: Sequence[str | Path] = (), sets: Sequence[str] = (), seed: int | None = None
+) -> Declared:
+    """Return the declared model of configuration files and ``--set`` values.
+
+    Raises
+    ------
+    ConfigError, UsageError
+        As :func:`adv2e.config.load_config`.
+    """
+    config = load_config(files, sets, seed)
+    layers = [*(read(name) for name in files), *(parse_set(text) for text in sets)]
+    names = ", ".join([*(Path(name).name for name in files), *sets])
+    return Declared(names or "nothing", config, dict(_scalars(merge_all(layers), "")))
+
+
+def _scalars(tree: Value, path: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(tree.content, dict):
+        for key, value in tree.content.items():
+            yield from _scalars(value, f"{path}.{key}" if path else key)
+    elif not isinstance(tree.content, list):
+        yield path, tree.content

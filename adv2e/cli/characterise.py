@@ -1,0 +1,117 @@
+"""``adv2e characterise``: what a table of measurements says of the camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from adv2e.cli import options
+
+if TYPE_CHECKING:
+    from adv2e.cli.options import Log
+
+
+@click.command("characterise")
+@click.argument("table", metavar="TABLE")
+@click.option(
+    "-c",
+    "--config",
+    "config_files",
+    metavar="FILE",
+    multiple=True,
+    help="What is known of the camera: every key written there is held. Repeatable.",
+)
+@click.option("--set", "sets", metavar="KEY=VALUE", multiple=True, help="Declare one key.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the drawn tables."
+)
+@click.option(
+    "--where", metavar="COL=VALUE", multiple=True, help="Use only such rows. Repeatable: all hold."
+)
+@click.option(
+    "--judge",
+    metavar="COL=VALUE",
+    multiple=True,
+    help="Judge on such rows and fit to the others."
+    "  [default: each light level is held out in turn]",
+)
+@click.option(
+    "--white",
+    type=options.FiniteNumber(min=0, min_open=True),
+    metavar="LIGHT",
+    help="Light that 255 DN stand for, in the table's unit.  [default: the highest]",
+)
+@click.option(
+    "--contrast",
+    type=options.FiniteNumber(min=0, min_open=True),
+    default=1.0,
+    show_default=True,
+    metavar="LN",
+    help="Size of the steps where a table of latencies does not say.",
+)
+@click.option(
+    "--error",
+    type=options.FiniteNumber(min=0, min_open=True),
+    metavar="SHARE",
+    help="Standard error of every row, relative.  [default: from the table]",
+)
+@options.output_options
+@options.verbosity_options
+def command(
+    table: str,
+    config_files: tuple[str, ...],
+    sets: tuple[str, ...],
+    seed: int,
+    where: tuple[str, ...],
+    judge: tuple[str, ...],
+    white: float | None,
+    contrast: float,
+    error: float | None,
+    output: str | None,
+    overwrite: bool,
+    log: Log,
+) -> None:
+    """Name the effect that measured latencies or noise rates ask for.
+
+    TABLE is delimited text with a header. Columns are known by their names: light (irradiance_W_m2,
+    illuminance_lux or light_dn) and either latency_us (_ms, _s), with latency_error_us or
+    latency_sd_us and number, contrast_ln, polarity and bias where known; or on_rate_hz and
+    off_rate_hz, with on_median_hz, off_median_hz, on_share, off_share, pixels and duration_s where
+    known. Other columns are labels.
+
+    The declared model is the circuit of the paper (corner proportional to light, no noise) with the
+    keys written in -c and --set. An effect is named only where it lowers the error on light that it
+    was not fitted to. With -o, report.html, report.json and model.yaml are written there.
+
+    \b
+    Examples:
+      adv2e characterise latency.csv -o latency/
+      adv2e characterise latency.csv --where bias=0 --judge camera=CAM2 -o judged/
+      adv2e characterise noise.csv -c v2e -o noise/
+    """
+    from adv2e.characterisation.characterise import Settings, characterise
+    from adv2e.characterisation.declared import read_declared
+    from adv2e.characterisation.report import check_free, summary, write_report
+    from adv2e.characterisation.table import read_table
+
+    if output is not None:
+        check_free(Path(output), overwrite)
+    declared = read_declared(config_files, sets, seed)
+    settings = Settings(
+        where=where,
+        judge=judge,
+        white=white,
+        contrast=contrast,
+        error=error,
+        seed=seed,
+        tick=lambda line: log(line, 1),
+    )
+    found = characterise(read_table(table), declared, settings)
+    if output is not None:
+        write_report(found, Path(output), overwrite)
+    if log.level >= 0:
+        click.echo(summary(found))
+        if output is not None:
+            click.echo(f"written: {Path(output) / 'report.html'}, report.json, model.yaml")

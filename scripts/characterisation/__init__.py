@@ -1,0 +1,1 @@
+"""Reading published measurements, for the scripts that characterise them."""
