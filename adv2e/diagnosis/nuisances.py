@@ -95,4 +95,31 @@ def _slope(moved: NDArray[Any], gained: NDArray[Any], slope: NDArray[Any]) -> ND
     Each total depends on both thresholds, so that a secant may come out with the wrong sign.
     """
     told = np.abs(moved) > 1e-6
-    return np.clip(np.divide(gained, moved, out=slope.copy(), where=told), -6.0, -0.7)
+    secant = np.divide(gained, moved, out=slope.copy(), where=told)
+    return np.asarray(np.clip(secant, -6.0, -0.7))
+
+
+THRESHOLDS = ("pixel.thresholds.on", "pixel.thresholds.off")
+"""Keys that :func:`fit_thresholds` fits."""
+
+
+def fit_thresholds(
+    simulate: Callable[[Config], tuple[int, int]], declared: Config, measured: tuple[int, int]
+) -> tuple[Config, dict[str, float]]:
+    """Return the declared model with thresholds that match the totals, and their values by key.
+
+    Parameters
+    ----------
+    simulate : callable
+        Takes a configuration, returns the counts of ON and OFF events of a simulation.
+    declared : Config
+    measured : (int, int)
+        Counts of the recording, over the same pixels and times.
+    """
+
+    def count(on: float, off: float) -> tuple[int, int]:
+        return simulate(with_thresholds(declared, on, off))
+
+    here = declared.pixel.thresholds
+    on, off, _ = match_totals(count, (here.on, here.off), measured)
+    return with_thresholds(declared, on, off), dict(zip(THRESHOLDS, (on, off), strict=True))
