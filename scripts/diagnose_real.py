@@ -15,6 +15,7 @@ by dropping every second frame, and the score where it does not.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -55,19 +56,26 @@ class Step:
 @click.argument("folders", metavar="FOLDER...", nargs=-1, required=True)
 @click.option("--declared", default="paper", show_default=True, help="Shipped name or YAML file.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--effects", default="", help="Try these effects of the camera alone, by commas.")
 @click.option("--threads", type=click.IntRange(min=1), help="[default: all cores]")
 @click.option("--out", type=click.Path(path_type=Path), help="Write here.  [default: stdout]")
 def main(
-    folders: tuple[str, ...], declared: str, seed: int, threads: int | None, out: Path | None
+    folders: tuple[str, ...],
+    declared: str,
+    seed: int,
+    effects: str,
+    threads: int | None,
+    out: Path | None,
 ) -> None:
     """Add effects to a declared model of real recordings, one by one."""
     try:
-        parts = [_preamble(declared)]
+        only = [name for name in effects.split(",") if name]
+        parts = [_preamble(declared, only)]
         for folder in folders:
             real = read(folder)
             for problem in real.problems:
                 click.echo(f"{folder}: {problem}", err=True)
-            parts.append(section(real, declared, seed, threads))
+            parts.append(section(real, declared, seed, only, threads))
         text = "\n\n".join(parts)
         if out is None:
             click.echo(text)
@@ -84,18 +92,18 @@ def _write(text: str, out: Path) -> None:
         raise OutputError(f"{out}: cannot be written: {error.strerror}") from None
 
 
-def _preamble(declared: str) -> str:
+def _preamble(declared: str, only: Sequence[str]) -> str:
     left_out = "; ".join(f"{name} ({why})" for name, why in UNSEEN.items())
     return (
         f"Declared: {declared}. Distances relative to the measured grid, median over frame"
         " intervals, means over two seeds, on the second half of the intervals, which nothing was"
         " fitted to; 1 is as far as no events. In brackets: the distance between the two seeds."
         " 'over time' is the error of `adv2e compare`. Events and ON share: simulated over"
-        f" measured. Not among the candidates: {left_out}."
+        f" measured. Camera effects tried: {', '.join(only) or f'all of the library but {left_out}'}."
     )
 
 
-def section(real: Real, declared: str, seed: int, threads: int | None) -> str:
+def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: int | None) -> str:
     """Return what was found for one recording, as Markdown."""
     began = time.perf_counter()
     first, second = halves(real.windows)
@@ -108,11 +116,14 @@ def section(real: Real, declared: str, seed: int, threads: int | None) -> str:
     config = load_config([declared], seed=seed)
     as_declared = Added.plain("as declared", config)
     steps = [Step(as_declared, bench.judge(config, second, seeds))]
-    for added in forward(bench, config, first, (seed,), say):
+    for added in forward(bench, config, first, (seed,), say, only):
         settled = replace(added, config=bench.matched(added.config, first, tolerance=0.01))
         steps.append(Step(settled, bench.judge(settled.config, second, seeds)))
         say(f"{added.text()}: {added.score:.3f}, held out {steps[-1].judged.values[SCORE]:.3f}")
-    last = steps[-1]
+    last = replace(
+        steps[-1], judged=bench.judge(steps[-1].added.config, second, seeds, in_full=True)
+    )
+    steps[-1] = last
     stability, alone = _stability(bench, last.added, second, seeds)
     seconds = time.perf_counter() - began
     say(f"{bench.simulations} simulations in {seconds:.0f} s")

@@ -22,7 +22,7 @@ from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.events import Events
 from adv2e.simulation import events_from_light
 from adv2e.upsampling import make_upsampler
-from real.recording import Real
+from real.recording import Real, still_rate
 
 SCORE = "relative_5_bins_smoothed"
 """What the search goes by."""
@@ -49,8 +49,7 @@ class Bench:
 
     In-between frames along the motion take longer than all else, so they are made once for each
     way to decode and sharpen the frames; black level and clock offset are laid over them, which
-    moves the motion found by next to nothing.  That is for the search; :meth:`judge` simulates
-    what ``adv2e convert`` would.
+    moves the motion found by next to nothing.
     """
 
     def __init__(self, real: Real, threads: int | None) -> None:
@@ -109,22 +108,37 @@ class Bench:
         on, off, _ = match_totals(count, (here.on, here.off), goal, tolerance=tolerance, rounds=5)
         return with_thresholds(config, on, off)
 
-    def score(self, config: Config, windows: Windows, seeds: Sequence[int]) -> float:
-        """Return the mean score over seeds; infinity where there is nothing to score."""
-        found = []
+    def score(
+        self, config: Config, windows: Windows, seeds: Sequence[int]
+    ) -> tuple[float, float | None]:
+        """Return score and rate of the still pixels [Hz], means over seeds.
+
+        The score is infinite where there is nothing to score.
+        """
+        scores, rates = [], []
         for seed in seeds:
             events = self.quick(config, windows, seed)
             values = distances(self.real.events, events, windows, *self.real.size).values
-            found.append(values[SCORE])
-        mean = pooled(found, "mean")
-        return np.inf if mean is None else mean
+            scores.append(values[SCORE])
+            rates.append(still_rate(events, self.real.still, windows.duration_s))
+        mean = pooled(scores, "mean")
+        return np.inf if mean is None else mean, pooled(rates, "mean")
 
-    def judge(self, config: Config, windows: Windows, seeds: Sequence[int]) -> Judged:
-        """Return how far ``adv2e convert`` with this configuration is in the windows."""
+    def still_hz(self, windows: Windows) -> float | None:
+        """Return the measured rate of the still pixels [Hz]."""
+        measured = cut(self.real.events, windows.start, windows.stop)
+        return still_rate(measured, self.real.still, windows.duration_s)
+
+    def judge(
+        self, config: Config, windows: Windows, seeds: Sequence[int], *, in_full: bool = False
+    ) -> Judged:
+        """Return how far a configuration is; `in_full`: as ``adv2e convert`` simulates it."""
         real = self.real
-        simulate = real.simulator(config, windows.stop + BEYOND_US, self.threads)
-        streams = [cut(simulate(seed), windows.start, windows.stop) for seed in seeds]
-        self.simulations += len(streams)
+        if in_full:
+            simulate = real.simulator(config, windows.stop + BEYOND_US, self.threads)
+            streams = [cut(simulate(seed), windows.start, windows.stop) for seed in seeds]
+        else:
+            streams = [self.quick(config, windows, seed) for seed in seeds]
         found = [distances(real.events, one, windows, *real.size).values for one in streams]
         apart = [
             distances(*pair, windows, *real.size, whole=real.events).values

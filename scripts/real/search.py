@@ -16,6 +16,9 @@ LEAST_GAIN = 0.01
 """An effect is added if it lowers the score by as much as this."""
 MOST = 7
 """Effects at most."""
+NOISE_HZ = 0.1
+"""An effect is not added if it moves still pixels farther from the measured rate by more [Hz]:
+noise at random costs this score less than events in the wrong place, and is no explanation."""
 
 EXACT = Candidate("exact filter", (), ((),), (("pixel.low_pass.update", "exact"),))
 """Replaces the printed filter, whose gain is known to be wrong, whatever that does to the score."""
@@ -63,11 +66,21 @@ class Added:
     values: tuple[float, ...]
     config: Config
     score: float
+    still_hz: float | None
 
     @classmethod
-    def plain(cls, name: str, config: Config, score: float = np.nan) -> Added:
+    def plain(
+        cls, name: str, config: Config, score: float = np.nan, still_hz: float | None = None
+    ) -> Added:
         """Return a step that adds no key."""
-        return cls(Candidate(name, (), ((),)), (), config, score)
+        return cls(Candidate(name, (), ((),)), (), config, score, still_hz)
+
+    def noisier(self, before: Added, measured_hz: float | None) -> bool:
+        """Tell whether it takes the still pixels away from what was measured."""
+        if measured_hz is None or self.still_hz is None or before.still_hz is None:
+            return False
+        miss, was = abs(self.still_hz - measured_hz), abs(before.still_hz - measured_hz)
+        return miss > was + NOISE_HZ
 
     def text(self) -> str:
         """Return name and values."""
@@ -87,19 +100,30 @@ def forward(
     windows: Windows,
     seeds: Sequence[int],
     say: Callable[[str], None],
+    only: Sequence[str] = (),
 ) -> Iterator[Added]:
-    """Yield the model after each effect that was added, the first as declared but thresholds."""
+    """Yield the model after each effect that was added, the first as declared but thresholds.
+
+    `only`: names of the effects of the camera to try; empty: all.
+    """
     config = bench.matched(declared, windows)
-    yield Added.plain("thresholds", config, bench.score(config, windows, seeds))
+    yield Added.plain("thresholds", config, *bench.score(config, windows, seeds))
     here = _trial(bench, EXACT, (), config, windows, seeds)
     yield here
+    measured_hz = bench.still_hz(windows)
     camera = library(declared, Hints(windows.duration_s, (), 1))
-    for group in (list(OWN), [one for one in camera if one.name not in UNSEEN]):
+    camera = [one for one in camera if one.name not in UNSEEN and (not only or one.name in only)]
+    for group in (list(OWN), camera):
         left = group
         for _ in range(MOST):
             tried = [t for one in left for t in _probed(bench, one, here.config, windows, seeds)]
+            noisier = [trial for trial in tried if trial.noisier(here, measured_hz)]
+            tried = [trial for trial in tried if trial not in noisier]
             if not tried:
                 break
+            if noisier:
+                names = ", ".join(f"{trial.text()} {trial.score:.3f}" for trial in noisier)
+                say(f"  make noise of their own in still pixels: {names}")
             tried.sort(key=lambda trial: trial.score)
             nearest = ", ".join(f"{t.text()} {t.score:.3f}" for t in tried[:6])
             say(f"  {here.score:.3f}; next: {nearest}")
@@ -134,7 +158,7 @@ def _trial(
 ) -> Added:
     changed = candidate.applied(base, candidate.inner(values))
     config = bench.matched(changed, windows)
-    return Added(candidate, values, config, bench.score(config, windows, seeds))
+    return Added(candidate, values, config, *bench.score(config, windows, seeds))
 
 
 def _refined(

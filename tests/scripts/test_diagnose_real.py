@@ -77,7 +77,7 @@ def test_the_search_finds_the_black_level_that_made_the_events(scripts, recordin
     bench = Bench(read(str(recording)), 1)
     first, _ = halves(bench.real.windows)
     config = load_config([declared])
-    before = bench.score(bench.matched(config, first), first, (0,))
+    before, _ = bench.score(bench.matched(config, first), first, (0,))
     best = min(_probed(bench, BLACK_LEVEL, config, first, (0,)), key=lambda trial: trial.score)
     best = _refined(bench, best, config, first, (0,))
     assert best.score < 0.5 * before
@@ -104,6 +104,15 @@ def test_in_between_frames_made_once_give_nearly_the_events_of_a_conversion(
     whole = cut(whole, windows.start, windows.stop)
     assert len(whole) > 1000
     assert len(quick) == pytest.approx(len(whole), rel=0.01)
+
+
+def test_noise_in_still_pixels_is_no_explanation(scripts):
+    from real.search import Added
+
+    before = Added.plain("before", load_config(), 0.8, still_hz=0.1)
+    assert Added.plain("noise", load_config(), 0.7, still_hz=1.0).noisier(before, 0.2)
+    assert not Added.plain("less", load_config(), 0.7, still_hz=0.2).noisier(before, 0.2)
+    assert not Added.plain("unknown", load_config(), 0.7).noisier(before, None)
 
 
 def test_every_second_frame_and_the_ends_stay(scripts, recording):
@@ -163,6 +172,7 @@ def test_tables_before_and_after_each_effect(scripts, recording, declared, tmp_p
     assert smoothed[3] < smoothed[1]
     assert smoothed[5] == 1.0
     assert "Dropping every second frame" in text
+    assert "Camera effects tried: all of the library but" in text
     assert "No other tools were run on this recording." in text
 
 
