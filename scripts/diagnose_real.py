@@ -94,12 +94,13 @@ def _write(text: str, out: Path) -> None:
 
 def _preamble(declared: str, only: Sequence[str]) -> str:
     left_out = "; ".join(f"{name} ({why})" for name, why in UNSEEN.items())
+    tried = ", ".join(only) or f"all of the library but {left_out}"
     return (
         f"Declared: {declared}. Distances relative to the measured grid, median over frame"
         " intervals, means over two seeds, on the second half of the intervals, which nothing was"
         " fitted to; 1 is as far as no events. In brackets: the distance between the two seeds."
         " 'over time' is the error of `adv2e compare`. Events and ON share: simulated over"
-        f" measured. Camera effects tried: {', '.join(only) or f'all of the library but {left_out}'}."
+        f" measured. Camera effects tried: {tried}."
     )
 
 

@@ -148,7 +148,9 @@ def _with_fitted_thresholds(
         return on, len(fitted_to) - on
 
     return fit_thresholds(
-        lambda config: counts(simulator.stream(config, _MATCHING_SEED)), declared, counts(evidence.stream)
+        lambda config: counts(simulator.stream(config, _MATCHING_SEED)),
+        declared,
+        counts(evidence.stream),
     )
 
 
