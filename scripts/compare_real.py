@@ -17,16 +17,16 @@ from pathlib import Path
 
 import click
 import numpy as np
-from real.recording import Real, read, still_rate
+from real.recording import Real, halves, read, still_rate
 from real.table import Row, Stream, definitions, markdown, preamble
-from real.totals import TOLERANCE, match_totals, totals, with_thresholds
 
 from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config, load_config
 from adv2e.config.model import INTERPOLATIONS
-from adv2e.errors import Adv2eError, DataError, OutputError
+from adv2e.diagnosis.nuisances import TOLERANCE, match_totals, totals, with_thresholds
+from adv2e.errors import Adv2eError, OutputError
 from adv2e.events import Events, empty_events
 from adv2e.sources.times import seconds
 
@@ -141,21 +141,6 @@ def _matched(real: Real, cases: Sequence[Case], run: Run) -> str:
         f" {_span(first)}; (!): they do not, to {TOLERANCE:.0%}."
     )
     return _section(real, matched, second, run, title, about)
-
-
-def halves(windows: Windows) -> tuple[Windows, Windows]:
-    """Return the first half of the windows and the rest.
-
-    Raises
-    ------
-    DataError
-        There is only one window.
-    """
-    middle = len(windows.used) // 2
-    if not middle:
-        raise DataError("--match-totals needs two frame intervals or more that events cover")
-    first, second = windows.used[:middle], windows.used[middle:]
-    return replace(windows, used=first), replace(windows, used=second)
 
 
 def with_totals(real: Real, case: Case, windows: Windows, run: Run) -> Case:

@@ -26,12 +26,18 @@ if TYPE_CHECKING:
     metavar="EFFECT",
     help="Leave an effect out of the library. Repeatable.",
 )
+@click.option(
+    "--fit-thresholds",
+    is_flag=True,
+    help="The contrast thresholds are not known: fit them first, to the totals of ON and OFF.",
+)
 def command(
     recording: str,
     config: Config,
     output: str | None,
     overwrite: bool,
     without: tuple[str, ...],
+    fit_thresholds: bool,
     threads: int | None,
     progress: bool,
     log: Log,
@@ -54,14 +60,14 @@ def command(
     from pathlib import Path
 
     from adv2e.diagnosis.diagnose import diagnose
-    from adv2e.diagnosis.evidence import read_evidence
+    from adv2e.diagnosis.evidence import affordable, read_evidence
     from adv2e.diagnosis.report import check_folder, summary_text, write_reports
     from adv2e.pixel import is_compiled
 
     check_names(without)
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     check_folder(folder, overwrite=overwrite)
-    evidence = read_evidence(recording)
+    evidence = affordable(read_evidence(recording), config)
     if not is_compiled(config.pixel, config.sampling):
         log("compiling the pixel's kernel (once; about half a minute)")
     with _counting(progress) as count:
@@ -70,6 +76,7 @@ def command(
             config,
             declared_name=", ".join(click.get_current_context().params["config_files"]),
             without=without,
+            free_thresholds=fit_thresholds,
             threads=threads,
             progress=count,
             log=lambda text: log(text, 1),

@@ -21,15 +21,18 @@ from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.light import light_of, quantum_dn
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.markers.timing import strongest_lines
+from adv2e.diagnosis.nuisances import fit_thresholds
 from adv2e.diagnosis.picture import Gallery
 from adv2e.diagnosis.result import Diagnosis, Finding, Rejected, Signature, Verdict
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.search import LEVEL, PARTLY, Outcome, Search, State
 from adv2e.diagnosis.simulations import Laboratory, Simulator
+from adv2e.diagnosis.stream import Stream
 
 Array = NDArray[np.float64]
 
 _PILOT = 16
+_MATCHING_SEED = 9_999
 _DRAWS = 12
 
 
@@ -39,6 +42,7 @@ def diagnose(
     *,
     declared_name: str = "",
     without: Sequence[str] = (),
+    free_thresholds: bool = False,
     threads: int | None = None,
     progress: Callable[[int, int], None] = lambda done, likely: None,
     log: Callable[[str], None] = lambda text: None,
@@ -55,6 +59,8 @@ def diagnose(
         Its file, for the report.
     without : sequence of str
         Effects that the library is to do without.
+    free_thresholds : bool
+        Whether thresholds are not known: they are fitted first, as a nuisance.
     threads : int, optional
         Simulations at a time; default: all cores.  The result does not depend on it.
     progress : callable
@@ -71,6 +77,10 @@ def diagnose(
     light = light_of(evidence, declared)
     scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
     with closing(Simulator(evidence, threads or _cores(), progress)) as simulator:
+        nuisances: dict[str, float] = {}
+        if free_thresholds:
+            declared, nuisances = _with_fitted_thresholds(evidence, declared, simulator, scene)
+            log(f"thresholds that match the totals: {nuisances}")
         pilot_seeds = range(10_000, 10_000 + _PILOT)
         pilot = simulator.map(
             lambda seed: Placed.of(simulator.stream(declared, seed), scene), pilot_seeds
@@ -102,7 +112,7 @@ def diagnose(
             declared=declared_name,
             effects=[finding_of(fit) for fit in kept.fits],
             alternatives=outcome.alternatives if kept.fits else [],
-            nuisances={},
+            nuisances=nuisances,
             rejected=_rejected(outcome, kept, candidates),
             errors=error_rows(
                 last(measured), [last(one) for one in before], [last(one) for one in after]
@@ -127,6 +137,21 @@ def diagnose(
                 "adv2e": __version__,
             },
         )
+
+
+def _with_fitted_thresholds(
+    evidence: Evidence, declared: Config, simulator: Simulator, scene: Scene
+) -> tuple[Config, dict[str, float]]:
+    def counts(stream: Stream) -> tuple[int, int]:
+        fitted_to = of_part(stream, scene.parts, parts.FIT)
+        on = int(np.count_nonzero(fitted_to.on))
+        return on, len(fitted_to) - on
+
+    return fit_thresholds(
+        lambda config: counts(simulator.stream(config, _MATCHING_SEED)),
+        declared,
+        counts(evidence.stream),
+    )
 
 
 def _cores() -> int:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.config import Config
 from adv2e.diagnosis.result import Masked
 from adv2e.diagnosis.stream import Stream
 from adv2e.errors import DataError
@@ -17,6 +18,13 @@ from adv2e.recordings import read_recording
 
 LEAST_EVENTS = 1000
 """Below that nothing can be told."""
+
+AFFORDABLE = 12_000_000
+"""Pixels times instants of one simulation; a diagnosis takes a thousand of them and more."""
+
+_STEPPED = 10
+_BLOCK = 8
+_SMALLEST = 48
 
 
 @dataclass(frozen=True)
@@ -128,3 +136,66 @@ def _between_frames(events: Events, times_s: NDArray[np.float64]) -> tuple[Event
     lost = 1.0 - float(np.count_nonzero(inside)) / max(1, len(events))
     masked = [Masked("events before the first frame or after the last", lost)] if lost else []
     return events[inside], masked
+
+
+def affordable(evidence: Evidence, declared: Config) -> Evidence:
+    """Return the recording, cropped where simulating all of it many times would take too long.
+
+    A rectangle of the sensor's proportions is kept that holds as many events as any.  A pixel does
+    not depend on its neighbours, so that the crop sees what it saw in the whole, but for load of
+    the readout and for interpolation along motion at its border.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    declared : Config
+        Its `sampling` and the form of its filter decide what a simulation costs.
+    """
+    instants = (len(evidence.frames) - 1) * declared.sampling.L
+    low_pass = declared.pixel.low_pass
+    each = 1 if low_pass is None or low_pass.update == "exact" else _STEPPED
+    pixels = AFFORDABLE / (instants * each)
+    if evidence.width * evidence.height <= pixels:
+        return evidence
+    share = (pixels / (evidence.width * evidence.height)) ** 0.5
+    width, height = (
+        min(length, max(_SMALLEST, round(length * share / _BLOCK) * _BLOCK))
+        for length in (evidence.width, evidence.height)
+    )
+    left, top = _busiest(evidence, width, height)
+    return _cropped(evidence, left, top, width, height)
+
+
+def _busiest(evidence: Evidence, width: int, height: int) -> tuple[int, int]:
+    """Return column and row, multiples of a block, at which a crop holds the most events."""
+    counts = np.bincount(evidence.stream.pixel, minlength=evidence.width * evidence.height)
+    sums = np.zeros((evidence.height + 1, evidence.width + 1), np.int64)
+    sums[1:, 1:] = counts.reshape(evidence.height, -1).cumsum(axis=0).cumsum(axis=1)
+    rows = np.arange(0, evidence.height - height + 1, _BLOCK)[:, None]
+    columns = np.arange(0, evidence.width - width + 1, _BLOCK)[None, :]
+    inside = sums[rows + height, columns + width] - sums[rows, columns + width]
+    inside += sums[rows, columns] - sums[rows + height, columns]
+    row, column = np.unravel_index(int(inside.argmax()), inside.shape)
+    return int(columns[0, column]), int(rows[row, 0])
+
+
+def _cropped(evidence: Evidence, left: int, top: int, width: int, height: int) -> Evidence:
+    stream = evidence.stream
+    y, x = np.divmod(stream.pixel, evidence.width)
+    inside = (x >= left) & (x < left + width) & (y >= top) & (y < top + height)
+    pixel = ((y - top) * width + (x - left))[inside].astype(np.int32)
+    kept = Stream(stream.t[inside], pixel, stream.on[inside], width, height)
+    what = f"pixels outside the {width}x{height} at column {left}, row {top}"
+    return replace(
+        evidence,
+        frames=[frame[top : top + height, left : left + width] for frame in evidence.frames],
+        stream=kept,
+        width=width,
+        height=height,
+        masked=[*evidence.masked, Masked(what, 1.0 - len(kept) / len(stream))],
+        notes=[
+            *evidence.notes,
+            f"cropped from {evidence.width}x{evidence.height} pixels, as all of them would take too"
+            " long to simulate often enough",
+        ],
+    )

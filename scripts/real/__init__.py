@@ -1,1 +1,1 @@
-"""Parts of ``scripts/compare_real.py``: recordings, thresholds that match totals, the table."""
+"""Parts of ``scripts/compare_real.py`` and ``scripts/diagnose_real.py``."""

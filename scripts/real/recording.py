@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,8 @@ class Real:
         Pixels that see no change within the windows.
     problems : list of str
         What is doubtful.
+    used : array of bool, (frames,)
+        Frames that simulations see.
     """
 
     name: str
@@ -55,11 +57,18 @@ class Real:
     windows: Windows
     still: NDArray[np.bool_]
     problems: list[str]
+    used: NDArray[np.bool_]
 
     @property
     def size(self) -> tuple[int, int]:
         """Columns and rows."""
         return self.source.width, self.source.height
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield the frames that are used."""
+        for frame, used in zip(self.source.frames(), self.used, strict=True):
+            if used:
+                yield frame
 
     def simulator(
         self, config: Config, until_us: int, threads: int | None
@@ -67,12 +76,19 @@ class Real:
         """Return a function from a seed to the events of the frames up to a time [us]."""
 
         def frames() -> Iterator[Frame]:
-            for frame, t_us in zip(self.source.frames(), self.times_us, strict=True):
+            for frame, t_us in zip(self.frames(), self.times_us[self.used], strict=True):
                 if t_us > until_us:
                     return
                 yield frame
 
         return resimulator(frames, config, self.source.encoding, threads=threads)
+
+    def thinned(self) -> Real:
+        """Return the recording with every second frame alone, the last one kept."""
+        kept = np.zeros(len(self.times_us), np.bool_)
+        kept[::-2] = True
+        kept[0] = True
+        return replace(self, used=kept)
 
 
 def read(folder: str) -> Real:
@@ -103,6 +119,7 @@ def read(folder: str) -> Real:
         windows=windows,
         still=still_pixels(_light(source, to_us(times), windows)),
         problems=[*recording.problems, *source.notes],
+        used=np.ones(len(times), np.bool_),
     )
 
 
@@ -139,3 +156,20 @@ def still_rate(events: Events, still: NDArray[np.bool_], duration_s: float) -> f
     pixels = int(np.count_nonzero(still))
     count = int(np.count_nonzero(still[events["y"], events["x"]]))
     return count / (pixels * duration_s) if pixels else None
+
+
+def halves(windows: Windows) -> tuple[Windows, Windows]:
+    """Return the first half of the windows and the rest.
+
+    Raises
+    ------
+    DataError
+        There is only one window.
+    """
+    middle = len(windows.used) // 2
+    if not middle:
+        raise DataError(
+            "two frame intervals or more that events cover are needed to match totals on one half"
+        )
+    first, second = windows.used[:middle], windows.used[middle:]
+    return replace(windows, used=first), replace(windows, used=second)

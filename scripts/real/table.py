@@ -71,8 +71,8 @@ def definitions() -> str:
 def markdown(rows: Sequence[Row], measured: Stream) -> str:
     """Return the table."""
     names = ["configuration", "events", "ON share", *COLUMNS.values(), "still"]
-    lines = [_line(names), _line(["---"] * len(names))]
-    return "\n".join([*lines, *(_line(_cells(row, measured)) for row in rows)])
+    lines = [line(names), line(["---"] * len(names))]
+    return "\n".join([*lines, *(line(_cells(row, measured)) for row in rows)])
 
 
 def _cells(row: Row, measured: Stream) -> list[str]:
@@ -101,5 +101,6 @@ def number(value: float | None) -> str:
     return f"{value:.2f}" if value < 100 else f"{value:.0f}"
 
 
-def _line(cells: Sequence[str]) -> str:
+def line(cells: Sequence[str]) -> str:
+    """Return a line of a table."""
     return f"| {' | '.join(cells)} |"

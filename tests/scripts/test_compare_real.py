@@ -148,7 +148,7 @@ def test_matching_totals_finds_the_thresholds_the_events_were_made_with(compare_
 
 
 def test_totals_that_no_threshold_gives_are_marked(compare_real):
-    from real.totals import TOLERANCE, match_totals
+    from adv2e.diagnosis.nuisances import TOLERANCE, match_totals
 
     _, _, miss = match_totals(lambda on, off: (int(50 / on), 400), (0.2, 0.2), (100, 200))
     assert miss == pytest.approx(1.0)
@@ -166,7 +166,7 @@ def test_events_that_no_threshold_gives_are_marked_in_the_table(compare_real, tm
 
 
 def test_totals_that_depend_on_both_thresholds_are_matched(compare_real):
-    from real.totals import TOLERANCE, match_totals
+    from adv2e.diagnosis.nuisances import TOLERANCE, match_totals
 
     def count(on, off):
         return int(90_000 * on**-2.2 * off**0.4), int(70_000 * off**-1.1 * on**0.3)

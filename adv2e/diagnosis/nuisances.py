@@ -1,4 +1,9 @@
-"""Thresholds with which a simulation has as many ON and OFF events as were measured."""
+"""Keys that nobody declared: fitted before the search, so that effects are not blamed for them.
+
+The contrast thresholds come first.  Bias settings move them by factors, they are hardly ever known,
+and as long as they are wrong every other statistic is, too.  They are set so that the simulation
+has as many ON and as many OFF events as were measured.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +25,9 @@ ROUNDS = 15
 LARGEST = 5.0
 """Largest threshold tried [ln]; grey levels of 8 bits span 5.5."""
 
+Count = Callable[[float, float], tuple[int, int]]
+"""Takes ON and OFF thresholds [ln], returns counts of ON and OFF events."""
+
 
 def totals(events: Events) -> tuple[int, int]:
     """Return the counts of ON and OFF events."""
@@ -34,9 +42,12 @@ def with_thresholds(config: Config, on: float, off: float) -> Config:
 
 
 def match_totals(
-    count: Callable[[float, float], tuple[int, int]],
+    count: Count,
     start: tuple[float, float],
     goal: tuple[int, int],
+    *,
+    tolerance: float = TOLERANCE,
+    rounds: int = ROUNDS,
 ) -> tuple[float, float, float]:
     """Find the thresholds that give `goal`, by the secant method on logarithms.
 
@@ -48,22 +59,26 @@ def match_totals(
         Thresholds to begin with [ln].
     goal : (int, int)
         Counts wanted.
+    tolerance : float
+        The search ends where both totals are this near, relative.
+    rounds : int
+        Calls of `count` at most.
 
     Returns
     -------
     on, off, miss : float
         The best thresholds met, and by how much the worse of the two totals misses, relative;
-        above TOLERANCE where no thresholds match.
+        above `tolerance` where no thresholds match.
     """
     wanted = np.log(np.maximum(goal, 0.5))
     levels, slope = np.log(start), np.full(2, -1.0)
     best = np.inf, levels
     before: tuple[NDArray[Any], NDArray[Any]] | None = None
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         miss = np.log(np.maximum(count(*np.exp(levels)), 0.5)) - wanted
         if np.abs(miss).max() < best[0]:
             best = float(np.abs(miss).max()), levels
-        if best[0] <= np.log1p(TOLERANCE):
+        if best[0] <= np.log1p(tolerance):
             break
         if before is not None:
             slope = _slope(levels - before[0], miss - before[1], slope)
@@ -80,4 +95,31 @@ def _slope(moved: NDArray[Any], gained: NDArray[Any], slope: NDArray[Any]) -> ND
     Each total depends on both thresholds, so that a secant may come out with the wrong sign.
     """
     told = np.abs(moved) > 1e-6
-    return np.clip(np.divide(gained, moved, out=slope.copy(), where=told), -6.0, -0.7)
+    secant = np.divide(gained, moved, out=slope.copy(), where=told)
+    return np.asarray(np.clip(secant, -6.0, -0.7))
+
+
+THRESHOLDS = ("pixel.thresholds.on", "pixel.thresholds.off")
+"""Keys that :func:`fit_thresholds` fits."""
+
+
+def fit_thresholds(
+    simulate: Callable[[Config], tuple[int, int]], declared: Config, measured: tuple[int, int]
+) -> tuple[Config, dict[str, float]]:
+    """Return the declared model with thresholds that match the totals, and their values by key.
+
+    Parameters
+    ----------
+    simulate : callable
+        Takes a configuration, returns the counts of ON and OFF events of a simulation.
+    declared : Config
+    measured : (int, int)
+        Counts of the recording, over the same pixels and times.
+    """
+
+    def count(on: float, off: float) -> tuple[int, int]:
+        return simulate(with_thresholds(declared, on, off))
+
+    here = declared.pixel.thresholds
+    on, off, _ = match_totals(count, (here.on, here.off), measured)
+    return with_thresholds(declared, on, off), dict(zip(THRESHOLDS, (on, off), strict=True))

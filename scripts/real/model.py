@@ -1,0 +1,155 @@
+"""A model of a recording under search: configurations simulated, thresholds matched, scored."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.comparison.distances import distances, pooled
+from adv2e.comparison.floor import Floor
+from adv2e.comparison.windows import Windows, cut
+from adv2e.config import Config
+from adv2e.config.model import Frames
+from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
+from adv2e.effects.active import active_hooks
+from adv2e.effects.composition import begin
+from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.events import Events
+from adv2e.simulation import events_from_light
+from adv2e.upsampling import make_upsampler
+from real.recording import Real, still_rate
+
+SCORE = "relative_5_bins_smoothed"
+"""What the search goes by."""
+NEAR = 0.03
+"""Totals match to this while candidates are compared, relative."""
+BEYOND_US = 100_000
+"""Frames are simulated to this long after the windows, as a clock offset may need them [us]."""
+
+Light = list[tuple[int, NDArray[Any]]]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A configuration against the measured events: means over seeds."""
+
+    values: Floor
+    floor: Floor
+    events_ratio: float
+    on_share: float | None
+
+
+class Bench:
+    """Simulates a recording with configurations.
+
+    In-between frames along the motion take longer than all else, so they are made once for each
+    way to decode and sharpen the frames; black level and clock offset are laid over them, which
+    moves the motion found by next to nothing.
+    """
+
+    def __init__(self, real: Real, threads: int | None) -> None:
+        self.real, self.threads = real, threads
+        self._made: dict[Any, Light] = {}
+        self.simulations = 0
+
+    def quick(self, config: Config, windows: Windows, seed: int) -> Events:
+        """Return the events in the windows, from in-between frames made once."""
+        self.simulations += 1
+        if config.sampling.interpolation == "linear":
+            made = self.real.simulator(config, windows.stop + BEYOND_US, self.threads)(seed)
+            return cut(made, windows.start, windows.stop)
+        over = replace(config.frames, exposure_us=0.0)
+        sampling = replace(config.sampling, L=1, interpolation="linear")
+        lean = replace(config, frames=over, sampling=sampling, seed=seed)
+        light = self._instants(config)
+        until = (windows.stop + BEYOND_US) * 1000
+        used: Iterable[Any] = (pair for pair in light if pair[0] <= until)
+        chunks = events_from_light(used, lean, threads=self.threads)
+        return cut(np.concatenate(list(chunks)), windows.start, windows.stop)
+
+    def _instants(self, config: Config) -> Light:
+        """Return light between the frames, without black level and clock offset."""
+        only = Frames(exposure_us=config.frames.exposure_us)
+        sampling = config.sampling
+        key = config.frames.encoding, only.exposure_us, sampling.interpolation, sampling.L
+        if key not in self._made:
+            bare = replace(config, frames=only, readout=None)
+            bare = replace(bare, pixel=replace(bare.pixel, dark_current=None, dead_pixels=None))
+            frames = list(begin(active_hooks(bare), self._decoded(config), config.seed))
+            upsampler = make_upsampler(sampling.interpolation, sampling.L, threads=2)
+            made = frames[:1]
+            for (t0, a), (t1, b) in itertools.pairwise(frames):
+                between = enumerate(upsampler.between(a, b), start=1)
+                made += [(t0 + (t1 - t0) * k // sampling.L, light) for k, light in between]
+            self._made[key] = made
+        return self._made[key]
+
+    def _decoded(self, config: Config) -> Iterator[tuple[int, NDArray[Any]]]:
+        source, wanted = self.real.source, config.frames.encoding
+        encoding = source.encoding if wanted == "auto" else wanted
+        white = config.frames.full_scale or full_scale_of(source.dtype)
+        decoder = LightDecoder(encoding, white, source.dtype, source.colour)
+        for frame in self.real.frames():
+            yield frame.t_ns, decoder.decode(frame.image)
+
+    def matched(self, config: Config, windows: Windows, tolerance: float = NEAR) -> Config:
+        """Return `config` with thresholds that match the totals in the windows."""
+        goal = totals(cut(self.real.events, windows.start, windows.stop))
+
+        def count(on: float, off: float) -> tuple[int, int]:
+            return totals(self.quick(with_thresholds(config, on, off), windows, config.seed))
+
+        here = config.pixel.thresholds
+        on, off, _ = match_totals(count, (here.on, here.off), goal, tolerance=tolerance, rounds=5)
+        return with_thresholds(config, on, off)
+
+    def score(
+        self, config: Config, windows: Windows, seeds: Sequence[int]
+    ) -> tuple[float, float | None]:
+        """Return score and rate of the still pixels [Hz], means over seeds.
+
+        The score is infinite where there is nothing to score.
+        """
+        scores, rates = [], []
+        for seed in seeds:
+            events = self.quick(config, windows, seed)
+            values = distances(self.real.events, events, windows, *self.real.size).values
+            scores.append(values[SCORE])
+            rates.append(still_rate(events, self.real.still, windows.duration_s))
+        mean = pooled(scores, "mean")
+        return np.inf if mean is None else mean, pooled(rates, "mean")
+
+    def still_hz(self, windows: Windows) -> float | None:
+        """Return the measured rate of the still pixels [Hz]."""
+        measured = cut(self.real.events, windows.start, windows.stop)
+        return still_rate(measured, self.real.still, windows.duration_s)
+
+    def judge(
+        self, config: Config, windows: Windows, seeds: Sequence[int], *, in_full: bool = False
+    ) -> Judged:
+        """Return how far a configuration is; `in_full`: as ``adv2e convert`` simulates it."""
+        real = self.real
+        if in_full:
+            simulate = real.simulator(config, windows.stop + BEYOND_US, self.threads)
+            streams = [cut(simulate(seed), windows.start, windows.stop) for seed in seeds]
+        else:
+            streams = [self.quick(config, windows, seed) for seed in seeds]
+        found = [distances(real.events, one, windows, *real.size).values for one in streams]
+        apart = [
+            distances(*pair, windows, *real.size, whole=real.events).values
+            for pair in itertools.combinations(streams, 2)
+        ]
+        measured = cut(real.events, windows.start, windows.stop)
+        shares = [totals(one)[0] / len(one) if len(one) else None for one in streams]
+        ratio = float(np.mean([len(one) for one in streams])) / len(measured)
+        return Judged(means(found), means(apart), ratio, pooled(shares, "mean"))
+
+
+def means(found: Sequence[Floor]) -> Floor:
+    """Return the mean of each measure."""
+    return {name: pooled([one[name] for one in found], "mean") for name in found[0]}

@@ -1,0 +1,180 @@
+"""Effects added one by one, each fitted with thresholds matched anew, on one stretch of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from adv2e.comparison.windows import Windows
+from adv2e.config import Config
+from adv2e.diagnosis.candidates import Candidate, Hints, library
+from real.model import Bench
+
+LEAST_GAIN = 0.01
+"""An effect is added if it lowers the score by as much as this."""
+MOST = 7
+"""Effects at most."""
+NOISE_HZ = 0.1
+"""An effect is not added if it moves still pixels farther from the measured rate by more [Hz]:
+noise at random costs this score less than events in the wrong place, and is no explanation."""
+
+EXACT = Candidate("exact filter", (), ((),), (("pixel.low_pass.update", "exact"),))
+"""Replaces the printed filter, whose gain is known to be wrong, whatever that does to the score."""
+
+OWN = (
+    Candidate(
+        "interpolation",
+        (),
+        ((),),
+        (("sampling.interpolation", "flow"), ("sampling.last_interval", "corrected")),
+    ),
+    Candidate("initial_reference", (), ((),), (("pixel.initial_reference", "random"),)),
+    *(
+        Candidate(
+            "log_response",
+            (),
+            ((),),
+            (("pixel.log_response.linear_below", knee), ("pixel.log_response.floor", 0.5)),
+        )
+        for knee in (0.0, 2.72, 40.0)
+    ),
+)
+"""What is no effect of the camera, but of how its frames were simulated."""
+
+UNSEEN = {
+    "thresholds": "matched to the totals each time",
+    "photoreceptor_noise": "solved pixel by pixel: too slow to search over",
+    "source_follower": "solved pixel by pixel: too slow to search over",
+    "timestamp_tick": "does not move this score",
+    "readout": "does not move this score at these rates",
+    "threshold_drift": "not within half a second",
+    "clock_drift": "not within half a second",
+    "hot_pixels": "a few pixels do not move this score",
+    "dead_pixels": "a few pixels do not move this score",
+    "frame_coupling": "bound to the frames, as is interpolation: not to be told here",
+}
+"""Effects of the library that are left out, and why."""
+
+
+@dataclass(frozen=True)
+class Added:
+    """An effect that was added, or the best of those that were not."""
+
+    candidate: Candidate
+    values: tuple[float, ...]
+    config: Config
+    score: float
+    still_hz: float | None
+
+    @classmethod
+    def plain(
+        cls, name: str, config: Config, score: float = np.nan, still_hz: float | None = None
+    ) -> Added:
+        """Return a step that adds no key."""
+        return cls(Candidate(name, (), ((),)), (), config, score, still_hz)
+
+    def noisier(self, before: Added, measured_hz: float | None) -> bool:
+        """Tell whether it takes the still pixels away from what was measured."""
+        if measured_hz is None or self.still_hz is None or before.still_hz is None:
+            return False
+        miss, was = abs(self.still_hz - measured_hz), abs(before.still_hz - measured_hz)
+        return miss > was + NOISE_HZ
+
+    def text(self) -> str:
+        """Return name and values."""
+        keys = self.candidate.parameters(self.candidate.inner(self.values))
+        named = ((key.rpartition(".")[2], value) for key, value in keys.items())
+        values = ", ".join(f"{key} {_short(value)}" for key, value in named)
+        return f"{self.candidate.name}{f' ({values})' if values else ''}"
+
+
+def _short(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def forward(
+    bench: Bench,
+    declared: Config,
+    windows: Windows,
+    seeds: Sequence[int],
+    say: Callable[[str], None],
+    only: Sequence[str] = (),
+) -> Iterator[Added]:
+    """Yield the model after each effect that was added, the first as declared but thresholds.
+
+    `only`: names of the effects of the camera to try; empty: all.
+    """
+    config = bench.matched(declared, windows)
+    yield Added.plain("thresholds", config, *bench.score(config, windows, seeds))
+    here = _trial(bench, EXACT, (), config, windows, seeds)
+    yield here
+    measured_hz = bench.still_hz(windows)
+    camera = library(declared, Hints(windows.duration_s, (), 1))
+    camera = [one for one in camera if one.name not in UNSEEN and (not only or one.name in only)]
+    for group in (list(OWN), camera):
+        left = group
+        for _ in range(MOST):
+            tried = [t for one in left for t in _probed(bench, one, here.config, windows, seeds)]
+            noisier = [trial for trial in tried if trial.noisier(here, measured_hz)]
+            tried = [trial for trial in tried if trial not in noisier]
+            if not tried:
+                break
+            if noisier:
+                names = ", ".join(f"{trial.text()} {trial.score:.3f}" for trial in noisier)
+                say(f"  make noise of their own in still pixels: {names}")
+            tried.sort(key=lambda trial: trial.score)
+            nearest = ", ".join(f"{t.text()} {t.score:.3f}" for t in tried[:6])
+            say(f"  {here.score:.3f}; next: {nearest}")
+            best = _refined(bench, tried[0], here.config, windows, seeds)
+            if here.score - best.score < LEAST_GAIN:
+                break
+            here = best
+            left = _promising(tried[1:], here.candidate.name)
+            yield here
+
+
+def _promising(tried: Sequence[Added], added: str) -> list[Candidate]:
+    """Return the better half of what was tried, without what is added, each once."""
+    kept = [trial.candidate for trial in tried[: -(-len(tried) // 2)]]
+    return [one for one in dict.fromkeys(kept) if one.name != added]
+
+
+def _probed(
+    bench: Bench, candidate: Candidate, base: Config, windows: Windows, seeds: Sequence[int]
+) -> Iterator[Added]:
+    for probe in candidate.probes:
+        yield _trial(bench, candidate, tuple(probe), base, windows, seeds)
+
+
+def _trial(
+    bench: Bench,
+    candidate: Candidate,
+    values: tuple[float, ...],
+    base: Config,
+    windows: Windows,
+    seeds: Sequence[int],
+) -> Added:
+    changed = candidate.applied(base, candidate.inner(values))
+    config = bench.matched(changed, windows)
+    return Added(candidate, values, config, *bench.score(config, windows, seeds))
+
+
+def _refined(
+    bench: Bench, best: Added, base: Config, windows: Windows, seeds: Sequence[int]
+) -> Added:
+    """Return the effect with its keys at a better place, by steps that halve."""
+    candidate = best.candidate
+    for k in range(len(candidate.knobs)):
+        step = 0.5 if candidate.knobs[k].log else 0.5 * max(abs(candidate.inner(best.values)[k]), 1)
+        for share in (1.0, 0.5):
+            here = np.array(candidate.inner(best.values))
+            for sign in (-1.0, 1.0):
+                place = here.copy()
+                place[k] += sign * share * step
+                knobs = zip(candidate.knobs, place, strict=True)
+                values = tuple(knob.outer(inner) for knob, inner in knobs)
+                trial = _trial(bench, candidate, values, base, windows, seeds)
+                best = min(best, trial, key=lambda one: one.score)
+    return best

@@ -1,0 +1,109 @@
+"""Where a simulation hangs on how the light between the frames was made up.
+
+The recording is simulated from every second frame alone.  What changes by that is no less than what
+interpolation of all frames gets wrong, if errors grow with the gaps; tiles of pixels in which it is
+large say nothing of the camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.comparison.grids import smoothed, voxel_grid
+from adv2e.comparison.windows import Windows, cut
+from adv2e.events import Events
+
+TILE = 8
+"""Pixels along a tile."""
+MOST = 0.2
+"""Change of a tile's norm above which it is not judged by, relative."""
+_BINS = 5
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What changes when every second frame is dropped.
+
+    Attributes
+    ----------
+    change : float
+        Norm of the change over that of the simulation, chance taken off; median over windows.
+    stable : (windows, rows, columns) bool
+        Pixels in whose tile it is below MOST.
+    kept : float
+        Share of the measured events there.
+    """
+
+    change: float
+    stable: NDArray[np.bool_]
+    kept: float
+
+
+def compare_halved(
+    whole: tuple[Events, Events], halved: tuple[Events, Events], measured: Events,
+    windows: Windows, width: int, height: int,
+) -> Stability:  # fmt: skip
+    """Return what dropping frames changes.
+
+    Parameters
+    ----------
+    whole, halved : (Events, Events)
+        Two seeds from all frames, and the same two from every second one: the change is read off
+        the product of the two differences, in which chance cancels on average.
+    measured : Events
+    windows : Windows
+    width, height : int
+    """
+    changes, masks, kept = [], [], 0
+
+    def grid(events: Events, window: tuple[int, int]) -> NDArray[Any]:
+        return smoothed(voxel_grid(cut(events, *window), window, _BINS, width, height))
+
+    for window in windows.used:
+        a, b = (grid(one, window) for one in whole)
+        c, d = (grid(one, window) for one in halved)
+        moved, power = _tiled((a - c) * (b - d)), _tiled(a * b)
+        whole_power = max(float((a * b).sum()), 1e-9)
+        changes.append(np.sqrt(max(float(((a - c) * (b - d)).sum()), 0.0) / whole_power))
+        stable = _pixels(moved <= MOST**2 * np.maximum(power, 0.0), height, width)
+        masks.append(stable)
+        part = cut(measured, *window)
+        kept += int(np.count_nonzero(stable[part["y"], part["x"]]))
+    total = len(cut(measured, windows.start, windows.stop))
+    return Stability(float(np.median(changes)), np.array(masks), kept / max(total, 1))
+
+
+def stable_score(
+    measured: Events, simulated: Events, windows: Windows, stability: Stability
+) -> float | None:
+    """Return the score of stable pixels alone, median over windows that have any."""
+    rows, columns = stability.stable.shape[1:]
+    found = []
+    for window, stable in zip(windows.used, stability.stable, strict=True):
+        a, b = (
+            voxel_grid(cut(one, *window), window, _BINS, columns, rows) * stable
+            for one in (measured, simulated)
+        )
+        norm = float(np.linalg.norm(smoothed(a)))
+        if norm:
+            found.append(float(np.linalg.norm(smoothed(a - b))) / norm)
+    return float(np.median(found)) if found else None
+
+
+def _tiled(grid: NDArray[Any]) -> NDArray[Any]:
+    """Return sums over bins and tiles."""
+    flat = grid.sum(axis=0)
+    rows, columns = (-(-n // TILE) * TILE for n in flat.shape)
+    padded = np.zeros((rows, columns))
+    padded[: flat.shape[0], : flat.shape[1]] = flat
+    tiles: NDArray[Any] = padded.reshape(rows // TILE, TILE, columns // TILE, TILE).sum(axis=(1, 3))
+    return tiles
+
+
+def _pixels(tiles: NDArray[np.bool_], rows: int, columns: int) -> NDArray[np.bool_]:
+    full = np.repeat(np.repeat(tiles, TILE, axis=0), TILE, axis=1)
+    return full[:rows, :columns]

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adv2e import simulate
+from adv2e.config import load_config
+from adv2e.diagnosis import evidence as evidence_module
+from adv2e.diagnosis.evidence import Evidence, affordable
+from adv2e.diagnosis.stream import Stream
+
+WIDTH, HEIGHT = 96, 80
+TIMES = np.arange(6) * 0.01
+CONFIG = load_config(["ideal"])
+
+
+def recording():
+    """A spot that moves in one corner, and an ideal pixel's events of it."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    frames = [
+        np.rint(50 + 150 * np.exp(-((x - 70 - 2 * k) ** 2 + (y - 60) ** 2) / 40)).astype(np.uint8)
+        for k in range(len(TIMES))
+    ]
+    events = np.concatenate(list(simulate(frames, TIMES, CONFIG, threads=1)))
+    stream = Stream.of(events, WIDTH, HEIGHT)
+    return Evidence("spot", frames, TIMES, stream, WIDTH, HEIGHT)
+
+
+def limit(monkeypatch, pixels, steps=1):
+    instants = (len(TIMES) - 1) * CONFIG.sampling.L
+    monkeypatch.setattr(evidence_module, "AFFORDABLE", pixels * instants * steps)
+
+
+def test_what_is_affordable_stays_as_it_is(monkeypatch):
+    whole = recording()
+    limit(monkeypatch, WIDTH * HEIGHT)
+    assert affordable(whole, CONFIG) is whole
+
+
+def test_a_crop_holds_the_busiest_pixels_and_says_so(monkeypatch):
+    whole = recording()
+    limit(monkeypatch, WIDTH * HEIGHT // 3)
+    crop = affordable(whole, CONFIG)
+    assert (crop.width, crop.height) == (56, 48)
+    assert crop.width * crop.height < WIDTH * HEIGHT // 2
+    assert len(crop.stream) == len(whole.stream)
+    assert crop.masked[-1].what == "pixels outside the 56x48 at column 40, row 24"
+    assert crop.masked[-1].share == 0.0
+    assert "cropped from 96x80" in crop.notes[-1]
+
+
+def test_a_crop_simulates_to_what_its_pixels_saw_in_the_whole(monkeypatch):
+    whole = recording()
+    limit(monkeypatch, WIDTH * HEIGHT // 3)
+    crop = affordable(whole, CONFIG)
+    events = np.concatenate(list(simulate(crop.frames, crop.times_s, CONFIG, threads=1)))
+    np.testing.assert_array_equal(events, crop.stream.events())
+
+
+def test_a_stepped_filter_costs_more(monkeypatch):
+    whole = recording()
+    limit(monkeypatch, WIDTH * HEIGHT)
+    stepped = load_config(["paper"])
+    assert affordable(whole, stepped).width < WIDTH
+    limit(monkeypatch, WIDTH * HEIGHT, steps=10)
+    assert affordable(whole, stepped) is whole
+
+
+@pytest.mark.parametrize("pixels", [1, 48 * 48])
+def test_a_crop_is_not_smaller_than_statistics_allow(monkeypatch, pixels):
+    limit(monkeypatch, pixels)
+    crop = affordable(recording(), CONFIG)
+    assert crop.width >= 48
+    assert crop.height >= 48

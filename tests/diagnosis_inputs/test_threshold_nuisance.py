@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+import pytest
+
+from adv2e.config import load_config
+from adv2e.diagnosis.nuisances import fit_thresholds
+
+
+def counts_of(config):
+    """Counts that fall with the threshold of their sign and, less, of the other."""
+    levels = config.pixel.thresholds
+    return (
+        round(2000 / levels.on**1.2 / levels.off**0.3),
+        round(3000 / levels.off**1.1 / levels.on**0.2),
+    )
+
+
+def test_thresholds_that_made_the_totals_come_back_by_key():
+    truth = load_config([], ["pixel.thresholds={on: 0.31, off: 0.17}"])
+    declared = load_config(["paper"])
+    fitted, nuisances = fit_thresholds(counts_of, declared, counts_of(truth))
+    assert nuisances == {
+        "pixel.thresholds.on": pytest.approx(0.31, rel=0.02),
+        "pixel.thresholds.off": pytest.approx(0.17, rel=0.02),
+    }
+    assert fitted.pixel.thresholds.on == nuisances["pixel.thresholds.on"]
+    assert fitted.pixel.thresholds.mismatch == declared.pixel.thresholds.mismatch
+    assert fitted.frames == declared.frames

@@ -1,0 +1,197 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from adv2e import simulate
+from adv2e.comparison.windows import Windows
+from adv2e.config import load_config
+from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.events import empty_events, make_events
+
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
+REAL = os.environ.get("ADV2E_REAL_DATA")
+WIDTH, HEIGHT, FRAMES = 24, 16, 9
+TIMES = np.arange(FRAMES) * 0.02
+BLACK_LEVEL = Candidate(
+    "black_level", (Knob("frames.black_level_dn", 0.02, 100.0),), ((2.0,), (14.0,))
+)
+
+
+@pytest.fixture
+def scripts(monkeypatch):
+    monkeypatch.syspath_prepend(SCRIPTS)
+
+
+def moving_waves():
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    phases = 2 * np.pi * (x / 11 + y / 17 - 9 * TIMES[:, None, None])
+    return np.rint(60 + 50 * np.sin(phases)).astype(np.uint8)
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """Waves seen by an ideal pixel with a black level of 20 DN, ON 0.2, OFF 0.15."""
+    folder = tmp_path / "waves"
+    (folder / "images").mkdir(parents=True)
+    frames = moving_waves()
+    sets = [
+        "frames.black_level_dn=20",
+        "pixel.thresholds.on=0.2",
+        "pixel.thresholds.off=0.15",
+        "pixel.log_response.linear_below=0",
+        "pixel.log_response.floor=0.5",
+    ]
+    config = load_config(["ideal"], sets)
+    events = np.concatenate(list(simulate(frames, TIMES, config, threads=1)))
+    names = [f"images/frame_{number:08d}.png" for number in range(FRAMES)]
+    for name, frame in zip(names, frames, strict=True):
+        assert cv2.imwrite(str(folder / name), frame)
+    stamps = [f"{t:.9f} {name}\n" for t, name in zip(TIMES, names, strict=True)]
+    (folder / "images.txt").write_text("".join(stamps))
+    lines = [f"{e['t'] / 1e6:.9f} {e['x']} {e['y']} {e['p']}\n" for e in events]
+    (folder / "events.txt").write_text("".join(lines))
+    return folder
+
+
+@pytest.fixture
+def declared(tmp_path):
+    path = tmp_path / "declared.yaml"
+    path.write_text(
+        "pixel: {log_response: {linear_below: 0, floor: 0.5}, low_pass: null, refractory: null,"
+        " leak: null, shot_noise: null, thresholds: {on: 0.3, off: 0.3, mismatch: 0}}\n"
+    )
+    return path
+
+
+def test_the_search_finds_the_black_level_that_made_the_events(scripts, recording, declared):
+    from real.model import Bench
+    from real.recording import halves, read
+    from real.search import _probed, _refined
+
+    bench = Bench(read(str(recording)), 1)
+    first, _ = halves(bench.real.windows)
+    config = load_config([declared])
+    before, _ = bench.score(bench.matched(config, first), first, (0,))
+    best = min(_probed(bench, BLACK_LEVEL, config, first, (0,)), key=lambda trial: trial.score)
+    best = _refined(bench, best, config, first, (0,))
+    assert best.score < 0.5 * before
+    assert best.values[0] == pytest.approx(20.0, rel=0.25)
+    assert best.config.pixel.thresholds.on == pytest.approx(0.2, rel=0.1)
+    assert best.config.pixel.thresholds.off == pytest.approx(0.15, rel=0.1)
+    assert best.text() == f"black_level (black_level_dn {best.values[0]:.4g})"
+
+
+@pytest.mark.parametrize("sets", [[], ["frames.clock_offset_us=-3000", "frames.black_level_dn=4"]])
+def test_in_between_frames_made_once_give_nearly_the_events_of_a_conversion(
+    scripts, recording, declared, sets
+):
+    from real.model import BEYOND_US, Bench
+    from real.recording import read
+
+    from adv2e.comparison.windows import cut
+
+    bench = Bench(read(str(recording)), 1)
+    windows = bench.real.windows
+    config = load_config([declared], ["sampling.interpolation=flow", *sets])
+    quick = bench.quick(config, windows, 3)
+    whole = bench.real.simulator(config, windows.stop + BEYOND_US, 1)(3)
+    whole = cut(whole, windows.start, windows.stop)
+    assert len(whole) > 1000
+    assert len(quick) == pytest.approx(len(whole), rel=0.01)
+
+
+def test_noise_in_still_pixels_is_no_explanation(scripts):
+    from real.search import Added
+
+    before = Added.plain("before", load_config(), 0.8, still_hz=0.1)
+    assert Added.plain("noise", load_config(), 0.7, still_hz=1.0).noisier(before, 0.2)
+    assert not Added.plain("less", load_config(), 0.7, still_hz=0.2).noisier(before, 0.2)
+    assert not Added.plain("unknown", load_config(), 0.7).noisier(before, None)
+
+
+def test_every_second_frame_and_the_ends_stay(scripts, recording):
+    from real.recording import read
+
+    thin = read(str(recording)).thinned()
+    assert np.flatnonzero(thin.used).tolist() == [0, 2, 4, 6, 8]
+    assert len(list(thin.frames())) == 5
+
+
+def noisy(rng, x, count, on):
+    t = np.sort(rng.integers(0, 40_000, count))
+    return make_events(t, x + rng.integers(0, 8, count), np.full(count, 3), np.full(count, on))
+
+
+def test_tiles_that_change_are_unstable_and_chance_is_not(scripts):
+    from real.stability import compare_halved, stable_score
+
+    rng = np.random.default_rng(1)
+    windows = Windows("frame intervals", ((0, 40_000),), 1)
+
+    def stream(second_on):
+        parts = [noisy(rng, 0, 2000, 1), noisy(rng, 16, 2000, second_on)]
+        both = np.concatenate(parts)
+        return both[np.argsort(both["t"], kind="stable")]
+
+    whole, halved = (stream(1), stream(1)), (stream(0), stream(0))
+    measured = stream(1)
+    found = compare_halved(whole, halved, measured, windows, 24, 8)
+    assert found.stable[0, 3, :8].all()
+    assert not found.stable[0, 3, 16:].any()
+    assert found.kept == pytest.approx(0.5)
+    assert found.change == pytest.approx(np.sqrt(2.0), rel=0.1)
+    assert stable_score(measured, whole[0], windows, found) < 0.3
+    assert stable_score(measured, empty_events(), windows, found) == pytest.approx(1.0)
+
+
+def test_tables_before_and_after_each_effect(scripts, recording, declared, tmp_path, monkeypatch):
+    import diagnose_real
+    from real import search
+
+    monkeypatch.setattr(search, "OWN", ())
+    monkeypatch.setattr(search, "library", lambda *_: [BLACK_LEVEL])
+
+    out = tmp_path / "table.md"
+    arguments = [str(recording), "--declared", str(declared), "--threads", "1", "--out", str(out)]
+    result = CliRunner().invoke(diagnose_real.main, arguments)
+    assert result.exit_code == 0, result.output
+    text = out.read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    labels = [row[0] for row in rows]
+    assert labels[2:4] == ["as declared", "thresholds"]
+    assert labels[4].startswith("exact filter")
+    assert labels[5].startswith("black_level")
+    assert labels[6:] == ["half split (Poisson)", "no events at all"]
+    smoothed = [float(row[5].split(" ")[0]) for row in rows[2:]]
+    assert smoothed[3] < smoothed[1]
+    assert smoothed[5] == 1.0
+    assert "Dropping every second frame" in text
+    assert "Camera effects tried: all of the library but" in text
+    assert "No other tools were run on this recording." in text
+
+
+@pytest.mark.skipif(not REAL, reason="ADV2E_REAL_DATA does not name a folder of recordings")
+def test_flow_and_an_offset_come_nearer_to_the_slider_than_the_best_tool(scripts):
+    from real.model import SCORE, Bench
+    from real.recording import halves, read
+
+    bench = Bench(read(str(Path(str(REAL)) / "davis240c-slider-depth-chunk")), None)
+    first, second = halves(bench.real.windows)
+    sets = [
+        "sampling.interpolation=flow",
+        "frames.clock_offset_us=3000",
+        "frames.black_level_dn=8",
+        "pixel.log_response.linear_below=0",
+        "pixel.log_response.floor=0.5",
+        "pixel.initial_reference=random",
+    ]
+    config = bench.matched(load_config(["ideal"], sets), first, tolerance=0.01)
+    judged = bench.judge(config, second, (1, 2))
+    assert judged.values[SCORE] < 0.65
+    assert judged.events_ratio == pytest.approx(1.0, abs=0.15)
