@@ -116,7 +116,11 @@ def _yaml(tree: Mapping[str, Any], depth: int) -> Iterator[str]:
             yield f"{indent}{key}:" if value else f"{indent}{key}: {{}}"
             yield from _yaml(value, depth + 1)
         else:
-            yield f"{indent}{key}: {scalar_text(value)}"
+            items = value if isinstance(value, (list, tuple)) else None
+            text = (
+                scalar_text(value) if items is None else f"[{', '.join(map(scalar_text, items))}]"
+            )
+            yield f"{indent}{key}: {text}"
 
 
 def summary(found: Diagnosis) -> str:

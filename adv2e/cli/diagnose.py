@@ -60,14 +60,14 @@ def command(
     from pathlib import Path
 
     from adv2e.diagnosis.diagnose import diagnose
-    from adv2e.diagnosis.evidence import affordable, read_evidence
+    from adv2e.diagnosis.evidence import read_evidence
     from adv2e.diagnosis.report import check_folder, summary_text, write_reports
     from adv2e.pixel import is_compiled
 
     check_names(without)
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     check_folder(folder, overwrite=overwrite)
-    evidence = affordable(read_evidence(recording), config)
+    evidence = read_evidence(recording)
     if not is_compiled(config.pixel, config.sampling):
         log("compiling the pixel's kernel (once; about half a minute)")
     with _counting(progress) as count:

@@ -16,7 +16,7 @@ from adv2e.config import Config, to_dict
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.candidates import Candidate, hints_of, library, without_user_effects
 from adv2e.diagnosis.error import error_rows, of_part
-from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.evidence import Evidence, affordable
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.light import light_of, quantum_dn
 from adv2e.diagnosis.markers import Markers
@@ -74,6 +74,7 @@ def diagnose(
     """
     began = time.perf_counter()
     declared = without_user_effects(declared)
+    evidence = affordable(evidence, declared)
     light = light_of(evidence, declared)
     scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
     with closing(Simulator(evidence, threads or _cores(), progress)) as simulator:

@@ -27,7 +27,7 @@ def recordings(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recordings")
     camera = Camera(
         patchwork(SIZE, seed=6), BENCH, hidden={"pixel": {"refractory": {"period_us": DEAD_US}}},
-        size=SIZE, duration_s=0.3, fps=100.0, step_us=50.0,
+        size=SIZE, duration_s=0.3, fps=400.0, step_us=25.0,
     )  # fmt: skip
     camera.record(folder / "dead.zip")
     shutil.copy(folder / "dead.declared.yaml", folder / "none.declared.yaml")
