@@ -25,7 +25,7 @@ from adv2e.diagnosis.nuisances import fit_thresholds
 from adv2e.diagnosis.picture import Gallery
 from adv2e.diagnosis.result import Diagnosis, Finding, Rejected, Signature, Verdict
 from adv2e.diagnosis.scene import Placed, Scene
-from adv2e.diagnosis.search import LEVEL, PARTLY, Outcome, Search, State
+from adv2e.diagnosis.search import LEVEL, NEARLY, PARTLY, Outcome, Search, State
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 from adv2e.diagnosis.stream import Stream
 
@@ -164,7 +164,7 @@ def _cores() -> int:
 def _verdict(search: Search, outcome: Outcome) -> Verdict:
     if not outcome.state.fits:
         return "consistent" if outcome.probability >= LEVEL else "unexplained"
-    if outcome.probability < LEVEL:
+    if outcome.probability < LEVEL and outcome.explained < NEARLY:
         return "partly_explained" if outcome.explained >= PARTLY else "unexplained"
     return "not_identifiable" if outcome.alternatives else "explained"
 
@@ -187,6 +187,9 @@ def _sentence(verdict: Verdict, kept: State, outcome: Outcome) -> str:
     if verdict == "not_identifiable":
         others = ", ".join(outcome.alternatives)
         return f"The declared model lacks an effect: {names}, or as well {others}."
+    if outcome.probability < LEVEL:
+        share = f"{outcome.explained:.1%}"
+        return f"The declared model lacks {names}; that explains {share} of the residual."
     return f"The declared model lacks {names}; with that, nothing is left that can be seen."
 
 

@@ -31,6 +31,9 @@ MOST_EFFECTS = 4
 PARTLY = 0.8
 """Share of the residual that effects must explain to be named when something is left."""
 
+NEARLY = 0.98
+"""Share of the residual beyond which what is left is put down to the fit, not to another effect."""
+
 _MANY, _SOME = 100, 32
 _FINALISTS = 6
 _FAR = 2.0
@@ -139,7 +142,11 @@ class Search:
         alternatives: list[str] = []
         probability = self.probability(state)
         self._log(f"declared model: probability of the residual {probability:.2g}")
-        while probability < LEVEL and len(state.fits) < MOST_EFFECTS:
+        while (
+            probability < LEVEL
+            and self.explained(state) < NEARLY
+            and len(state.fits) < MOST_EFFECTS
+        ):
             if state.fits:
                 self._laboratory.simulator.likely += _likely(self._candidates, 0)
             trials = self._trials(state)
