@@ -199,10 +199,10 @@ def test_floor_and_spread_are_of_simulations_left_out():
     assert model.spread == pytest.approx(np.std(fresh), rel=0.5)
 
 
-def test_sd_is_not_taken_for_less_than_a_quarter():
+def test_sd_is_not_taken_for_less_than_half():
     scale = Scale(np.zeros(2), np.ones(2), np.eye(2))
     model = Model(scale, np.column_stack([np.zeros(10), np.arange(10.0)]))
-    assert model.sd[0] == 0.25
+    assert model.sd[0] == 0.5
     assert model.sd[1] == pytest.approx(np.arange(10.0).std(ddof=1))
 
 
