@@ -34,7 +34,7 @@ from adv2e.comparison.windows import Windows, cut
 from adv2e.config import load_config
 from adv2e.diagnosis.nuisances import totals
 from adv2e.errors import Adv2eError, OutputError
-from adv2e.events import empty_events
+from adv2e.events import Events, empty_events
 
 COLUMNS = {
     "relative_5_bins": "5 bins",
@@ -144,9 +144,12 @@ def _stability(
 ) -> tuple[Stability, float | None]:
     """Return what dropping every second frame changes, and the score where that is little."""
     half = Bench(bench.real.thinned(), bench.threads)
-    whole, thinned = (
-        tuple(one.quick(found.config, windows, seed) for seed in seeds) for one in (bench, half)
-    )
+    first, second = seeds
+
+    def pair(one: Bench) -> tuple[Events, Events]:
+        return one.quick(found.config, windows, first), one.quick(found.config, windows, second)
+
+    whole, thinned = pair(bench), pair(half)
     measured = bench.real.events
     stability = compare_halved(whole, thinned, measured, windows, *bench.real.size)
     return stability, stable_score(measured, whole[0], windows, stability)

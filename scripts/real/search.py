@@ -113,8 +113,9 @@ def forward(
     measured_hz = bench.still_hz(windows)
     camera = library(declared, Hints(windows.duration_s, (), 1))
     camera = [one for one in camera if one.name not in UNSEEN and (not only or one.name in only)]
-    for group in (list(OWN), camera):
-        left = group
+    own = list(OWN)
+    for group in (own, camera):
+        left = group if group is own else [*own, *camera]
         for _ in range(MOST):
             tried = [t for one in left for t in _probed(bench, one, here.config, windows, seeds)]
             noisier = [trial for trial in tried if trial.noisier(here, measured_hz)]
@@ -131,14 +132,16 @@ def forward(
             if here.score - best.score < LEAST_GAIN:
                 break
             here = best
-            left = _promising(tried[1:], here.candidate.name)
+            own = [one for one in own if one.name != here.candidate.name]
+            left = own if group is not camera else [*own, *_promising(tried[1:], here, own)]
             yield here
 
 
-def _promising(tried: Sequence[Added], added: str) -> list[Candidate]:
-    """Return the better half of what was tried, without what is added, each once."""
+def _promising(tried: Sequence[Added], added: Added, own: Sequence[Candidate]) -> list[Candidate]:
+    """Return the better half of what was tried of the camera, without what is added, each once."""
     kept = [trial.candidate for trial in tried[: -(-len(tried) // 2)]]
-    return [one for one in dict.fromkeys(kept) if one.name != added]
+    left = [one for one in dict.fromkeys(kept) if one.name != added.candidate.name]
+    return [one for one in left if one not in own]
 
 
 def _probed(
