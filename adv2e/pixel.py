@@ -146,6 +146,8 @@ class PixelArray:
         What effects outside the kernel add to the pixels.
     method : {"auto", "dense"}
         How the circuit is solved: the fastest way that covers it, or in steps of time.
+    coarseness : float
+        Factor on the longest of those steps, where some us of precision may go for speed.
 
     Raises
     ------
@@ -166,6 +168,7 @@ class PixelArray:
         exact_times: bool = False,
         additions: Additions | None = None,
         method: str = "auto",
+        coarseness: float = 1.0,
     ) -> None:
         self.rows, self.columns = first.shape
         self.pixels = self.rows * self.columns
@@ -187,7 +190,7 @@ class PixelArray:
         if self._driver == "run_dense":
             self._stepping = Stepping(
                 self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
-                self.origin_us, self._relative(t_ns),
+                self.origin_us, self._relative(t_ns), coarseness,
             )  # fmt: skip
             self._first_steps()
         size = tile or min(_TILE, max(STRIP, -(-self.pixels // (4 * self.threads))))

@@ -12,7 +12,7 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from typing import Any
@@ -138,12 +138,13 @@ def events_from_light(
     table: NDArray[np.float32] | None = None,
     effects: Sequence[Hooks] = (),
     method: str = "auto",
+    coarseness: float = 1.0,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 
     With a `table` of 256 entries [DN], the frames are grey values of 8 bits that it decodes; then
     `sampling.L` should be 1, as every instant looks its frames up again.  `effects`: see
-    :func:`simulate`; `method`: see :class:`adv2e.pixel.PixelArray`.
+    :func:`simulate`; `method`, `coarseness`: see :class:`adv2e.pixel.PixelArray`.
 
     Raises
     ------
@@ -154,7 +155,8 @@ def events_from_light(
     if table is not None and changes_light(hooks):
         light, table = _decoded(light, table), None
     frames = begin(hooks, iter(light), config.seed)
-    yield from map_events(hooks, _pixel_events(frames, config, hooks, threads, table, method))
+    how = {"method": method, "coarseness": coarseness}
+    yield from map_events(hooks, _pixel_events(frames, config, hooks, threads, table, how))
 
 
 def _decoded(
@@ -170,7 +172,7 @@ def _pixel_events(
     hooks: Sequence[Hooks],
     threads: int | None,
     table: NDArray[np.float32] | None,
-    method: str,
+    how: Mapping[str, Any],
 ) -> Iterator[Events]:
     """Yield the sorted events of all pixels, as they are before the readout."""
     t_ns, first = next(source)
@@ -185,7 +187,7 @@ def _pixel_events(
         t_ns,
         threads=workers,
         additions=additions,
-        method=method,
+        **how,
     )
     with ThreadPoolExecutor(workers) if workers > 1 else nullcontext() as pool:
         order = InOrder()

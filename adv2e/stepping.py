@@ -59,7 +59,11 @@ _WHITE = 255.0
 
 
 def steps_of(
-    length_us: float, circuit: Circuit, step_us: float = math.inf, brightest: float = _WHITE
+    length_us: float,
+    circuit: Circuit,
+    step_us: float = math.inf,
+    brightest: float = _WHITE,
+    longest_us: float = LONGEST_US,
 ) -> int:
     """Return how many steps ``exact`` makes of a straight piece of x.
 
@@ -72,8 +76,10 @@ def steps_of(
         Longest step that resolves what is added.
     brightest : float
         Light in the piece, if it is above white [DN].
+    longest_us : float
+        Longest step that is precise enough.
     """
-    limit = min(LONGEST_US, step_us)
+    limit = min(longest_us, step_us)
     fastest = max(circuit.dark + max(brightest, _WHITE) * circuit.per_dn, circuit.dark)
     if circuit.filtered:
         limit = min(limit, _SHARE / fastest if fastest > 0 else limit)
@@ -99,16 +105,19 @@ class Stepping:
         Time that the pixel array counts from, on the recording's clock.
     start_us : float
         Time of the first frame, from there.
+    coarseness : float
+        Factor on the longest step, and on that which resolves what is added.
     """
 
     def __init__(
         self, circuit: Circuit, pixels: int, columns: int, additions: Additions | None,
-        drift_per_s: float, origin_us: int, start_us: float,
+        drift_per_s: float, origin_us: int, start_us: float, coarseness: float = 1.0,
     ) -> None:  # fmt: skip
         self._circuit, self._pixels, self._columns = circuit, pixels, columns
         self._additions = additions
         self._drift, self._origin, self._start = drift_per_s, origin_us, start_us
-        self._step_us = additions.step_us if additions else math.inf
+        self._step_us = coarseness * additions.step_us if additions else math.inf
+        self._longest_us = coarseness * LONGEST_US
         at = np.array([start_us])
         widths = (self._course(name, at).shape[1] for name in _COURSES)
         self._width = sum(width for width in widths if width > 1)
@@ -153,7 +162,9 @@ class Stepping:
         steps = np.ones(lengths.size, np.int64)
         if exact:
             for f, brightest in enumerate(_brightest(part, frames, lengths.size)):
-                steps[f] = steps_of(lengths[f] / pieces, circuit, self._step_us, brightest)
+                steps[f] = steps_of(
+                    lengths[f] / pieces, circuit, self._step_us, brightest, self._longest_us
+                )
         for first, first_step, stop, stop_step in self._cuts(pieces, steps):
             times = _instants(starts, pieces * steps, first, first_step, stop, stop_step)
             run = Run(

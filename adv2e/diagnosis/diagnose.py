@@ -14,18 +14,21 @@ from numpy.typing import NDArray
 from adv2e import __version__
 from adv2e.config import Config, to_dict
 from adv2e.diagnosis import parts
+from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate, hints_of, library, without_user_effects
+from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.error import error_rows, of_part
 from adv2e.diagnosis.evidence import Evidence, affordable
 from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.interpolation import InterpolationError, interpolation_error
 from adv2e.diagnosis.light import light_of, quantum_dn
-from adv2e.diagnosis.markers import Markers
+from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.markers.timing import strongest_lines
 from adv2e.diagnosis.nuisances import fit_thresholds
 from adv2e.diagnosis.picture import Gallery
 from adv2e.diagnosis.result import Diagnosis, Finding, Rejected, Signature, Verdict
 from adv2e.diagnosis.scene import Placed, Scene
-from adv2e.diagnosis.search import LEVEL, NEARLY, PARTLY, Outcome, Search, State
+from adv2e.diagnosis.search import LEVEL, NEARLY, PARTLY, Outcome, Search
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 from adv2e.diagnosis.stream import Stream
 
@@ -82,17 +85,25 @@ def diagnose(
         if free_thresholds:
             declared, nuisances = _with_fitted_thresholds(evidence, declared, simulator, scene)
             log(f"thresholds that match the totals: {nuisances}")
-        pilot_seeds = range(10_000, 10_000 + _PILOT)
-        pilot = simulator.map(
-            lambda seed: Placed.of(simulator.stream(declared, seed), scene), pilot_seeds
+        seeds = range(10_000, 10_000 + _PILOT)
+        streams = simulator.map(lambda seed: simulator.stream(declared, seed), seeds)
+        pilot = [Placed.of(stream, scene) for stream in streams]
+        markers = Markers(scene, pilot)
+        error = interpolation_error(
+            evidence,
+            declared,
+            scene,
+            markers,
+            dict(zip(seeds, streams, strict=True)),
+            lambda fewer: Simulator(fewer, threads or _cores()),
         )
-        laboratory = Laboratory(simulator, scene, Markers(scene, pilot))
+        laboratory = Laboratory(simulator, scene, markers, error.bias if error else None)
         measured = Placed.of(evidence.stream, scene)
         observed = laboratory.markers.measure(measured)
         lines = strongest_lines(measured.stream, [one.stream for one in pilot], scene)
         hints = hints_of(evidence.stream.t, evidence.seconds, lines)
         candidates = [one for one in library(declared, hints) if one.name not in without]
-        search = Search(laboratory, observed, declared, candidates, log)
+        search = Search(laboratory, observed, declared, candidates, error, log)
         outcome = search.run()
         verdict = _verdict(search, outcome)
         kept = outcome.state if verdict not in ("consistent", "unexplained") else search.declared
@@ -123,10 +134,10 @@ def diagnose(
             signatures=_signatures(search, observed, kept, laboratory.markers),
             curves=gallery.curves(),
             maps=gallery.maps(),
-            detectable=search.detectable(candidates),
+            detectable=detectable(search.bench, search.declared, candidates),
             masked=evidence.masked,
             split=scene.parts.text(),
-            notes=evidence.notes,
+            notes=[*evidence.notes, _about_interpolation(search, error)],
             model=to_dict(kept.config),
             facts={
                 "sensor": f"{evidence.width}x{evidence.height}",
@@ -138,6 +149,21 @@ def diagnose(
                 "adv2e": __version__,
             },
         )
+
+
+def _about_interpolation(search: Search, error: InterpolationError | None) -> str:
+    if error is None:
+        return (
+            "too few frames to leave any out: what the interpolation between them does to the"
+            " residual is not known, and may be all of it"
+        )
+    size = error.size(search.bench.scales[BOTH].sd, BOTH)
+    text = (
+        f"interpolation between the frames moves a statistic by {size:.2g} deviations (root mean"
+        " square), as simulations with every second frame left out tell; taken off, and counted as"
+        " uncertain by as much"
+    )
+    return text + (": the frames hardly resolve the motion" if size > 1.0 else "")
 
 
 def _with_fitted_thresholds(
@@ -220,7 +246,8 @@ def _rejected(outcome: Outcome, kept: State, candidates: Sequence[Candidate]) ->
 
 def _signatures(search: Search, observed: Array, kept: State, markers: Markers) -> list[Signature]:
     view = parts.LAST
-    before, after, scale = search.declared.models[view], kept.models[view], search.scales[view]
+    before, after = search.declared.models[view], kept.models[view]
+    scale = search.bench.scales[view]
     z_before, z_after = before.z(observed[view]), after.z(observed[view])
 
     def value(mean: Array) -> Array:

@@ -23,6 +23,8 @@ from adv2e.simulation import events_from_light
 Result = TypeVar("Result")
 
 _KEPT = 4  # sets of decoded frames
+_COARSENESS = 2.5
+"""Of the steps of time, where the pixel takes any: some us, which no statistic shows."""
 
 
 class Simulator:
@@ -59,7 +61,11 @@ class Simulator:
         evidence = self._evidence
         light = zip(evidence.times_ns, self._light(config), strict=True)
         chunks = events_from_light(
-            light, dataclasses.replace(config, seed=seed), threads=1, method=_method(config)
+            light,
+            dataclasses.replace(config, seed=seed),
+            threads=1,
+            method=_method(config),
+            coarseness=_COARSENESS,
         )
         events = np.concatenate([empty_events(), *chunks])
         with self._counting:
@@ -100,22 +106,40 @@ class Laboratory:
     simulator : Simulator
     scene : Scene
     markers : Markers
+    bias : (views, statistics), optional
+        Taken off all statistics: what they owe to the interpolation between frames.
     """
 
-    def __init__(self, simulator: Simulator, scene: Scene, markers: Markers) -> None:
+    def __init__(
+        self,
+        simulator: Simulator,
+        scene: Scene,
+        markers: Markers,
+        bias: NDArray[np.float64] | None = None,
+    ) -> None:
         self.simulator, self.scene, self.markers = simulator, scene, markers
+        self._bias = 0.0 if bias is None else bias
+        self._held: dict[tuple[Config, int], Any] = {}
 
     def measure(self, config: Config, seed: int) -> Any:
         """Return the statistics of one simulation, (views, statistics)."""
         stream = self.simulator.stream(config, seed)
-        return self.markers.measure(Placed.of(stream, self.scene))
+        return self.markers.measure(Placed.of(stream, self.scene)) - self._bias
 
     def ensemble(self, config: Config, seeds: Sequence[int]) -> Any:
         """Return the statistics of simulations of one model, (seeds, views, statistics)."""
-        return np.array(self.simulator.map(lambda seed: self.measure(config, seed), seeds))
+        return self.many([config], seeds)[0]
 
     def many(self, configs: Sequence[Config], seeds: Sequence[int]) -> Any:
-        """Return the statistics of each configuration with each seed, (configs, seeds, ...)."""
+        """Return the statistics of each configuration with each seed, (configs, seeds, ...).
+
+        What was simulated before is not simulated again: a step of a fit ends where the next one
+        begins, and each effect is probed more than once.
+        """
         pairs = [(config, seed) for config in configs for seed in seeds]
-        rows = self.simulator.map(lambda pair: self.measure(*pair), pairs)
-        return np.array(rows).reshape(len(configs), len(seeds), *rows[0].shape)
+        fresh = [pair for pair in dict.fromkeys(pairs) if pair not in self._held]
+        self._held.update(
+            zip(fresh, self.simulator.map(lambda pair: self.measure(*pair), fresh), strict=True)
+        )
+        rows = np.array([self._held[pair] for pair in pairs])
+        return rows.reshape(len(configs), len(seeds), *rows.shape[1:])

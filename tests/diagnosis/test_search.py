@@ -8,9 +8,12 @@ from made_up_laboratory import EFFECTS, STATISTICS, MadeUpLaboratory, candidates
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import parts
+from adv2e.diagnosis.bench import Rejections
 from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.diagnose import _verdict, finding_of
 from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.judging import chance_gain
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.search import LEVEL, PARTLY, Search
 
@@ -119,8 +122,8 @@ def test_two_effects_are_both_found(period, rate):
 
 def refitted(search, fits):
     """Return the model with all `fits`, fitted together."""
-    joint, fits = search._fitted(fits, search.declared.models[BOTH].sd, BOTH)
-    return search._state(joint.config, fits)
+    joint, fits = search.bench.fitted(fits, search.declared.models[BOTH].sd, BOTH)
+    return search.bench.state(joint.config, fits)
 
 
 def test_backward_drops_what_the_others_do_without():
@@ -134,7 +137,7 @@ def test_backward_drops_what_the_others_do_without():
     state = refitted(search, tuple(fits))
     assert state.names == ("dark_current", "leak")
     assert search._backward(state).names == ("leak",)
-    assert "not needed" in search.rejected["dark_current"].reason
+    assert "not needed" in search.bench.rejections.held["dark_current"].reason
 
 
 def test_backward_keeps_what_is_needed():
@@ -160,7 +163,7 @@ def test_an_empty_library_explains_nothing():
     search, outcome = searched(["pixel.refractory.period_us=6000"], library=[])
     assert _verdict(search, outcome) == "unexplained"
     assert outcome.rejected == {}
-    assert search.detectable([]) == []
+    assert detectable(search.bench, search.declared, []) == []
 
 
 def test_a_fit_at_the_end_of_its_range_is_not_taken():
@@ -193,7 +196,7 @@ def test_chance_alone_gains_less_than_it_may():
     search, outcome = searched(["pixel.leak.rate_hz=1"], laboratory)
     before = search.declared.models[parts.JUDGE]
     after = outcome.state.models[parts.JUDGE]
-    limit = search._chance_gain(before, after)
+    limit = chance_gain(after, before)
     gains = [
         after.log_likelihood(row[parts.JUDGE]) - before.log_likelihood(row[parts.JUDGE])
         for row in laboratory.ensemble(Config(), range(80_000, 80_300))
@@ -203,10 +206,61 @@ def test_chance_alone_gains_less_than_it_may():
 
 def test_what_would_have_been_seen():
     search, _ = searched()
-    found = {one.name: one for one in search.detectable(candidates())}
+    found = {one.name: one for one in detectable(search.bench, search.declared, candidates())}
     assert set(found) == set(EFFECTS)
     assert found["refractory"].unit == "us"
     assert found["refractory"].key == "pixel.refractory.period_us"
     assert 500.0 < found["refractory"].size < 1500.0
     assert 0.0 < found["event_loss"].size < 0.05
     assert all(math.isfinite(one.size) for one in found.values())
+
+
+def test_two_effects_that_hide_one_another_are_found_together():
+    """Alone, either leaves so much of the other that what it changes most stands out."""
+    laboratory = MadeUpLaboratory(strength=60.0)
+    shared = laboratory.patterns["pixel.leak.rate_hz"]
+    other = laboratory.patterns["pixel.refractory.period_us"]
+    laboratory.patterns["pixel.refractory.period_us"] = 0.6 * shared + 0.6 * other
+    truth = ["pixel.refractory.period_us=4000", "pixel.leak.rate_hz=4"]
+    search, outcome = searched(truth, laboratory)
+    single = search._attempts(search.declared, [search.declared])
+    assert all(one.objections for one in single)
+    assert set(outcome.state.names) == {"refractory", "leak"}
+    assert _verdict(search, outcome) == "explained"
+    assert outcome.state.config.pixel.refractory.period_us == pytest.approx(4000.0, rel=0.1)
+
+
+def test_backward_drops_one_after_another():
+    laboratory = MadeUpLaboratory()
+    observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
+    search = Search(laboratory, observed, Config(), candidates())
+    fits = []
+    for name, value in (("dark_current", 0.05), ("event_loss", 0.002), ("leak", 4.0)):
+        (one,) = candidates(name)
+        fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
+    assert search._backward(refitted(search, tuple(fits))).names == ("leak",)
+
+
+def test_the_reason_of_the_best_form_is_kept():
+    def fit(value):
+        (one, *_) = candidates("leak")
+        return Fit(one, Config(), np.array(one.inner((value,))))
+
+    reasons = Rejections()
+    reasons.add(fit(2.0), "best form")
+    reasons.add(fit(3.0), "another form")
+    assert reasons.held["leak"].reason == "best form"
+    reasons.add(fit(2.0), "judged", final=True)
+    assert reasons.held["leak"].reason == "judged"
+    reasons.new_round()
+    reasons.add(fit(4.0), "next round")
+    assert reasons.held["leak"].reason == "next round"
+    assert reasons.held["leak"].parameters == {"pixel.leak.rate_hz": pytest.approx(4.0)}
+
+
+def test_an_effect_too_weak_to_be_seen_at_any_size_is_left_out():
+    laboratory = MadeUpLaboratory()
+    laboratory.patterns["readout.loss.fraction"] = 1e-3 * laboratory.patterns["pixel.leak.rate_hz"]
+    search, _ = searched(laboratory=laboratory)
+    found = {one.name for one in detectable(search.bench, search.declared, candidates())}
+    assert found == set(EFFECTS) - {"event_loss"}

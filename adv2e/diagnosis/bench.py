@@ -1,0 +1,180 @@
+"""What candidates are measured against: the recording, and simulations on the declared scale."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config import Config
+from adv2e.diagnosis.candidates import Candidate
+from adv2e.diagnosis.fit import Fit, Fitter
+from adv2e.diagnosis.interpolation import InterpolationError
+from adv2e.diagnosis.markers import BOTH, VIEWS
+from adv2e.diagnosis.metric import Model, Scale
+from adv2e.diagnosis.result import Rejected
+from adv2e.diagnosis.simulations import Laboratory
+
+Array = NDArray[np.float64]
+
+MANY, SOME = 100, 32
+"""Simulations of a model that is kept, and of one that is tried."""
+
+_OF_SCALES, _OF_MODELS = 1, 2
+_SEEDS = 6
+_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class State:
+    """A model: configuration, the fits that made it, and its simulations in every view.
+
+    Attributes
+    ----------
+    config : Config
+    fits : tuple of Fit
+    models : tuple of Model
+        One a view.
+    alternatives : frozenset of str
+        Effects that cannot be told from one of those that were added.
+    """
+
+    config: Config
+    fits: tuple[Fit, ...]
+    models: tuple[Model, ...]
+    alternatives: frozenset[str] = frozenset()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects that were added."""
+        return tuple(fit.candidate.name for fit in self.fits)
+
+
+@dataclass
+class Rejections:
+    """Why effects were not added: of each round, the reason of an effect's best form."""
+
+    held: dict[str, Rejected] = field(default_factory=dict)
+    _this_round: set[str] = field(default_factory=set)
+
+    def new_round(self) -> None:
+        """Let reasons take the place of earlier ones."""
+        self._this_round.clear()
+
+    def add(self, fit: Fit, reason: str, *, final: bool = False) -> None:
+        """Note why an effect was not taken; `final` reasons replace those of the same round."""
+        name = fit.candidate.name
+        if final or name not in self._this_round:
+            self._this_round.add(name)
+            self.held[name] = Rejected(name, reason, fit.candidate.parameters(fit.place))
+
+
+@dataclass(frozen=True)
+class Bench:
+    """The recording, the scales of its statistics, and the means to simulate.
+
+    Attributes
+    ----------
+    laboratory : Laboratory
+    observed : (views, statistics)
+        Of the recording.
+    declared : Config
+    scales : tuple of Scale
+        One a view.
+    error : InterpolationError
+        Of the statistics.
+    log : callable
+        Told of each step.
+    rejections : Rejections
+    """
+
+    laboratory: Laboratory
+    observed: Array
+    declared: Config
+    scales: tuple[Scale, ...]
+    error: InterpolationError
+    log: Callable[[str], None]
+    rejections: Rejections = field(default_factory=Rejections)
+
+    @classmethod
+    def of(
+        cls,
+        laboratory: Laboratory,
+        observed: Array,
+        declared: Config,
+        error: InterpolationError | None,
+        log: Callable[[str], None],
+    ) -> Bench:
+        """Return the bench of a declared model, which is simulated for the scales."""
+        error = error or InterpolationError.none(observed.shape)
+        # not the simulations that misfits are compared with: those would fit too well
+        sample = laboratory.ensemble(declared, range(MANY + 1, 2 * MANY + 1))
+        least = laboratory.markers.least
+        scales = tuple(
+            Scale.of(error.blurred(sample[:, view], view, _OF_SCALES), least)
+            for view in range(VIEWS)
+        )
+        return cls(laboratory, observed, declared, scales, error, log)
+
+    def fitter(self, view: int, sd: Array | None = None) -> Fitter:
+        """Return what fits candidates in one view of the data."""
+        return Fitter(self.laboratory, self.scales[view], self.observed[view], view, sd)
+
+    def models(self, sample: Any) -> tuple[Model, ...]:
+        """Return the models of simulations, (seeds, views, statistics)."""
+        return tuple(
+            Model.of(self.scales[view], self.error.blurred(sample[:, view], view, _OF_MODELS))
+            for view in range(VIEWS)
+        )
+
+    def tried(self, config: Config) -> tuple[Model, ...]:
+        """Return the models of a configuration, simulated often enough to judge it."""
+        return self.models(self.laboratory.ensemble(config, range(1, SOME + 1)))
+
+    def state(self, config: Config, fits: tuple[Fit, ...]) -> State:
+        """Return a model, simulated often enough to build on it."""
+        sample = self.laboratory.ensemble(config, range(1, MANY + 1))
+        return State(config, fits, self.models(sample))
+
+    def fitted(self, fits: tuple[Fit, ...], sd: Array, view: int) -> tuple[Fit, tuple[Fit, ...]]:
+        """Return all effects fitted together in a view of the data, joined and one by one."""
+        joint = _joined(fits, self.declared)
+        fitter = self.fitter(view, sd)
+        for _ in range(_ROUNDS):
+            fitter.improve([joint], range(11, 11 + _SEEDS), 0.08)
+            if joint.moved < 0.015:
+                break
+        return joint, _parted(joint, fits)
+
+    def misfit(self, state: State, view: int = BOTH) -> float:
+        """Return how far the recording is from a model."""
+        return state.models[view].misfit(self.observed[view])
+
+    def likelihood(self, state: State, view: int = BOTH) -> float:
+        """Return the log likelihood of the recording under a model."""
+        return state.models[view].log_likelihood(self.observed[view])
+
+
+def _joined(fits: tuple[Fit, ...], declared: Config) -> Fit:
+    """Return one fit of all effects together."""
+    knobs = tuple(knob for fit in fits for knob in fit.candidate.knobs)
+    extra = tuple(pair for fit in fits for pair in fit.candidate.extra)
+    name = " and ".join(fit.candidate.name for fit in fits)
+    place = np.concatenate([fit.place for fit in fits])
+    return Fit(Candidate(name, knobs, (), extra), declared, place)
+
+
+def _parted(joint: Fit, fits: tuple[Fit, ...]) -> tuple[Fit, ...]:
+    """Return the effects of a joined fit, each with its own place and covariance."""
+    result, start = [], 0
+    for fit in fits:
+        stop = start + len(fit.candidate.knobs)
+        covariance = joint.covariance[start:stop, start:stop]
+        result.append(
+            Fit(fit.candidate, fit.base, joint.place[start:stop], joint.misfit, covariance)
+        )
+        start = stop
+    return tuple(result)

@@ -1,0 +1,94 @@
+"""Which effects are worth trying on top of a model: all are fitted, few are simulated often."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.bench import MANY, SOME, Bench, State
+from adv2e.diagnosis.candidates import Candidate
+from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.metric import Model
+
+_FINALISTS = 6
+_FAR = 2.0
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate that was simulated often enough to compare it with others.
+
+    Attributes
+    ----------
+    fit : Fit
+    models : tuple of Model
+        One a view.
+    score : float
+        Log likelihood of fitting and judging data together, less the number of its knobs.
+    """
+
+    fit: Fit
+    models: tuple[Model, ...]
+    score: float
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.fit.candidate.name
+
+
+def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> list[Trial]:
+    """Return the best of the candidates on top of a model, the best first.
+
+    The others are noted as rejected.
+    """
+    left = [one for one in candidates if one.name not in state.names]
+    if not left:
+        return []
+    fitter = bench.fitter(parts.FIT)
+    fits = fitter.probe(left, state.config, (1, 2))
+    nothing = fitter.misfit(state.config, (1, 2))
+    dropped: list[Fit] = []
+    for _ in range(2):
+        fitter.improve(fits, (1, 2))
+        fits.sort(key=lambda fit: fit.misfit)
+        dropped = fits[2 * _FINALISTS :] + dropped
+        fits = fits[: 2 * _FINALISTS]
+    # whoever is far behind the first is not worth the simulations
+    far = _FAR * fits[0].misfit + _FAR * len(bench.observed[BOTH])
+    dropped = [fit for k, fit in enumerate(fits) if k >= _FINALISTS or fit.misfit > far] + dropped
+    fits = [fit for fit in fits[:_FINALISTS] if fit.misfit <= far]
+    fitter.improve(fits, (3, 4, 5))
+    sample = bench.laboratory.many([fit.config for fit in fits], range(1, SOME + 1))
+    trials = [
+        _trial(bench, fit, bench.models(rows)) for fit, rows in zip(fits, sample, strict=True)
+    ]
+    trials.sort(key=lambda trial: -trial.score)
+    bench.rejections.new_round()
+    for trial in trials:
+        parameters = trial.fit.candidate.parameters(trial.fit.place)
+        bench.log(f"  {trial.name} {parameters}: score {trial.score:.0f}")
+        bench.rejections.add(trial.fit, "others explain more")
+    for fit in dropped:
+        bench.rejections.add(fit, _behind(fit, nothing))
+    return trials
+
+
+def _behind(fit: Fit, nothing: float) -> str:
+    share = 1.0 - fit.misfit / nothing
+    what = f"takes away {share:.0%} of the misfit" if share > 0 else "makes nothing better"
+    return f"{what} where others do more"
+
+
+def _trial(bench: Bench, fit: Fit, models: tuple[Model, ...]) -> Trial:
+    score = models[BOTH].log_likelihood(bench.observed[BOTH]) - len(fit.candidate.knobs)
+    return Trial(fit, models, score)
+
+
+def likely_simulations(candidates: Sequence[Candidate]) -> int:
+    """Return about how many simulations one round takes, with what is tried after it."""
+    probes = 2 * sum(len(one.probes) for one in candidates)
+    steps = 2 * sum(2 + len(one.knobs) for one in candidates)
+    return probes + steps + steps // 2 + _FINALISTS * (3 * 4 + SOME) + 3 * 10 * 4 + MANY

@@ -1,0 +1,64 @@
+"""Whether a model is to be taken for the one before it, on data that it was not fitted to."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.metric import Model
+
+Array = NDArray[np.float64]
+
+_QUIET = 2.5
+_SIGNATURE = 12
+
+BORDER = "its fit runs to the end of the physical range"
+BY_CHANCE = "what it gains on data it was not fitted to, chance could gain"
+
+
+def objections(fit: Fit, after: Model, before: Model, observed: Array) -> list[str]:
+    """Return why a model is not to be taken for the one before it; none: it holds.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of the model.
+    after, before : Model
+        Of the two, in the view that judges.
+    observed : (statistics,)
+        Of the recording, in that view.
+    """
+    found = []
+    if gain(after, before, observed) < chance_gain(after, before):
+        found.append(BY_CHANCE)
+    if fit.at_border:
+        found.append(BORDER)
+    loud = _loudness(after, before, observed)
+    if loud > _QUIET:
+        found.append(f"what it changes most still stands out by {loud:.1f} deviations")
+    return found
+
+
+def gain(after: Model, before: Model, observed: Array) -> float:
+    """Return what a model gains over the one before it in log likelihood."""
+    return after.log_likelihood(observed) - before.log_likelihood(observed)
+
+
+def chance_gain(after: Model, before: Model) -> float:
+    """Return what a model gains on recordings of the one before it, at most."""
+    rows = before.sample
+    white = before.scale.whitening
+    zb = ((rows - before.mean) / before.sd) @ white.T
+    za = ((rows - after.mean) / after.sd) @ white.T
+    gains = 0.5 * np.sum(zb * zb - za * za, axis=1)
+    gains += np.log(before.sd).sum() - np.log(after.sd).sum()
+    return float(max(gains.mean() + 3.0 * gains.std(), 3.0))
+
+
+def _loudness(after: Model, before: Model, observed: Array) -> float:
+    """Return how far the statistics that a model changes most are still off [deviations]."""
+    change = np.abs(before.scale.whitening @ (after.mean - before.mean))
+    own = np.argsort(-change)[:_SIGNATURE]
+    z = after.z(observed)[own]
+    return float(np.sqrt(np.mean(z * z)))
