@@ -25,7 +25,10 @@ MANY, SOME = 100, 32
 
 _OF_SCALES, _OF_MODELS = 1, 2
 _SEEDS = 6
-_ROUNDS = 3
+_ROUNDS = 4
+_SETTLED = 0.015
+_REACH = 0.4
+"""Of the derivatives of fits that are near their end."""
 
 
 @dataclass(frozen=True)
@@ -144,8 +147,8 @@ class Bench:
         joint = _joined(fits, self.declared)
         fitter = self.fitter(view, sd)
         for _ in range(_ROUNDS):
-            fitter.improve([joint], range(11, 11 + _SEEDS), 0.08)
-            if joint.moved < 0.015:
+            fitter.improve([joint], range(11, 11 + _SEEDS))
+            if joint.moved < _SETTLED:
                 break
         return joint, _parted(joint, fits)
 
@@ -164,7 +167,7 @@ def _joined(fits: tuple[Fit, ...], declared: Config) -> Fit:
     extra = tuple(pair for fit in fits for pair in fit.candidate.extra)
     name = " and ".join(fit.candidate.name for fit in fits)
     place = np.concatenate([fit.place for fit in fits])
-    return Fit(Candidate(name, knobs, (), extra), declared, place)
+    return Fit(Candidate(name, knobs, (), extra), declared, place, reach=_REACH)
 
 
 def _parted(joint: Fit, fits: tuple[Fit, ...]) -> tuple[Fit, ...]:

@@ -1,6 +1,10 @@
-"""Fitting a candidate's keys by simulation: damped Gauss-Newton steps on the marker statistics.
+r"""Fitting a candidate's keys by simulation: damped Gauss-Newton steps on the marker statistics.
 
 All simulations of one step share their seeds, so that most of chance falls out of the differences.
+What is left of it in a derivative :math:`J` does not cancel in :math:`J^T J`, where hundreds of
+statistics add up their squares: a fit by that would hardly move, and be called precise.  So
+products are formed between different seeds only, which is unbiased, and derivatives are taken over
+wide differences that become narrower from step to step, down to what the data can tell apart.
 """
 
 from __future__ import annotations
@@ -19,8 +23,12 @@ from adv2e.diagnosis.simulations import Laboratory
 
 Array = NDArray[np.float64]
 
-_STEP = 0.12
+WIDE, _NARROW = 0.8, 0.1
+"""Reach of the first derivative, and least of any, on the knobs' scales."""
+
 _LARGEST_MOVE = 1.2
+_SHARES = (1.0, 0.4)
+_LEAST_SHARE = 0.1  # of the biased normal matrix, of an unbiased one that is used
 
 
 @dataclass
@@ -38,6 +46,11 @@ class Fit:
         Sum of squares there.
     covariance : (knobs, knobs)
         Of the place, from the last derivative.
+    reach : float
+        Over which the next derivative is taken.
+    damping : float
+    moved : float
+        By the last step, at most.
     """
 
     candidate: Candidate
@@ -45,7 +58,7 @@ class Fit:
     place: Array
     misfit: float = np.inf
     covariance: NDArray[Any] = field(default_factory=lambda: np.zeros((0, 0)))
-    derivative: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    reach: float = WIDE
     damping: float = 0.05
     moved: float = np.inf
 
@@ -97,10 +110,14 @@ class Fitter:
         self._whitening = scale.whitening if sd is None else scale.whitening / sd
         self._observed = self._whitening @ scale.of_values(observed)
 
-    def _white(self, sample: Array) -> Array:
-        """Return the mean over seeds of (configs, seeds, views, statistics), uncorrelated."""
-        compressed = self._scale.of_values(sample[:, :, self._view])
-        return np.asarray(compressed.mean(axis=1) @ self._whitening.T)
+    def _white_of_seeds(self, configs: Sequence[Config], seeds: Sequence[int]) -> Array:
+        """Return the statistics of models, uncorrelated, (configs, seeds, statistics)."""
+        sample = self._laboratory.many(configs, seeds)[:, :, self._view]
+        return np.asarray(self._scale.of_values(sample) @ self._whitening.T)
+
+    def whites(self, configs: Sequence[Config], seeds: Sequence[int]) -> Array:
+        """Return the mean statistics of models, uncorrelated, (configs, statistics)."""
+        return np.asarray(self._white_of_seeds(configs, seeds).mean(axis=1))
 
     def probe(
         self, candidates: Sequence[Candidate], base: Config, seeds: Sequence[int]
@@ -112,7 +129,7 @@ class Fitter:
             for probe in candidate.probes
         ]
         configs = [candidate.applied(base, place) for candidate, place in places]
-        means = self._white(self._laboratory.many(configs, seeds))
+        means = self.whites(configs, seeds)
         best: dict[int, Fit] = {}
         for (candidate, place), mean in zip(places, means, strict=True):
             misfit = float(np.sum((self._observed - mean) ** 2))
@@ -121,49 +138,43 @@ class Fitter:
                 best[id(candidate)] = Fit(candidate, base, place, misfit)
         return [best[id(candidate)] for candidate in candidates]
 
-    def whites(self, configs: Sequence[Config], seeds: Sequence[int]) -> Array:
-        """Return the mean statistics of models, uncorrelated, (configs, statistics)."""
-        return self._white(self._laboratory.many(configs, seeds))
-
     def misfit(self, config: Config, seeds: Sequence[int]) -> float:
         """Return the sum of squares of a model as it is."""
-        mean = self._white(self._laboratory.many([config], seeds))[0]
+        mean = self.whites([config], seeds)[0]
         return float(np.sum((self._observed - mean) ** 2))
 
-    def improve(self, fits: Sequence[Fit], seeds: Sequence[int], step: float = _STEP) -> None:
-        """Move every fit by one step, all of them with one batch of simulations for each half."""
+    def improve(self, fits: Sequence[Fit], seeds: Sequence[int]) -> None:
+        """Move every fit by one step, all of them with one batch of simulations for each half.
+
+        Parameters
+        ----------
+        fits : sequence of Fit
+        seeds : sequence of int
+            Two at least.
+        """
         fits = [fit for fit in fits if fit.candidate.knobs]
         if not fits:
             return
         configs: list[Config] = []
         for fit in fits:
-            nudged = (_nudged(fit, k, step) for k in range(len(fit.place)))
-            configs += [fit.config, *map(fit.moved_to, nudged)]
-        means = iter(self._white(self._laboratory.many(configs, seeds)))
-        moves = []
+            configs += [fit.config, *(fit.moved_to(place) for place in _nudged(fit))]
+        whites = iter(self._white_of_seeds(configs, seeds))
+        trials: list[tuple[Fit, Array]] = []
         for fit in fits:
-            here = next(means)
-            residual = self._observed - here
-            fit.misfit = float(residual @ residual)
+            here = next(whites)
             columns = []
-            for k in range(len(fit.place)):
-                width = _nudged(fit, k, step)[k] - fit.place[k]
-                columns.append((next(means) - here) / width)
-            fit.derivative = np.array(columns).T
-            moves.append(_move(fit, residual, len(seeds)))
-        shares = (1.0, 0.4)
-        owners = [fit for fit in fits for _ in shares]
-        trials = [
-            fit.inside(fit.place + share * move)
-            for fit, move in zip(fits, moves, strict=True)
-            for share in shares
-        ]
-        configs = [fit.moved_to(place) for fit, place in zip(owners, trials, strict=True)]
+            for k, place in enumerate(_nudged(fit)):
+                columns.append((next(whites) - here) / (place[k] - fit.place[k]))
+            residual = self._observed - here
+            fit.misfit = float(np.sum(residual.mean(axis=0) ** 2))
+            move = _move(fit, np.array(columns), residual)
+            trials += [(fit, fit.inside(fit.place + share * move)) for share in _SHARES]
         for fit in fits:
             fit.moved = 0.0
             fit.damping *= 4.0
-        means = iter(self._white(self._laboratory.many(configs, seeds)))
-        for fit, place, mean in zip(owners, trials, means, strict=True):
+            fit.reach = max(0.5 * fit.reach, _NARROW)
+        means = self.whites([fit.moved_to(place) for fit, place in trials], seeds)
+        for (fit, place), mean in zip(trials, means, strict=True):
             misfit = float(np.sum((self._observed - mean) ** 2))
             if misfit < fit.misfit:
                 fit.moved = float(np.abs(place - fit.place).max())
@@ -171,22 +182,40 @@ class Fitter:
                 fit.damping = max(fit.damping / 16.0, 1e-3)
 
 
-def _nudged(fit: Fit, k: int, step: float) -> Array:
-    """Return the place with knob `k` moved a little, inwards at the end of its range."""
-    place = fit.place.copy()
-    place[k] += step
-    if fit.inside(place)[k] < place[k] - 1e-12:
-        place[k] = fit.place[k] - step
-    return place
+def _nudged(fit: Fit) -> list[Array]:
+    """Return the place with each knob in turn moved, inwards at the end of its range."""
+    places = []
+    for k in range(len(fit.place)):
+        place = fit.place.copy()
+        place[k] += fit.reach
+        if fit.inside(place)[k] < place[k] - 1e-12:
+            place[k] = fit.place[k] - fit.reach
+        places.append(place)
+    return places
 
 
-def _move(fit: Fit, residual: Array, seeds: int) -> Array:
-    """Return the damped step, and note the covariance of the place."""
-    j = fit.derivative
-    normal = j.T @ j
-    damped = normal + np.diag(fit.damping * np.diag(normal) + 1e-6)
+def _move(fit: Fit, derivative: Array, residual: Array) -> Array:
+    """Return the damped step, and note the covariance of the place.
+
+    Parameters
+    ----------
+    fit : Fit
+    derivative : (knobs, seeds, statistics)
+    residual : (seeds, statistics)
+    """
+    seeds = len(residual)
+    total, left = derivative.sum(axis=1), residual.sum(axis=0)
+    biased = total @ total.T / seeds**2
+    own = np.einsum("ask,bsk->ab", derivative, derivative)
+    pairs = seeds * (seeds - 1)
+    normal = (total @ total.T - own) / pairs
+    downhill = (total @ left - np.einsum("ask,sk->a", derivative, residual)) / pairs
+    # with few seeds the unbiased matrix may be no matrix of squares at all
+    if np.linalg.eigvalsh(normal - _LEAST_SHARE * np.diag(np.diag(biased))).min() < 0.0:
+        normal, downhill = biased, total @ left / seeds**2
     # the mean of the simulations varies, too
     fit.covariance = np.linalg.pinv(normal) * (1.0 + 1.0 / seeds)
-    move = np.linalg.solve(damped, j.T @ residual)
+    damped = normal + np.diag(fit.damping * np.diag(normal) + 1e-6)
+    move = np.linalg.solve(damped, downhill)
     largest = float(np.abs(move).max())
     return np.asarray(move * min(1.0, _LARGEST_MOVE / max(largest, 1e-12)))

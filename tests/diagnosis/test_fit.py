@@ -61,7 +61,6 @@ def test_two_knobs_are_found_together():
     assert fit.config.pixel.thresholds.on == pytest.approx(0.26, rel=0.05)
     assert fit.config.pixel.thresholds.off == pytest.approx(0.17, rel=0.05)
     assert fit.covariance.shape == (2, 2)
-    assert fit.derivative.shape == (STATISTICS, 2)
 
 
 @pytest.mark.parametrize("view", [parts.JUDGE, BOTH])
