@@ -23,8 +23,8 @@ from adv2e.characterisation.characterise import Settings, characterise
 from adv2e.characterisation.declared import read_declared
 from adv2e.characterisation.table import Table, parse_table
 from adv2e.config import Config, from_dict
-from adv2e.diagnosis.result import Diagnosis
 from adv2e.errors import Adv2eError, DataError
+from adv2e.reports.result import Diagnosis
 
 COARSEST = 0.05
 """Medians whose reading error is above this share of them are left out."""

@@ -24,8 +24,8 @@ from adv2e.characterisation.declared import read_declared
 from adv2e.characterisation.noise_problem import NoiseProblem
 from adv2e.characterisation.table import Table, parse_table
 from adv2e.config import Config, load_config
-from adv2e.diagnosis.result import Diagnosis
 from adv2e.errors import Adv2eError
+from adv2e.reports.result import Diagnosis
 
 DECLARED = "v2e"
 OPEN = 0.25

@@ -1,4 +1,4 @@
-"""From a table to what it says of the camera: a :class:`adv2e.diagnosis.result.Diagnosis`."""
+"""From a table to what it says of the camera: a :class:`adv2e.reports.result.Diagnosis`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from adv2e.characterisation.problem import Problem
 from adv2e.characterisation.selection import Draws, Model, Selection, Selector
 from adv2e.characterisation.table import Table
 from adv2e.config import to_dict
-from adv2e.diagnosis.result import (
+from adv2e.errors import DataError
+from adv2e.reports.result import (
     Band,
     Curve,
     Diagnosis,
@@ -30,7 +31,6 @@ from adv2e.diagnosis.result import (
     Rejected,
     Verdict,
 )
-from adv2e.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -228,7 +228,7 @@ def _errors(chosen: Selection, problem: Problem) -> list[ErrorRow]:
     for k, level in enumerate(levels if levels.size > 1 else ()):
         light = float(problem.light[problem.level == level][0])
         before, after = (float(m.errors[k] ** 0.5) for m in (chosen.before, chosen.after))
-        rows.append(_row(f"the same, at {problem.light_label} {light:g}", before, after, floor))
+        rows.append(_row(f"the same, at {light:g} {problem.light_unit}", before, after, floor))
     return rows
 
 
@@ -252,7 +252,7 @@ def _curves(problem: Problem, chosen: Selection, before: Draws, after: Draws) ->
         curves.append(
             Curve(
                 title=f"{problem.what.capitalize()}, {group.title}",
-                x_label=problem.light_label,
+                x_label=f"light [{problem.light_unit}]",
                 y_label=f"{problem.what} [{problem.unit}]",
                 x=problem.light[rows],
                 measured=np.exp(problem.measured[rows]),

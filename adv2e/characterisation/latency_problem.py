@@ -70,7 +70,7 @@ class LatencyProblem:
     ) -> None:
         self.measured = np.log(data.latency_us)
         self.light, self.level, self.judged = data.light, levels_of(data.light), judged
-        self.light_label = f"light [{data.unit}]"
+        self.light_unit = data.unit
         self._polarity = data.polarity
         self._white = white or float(data.light.max())
         self._contrast = (

@@ -89,7 +89,7 @@ class NoiseProblem:
         self.error, self.error_source = row_errors(
             given, self.measured, repeats, ASSUMED_ERROR, LEAST_ERROR
         )
-        self.light_label = f"light [{data.unit}]"
+        self.light_unit = data.unit
         self.groups = tuple(
             Group(_title(kind), np.array([k for k, at in enumerate(self._kinds) if at == kind]))
             for kind in data.rates

@@ -74,7 +74,7 @@ class Problem(Protocol):
     candidates : tuple of Candidate
     out_of_reach : mapping of str to str
         Effects that cannot act on such a table, and why.
-    what, unit, light_label : str
+    what, unit, light_unit : str
         What is measured.
     groups : tuple of Group
     notes : tuple of str
@@ -91,7 +91,7 @@ class Problem(Protocol):
     out_of_reach: Mapping[str, str]
     what: str
     unit: str
-    light_label: str
+    light_unit: str
     groups: tuple[Group, ...]
     notes: tuple[str, ...]
 

@@ -93,11 +93,12 @@ def command(
     """
     from adv2e.characterisation.characterise import Settings, characterise
     from adv2e.characterisation.declared import read_declared
-    from adv2e.characterisation.report import check_free, summary, write_report
+    from adv2e.characterisation.report import summary, write_reports
     from adv2e.characterisation.table import read_table
+    from adv2e.reports.files import check_folder
 
     if output is not None:
-        check_free(Path(output), overwrite)
+        check_folder(output, overwrite=overwrite)
     declared = read_declared(config_files, sets, seed)
     settings = Settings(
         where=where,
@@ -110,7 +111,7 @@ def command(
     )
     found = characterise(read_table(table), declared, settings)
     if output is not None:
-        write_report(found, Path(output), overwrite)
+        write_reports(found, output, overwrite=overwrite)
     if log.level >= 0:
         click.echo(summary(found))
         if output is not None:

@@ -61,8 +61,10 @@ def command(
 
     from adv2e.diagnosis.diagnose import diagnose
     from adv2e.diagnosis.evidence import read_evidence
-    from adv2e.diagnosis.report import check_folder, summary_text, write_reports
+    from adv2e.diagnosis.report import write_reports
     from adv2e.pixel import is_compiled
+    from adv2e.reports.files import check_folder
+    from adv2e.reports.summary import summary_text
 
     check_names(without)
     folder = Path(output or f"{Path(recording).stem}.diagnosis")

@@ -15,8 +15,8 @@ from adv2e.diagnosis.fit import Fit, Fitter
 from adv2e.diagnosis.interpolation import InterpolationError
 from adv2e.diagnosis.markers import BOTH, VIEWS
 from adv2e.diagnosis.metric import Model, Scale
-from adv2e.diagnosis.result import Rejected
 from adv2e.diagnosis.simulations import Laboratory
+from adv2e.reports.result import Rejected
 
 Array = NDArray[np.float64]
 

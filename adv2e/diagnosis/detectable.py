@@ -9,7 +9,7 @@ import numpy as np
 from adv2e.diagnosis.bench import Bench, State
 from adv2e.diagnosis.candidates import Candidate, about_key, neutral_value
 from adv2e.diagnosis.markers import BOTH
-from adv2e.diagnosis.result import Detectable
+from adv2e.reports.result import Detectable
 
 _POWER = 3.2  # deviations: 99 % below without the effect, 80 % above with it
 _SEEDS = (1, 2)  # those of the probes

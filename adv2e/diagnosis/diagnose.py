@@ -26,11 +26,11 @@ from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.markers.timing import strongest_lines
 from adv2e.diagnosis.nuisances import fit_thresholds
 from adv2e.diagnosis.picture import Gallery
-from adv2e.diagnosis.result import Diagnosis, Finding, Rejected, Signature, Verdict
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.search import LEVEL, NEARLY, PARTLY, Outcome, Search
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 from adv2e.diagnosis.stream import Stream
+from adv2e.reports.result import Diagnosis, Finding, Rejected, Signature, Verdict
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_norms
 from adv2e.diagnosis.parts import Parts
-from adv2e.diagnosis.result import ErrorRow, Estimate
 from adv2e.diagnosis.stream import Stream
+from adv2e.reports.result import ErrorRow, Estimate
 
 NAME = "distance of the signed streams, smoothed in time"
 PAIRS = 20

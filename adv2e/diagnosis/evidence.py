@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.result import Masked
 from adv2e.diagnosis.stream import Stream
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.recordings import read_recording
+from adv2e.reports.result import Masked
 
 LEAST_EVENTS = 1000
 """Below that nothing can be told."""

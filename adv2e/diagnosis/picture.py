@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from adv2e.diagnosis.markers.intervals import BORDERS_MS
 from adv2e.diagnosis.markers.timing import LAGS_MS
-from adv2e.diagnosis.result import Band, Curve, ResidualMap
 from adv2e.diagnosis.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
+from adv2e.reports.result import Band, Curve, ResidualMap
 
 Array = NDArray[np.float64]
 _Measure = Callable[[Placed], Array]

@@ -24,8 +24,8 @@ from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations
 from adv2e.diagnosis.interpolation import InterpolationError
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
-from adv2e.diagnosis.result import Rejected
 from adv2e.diagnosis.simulations import Laboratory
+from adv2e.reports.result import Rejected
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from adv2e.config import Config, load_config
 from adv2e.diagnosis.candidates import Hints, library
 from adv2e.diagnosis.diagnose import diagnose
 from adv2e.diagnosis.evidence import read_evidence
-from adv2e.diagnosis.result import Diagnosis
+from adv2e.reports.result import Diagnosis
 from study_diagnosis_parts.camera import REPOSITORY, camera, settings
 from study_diagnosis_parts.cases import Case
 from study_diagnosis_parts.results import Line

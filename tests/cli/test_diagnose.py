@@ -13,6 +13,7 @@ from adv2e import load_config, simulate
 from adv2e.diagnosis import diagnose as whole
 from adv2e.diagnosis import evidence, report, search
 from adv2e.diagnosis.candidates import names
+from adv2e.reports import summary
 from adv2e.sinks import open_sink
 
 FILES = ["model.yaml", "report.html", "report.json"]
@@ -196,7 +197,7 @@ def made_up(monkeypatch, tmp_path):
     monkeypatch.setattr(evidence, "read_evidence", read)
     monkeypatch.setattr(whole, "diagnose", diagnose)
     monkeypatch.setattr(report, "write_reports", write)
-    monkeypatch.setattr(report, "summary_text", lambda found: "the summary")
+    monkeypatch.setattr(summary, "summary_text", lambda found: "the summary")
     monkeypatch.chdir(tmp_path)
     return calls
 

@@ -1,4 +1,4 @@
-"""The second half of the page: the residual in pictures and numbers, what was tried, the data."""
+"""Sections of the page that only recordings have: maps, signatures, what was left out."""
 
 from __future__ import annotations
 
@@ -7,31 +7,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adv2e.diagnosis.report.curve_chart import curve_chart
-from adv2e.diagnosis.report.findings import unit_text
-from adv2e.diagnosis.report.markup import Markup, join, tag
-from adv2e.diagnosis.report.quantities import (
+from adv2e.diagnosis.report.sensor_map import CLIP_SD, Map, colour_bar, map_image, reduction
+from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.quantities import (
     NOTHING,
     number_text,
     percent_text,
     short_text,
-    unit_of,
-    value_text,
+    unit_text,
 )
-from adv2e.diagnosis.report.sensor_map import CLIP_SD, Map, colour_bar, map_image, reduction
-from adv2e.diagnosis.report.tables import Column, table
-from adv2e.diagnosis.result import Curve, Diagnosis, Rejected, ResidualMap, Signature
+from adv2e.reports.result import Diagnosis, ResidualMap, Signature
+from adv2e.reports.tables import SHOWN, Column, table
 
 LARGE_Z = 3.0
 """Distances in standard deviations from here on are marked."""
-_SHOWN = 12
-"""Rows of a long table that are not folded away."""
-
-
-def curves(given: Sequence[Curve]) -> Markup:
-    """Return the curves, side by side where there is room."""
-    figures = [tag("figure", tag("figcaption", curve.title), curve_chart(curve)) for curve in given]
-    return tag("div", *figures, class_="side")
 
 
 def maps(given: Sequence[ResidualMap]) -> Markup:
@@ -82,7 +71,7 @@ def signatures(given: Sequence[Signature]) -> Markup:
         f" ±{LARGE_Z:g} (marked ▲ or ▼): {far} of {len(given)} before, {still} after."
     )
     caption = "Marker statistics on held-out data, by their distance before"
-    return join(tag("p", lead), table(caption, columns, rows, folded_from=_SHOWN))
+    return join(tag("p", lead), table(caption, columns, rows, folded_from=SHOWN))
 
 
 def _rank(signature: Signature) -> tuple[float, float]:
@@ -111,29 +100,6 @@ def _z(z: float) -> Markup | str:
     return tag("strong", tag("span", sign, aria_hidden="true"), f" {text}", class_="large")
 
 
-def rejected(given: Sequence[Rejected]) -> Markup:
-    """Return what was tried and not added, and why."""
-    if not given:
-        return tag("p", "Nothing else was tried.")
-    columns = [
-        Column("effect"),
-        Column("why not"),
-        Column("tried with"),
-        Column("misfit with it", number=True),
-    ]
-    rows = []
-    for one in given:
-        tried = [
-            f"{path} = {value_text(value)} {unit_text(unit_of(path))}".rstrip()
-            for path, value in one.parameters.items()
-        ]
-        lines = [tag("span", text, class_="line") for text in tried or [NOTHING]]
-        held_out = NOTHING if one.held_out is None else number_text(one.held_out)
-        rows.append((one.name, one.reason, join(*lines), held_out))
-    caption = "Effects tried and not added; misfit on held-out data relative to that before"
-    return table(caption, columns, rows, folded_from=_SHOWN)
-
-
 def detectable(diagnosis: Diagnosis) -> Markup:
     """Return how small an effect could have been to be seen."""
     if not diagnosis.detectable:
@@ -144,7 +110,7 @@ def detectable(diagnosis: Diagnosis) -> Markup:
         for one in diagnosis.detectable
     ]
     caption = "Smallest change of each key that would have been seen 8 times in 10"
-    return table(caption, columns, rows, folded_from=2 * _SHOWN)
+    return table(caption, columns, rows, folded_from=2 * SHOWN)
 
 
 def data(diagnosis: Diagnosis) -> Markup:
@@ -157,10 +123,3 @@ def data(diagnosis: Diagnosis) -> Markup:
     else:
         parts.append(tag("p", "Nothing was set aside."))
     return join(*parts)
-
-
-def facts(diagnosis: Diagnosis) -> Markup:
-    """Return the small things."""
-    rows = list(diagnosis.facts.items())
-    columns = [Column("what"), Column("value")]
-    return table("Sizes, seeds, times and versions", columns, rows) if rows else Markup()

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.report.markup import Markup, tag
+from adv2e.reports.markup import Markup, tag
 
 Map = NDArray[np.float64]
 Picture = NDArray[np.uint8]

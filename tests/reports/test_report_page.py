@@ -9,10 +9,11 @@ import pytest
 from camera.catalogue import LIBRARY
 from made_up_diagnosis import HOSTILE, everything, nothing, strange
 
-from adv2e.diagnosis.report.findings import MARKS
+from adv2e.characterisation import report as characterisation_report
 from adv2e.diagnosis.report.page import page
-from adv2e.diagnosis.report.separation import SEPARATIONS
-from adv2e.diagnosis.result import ResidualMap, Signature
+from adv2e.reports.findings import MARKS
+from adv2e.reports.result import ResidualMap, Signature
+from adv2e.reports.separation import SEPARATIONS
 
 EMPTY = {"br", "img", "meta"}
 LOADING = {"src", "href", "srcset", "data", "action", "poster"}
@@ -60,8 +61,9 @@ def full():
     return page(everything())
 
 
+@pytest.mark.parametrize("page", [page, characterisation_report.page])
 @pytest.mark.parametrize("make", [everything, nothing, strange])
-def test_the_page_is_well_formed_and_alone(make):
+def test_the_page_is_well_formed_and_alone(make, page):
     text = page(make())
     outline = Outline(text)
     assert text.startswith("<!DOCTYPE html>\n<html lang=")
@@ -90,6 +92,7 @@ def test_texts_are_shown_as_they_are():
     whole = HOSTILE.replace("\x00", "\ufffd").replace("\udc80", "\ufffd")
     assert whole in shown
     assert shown.count(whole) >= 15
+    assert Outline(characterisation_report.page(strange())).texts.count(whole) >= 10
 
 
 def test_headings_come_in_order(full):
@@ -138,6 +141,15 @@ def test_the_page_says_what_was_found(full):
         "Time between events",
     ):
         assert part in text
+
+
+def test_the_page_of_a_table_holds_what_a_table_can_show():
+    outline = Outline(characterisation_report.page(everything()))
+    assert outline.headings[0] == ("h1", "Characterisation of office_zigzag.zip")
+    absent = ("Signatures", "What could have been seen")
+    assert not {text for _, text in outline.headings} & set(absent)
+    for part in ("no line in the spectrum beyond chance", "Blocks of 0.5 s", "standard errors"):
+        assert part in outline.text
 
 
 @pytest.mark.parametrize("verdict", MARKS)

@@ -7,30 +7,31 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from adv2e.config.yaml12 import scalar_text
-from adv2e.diagnosis.report.markup import plain
-from adv2e.diagnosis.report.quantities import interval_text, native, unit_of
-from adv2e.diagnosis.result import Diagnosis
+from adv2e.reports.markup import plain
+from adv2e.reports.quantities import interval_text, native, unit_of
+from adv2e.reports.result import Diagnosis
+from adv2e.reports.wording import Wording
 
 _WIDTH = 100
 
 
-def model_text(diagnosis: Diagnosis) -> str:
+def model_text(diagnosis: Diagnosis, wording: Wording) -> str:
     """Return the configuration found as YAML that ``adv2e convert -c`` takes.
 
     Keys that were added, and nuisances, say so; every key that has a unit names it.
     """
     origins = _origins(diagnosis)
     lines = list(_lines(native(diagnosis.model), "", 0, origins))
-    return "\n".join([*_head(diagnosis), "", *(lines or ["{}"]), ""])
+    return "\n".join([*_head(diagnosis, wording), "", *(lines or ["{}"]), ""])
 
 
-def _head(diagnosis: Diagnosis) -> list[str]:
+def _head(diagnosis: Diagnosis, wording: Wording) -> list[str]:
     texts = [
-        f"Model found by adv2e diagnose in {diagnosis.recording},"
+        f"Model found by {wording.command} in {diagnosis.recording},"
         f" on top of {diagnosis.declared}: {diagnosis.verdict}.",
         diagnosis.sentence,
         "Keys marked 'added' belong to effects that the declared model lacked; those marked"
-        " 'nuisance' were not declared and were fitted; all others are as declared.",
+        f" 'nuisance' were not declared and were fitted; all others are {wording.others}.",
     ]
     return [
         line

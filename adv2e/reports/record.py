@@ -6,24 +6,25 @@ import json
 import math
 from typing import Any
 
-from adv2e.diagnosis.report.quantities import native
-from adv2e.diagnosis.result import Diagnosis, Estimate
+from adv2e.reports.quantities import native
+from adv2e.reports.result import Diagnosis, Estimate
+from adv2e.reports.wording import Wording
 
 
-def record(diagnosis: Diagnosis) -> dict[str, Any]:
+def record(diagnosis: Diagnosis, wording: Wording) -> dict[str, Any]:
     """Return the content of ``report.json``.
 
     The keys up to ``signatures`` are what programs may rely on; those after it hold the rest of
     what the page shows.  Numbers are finite, or None.
     """
-    content = {**_fixed(diagnosis), **_further(diagnosis)}
+    content = {**_fixed(diagnosis), **_further(diagnosis, wording)}
     finite: dict[str, Any] = _finite(native(content))
     return finite
 
 
-def record_text(diagnosis: Diagnosis) -> str:
+def record_text(diagnosis: Diagnosis, wording: Wording) -> str:
     """Return ``report.json`` as text."""
-    return json.dumps(record(diagnosis), indent=2, allow_nan=False) + "\n"
+    return json.dumps(record(diagnosis, wording), indent=2, allow_nan=False) + "\n"
 
 
 def _fixed(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -49,10 +50,10 @@ def _fixed(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _further(diagnosis: Diagnosis) -> dict[str, Any]:
+def _further(diagnosis: Diagnosis, wording: Wording) -> dict[str, Any]:
     return {
         "sentence": diagnosis.sentence,
-        "recording": diagnosis.recording,
+        wording.subject: diagnosis.recording,
         "declared": diagnosis.declared,
         "errors": [
             {

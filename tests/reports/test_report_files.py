@@ -7,12 +7,16 @@ import pytest
 import yaml
 from made_up_diagnosis import MODEL, everything, nothing, strange
 
+from adv2e.characterisation import report as characterisation_report
 from adv2e.config import from_dict, load_config
-from adv2e.diagnosis import report
-from adv2e.diagnosis.report import check_folder, summary_text, write_reports
-from adv2e.diagnosis.report.model_file import model_text
-from adv2e.diagnosis.report.quantities import native
+from adv2e.diagnosis.report import write_reports
+from adv2e.diagnosis.report.page import WORDING
 from adv2e.errors import OutputError
+from adv2e.reports import files
+from adv2e.reports.files import check_folder
+from adv2e.reports.model_file import model_text
+from adv2e.reports.quantities import native
+from adv2e.reports.summary import summary_text
 
 NAMES = ["model.yaml", "report.html", "report.json"]
 
@@ -21,9 +25,10 @@ def listing(folder):
     return sorted(entry.name for entry in folder.iterdir())
 
 
+@pytest.mark.parametrize("write", [write_reports, characterisation_report.write_reports])
 @pytest.mark.parametrize("make", [everything, nothing, strange])
-def test_three_files_are_written(make, tmp_path):
-    write_reports(make(), tmp_path / "new" / "found")
+def test_three_files_are_written(make, write, tmp_path):
+    write(make(), tmp_path / "new" / "found")
     assert listing(tmp_path / "new" / "found") == NAMES
     assert listing(tmp_path) == ["new"]
 
@@ -55,10 +60,10 @@ def test_a_free_name_is_left_untouched_by_the_check(tmp_path):
 
 
 def test_what_fails_leaves_nothing(tmp_path, monkeypatch):
-    def full_disk(diagnosis):
+    def full_disk(diagnosis, wording):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setitem(report.FILES, "model.yaml", full_disk)
+    monkeypatch.setattr(files, "model_text", full_disk)
     with pytest.raises(OSError, match="No space"):
         write_reports(everything(), tmp_path / "found")
     assert listing(tmp_path) == []
@@ -76,7 +81,7 @@ def test_an_interruption_leaves_nothing(tmp_path, monkeypatch):
 
 
 def test_errors_of_the_system_name_the_folder(tmp_path, monkeypatch):
-    monkeypatch.setitem(report.FILES, "no/such/folder.txt", lambda diagnosis: "")
+    monkeypatch.setattr(files, "NAMES", ("report.html", "report.json", "no/such/folder.txt"))
     with pytest.raises(OutputError, match="found: cannot be written: No such file"):
         write_reports(everything(), tmp_path / "found")
     assert listing(tmp_path) == []
@@ -104,19 +109,21 @@ def test_hostile_names_stay_in_comments(tmp_path):
 
 
 def test_the_model_says_where_its_values_are_from():
-    lines = {line.split(":")[0].strip(): line for line in model_text(everything()).splitlines()}
+    lines = {
+        line.split(":")[0].strip(): line for line in model_text(everything(), WORDING).splitlines()
+    }
     assert lines["period_us"].endswith("# [us] added: refractory, 95 % interval 5,500 to 6,500")
     assert lines["cutoff_hz"].endswith("# [Hz] added: low_pass, 95 % interval 172 to 204")
     assert lines["on"].endswith("on: 0.21  # [ln] nuisance")
     assert lines["off"].endswith("off: 0.2  # [ln]")
     assert lines["encoding"].endswith("# nuisance")
     assert lines["source_follower"].strip() == "source_follower: null"
-    assert all(len(line) <= 100 for line in model_text(everything()).splitlines())
+    assert all(len(line) <= 100 for line in model_text(everything(), WORDING).splitlines())
 
 
 def test_lists_are_written_in_one_line():
     model = {"frames": {"shift_px": [0.5, -0.25]}}
-    text = model_text(replace(everything(), model=model))
+    text = model_text(replace(everything(), model=model), WORDING)
     assert yaml.safe_load(text) == model
     assert "shift_px: [0.5, -0.25]" in text
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e.diagnosis.report import paths
-from adv2e.diagnosis.report.axes import (
+from adv2e.reports import paths
+from adv2e.reports.axes import (
     LINE_HEIGHT,
     Axis,
     Floats,
@@ -17,18 +18,19 @@ from adv2e.diagnosis.report.axes import (
     place_text,
     wrapped,
 )
-from adv2e.diagnosis.report.markup import Markup, join, tag
-from adv2e.diagnosis.result import Band, Curve
+from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.result import Band, Curve
+from adv2e.reports.wording import Wording
 
 WIDTH, _PLOT_HEIGHT = 460, 200
 _LEFT, _RIGHT, _LEGEND = 58, 14, 22
 _FEW_POINTS, _MANY_POINTS = 40, 250
-"""Up to the one number, points are marked one by one; from the other on, the line is thin."""
+"""Up to the one number, points of a line are marked; from the other on, the line is thin."""
 
 _LEGENDS = (
     ("measured", "measured", 4),
-    ("before", "before (declared model)", 94),
-    ("after", "after (model found)", 276),
+    ("before", "before (declared model)", 104),
+    ("after", "after (model found)", 290),
 )
 
 
@@ -56,11 +58,20 @@ class _Frame:
         return paths.band(xs, lows, highs)
 
 
+def curves(given: Sequence[Curve], wording: Wording) -> Markup:
+    """Return the curves, side by side where there is room, and what their bands are."""
+    if not given:
+        return Markup()
+    figures = [tag("figure", tag("figcaption", curve.title), curve_chart(curve)) for curve in given]
+    note = tag("p", f"Bands: {wording.bands}.", class_="note")
+    return join(tag("div", *figures, class_="side"), note)
+
+
 def curve_chart(curve: Curve) -> Markup:
     """Return the picture of `curve`: measured, and median and 95 % band of either model.
 
-    Borders of bins are drawn as steps.  What cannot be drawn (no number, or none that the
-    logarithm has) leaves a gap.
+    Borders of bins are drawn as steps; values at the same place are points without a line.  What
+    cannot be drawn (no number, or none that the logarithm has) leaves a gap.
     """
     x_label = wrapped(curve.x_label, WIDTH - _LEFT)
     y_label = wrapped(curve.y_label, WIDTH)
@@ -69,21 +80,40 @@ def curve_chart(curve: Curve) -> Markup:
     frame = _frame_of(curve, top, bottom)
     if frame is None:
         return tag("p", "There is nothing to draw: no value is known.", class_="note")
+    measured = drawable(curve.measured)
+    joined = bool((np.diff(curve.x) > 0).all())
+    dots = len(frame.x) == len(measured) and (len(measured) <= _FEW_POINTS or not joined)
     content = [
-        tag("title", f"{curve.title}: {curve.y_label} against {curve.x_label}"),
-        _legend(),
+        tag("title", _description(curve)),
+        _legend(joined, dots),
         draw_axes(frame.across, frame.up, x_label, y_label),
     ]
     for name, band in (("before", curve.before), ("after", curve.after)):
         content.append(tag("path", d=frame.band(band), class_=f"band {name}"))
-    measured = drawable(curve.measured)
-    width = "dense" if len(measured) > _MANY_POINTS else ""
-    content.append(tag("path", d=frame.line(measured), class_=f"curve measured {width}".rstrip()))
-    content.append(_points(frame, measured))
+    if joined:
+        width = " dense" if len(measured) > _MANY_POINTS else ""
+        content.append(tag("path", d=frame.line(measured), class_=f"curve measured{width}"))
+    if dots:
+        ys = frame.up.place(measured)
+        content += [_dot(x, y, joined) for x, y in zip(frame.x, ys, strict=True)]
     for name, band in (("after", curve.after), ("before", curve.before)):
         content.append(tag("path", d=frame.line(drawable(band.middle)), class_=f"curve {name}"))
     height = bottom + 26 + len(x_label) * LINE_HEIGHT
     return tag("svg", *content, viewBox=f"0 0 {WIDTH} {height}", role="img")
+
+
+def _description(curve: Curve) -> str:
+    """Return what the picture shows, for those who do not see it."""
+    known = np.isfinite(curve.measured)
+    inside = [
+        int(np.sum(known & (curve.measured >= band.low) & (curve.measured <= band.high)))
+        for band in (curve.before, curve.after)
+    ]
+    return (
+        f"{curve.title}: {curve.y_label} against {curve.x_label}. Of {known.sum()} measured values"
+        f" {inside[0]} lie in the band of the declared model, {inside[1]} in that of the model"
+        " found."
+    )
 
 
 def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
@@ -101,24 +131,21 @@ def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
     return _Frame(across, up, across.place(x))
 
 
-def _points(frame: _Frame, measured: Floats) -> Markup:
-    if len(frame.x) != len(measured) or len(measured) > _FEW_POINTS:
+def _dot(x: float, y: float, joined: bool) -> Markup:
+    if not (np.isfinite(x) and np.isfinite(y)):
         return Markup()
-    places = zip(frame.x, frame.up.place(measured), strict=True)
-    return join(
-        *(
-            tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=2.5, class_="dot measured")
-            for x, y in places
-            if np.isfinite(x) and np.isfinite(y)
-        )
-    )
+    r = 2.5 if joined else 3.5
+    return tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=r, class_="dot measured")
 
 
-def _legend() -> Markup:
+def _legend(joined: bool, dots: bool) -> Markup:
     parts = []
     for name, text, x in _LEGENDS:
         if name != "measured":
             parts.append(tag("rect", x=x, y=4, width=22, height=12, class_=f"band {name}"))
-        parts.append(tag("path", d=f"M{x} 10L{x + 22} 10", class_=f"curve {name}"))
+        elif dots:
+            parts.append(_dot(x + 11, 10, joined))
+        if joined or name != "measured":
+            parts.append(tag("path", d=f"M{x} 10L{x + 22} 10", class_=f"curve {name}"))
         parts.append(place_text(x + 27, 14, text, class_="label"))
     return join(*parts)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.report.markup import Markup, join, tag
-from adv2e.diagnosis.report.ticks import linear_ticks, log_ticks, tick_labels
+from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.ticks import linear_ticks, log_ticks, tick_labels
 
 Floats = NDArray[np.float64]
 

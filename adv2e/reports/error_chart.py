@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adv2e.diagnosis.report.axes import LINE_HEIGHT, Axis, place_text, rule, wrapped
-from adv2e.diagnosis.report.markup import Markup, join, tag
-from adv2e.diagnosis.report.quantities import estimate_text
-from adv2e.diagnosis.report.ticks import linear_ticks, tick_labels
-from adv2e.diagnosis.result import ErrorRow, Estimate
+from adv2e.reports.axes import LINE_HEIGHT, Axis, place_text, rule, wrapped
+from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.quantities import estimate_text
+from adv2e.reports.result import ErrorRow, Estimate
+from adv2e.reports.ticks import linear_ticks, tick_labels
 
 WIDTH = 720
 _START, _END, _VALUES = 130, 520, 536
@@ -46,7 +46,7 @@ def error_chart(rows: Sequence[ErrorRow]) -> Markup:
     middle = (_START + _END) / 2
     caption = "error relative to that of the declared model"
     grid.append(place_text(middle, y + 36, caption, text_anchor="middle", class_="label"))
-    title = tag("title", "Errors before and after, and floor, with 95 % intervals; numbers below")
+    title = tag("title", "Errors before and after, and floor; the numbers stand below")
     view = f"0 0 {WIDTH} {y + 44:.0f}"
     return tag("svg", title, *grid, *parts, viewBox=view, role="img", class_="wide")
 

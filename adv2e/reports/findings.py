@@ -1,24 +1,25 @@
-"""The first half of the page: verdict, errors, what was added and what else would explain it."""
+"""Sections of the page on what was found: verdict, errors, what was added, nuisances, notes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from adv2e.diagnosis.report.error_chart import error_chart
-from adv2e.diagnosis.report.markup import Markup, join, tag
-from adv2e.diagnosis.report.quantities import (
+from adv2e.reports.error_chart import error_chart
+from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.quantities import (
     estimate_text,
     interval_text,
     meaning_of,
     probability_text,
     summary_of,
     unit_of,
+    unit_text,
     value_text,
 )
-from adv2e.diagnosis.report.separation import separation_of
-from adv2e.diagnosis.report.tables import Column, table
-from adv2e.diagnosis.result import Diagnosis, Finding, Interval, Rejected
+from adv2e.reports.result import Diagnosis, Finding, Interval
+from adv2e.reports.tables import Column, table
+from adv2e.reports.wording import Wording
 
 MARKS = {
     "consistent": ("✓", "Consistent", "nothing is missing from the declared model"),
@@ -28,11 +29,6 @@ MARKS = {
     "unexplained": ("✗", "Unexplained", "nothing in the library accounts for the residual"),
 }
 """Sign, word and meaning of each verdict."""
-
-
-def unit_text(unit: str) -> str:
-    """Return a unit as people write it."""
-    return {"us": "µs", "-": ""}.get(unit, unit)
 
 
 def verdict(diagnosis: Diagnosis) -> Markup:
@@ -47,7 +43,7 @@ def verdict(diagnosis: Diagnosis) -> Markup:
     )
 
 
-def errors(diagnosis: Diagnosis) -> Markup:
+def errors(diagnosis: Diagnosis, wording: Wording) -> Markup:
     """Return the errors before and after, beside the floor, as a picture and a table."""
     names = ("measure", "before", "after", "floor")
     columns = [Column(name, number=name != "measure") for name in names]
@@ -58,7 +54,9 @@ def errors(diagnosis: Diagnosis) -> Markup:
     parts: list[Markup] = []
     if rows:
         parts.append(tag("figure", error_chart(diagnosis.errors)))
-        parts.append(table("Errors on held-out data, with 95 % intervals", columns, rows))
+        given = any(row.before.interval or row.after.interval for row in diagnosis.errors)
+        caption = f"Errors on held-out data{', with 95 % intervals' if given else ''}"
+        parts.append(table(caption, columns, rows))
     else:
         parts.append(tag("p", "No error was measured."))
     before, after = diagnosis.global_p_before, diagnosis.global_p_after
@@ -72,10 +70,7 @@ def errors(diagnosis: Diagnosis) -> Markup:
             " after.",
         )
     )
-    explained = (
-        "Before: the declared model. After: the model found. Floor: independent draws of the"
-        " model found against each other: as near as it comes to itself."
-    )
+    explained = f"Before: the declared model. After: the model found. Floor: {wording.floor}."
     parts.append(tag("p", explained, class_="note"))
     return join(*parts)
 
@@ -111,36 +106,6 @@ def _parameters(finding: Finding) -> Markup:
     return table(f"Parameters of {finding.name}", columns, rows)
 
 
-def alternatives(diagnosis: Diagnosis) -> Markup:
-    """Return which effects explain the residual as well, and what would separate them."""
-    if not diagnosis.alternatives:
-        return tag("p", "None.")
-    names = [finding.name for finding in diagnosis.effects] + diagnosis.alternatives
-    paths = _paths(diagnosis)
-    rows = []
-    for name in dict.fromkeys(names):
-        role = "explains it as well" if name in diagnosis.alternatives else "in the model found"
-        heading = join(name, tag("span", role, class_="meaning"))
-        summary = summary_of(name, paths.get(name, []))
-        rows.append((heading, summary, separation_of(name) or "not known"))
-    columns = [Column("effect"), Column("what it is"), Column("what would show it")]
-    lead = (
-        "These data do not tell the following effects apart; recordings of the kind in the last"
-        " column would."
-    )
-    caption = "Effects that explain the residual, and the recordings that would separate them"
-    return join(tag("p", lead), table(caption, columns, rows))
-
-
-def _paths(diagnosis: Diagnosis) -> dict[str, list[str]]:
-    """Return the keys of each effect, as far as the diagnosis names them."""
-    paths = {one.name: [one.key] for one in diagnosis.detectable}
-    trials: list[Rejected | Finding] = [*diagnosis.rejected, *diagnosis.effects]
-    for trial in trials:
-        paths.setdefault(trial.name, []).extend(trial.parameters)
-    return paths
-
-
 def _cell(value: Any, interval: Interval | None = None) -> Markup | str:
     """Return a value; a text may take several lines, a number may not."""
     text = value_text(value, interval)
@@ -157,3 +122,15 @@ def nuisances(values: Mapping[str, Any]) -> Markup:
         for path, value in values.items()
     ]
     return table("Keys that were not declared, with fitted values", columns, rows)
+
+
+def notes(texts: Sequence[str]) -> Markup:
+    """Return what the reader should know besides."""
+    return tag("ul", *(tag("li", text) for text in texts)) if texts else tag("p", "None.")
+
+
+def facts(given: Mapping[str, str]) -> Markup:
+    """Return the small things."""
+    columns = [Column("what"), Column("value")]
+    rows = list(given.items())
+    return table("Sizes, seeds, times and versions", columns, rows) if rows else Markup()

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from adv2e.diagnosis.report.markup import Markup, join, tag
+from adv2e.reports.markup import Markup, join, tag
+
+SHOWN = 12
+"""Rows of a long table that are not folded away."""
 
 
 @dataclass(frozen=True)

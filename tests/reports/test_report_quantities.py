@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adv2e.diagnosis.report.markup import join, markup, plain, tag
-from adv2e.diagnosis.report.quantities import (
+from adv2e.reports.markup import join, markup, plain, tag
+from adv2e.reports.quantities import (
     estimate_text,
     interval_text,
     meaning_of,
@@ -19,7 +19,7 @@ from adv2e.diagnosis.report.quantities import (
     unit_of,
     value_text,
 )
-from adv2e.diagnosis.result import Estimate
+from adv2e.reports.result import Estimate
 
 
 @pytest.mark.parametrize(
@@ -70,8 +70,8 @@ def test_values_of_other_kinds():
     assert value_text(187.123456) == "187.1"
     assert interval_text(None) == "-"
     assert interval_text(([0.1, 0.2], [0.3, 0.4])) == "[0.1, 0.2] to [0.3, 0.4]"
-    assert estimate_text(Estimate(2.0)) == "2"
-    assert estimate_text(Estimate(2.0, (float("nan"), 3.0))) == "2"
+    assert estimate_text(Estimate(2.0)) == "2.00"
+    assert estimate_text(Estimate(2.0, (float("nan"), 3.0))) == "2.00"
 
 
 @settings(deadline=None)

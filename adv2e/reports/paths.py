@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from adv2e.diagnosis.report.axes import Floats
+from adv2e.reports.axes import Floats
 
 _MOST_POINTS = 1000
 """Longer curves are thinned to what a picture of this size can show."""

@@ -12,10 +12,6 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from made_up_diagnosis import everything, strange
 
-from adv2e.diagnosis.report import paths
-from adv2e.diagnosis.report.axes import Axis, axis_over, drawable
-from adv2e.diagnosis.report.curve_chart import curve_chart
-from adv2e.diagnosis.report.error_chart import error_chart
 from adv2e.diagnosis.report.sensor_map import (
     colour_bar,
     colours,
@@ -23,7 +19,11 @@ from adv2e.diagnosis.report.sensor_map import (
     reduced,
     reduction,
 )
-from adv2e.diagnosis.result import Band, Curve, ErrorRow, Estimate
+from adv2e.reports import paths
+from adv2e.reports.axes import Axis, axis_over, drawable
+from adv2e.reports.curve_chart import curve_chart
+from adv2e.reports.error_chart import error_chart
+from adv2e.reports.result import Band, Curve, ErrorRow, Estimate
 
 NAN = np.nan
 ANY = hnp.arrays(np.float64, st.integers(0, 8), elements=st.floats())
@@ -134,7 +134,18 @@ def test_curves_lie_where_their_values_are():
     first, last = path_of(svg, "curve measured")
     assert first[0][1] == pytest.approx(height(1), abs=0.2)
     assert last[0][1] == pytest.approx(height(3), abs=0.2)
-    assert svg.count("<circle") == 2
+    assert svg.count("<circle") == 2 + 1  # and the one of the legend
+
+
+def test_repeated_measurements_are_points_without_a_line():
+    x, measured = np.array([1.0, 1, 2]), np.array([1.0, 3, NAN])
+    band = Band(np.full(3, 2.0), np.full(3, 0.5), np.full(3, 2.5))
+    other = Band(band.middle, band.low, np.full(3, 4.0))
+    svg = curve_chart(Curve("t", "x", "y", x, measured, band, other))
+    assert 'class="curve measured"' not in svg
+    assert svg.count("<circle") == 2 + 1  # and the one of the legend
+    title = re.search("<title>(.*)</title>", svg)[1]
+    assert "Of 2 measured values 1 lie in the band of the declared model, 2 in" in title
 
 
 def test_bands_that_reach_zero_end_at_the_bottom_of_a_logarithm():

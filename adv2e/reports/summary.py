@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import textwrap
 
-from adv2e.diagnosis.report.markup import plain
-from adv2e.diagnosis.report.quantities import (
+from adv2e.reports.markup import plain
+from adv2e.reports.quantities import (
     interval_text,
     number_text,
     probability_text,
     unit_of,
     value_text,
 )
-from adv2e.diagnosis.result import Diagnosis
+from adv2e.reports.result import Diagnosis
 
 WIDTH = 100
 _MOST_PARAMETERS = 5

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adv2e.diagnosis.result import (
+from adv2e.reports.result import (
     Band,
     Curve,
     Detectable,

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from adv2e.config import Key, all_keys
-from adv2e.diagnosis.result import Estimate
 from adv2e.effects import EFFECTS
+from adv2e.reports.result import Estimate
 
 NOTHING = "-"
 """Stands where there is no number."""
@@ -82,10 +82,9 @@ def interval_text(interval: Sequence[Any] | None) -> str:
 
 def estimate_text(estimate: Estimate) -> str:
     """Return value and interval, as in ``1.38 (1.30 to 1.46)``."""
-    value = value_text(estimate.value, estimate.interval)
     if estimate.interval is None or any(math.isnan(end) for end in estimate.interval):
-        return value
-    return f"{value} ({interval_text(estimate.interval)})"
+        return number_text(estimate.value)
+    return f"{value_text(estimate.value, estimate.interval)} ({interval_text(estimate.interval)})"
 
 
 def percent_text(share: float) -> str:
@@ -114,6 +113,11 @@ def unit_of(path: str) -> str:
     """Return the unit of the key `path`, empty where it has none or is not known."""
     key = key_named(path)
     return key.about.unit if key is not None and key.about.unit != "-" else ""
+
+
+def unit_text(unit: str) -> str:
+    """Return a unit as people write it."""
+    return {"us": "µs", "-": ""}.get(unit, unit)
 
 
 def meaning_of(path: str) -> str:

@@ -1,0 +1,75 @@
+"""The folder of a report: all its files come into place together, or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from adv2e.errors import OutputError
+from adv2e.reports.model_file import model_text
+from adv2e.reports.record import record_text
+from adv2e.reports.result import Diagnosis
+from adv2e.reports.wording import Wording
+from adv2e.sinks.staging import Staging
+
+NAMES = ("report.html", "report.json", "model.yaml")
+
+
+def check_folder(folder: str | Path, *, overwrite: bool = False) -> None:
+    """Check before long work that :func:`write_reports` will take `folder`; nothing is touched.
+
+    Raises
+    ------
+    OutputError
+        As :func:`write_reports` raises it.
+    """
+    Staging(overwrite).folder(Path(folder), _foreign)
+
+
+def write_reports(
+    diagnosis: Diagnosis,
+    folder: str | Path,
+    page: Callable[[Diagnosis], str],
+    wording: Wording,
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Write ``report.html``, ``report.json`` and ``model.yaml`` into a new `folder`.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    folder : str or Path
+    page : callable
+        Makes ``report.html``.
+    wording : Wording
+    overwrite : bool
+        Replace a folder of an earlier report.
+
+    Raises
+    ------
+    OutputError
+        `folder` exists and is not to be replaced, holds other things than a report, or cannot be
+        written.
+    """
+    texts = (page(diagnosis), record_text(diagnosis, wording), model_text(diagnosis, wording))
+    staging = Staging(overwrite)
+    unfinished = staging.folder(Path(folder), _foreign)
+    try:
+        staging.prepare()
+        unfinished.mkdir()
+        for name, text in zip(NAMES, texts, strict=True):
+            (unfinished / name).write_text(text, encoding="utf-8", newline="\n")
+        staging.commit()
+    except OSError as error:
+        staging.discard()
+        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
+    except BaseException:
+        staging.discard()
+        raise
+
+
+def _foreign(folder: Path) -> str | None:
+    """Name something in `folder` that no report holds."""
+    names = sorted(entry.name for entry in folder.iterdir() if entry.name not in NAMES)
+    return names[0] if names else None

@@ -1,0 +1,33 @@
+"""What a report calls things: where those of recordings and of tables differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Wording:
+    """Words of one kind of report.
+
+    Attributes
+    ----------
+    title : str
+        Of the page, before the name of the input.
+    command : str
+        What made the report.
+    subject : str
+        What the input is; its key in ``report.json``.
+    floor : str
+        What the floor of the errors is.
+    bands : str
+        What the bands of a curve are drawn around.
+    others : str
+        What the keys of ``model.yaml`` are that are neither added nor nuisances.
+    """
+
+    title: str
+    command: str
+    subject: str
+    floor: str
+    bands: str
+    others: str
