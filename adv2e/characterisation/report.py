@@ -19,7 +19,7 @@ WORDING = Wording(
     subject="table",
     floor="the standard errors of the table's rows",
     bands="the middle 95 % of fits to tables drawn from the model",
-    others="as declared; or else off where a table shows them, and defaults where it cannot",
+    others="as declared; what was not is off, or its default where a table cannot show it",
 )
 
 
@@ -42,7 +42,7 @@ def page(found: Diagnosis) -> str:
         ("What explains it as well", trials.alternatives(found)),
         ("Measured and predicted", curves(found.curves, WORDING)),
         ("What was rejected", trials.rejected(found.rejected)),
-        ("Data", tag("p", found.split)),
+        ("Data", tag("p", f"Held out: {found.split}.")),
         ("Nuisances", findings.nuisances(found.nuisances)),
         ("Notes", findings.notes(found.notes)),
         ("Facts", findings.facts(found.facts)),

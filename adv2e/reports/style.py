@@ -59,11 +59,10 @@ tbody th { font-weight: 600; min-width: 9em; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 td.number, th.number { padding-left: 10px; }
 .number + td:not(.number), .number + th:not(.number) { padding-left: 10px; }
-thead .number { white-space: normal; }
 td { min-width: 3em; }
 .number .text { white-space: normal; overflow-wrap: anywhere; }
 .meaning, .line { display: block; font-weight: 400; }
-.line { padding-left: 1em; text-indent: -1em; }
+.line { white-space: nowrap; }
 .large { color: var(--before); white-space: nowrap; }
 details > summary { cursor: pointer; padding: 6px 0; color: var(--after); }
 figure { margin: 0; min-width: 0; overflow-x: auto; }

@@ -61,7 +61,7 @@ def rejected(given: Sequence[Rejected]) -> Markup:
     rows = []
     for one in given:
         tried = [
-            f"{path} = {value_text(value)}\u00a0{unit_text(unit_of(path))}".rstrip()
+            f"{path} = {value_text(value)} {unit_text(unit_of(path))}".rstrip()
             for path, value in one.parameters.items()
         ]
         lines = [tag("span", text, class_="line") for text in tried or [NOTHING]]
