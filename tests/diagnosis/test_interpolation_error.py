@@ -11,7 +11,7 @@ from adv2e.diagnosis.interpolation import InterpolationError, every, interpolati
 from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.scene import Placed, Scene
-from adv2e.diagnosis.simulations import Laboratory, Simulator
+from adv2e.diagnosis.simulations import Simulator
 from adv2e.diagnosis.stream import Stream
 from adv2e.events import empty_events
 
@@ -77,7 +77,6 @@ def test_simulations_without_the_bias_are_nearer_to_a_camera(tmp_path):
         evidence, declared, scene, markers, streams, lambda fewer: Simulator(fewer, 2)
     )
     simulator.close()
-    laboratory = Laboratory(simulator, scene, markers, error.bias)
     sample = np.array([markers.measure(Placed.of(one, scene)) for one in streams.values()])[:, BOTH]
     measured = [markers.measure(Placed.of(one.stream, scene))[BOTH] for one in recordings]
     sd = np.maximum(sample.std(axis=0), markers.least)
