@@ -14,6 +14,7 @@ from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 from adv2e.simulation import events_from_light
 from adv2e.stepping import steps_of
+from adv2e.upsampling import make_upsampler
 
 FRAMES = [image.astype(np.uint8) for image in wandering_light(seed=1)]
 EVIDENCE = Evidence("made up", FRAMES, 0.01 * np.arange(21), random_stream(10), 16, 12)
@@ -110,3 +111,31 @@ def test_coarser_steps_of_time_make_the_same_events(simulator, monkeypatch):
     assert sum(planned) < 0.45 * sum(steps)
     assert len(stream) == len(fine) > 500
     assert np.abs(stream.t - fine["t"]).max() < 10
+
+
+FLOW = [*LINEAR, "sampling.interpolation=flow", "sampling.L=4", "sampling.last_interval=corrected"]
+
+
+def test_frames_along_the_motion_are_made_once_and_the_same(simulator, monkeypatch):
+    made = []
+    monkeypatch.setattr(
+        "adv2e.diagnosis.instants.make_upsampler",
+        lambda *arguments: made.append(1) or make_upsampler(*arguments),
+    )
+    config = load_config([], [*FLOW, "pixel.refractory.period_us=300"])
+    light = zip(EVIDENCE.times_ns, light_of(EVIDENCE, config), strict=True)
+    whole = np.concatenate(list(events_from_light(light, replace(config, seed=5))))
+    whole = whole[whole["t"] < 200_000]
+    np.testing.assert_array_equal(simulator.stream(config, 5).t, whole["t"])
+    simulator.stream(load_config([], [*FLOW, "pixel.leak.rate_hz=4"]), 6)
+    assert len(made) == 1
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [["frames.exposure_us=3000"], ["readout.frame_coupling.amplitude=0.05"], ["sampling.L=1"]],
+)
+def test_where_frames_matter_they_are_the_recorded_ones(simulator, monkeypatch, sets):
+    monkeypatch.setattr("adv2e.diagnosis.simulations.made", None)
+    extra = ["readout.frame_coupling.tau_us=300"] if "coupling" in sets[0] else []
+    assert len(simulator.stream(load_config([], [*FLOW, *sets, *extra]), 1)) > 0
