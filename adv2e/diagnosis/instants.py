@@ -1,8 +1,8 @@
 """In-between frames made once for many simulations, where making them takes longer than all else.
 
 Frames along the motion depend on the frames alone, so they can be given to the pixels as if they
-had been recorded.  What acts on the light of each frame is laid over them: it moves the motion found
-by next to nothing.
+had been recorded.  What acts on the light of each frame is laid over them: it moves the motion that
+is found by next to nothing.
 """
 
 from __future__ import annotations
