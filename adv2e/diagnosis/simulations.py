@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.instants import Instants, as_recorded, is_made_once, made
 from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
@@ -47,7 +48,7 @@ class Simulator:
     ) -> None:
         self._evidence, self._progress = evidence, progress
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
-        self._decoded: dict[Any, NDArray[np.float32]] = {}
+        self._decoded: dict[Any, Instants] = {}
         self._lock, self._counting = threading.Lock(), threading.Lock()
         self.done = 0
         self.likely = 0
@@ -59,9 +60,11 @@ class Simulator:
     def stream(self, config: Config, seed: int) -> Stream:
         """Return the events of one simulation, cut to the time of the frames."""
         evidence = self._evidence
-        light = zip(evidence.times_ns, self._light(config), strict=True)
+        times_ns, light = self._light(config)
+        if is_made_once(config):
+            config = as_recorded(config)
         chunks = events_from_light(
-            light,
+            zip(times_ns, light, strict=True),
             dataclasses.replace(config, seed=seed),
             threads=1,
             method=_method(config),
@@ -74,15 +77,17 @@ class Simulator:
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
 
-    def _light(self, config: Config) -> NDArray[np.float32]:
-        """Return the light of the frames, decoded once for each way to read their numbers."""
-        frames = config.frames
-        key = (frames.encoding, frames.full_scale)
+    def _light(self, config: Config) -> Instants:
+        """Return the light of the frames, made once for each way to read their numbers."""
+        frames, sampling = config.frames, config.sampling
+        between = (sampling.interpolation, sampling.L) if is_made_once(config) else None
+        key = (frames.encoding, frames.full_scale, between)
         with self._lock:
             if key not in self._decoded:
                 while len(self._decoded) >= _KEPT:
                     del self._decoded[next(iter(self._decoded))]
-                self._decoded[key] = light_of(self._evidence, config)
+                times_ns, light = self._evidence.times_ns, light_of(self._evidence, config)
+                self._decoded[key] = made(config, times_ns, light) if between else (times_ns, light)
             return self._decoded[key]
 
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:

@@ -10,8 +10,8 @@ from camera import Camera, patchwork
 from camera.settings import BENCH
 
 from adv2e import load_config, simulate
+from adv2e.diagnosis import bench, evidence, finalists, report
 from adv2e.diagnosis import diagnose as whole
-from adv2e.diagnosis import evidence, report, search
 from adv2e.diagnosis.candidates import names
 from adv2e.reports import summary
 from adv2e.sinks import open_sink
@@ -47,8 +47,9 @@ def recordings(tmp_path_factory):
 @pytest.fixture
 def short(monkeypatch):
     """Simulate less often than a diagnosis that is to be believed."""
-    monkeypatch.setattr(search, "_MANY", 40)
-    monkeypatch.setattr(search, "_SOME", 16)
+    monkeypatch.setattr(bench, "MANY", 40)
+    for module in (bench, finalists):
+        monkeypatch.setattr(module, "SOME", 16)
     monkeypatch.setattr(whole, "_PILOT", 4)
     monkeypatch.setattr(whole, "_DRAWS", 4)
 

@@ -1,12 +1,20 @@
 """Simulations of a recording's own frames: the same for any number of threads, and bounded."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_up_streams import random_stream, wandering_light
 
 from adv2e import load_config
 from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.simulations import Simulator
+from adv2e.diagnosis.light import light_of
+from adv2e.diagnosis.markers import Markers
+from adv2e.diagnosis.scene import Placed, Scene
+from adv2e.diagnosis.simulations import Laboratory, Simulator
+from adv2e.simulation import events_from_light
+from adv2e.stepping import steps_of
+from adv2e.upsampling import make_upsampler
 
 FRAMES = [image.astype(np.uint8) for image in wandering_light(seed=1)]
 EVIDENCE = Evidence("made up", FRAMES, 0.01 * np.arange(21), random_stream(10), 16, 12)
@@ -66,3 +74,68 @@ def test_a_second_pole_only_takes_events_away(simulator, name):
         [*LINEAR, "pixel.refractory.period_us=500", "pixel.source_follower.cutoff_hz=600"],
     )
     assert len(simulator.stream(slow, 1)) <= 1.1 * len(simulator.stream(declared, 1))
+
+
+def test_nothing_is_simulated_twice(simulator):
+    light = light_of(EVIDENCE, load_config([], LINEAR))
+    scene = Scene.of(light, EVIDENCE.times_s, 1.0)
+    config, other = load_config([], LINEAR), load_config([], [*LINEAR, "pixel.leak.rate_hz=3"])
+    markers = Markers(scene, [Placed.of(simulator.stream(config, 9), scene)])
+    done = simulator.done
+    laboratory = Laboratory(simulator, scene, markers)
+    first = laboratory.many([config, other, config], (1, 2))
+    assert simulator.done == done + 4
+    np.testing.assert_array_equal(first[0], first[2])
+    assert not np.array_equal(first[0], first[1])
+    again = laboratory.many([other], (2, 3, 1))
+    assert simulator.done == done + 5
+    np.testing.assert_array_equal(again[0, [2, 0]], first[1])
+    np.testing.assert_array_equal(laboratory.ensemble(other, (1, 2)), first[1])
+
+
+def test_coarser_steps_of_time_make_the_same_events(simulator, monkeypatch):
+    """The light leaps and crosses the knee here: no stamp is off by more than some us."""
+    planned = []
+
+    def noted(*arguments):
+        planned.append(steps_of(*arguments))
+        return planned[-1]
+
+    monkeypatch.setattr("adv2e.stepping.steps_of", noted)
+    config = load_config([], [*LINEAR, "pixel.slew_limit.per_s=80", "pixel.low_pass.cutoff_hz=100"])
+    light = zip(EVIDENCE.times_ns, light_of(EVIDENCE, config), strict=True)
+    fine = np.concatenate(list(events_from_light(light, replace(config, seed=3))))
+    fine, steps = fine[fine["t"] < 200_000], planned.copy()
+    planned.clear()
+    stream = simulator.stream(config, 3)
+    assert sum(planned) < 0.45 * sum(steps)
+    assert len(stream) == len(fine) > 500
+    assert np.abs(stream.t - fine["t"]).max() < 10
+
+
+FLOW = [*LINEAR, "sampling.interpolation=flow", "sampling.L=4", "sampling.last_interval=corrected"]
+
+
+def test_frames_along_the_motion_are_made_once_and_the_same(simulator, monkeypatch):
+    made = []
+    monkeypatch.setattr(
+        "adv2e.diagnosis.instants.make_upsampler",
+        lambda *arguments: made.append(1) or make_upsampler(*arguments),
+    )
+    config = load_config([], [*FLOW, "pixel.refractory.period_us=300"])
+    light = zip(EVIDENCE.times_ns, light_of(EVIDENCE, config), strict=True)
+    whole = np.concatenate(list(events_from_light(light, replace(config, seed=5))))
+    whole = whole[whole["t"] < 200_000]
+    np.testing.assert_array_equal(simulator.stream(config, 5).t, whole["t"])
+    simulator.stream(load_config([], [*FLOW, "pixel.leak.rate_hz=4"]), 6)
+    assert len(made) == 1
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [["frames.exposure_us=3000"], ["readout.frame_coupling.amplitude=0.05"], ["sampling.L=1"]],
+)
+def test_where_frames_matter_they_are_the_recorded_ones(simulator, monkeypatch, sets):
+    monkeypatch.setattr("adv2e.diagnosis.simulations.made", None)
+    extra = ["readout.frame_coupling.tau_us=300"] if "coupling" in sets[0] else []
+    assert len(simulator.stream(load_config([], [*FLOW, *sets, *extra]), 1)) > 0

@@ -1,0 +1,64 @@
+"""In-between frames made once for many simulations, where making them takes longer than all else.
+
+Frames along the motion depend on the frames alone, so they can be given to the pixels as if they
+had been recorded.  What acts on the light of each frame is laid over them: it moves the motion that
+is found by next to nothing.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config import Config
+from adv2e.diagnosis.candidates import user_effects
+from adv2e.upsampling import make_upsampler
+
+Instants = tuple[list[int], NDArray[np.float32]]
+"""Times [ns], and the light at them [DN], (instants, rows, columns)."""
+
+
+def is_made_once(config: Config) -> bool:
+    """Tell whether in-between frames may be given as frames.
+
+    Not where an effect needs to know which of them were recorded, and not with linear
+    interpolation, which costs nothing.
+    """
+    sampling, user = config.sampling, getattr(config, "user", None)
+    return (
+        sampling.interpolation != "linear"
+        and sampling.L > 1
+        and sampling.last_interval != "printed"
+        and not config.frames.exposure_us
+        and (config.readout is None or config.readout.frame_coupling is None)
+        and not any(getattr(user, name) is not None for name in user_effects(config))
+    )
+
+
+def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Instants:
+    """Return the frames and what is between them.
+
+    Parameters
+    ----------
+    config : Config
+    times_ns : list of int
+        Of the frames.
+    light : (frames, rows, columns)
+        [DN]
+    """
+    count = config.sampling.L
+    upsampler = make_upsampler(config.sampling.interpolation, count)
+    times, found = times_ns[:1], [light[0]]
+    frames = zip(times_ns, light, strict=True)
+    for (t0, before), (t1, after) in itertools.pairwise(frames):
+        times += [t0 + ((t1 - t0) * k + count // 2) // count for k in range(1, count + 1)]
+        found += list(upsampler.between(before, after))
+    return times, np.array(found, np.float32)
+
+
+def as_recorded(config: Config) -> Config:
+    """Return `config` for frames between which nothing is to be made."""
+    return replace(config, sampling=replace(config.sampling, L=1, interpolation="linear"))
