@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from adv2e.config import Config
 from adv2e.diagnosis.candidates import Candidate, Hints, library
 from real.model import Bench
 
-LEAST_GAIN = 0.01
+LEAST_GAIN = 0.005
 """An effect is added if it lowers the score by as much as this."""
+PASSES = 2
+"""Rounds in which all that was added is refined together, at most."""
 MOST = 7
 """Effects at most."""
 NOISE_HZ = 0.1
@@ -106,6 +108,7 @@ def forward(
 
     `only`: names of the effects of the camera to try; empty: all.
     """
+    chain: list[Added] = []
     config = bench.matched(declared, windows)
     yield Added.plain("thresholds", config, *bench.score(config, windows, seeds))
     here = _trial(bench, EXACT, (), config, windows, seeds)
@@ -132,9 +135,35 @@ def forward(
             if here.score - best.score < LEAST_GAIN:
                 break
             here = best
+            chain.append(best)
             own = [one for one in own if one.name != here.candidate.name]
             left = own if group is not camera else [*own, *_promising(tried[1:], here, own)]
             yield here
+    together = _together(bench, chain, here, windows, seeds)
+    if together is not here:
+        yield together
+
+
+def _together(
+    bench: Bench, chain: Sequence[Added], last: Added, windows: Windows, seeds: Sequence[int]
+) -> Added:
+    """Return the last model with the keys of all effects refined, now that all are there."""
+    values = {one.candidate: one.values for one in chain if one.candidate.knobs}
+    here = last
+    for _ in range(PASSES):
+        before = here.score
+        for candidate, value in list(values.items()):
+            current = replace(here, candidate=candidate, values=value)
+            better = _refined(bench, current, here.config, windows, seeds)
+            if better.score < here.score:
+                here, values[candidate] = better, better.values
+        if before - here.score < LEAST_GAIN:
+            break
+    if here is last:
+        return last
+    knobs = tuple(knob for candidate in values for knob in candidate.knobs)
+    refined = Candidate("all refined together", knobs, ())
+    return replace(here, candidate=refined, values=tuple(v for one in values.values() for v in one))
 
 
 def _promising(tried: Sequence[Added], added: Added, own: Sequence[Candidate]) -> list[Candidate]:
