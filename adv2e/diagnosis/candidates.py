@@ -418,9 +418,14 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
         ),
     ]  # fmt: skip
     for hz in hints.line_hz:
-        depth = Knob("frames.flicker.depth", 0.005, 0.99)
-        line = ("frames.flicker.frequency_hz", float(hz))
-        made.append(Candidate("flicker", (depth,), ((0.08,), (0.25,)), (line,)))
+        lamp = (
+            Knob("frames.flicker.depth", 0.005, 0.99),
+            # whole turns more are the same phase: no border that a fit could run to
+            Knob("frames.flicker.phase_rad", -20.0, 20.0, False),
+            Knob("frames.flicker.frequency_hz", hz - 3.0, hz + 3.0, False, 0.25 / hints.seconds),
+        )
+        quarters = (-0.5 * math.pi, 0.0, 0.5 * math.pi, math.pi)
+        made.append(Candidate("flicker", lamp, tuple((0.12, phase, hz) for phase in quarters)))
     made += _encodings(values)
     return made
 
