@@ -29,6 +29,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core.caching import FunctionCache
+from numba.core.runtime.nrt import rtsys
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -111,10 +112,17 @@ class _Cache(_FunctionCache):  # type: ignore[misc]
         )
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return the compiled code for a signature, or None."""
+        """Return the compiled code for a signature, or None.
+
+        Numba first gets ready to compile, as long as all other imports take; code that is there
+        needs only the run-time.  If more is to be compiled, Numba sees to that by itself.
+        """
         try:
-            return super().load_overload(signature, context)
-        except Exception:  # a file cut short may raise anything
+            rtsys.initialize(context)
+            return self._load_overload(signature, context)
+        except Exception:  # a file cut short may raise anything, another Numba may do it otherwise
+            with suppress(Exception):
+                return super().load_overload(signature, context)
             return None
 
     def save_overload(self, signature: Any, code: Any) -> None:
