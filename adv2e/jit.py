@@ -137,6 +137,25 @@ class _Cache(_FunctionCache):  # type: ignore[misc]
                 super().save_overload(signature, code)
 
 
+class _LateCache:
+    """A :class:`_Cache` made when something is asked of it: of most functions nothing ever is."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "_made":
+            config: Any = numba.config  # its attributes are made at run time
+            before = config.CACHE_DIR
+            config.CACHE_DIR = str(_FOLDER)
+            try:
+                self._made = _Cache(self._function)  # as the option `cache` does
+            finally:
+                config.CACHE_DIR = before
+            return self._made
+        return getattr(self._made, name)
+
+
 _FOLDER = cache_folder()
 _PROCESS = secrets.token_hex(4)
 
@@ -146,13 +165,7 @@ def _compile(function: Function, *, cache: bool = False, **options: Any) -> Func
         function
     )
     if cache:
-        config: Any = numba.config  # its attributes are made at run time
-        before = config.CACHE_DIR
-        config.CACHE_DIR = str(_FOLDER)
-        try:
-            compiled._cache = _Cache(function)  # as the option `cache` does
-        finally:
-            config.CACHE_DIR = before
+        compiled._cache = _LateCache(function)
     return compiled  # type: ignore[no-any-return]
 
 
