@@ -13,7 +13,6 @@ from typing import Any
 
 from benchmarks.measuring import children_cpu_s, children_peak_mib, measured, peak_mib
 
-
 _NO_BYTECODE = "PYTHONDONTWRITEBYTECODE"
 
 

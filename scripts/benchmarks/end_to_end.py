@@ -17,9 +17,9 @@ from benchmarks.report import peak_text, table
 from benchmarks.settings import CAMERAS, CUTOFF_HZ, IDEAL, THRESHOLD, Peers, Plan
 
 ABOUT = (
-    "346x260, 240 frames a second, light coded as sRGB, MP4 (mp4v). Whole processes, from start to end, so with imports"
-    " and compiled code loaded from its cache: median (least..most). The parts below are measured"
-    " each by itself, inside a process, after warming up."
+    "346x260, 240 frames a second, light coded as sRGB, MP4 (mp4v). Whole processes, from start to"
+    " end, so with imports and compiled code loaded from its cache: median (least..most). The parts"
+    " below are measured each by itself, inside a process, after warming up."
 )
 QUIET = tuple(one for one in IDEAL if not one.startswith("sampling."))
 WHOLE, PART = "whole: ", "part: "
