@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache, partial
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,10 @@ from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events, empty_events
 from adv2e.intervals import Part
 from adv2e.kernel import order, screen, stepped
+from adv2e.kernel.dense import Run, run_dense
+from adv2e.kernel.dense_events import Injected
 from adv2e.kernel.exact import run_exact
+from adv2e.kernel.general import run_general
 from adv2e.kernel.screen import NODES_MAX
 from adv2e.kernel.tile import Frames, frames_of, scratch
 from adv2e.kernel.workspace import (
@@ -52,13 +55,7 @@ from adv2e.kernel.workspace import (
     STRIP,
     pack_limit_us,
 )
-
-if TYPE_CHECKING:
-    from adv2e.kernel.dense import Run
-    from adv2e.kernel.dense_events import Injected
-
-# What only some pixels need (adv2e.stepping, adv2e.kernel.dense, adv2e.kernel.general) is imported
-# when it is needed: every compiled function takes its time to declare.
+from adv2e.stepping import Stepping
 
 _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP
@@ -188,8 +185,6 @@ class PixelArray:
         self._driver = driver_of(pixel, self.circuit, additions, method)
         self.state = self._first_state(pixel, seed, first, self._relative(t_ns))
         if self._driver == "run_dense":
-            from adv2e.stepping import Stepping  # noqa: PLC0415
-
             self._stepping = Stepping(
                 self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
                 self.origin_us, self._relative(t_ns),
@@ -335,9 +330,7 @@ class PixelArray:
     ) -> list[_Parted]:
         """Return the events of all tiles, solved interval by interval."""
         nodes, weights, counts = self._nodes(np.diff(starts))
-        advance = run_exact
-        if self._driver == "run_general":
-            from adv2e.kernel.general import run_general as advance  # noqa: PLC0415
+        advance = run_exact if self._driver == "run_exact" else run_general
 
         def run(tile: tuple[int, int]) -> _Parted:
             lo, hi = tile
@@ -363,7 +356,6 @@ class PixelArray:
         pool: ThreadPoolExecutor | None,
     ) -> list[_Parted]:
         """Return the events of all tiles, in steps of time."""
-        from adv2e.kernel.dense import run_dense  # noqa: PLC0415
 
         def run(steps: Run, injected: Injected, tile: tuple[int, int]) -> _Arrays:
             lo, hi = tile
