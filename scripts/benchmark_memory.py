@@ -251,7 +251,9 @@ def measure_long(setup: Setup, seconds: float, format_: str) -> tuple[str, dict[
         "-o", str(setup.scratch / f"long.{format_}"), "--set", "sampling.L=1",
         *threads_option(setup.threads),
     ]  # fmt: skip
-    moments, printed = watched(command)
+    # the compiler's memory is no part of a conversion's
+    watched([*command, "--stop", "0.2"])
+    moments, printed = watched([*command, "--overwrite"])
     about = (
         f"{seconds:g} s of {LONG_SIZE.name} at {LONG_FPS:g} frames a second, {frames:,} frames, of"
         f" which {100 * LONG_MOVING:g} % of the rows move, to {format_}, L = 1:"
