@@ -29,6 +29,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core.caching import FunctionCache
+from numba.core.runtime.nrt import rtsys
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -111,10 +112,17 @@ class _Cache(_FunctionCache):  # type: ignore[misc]
         )
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return the compiled code for a signature, or None."""
+        """Return the compiled code for a signature, or None.
+
+        Numba first gets ready to compile, as long as all other imports take; code that is there
+        needs only the run-time.  If more is to be compiled, Numba sees to that by itself.
+        """
         try:
-            return super().load_overload(signature, context)
-        except Exception:  # a file cut short may raise anything
+            rtsys.initialize(context)
+            return self._load_overload(signature, context)
+        except Exception:  # a file cut short may raise anything, another Numba may do it otherwise
+            with suppress(Exception):
+                return super().load_overload(signature, context)
             return None
 
     def save_overload(self, signature: Any, code: Any) -> None:
@@ -129,6 +137,25 @@ class _Cache(_FunctionCache):  # type: ignore[misc]
                 super().save_overload(signature, code)
 
 
+class _LateCache:
+    """A :class:`_Cache` made when something is asked of it: of most functions nothing ever is."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "_made":
+            config: Any = numba.config  # its attributes are made at run time
+            before = config.CACHE_DIR
+            config.CACHE_DIR = str(_FOLDER)
+            try:
+                self._made = _Cache(self._function)  # as the option `cache` does
+            finally:
+                config.CACHE_DIR = before
+            return self._made
+        return getattr(self._made, name)
+
+
 _FOLDER = cache_folder()
 _PROCESS = secrets.token_hex(4)
 
@@ -138,13 +165,7 @@ def _compile(function: Function, *, cache: bool = False, **options: Any) -> Func
         function
     )
     if cache:
-        config: Any = numba.config  # its attributes are made at run time
-        before = config.CACHE_DIR
-        config.CACHE_DIR = str(_FOLDER)
-        try:
-            compiled._cache = _Cache(function)  # as the option `cache` does
-        finally:
-            config.CACHE_DIR = before
+        compiled._cache = _LateCache(function)
     return compiled  # type: ignore[no-any-return]
 
 

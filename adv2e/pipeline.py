@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,13 @@ from adv2e.effects.user import user_sources
 from adv2e.events import Events
 from adv2e.heap import return_large_blocks
 from adv2e.overlap import ReadAhead, WriteBehind
-from adv2e.rendering import Preview
 from adv2e.simulation import events_from_light, is_compiled
 from adv2e.sinks import Sink, default_threads, format_name, open_sink
 from adv2e.sources import open_source
 from adv2e.sources.base import Source
+
+if TYPE_CHECKING:
+    from adv2e.rendering import Preview
 
 AHEAD_BYTES = 16 << 20
 """Memory for frames that were decoded and not taken yet."""
@@ -274,6 +276,8 @@ def _open_preview(
 ) -> Preview | None:
     if preview is None:
         return None
+    from adv2e.rendering import Preview  # noqa: PLC0415 - most conversions draw nothing
+
     return stack.enter_context(
         Preview(Path(preview), recording.width, recording.height, overwrite=overwrite)
     )

@@ -251,7 +251,9 @@ def measure_long(setup: Setup, seconds: float, format_: str) -> tuple[str, dict[
         "-o", str(setup.scratch / f"long.{format_}"), "--set", "sampling.L=1",
         *threads_option(setup.threads),
     ]  # fmt: skip
-    moments, printed = watched(command)
+    # the compiler's memory is no part of a conversion's
+    watched([*command, "--stop", "0.2"])
+    moments, printed = watched([*command, "--overwrite"])
     about = (
         f"{seconds:g} s of {LONG_SIZE.name} at {LONG_FPS:g} frames a second, {frames:,} frames, of"
         f" which {100 * LONG_MOVING:g} % of the rows move, to {format_}, L = 1:"
@@ -283,7 +285,7 @@ def long_clip(folder: Path, frames: int) -> Path:
 
 
 def long_table(moments: Sequence[Moment], frames: int) -> str:
-    """Return time a frame and memory, tenth by tenth.
+    """Return time and processor time a frame, and memory, tenth by tenth.
 
     Raises
     ------
@@ -297,13 +299,17 @@ def long_table(moments: Sequence[Moment], frames: int) -> str:
         if len(inside) < 3:
             raise RuntimeError(f"too few looks at tenth {tenth + 1} of the run: make it longer")
         first, last = inside[0], inside[-1]
-        each = (last.seconds - first.seconds) / (last.frames - first.frames)
+        count = last.frames - first.frames
+        each = (last.seconds - first.seconds) / count
+        work = (last.cpu_s - first.cpu_s) / count
         memory = [moment.rss_mib for moment in inside]
         rows.append([
-            str(tenth + 1), number(1e3 * each), f"{statistics.median(memory):.0f}",
-            f"{max(memory):.0f}",
+            str(tenth + 1), number(1e3 * each), number(1e3 * work),
+            f"{statistics.median(memory):.0f}", f"{max(memory):.0f}",
         ])  # fmt: skip
-    return table(("tenth", "ms a frame", "memory, median [MiB]", "most [MiB]"), rows)
+    return table(
+        ("tenth", "ms a frame", "CPU ms a frame", "memory, median [MiB]", "most [MiB]"), rows
+    )
 
 
 if __name__ == "__main__":

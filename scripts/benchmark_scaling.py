@@ -41,6 +41,10 @@ STEPS = (1, 2, 5, 10, 20, 50, 100)
 PIXEL_FRAMES = 60_000_000
 """Pixels times frames of the sizes that the base clip's number of frames would take too long."""
 
+_THREADS = "threads"
+_TITLES = {"K": "sub-steps K", _THREADS: "threads, wall time"}
+"""Of the pictures, where they are not what is varied; other programs lengthen wall times most."""
+
 OFF, EVERY = "noise off", "all effects"
 COLOURS = {
     OFF: "#1d3557", EVERY: "#c1121f", "first_order_hold": "#e08a1e", "paper": "#9d7fb8",
@@ -108,7 +112,7 @@ def samples(setup: Setup) -> Iterator[Sample]:
             yield Sample(axis, value, curve, label, job)
         for count in range(1, cores() + 1) if cores() <= 4 else _powers(cores()):
             job = setup.job(f"threads {count}, {curve}", setup.base, effects, count)
-            yield Sample("threads", count, curve, str(count), job)
+            yield Sample(_THREADS, count, curve, str(count), job)
     yield from _stepped(setup)
 
 
@@ -214,7 +218,10 @@ def write(output: Path, text: str, points: Sequence[Sample], measured: dict[str,
 
 
 def draw(points: Sequence[Sample], measured: dict[str, Measured], path: Path) -> None:
-    """Draw one small picture a quantity, all with the same vertical axis."""
+    """Draw one small picture a quantity, all with the same vertical axis.
+
+    Processor time, which other programs on the machine lengthen least; for threads, wall time.
+    """
     pyplot = load_pyplot()
     names = list(dict.fromkeys(point.axis for point in points))
     columns = 4
@@ -225,9 +232,9 @@ def draw(points: Sequence[Sample], measured: dict[str, Measured], path: Path) ->
         axis.set_axis_off()
     for axis, name in zip(axes.flat, names, strict=False):
         _panel(axis, [p for p in points if p.axis == name], measured)
-        axis.set_title("sub-steps K" if name == "K" else name, loc="left", fontsize=10)
+        axis.set_title(_TITLES.get(name, name), loc="left", fontsize=10)
     for row in axes:
-        row[0].set_ylabel("wall time a pixel and frame [ns]", fontsize=9)
+        row[0].set_ylabel("processor time a pixel and frame [ns]", fontsize=9)
     handles = {}
     for axis in axes.flat:
         handles.update({h.get_label(): h for h in axis.get_lines()})
@@ -241,7 +248,7 @@ def _panel(axis: Any, points: Sequence[Sample], measured: dict[str, Measured]) -
     for curve in dict.fromkeys(point.curve for point in points):
         own = sorted((p for p in points if p.curve == curve), key=lambda p: p.value)
         x = [p.value for p in own]
-        spreads = [_ns(measured[p.job.name]) for p in own]
+        spreads = [_ns(measured[p.job.name], wall=p.axis == _THREADS) for p in own]
         colour = COLOURS[curve]
         axis.plot(x, [s[1] for s in spreads], color=colour, marker="o", ms=4, lw=1.4, label=curve)
         axis.fill_between(x, *zip(*[(s[0], s[2]) for s in spreads], strict=True),
@@ -260,9 +267,10 @@ def _panel(axis: Any, points: Sequence[Sample], measured: dict[str, Measured]) -
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def _ns(one: Measured) -> tuple[float, float, float]:
-    """Return least, median and most wall time a pixel and frame [ns]."""
-    spread = one.wall_s().times(1e9 / (one.last["pixels"] * one.last["frames"]))
+def _ns(one: Measured, *, wall: bool) -> tuple[float, float, float]:
+    """Return least, median and most time a pixel and frame [ns]."""
+    spread = one.wall_s() if wall else one.cpu_s()
+    spread = spread.times(1e9 / (one.last["pixels"] * one.last["frames"]))
     return spread.least, spread.median, spread.most
 
 

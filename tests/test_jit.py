@@ -54,9 +54,9 @@ def start(package, tmp_path):
     places = {"PYTHONPATH": str(package.parent), "XDG_CACHE_HOME": str(tmp_path / "cache")}
     environment = {**without, **places, "PYTHONDONTWRITEBYTECODE": "1"}
 
-    def start(*numbers, **more):
+    def start(*numbers, code=RUN, **more):
         return subprocess.Popen(
-            [sys.executable, "-c", RUN, *map(str, numbers)],
+            [sys.executable, "-c", code, *map(str, numbers)],
             env={**environment, **more},
             cwd=tmp_path,
             stdout=subprocess.PIPE,
@@ -76,6 +76,13 @@ def said(process):
 def test_a_second_process_finds_the_code(start):
     assert said(start(1)) == ["20", "0"]
     assert said(start(1)) == ["20", "1"]
+
+
+def test_code_that_is_there_runs_without_what_only_the_compiler_needs(start):
+    told = RUN + 'print("numba.np.linalg" in sys.modules)'
+    assert said(start(1, code=told)) == ["20", "0", "True"]
+    assert said(start(1, code=told)) == ["20", "1", "False"]
+    assert said(start(1, 1.5, code=told)) == ["20", "25.0", "1", "True"]
 
 
 def test_a_read_only_installation_is_served_and_not_touched(package, start):

@@ -6,6 +6,7 @@ import atexit
 import difflib
 import gc
 import importlib
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -40,6 +41,8 @@ class Program(click.Group):
         """Return the command `cmd_name`, from the module of that name."""
         if cmd_name not in COMMANDS:
             return None
+        # BLAS, which has little to do here, would start threads that wait busily, beside ours
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         module = importlib.import_module(f"adv2e.cli.{cmd_name}")
         found = (item for item in vars(module).values() if isinstance(item, click.Command))
         return next(command for command in found if command.name == cmd_name)
@@ -92,11 +95,12 @@ class Program(click.Group):
 def _rare_collection() -> Iterator[None]:
     """Let the body make many objects before Python looks for cycles among them.
 
-    Importing Numba makes a million that stay; looking through them again and again, while they are
-    made and once more at the end of the program, takes a fifth of a short run.
+    Importing Numba makes a hundred thousand that stay, and compiling a million; looking through
+    them again and again, while they are made and once more at the end of the program, would take
+    longer than a short run may.
     """
     before = gc.get_threshold()
-    gc.set_threshold(100_000, 20, 20)
+    gc.set_threshold(200_000, 20, 20)
     atexit.register(gc.freeze)
     try:
         yield

@@ -1,50 +1,69 @@
 """Long columns of an HDF5 file, compressed in threads and written chunk by chunk.
 
-HDF5 compresses in the thread that writes.  Here whole chunks are compressed beforehand with the
-same two filters, shuffle and deflate, and stored as they are, so that any reader of HDF5 opens
-them without plug-ins.
+HDF5 compresses in the thread that writes.  Here whole chunks are compressed beforehand into what
+its filters shuffle and deflate would read, and stored as they are, so that any reader of HDF5
+opens them without plug-ins.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
+from adv2e.sinks.deflate import deflate_shuffled, deflate_words
 from adv2e.sinks.work import OrderedWork
 
 CHUNK = 1 << 16
 """Rows of a chunk."""
 
 LEVEL = 1
-"""Level of deflate: half the time of level 4 for a tenth more bytes."""
+"""Level of deflate that the file states, and that of images."""
 
-FILTERS: dict[str, Any] = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True}
-"""Filters of a dataset whose chunks :func:`encode` makes."""
+_SPARSE = 0.8
+"""Share of times unlike the one before from which zlib, slow but with less to do, finds more."""
+
+FILTERS: dict[str, Any] = {"compression": "gzip", "compression_opts": LEVEL}
+"""Filters of a dataset whose chunks are zlib streams."""
 
 
-def encode(chunk: NDArray[Any], strategy: int = zlib.Z_DEFAULT_STRATEGY) -> bytes:
-    """Return the bytes of a chunk as shuffle (bytes of equal rank together) and deflate leave it.
+def encode_image(image: NDArray[np.uint8]) -> bytes:
+    """Return the bytes of an image of 8 bits as deflate leaves them."""
+    return zlib.compress(np.ascontiguousarray(image).data, LEVEL)
 
-    Parameters
+
+@dataclass(frozen=True)
+class Column:
+    """A dataset that grows.
+
+    Attributes
     ----------
-    chunk : array
-    strategy : int
-        What deflate looks for; :data:`zlib.Z_RLE`, runs only, takes less time where there is
-        nothing else to find.
-
-    References
-    ----------
-    .. [1] HDF5 reference, H5Pset_shuffle, H5Pset_deflate.
+    dtype : dtype
+    of : callable
+        Its values for some rows.
     """
-    flat = np.ascontiguousarray(chunk).reshape(-1)
-    ranks = flat.view(np.uint8).reshape(flat.size, flat.itemsize)
-    deflate = zlib.compressobj(LEVEL, strategy=strategy)
-    return deflate.compress(np.ascontiguousarray(ranks.T).data) + deflate.flush()
+
+    dtype: np.dtype[Any]
+    of: Callable[[NDArray[Any]], NDArray[Any]]
+
+    @property
+    def shuffled(self) -> bool:
+        """Whether the bytes of equal rank go together, as suits whole numbers."""
+        return self.dtype.kind != "f"
+
+    def encode(self, rows: NDArray[Any]) -> bytes:
+        """Return the bytes of a chunk."""
+        values = self.of(rows).astype(self.dtype, copy=False)
+        if self.shuffled:
+            return deflate_shuffled(values)
+        if np.count_nonzero(values[1:] != values[:-1]) > _SPARSE * values.size:
+            return zlib.compress(np.ascontiguousarray(values).data, LEVEL)
+        return deflate_words(values)
 
 
 class ChunkedColumns:
@@ -54,35 +73,47 @@ class ChunkedColumns:
     ----------
     group : h5py.Group
         Where the datasets are made.
-    types : mapping of str to dtype
-        Their names and types.
+    columns : mapping of str to Column
+        Their names, and what they hold.
+    rows : dtype
+        Type of the rows from which they are made.
     work : OrderedWork
         Threads that compress.
     """
 
     def __init__(
-        self, group: h5py.Group, types: Mapping[str, np.dtype[Any]], work: OrderedWork
+        self,
+        group: h5py.Group,
+        columns: Mapping[str, Column],
+        rows: DTypeLike,
+        work: OrderedWork,
     ) -> None:
-        self._types = dict(types)
+        self._columns = list(columns.values())
         self._work = work
-        self._datasets = {
-            name: group.create_dataset(
-                name, (0,), dtype, chunks=(CHUNK,), maxshape=(None,), track_times=False, **FILTERS
+        self._datasets = [
+            group.create_dataset(
+                name,
+                (0,),
+                column.dtype,
+                chunks=(CHUNK,),
+                maxshape=(None,),
+                shuffle=column.shuffled,
+                track_times=False,
+                **FILTERS,
             )
-            for name, dtype in self._types.items()
-        }
+            for name, column in columns.items()
+        ]
+        self._rows = np.dtype(rows)
         self._written = 0  # rows handed on
-        self._held = 0  # rows in the buffers
-        self._buffers = self._fresh()
+        self._held = 0  # rows in the buffer
+        self._buffer = self._fresh()
 
-    def append(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Append rows: an array for each column, all of the same length."""
-        count = len(next(iter(columns.values())))
+    def append(self, rows: NDArray[Any]) -> None:
+        """Append rows."""
         begin = 0
-        while begin < count:
-            take = min(CHUNK - self._held, count - begin)
-            for name, buffer in self._buffers.items():
-                buffer[self._held : self._held + take] = columns[name][begin : begin + take]
+        while begin < rows.size:
+            take = min(CHUNK - self._held, rows.size - begin)
+            self._buffer[self._held : self._held + take] = rows[begin : begin + take]
             self._held += take
             begin += take
             if self._held == CHUNK:
@@ -93,21 +124,21 @@ class ChunkedColumns:
         if self._held:
             self._hand_on()
 
-    def _fresh(self) -> dict[str, NDArray[Any]]:
+    def _fresh(self) -> NDArray[Any]:
         # zeros: the last chunk is stored in full
-        return {name: np.zeros(CHUNK, dtype) for name, dtype in self._types.items()}
+        return np.zeros(CHUNK, self._rows)
 
     def _hand_on(self) -> None:
-        end = self._written + self._held
-        for name, buffer in self._buffers.items():
-            self._submit(self._datasets[name], self._written, end, buffer)
-        self._written, self._held, self._buffers = end, 0, self._fresh()
+        begin, self._written = self._written, self._written + self._held
+        end = self._written
 
-    def _submit(self, dataset: h5py.Dataset, begin: int, end: int, buffer: NDArray[Any]) -> None:
-        def take(data: bytes) -> None:
-            dataset.resize((end,))
-            dataset.id.write_direct_chunk((begin,), data)
+        def take(chunks: list[bytes]) -> None:
+            for dataset, data in zip(self._datasets, chunks, strict=True):
+                dataset.resize((end,))
+                dataset.id.write_direct_chunk((begin,), data)
 
-        # bytes of whole numbers are noise or runs; only float times have more to find
-        strategy = zlib.Z_DEFAULT_STRATEGY if buffer.dtype.kind == "f" else zlib.Z_RLE
-        self._work.submit(encode, buffer, strategy, take=take)
+        self._work.submit(self._encode, self._buffer, take=take)
+        self._held, self._buffer = 0, self._fresh()
+
+    def _encode(self, rows: NDArray[Any]) -> list[bytes]:
+        return [column.encode(rows) for column in self._columns]

@@ -30,14 +30,12 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.events import Events
+from adv2e.events import EVENT_DTYPE, Events
 from adv2e.sinks.base import FileSink, to_json
-from adv2e.sinks.columns import FILTERS, ChunkedColumns, encode
+from adv2e.sinks.columns import FILTERS, ChunkedColumns, Column, encode_image
 from adv2e.sinks.spool import FrameSpool, StoredFrame
 from adv2e.sinks.staging import Staging
 from adv2e.sinks.work import OrderedWork
-
-_PART = 1 << 20  # events turned to columns at once
 
 
 class MonashSink(FileSink):
@@ -87,25 +85,24 @@ class MonashSink(FileSink):
         # fixed: the oldest structures, which every reader knows and which hold no times
         self._file = h5py.File(self._temporary, "w", libver=("earliest", "v108"))
         pixel = np.dtype(np.int16 if max(self._shape) <= 32767 else np.uint16)
-        types: dict[str, np.dtype[Any]] = {
-            "xs": pixel,
-            "ys": pixel,
-            "ts": np.dtype(np.float64),
-            "ps": np.dtype(np.bool_),
+        columns = {
+            "xs": Column(pixel, lambda events: events["x"]),
+            "ys": Column(pixel, lambda events: events["y"]),
+            "ts": Column(np.dtype(np.float64), lambda events: events["t"] / 1e6),
+            "ps": Column(np.dtype(np.bool_), lambda events: events["p"]),
         }
-        self._columns = ChunkedColumns(self._file.create_group("events"), types, self._work)
+        group = self._file.create_group("events")
+        self._columns = ChunkedColumns(group, columns, EVENT_DTYPE, self._work)
         self._file.create_group("images")
         if self.wants_frames:
             self._spool = FrameSpool(self._temporary.parent)
 
     def _write_events(self, events: Events) -> None:
         assert self._columns is not None
-        for begin in range(0, events.size, _PART):
-            part = events[begin : begin + _PART]
-            seconds = part["t"] / 1e6
-            self._columns.append({"xs": part["x"], "ys": part["y"], "ts": seconds, "ps": part["p"]})
-            self._indices.add_events(seconds)
-            self._totals.add(seconds, part["p"])
+        if events.size:
+            self._columns.append(events)
+            self._indices.add_events(events["t"])
+            self._totals.add(events)
 
     def _write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         assert self._work is not None
@@ -114,7 +111,7 @@ class MonashSink(FileSink):
         picture = picture[..., ::-1].copy() if picture.ndim == 3 else picture.copy()
         self._indices.add_frame(t_ns / 1e9)
         spool, shape = self._spool, picture.shape
-        self._work.submit(encode, picture, take=lambda data: spool.add(t_ns, shape, data))
+        self._work.submit(encode_image, picture, take=lambda data: spool.add(t_ns, shape, data))
 
     def _finish(self) -> None:
         assert self._file is not None
@@ -182,12 +179,13 @@ class _Totals:
         self._first = 0.0
         self._last = 0.0
 
-    def add(self, seconds: NDArray[np.float64], p: NDArray[np.uint8]) -> None:
+    def add(self, events: Events) -> None:
+        """Count some events, one at least."""
         if not self._count:
-            self._first = float(seconds[0])
-        self._last = float(seconds[-1])
-        self._count += seconds.size
-        self._on += int(np.count_nonzero(p))
+            self._first = float(events["t"][0]) / 1e6
+        self._last = float(events["t"][-1]) / 1e6
+        self._count += events.size
+        self._on += int(np.count_nonzero(events["p"]))
 
     def attributes(self) -> dict[str, Any]:
         return {
@@ -215,13 +213,16 @@ class _EventIndices:
             raise ValueError("a frame must come before the events that follow it")
         self._waiting.append(seconds)
 
-    def add_events(self, seconds: NDArray[np.float64]) -> None:
-        settled = int(np.searchsorted(self._waiting, seconds[-1], side="right"))
-        before = np.searchsorted(seconds, self._waiting[:settled], side="left")
-        self._found.extend(max(self._count + int(n) - 1, 0) for n in before)
-        del self._waiting[:settled]
-        self._count += seconds.size
-        self._last = float(seconds[-1])
+    def add_events(self, t_us: NDArray[np.int64]) -> None:
+        """Settle the frames that come before the last of these events, one at least."""
+        self._last = float(t_us[-1]) / 1e6
+        if self._waiting:
+            seconds = t_us / 1e6
+            settled = int(np.searchsorted(self._waiting, self._last, side="right"))
+            before = np.searchsorted(seconds, self._waiting[:settled], side="left")
+            self._found.extend(max(self._count + int(n) - 1, 0) for n in before)
+            del self._waiting[:settled]
+        self._count += t_us.size
 
     def finish(self) -> list[int]:
         """Return the index for each frame."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import math
+import os
 import re
 import subprocess
 import tempfile
@@ -116,11 +118,24 @@ def count_in(summary: str) -> int:
 
 @dataclass(frozen=True)
 class Moment:
-    """A look at a running conversion: time since its start [s], frames taken, memory [MiB]."""
+    """A look at a running conversion.
+
+    Attributes
+    ----------
+    seconds : float
+        Time since its start.
+    frames : int
+        Frames taken.
+    rss_mib : float
+        Memory.
+    cpu_s : float
+        Processor time of all its threads.
+    """
 
     seconds: float
     frames: int
     rss_mib: float
+    cpu_s: float = math.nan
 
 
 def watched(command: Sequence[str]) -> tuple[list[Moment], str]:
@@ -144,7 +159,7 @@ def watched(command: Sequence[str]) -> tuple[list[Moment], str]:
             taken = frames_taken(told)
             if taken is not None and not (moments and moments[-1].frames == taken):
                 seconds = time.perf_counter() - began
-                moments.append(Moment(seconds, taken, _rss_mib(process.pid)))
+                moments.append(Moment(seconds, taken, *_look(process.pid)))
         printed = process.stdout.read().decode()
     if process.returncode:
         lines = told.strip().splitlines() or [f"exit status {process.returncode}"]
@@ -158,7 +173,13 @@ def frames_taken(progress: str) -> int | None:
     return int(found[-1]) if found else None
 
 
-def _rss_mib(pid: int) -> float:
+def _look(pid: int) -> tuple[float, float]:
+    """Return memory [MiB] and processor time [s] of a process; NaN when it has just ended."""
     status = Path(f"/proc/{pid}/status").read_text()
+    # behind the name, which may hold anything: state, ten others, time as user and as system
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     found = re.search(r"VmRSS:\s+(\d+)", status)
-    return int(found[1]) / 1024 if found else float("nan")  # it has just ended
+    if found is None:
+        return math.nan, math.nan
+    ticks = int(fields[11]) + int(fields[12])
+    return int(found[1]) / 1024, ticks / os.sysconf("SC_CLK_TCK")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import signal
 import subprocess
 import sys
@@ -279,3 +280,19 @@ def test_help_imports_nothing_heavy(args):
     assert done.stderr == ""
     assert done.returncode == 0
     assert "adv2e" in done.stdout
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="threads are counted by Linux")
+def test_importing_what_a_conversion_needs_starts_no_threads():
+    code = """
+import os
+from adv2e.cli import main
+main.get_command(None, "convert")
+import adv2e.pipeline
+print(len(os.listdir("/proc/self/task")))
+"""
+    environment = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "1\n"

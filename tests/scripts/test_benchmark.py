@@ -291,6 +291,74 @@ def test_v2e_rows_are_time_column_row_sign(stand_in, tool, tmp_path):
     ]
 
 
+# The parameters of v2e's EventEmulator (SensorsINI/v2e, v2ecore/emulator.py); as there, the first
+# frame makes no events, and a frame without events makes None.
+V2E = """
+import numpy as np
+
+class EventEmulator:
+    def __init__(
+        self, pos_thres=0.2, neg_thres=0.2, sigma_thres=0.03, cutoff_hz=0.0, leak_rate_hz=0.1,
+        refractory_period_s=0.0, shot_noise_rate_hz=0.0, photoreceptor_noise=False,
+        leak_jitter_fraction=0.1, noise_rate_cov_decades=0.1, seed=0, output_folder=None,
+        dvs_h5=None, dvs_aedat2=None, dvs_aedat4=None, dvs_text=None, show_dvs_model_state=None,
+        save_dvs_model_state=False, output_width=None, output_height=None, device="cuda",
+        cs_lambda_pixels=None, cs_tau_p_ms=None, hdr=False, scidvs=False,
+        record_single_pixel_states=None, label_signal_noise=False,
+    ):
+        assert device == "cpu" and seed != 0 and sigma_thres > 0
+        self.levels, self.before = (pos_thres, neg_thres), None
+
+    def generate_events(self, new_frame, t_frame):
+        assert new_frame.dtype == np.float32
+        log = np.log(np.maximum(new_frame, 1))
+        change, self.before = log - (log if self.before is None else self.before), log
+        y, x = np.nonzero((change > self.levels[0]) | (change < -self.levels[1]))
+        if not len(x):
+            return None
+        sign = np.sign(change[y, x])
+        return np.stack([np.full(len(x), t_frame, np.float32), x, y, sign], axis=1)
+"""
+
+
+@pytest.fixture
+def v2e_folder(tmp_path, monkeypatch):
+    """A folder laid out as a checkout of v2e, which is forgotten afterwards."""
+    package = tmp_path / "v2e" / "v2ecore"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
+    (package / "emulator.py").write_text(V2E)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    yield package.parent
+    for name in ("v2ecore", "v2ecore.emulator"):
+        sys.modules.pop(name, None)
+
+
+def test_v2e_is_taken_from_the_folder_named(module, stand_in, tool, v2e_folder, small):
+    peers = module("benchmark").find_peers(sys.executable, v2e_folder, [])
+    assert peers.v2e == v2e_folder
+    stand_in("torch", set_num_threads=lambda count: None, __version__="0")
+    settings = module("benchmarks.settings")
+    runs = [given for given in settings.peer_arguments(peers, 1) if given[1] == "v2e"]
+    assert [name for name, _, _ in runs] == ["v2e, noise off", "v2e, all effects"]
+    v2e = tool("v2e")
+    frames = np.load(small)
+    for _, _, options in runs:
+        t, x, y, p = v2e.columns(v2e.simulator(options)(frames, 240.0))
+        assert t.size > 100
+        assert np.isin(t, np.rint(np.arange(1, 25) / 240 * 1e6)).all()
+        assert x.max() > 23 >= y.max()  # columns first: there are more
+        assert set(p) == {0, 1}
+
+
+def test_v2e_that_makes_no_events_leaves_empty_columns(tool, stand_in, v2e_folder):
+    stand_in("torch", set_num_threads=lambda count: None, __version__="0")
+    v2e = tool("v2e")
+    still = np.full((5, 4, 6), 90, np.uint8)
+    options = {"folder": str(v2e_folder), "threads": None, "arguments": {}}
+    assert [column.size for column in v2e.columns(v2e.simulator(options)(still, 240.0))] == [0] * 4
+
+
 def test_eventcv_columns_are_taken_by_name(stand_in, tool):
     table = np.array([[7, 5, 1000, 1], [6, 4, 2000, 0]], np.uint64)
     stream = SimpleNamespace(

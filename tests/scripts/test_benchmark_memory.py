@@ -71,16 +71,20 @@ def test_a_run_is_watched_and_its_failure_told(memory):
     moments, printed = memory.watched([sys.executable, "-c", script])
     assert [moment.frames for moment in moments][-1] == 4
     assert all(moment.rss_mib > 1 for moment in moments)
+    assert 0 <= moments[0].cpu_s <= moments[-1].cpu_s < 10
     assert memory.count_in(printed) == 1234
     with pytest.raises(RuntimeError, match="no such thing"):
         memory.watched([sys.executable, "-c", "raise SystemExit('no such thing')"])
 
 
 def test_the_long_table_tells_each_tenth(benchmark_memory, memory):
-    moments = [memory.Moment(k * 0.01 * (1 + (k > 900)), k, 100 + k / 100) for k in range(1, 1001)]
+    moments = [
+        memory.Moment(k * 0.01 * (1 + (k > 900)), k, 100 + k / 100, k * 0.005)
+        for k in range(1, 1001)
+    ]
     rows = benchmark_memory.long_table(moments, 1000).splitlines()[2:]
     assert len(rows) == 10
-    assert rows[0].startswith("| 1 | 10.0 ")
+    assert rows[0].startswith("| 1 | 10.0 | 5.00 ")
     assert rows[9].startswith("| 10 | 20.0 ")
     assert rows[9].endswith("| 110 |")
     with pytest.raises(RuntimeError, match="tenth 1 "):

@@ -58,12 +58,18 @@ def test_columns_are_chunked_resizable_and_compressed_with_standard_filters(tmp_
             assert column.chunks == (65536,)
             assert column.maxshape == (None,)
             assert (column.compression, column.compression_opts) == ("gzip", 1)
-            assert column.shuffle
+        assert [name for name in file["events"] if file["events"][name].shuffle] == [
+            "ps",
+            "xs",
+            "ys",
+        ]
 
 
 @pytest.mark.parametrize("count", [CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK + 17])
-def test_chunks_hold_every_event(tmp_path, count):
+@pytest.mark.parametrize("slower", [1, 1000], ids=["busy", "sparse"])
+def test_chunks_hold_every_event(tmp_path, count, slower):
     events = many(count)
+    events["t"] *= slower
     with write(tmp_path / "a.h5", np.array_split(events, 7)) as file:
         group = file["events"]
         assert np.array_equal(group["xs"][:], events["x"])

@@ -41,7 +41,8 @@ def simulator(options: dict[str, Any]) -> Callable[[Any, float], Any]:
 
 def columns(events: Any) -> tuple[Any, ...]:
     """Return times [us], columns, rows and polarities."""
-    table = np.concatenate([np.asarray(part, np.float64)[:, :4] for part in events])
+    parts = [np.asarray(part, np.float64)[:, :4] for part in events]
+    table = np.concatenate([np.empty((0, 4)), *parts])
     t, x, y, p = table.T
     whole = (column.astype(np.int64) for column in (np.rint(t * 1e6), x, y, p > 0))
     return tuple(whole)
