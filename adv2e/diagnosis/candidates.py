@@ -98,7 +98,7 @@ class Candidate:
             set_key(values, key, value)
         for knob, place in zip(self.knobs, inner, strict=True):
             _turn(values, knob, knob.outer(place))
-        return from_dict(values, self.name, list(user_effects(config).values()))
+        return _from_values(values, self.name, config)
 
     def parameters(self, inner: Places) -> dict[str, Any]:
         """Return the keys that this effect sets, and their values."""
@@ -161,6 +161,18 @@ _OFF_AT_INFINITY = (
 )
 
 
+def with_keys(config: Config, keys: Mapping[str, Any]) -> Config:
+    """Return `config` with other values of some keys, given by their paths."""
+    values = to_dict(config)
+    for key, value in keys.items():
+        set_key(values, key, value)
+    return _from_values(values, ", ".join(keys), config)
+
+
+def _from_values(values: dict[str, Any], name: str, like: Config) -> Config:
+    return from_dict(values, name, list(user_effects(like).values()))
+
+
 def _known(section: type[Config]) -> dict[str, Parameter]:
     return {key.path: key.about for key in all_keys(section)}
 
@@ -220,6 +232,14 @@ def neutral_value(config: Config, knob: Knob) -> float:
 
 
 @dataclass(frozen=True)
+class Lamp:
+    """A line in the rate that a lamp may make: its frequency, and the phase that it would have."""
+
+    hz: float
+    phase_rad: float = 0.0
+
+
+@dataclass(frozen=True)
 class Hints:
     """What a look at the recording says of where fits may start.
 
@@ -227,14 +247,14 @@ class Hints:
     ----------
     seconds : float
         Length of the recording.
-    line_hz : tuple of float
-        Frequencies of the strongest lines in the rate.
+    lamps : tuple of Lamp
+        Of the strongest lines in the rate.
     tick_us : int
         Largest time of which all stamps are multiples.
     """
 
     seconds: float
-    line_hz: tuple[float, ...]
+    lamps: tuple[Lamp, ...]
     tick_us: int
 
 
@@ -417,15 +437,13 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
             "misregistration", shift, ((0.3, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.0, -0.3))
         ),
     ]  # fmt: skip
-    for hz in hints.line_hz:
-        lamp = (
-            Knob("frames.flicker.depth", 0.005, 0.99),
-            # whole turns more are the same phase: no border that a fit could run to
-            Knob("frames.flicker.phase_rad", -20.0, 20.0, False),
-            Knob("frames.flicker.frequency_hz", hz - 3.0, hz + 3.0, False, 0.25 / hints.seconds),
+    for lamp in hints.lamps:
+        depth = Knob("frames.flicker.depth", 0.005, 0.99)
+        read_off = (
+            ("frames.flicker.frequency_hz", lamp.hz),
+            ("frames.flicker.phase_rad", lamp.phase_rad),
         )
-        quarters = (-0.5 * math.pi, 0.0, 0.5 * math.pi, math.pi)
-        made.append(Candidate("flicker", lamp, tuple((0.12, phase, hz) for phase in quarters)))
+        made.append(Candidate("flicker", (depth,), ((0.06,), (0.15,), (0.35,)), read_off))
     made += _encodings(values)
     return made
 
@@ -456,11 +474,11 @@ _BUILDERS = (
 
 def names() -> list[str]:
     """Return the names of all effects that can be found."""
-    return list(dict.fromkeys(one.name for one in _all(Config(), Hints(1.0, (100.0,), 10))))
+    return list(dict.fromkeys(one.name for one in _all(Config(), Hints(1.0, (Lamp(100.0),), 10))))
 
 
-def hints_of(times_us: np.ndarray[Any, Any], seconds: float, lines: Sequence[float]) -> Hints:
+def hints_of(times_us: np.ndarray[Any, Any], seconds: float, lamps: Sequence[Lamp]) -> Hints:
     """Return hints from the stamps of a recording's events [us]."""
     # of the times themselves, not of differences: ticks count from zero
     step = int(np.gcd.reduce(times_us)) if len(times_us) else 1
-    return Hints(seconds, tuple(lines), max(1, step))
+    return Hints(seconds, tuple(lamps), max(1, step))

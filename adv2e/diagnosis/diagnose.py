@@ -21,6 +21,7 @@ from adv2e.diagnosis.error import error_rows, of_part
 from adv2e.diagnosis.evidence import Evidence, affordable
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.interpolation import InterpolationError, interpolation_error
+from adv2e.diagnosis.lamps import lamps_of
 from adv2e.diagnosis.light import light_of, quantum_dn
 from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.markers.timing import strongest_lines
@@ -36,6 +37,7 @@ Array = NDArray[np.float64]
 
 _PILOT = 16
 _MATCHING_SEED = 9_999
+_LAMP_SEED = 9_998
 _DRAWS = 12
 
 
@@ -101,7 +103,10 @@ def diagnose(
         measured = Placed.of(evidence.stream, scene)
         observed = laboratory.markers.measure(measured)
         lines = strongest_lines(measured.stream, [one.stream for one in pilot], scene)
-        hints = hints_of(evidence.stream.t, evidence.seconds, lines)
+        lamps = lamps_of(
+            lines, measured.stream, declared, lambda lit: simulator.stream(lit, _LAMP_SEED)
+        )
+        hints = hints_of(evidence.stream.t, evidence.seconds, lamps)
         candidates = [one for one in library(declared, hints) if one.name not in without]
         search = Search(laboratory, observed, declared, candidates, error, log)
         outcome = search.run()

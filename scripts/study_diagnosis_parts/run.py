@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis.candidates import Hints, library
+from adv2e.diagnosis.candidates import Hints, Lamp, library
 from adv2e.diagnosis.diagnose import diagnose
 from adv2e.diagnosis.evidence import read_evidence
 from adv2e.reports.result import Diagnosis
@@ -61,7 +61,7 @@ def _git(*arguments: str) -> str:
 
 def library_names() -> set[str]:
     """Return the effects that adv2e can add."""
-    return {one.name for one in library(Config(), Hints(1.0, (100.0,), 10))}
+    return {one.name for one in library(Config(), Hints(1.0, (Lamp(100.0),), 10))}
 
 
 def diagnosed(

@@ -9,11 +9,11 @@ import numpy as np
 
 from adv2e.config import Config, to_dict
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.candidates import Hints, get_key, library
+from adv2e.diagnosis.candidates import Hints, Lamp, get_key, library
 from adv2e.diagnosis.markers import BOTH, VIEWS
 
 STATISTICS = 40
-HINTS = Hints(1.0, (100.0,), 1)
+HINTS = Hints(1.0, (Lamp(100.0),), 1)
 
 RESPONSES = {
     "pixel.refractory.period_us": lambda value: np.log(value / 500.0),

@@ -12,6 +12,7 @@ from adv2e.config import Config, load_config, shipped, to_dict
 from adv2e.diagnosis.candidates import (
     Candidate,
     Hints,
+    Lamp,
     about_key,
     flat,
     get_key,
@@ -22,7 +23,7 @@ from adv2e.diagnosis.candidates import (
     set_key,
 )
 
-HINTS = Hints(0.3, (100.0, 63.5), 10)
+HINTS = Hints(0.3, (Lamp(100.0), Lamp(63.5, 1.2)), 10)
 CONFIGS = [None, *shipped()]
 
 
@@ -143,7 +144,7 @@ def test_the_tick_of_stamps(tick, start):
 
 def test_stamps_that_say_nothing_of_a_tick():
     assert hints_of(np.array([], np.int64), 1.0, ()).tick_us == 1
-    assert hints_of(np.array([0], np.int64), 1.0, (50.0,)) == Hints(1.0, (50.0,), 1)
+    assert hints_of(np.array([0], np.int64), 1.0, (Lamp(50.0),)) == Hints(1.0, (Lamp(50.0),), 1)
 
 
 # --- knobs ---------------------------------------------------------------------------------------

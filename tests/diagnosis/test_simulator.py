@@ -7,7 +7,9 @@ import pytest
 from made_up_streams import random_stream, wandering_light
 
 from adv2e import load_config
+from adv2e.diagnosis.candidates import with_keys
 from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.lamps import lamps_of
 from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
@@ -139,3 +141,19 @@ def test_where_frames_matter_they_are_the_recorded_ones(simulator, monkeypatch, 
     monkeypatch.setattr("adv2e.diagnosis.simulations.made", None)
     extra = ["readout.frame_coupling.tau_us=300"] if "coupling" in sets[0] else []
     assert len(simulator.stream(load_config([], [*FLOW, *sets, *extra]), 1)) > 0
+
+
+@pytest.mark.parametrize("phase", [-2.0, 0.3, 2.9])
+def test_the_phase_of_a_lamp_is_read_off_the_events(phase):
+    frames = [np.full((12, 16), 40 + 5 * k, np.uint8) for k in range(21)]
+    evidence = Evidence("made up", frames, 0.01 * np.arange(21), random_stream(10), 16, 12)
+    declared = load_config([], LINEAR)
+    keys = {"frequency_hz": 85.0, "depth": 0.25, "phase_rad": phase}
+    lit = with_keys(declared, {f"frames.flicker.{key}": value for key, value in keys.items()})
+    lighted = Simulator(evidence, 1)
+    (lamp,) = lamps_of(
+        (85.0, 170.0, 255.1), lighted.stream(lit, 1), declared, lambda c: lighted.stream(c, 2)
+    )
+    lighted.close()
+    assert lamp.hz == 85.0
+    assert np.angle(np.exp(1j * (lamp.phase_rad - phase))) == pytest.approx(0.0, abs=0.15)
