@@ -174,13 +174,10 @@ class Search:
             models = bench.tried(joint.config)
             against: list[str] = []
             for ground in grounds:
-                against += objections(
-                    joint,
-                    models[parts.JUDGE],
-                    ground.models[parts.JUDGE],
-                    bench.observed[parts.JUDGE],
-                )
-            against = list(dict.fromkeys(against))
+                before, after = ground.models[parts.JUDGE], models[parts.JUDGE]
+                against = objections(joint, after, before, bench.observed[parts.JUDGE])
+                if against:
+                    break
             parameters = fits[-1].candidate.parameters(fits[-1].place)
             bench.log(f"  {name} {parameters}: {'; '.join(against) or 'holds'}")
             alike = state.alternatives | _alike(trial, trials)
