@@ -580,21 +580,40 @@ def _leave(j, lo, state, pixels, lanes, alone, count):
 
 
 @kernel
+def _stays(j, give_up, lanes):
+    """Tell whether a lane looks for something."""
+    seeks = lanes[SEEKS + j]
+    return seeks != _DONE and seeks != _ALONE and not give_up
+
+
+@kernel
+def _take_out(j, lo, start, state, rows, pixels, lanes, alone, left_alone):
+    """Write back a lane that is done, or hand it on; returns how many are alone."""
+    if lanes[SEEKS + j] == _DONE:
+        _finish(j, lo, start, state, rows, pixels, lanes)
+        return left_alone
+    return _leave(j, lo, state, pixels, lanes, alone, left_alone)
+
+
+@kernel
 def _sort_out(lo, m, give_up, start, state, rows, pixels, lanes, alone, left_alone):
     """Take out the lanes that are done or left alone; returns how many stay, how many are alone."""
-    stay = 0
-    for j in range(m):
-        seeks = lanes[SEEKS + j]
-        if seeks == _DONE:
-            _finish(j, lo, start, state, rows, pixels, lanes)
-        elif seeks == _ALONE or give_up:
-            left_alone = _leave(j, lo, state, pixels, lanes, alone, left_alone)
-        else:
-            if stay != j:
-                places.move(lanes, j, stay)
-                pixels[stay] = pixels[j]
-            stay += 1
-    return stay, left_alone
+    j = 0
+    while j < m:
+        if _stays(j, give_up, lanes):
+            j += 1
+            continue
+        left_alone = _take_out(j, lo, start, state, rows, pixels, lanes, alone, left_alone)
+        # lanes that stay fill the gaps from behind, so that few have to move
+        m -= 1
+        while m > j and not _stays(m, give_up, lanes):
+            left_alone = _take_out(m, lo, start, state, rows, pixels, lanes, alone, left_alone)
+            m -= 1
+        if m > j:
+            places.move(lanes, m, j)
+            pixels[j] = pixels[m]
+            j += 1
+    return m, left_alone
 
 
 @kernel

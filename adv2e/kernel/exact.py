@@ -32,6 +32,16 @@ def covers(circuit: Circuit) -> bool:
 
 
 @kernel
+def _alike(a, b):
+    """Tell whether two rows of grey values are equal."""
+    changes = np.uint8(0)
+    for k in range(a.shape[0]):
+        # narrow on purpose: as many at a time as there are bytes in a vector
+        changes = np.uint8(changes | np.uint8(a[k] ^ b[k]))
+    return changes == 0
+
+
+@kernel
 def _rests(frames, f, before, share, first, count):
     """Tell whether the grey values of a strip are those of the instant before."""
     if not frames.coded or share[f] != _f(1.0) or share[f + 1] != _f(1.0):
@@ -40,12 +50,9 @@ def _rests(frames, f, before, share, first, count):
         return False
     now = before[f + 1] + 1
     for lo in range(first, first + count, _BLOCK):
-        changes = np.uint8(0)
-        for k in range(lo, min(lo + _BLOCK, first + count)):
-            # narrow on purpose: as many at a time as there are bytes in a vector
-            change = frames.codes[now, k] ^ frames.codes[now - 1, k]
-            changes = np.uint8(changes | np.uint8(change))
-        if changes != 0:
+        hi = min(lo + _BLOCK, first + count)
+        # slices: indices that count from zero need no test of their sign, which vectors bear ill
+        if not _alike(frames.codes[now - 1, lo:hi], frames.codes[now, lo:hi]):
             return False
     return True
 
