@@ -6,21 +6,17 @@ once a call, and only the frames stream through memory.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from adv2e.effects.pixel.leak import fill_falls
 from adv2e.jit import allocating_kernel, kernel
-from adv2e.kernel import batch, screen, special
+from adv2e.kernel import batch, exchange, screen, special
+from adv2e.kernel.quadrature import Rule
 from adv2e.kernel.tile import load, solve_one, with_room
 from adv2e.kernel.workspace import EXACT, S_LAG, S_REFERENCE, S_X, STRIP, Circuit
 
 _f = np.float32
 _BLOCK = 256
-_STEEP = _f(math.tanh(0.5 * screen.LARGEST_STEP))
-_FEW = STRIP // 64
-"""Steep pixels of a strip that are left to be solved by themselves; flashes and cuts make more."""
 _ROUNDS = 100
 """Places in one interval after which a pixel is solved by itself instead: a batch thins out."""
 
@@ -65,7 +61,7 @@ def _open_strip(lo, count, start, circuit, state, rows):
         rows[screen.LAG_0 + k] = state[S_LAG, lo + k]
     for k in range(count):
         i = lo + k
-        batch.watch(k, i, state[S_X, i], start, circuit, state, rows)
+        exchange.watch(k, i, state[S_X, i], start, circuit, state, rows)
         rows[screen.AWAY_0 + k] = rows[screen.AWAY_1 + k]
     # the rest of the last strip must be harmless
     for k in range(count, STRIP):
@@ -84,7 +80,7 @@ def _close_strip(lo, count, circuit, state, rows):
     """State of a strip at the end of a call."""
     for k in range(count):
         state[S_LAG, lo + k] = rows[screen.LAG_0 + k]
-        state[S_X, lo + k] = batch.log_of(np.float64(rows[screen.LIGHT_0 + k]), circuit)
+        state[S_X, lo + k] = exchange.log_of(np.float64(rows[screen.LIGHT_0 + k]), circuit)
 
 
 @kernel
@@ -117,10 +113,10 @@ def _lower_references(lo, count, state, rows, falls):
 
 
 @kernel
-def _screen(rows, end, length, circuit, nodes, weights):
+def _screen(rows, end, length, circuit, rule):
     screen.screen(
         rows, end, _f(circuit.dark * length), _f(circuit.per_dn * length),
-        _f(circuit.slope * circuit.knee), _f(circuit.slope), nodes, weights,
+        _f(circuit.slope * circuit.knee), _f(circuit.slope), rule,
     )  # fmt: skip
 
 
@@ -128,34 +124,35 @@ def _screen(rows, end, length, circuit, nodes, weights):
 def _return(k, i, start, circuit, state, rows):
     """Rows of a pixel that was solved by itself."""
     rows[screen.LAG_1 + k] = state[S_LAG, i]
-    x1 = batch.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
-    batch.watch(k, i, x1, start, circuit, state, rows)
+    x1 = exchange.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
+    exchange.watch(k, i, x1, start, circuit, state, rows)
 
 
 @allocating_kernel
 def _solve_flagged(
-    lo, m, start, ta, length, t_base, circuit, nodes, weights, state, scratch, keys, times, n
+    lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
 ):  # fmt: skip
     """Solve the m pixels whose numbers are in scratch.pixels, in lanes and by themselves."""
     rows, pixels, lanes, alone = scratch.rows, scratch.pixels, scratch.lanes, scratch.alone
     left = 0
     rounds = 0
-    batch.load(lo, m, ta, length, circuit, state, rows, scratch.falls, pixels, lanes)
+    waiting = exchange.held_first(m, rows, pixels)
+    exchange.load(lo, m, ta, length, circuit, state, rows, scratch.falls, pixels, lanes)
     while True:
         keys, times = with_room(keys, times, n, n + 2 * m)
         m, left, n = batch.decide(
-            lo, m, rounds == _ROUNDS, start, ta, length, t_base, circuit, state, rows, pixels,
-            lanes, alone, left, keys, times, n,
+            lo, m, waiting, rounds == _ROUNDS, start, ta, length, t_base, circuit, rule, state,
+            rows, pixels, lanes, alone, left, keys, times, n,
         )  # fmt: skip
         if m == 0:
             break
         rounds += 1
-        n = batch.search(
-            lo, m, ta, length, t_base, circuit, nodes, weights, pixels, lanes, keys, times, n
+        n, waiting = batch.search(
+            lo, m, ta, length, t_base, circuit, rule, pixels, lanes, keys, times, n
         )
     for c in range(left):
         k, s, x = int(alone[0, c]), alone[1, c], alone[2, c]
-        end = batch.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
+        end = exchange.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
         n, keys, times = solve_one(
             lo + k, x, x, end - x, end, ta + s * length, (1.0 - s) * length, t_base, circuit,
             state, scratch.ws, keys, times, n,
@@ -164,46 +161,9 @@ def _solve_flagged(
     return n, keys, times
 
 
-@kernel
-def _pieces(rows, knee_dn):
-    """Into how many parts to cut an interval over which many pixels step by more than an e-fold."""
-    steep = 0
-    for k in range(STRIP):
-        i0, i1 = rows[screen.LIGHT_0 + k], rows[screen.LIGHT_1 + k]
-        steep += (abs(i1 - i0) > _STEEP * (i1 + i0)) & (min(i0, i1) >= knee_dn)
-    if steep <= _FEW:
-        return 1
-    most = 0.0
-    for k in range(STRIP):
-        i0, i1 = rows[screen.LIGHT_0 + k], rows[screen.LIGHT_1 + k]
-        if min(i0, i1) >= knee_dn:
-            most = max(most, abs(math.log(np.float64(i1) / np.float64(i0))))
-    return math.ceil(most / (0.95 * screen.LARGEST_STEP))
-
-
-@kernel
-def _keep_ends(count, circuit, rows, columns):
-    """Columns 0, 1: log intensity at both ends of the interval; 2: light at its end."""
-    for k in range(count):
-        columns[0, k] = batch.log_of(np.float64(rows[screen.LIGHT_0 + k]), circuit)
-        columns[1, k] = batch.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
-        columns[2, k] = rows[screen.LIGHT_1 + k]
-
-
-@kernel
-def _load_piece(count, share, circuit, columns, rows):
-    """Row LIGHT_1: light at a share of an interval that is cut up; x is linear in time over it."""
-    for k in range(count):
-        x = columns[0, k] + (columns[1, k] - columns[0, k]) * share
-        foot = x * circuit.slope
-        light = special.exp(x)
-        light = foot if x < circuit.knee else light
-        rows[screen.LIGHT_1 + k] = columns[2, k] if share >= 1.0 else light
-
-
 @allocating_kernel
 def _advance_strip(
-    lo, count, start, ta, length, rests, circuit, nodes, weights, t_base, state, scratch, keys,
+    lo, count, start, ta, length, rests, circuit, rule, t_base, state, scratch, keys,
     times, n,
 ):  # fmt: skip
     """Advance one strip over one interval, whose light is in LIGHT_0 and LIGHT_1."""
@@ -216,12 +176,12 @@ def _advance_strip(
     if rests:
         any_flag = screen.screen_at_rest(rows, end)
     else:
-        _screen(rows, end, length, circuit, nodes, weights)
+        _screen(rows, end, length, circuit, rule)
     if any_flag:
         m = screen.flagged(rows, scratch.pixels)
         if m > 0:
             n, keys, times = _solve_flagged(
-                lo, m, start, ta, length, t_base, circuit, nodes, weights, state, scratch, keys,
+                lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys,
                 times, n,
             )  # fmt: skip
     if leaks:
@@ -230,9 +190,19 @@ def _advance_strip(
     return n, keys, times
 
 
+@allocating_kernel  # it returns arrays, whose references have to be counted
+def _rule(rules, f):
+    """Return the quadrature of interval f."""
+    count, dead = rules.counts[f], rules.counts_dead[f]
+    return Rule(
+        rules.nodes[f, :count], rules.weights[f, :count],
+        rules.nodes_dead[f, :dead], rules.weights_dead[f, :dead],
+    )  # fmt: skip
+
+
 @allocating_kernel
 def _strip(
-    lo, count, frames, before, share, starts, circuit, nodes, weights, counts, t_base,
+    lo, count, frames, before, share, starts, circuit, rules, t_base,
     state, scratch, keys, times, n,
 ):  # fmt: skip
     """Advance one strip of the exact circuit over all intervals."""
@@ -245,21 +215,14 @@ def _strip(
     for f in range(starts.shape[0] - 1):
         length = starts[f + 1] - starts[f]
         still = _rests(frames, f, before, share, lo, count)
-        pieces = 1
         if not still:
             load(frames, before[f + 1], share[f + 1], lo, count, floor, rows)
             still = screen.is_still(rows)
-            pieces = 1 if still else _pieces(rows, _f(circuit.slope * circuit.knee))
-        if pieces > 1:
-            _keep_ends(count, circuit, rows, scratch.columns)
-        for q in range(pieces):
-            if pieces > 1:
-                _load_piece(count, (q + 1) / pieces, circuit, scratch.columns, rows)
-            n, keys, times = _advance_strip(
-                lo, count, start, starts[f] + length * (q / pieces), length / pieces,
-                still and settled, circuit, nodes[f, : counts[f]], weights[f, : counts[f]], t_base,
-                state, scratch, keys, times, n,
-            )  # fmt: skip
+        rule = _rule(rules, f)
+        n, keys, times = _advance_strip(
+            lo, count, start, starts[f], length, still and settled, circuit, rule, t_base, state,
+            scratch, keys, times, n,
+        )  # fmt: skip
         settled = still and (settled or screen.is_settled(rows))
     _close_strip(lo, count, circuit, state, rows)
     return n, keys, times
@@ -267,7 +230,7 @@ def _strip(
 
 @allocating_kernel
 def run_exact(
-    lo, hi, frames, before, share, starts, begins, last, circuit, nodes, weights, counts, t_base,
+    lo, hi, frames, before, share, starts, begins, last, circuit, rules, t_base,
     state, scratch, keys, times,
 ):  # fmt: skip
     """Advance the pixels lo..hi over the intervals between neighbouring frames.
@@ -285,7 +248,7 @@ def run_exact(
     last : (intervals + 1,)
         With the paper's last interval as printed: which intervals are the last of an input
         interval (the final entry looks ahead); else all False.
-    nodes, weights : (intervals, NODES_MAX); counts : (intervals,)
+    rules : Rules
         Quadrature for each interval.
 
     Returns
@@ -296,7 +259,7 @@ def run_exact(
     for s in range(lo, hi, STRIP):
         count = min(STRIP, hi - s)
         n, keys, times = _strip(
-            s, count, frames, before, share, starts, circuit, nodes, weights, counts, t_base,
+            s, count, frames, before, share, starts, circuit, rules, t_base,
             state, scratch, keys, times, n,
         )  # fmt: skip
     return n, keys, times

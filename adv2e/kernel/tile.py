@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.jit import allocating_kernel, kernel
-from adv2e.kernel import batch, dense_rows, lanes, screen
+from adv2e.kernel import dense_rows, lanes, screen
 from adv2e.kernel.solve import solve_interval
 from adv2e.kernel.workspace import S_LAG, SAVED, STRIP, workspace
 
@@ -63,7 +63,7 @@ def scratch() -> Scratch:
         ws=workspace(),
         rows=screen.scratch(),
         lanes=lanes.scratch(),
-        pixels=batch.pixel_numbers(),
+        pixels=lanes.pixel_numbers(),
         alone=np.zeros((3, padded)),
         columns=np.zeros((14, padded)),
         flags=np.zeros(STRIP, np.bool_),
