@@ -112,10 +112,14 @@ def plan(count, ta, length, circuit, lanes):
         level = on if away_p >= on else -off
         goal = lanes[REFERENCE + j] - lanes[X0 + j] + level
         lanes[GOAL + j] = goal if crosses else lanes[GOAL + j]
-        lanes[F_LO + j] = away_s - level
-        lanes[F_HI + j] = away_p - level
-        lanes[G_LO + j] = fall + fall_dn * light_s - rate_s * lag_s
-        lanes[G_HI + j] = fall + fall_dn * light_p - rate_p * lag_p
+        f_lo = away_s - level
+        lanes[F_LO + j] = f_lo if crosses else lanes[F_LO + j]
+        f_hi = away_p - level
+        lanes[F_HI + j] = f_hi if crosses else lanes[F_HI + j]
+        g_lo = fall + fall_dn * light_s - rate_s * lag_s
+        lanes[G_LO + j] = g_lo if crosses else lanes[G_LO + j]
+        g_hi = fall + fall_dn * light_p - rate_p * lag_p
+        lanes[G_HI + j] = g_hi if crosses else lanes[G_HI + j]
         lanes[ROOT + j] = 1.0 if crosses else lanes[ROOT + j]
         lanes[FRESH + j] = 1.0 if crosses else lanes[FRESH + j]
         lanes[MOVES + j] = 1.0 if crosses else lanes[MOVES + j]
