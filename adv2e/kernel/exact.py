@@ -12,6 +12,7 @@ from adv2e.effects.pixel.leak import fill_falls
 from adv2e.jit import allocating_kernel, kernel
 from adv2e.kernel import batch, exchange, screen, special
 from adv2e.kernel.quadrature import Rule
+from adv2e.kernel.rest import solve_at_rest
 from adv2e.kernel.tile import load, solve_one, with_room
 from adv2e.kernel.workspace import EXACT, S_LAG, S_REFERENCE, S_X, STRIP, Circuit
 
@@ -113,6 +114,14 @@ def _lower_references(lo, count, state, rows, falls):
 
 
 @kernel
+def _lower_all_references(lo, count, state, falls):
+    """Take the fall from the references of all pixels."""
+    reference = state[S_REFERENCE, lo : lo + count]
+    for k in range(count):
+        reference[k] -= falls[k]
+
+
+@kernel
 def _screen(rows, end, length, circuit, rule):
     screen.screen(
         rows, end, _f(circuit.dark * length), _f(circuit.per_dn * length),
@@ -163,27 +172,52 @@ def _solve_flagged(
 
 @allocating_kernel
 def _advance_strip(
-    lo, count, start, ta, length, rests, circuit, rule, t_base, state, scratch, keys,
-    times, n,
+    lo, count, start, ta, length, circuit, rule, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
     """Advance one strip over one interval, whose light is in LIGHT_0 and LIGHT_1."""
+    rows, falls = scratch.rows, scratch.falls
+    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
+    if leaks:
+        _leak_strip(lo, count, length, circuit, state, rows, falls, scratch.means)
+    _screen(rows, _f(ta + length - start), length, circuit, rule)
+    m = screen.flagged(rows, scratch.pixels)
+    if m > 0:
+        n, keys, times = _solve_flagged(
+            lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
+        )
+    if leaks:
+        _lower_references(lo, count, state, rows, falls)
+    screen.step_on(rows)
+    return n, keys, times
+
+
+@allocating_kernel
+def _rest_strip(
+    lo, count, start, ta, length, circuit, rule, t_base, state, scratch, keys, times, n
+):  # fmt: skip
+    """Advance one strip over one interval in which no light changes and no lag is left."""
     rows, falls = scratch.rows, scratch.falls
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     end = _f(ta + length - start)
     if leaks:
         _leak_strip(lo, count, length, circuit, state, rows, falls, scratch.means)
-    any_flag = True
-    if rests:
-        any_flag = screen.screen_at_rest(rows, end)
+    if not screen.anything_due(rows, end):
+        if leaks:
+            screen.fall_at_rest(rows)
+            _lower_all_references(lo, count, state, falls)
+        return n, keys, times
+    screen.screen_at_rest(rows, end)
+    m = screen.flagged(rows, scratch.pixels)
+    if circuit.leak_jitter > 0.0:
+        n, keys, times = _solve_flagged(
+            lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
+        )
     else:
-        _screen(rows, end, length, circuit, rule)
-    if any_flag:
-        m = screen.flagged(rows, scratch.pixels)
-        if m > 0:
-            n, keys, times = _solve_flagged(
-                lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys,
-                times, n,
-            )  # fmt: skip
+        for j in range(m):
+            k = scratch.pixels[j]
+            n, keys, times = solve_at_rest(
+                k, lo + k, start, ta, length, t_base, circuit, state, rows, falls, keys, times, n
+            )
     if leaks:
         _lower_references(lo, count, state, rows, falls)
     screen.step_on(rows)
@@ -219,10 +253,16 @@ def _strip(
             load(frames, before[f + 1], share[f + 1], lo, count, floor, rows)
             still = screen.is_still(rows)
         rule = _rule(rules, f)
-        n, keys, times = _advance_strip(
-            lo, count, start, starts[f], length, still and settled, circuit, rule, t_base, state,
-            scratch, keys, times, n,
-        )  # fmt: skip
+        if still and settled:
+            n, keys, times = _rest_strip(
+                lo, count, start, starts[f], length, circuit, rule, t_base, state, scratch, keys,
+                times, n,
+            )  # fmt: skip
+        else:
+            n, keys, times = _advance_strip(
+                lo, count, start, starts[f], length, circuit, rule, t_base, state, scratch, keys,
+                times, n,
+            )  # fmt: skip
         settled = still and (settled or screen.is_settled(rows))
     _close_strip(lo, count, circuit, state, rows)
     return n, keys, times

@@ -222,6 +222,24 @@ def screen(rows, end, dark, per_dn, knee_dn, slope, rule):
 
 
 @kernel
+def anything_due(rows, end):
+    """Tell whether screen_at_rest would flag any pixel."""
+    hits = 0
+    for k in range(STRIP):
+        before = rows[AWAY_0 + k]
+        away = before + rows[FALL + k]
+        hits += (away >= rows[ON + k]) | (-before >= rows[OFF + k]) | (rows[DUE + k] < end)
+    return hits > 0
+
+
+@kernel
+def fall_at_rest(rows):
+    """Make the end of an interval at rest the start of the next, where nothing is flagged."""
+    for k in range(STRIP):
+        rows[AWAY_0 + k] += rows[FALL + k]
+
+
+@kernel
 def screen_at_rest(rows, end):
     """As screen, where no light changes and no lag is left; tells whether any pixel is flagged."""
     hits = 0
