@@ -217,14 +217,16 @@ class PixelArray:
         stepped.load_strip(light, circuit, np.empty(self.pixels), state[S_X])
         levels = pixel.thresholds
         on, off = state[S_ON], state[S_OFF]
-        self._over_pixels(fill_levels, seed, levels.on, levels.off, levels.mismatch, on, off)
+        means, spare = (levels.on, levels.off), state[S_REFERENCE]
+        self._over_pixels(fill_levels, seed, *means, levels.mismatch, on, off, spare)
         state[S_REFERENCE] = state[S_X]
         state[S_HOLD] = -1.0
         if pixel.initial_reference == "random":
             fill_random_reference(seed, on, off, state[S_X], state[S_REFERENCE])
         if circuit.shot_rate > 0:
             times = state[S_SHOT_TIME]
-            self._over_pixels(fill_first_candidates, seed, circuit.shot_rate, start, times)
+            draws = state[S_SHOT_DRAW]
+            self._over_pixels(fill_first_candidates, seed, circuit.shot_rate, start, times, draws)
         if pixel.hot_pixels and circuit.hot_rate > 0:
             share, times = pixel.hot_pixels.fraction, state[S_HOT_TIME]
             fill_first_hot_times(seed, share, circuit.hot_rate, start, times)
