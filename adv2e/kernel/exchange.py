@@ -6,6 +6,7 @@ from adv2e.jit import kernel
 from adv2e.kernel import special
 from adv2e.kernel.comparator import HOT, SHOT
 from adv2e.kernel.lanes import (
+    A1,
     ALONE,
     AWAY_P,
     AWAY_S,
@@ -22,6 +23,7 @@ from adv2e.kernel.lanes import (
     HOLD,
     I0,
     I1,
+    KAPPA,
     KIND,
     KNOWN,
     LAG_P,
@@ -71,6 +73,7 @@ from adv2e.kernel.workspace import (
     S_SHOT_TIME,
 )
 
+_LEAVING, _STAYING = A1, KAPPA  # rows that hold nothing between two searches
 _EARLY = 1.0 - 1e-6  # single precision must not make a due time late
 _NO_TIME = 1e300
 
@@ -229,37 +232,27 @@ def _leave(j, lo, state, pixels, lanes, alone, count):
 
 
 @kernel
-def _stays(j, give_up, lanes):
-    """Tell whether a lane looks for something."""
-    seeks = lanes[SEEKS + j]
-    return not (give_up or seeks in (DONE, ALONE))
-
-
-@kernel
-def _take_out(j, lo, start, state, rows, pixels, lanes, alone, left_alone):
-    """Write back a lane that is done, or hand it on; returns how many are alone."""
-    if lanes[SEEKS + j] == DONE:
-        _finish(j, lo, start, state, rows, pixels, lanes)
-        return left_alone
-    return _leave(j, lo, state, pixels, lanes, alone, left_alone)
-
-
-@kernel
 def sort_out(lo, m, give_up, start, state, rows, pixels, lanes, alone, left_alone):
     """Take out the lanes that are done or left alone; returns how many stay, how many are alone."""
-    j = 0
-    while j < m:
-        if _stays(j, give_up, lanes):
-            j += 1
+    leaving, staying = 0, 0
+    for j in range(m):
+        seeks = lanes[SEEKS + j]
+        if seeks == DONE:
+            _finish(j, lo, start, state, rows, pixels, lanes)
+        elif seeks == ALONE or give_up:
+            left_alone = _leave(j, lo, state, pixels, lanes, alone, left_alone)
+        else:
+            lanes[_STAYING + staying] = j
+            staying += 1
             continue
-        left_alone = _take_out(j, lo, start, state, rows, pixels, lanes, alone, left_alone)
-        # lanes that stay fill the gaps from behind, so that few have to move
-        m -= 1
-        while m > j and not _stays(m, give_up, lanes):
-            left_alone = _take_out(m, lo, start, state, rows, pixels, lanes, alone, left_alone)
-            m -= 1
-        if m > j:
-            move(lanes, m, j)
-            pixels[j] = pixels[m]
-            j += 1
-    return m, left_alone
+        lanes[_LEAVING + leaving] = j
+        leaving += 1
+    # the last lanes that stay fill the gaps among the first ones, so that few have to move
+    gaps = 0
+    while gaps < leaving and lanes[_LEAVING + gaps] < staying:
+        gaps += 1
+    for c in range(gaps):
+        gap, last = int(lanes[_LEAVING + c]), int(lanes[_STAYING + staying - gaps + c])
+        move(lanes, last, gap)
+        pixels[gap] = pixels[last]
+    return staying, left_alone
