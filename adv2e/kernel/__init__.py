@@ -55,6 +55,8 @@ All effects with 5 Hz of shot noise cost 1.5 to 1.6 times what noise off does (3
 second; processor time on an Intel Xeon, by ``perf``).  Of the difference, ends of dead times take
 about 30 parts of a hundred (a rule of 4 nodes from the event on), pixels into lanes and out 20,
 noise events 17, as they are drawn one by one, the further places and events 20, and leak and the
-first draws of all pixels 5 each.  Not in these: a process that has just imported Numba searches it for
-garbage once, some 40 ms, as long as half of a clip of 480 such frames of which nine tenths rest.
+first draws of all pixels 5 each.
+
+Not in these figures: a process that has just imported Numba searches it for garbage once, some 40
+ms, as long as half of a clip of 480 such frames of which nine tenths rest.
 """
