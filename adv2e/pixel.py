@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache, partial
+from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
@@ -26,12 +26,12 @@ from adv2e.effects.pixel.thresholds import fill_levels, fill_random_reference
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events, empty_events
 from adv2e.intervals import Part
-from adv2e.kernel import order, screen, stepped
+from adv2e.kernel import order, stepped
 from adv2e.kernel.dense import Run, run_dense
 from adv2e.kernel.dense_events import Injected
 from adv2e.kernel.exact import run_exact
 from adv2e.kernel.general import run_general
-from adv2e.kernel.screen import NODES_MAX
+from adv2e.kernel.quadrature import rules_for
 from adv2e.kernel.tile import Frames, frames_of, scratch
 from adv2e.kernel.workspace import (
     PIXEL_BITS,
@@ -83,11 +83,6 @@ def is_compiled(pixel: Pixel, sampling: Sampling, additions: Additions | None = 
     """Tell whether the kernel that this pixel needs has been compiled before."""
     circuit = make_circuit(pixel, sampling, 0)
     return jit.is_cached(driver_of(pixel, circuit, additions, "auto"))
-
-
-@lru_cache(maxsize=256)
-def _quadrature(length: float, fastest: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    return screen.quadrature(length, fastest)
 
 
 def _spread(count: int) -> list[int]:
@@ -225,14 +220,16 @@ class PixelArray:
         stepped.load_strip(light, circuit, np.empty(self.pixels), state[S_X])
         levels = pixel.thresholds
         on, off = state[S_ON], state[S_OFF]
-        self._over_pixels(fill_levels, seed, levels.on, levels.off, levels.mismatch, on, off)
+        means, spare = (levels.on, levels.off), state[S_REFERENCE]
+        self._over_pixels(fill_levels, seed, *means, levels.mismatch, on, off, spare)
         state[S_REFERENCE] = state[S_X]
         state[S_HOLD] = -1.0
         if pixel.initial_reference == "random":
             fill_random_reference(seed, on, off, state[S_X], state[S_REFERENCE])
         if circuit.shot_rate > 0:
             times = state[S_SHOT_TIME]
-            self._over_pixels(fill_first_candidates, seed, circuit.shot_rate, start, times)
+            draws = state[S_SHOT_DRAW]
+            self._over_pixels(fill_first_candidates, seed, circuit.shot_rate, start, times, draws)
         if pixel.hot_pixels and circuit.hot_rate > 0:
             share, times = pixel.hot_pixels.fraction, state[S_HOT_TIME]
             fill_first_hot_times(seed, share, circuit.hot_rate, start, times)
@@ -332,7 +329,8 @@ class PixelArray:
         pool: ThreadPoolExecutor | None,
     ) -> list[_Parted]:
         """Return the events of all tiles, solved interval by interval."""
-        nodes, weights, counts = self._nodes(np.diff(starts))
+        fastest = max(self.circuit.dark + 255.0 * self.circuit.per_dn, self.circuit.dark)
+        rules = rules_for(np.diff(starts), fastest, self.circuit.dead_time)
         advance = run_exact if self._driver == "run_exact" else run_general
 
         def run(tile: tuple[int, int]) -> _Parted:
@@ -340,8 +338,7 @@ class PixelArray:
             worker = self._workers.get()
             n, worker.keys, worker.times = advance(
                 lo, hi, frames, part.before, part.share, starts, not self.started, part.last,
-                self.circuit, nodes, weights, counts, t_base, self.state, worker.scratch,
-                worker.keys, worker.times,
+                self.circuit, rules, t_base, self.state, worker.scratch, worker.keys, worker.times,
             )  # fmt: skip
             parted = _Parted(worker.keys, worker.times, n, per_us)
             self._workers.put(worker)
@@ -427,17 +424,3 @@ class PixelArray:
 
         list((pool.map if pool else map)(sort, borders[:-1], borders[1:]))
         return events
-
-    def _nodes(self, lengths: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
-        nodes = np.zeros((lengths.size, NODES_MAX))
-        weights = np.zeros_like(nodes)
-        counts = np.zeros(lengths.size, np.int64)
-        fastest = max(self.circuit.dark + 255.0 * self.circuit.per_dn, self.circuit.dark)
-        for k, length in enumerate(lengths):
-            # rounded up so that jitter of the frame times does not miss the cache
-            rounded = float(f"{length * 1.005:.2e}")
-            node, weight = _quadrature(rounded, fastest)
-            counts[k] = node.size
-            nodes[k, : node.size] = node
-            weights[k, : node.size] = weight
-        return nodes, weights, counts

@@ -101,16 +101,42 @@ def uniforms(seed: int, stream: int, pixel: int, draw: float) -> tuple[float, fl
 
 
 @kernel
+def normal_of(u: float, v: float) -> float:
+    """Return the standard normal number of two uniform ones (Box and Muller)."""
+    return math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)
+
+
+@kernel
 def normal(seed: int, stream: int, pixel: int, draw: float) -> float:
     """Return a standard normal number (Box and Muller)."""
     u, v = uniforms(seed, stream, pixel, draw)
-    return math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)
+    return normal_of(u, v)
 
 
 @kernel
 def exponential(seed: int, stream: int, pixel: int, draw: float) -> float:
     """Return an exponential number of mean 1."""
     return -math.log(uniforms(seed, stream, pixel, draw)[0])
+
+
+@kernel
+def uniforms_of_pixels(
+    seed: int, stream: int, first: int, u: NDArray[np.float64], v: NDArray[np.float64]
+) -> None:
+    """Draw what `uniforms` gives for draw 0 of the pixels first.. into `u` and `v`.
+
+    Vectorises, which a loop that goes on to call a logarithm of the C library does not.
+    """
+    s = np.uint64(seed)
+    low, high = s & _LOW, s >> _32
+    none = np.uint64(0)
+    scale = 1.0 / 9007199254740992.0
+    for k in range(u.shape[0]):
+        a, b, c, e = _philox_unrolled(
+            np.uint64(first + k) & _LOW, np.uint64(stream), none, none, low, high
+        )
+        u[k] = (np.float64(a >> _5) * 67108864.0 + np.float64(b >> _6) + 0.5) * scale
+        v[k] = (np.float64(c >> _5) * 67108864.0 + np.float64(e >> _6) + 0.5) * scale
 
 
 @kernel

@@ -1,5 +1,6 @@
 """The cache of compiled code, as seen by processes of their own."""
 
+import ast
 import os
 import shutil
 import stat
@@ -180,3 +181,20 @@ def test_folders_that_nobody_used_for_a_month_are_removed(tmp_path):
     jit.note_use(mine)
     assert not (tmp_path / "kernels-late").exists()
     assert (mine / "used").stat().st_mtime > now - day
+
+
+def test_the_digest_covers_the_constants_that_compiled_code_takes_in():
+    """Whatever a file of kernel or effects imports in capitals lies in a file of the digest."""
+    package = Path(adv2e.__file__).parent
+    covered = set(jit.sources())
+    seen = 0
+    parts = {package / "kernel", package / "effects" / "pixel"}
+    for path in (path for path in covered if path.parent in parts):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("adv2e."):
+                continue
+            if any(alias.name.isupper() for alias in node.names):
+                file = package.joinpath(*node.module.split(".")[1:]).with_suffix(".py")
+                assert file in covered, f"{path} takes constants from {file}"
+                seen += 1
+    assert seen > 20

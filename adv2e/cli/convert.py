@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -92,6 +93,7 @@ def command(
         raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
     from adv2e.pipeline import convert
 
+    gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
     summary = convert(
         source,
         output,

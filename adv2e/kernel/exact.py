@@ -6,21 +6,18 @@ once a call, and only the frames stream through memory.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from adv2e.effects.pixel.leak import fill_falls
 from adv2e.jit import allocating_kernel, kernel
-from adv2e.kernel import batch, screen, special
+from adv2e.kernel import batch, exchange, screen, special
+from adv2e.kernel.quadrature import Rule
+from adv2e.kernel.rest import solve_at_rest
 from adv2e.kernel.tile import load, solve_one, with_room
 from adv2e.kernel.workspace import EXACT, S_LAG, S_REFERENCE, S_X, STRIP, Circuit
 
 _f = np.float32
 _BLOCK = 256
-_STEEP = _f(math.tanh(0.5 * screen.LARGEST_STEP))
-_FEW = STRIP // 64
-"""Steep pixels of a strip that are left to be solved by themselves; flashes and cuts make more."""
 _ROUNDS = 100
 """Places in one interval after which a pixel is solved by itself instead: a batch thins out."""
 
@@ -32,6 +29,16 @@ def covers(circuit: Circuit) -> bool:
 
 
 @kernel
+def _alike(a, b):
+    """Tell whether two rows of grey values are equal."""
+    changes = np.uint8(0)
+    for k in range(a.shape[0]):
+        # narrow on purpose: as many at a time as there are bytes in a vector
+        changes = np.uint8(changes | np.uint8(a[k] ^ b[k]))
+    return changes == 0
+
+
+@kernel
 def _rests(frames, f, before, share, first, count):
     """Tell whether the grey values of a strip are those of the instant before."""
     if not frames.coded or share[f] != _f(1.0) or share[f + 1] != _f(1.0):
@@ -40,12 +47,9 @@ def _rests(frames, f, before, share, first, count):
         return False
     now = before[f + 1] + 1
     for lo in range(first, first + count, _BLOCK):
-        changes = np.uint8(0)
-        for k in range(lo, min(lo + _BLOCK, first + count)):
-            # narrow on purpose: as many at a time as there are bytes in a vector
-            change = frames.codes[now, k] ^ frames.codes[now - 1, k]
-            changes = np.uint8(changes | np.uint8(change))
-        if changes != 0:
+        hi = min(lo + _BLOCK, first + count)
+        # slices: indices that count from zero need no test of their sign, which vectors bear ill
+        if not _alike(frames.codes[now - 1, lo:hi], frames.codes[now, lo:hi]):
             return False
     return True
 
@@ -58,7 +62,7 @@ def _open_strip(lo, count, start, circuit, state, rows):
         rows[screen.LAG_0 + k] = state[S_LAG, lo + k]
     for k in range(count):
         i = lo + k
-        batch.watch(k, i, state[S_X, i], start, circuit, state, rows)
+        exchange.watch(k, i, state[S_X, i], start, circuit, state, rows)
         rows[screen.AWAY_0 + k] = rows[screen.AWAY_1 + k]
     # the rest of the last strip must be harmless
     for k in range(count, STRIP):
@@ -77,7 +81,7 @@ def _close_strip(lo, count, circuit, state, rows):
     """State of a strip at the end of a call."""
     for k in range(count):
         state[S_LAG, lo + k] = rows[screen.LAG_0 + k]
-        state[S_X, lo + k] = batch.log_of(np.float64(rows[screen.LIGHT_0 + k]), circuit)
+        state[S_X, lo + k] = exchange.log_of(np.float64(rows[screen.LIGHT_0 + k]), circuit)
 
 
 @kernel
@@ -110,10 +114,18 @@ def _lower_references(lo, count, state, rows, falls):
 
 
 @kernel
-def _screen(rows, end, length, circuit, nodes, weights):
+def _lower_all_references(lo, count, state, falls):
+    """Take the fall from the references of all pixels."""
+    reference = state[S_REFERENCE, lo : lo + count]
+    for k in range(count):
+        reference[k] -= falls[k]
+
+
+@kernel
+def _screen(rows, end, length, circuit, rule):
     screen.screen(
         rows, end, _f(circuit.dark * length), _f(circuit.per_dn * length),
-        _f(circuit.slope * circuit.knee), _f(circuit.slope), nodes, weights,
+        _f(circuit.slope * circuit.knee), _f(circuit.slope), rule,
     )  # fmt: skip
 
 
@@ -121,34 +133,35 @@ def _screen(rows, end, length, circuit, nodes, weights):
 def _return(k, i, start, circuit, state, rows):
     """Rows of a pixel that was solved by itself."""
     rows[screen.LAG_1 + k] = state[S_LAG, i]
-    x1 = batch.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
-    batch.watch(k, i, x1, start, circuit, state, rows)
+    x1 = exchange.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
+    exchange.watch(k, i, x1, start, circuit, state, rows)
 
 
 @allocating_kernel
 def _solve_flagged(
-    lo, m, start, ta, length, t_base, circuit, nodes, weights, state, scratch, keys, times, n
+    lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
 ):  # fmt: skip
     """Solve the m pixels whose numbers are in scratch.pixels, in lanes and by themselves."""
     rows, pixels, lanes, alone = scratch.rows, scratch.pixels, scratch.lanes, scratch.alone
     left = 0
     rounds = 0
-    batch.load(lo, m, ta, length, circuit, state, rows, scratch.falls, pixels, lanes)
+    waiting = exchange.held_first(m, rows, pixels)
+    exchange.load(lo, m, ta, length, circuit, state, rows, scratch.falls, pixels, lanes)
     while True:
         keys, times = with_room(keys, times, n, n + 2 * m)
         m, left, n = batch.decide(
-            lo, m, rounds == _ROUNDS, start, ta, length, t_base, circuit, state, rows, pixels,
-            lanes, alone, left, keys, times, n,
+            lo, m, waiting, rounds == _ROUNDS, start, ta, length, t_base, circuit, rule, state,
+            rows, pixels, lanes, alone, left, keys, times, n,
         )  # fmt: skip
         if m == 0:
             break
         rounds += 1
-        n = batch.search(
-            lo, m, ta, length, t_base, circuit, nodes, weights, pixels, lanes, keys, times, n
+        n, waiting = batch.search(
+            lo, m, ta, length, t_base, circuit, rule, pixels, lanes, keys, times, n
         )
     for c in range(left):
         k, s, x = int(alone[0, c]), alone[1, c], alone[2, c]
-        end = batch.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
+        end = exchange.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
         n, keys, times = solve_one(
             lo + k, x, x, end - x, end, ta + s * length, (1.0 - s) * length, t_base, circuit,
             state, scratch.ws, keys, times, n,
@@ -157,66 +170,21 @@ def _solve_flagged(
     return n, keys, times
 
 
-@kernel
-def _pieces(rows, knee_dn):
-    """Into how many parts to cut an interval over which many pixels step by more than an e-fold."""
-    steep = 0
-    for k in range(STRIP):
-        i0, i1 = rows[screen.LIGHT_0 + k], rows[screen.LIGHT_1 + k]
-        steep += (abs(i1 - i0) > _STEEP * (i1 + i0)) & (min(i0, i1) >= knee_dn)
-    if steep <= _FEW:
-        return 1
-    most = 0.0
-    for k in range(STRIP):
-        i0, i1 = rows[screen.LIGHT_0 + k], rows[screen.LIGHT_1 + k]
-        if min(i0, i1) >= knee_dn:
-            most = max(most, abs(math.log(np.float64(i1) / np.float64(i0))))
-    return math.ceil(most / (0.95 * screen.LARGEST_STEP))
-
-
-@kernel
-def _keep_ends(count, circuit, rows, columns):
-    """Columns 0, 1: log intensity at both ends of the interval; 2: light at its end."""
-    for k in range(count):
-        columns[0, k] = batch.log_of(np.float64(rows[screen.LIGHT_0 + k]), circuit)
-        columns[1, k] = batch.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
-        columns[2, k] = rows[screen.LIGHT_1 + k]
-
-
-@kernel
-def _load_piece(count, share, circuit, columns, rows):
-    """Row LIGHT_1: light at a share of an interval that is cut up; x is linear in time over it."""
-    for k in range(count):
-        x = columns[0, k] + (columns[1, k] - columns[0, k]) * share
-        foot = x * circuit.slope
-        light = special.exp(x)
-        light = foot if x < circuit.knee else light
-        rows[screen.LIGHT_1 + k] = columns[2, k] if share >= 1.0 else light
-
-
 @allocating_kernel
 def _advance_strip(
-    lo, count, start, ta, length, rests, circuit, nodes, weights, t_base, state, scratch, keys,
-    times, n,
+    lo, count, start, ta, length, circuit, rule, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
     """Advance one strip over one interval, whose light is in LIGHT_0 and LIGHT_1."""
     rows, falls = scratch.rows, scratch.falls
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
-    end = _f(ta + length - start)
     if leaks:
         _leak_strip(lo, count, length, circuit, state, rows, falls, scratch.means)
-    any_flag = True
-    if rests:
-        any_flag = screen.screen_at_rest(rows, end)
-    else:
-        _screen(rows, end, length, circuit, nodes, weights)
-    if any_flag:
-        m = screen.flagged(rows, scratch.pixels)
-        if m > 0:
-            n, keys, times = _solve_flagged(
-                lo, m, start, ta, length, t_base, circuit, nodes, weights, state, scratch, keys,
-                times, n,
-            )  # fmt: skip
+    _screen(rows, _f(ta + length - start), length, circuit, rule)
+    m = screen.flagged(rows, scratch.pixels)
+    if m > 0:
+        n, keys, times = _solve_flagged(
+            lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
+        )
     if leaks:
         _lower_references(lo, count, state, rows, falls)
     screen.step_on(rows)
@@ -224,8 +192,51 @@ def _advance_strip(
 
 
 @allocating_kernel
+def _rest_strip(
+    lo, count, start, ta, length, circuit, rule, t_base, state, scratch, keys, times, n
+):  # fmt: skip
+    """Advance one strip over one interval in which no light changes and no lag is left."""
+    rows, falls = scratch.rows, scratch.falls
+    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
+    end = _f(ta + length - start)
+    if leaks:
+        _leak_strip(lo, count, length, circuit, state, rows, falls, scratch.means)
+    if not screen.anything_due(rows, end):
+        if leaks:
+            screen.fall_at_rest(rows)
+            _lower_all_references(lo, count, state, falls)
+        return n, keys, times
+    screen.screen_at_rest(rows, end)
+    m = screen.flagged(rows, scratch.pixels)
+    if circuit.leak_jitter > 0.0:
+        n, keys, times = _solve_flagged(
+            lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
+        )
+    else:
+        for j in range(m):
+            k = scratch.pixels[j]
+            n, keys, times = solve_at_rest(
+                k, lo + k, start, ta, length, t_base, circuit, state, rows, falls, keys, times, n
+            )
+    if leaks:
+        _lower_references(lo, count, state, rows, falls)
+    screen.step_on(rows)
+    return n, keys, times
+
+
+@allocating_kernel  # it returns arrays, whose references have to be counted
+def _rule(rules, f):
+    """Return the quadrature of interval f."""
+    count, dead = rules.counts[f], rules.counts_dead[f]
+    return Rule(
+        rules.nodes[f, :count], rules.weights[f, :count],
+        rules.nodes_dead[f, :dead], rules.weights_dead[f, :dead],
+    )  # fmt: skip
+
+
+@allocating_kernel
 def _strip(
-    lo, count, frames, before, share, starts, circuit, nodes, weights, counts, t_base,
+    lo, count, frames, before, share, starts, circuit, rules, t_base,
     state, scratch, keys, times, n,
 ):  # fmt: skip
     """Advance one strip of the exact circuit over all intervals."""
@@ -238,20 +249,19 @@ def _strip(
     for f in range(starts.shape[0] - 1):
         length = starts[f + 1] - starts[f]
         still = _rests(frames, f, before, share, lo, count)
-        pieces = 1
         if not still:
             load(frames, before[f + 1], share[f + 1], lo, count, floor, rows)
             still = screen.is_still(rows)
-            pieces = 1 if still else _pieces(rows, _f(circuit.slope * circuit.knee))
-        if pieces > 1:
-            _keep_ends(count, circuit, rows, scratch.columns)
-        for q in range(pieces):
-            if pieces > 1:
-                _load_piece(count, (q + 1) / pieces, circuit, scratch.columns, rows)
+        rule = _rule(rules, f)
+        if still and settled:
+            n, keys, times = _rest_strip(
+                lo, count, start, starts[f], length, circuit, rule, t_base, state, scratch, keys,
+                times, n,
+            )  # fmt: skip
+        else:
             n, keys, times = _advance_strip(
-                lo, count, start, starts[f] + length * (q / pieces), length / pieces,
-                still and settled, circuit, nodes[f, : counts[f]], weights[f, : counts[f]], t_base,
-                state, scratch, keys, times, n,
+                lo, count, start, starts[f], length, circuit, rule, t_base, state, scratch, keys,
+                times, n,
             )  # fmt: skip
         settled = still and (settled or screen.is_settled(rows))
     _close_strip(lo, count, circuit, state, rows)
@@ -260,7 +270,7 @@ def _strip(
 
 @allocating_kernel
 def run_exact(
-    lo, hi, frames, before, share, starts, begins, last, circuit, nodes, weights, counts, t_base,
+    lo, hi, frames, before, share, starts, begins, last, circuit, rules, t_base,
     state, scratch, keys, times,
 ):  # fmt: skip
     """Advance the pixels lo..hi over the intervals between neighbouring frames.
@@ -278,7 +288,7 @@ def run_exact(
     last : (intervals + 1,)
         With the paper's last interval as printed: which intervals are the last of an input
         interval (the final entry looks ahead); else all False.
-    nodes, weights : (intervals, NODES_MAX); counts : (intervals,)
+    rules : Rules
         Quadrature for each interval.
 
     Returns
@@ -289,7 +299,7 @@ def run_exact(
     for s in range(lo, hi, STRIP):
         count = min(STRIP, hi - s)
         n, keys, times = _strip(
-            s, count, frames, before, share, starts, circuit, nodes, weights, counts, t_base,
+            s, count, frames, before, share, starts, circuit, rules, t_base,
             state, scratch, keys, times, n,
         )  # fmt: skip
     return n, keys, times

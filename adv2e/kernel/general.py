@@ -125,7 +125,7 @@ def _strip(
 
 @allocating_kernel
 def run_general(
-    lo, hi, frames, before, share, starts, begins, last, circuit, nodes, weights, counts, t_base,
+    lo, hi, frames, before, share, starts, begins, last, circuit, rules, t_base,
     state, scratch, keys, times,
 ):  # fmt: skip
     """Advance the pixels lo..hi; see :func:`adv2e.kernel.exact.run_exact`."""

@@ -1,15 +1,8 @@
-r"""Places within an interval, found for many pixels at a time: one pixel a lane.
+"""Lanes: pixels that are solved side by side, one flat array with a row for each of their numbers.
 
-A lane holds a pixel whose light stays on one branch of the log map.  Three vectorised steps serve
-all lanes, whatever each is looking for (a threshold, the turn of the signal, or just the signal at
-a given time):
-
-1. `guess`: the root of the cubic through values and slopes at both ends of the search;
-2. `evaluate`: the lag there, by the quadrature of :mod:`adv2e.kernel.screen` in double precision;
-3. `refine`: the root of the Taylor polynomial of order 6 about that place.
-
-The polynomial's remainder says how far off the root can be; a lane over the tolerance goes round
-again from the better place, by itself: what its neighbours do does not count.
+A lane holds a pixel over an interval, or over a piece of one: its light stays on one branch of the
+log map and moves by less than an e-fold.  Most pixels take one piece, from 0 to 1; one that passes
+the knee takes one before and one after, and larger steps are cut in more.
 
 Places s are shares of the interval; x, signal and reference are counted from x at its start.
 """
@@ -20,8 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.jit import kernel
-from adv2e.kernel import special
-from adv2e.kernel.screen import REACH
 from adv2e.kernel.workspace import STRIP
 
 TOLERANCE = 0.002
@@ -33,21 +24,25 @@ WIDTH = 16
 _STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
 (
     # what holds over the whole interval
-    U0,  # lag at its start, and at its end
-    U1,
-    I0,  # light at its start, and at its end
-    I1,
     X0,  # log intensity at its start
     DX,  # change of log intensity
-    LOG,  # 1: on the logarithmic branch
     FALL,  # fall of the reference over the interval, constant part
     FALL_DN,  # the same for each DN
-    TAIL,  # the whole fall
     ON,  # thresholds
     OFF,
     REFERENCE,  # at its start, and moved by the events since
     HOLD,  # end of the dead time [us], -1: not in it
     NOISE,  # next noise event [us]
+    # what holds over the present piece
+    BASE,  # its start, and its end
+    END,
+    U0,  # lag at its start, and at its end
+    U1,
+    I0,  # light at its start, and at its end
+    I1,
+    LOG,  # 1: on the logarithmic branch
+    FALLEN_B,  # fall of the reference until its start, and until its end
+    TAIL,
     # where the lane is, and the next place that is known
     S,
     LAG_S,  # lag, light, fall of the reference and distance of the signal from it
@@ -74,7 +69,7 @@ _STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
     G_HI,
     # what was found
     PLACE,
-    LAG_E,  # lag, light and integral of the light there
+    LAG_E,  # lag and light there, integral of the light since the start of the piece
     LIGHT_E,
     SUM_E,
     ERROR,  # what the place may still be off [us]
@@ -86,14 +81,25 @@ _STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
     Z,
     UPTO,
     TOTAL,
-) = (row * _STRIDE for row in range(49))
-SIZE = 49 * _STRIDE
+) = (row * _STRIDE for row in range(52))
+SIZE = 52 * _STRIDE
+
+# what a lane is looking for; READY: to be decided; DOUBTFUL: to be decided lane by lane;
+# OPEN: the signal at the end of its piece
+DONE, ALONE, SEEK_ON, SEEK_OFF, TURN, INJECTED, RELEASE, READY, DOUBTFUL, OPEN = (
+    float(code) for code in range(10)
+)
+
+
+def pixel_numbers() -> NDArray[np.int64]:
+    """Return room for the numbers, within the strip, of the lanes' pixels."""
+    return np.zeros(STRIP + WIDTH, np.int64)
 
 
 def scratch() -> NDArray[np.float64]:
     """Return the flat array of rows; lanes that fill up a vector must be harmless."""
     rows = np.zeros(SIZE)
-    for row in (I0, I1, STOP, F_LO, DX, U0):
+    for row in (I0, I1, END, STOP, F_LO, DX, U0):
         rows[row : row + _STRIDE] = 1.0
     rows[F_HI : F_HI + _STRIDE] = -1.0
     for row in (G_LO, G_HI):
@@ -104,7 +110,7 @@ def scratch() -> NDArray[np.float64]:
 @kernel
 def move(lanes, source, target):
     """Move what a lane keeps from round to round to another one."""
-    for row in range(U0, PLACE + 1, _STRIDE):
+    for row in range(X0, PLACE + 1, _STRIDE):
         lanes[row + target] = lanes[row + source]
 
 
@@ -112,140 +118,3 @@ def move(lanes, source, target):
 def whole(count):
     """Round a number of lanes up to whole vectors."""
     return (count + WIDTH - 1) // WIDTH * WIDTH
-
-
-@kernel
-def guess(lanes, count):
-    """First place: root of the cubic through both ends, by guarded Newton steps."""
-    for k in range(count):
-        w = lanes[STOP + k] - lanes[S + k]
-        f0, f1 = lanes[F_LO + k], lanes[F_HI + k]
-        g0, g1 = lanes[G_LO + k] * w, lanes[G_HI + k] * w
-        c2 = 3.0 * (f1 - f0) - 2.0 * g0 - g1
-        c3 = g0 + g1 - 2.0 * (f1 - f0)
-        t = f0 / (f0 - f1)
-        for _ in range(3):
-            v = f0 + t * (g0 + t * (c2 + t * c3))
-            dv = g0 + t * (2.0 * c2 + 3.0 * t * c3)
-            q = t - v / (dv if dv != 0.0 else 1.0)
-            t = q if (q > 0.0) & (q < 1.0) else t
-        fresh = lanes[FRESH + k] > 0.5
-        lanes[PLACE + k] = lanes[S + k] + w * t if fresh else lanes[PLACE + k]
-
-
-@kernel
-def _set_up(lanes, count, dark, per_dn, slope):
-    """Light and its integral at each place, and the parameters of the quadrature."""
-    for k in range(count):
-        s = lanes[PLACE + k]
-        i0 = lanes[I0 + k]
-        d = lanes[DX + k] * s
-        on_log = lanes[LOG + k] > 0.5
-        grown = i0 * special.exp(d)
-        light = grown if on_log else i0 + slope * d
-        z = -d if on_log else 0.0
-        mean = light * (1.0 - d * special.psi(z)) if on_log else 0.5 * (i0 + light)
-        lanes[LIGHT_E + k] = light
-        lanes[SUM_E + k] = s * mean
-        a = (dark + per_dn * light) * s
-        up = d if d > 0.0 else 0.0
-        v = REACH * (1.0 + 0.6 * up) / (a + 1e-30)
-        v = v if v < 1.0 else 1.0
-        moving = light if on_log else slope
-        lanes[A1 + k] = a * v
-        lanes[KAPPA + k] = d * s * per_dn * moving * v * v
-        lanes[Z + k] = z * v
-        lanes[UPTO + k] = v
-        lanes[TOTAL + k] = 0.0
-
-
-@kernel
-def _node(lanes, count, node, weight):
-    """Add one node of the quadrature."""
-    square = node * node
-    for k in range(count):
-        t = lanes[A1 + k] * node - lanes[KAPPA + k] * square * special.psi(lanes[Z + k] * node)
-        lanes[TOTAL + k] += weight * special.exp(-t)
-
-
-@kernel
-def evaluate(lanes, count, length, circuit, nodes, weights):
-    """Lag, light and integral of the light of each lane at its place."""
-    dark = circuit.dark * length
-    per_dn = circuit.per_dn * length
-    _set_up(lanes, count, dark, per_dn, circuit.slope)
-    for c in range(nodes.shape[0]):
-        _node(lanes, count, nodes[c], weights[c])
-    for k in range(count):
-        s = lanes[PLACE + k]
-        t = dark * s + per_dn * lanes[SUM_E + k]
-        gone = lanes[DX + k] * s * lanes[UPTO + k] * lanes[TOTAL + k]
-        lanes[LAG_E + k] = special.exp(-t) * lanes[U0 + k] - gone
-
-
-@kernel
-def refine(lanes, count, length, circuit):
-    """Move each place to the root of the Taylor polynomial there; note what may be left.
-
-    Light and its integral move along.
-    """
-    dark = circuit.dark * length
-    per_dn = circuit.per_dn * length
-    slope = circuit.slope
-    for k in range(count):
-        s = lanes[PLACE + k]
-        d = lanes[DX + k]
-        on_log = lanes[LOG + k] > 0.5
-        i0 = lanes[LIGHT_E + k]
-        i1 = d * i0 if on_log else slope * d
-        e = d if on_log else 0.0
-        i2 = i1 * e / 2.0
-        i3 = i2 * e / 3.0
-        i4 = i3 * e / 4.0
-        w0 = dark + per_dn * i0
-        w1, w2, w3 = per_dn * i1, per_dn * i2, per_dn * i3
-        w4, w5 = per_dn * i4, per_dn * i4 * e / 5.0
-        u0 = lanes[LAG_E + k]
-        u1 = -w0 * u0 - d
-        u2 = -(w0 * u1 + w1 * u0) / 2.0
-        u3 = -(w0 * u2 + w1 * u1 + w2 * u0) / 3.0
-        u4 = -(w0 * u3 + w1 * u2 + w2 * u1 + w3 * u0) / 4.0
-        u5 = -(w0 * u4 + w1 * u3 + w2 * u2 + w3 * u1 + w4 * u0) / 5.0
-        u6 = -(w0 * u5 + w1 * u4 + w2 * u3 + w3 * u2 + w4 * u1 + w5 * u0) / 6.0
-        root = lanes[ROOT + k]
-        fall = root * lanes[FALL + k]
-        q = root * lanes[FALL_DN + k]
-        f0 = root * d * s + u0 + fall * s + q * lanes[SUM_E + k] - lanes[GOAL + k]
-        f1 = root * d + u1 + fall + q * i0
-        f2 = u2 + q * i1 / 2.0
-        f3 = u3 + q * i2 / 3.0
-        f4 = u4 + q * i3 / 4.0
-        f5 = u5 + q * i4 / 5.0
-        t = -f0 / (f1 if f1 != 0.0 else 1.0)
-        dv = f1
-        last = t
-        for _ in range(3):
-            v = f0 + t * (f1 + t * (f2 + t * (f3 + t * (f4 + t * (f5 + t * u6)))))
-            dv = f1 + t * (
-                2.0 * f2 + t * (3.0 * f3 + t * (4.0 * f4 + t * (5.0 * f5 + t * 6.0 * u6)))
-            )
-            dv = dv if dv != 0.0 else 1.0
-            last = v / dv
-            t = t - last
-        t = t if lanes[MOVES + k] > 0.5 else 0.0
-        place = s + t
-        lo, hi = lanes[S + k], lanes[STOP + k]
-        # the end values are single precision: a root beyond them by that is a root at the end
-        inside = (place >= lo - 1e-6) & (place <= hi + 1e-6)
-        place = place if place > lo else lo
-        place = place if place < hi else hi
-        reach = (w0 * (1.0 + abs(t * e)) + abs(d)) * abs(t)
-        r2 = reach * reach
-        remainder = (abs(u0) + abs(d)) * r2 * r2 * r2 * reach / 5040.0 / abs(dv)
-        # close to a turn the steps only halve what is left: the next one tells how much
-        left = (remainder + last * last * (abs(f2) + abs(f3)) / abs(dv)) * length
-        lanes[ERROR + k] = left if inside & (reach < 0.8) else 1e30
-        moves = (lanes[MOVES + k] > 0.5) & (abs(t) < 10.0)
-        lanes[PLACE + k] = place if moves else s
-        lanes[SUM_E + k] += t * (i0 + t * (i1 / 2.0 + t * (i2 / 3.0 + t * i3 / 4.0)))
-        lanes[LIGHT_E + k] = i0 + t * (i1 + t * (i2 + t * (i3 + t * i4)))

@@ -40,16 +40,13 @@ added to it in between.  A pixel that is looked at needlessly costs time, never 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.jit import kernel
 from adv2e.kernel import special
+from adv2e.kernel.quadrature import REACH
 from adv2e.kernel.workspace import STRIP
-
-NODES_MAX = 32
 
 LARGEST_STEP = 0.98
 """Change of log intensity above which a pixel is looked at in any case [ln units]."""
@@ -59,9 +56,6 @@ LARGEST_LIGHT = 1.5 * 255.0
 
 MARGIN = 1e-5
 """Rounding of a distance in single precision over a call, with room [ln units]."""
-
-REACH = 20.0
-"""Corner times time beyond which the past is forgotten: e^-20 of a lag is less than a tie."""
 
 AT_REST = 1e-10
 """Lag below which it counts as none: a tenth of a tie (:mod:`adv2e.kernel.polynomial`)."""
@@ -109,50 +103,6 @@ def scratch() -> NDArray[np.float32]:
     for row in (ON, OFF, DUE):
         rows[row : row + STRIDE] = NEVER
     return rows
-
-
-def quadrature(length: float, fastest: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the fewest Gauss nodes and weights on [0, 1] good to 0.01 us of event time.
-
-    Parameters
-    ----------
-    length : float
-        The interval [us].
-    fastest : float
-        Corner at white [rad/us].
-
-    Notes
-    -----
-    A relative error eps of the lag moves an event by eps / w.  The error is measured here, for
-    corners up to LARGEST_LIGHT and steps of one e-fold either way, not estimated.
-    """
-    a1 = np.geomspace(1e-3, max(1.5 * fastest * length, 2e-3), 60)
-    worst = 0.01 * a1 / length
-    exact = _integral(a1, 120)
-    for count in range(3, NODES_MAX):
-        error = np.abs(_integral(a1, count) / exact - 1.0)
-        if np.all(error <= np.maximum(worst, 1e-9)):
-            break
-    return _nodes(count)
-
-
-def _nodes(count: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    node, weight = np.polynomial.legendre.leggauss(count)
-    return 0.5 * (node + 1.0), 0.5 * weight
-
-
-def _integral(a1: NDArray[Any], count: int) -> NDArray[Any]:
-    """Integral of e^-tau for a light that is exponential in time, dx = -1, 0, 1."""
-    node, weight = _nodes(count)
-    rows = []
-    for dx in (-1.0, -0.3, 0.0, 0.3, 1.0):
-        upto = np.minimum(1.0, REACH * (1.0 + 0.6 * max(dx, 0.0)) / a1)
-        v = upto[:, None] * node
-        z = -dx * v
-        half = np.where(np.abs(z) < 1e-4, 0.5 + z / 6, (np.expm1(z) - z) / np.where(z, z, 1) ** 2)
-        tau = v * a1[:, None] * (1.0 - dx * v * half)
-        rows.append(upto * (np.exp(-tau) @ weight))
-    return np.array(rows)
 
 
 @kernel
@@ -249,7 +199,7 @@ def _flag(rows, end, dark, per_dn, knee_dn):
 
 
 @kernel
-def screen(rows, end, dark, per_dn, knee_dn, slope, nodes, weights):
+def screen(rows, end, dark, per_dn, knee_dn, slope, rule):
     """Move every pixel of the strip to the end of the interval and flag those that may fire.
 
     Parameters
@@ -261,15 +211,32 @@ def screen(rows, end, dark, per_dn, knee_dn, slope, nodes, weights):
         Corner in darkness, and for each DN, times the interval [rad].
     knee_dn, slope : float32
         Knee of the log map [DN], light over log intensity on the foot; 0 without a knee.
-    nodes, weights
-        Quadrature on [0, 1].
+    rule : Rule
     """
     inverse_slope = _ONE / slope if slope > _ZERO else _ZERO
     _prepare(rows, dark, per_dn, knee_dn, slope, inverse_slope)
-    for c in range(nodes.shape[0]):
-        _node(rows, _f(nodes[c]), _f(weights[c]))
+    for c in range(rule.nodes.shape[0]):
+        _node(rows, _f(rule.nodes[c]), _f(rule.weights[c]))
     _end_lags(rows)
     _flag(rows, end, dark, per_dn, knee_dn)
+
+
+@kernel
+def anything_due(rows, end):
+    """Tell whether screen_at_rest would flag any pixel."""
+    hits = 0
+    for k in range(STRIP):
+        before = rows[AWAY_0 + k]
+        away = before + rows[FALL + k]
+        hits += (away >= rows[ON + k]) | (-before >= rows[OFF + k]) | (rows[DUE + k] < end)
+    return hits > 0
+
+
+@kernel
+def fall_at_rest(rows):
+    """Make the end of an interval at rest the start of the next, where nothing is flagged."""
+    for k in range(STRIP):
+        rows[AWAY_0 + k] += rows[FALL + k]
 
 
 @kernel

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.jit import allocating_kernel, kernel
-from adv2e.kernel import batch, dense_rows, lanes, screen
+from adv2e.kernel import dense_rows, lanes, screen
 from adv2e.kernel.solve import solve_interval
 from adv2e.kernel.workspace import S_LAG, SAVED, STRIP, workspace
 
@@ -63,7 +63,7 @@ def scratch() -> Scratch:
         ws=workspace(),
         rows=screen.scratch(),
         lanes=lanes.scratch(),
-        pixels=batch.pixel_numbers(),
+        pixels=lanes.pixel_numbers(),
         alone=np.zeros((3, padded)),
         columns=np.zeros((14, padded)),
         flags=np.zeros(STRIP, np.bool_),
@@ -125,20 +125,28 @@ def solve_one(
 def load(frames, before, share, first, count, floor, rows):
     """Row LIGHT_1: `share` of the way from frame `before` to the next, for a strip."""
     low, row = _f(floor), screen.LIGHT_1
+    now, last = before + 1, first + count
+    # slices: indices that count from zero need no test of their sign, which vectors bear ill
     if frames.coded and frames.plain and share == _f(1.0):
+        codes = frames.codes[now, first:last]
         for k in range(count):
-            rows[row + k] = _f(frames.codes[before + 1, first + k])
+            rows[row + k] = max(_f(codes[k]), low)
+    elif frames.coded and share == _f(1.0):
+        codes = frames.codes[now, first:last]
+        for k in range(count):
+            rows[row + k] = max(frames.table[codes[k]], low)
     elif frames.coded:
+        codes = frames.codes[now, first:last]
+        codes_before = frames.codes[max(before, 0), first:last]
         for k in range(count):
-            b = frames.table[frames.codes[before + 1, first + k]]
-            a = frames.table[frames.codes[max(before, 0), first + k]]
-            rows[row + k] = b if share == _f(1.0) else a + (b - a) * share
+            a = frames.table[codes_before[k]]
+            rows[row + k] = max(a + (frames.table[codes[k]] - a) * share, low)
     elif share == _f(1.0):
+        light = frames.light[now, first:last]
         for k in range(count):
-            rows[row + k] = frames.light[before + 1, first + k]
+            rows[row + k] = max(light[k], low)
     else:
+        light, light_before = frames.light[now, first:last], frames.light[before, first:last]
         for k in range(count):
-            a = frames.light[before, first + k]
-            rows[row + k] = a + (frames.light[before + 1, first + k] - a) * share
-    for k in range(count):
-        rows[row + k] = max(rows[row + k], low)
+            a = light_before[k]
+            rows[row + k] = max(a + (light[k] - a) * share, low)

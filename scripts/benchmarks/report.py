@@ -8,8 +8,9 @@ from benchmarks.frontier import Point
 from benchmarks.processes import Measured, Spread, number
 
 SPEED_ABOUT = (
-    "Frames in memory to sorted events in memory, compiled and warmed up, each run in a process of"
-    " its own, rounds interleaved: median (least..most). Mpx-frames: pixels times frames, in"
+    "Frames in memory to sorted events in memory, compiled and warmed up (four frames; then the"
+    " garbage of the imports is collected, whatever the tool), each run in a process of its own,"
+    " rounds interleaved: median (least..most). Mpx-frames: pixels times frames, in"
     " millions, as the pixel sees them (after interpolation). Time: wall time relative to the first"
     " row of the table, paired by round. Peak memory is that of the whole process, with the"
     " interpreter, libraries, clip and all events."

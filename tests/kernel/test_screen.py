@@ -7,7 +7,8 @@ import pytest
 from harness import quiet
 
 from adv2e.config.model import Leak, LogResponse, LowPass, Sampling
-from adv2e.kernel import screen, stepped
+from adv2e.kernel import quadrature, screen, stepped
+from adv2e.kernel.quadrature import Rule
 from adv2e.pixel import make_circuit
 
 PIXELS = screen.STRIP
@@ -77,7 +78,7 @@ def fill(pixel, x0, x1, lag):
 
 def run(circuit, rows, length, end=0.0):
     fastest = circuit.dark + 255 * circuit.per_dn
-    nodes, weights = screen.quadrature(length, fastest)
+    nodes, weights = quadrature.quadrature(length, fastest)
     f = np.float32
     screen.screen(
         rows,
@@ -86,8 +87,7 @@ def run(circuit, rows, length, end=0.0):
         f(circuit.per_dn * length),
         f(circuit.slope * circuit.knee),
         f(circuit.slope),
-        nodes,
-        weights,
+        Rule(nodes, weights, nodes, weights),
     )
 
 
@@ -222,5 +222,8 @@ def test_stepped_forms_stay_between_their_steps():
 
 
 def test_quadrature_is_chosen_by_its_error():
-    short, long = screen.quadrature(100.0, 1.9e-3)[0], screen.quadrature(33_000.0, 1.9e-3)[0]
-    assert 3 <= short.size < long.size < screen.NODES_MAX
+    short, long = (
+        quadrature.quadrature(100.0, 1.9e-3)[0],
+        quadrature.quadrature(33_000.0, 1.9e-3)[0],
+    )
+    assert 3 <= short.size < long.size < quadrature.NODES_MAX

@@ -17,6 +17,7 @@ References
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from adv2e import rng
@@ -60,8 +61,14 @@ def candidate_polarity(i: int, light: float, circuit: Circuit, state: Array) -> 
 
 @kernel
 def fill_first_candidates(
-    lo: int, hi: int, seed: int, rate: float, start: float, times: Array
+    lo: int, hi: int, seed: int, rate: float, start: float, times: Array, draws: Array
 ) -> None:
-    """Draw the first candidate time [us] of the pixels lo..hi; rate in events a us."""
-    for i in range(lo, hi):
-        times[i] = start + rng.exponential(seed, rng.SHOT_TIME, i, 0) / rate
+    """Draw the first candidate time [us] of the pixels lo..hi; rate in events a us.
+
+    `draws`, how often each has drawn since, becomes 0.
+    """
+    u, spare = times[lo:hi], draws[lo:hi]
+    rng.uniforms_of_pixels(seed, rng.SHOT_TIME, lo, u, spare)
+    for k in range(hi - lo):
+        u[k] = start + -math.log(u[k]) / rate
+        spare[k] = 0.0

@@ -65,18 +65,29 @@ class Thresholds(Section):
 
 
 @kernel
+def _fill_normal_levels(
+    seed: int, stream: int, first: int, mean: float, mismatch: float, levels: Array, spare: Array
+) -> None:
+    rng.uniforms_of_pixels(seed, stream, first, levels, spare)
+    for k in range(levels.shape[0]):
+        level = mean + mismatch * rng.normal_of(levels[k], spare[k])
+        levels[k] = level if level > FLOOR else FLOOR
+
+
+@kernel
 def fill_levels(
     lo: int, hi: int, seed: int, mean_on: float, mean_off: float, mismatch: float, on: Array,
-    off: Array,
+    off: Array, spare: Array,
 ) -> None:  # fmt: skip
-    """Draw the thresholds of the pixels lo..hi into `on` and `off`."""
-    for i in range(lo, hi):
-        a, b = mean_on, mean_off
-        if mismatch > 0.0:
-            a += mismatch * rng.normal(seed, rng.ON_THRESHOLD, i, 0)
-            b += mismatch * rng.normal(seed, rng.OFF_THRESHOLD, i, 0)
-        on[i] = a if a > FLOOR else FLOOR
-        off[i] = b if b > FLOOR else FLOOR
+    """Draw the thresholds of the pixels lo..hi into `on` and `off`; `spare` is overwritten."""
+    if mismatch > 0.0:
+        v = spare[lo:hi]
+        _fill_normal_levels(seed, rng.ON_THRESHOLD, lo, mean_on, mismatch, on[lo:hi], v)
+        _fill_normal_levels(seed, rng.OFF_THRESHOLD, lo, mean_off, mismatch, off[lo:hi], v)
+    else:
+        for i in range(lo, hi):
+            on[i] = mean_on if mean_on > FLOOR else FLOOR
+            off[i] = mean_off if mean_off > FLOOR else FLOOR
 
 
 @kernel
