@@ -106,7 +106,8 @@ class Stepping:
     start_us : float
         Time of the first frame, from there.
     coarseness : float
-        Factor on the longest step, and on that which resolves what is added.
+        Factor on the longest step, but not on that which resolves what is added: leaps would be
+        spread.
     """
 
     def __init__(
@@ -116,7 +117,7 @@ class Stepping:
         self._circuit, self._pixels, self._columns = circuit, pixels, columns
         self._additions = additions
         self._drift, self._origin, self._start = drift_per_s, origin_us, start_us
-        self._step_us = coarseness * additions.step_us if additions else math.inf
+        self._step_us = additions.step_us if additions else math.inf
         self._longest_us = coarseness * LONGEST_US
         at = np.array([start_us])
         widths = (self._course(name, at).shape[1] for name in _COURSES)
