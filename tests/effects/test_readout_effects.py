@@ -130,17 +130,27 @@ def test_dead_pixels_are_silent_and_the_others_as_they_were():
     assert found.tobytes() == events[np.isin(pixels, left)].tobytes()
 
 
-def test_coupling_is_that_of_the_camera_but_at_the_readouts_themselves():
-    readouts = np.array([0.0, 0.002, 0.004, 0.0061])
+def test_coupling_is_that_of_the_camera_after_its_rise_and_never_before_a_readout():
+    readouts, tau_s = np.array([0.0, 0.002, 0.004, 0.0061]), 800e-6
     hook = FrameCouplingHooks(FrameCoupling(amplitude=0.1, tau_us=800.0), delay_us=200.0)
     hook.begin(View(2, 2, 0, 0.0))
     frames = [(round(t * 1e9), np.zeros((2, 2))) for t in readouts]
     assert [t for t, _ in hook.light(iter(frames))] == [t for t, _ in frames]
+    begins, rise = readouts + 200e-6, tau_s / 12
     times = np.linspace(0.0, 0.012, 997)
-    wanted = frame_coupling(0.1, 800e-6, readouts + 200e-6, times)
-    np.testing.assert_allclose(hook.signal(times), wanted, atol=1e-9)
-    assert hook.signal(np.array([0.0002, 0.0062]))[0] == pytest.approx(0.1)
+    since = times[:, None] - begins
+    rises = np.any((since >= 0.0) & (since < rise), axis=1)
+    wanted = frame_coupling(0.1, tau_s, begins + rise, times)
+    found = hook.signal(times)
+    np.testing.assert_allclose(found[~rises], wanted[~rises], atol=1e-9)
+    fresh = (times > begins[0]) & (times < begins[0] + rise)
+    assert np.count_nonzero(fresh) > 3
+    np.testing.assert_allclose(found[fresh], 0.1 * (times[fresh] - begins[0]) / rise, atol=1e-9)
+    # the height is met, and nothing shows up to the readout itself
+    assert hook.signal(np.array([begins[0] + rise]))[0] == pytest.approx(0.1)
+    assert hook.signal(np.array([begins[0]]))[0] == pytest.approx(0.0, abs=1e-12)
+    assert hook.signal(np.array([begins[1]]))[0] < 0.1 * np.exp(-2.0)
     hook.passed(0.005)
-    later = times[times >= 0.005]
-    np.testing.assert_allclose(hook.signal(later), wanted[times >= 0.005], atol=1e-9)
+    later = times >= 0.005
+    np.testing.assert_allclose(hook.signal(times[later]), found[later], atol=1e-12)
     assert len(hook._readouts) == 2

@@ -5,8 +5,8 @@ r"""Frame coupling: the readout of a frame disturbs the event pixels of the same
 is added to the signal of all pixels behind all poles, with A = ``amplitude`` [ln], tau = ``tau_us``
 and t_f the times at which frames were read out: the end of each exposure, that is the time of the
 frame on the camera's clock (after clock offset and drift) plus half of ``frames.exposure_us``.
-The pixels are at rest at the first frame.  The leap is spread over the time step that it ends or
-lies in, a twelfth of tau at most.
+The pixels are at rest at the first frame.  The leap is a rise over a twelfth of tau, the longest step
+of time, after which it decays: nothing shows before the readout, and its height is met.
 
 References
 ----------
@@ -56,6 +56,7 @@ class FrameCouplingHooks(Hooks):
         super().__init__(parameters)
         self._delay_s = delay_us * 1e-6
         self.step_us = parameters.tau_us / _STEPS_PER_TAU
+        self._rise_s = self.step_us * 1e-6
 
     def begin(self, view: View) -> None:
         """Forget the frames of before."""
@@ -79,10 +80,12 @@ class FrameCouplingHooks(Hooks):
     def signal(self, times_s: Times) -> NDArray[np.float64]:
         """Return the disturbance, (n,)."""
         readouts, sums = np.array(self._readouts), np.array(self._sums)
-        # at a readout itself the leap has happened, so that its height is met by a step's end
         last = np.searchsorted(readouts, times_s, "right") - 1
         waited = np.maximum(times_s - readouts[last], 0.0)
-        left = sums[last] * np.exp(-waited / (self.parameters.tau_us * 1e-6))
+        tau_s = self.parameters.tau_us * 1e-6
+        fading = np.exp(-(waited - self._rise_s) / tau_s)
+        rising = waited / self._rise_s
+        left = (sums[last] - 1.0) * fading + np.where(rising < 1.0, rising, fading)
         begun = (last >= 0) & (times_s > self.view.start_s)
         return np.where(begun, self.parameters.amplitude * left, 0.0)
 
