@@ -5,8 +5,8 @@ r"""Frame coupling: the readout of a frame disturbs the event pixels of the same
 is added to the signal of all pixels behind all poles, with A = ``amplitude`` [ln], tau = ``tau_us``
 and t_f the times at which frames were read out: the end of each exposure, that is the time of the
 frame on the camera's clock (after clock offset and drift) plus half of ``frames.exposure_us``.
-The pixels are at rest at the first frame.  The leap is a rise over a twelfth of tau, the longest step
-of time, after which it decays: nothing shows before the readout, and its height is met.
+The pixels are at rest at the first frame.  The leap is a rise over a twelfth of tau, the longest
+step of time, after which it decays: nothing shows before the readout, and its height is met.
 
 References
 ----------
