@@ -93,21 +93,19 @@ class Candidate:
 
     def applied(self, config: Config, inner: Places) -> Config:
         """Return `config` with this effect."""
-        values = to_dict(config)
-        for key, value in self.extra:
-            set_key(values, key, value)
-        for knob, place in zip(self.knobs, inner, strict=True):
-            _turn(values, knob, knob.outer(place))
-        return _from_values(values, self.name, config)
+        return _from_values(self._set(to_dict(config), inner), self.name, config)
 
     def parameters(self, inner: Places) -> dict[str, Any]:
         """Return the keys that this effect sets, and their values."""
-        values: dict[str, Any] = {}
+        return dict(flat(self._set({}, inner)))
+
+    def _set(self, values: dict[str, Any], inner: Places) -> dict[str, Any]:
+        """Set this effect's keys in nested mappings, and return them."""
         for key, value in self.extra:
             set_key(values, key, value)
         for knob, place in zip(self.knobs, inner, strict=True):
             _turn(values, knob, knob.outer(place))
-        return dict(flat(values))
+        return values
 
 
 def set_key(values: dict[str, Any], key: str, value: Any) -> None:

@@ -73,7 +73,6 @@ class Outcome:
 class _Attempt:
     """A model with one effect more, fitted to its end, and what speaks against it."""
 
-    trial: Trial
     state: State
     objections: list[str]
 
@@ -164,10 +163,11 @@ class Search:
         self._simulator.likely = self._simulator.done + likely_simulations(self._candidates)
         bench = self.bench
         trials = finalists(bench, state, self._candidates)
-        best = dict.fromkeys(trial.name for trial in trials)
+        best: dict[str, Trial] = {}
+        for trial in trials:
+            best.setdefault(trial.name, trial)
         made: list[_Attempt] = []
-        for name in list(best)[:_TRIED]:
-            trial = next(trial for trial in trials if trial.name == name)
+        for name, trial in list(best.items())[:_TRIED]:
             joint, fits = bench.fitted(
                 (*state.fits, trial.fit), trial.models[parts.FIT].sd, parts.FIT
             )
@@ -181,7 +181,7 @@ class Search:
             parameters = fits[-1].candidate.parameters(fits[-1].place)
             bench.log(f"  {name} {parameters}: {'; '.join(against) or 'holds'}")
             alike = state.alternatives | _alike(trial, trials)
-            made.append(_Attempt(trial, State(joint.config, fits, models, alike), against))
+            made.append(_Attempt(State(joint.config, fits, models, alike), against))
             if not against:
                 break
             bench.rejections.add(fits[-1], "; ".join(against), final=True)
