@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -26,7 +27,7 @@ MANY, SOME = 100, 32
 _OF_SCALES, _OF_MODELS = 1, 2
 _SEEDS = 6
 _ROUNDS = 4
-_SETTLED = 0.015
+_SETTLED = 0.25  # deviations
 _REACH = 0.4
 """Of the derivatives of fits that are near their end."""
 
@@ -137,10 +138,22 @@ class Bench:
         """Return the models of a configuration, simulated often enough to judge it."""
         return self.models(self.laboratory.ensemble(config, range(1, SOME + 1)))
 
-    def state(self, config: Config, fits: tuple[Fit, ...]) -> State:
+    def state(self, config: Config, fits: tuple[Fit, ...] = ()) -> State:
         """Return a model, simulated often enough to build on it."""
         sample = self.laboratory.ensemble(config, range(1, MANY + 1))
         return State(config, fits, self.models(sample))
+
+    def settled(self, fits: tuple[Fit, ...], sd: Array) -> State:
+        """Return the model of effects fitted together to the data for fitting and judging.
+
+        How precise the fits are is told by its simulations.
+        """
+        joint, _ = self.fitted(fits, sd, BOTH)
+        state = self.state(joint.config)
+        if joint.derivative.size:
+            fitter = self.fitter(BOTH, sd)
+            fitter.set_covariance(joint, state.models[BOTH].sample, _SEEDS)
+        return dataclasses.replace(state, fits=_parted(joint, fits))
 
     def fitted(self, fits: tuple[Fit, ...], sd: Array, view: int) -> tuple[Fit, tuple[Fit, ...]]:
         """Return all effects fitted together in a view of the data, joined and one by one."""
@@ -175,9 +188,9 @@ def _parted(joint: Fit, fits: tuple[Fit, ...]) -> tuple[Fit, ...]:
     result, start = [], 0
     for fit in fits:
         stop = start + len(fit.candidate.knobs)
-        covariance = joint.covariance[start:stop, start:stop]
-        result.append(
-            Fit(fit.candidate, fit.base, joint.place[start:stop], joint.misfit, covariance)
-        )
+        own = slice(start, stop)
+        part = Fit(fit.candidate, fit.base, joint.place[own], joint.misfit)
+        part.covariance = joint.covariance[own, own]
+        result.append(part)
         start = stop
     return tuple(result)

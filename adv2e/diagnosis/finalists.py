@@ -63,7 +63,8 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     fitter.improve(fits, (3, 4, 5))
     sample = bench.laboratory.many([fit.config for fit in fits], range(1, SOME + 1))
     trials = [
-        _trial(bench, fit, bench.models(rows)) for fit, rows in zip(fits, sample, strict=True)
+        Trial(fit, models, scored(bench, models, fit.candidate))
+        for fit, models in zip(fits, map(bench.models, sample), strict=True)
     ]
     trials.sort(key=lambda trial: -trial.score)
     bench.rejections.new_round()
@@ -82,9 +83,17 @@ def _behind(fit: Fit, nothing: float) -> str:
     return f"{what} where others do more"
 
 
-def _trial(bench: Bench, fit: Fit, models: tuple[Model, ...]) -> Trial:
-    score = models[BOTH].log_likelihood(bench.observed[BOTH]) - len(fit.candidate.knobs)
-    return Trial(fit, models, score)
+def scored(bench: Bench, models: Sequence[Model], added: Candidate) -> float:
+    """Return a model's log likelihood of fitting and judging data, less the knobs of what it adds.
+
+    Parameters
+    ----------
+    bench : Bench
+    models : sequence of Model
+        One a view.
+    added : Candidate
+    """
+    return models[BOTH].log_likelihood(bench.observed[BOTH]) - len(added.knobs)
 
 
 def likely_simulations(candidates: Sequence[Candidate]) -> int:

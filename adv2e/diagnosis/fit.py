@@ -5,6 +5,14 @@ What is left of it in a derivative :math:`J` does not cancel in :math:`J^T J`, w
 statistics add up their squares: a fit by that would hardly move, and be called precise.  So
 products are formed between different seeds only, which is unbiased, and derivatives are taken over
 wide differences that become narrower from step to step, down to what the data can tell apart.
+
+How precise a fit is, is told by simulations of the fitted model: what each would have moved the fit
+by.  That needs no assumption on how statistics go together (sandwich estimator [1]_).
+
+References
+----------
+.. [1] P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions",
+   Proc. 5th Berkeley Symposium, 1967.
 """
 
 from __future__ import annotations
@@ -44,19 +52,26 @@ class Fit:
         Best place found, on the knobs' scales.
     misfit : float
         Sum of squares there.
+    derivative : (knobs, statistics)
+        The last one, of uncorrelated statistics.
+    normal : (knobs, knobs)
+        Of the last step.
     covariance : (knobs, knobs)
-        Of the place, from the last derivative.
+        Of the place; from the last step, as if statistics were as uncorrelated as they are taken
+        to be, until :meth:`Fitter.set_covariance` is called.
     reach : float
         Over which the next derivative is taken.
     damping : float
     moved : float
-        By the last step, at most.
+        By the last step, at most, in deviations of the place.
     """
 
     candidate: Candidate
     base: Config
     place: Array
     misfit: float = np.inf
+    derivative: NDArray[Any] = field(default_factory=lambda: np.zeros((0, 0)))
+    normal: NDArray[Any] = field(default_factory=lambda: np.zeros((0, 0)))
     covariance: NDArray[Any] = field(default_factory=lambda: np.zeros((0, 0)))
     reach: float = WIDE
     damping: float = 0.05
@@ -75,6 +90,11 @@ class Fit:
         """Return `place` within the physical ranges."""
         knobs = self.candidate.knobs
         return np.array([k.inner(k.outer(p)) for k, p in zip(knobs, place, strict=True)])
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation of each number of the place, above zero."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 1e-12)))
 
     @property
     def at_border(self) -> bool:
@@ -177,9 +197,32 @@ class Fitter:
         for (fit, place), mean in zip(trials, means, strict=True):
             misfit = float(np.sum((self._observed - mean) ** 2))
             if misfit < fit.misfit:
-                fit.moved = float(np.abs(place - fit.place).max())
+                fit.moved = float(np.max(np.abs(place - fit.place) / fit.deviation))
                 fit.misfit, fit.place = misfit, place
                 fit.damping = max(fit.damping / 16.0, 1e-3)
+
+    def set_covariance(self, fit: Fit, sample: Array, seeds: int) -> None:
+        """Note the covariance of a fit's place, as simulations of the fitted model tell it.
+
+        Parameters
+        ----------
+        fit : Fit
+            Moved at least once.
+        sample : (simulations, statistics)
+            Of the fitted model, in compressed deviations.
+        seeds : int
+            With which the fit was made.
+        """
+        apart = (sample - sample.mean(axis=0)) @ self._whitening.T
+        downhill = apart @ fit.derivative.T
+        spread = downhill.T @ downhill / (len(sample) - 1)
+        inverse = np.linalg.pinv(fit.normal)
+        fit.covariance = inverse @ spread @ inverse * _of_mean(seeds)
+
+
+def _of_mean(seeds: int) -> float:
+    """Return by how much variances grow as the mean of so many simulations varies, too."""
+    return 1.0 + 1.0 / seeds
 
 
 def _nudged(fit: Fit) -> list[Array]:
@@ -213,8 +256,8 @@ def _move(fit: Fit, derivative: Array, residual: Array) -> Array:
     # with few seeds the unbiased matrix may be no matrix of squares at all
     if np.linalg.eigvalsh(normal - _LEAST_SHARE * np.diag(np.diag(biased))).min() < 0.0:
         normal, downhill = biased, total @ left / seeds**2
-    # the mean of the simulations varies, too
-    fit.covariance = np.linalg.pinv(normal) * (1.0 + 1.0 / seeds)
+    fit.derivative, fit.normal = total / seeds, normal
+    fit.covariance = np.linalg.pinv(normal) * _of_mean(seeds)
     damped = normal + np.diag(fit.damping * np.diag(normal) + 1e-6)
     move = np.linalg.solve(damped, downhill)
     largest = float(np.abs(move).max())

@@ -5,30 +5,35 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.bench import Bench, State
 from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Model
 
 Array = NDArray[np.float64]
 
 _QUIET = 2.5
 _SIGNATURE = 12
+_WORSE = 5.0
 
 BORDER = "its fit runs to the end of the physical range"
 BY_CHANCE = "what it gains on data it was not fitted to, chance could gain"
 
 
-def objections(fit: Fit, after: Model, before: Model, observed: Array) -> list[str]:
+def objections(fit: Fit, grown: State, ground: State, bench: Bench) -> list[str]:
     """Return why a model is not to be taken for the one before it; none: it holds.
 
     Parameters
     ----------
     fit : Fit
         Of the model.
-    after, before : Model
-        Of the two, in the view that judges.
-    observed : (statistics,)
-        Of the recording, in that view.
+    grown, ground : State
+        The two.
+    bench : Bench
     """
+    after, before = grown.models[parts.JUDGE], ground.models[parts.JUDGE]
+    observed = bench.observed[parts.JUDGE]
     found = []
     if gain(after, before, observed) < chance_gain(after, before):
         found.append(BY_CHANCE)
@@ -37,6 +42,14 @@ def objections(fit: Fit, after: Model, before: Model, observed: Array) -> list[s
     loud = _loudness(after, before, observed)
     if loud > _QUIET:
         found.append(f"what it changes most still stands out by {loud:.1f} deviations")
+    for view in (parts.JUDGE, BOTH):
+        worst = _worse(grown.models[view], ground.models[view], bench.observed[view])
+        if worst is not None:
+            name, deviations = bench.laboratory.markers.entries[worst[0]].name, worst[1]
+            found.append(
+                f"makes '{name}' worse, which then stands out by {deviations:.0f} deviations"
+            )
+            break
     return found
 
 
@@ -62,3 +75,14 @@ def _loudness(after: Model, before: Model, observed: Array) -> float:
     own = np.argsort(-change)[:_SIGNATURE]
     z = after.z(observed)[own]
     return float(np.sqrt(np.mean(z * z)))
+
+
+def _worse(after: Model, before: Model, observed: Array) -> tuple[int, float] | None:
+    """Return which statistic a model makes worst, and how far it stands out then [deviations].
+
+    None if no statistic gets worse by more than chance and an imperfect fit make it.
+    """
+    now, then = np.abs(after.z(observed)), np.abs(before.z(observed))
+    worst = int(np.argmax(now - then))
+    much = now[worst] > max(then[worst] + _WORSE, 2.0 * then[worst])
+    return (worst, float(now[worst])) if much else None

@@ -20,7 +20,7 @@ from adv2e.config import Config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import MANY, Bench, State
 from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations
+from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations, scored
 from adv2e.diagnosis.interpolation import InterpolationError
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
@@ -39,8 +39,9 @@ PARTLY = 0.8
 NEARLY = 0.98
 """Share of the residual beyond which what is left is put down to the fit, not to another effect."""
 
-_TRIED = 3
-_CLOSE = 3.0
+_TRIED = 4
+_CATCHES_UP = 60.0  # log likelihood that a fit may gain when it is brought to its end
+_CLOSE = 5.0  # log likelihood; simulations are too few for less to be known
 
 
 @dataclass(frozen=True)
@@ -140,74 +141,88 @@ class Search:
     def _grown(self, state: State) -> State | None:
         """Return the model with one effect more, or two that hold only together."""
         attempts = self._attempts(state, [state])
-        if attempts and not attempts[-1].objections:
-            return self._taken(attempts[-1])
-        if len(state.fits) + 2 > MOST_EFFECTS:
-            return None
+        grown = self._best(attempts, state)
+        if grown is not None or len(state.fits) + 2 > MOST_EFFECTS:
+            return grown
         # with one of two effects, something still stands out; but the one gains, and is physical
         hidden = [one for one in attempts if not {BORDER, BY_CHANCE} & set(one.objections)]
         if not hidden:
             return None
         first = max(hidden, key=lambda one: self.bench.likelihood(one.state, parts.JUDGE))
         self.bench.log(f"on trial: {', '.join(first.state.names)}")
-        attempts = self._attempts(first.state, [first.state, state])
-        if attempts and not attempts[-1].objections:
-            return self._taken(attempts[-1])
-        return None
+        return self._best(self._attempts(first.state, [first.state, state]), state)
 
     def _attempts(self, state: State, grounds: Sequence[State]) -> list[_Attempt]:
-        """Return models with one effect more, up to the first that holds against all `grounds`.
+        """Return models with one effect more, judged against all `grounds`.
 
-        The fit is brought to its end on the data for fitting and judged on other data.
+        Fits are brought to their end on the data for fitting and judged on other data.  Before its
+        fit has ended, an effect may be behind another for that alone: all that are close are tried.
+        Others are, one after another, where none of these holds.
         """
         self._simulator.likely = self._simulator.done + likely_simulations(self._candidates)
-        bench = self.bench
-        trials = finalists(bench, state, self._candidates)
+        trials = finalists(self.bench, state, self._candidates)
         best: dict[str, Trial] = {}
         for trial in trials:
             best.setdefault(trial.name, trial)
         made: list[_Attempt] = []
-        for name, trial in list(best.items())[:_TRIED]:
-            joint, fits = bench.fitted(
-                (*state.fits, trial.fit), trial.models[parts.FIT].sd, parts.FIT
-            )
-            models = bench.tried(joint.config)
-            against: list[str] = []
-            for ground in grounds:
-                before, after = ground.models[parts.JUDGE], models[parts.JUDGE]
-                against = objections(joint, after, before, bench.observed[parts.JUDGE])
-                if against:
-                    break
-            parameters = fits[-1].candidate.parameters(fits[-1].place)
-            bench.log(f"  {name} {parameters}: {'; '.join(against) or 'holds'}")
-            alike = state.alternatives | _alike(trial, trials)
-            made.append(_Attempt(State(joint.config, fits, models, alike), against))
-            if not against:
+        for trial in list(best.values())[:_TRIED]:
+            close = trial.score > trials[0].score - _CATCHES_UP
+            if not close and any(not one.objections for one in made):
                 break
-            bench.rejections.add(fits[-1], "; ".join(against), final=True)
+            made.append(self._attempt(state, trial, grounds))
         return made
 
-    def _taken(self, attempt: _Attempt) -> State:
-        """Return the model of an attempt, fitted to all data but those that are looked at last."""
-        joint, fits = self.bench.fitted(attempt.state.fits, attempt.state.models[BOTH].sd, BOTH)
-        state = self.bench.state(joint.config, fits)
-        return dataclasses.replace(state, alternatives=attempt.state.alternatives)
+    def _attempt(self, state: State, trial: Trial, grounds: Sequence[State]) -> _Attempt:
+        """Return the model with a trial's effect more, fitted to its end and judged."""
+        bench = self.bench
+        joint, fits = bench.fitted((*state.fits, trial.fit), trial.models[parts.FIT].sd, parts.FIT)
+        grown = State(joint.config, fits, bench.tried(joint.config))
+        against: list[str] = []
+        for ground in grounds:
+            against = objections(joint, grown, ground, bench)
+            if against:
+                break
+        parameters = fits[-1].candidate.parameters(fits[-1].place)
+        bench.log(f"  {trial.name} {parameters}: {'; '.join(against) or 'holds'}")
+        if against:
+            bench.rejections.add(fits[-1], "; ".join(against), final=True)
+        return _Attempt(grown, against)
+
+    def _best(self, attempts: Sequence[_Attempt], state: State) -> State | None:
+        """Return the best of the models that hold, fitted to all data but those looked at last.
+
+        Effects of others that do as well are noted as alternatives.
+        """
+        holding = [
+            self.bench.settled(one.state.fits, one.state.models[BOTH].sd)
+            for one in attempts
+            if not one.objections
+        ]
+        if not holding:
+            return None
+        scores = [scored(self.bench, one.models, one.fits[-1].candidate) for one in holding]
+        best = max(scores)
+        alike = {
+            one.names[-1]
+            for one, score in zip(holding, scores, strict=True)
+            if best - _CLOSE < score < best
+        }
+        for one, score in zip(holding, scores, strict=True):
+            self.bench.log(f"  {' and '.join(one.names)}, on more data: score {score:.0f}")
+            if score < best:
+                self.bench.rejections.add(one.fits[-1], "others explain more", final=True)
+        return dataclasses.replace(
+            holding[scores.index(best)], alternatives=state.alternatives | alike
+        )
 
     def _backward(self, state: State) -> State:
         """Drop effects without which the others, fitted again, do as well, one after another."""
         for fit in state.fits[:-1] if len(state.fits) > 1 else ():
             rest = tuple(other for other in state.fits if other is not fit)
-            joint, rest = self.bench.fitted(rest, state.models[BOTH].sd, BOTH)
-            without = self.bench.state(joint.config, rest)
+            without = self.bench.settled(rest, state.models[BOTH].sd)
             loss = self.bench.likelihood(state) - self.bench.likelihood(without)
             if loss < _CLOSE:
                 self.bench.log(f"dropped {fit.candidate.name}: the others do without it")
                 self.bench.rejections.add(fit, "not needed beside the others", final=True)
                 return self._backward(dataclasses.replace(without, alternatives=state.alternatives))
         return state
-
-
-def _alike(chosen: Trial, trials: Sequence[Trial]) -> frozenset[str]:
-    """Return the effects that cannot be told from the chosen one."""
-    names = {trial.name for trial in trials if trial.score > chosen.score - _CLOSE}
-    return frozenset(names - {chosen.name})

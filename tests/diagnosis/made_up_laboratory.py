@@ -10,7 +10,7 @@ import numpy as np
 from adv2e.config import Config, to_dict
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.candidates import Hints, Lamp, get_key, library
-from adv2e.diagnosis.markers import BOTH, VIEWS
+from adv2e.diagnosis.markers import BOTH, VIEWS, Entry
 
 STATISTICS = 40
 HINTS = Hints(1.0, (Lamp(100.0),), 1)
@@ -66,7 +66,10 @@ class MadeUpLaboratory:
         self.curvature = curvature
         self._means = {}
         self.simulator = SimpleNamespace(done=0, likely=0)
-        self.markers = SimpleNamespace(least=np.full(STATISTICS, 0.01))
+        self.markers = SimpleNamespace(
+            least=np.full(STATISTICS, 0.01),
+            entries=[Entry(f"statistic {k}", "") for k in range(STATISTICS)],
+        )
 
     def mean(self, config):
         """Return what is expected of a configuration, (statistics,)."""

@@ -67,7 +67,9 @@ class Markers:
             self.pixels,
         ]
         self.entries: list[Entry] = [entry for group in self.groups for entry in group.entries]
-        self.least = np.array([group.least for group in self.groups for _ in group.entries])
+        self.least = np.concatenate(
+            [np.broadcast_to(group.least, len(group.entries)) for group in self.groups]
+        )
         self.titles: list[str] = [group.title for group in self.groups for _ in group.entries]
 
     def measure(self, placed: Placed) -> NDArray[np.float64]:

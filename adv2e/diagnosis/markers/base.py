@@ -29,8 +29,9 @@ class Group(Protocol):
 
     title: str
 
-    least: float
-    """Deviation below which no statistic of the group is trusted to be known."""
+    @property
+    def least(self) -> float | Sequence[float]:
+        """Deviation below which no statistic of the group, or each of them, counts as known."""
 
     @property
     def entries(self) -> Sequence[Entry]:
