@@ -126,14 +126,14 @@ class Fitter:
         view: int,
         sd: Array | None = None,
     ) -> None:
-        self._laboratory, self._scale, self._view = laboratory, scale, view
+        self._laboratory, self.scale, self._view = laboratory, scale, view
         self._whitening = scale.whitening if sd is None else scale.whitening / sd
         self._observed = self._whitening @ scale.of_values(observed)
 
     def _white_of_seeds(self, configs: Sequence[Config], seeds: Sequence[int]) -> Array:
         """Return the statistics of models, uncorrelated, (configs, seeds, statistics)."""
         sample = self._laboratory.many(configs, seeds)[:, :, self._view]
-        return np.asarray(self._scale.of_values(sample) @ self._whitening.T)
+        return np.asarray(self.scale.of_values(sample) @ self._whitening.T)
 
     def whites(self, configs: Sequence[Config], seeds: Sequence[int]) -> Array:
         """Return the mean statistics of models, uncorrelated, (configs, statistics)."""

@@ -202,18 +202,18 @@ class Search:
             return None
         scores = [scored(self.bench, one.models, one.fits[-1].candidate) for one in holding]
         best = max(scores)
-        alike = {
-            one.names[-1]
-            for one, score in zip(holding, scores, strict=True)
-            if best - _CLOSE < score < best
-        }
+        chosen = holding[scores.index(best)]
+        alike = set(state.alternatives)
         for one, score in zip(holding, scores, strict=True):
             self.bench.log(f"  {' and '.join(one.names)}, on more data: score {score:.0f}")
-            if score < best:
-                self.bench.rejections.add(one.fits[-1], "others explain more", final=True)
-        return dataclasses.replace(
-            holding[scores.index(best)], alternatives=state.alternatives | alike
-        )
+            if one is chosen:
+                continue
+            why = "others explain more"
+            if score > best - _CLOSE:
+                alike.add(one.names[-1])
+                why = f"does as well as {chosen.names[-1]}, and cannot be told from it"
+            self.bench.rejections.add(one.fits[-1], why, final=True)
+        return dataclasses.replace(chosen, alternatives=frozenset(alike))
 
     def _backward(self, state: State) -> State:
         """Drop effects without which the others, fitted again, do as well, one after another."""

@@ -53,9 +53,11 @@ class MadeUpLaboratory:
         Keys with the pattern of another.
     curvature : float
         How far responses are from proportional.
+    common : (statistics,), optional
+        Direction in which chance moves all statistics together, and by how much.
     """
 
-    def __init__(self, strength=20.0, alike=None, curvature=0.0):
+    def __init__(self, strength=20.0, alike=None, curvature=0.0, common=None):
         draw = np.random.default_rng(5)
         self.patterns = {}
         for key in RESPONSES:
@@ -64,6 +66,7 @@ class MadeUpLaboratory:
         for key, other in (alike or {}).items():
             self.patterns[key] = self.patterns[other]
         self.curvature = curvature
+        self.common = np.zeros(STATISTICS) if common is None else common
         self._means = {}
         self.simulator = SimpleNamespace(done=0, likely=0)
         self.markers = SimpleNamespace(
@@ -91,7 +94,8 @@ class MadeUpLaboratory:
         mean = self.mean(config) + beyond
         views = np.repeat(mean[None], VIEWS, axis=0)
         views[BOTH] *= np.sqrt(2.0)
-        return views + noise(seed)
+        together = np.random.default_rng([seed, 78]).normal(size=(VIEWS, 1)) * self.common
+        return views + noise(seed) + together
 
     def ensemble(self, config, seeds):
         return np.array([self.measure(config, seed) for seed in seeds])

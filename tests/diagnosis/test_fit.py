@@ -106,6 +106,31 @@ def test_the_covariance_is_that_of_repeated_draws():
     assert np.all(np.abs(off) < 4 * stated / np.sqrt(40))
 
 
+def test_the_covariance_of_simulations_does_not_depend_on_weights():
+    """Chance moves statistics together, and by twice as much as they are weighed by."""
+    pattern = MadeUpLaboratory().patterns["pixel.thresholds.on"]
+    laboratory = MadeUpLaboratory(common=2.0 * pattern / np.linalg.norm(pattern))
+    sd = np.full(STATISTICS, 0.5)
+    truth = load_config([], ["pixel.thresholds.on=0.25", "pixel.thresholds.off=0.22"])
+    slow = only("thresholds", 2)
+    candidate = QuickThresholds(slow.name, slow.knobs, slow.probes)
+    places, plain, known = [], [], []
+    for k in range(40):
+        seeds = range(100 + 3 * k, 103 + 3 * k)
+        fitter = fitter_of(laboratory, laboratory.measure(truth, 6000 + k)[VIEW], sd=sd)
+        (fit,) = fitter.probe([candidate], Config(), seeds)
+        for _ in range(3):
+            fitter.improve([fit], seeds)
+        places.append(fit.place)
+        plain.append(np.diag(fit.covariance))
+        sample = laboratory.ensemble(fit.config, range(3000, 3100))[:, VIEW]
+        fitter.set_covariance(fit, fitter.scale.of_values(sample), len(seeds))
+        known.append(np.diag(fit.covariance))
+    seen = np.std(places, axis=0, ddof=1)
+    np.testing.assert_allclose(seen / np.sqrt(np.mean(known, axis=0)), 1.0, atol=0.3)
+    assert np.all(seen > 1.2 * np.sqrt(np.mean(plain, axis=0)))
+
+
 @pytest.mark.parametrize(("truth", "end"), [(4000.0, "high"), (30.0, "low")])
 def test_a_fit_stays_in_its_range(truth, end):
     knob = Knob("pixel.refractory.period_us", 200.0, 1500.0)

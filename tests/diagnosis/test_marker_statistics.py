@@ -61,7 +61,7 @@ def test_a_group_has_as_many_values_as_entries(group):
     assert raw.shape[0] == parts.COUNT
     for row in raw:
         assert group.values(row).shape == (len(group.entries),)
-    assert group.least > 0
+    assert np.all(np.asarray(group.least) > 0)
 
 
 @settings(deadline=None, max_examples=25)
@@ -326,9 +326,9 @@ def pixels():
     def deviations(**differences):
         found = statistics(group, chip(draw, **differences))
         result = {}
-        for name, value in found.items():
+        for (name, value), least in zip(found.items(), group.least, strict=True):
             values = np.array([one[name] for one in usual])
-            result[name] = float((value - values.mean()) / max(values.std(ddof=1), group.least))
+            result[name] = float((value - values.mean()) / max(values.std(ddof=1), least))
         return result
 
     return deviations
@@ -340,7 +340,7 @@ def test_pixels_as_expected_are_within_chance(pixels):
 
 def test_pixels_that_are_silent(pixels):
     found = pixels(dead=[5, 50, 77, 100, 130, 160])
-    assert found["silent pixels"] > 8
+    assert found["silent pixels"] > 5
     assert abs(found["loudest pixel"]) < 5
 
 

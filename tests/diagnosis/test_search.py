@@ -230,6 +230,25 @@ def test_two_effects_that_hide_one_another_are_found_together():
     assert outcome.state.config.pixel.refractory.period_us == pytest.approx(4000.0, rel=0.1)
 
 
+def test_an_effect_that_makes_something_worse_is_not_taken():
+    """What is missing moves the others as leak does, and one statistic the other way."""
+    laboratory = MadeUpLaboratory()
+    pattern = laboratory.patterns["pixel.leak.rate_hz"]
+    largest = int(np.argmax(np.abs(pattern)))
+    beyond = 0.9 * pattern
+    beyond[largest] *= -1.0
+    search, outcome = searched(laboratory=laboratory, library=candidates("leak"), beyond=beyond)
+    assert f"makes 'statistic {largest}' worse" in outcome.rejected["leak"].reason
+    assert _verdict(search, outcome) == "unexplained"
+
+
+def test_a_look_alike_says_what_it_cannot_be_told_from():
+    laboratory = MadeUpLaboratory(alike={"pixel.leak.rate_hz": "pixel.shot_noise.rate_hz"})
+    _, outcome = searched(["pixel.leak.rate_hz=4"], laboratory)
+    (named,), (other,) = outcome.state.names, outcome.alternatives
+    assert f"as well as {named}" in outcome.rejected[other].reason
+
+
 def test_backward_drops_one_after_another():
     laboratory = MadeUpLaboratory()
     observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
