@@ -91,7 +91,7 @@ def check_names(names: tuple[str, ...]) -> None:
     """Raise UsageError for an effect that the library does not have."""
     import difflib
 
-    from adv2e.diagnosis.candidates import names as known_names
+    from adv2e.diagnosis.library import names as known_names
     from adv2e.errors import UsageError
 
     known = known_names() if names else []

@@ -1,25 +1,17 @@
-"""The effects that may be missing, as knobs on a configuration.
-
-A candidate is an effect with the keys that are fitted for it.  Some effects have several: one key
-alone, or more of them; the plainest that does as well is taken.  An effect whose keys the
-configuration does not have is left out.
-"""
+"""A candidate: an effect that may be missing, as knobs on a configuration."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.config import Config, from_dict, to_dict
-from adv2e.config.build import all_keys
-from adv2e.effects.hooks import Hooks
-from adv2e.parameters import Parameter
+from adv2e.config import Config, to_dict
+from adv2e.diagnosis.keys import flat, from_values, get_key, set_key
 
 Places = Sequence[float] | NDArray[np.float64]
 """A place on each knob's scale."""
@@ -93,7 +85,7 @@ class Candidate:
 
     def applied(self, config: Config, inner: Places) -> Config:
         """Return `config` with this effect."""
-        return _from_values(self._set(to_dict(config), inner), self.name, config)
+        return from_values(self._set(to_dict(config), inner), self.name, config)
 
     def parameters(self, inner: Places) -> dict[str, Any]:
         """Return the keys that this effect sets, and their values."""
@@ -106,37 +98,6 @@ class Candidate:
         for knob, place in zip(self.knobs, inner, strict=True):
             _turn(values, knob, knob.outer(place))
         return values
-
-
-def set_key(values: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted `key` in nested mappings; a section that is null becomes one."""
-    *above, last = key.split(".")
-    for name in above:
-        if not isinstance(values.get(name), dict):
-            values[name] = {}
-        values = values[name]
-    values[last] = value
-
-
-def get_key(values: Mapping[str, Any], key: str) -> Any:
-    """Return what a dotted `key` holds, None if it or its section is absent or null."""
-    found: Any = values
-    for name in key.split("."):
-        if not isinstance(found, Mapping):
-            return None
-        found = found.get(name)
-    return found
-
-
-def flat(values: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
-    """Return nested mappings as dotted keys."""
-    result: list[tuple[str, Any]] = []
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            result += flat(value, f"{above}{name}.")
-        else:
-            result.append((f"{above}{name}", value))
-    return result
 
 
 def _turn(values: dict[str, Any], knob: Knob, value: float) -> None:
@@ -159,69 +120,11 @@ _OFF_AT_INFINITY = (
 )
 
 
-def with_keys(config: Config, keys: Mapping[str, Any]) -> Config:
-    """Return `config` with other values of some keys, given by their paths."""
-    values = to_dict(config)
-    for key, value in keys.items():
-        set_key(values, key, value)
-    return _from_values(values, ", ".join(keys), config)
-
-
-def _from_values(values: dict[str, Any], name: str, like: Config) -> Config:
-    return from_dict(values, name, list(user_effects(like).values()))
-
-
-def _known(section: type[Config]) -> dict[str, Parameter]:
-    return {key.path: key.about for key in all_keys(section)}
-
-
-def about_key(config: Config, key: str) -> Parameter:
-    """Return what is declared of a key of a configuration."""
-    return _known(type(config))[key]
-
-
-def user_effects(config: Config) -> Mapping[str, type[Hooks]]:
-    """Return the effects of the user's own that a configuration has sections for, by name."""
-    user = getattr(config, "user", None)
-    return {} if user is None else type(user).effects
-
-
-def without_user_effects(config: Config) -> Config:
-    """Return the configuration with all effects of the user's own switched off."""
-    effects = user_effects(config)
-    if not effects:
-        return config
-    values = to_dict(config)
-    values["user"] = dict.fromkeys(effects)
-    return from_dict(values, "user", list(effects.values()))
-
-
-def _of_the_user(config: Config) -> list[Candidate]:
-    """Return the effects of the user's own: the parameters that say where they may be fitted."""
-    made = []
-    for name, effect in user_effects(config).items():
-        knobs, starts = [], []
-        for item in dataclasses.fields(effect.Parameters):
-            fit = item.metadata["parameter"].fit
-            if fit is None or item.type in ("bool", bool):
-                continue
-            scale = (fit.high - fit.low) / 10.0
-            knobs.append(Knob(f"user.{name}.{item.name}", fit.low, fit.high, fit.log, scale))
-            starts.append(fit.start)
-        milder = [knob.outer(knob.inner(v) - 1.0) for knob, v in zip(knobs, starts, strict=True)]
-        more = [knob.outer(knob.inner(v) + 1.0) for knob, v in zip(knobs, starts, strict=True)]
-        probes = [tuple(starts)]
-        for k in range(len(knobs)):
-            probes += [(*starts[:k], other[k], *starts[k + 1 :]) for other in (milder, more)]
-        made.append(Candidate(name, tuple(knobs), tuple(dict.fromkeys(probes))))
-    return made
-
-
 def neutral_value(config: Config, knob: Knob) -> float:
     """Return the value of a knob at which `config` is as it was: what it holds, or nothing."""
     held = get_key(to_dict(config), knob.key)
     if knob.text:
-        return _exponent(str(held))
+        return exponent(str(held))
     if knob.part is not None and isinstance(held, (list, tuple)):
         held = held[knob.part]
     if isinstance(held, (int, float)):
@@ -229,254 +132,8 @@ def neutral_value(config: Config, knob: Knob) -> float:
     return math.inf if knob.key in _OFF_AT_INFINITY else 0.0
 
 
-@dataclass(frozen=True)
-class Lamp:
-    """A line in the rate that a lamp may make: its frequency, and the phase that it would have."""
-
-    hz: float
-    phase_rad: float = 0.0
-
-
-@dataclass(frozen=True)
-class Hints:
-    """What a look at the recording says of where fits may start.
-
-    Attributes
-    ----------
-    seconds : float
-        Length of the recording.
-    lamps : tuple of Lamp
-        Of the strongest lines in the rate.
-    tick_us : int
-        Largest time of which all stamps are multiples.
-    """
-
-    seconds: float
-    lamps: tuple[Lamp, ...]
-    tick_us: int
-
-
-def library(declared: Config, hints: Hints) -> list[Candidate]:
-    """Return all candidates for what `declared` may lack."""
-    known = _known(type(declared))
-    built_in = [one for one in _all(declared, hints) if all(key in known for key in _keys_of(one))]
-    return [*built_in, *_of_the_user(declared)]
-
-
-def _all(declared: Config, hints: Hints) -> list[Candidate]:
-    values = to_dict(declared)
-
-    def now(key: str, otherwise: float) -> float:
-        held = get_key(values, key)
-        return float(held) if isinstance(held, (int, float)) and held > 0 else otherwise
-
-    def times(key: str, otherwise: float, *factors: float) -> tuple[tuple[float, ...], ...]:
-        return tuple((now(key, otherwise) * factor,) for factor in factors)
-
-    made: list[Candidate] = []
-    for build in _BUILDERS:
-        made += build(now, times, values, hints)
-    return made
-
-
-def _keys_of(candidate: Candidate) -> list[str]:
-    return [knob.key for knob in candidate.knobs] + [key for key, _ in candidate.extra]
-
-
-_Now = Callable[[str, float], float]
-_Times = Callable[..., tuple[tuple[float, ...], ...]]
-
-
-def _of_the_thresholds(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    on = Knob("pixel.thresholds.on", 0.01, 5.0)
-    off = Knob("pixel.thresholds.off", 0.01, 5.0)
-    a, b = now(on.key, 0.2), now(off.key, 0.2)
-    drift = 0.2 / hints.seconds
-    spread = "pixel.thresholds.mismatch"
-    return [
-        Candidate("thresholds", (on,), times(on.key, 0.2, 0.8, 1.25)),
-        Candidate("thresholds", (off,), times(off.key, 0.2, 0.8, 1.25)),
-        Candidate(
-            "thresholds", (on, off), ((0.8 * a, 0.8 * b), (1.25 * a, 1.25 * b), (1.25 * a, 0.8 * b))
-        ),
-        Candidate(
-            "threshold_mismatch", (Knob(spread, 1e-3, 0.5),), times(spread, 0.02, 0.5, 2.0, 4.0)
-        ),
-        Candidate(
-            "threshold_drift",
-            (Knob("pixel.thresholds.drift_per_s", -0.9 / hints.seconds, 20.0, False, drift),),
-            ((-drift,), (drift,), (3 * drift,)),
-        ),
-    ]
-
-
-def _of_the_photoreceptor(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    white = Knob("pixel.low_pass.cutoff_hz", 1.0, 1e5)
-    dark = Knob("pixel.low_pass.dark_cutoff_hz", 0.05, 1e4)
-    a, b = now(white.key, 300.0), now(dark.key, 20.0)
-    made = [
-        Candidate("low_pass", (white,), times(white.key, 300.0, 0.25, 0.6, 2.0)),
-        Candidate("low_pass", (dark,), times(dark.key, 20.0, 0.3, 3.0)),
-        Candidate("low_pass", (white, dark), ((0.4 * a, 0.5 * b), (2.0 * a, 2.0 * b))),
-        Candidate(
-            "dark_current",
-            (Knob("pixel.dark_current.dn", 0.02, 200.0),),
-            ((0.5,), (3.0,), (15.0,)),
-        ),
-        Candidate(
-            "source_follower",
-            (Knob("pixel.source_follower.cutoff_hz", 2.0, 1e5),),
-            ((20.0,), (60.0,), (200.0,), (600.0,)),
-        ),
-    ]
-    if get_key(values, "pixel.low_pass") is None:  # the others act on it
-        return made
-    least = min(now("pixel.thresholds.on", 0.2), now("pixel.thresholds.off", 0.2))
-    return [
-        *made,
-        Candidate(
-            "slew_limit",
-            (Knob("pixel.slew_limit.per_s", 0.5, 1e4),),
-            ((10.0,), (30.0,), (90.0,)),
-        ),
-        Candidate(
-            "photoreceptor_noise",
-            (Knob("pixel.photoreceptor_noise.rms", 1e-3, 0.5),),
-            tuple((f * least,) for f in (0.12, 0.2, 0.3)),
-        ),
-    ]
-
-
-def _of_the_comparator(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    return [
-        Candidate(
-            "refractory",
-            (Knob("pixel.refractory.period_us", 1.0, 2e6),),
-            ((1500.0,), (5000.0,), (15000.0,)),
-        ),
-        Candidate(
-            "reset_overshoot",
-            (Knob("pixel.reset_overshoot.fraction", -0.9, 0.9, False, 0.1),),
-            ((-0.1,), (0.1,), (0.25,)),
-        ),
-        Candidate(
-            "leak", (Knob("pixel.leak.rate_hz", 1e-3, 500.0),), ((0.6,), (2.0,), (6.0,))
-        ),
-        Candidate(
-            "photo_leak",
-            (Knob("pixel.leak.photo_rate_hz", 1e-2, 1000.0),),
-            ((1.5,), (5.0,), (15.0,)),
-            (("pixel.leak.rate_hz", 0.0),) if get_key(values, "pixel.leak") is None else (),
-        ),
-        Candidate(
-            "shot_noise", (Knob("pixel.shot_noise.rate_hz", 1e-3, 500.0),),
-            ((0.3,), (3.0,), (10.0,)),
-        ),
-        Candidate(
-            "hot_pixels",
-            (
-                Knob("pixel.hot_pixels.fraction", 2e-4, 0.2),
-                Knob("pixel.hot_pixels.rate_hz", 1.0, 2e4),
-            ),
-            ((0.003, 40.0), (0.01, 150.0)),
-        ),
-        Candidate(
-            "dead_pixels", (Knob("pixel.dead_pixels.fraction", 2e-4, 0.9),), ((0.005,), (0.03,))
-        ),
-    ]  # fmt: skip
-
-
-def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    amplitude = Knob("readout.frame_coupling.amplitude", -2.0, 2.0, False, 0.05)
-    tau = Knob("readout.frame_coupling.tau_us", 20.0, 1e5)
-    made = [
-        Candidate(
-            "frame_coupling",
-            (amplitude, tau),
-            ((0.05, 300.0), (-0.05, 300.0), (0.05, 1200.0), (0.15, 300.0)),
-        ),
-        Candidate(
-            "readout",
-            (Knob("readout.arbiter.event_ns", 1.0, 1e6), Knob("readout.arbiter.row_ns", 1.0, 1e7)),
-            ((300.0, 3000.0), (2000.0, 10000.0), (3000.0, 30000.0)),
-        ),
-        Candidate(
-            "event_loss",
-            (Knob("readout.loss.fraction", 1e-3, 0.95, False, 0.1),),
-            ((0.05,), (0.2,), (0.45,)),
-        ),
-    ]
-    if hints.tick_us > 1:
-        tick = ("readout.tick_us", float(hints.tick_us))
-        made.append(Candidate("timestamp_tick", (), ((),), (tick,)))
-    return made
-
-
-def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    offset = Knob("frames.clock_offset_us", -1e6, 1e6, False, 1000.0)
-    drift = Knob("frames.clock_drift_ppm", -1e5, 1e5, False, 1000.0)
-    shift = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
-    made = [
-        Candidate(
-            "black_level",
-            (Knob("frames.black_level_dn", 0.02, 100.0),),
-            ((0.3,), (1.5,), (6.0,)),
-        ),
-        Candidate(
-            "exposure_blur", (Knob("frames.exposure_us", 100.0, 2e5),), ((4000.0,), (15000.0,))
-        ),
-        Candidate(
-            "clock_offset",
-            (offset,),
-            ((-600.0,), (600.0,), (-3000.0,), (3000.0,)),
-        ),
-        Candidate("clock_drift", (drift,), ((-1500.0,), (1500.0,), (-6000.0,), (6000.0,))),
-        Candidate(
-            "misregistration", shift, ((0.3, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.0, -0.3))
-        ),
-    ]  # fmt: skip
-    for lamp in hints.lamps:
-        depth = Knob("frames.flicker.depth", 0.005, 0.99)
-        read_off = (
-            ("frames.flicker.frequency_hz", lamp.hz),
-            ("frames.flicker.phase_rad", lamp.phase_rad),
-        )
-        made.append(Candidate("flicker", (depth,), ((0.06,), (0.15,), (0.35,)), read_off))
-    made += _encodings(values)
-    return made
-
-
-def _encodings(values: Mapping[str, Any]) -> list[Candidate]:
-    here = _exponent(str(get_key(values, "frames.encoding")))
-    gamma = Knob("frames.encoding", 0.2, 5.0, text="gamma:{}")
-    return [
-        Candidate("frame_encoding", (gamma,), tuple((here * f,) for f in (0.8, 1.15, 1.5))),
-    ]
-
-
-def _exponent(encoding: str) -> float:
+def exponent(encoding: str) -> float:
     """Return the exponent that an encoding has, or is about as steep as."""
     if encoding.startswith("gamma:"):
         return float(encoding.partition(":")[2])
     return 2.2 if encoding == "srgb" else 1.0
-
-
-_BUILDERS = (
-    _of_the_thresholds,
-    _of_the_photoreceptor,
-    _of_the_comparator,
-    _of_the_readout,
-    _of_the_frames,
-)
-
-
-def names() -> list[str]:
-    """Return the names of all effects that can be found."""
-    return list(dict.fromkeys(one.name for one in _all(Config(), Hints(1.0, (Lamp(100.0),), 10))))
-
-
-def hints_of(times_us: np.ndarray[Any, Any], seconds: float, lamps: Sequence[Lamp]) -> Hints:
-    """Return hints from the stamps of a recording's events [us]."""
-    # of the times themselves, not of differences: ticks count from zero
-    step = int(np.gcd.reduce(times_us)) if len(times_us) else 1
-    return Hints(seconds, tuple(lamps), max(1, step))

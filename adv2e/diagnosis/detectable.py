@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from adv2e.diagnosis.bench import Bench, State
-from adv2e.diagnosis.candidates import Candidate, about_key, neutral_value
+from adv2e.diagnosis.candidates import Candidate, neutral_value
+from adv2e.diagnosis.keys import about_key
 from adv2e.diagnosis.markers import BOTH
 from adv2e.reports.result import Detectable
 

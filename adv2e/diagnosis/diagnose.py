@@ -15,13 +15,15 @@ from adv2e import __version__
 from adv2e.config import Config, to_dict
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import State
-from adv2e.diagnosis.candidates import Candidate, hints_of, library, without_user_effects
+from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.error import error_rows, of_part
 from adv2e.diagnosis.evidence import Evidence, affordable
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.interpolation import InterpolationError, interpolation_error
+from adv2e.diagnosis.keys import without_user_effects
 from adv2e.diagnosis.lamps import lamps_of
+from adv2e.diagnosis.library import hints_of, library
 from adv2e.diagnosis.light import light_of, quantum_dn
 from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.markers.timing import strongest_lines

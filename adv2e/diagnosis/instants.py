@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.candidates import user_effects
+from adv2e.diagnosis.keys import user_effects
 from adv2e.upsampling import make_upsampler
 
 Instants = tuple[list[int], NDArray[np.float32]]

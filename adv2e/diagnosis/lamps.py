@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from adv2e.config import Config
-from adv2e.diagnosis.candidates import Lamp, with_keys
+from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.stream import Stream
 
 _DEPTHS = (0.05, 0.1, 0.2, 0.3, 0.45)
 _NEAR = 0.005
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """A line in the rate that a lamp may make: its frequency, and the phase that it would have."""
+
+    hz: float
+    phase_rad: float = 0.0
 
 
 def lamps_of(

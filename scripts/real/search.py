@@ -9,7 +9,8 @@ import numpy as np
 
 from adv2e.comparison.windows import Windows
 from adv2e.config import Config
-from adv2e.diagnosis.candidates import Candidate, Hints, library
+from adv2e.diagnosis.candidates import Candidate
+from adv2e.diagnosis.library import Hints, library
 from real.model import Bench
 
 LEAST_GAIN = 0.005

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis.candidates import Hints, Lamp, library
 from adv2e.diagnosis.diagnose import diagnose
 from adv2e.diagnosis.evidence import read_evidence
+from adv2e.diagnosis.lamps import Lamp
+from adv2e.diagnosis.library import Hints, library
 from adv2e.reports.result import Diagnosis
 from study_diagnosis_parts.camera import REPOSITORY, camera, settings
 from study_diagnosis_parts.cases import Case

@@ -12,7 +12,7 @@ from camera.settings import BENCH
 from adv2e import load_config, simulate
 from adv2e.diagnosis import bench, evidence, finalists, report
 from adv2e.diagnosis import diagnose as whole
-from adv2e.diagnosis.candidates import names
+from adv2e.diagnosis.library import names
 from adv2e.reports import summary
 from adv2e.sinks import open_sink
 

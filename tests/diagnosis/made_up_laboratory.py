@@ -9,7 +9,9 @@ import numpy as np
 
 from adv2e.config import Config, to_dict
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.candidates import Hints, Lamp, get_key, library
+from adv2e.diagnosis.keys import get_key
+from adv2e.diagnosis.lamps import Lamp
+from adv2e.diagnosis.library import Hints, library
 from adv2e.diagnosis.markers import BOTH, VIEWS, Entry
 
 STATISTICS = 40

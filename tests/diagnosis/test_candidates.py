@@ -9,19 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adv2e.config import Config, load_config, shipped, to_dict
-from adv2e.diagnosis.candidates import (
-    Candidate,
-    Hints,
-    Lamp,
-    about_key,
-    flat,
-    get_key,
-    hints_of,
-    library,
-    names,
-    neutral_value,
-    set_key,
-)
+from adv2e.diagnosis.candidates import Candidate, neutral_value
+from adv2e.diagnosis.keys import about_key, flat, get_key, set_key
+from adv2e.diagnosis.lamps import Lamp
+from adv2e.diagnosis.library import Hints, hints_of, library, names
 
 HINTS = Hints(0.3, (Lamp(100.0), Lamp(63.5, 1.2)), 10)
 CONFIGS = [None, *shipped()]

@@ -7,8 +7,8 @@ import pytest
 from made_up_streams import random_stream, wandering_light
 
 from adv2e import load_config
-from adv2e.diagnosis.candidates import with_keys
 from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.lamps import lamps_of
 from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers

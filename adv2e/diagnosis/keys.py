@@ -1,0 +1,89 @@
+"""A configuration as dotted keys, and the effects of the user's own that it has sections for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from adv2e.config import Config, from_dict, to_dict
+from adv2e.config.build import all_keys
+from adv2e.effects.hooks import Hooks
+from adv2e.parameters import Parameter
+
+
+def set_key(values: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted `key` in nested mappings; a section that is null becomes one."""
+    *above, last = key.split(".")
+    for name in above:
+        if not isinstance(values.get(name), dict):
+            values[name] = {}
+        values = values[name]
+    values[last] = value
+
+
+def get_key(values: Mapping[str, Any], key: str) -> Any:
+    """Return what a dotted `key` holds, None if it or its section is absent or null."""
+    found: Any = values
+    for name in key.split("."):
+        if not isinstance(found, Mapping):
+            return None
+        found = found.get(name)
+    return found
+
+
+def flat(values: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
+    """Return nested mappings as dotted keys."""
+    result: list[tuple[str, Any]] = []
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            result += flat(value, f"{above}{name}.")
+        else:
+            result.append((f"{above}{name}", value))
+    return result
+
+
+def with_keys(config: Config, keys: Mapping[str, Any]) -> Config:
+    """Return `config` with other values of some keys, given by their paths."""
+    values = to_dict(config)
+    for key, value in keys.items():
+        set_key(values, key, value)
+    return from_values(values, ", ".join(keys), config)
+
+
+def from_values(values: dict[str, Any], name: str, like: Config) -> Config:
+    """Return the configuration of nested mappings, with the sections of `like`.
+
+    Parameters
+    ----------
+    values : dict
+    name : str
+        What a mistake is put down to.
+    like : Config
+    """
+    return from_dict(values, name, list(user_effects(like).values()))
+
+
+def known_keys(section: type[Config]) -> dict[str, Parameter]:
+    """Return what is declared of each key, by its path."""
+    return {key.path: key.about for key in all_keys(section)}
+
+
+def about_key(config: Config, key: str) -> Parameter:
+    """Return what is declared of a key of a configuration."""
+    return known_keys(type(config))[key]
+
+
+def user_effects(config: Config) -> Mapping[str, type[Hooks]]:
+    """Return the effects of the user's own that a configuration has sections for, by name."""
+    user = getattr(config, "user", None)
+    return {} if user is None else type(user).effects
+
+
+def without_user_effects(config: Config) -> Config:
+    """Return the configuration with all effects of the user's own switched off."""
+    effects = user_effects(config)
+    if not effects:
+        return config
+    values = to_dict(config)
+    values["user"] = dict.fromkeys(effects)
+    return from_dict(values, "user", list(effects.values()))
