@@ -22,7 +22,7 @@
 ``dense``       any circuit over a tile, in steps of time: what acts on the pixels from outside, and
                 effects that the others do not have; ``dense_rows``, ``dense_signal`` and
                 ``dense_events`` are its parts
-``tile``        what the two drivers share
+``tile``        what the two drivers share; ``claims`` hands strips out to threads
 ``order``       packed events into order
 
 Where the time goes

@@ -11,6 +11,7 @@ import numpy as np
 from adv2e.effects.pixel.leak import fill_falls
 from adv2e.jit import allocating_kernel, kernel
 from adv2e.kernel import batch, exchange, screen, special
+from adv2e.kernel.claims import claim
 from adv2e.kernel.quadrature import Rule
 from adv2e.kernel.rest import solve_at_rest
 from adv2e.kernel.tile import load, solve_one, with_room
@@ -270,13 +271,17 @@ def _strip(
 
 @allocating_kernel
 def run_exact(
-    lo, hi, frames, before, share, starts, begins, last, circuit, rules, t_base,
+    claimed, most, frames, before, share, starts, begins, last, circuit, rules, t_base,
     state, scratch, keys, times,
 ):  # fmt: skip
-    """Advance the pixels lo..hi over the intervals between neighbouring frames.
+    """Advance strips that nobody else works on over the intervals between neighbouring frames.
 
     Parameters
     ----------
+    claimed : (1,)
+        See :mod:`adv2e.kernel.claims`.
+    most : int
+        Strips after which to return, though there may be more.
     frames : Frames
     before, share : (intervals + 1[ + 1],)
         The light at the start and at the end of each interval is `share` of the way from frame
@@ -296,10 +301,12 @@ def run_exact(
     events written, and the arrays that hold them (larger ones where the given ones were full)
     """
     n = np.int64(0)
-    for s in range(lo, hi, STRIP):
-        count = min(STRIP, hi - s)
+    for _ in range(most):
+        lo, hi = claim(claimed, state.shape[1])
+        if lo == hi:
+            break
         n, keys, times = _strip(
-            s, count, frames, before, share, starts, circuit, rules, t_base,
+            lo, hi - lo, frames, before, share, starts, circuit, rules, t_base,
             state, scratch, keys, times, n,
         )  # fmt: skip
     return n, keys, times
