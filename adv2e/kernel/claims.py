@@ -7,7 +7,10 @@ work, or so small that calling the kernel costs as much as pixels at rest do.
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
+from numba import config
 from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -17,8 +20,8 @@ from adv2e.kernel.workspace import STRIP
 
 
 @intrinsic
-def _count_up(_, counter):
-    """Add one to the single entry of an array of int64, as one step among threads.
+def _count_up_atomically(_, counter):
+    """Add one to the only entry of an array of int64, as one step among threads.
 
     Returns what it was before.
     """
@@ -30,6 +33,19 @@ def _count_up(_, counter):
         return builder.atomic_rmw("add", entry, one, "monotonic")
 
     return types.int64(counter), generate
+
+
+_LOCK = threading.Lock()
+
+
+def _count_up_plainly(counter):
+    """Do the same where Numba is told not to compile."""
+    with _LOCK:
+        counter[0] += 1
+        return int(counter[0]) - 1
+
+
+_count_up = _count_up_plainly if config.DISABLE_JIT else _count_up_atomically
 
 
 def nothing_claimed() -> NDArray[np.int64]:
