@@ -8,9 +8,10 @@ work, or so small that calling the kernel costs as much as pixels at rest do.
 from __future__ import annotations
 
 import threading
+from typing import Any
 
+import numba
 import numpy as np
-from numba import config
 from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -45,7 +46,8 @@ def _count_up_plainly(counter):
         return int(counter[0]) - 1
 
 
-_count_up = _count_up_plainly if config.DISABLE_JIT else _count_up_atomically
+_config: Any = numba.config  # its attributes are made at run time
+_count_up = _count_up_plainly if _config.DISABLE_JIT else _count_up_atomically
 
 
 def nothing_claimed() -> NDArray[np.int64]:
