@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
@@ -27,8 +26,8 @@ from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events, empty_events
 from adv2e.intervals import Part
 from adv2e.kernel import order, stepped
-from adv2e.kernel.dense import Run, run_dense
-from adv2e.kernel.dense_events import Injected
+from adv2e.kernel.claims import nothing_claimed
+from adv2e.kernel.dense import run_dense
 from adv2e.kernel.exact import run_exact
 from adv2e.kernel.general import run_general
 from adv2e.kernel.quadrature import rules_for
@@ -59,15 +58,13 @@ from adv2e.stepping import Stepping
 
 _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP
-"""Pixels of the largest tiles, whose frames should stay in the second level of cache."""
+"""Pixels of the largest tiles; their events are held twice for a moment."""
 
 _SORTED = 1 << 15
 """Events that are sorted at a time."""
 
 _YIELDED = 1 << 20
 """Events that are yielded at a time, or one slice of time's."""
-
-_Arrays = tuple[NDArray[np.int64], NDArray[np.float64]]
 
 
 def thread_count(threads: int | None) -> int:
@@ -83,14 +80,6 @@ def is_compiled(pixel: Pixel, sampling: Sampling, additions: Additions | None = 
     """Tell whether the kernel that this pixel needs has been compiled before."""
     circuit = make_circuit(pixel, sampling, 0)
     return jit.is_cached(driver_of(pixel, circuit, additions, "auto"))
-
-
-def _spread(count: int) -> list[int]:
-    """Return 0..count-1, neighbours far apart: a stride that shares no factor with the count."""
-    stride = next(
-        k for k in range(round(0.618 * count) or 1, 2 * count + 2) if math.gcd(k, count) == 1
-    )
-    return [k * stride % count for k in range(count)]
 
 
 class _Worker:
@@ -134,7 +123,7 @@ class PixelArray:
         Its time.
     threads : int, optional
     tile : int, optional
-        Pixels a tile; the events do not depend on it.
+        Most pixels that one call of the kernel advances; the events do not depend on it.
     exact_times : bool
         Keep unrounded times (`last_times`), for tests.
     additions : Additions, optional
@@ -188,11 +177,10 @@ class PixelArray:
                 self.origin_us, self._relative(t_ns), coarseness,
             )  # fmt: skip
             self._first_steps()
-        size = tile or min(_TILE, max(STRIP, -(-self.pixels // (4 * self.threads))))
-        size = -(-size // STRIP) * STRIP
-        tiles = [(lo, min(lo + size, self.pixels)) for lo in range(0, self.pixels, size)]
-        # neighbouring tiles tend to be alike: spread over the threads, as they end about together
-        self._tiles = [tiles[k] for k in _spread(len(tiles))]
+        strips = -(-self.pixels // STRIP)
+        self._most = -(-(tile or _TILE) // STRIP)
+        # full tiles, and one for each thread that finds the rest, or nothing
+        self._tiles = strips // self._most + self.threads
         self._workers: SimpleQueue[_Worker] = SimpleQueue()
         for _ in range(self.threads):
             self._workers.put(_Worker(exact_times))
@@ -333,18 +321,15 @@ class PixelArray:
         rules = rules_for(np.diff(starts), fastest, self.circuit.dead_time)
         advance = run_exact if self._driver == "run_exact" else run_general
 
-        def run(tile: tuple[int, int]) -> _Parted:
-            lo, hi = tile
-            worker = self._workers.get()
-            n, worker.keys, worker.times = advance(
-                lo, hi, frames, part.before, part.share, starts, not self.started, part.last,
-                self.circuit, rules, t_base, self.state, worker.scratch, worker.keys, worker.times,
-            )  # fmt: skip
-            parted = _Parted(worker.keys, worker.times, n, per_us)
-            self._workers.put(worker)
-            return parted
-
-        return list((pool.map if pool else map)(run, self._tiles))
+        return self._by_tiles(
+            advance,
+            (
+                frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
+                rules, t_base, self.state,
+            ),
+            per_us,
+            pool,
+        )  # fmt: skip
 
     def _advance_dense(
         self,
@@ -356,29 +341,35 @@ class PixelArray:
         pool: ThreadPoolExecutor | None,
     ) -> list[_Parted]:
         """Return the events of all tiles, in steps of time."""
-
-        def run(steps: Run, injected: Injected, tile: tuple[int, int]) -> _Arrays:
-            lo, hi = tile
-            worker = self._workers.get()
-            n, worker.keys, worker.times = run_dense(
-                lo, hi, frames, part.before, part.share, starts, not self.started, part.last,
-                self.circuit, steps, injected, t_base, self.state, worker.scratch, worker.keys,
-                worker.times,
-            )  # fmt: skip
-            events = worker.keys[:n].copy(), worker.times[:n].copy()
-            self._workers.put(worker)
-            return events
-
-        found = [
-            list((pool.map if pool else map)(partial(run, *these), self._tiles))
-            for these in self._stepping.runs(part, frames, starts)
-        ]
         parted = []
-        for tile in zip(*found, strict=True):
-            keys = np.concatenate([keys for keys, _ in tile])
-            times = np.concatenate([times for _, times in tile])
-            parted.append(_Parted(keys, times, keys.size, per_us))
+        for steps, injected in self._stepping.runs(part, frames, starts):
+            arguments = (
+                frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
+                steps, injected, t_base, self.state,
+            )  # fmt: skip
+            parted += self._by_tiles(run_dense, arguments, per_us, pool)
         return parted
+
+    def _by_tiles(
+        self,
+        advance: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        per_us: float,
+        pool: ThreadPoolExecutor | None,
+    ) -> list[_Parted]:
+        """Return the events of all tiles; `advance` is a driver, which finds its tile itself."""
+        claimed = nothing_claimed()
+
+        def run(_: int) -> _Parted:
+            worker = self._workers.get()
+            n, worker.keys, worker.times = advance(
+                claimed, self._most, *arguments, worker.scratch, worker.keys, worker.times
+            )
+            parted = _Parted(worker.keys, worker.times, n, per_us)
+            self._workers.put(worker)
+            return parted
+
+        return list((pool.map if pool else map)(run, range(self._tiles)))
 
     def _keep_times(self, parted: list[_Parted]) -> None:
         times = np.concatenate([tile.times for tile in parted])

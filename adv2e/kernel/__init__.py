@@ -15,14 +15,14 @@
 ``plan``        what lanes look for next, for all of them together
 ``doubt``       the same lane by lane: turns, noise events, what leak makes doubtful
 ``batch``       the pixels of a strip that may fire, from event to event, by these
-``rest``        pixels at rest, in closed form
+``rest``        pixels at rest, in closed form: a block at a time, from what is due to what is next
 ``exact``       the exact circuit over a tile: screen, batch or rest, and what is left one by one
 ``stepped``     screens for all other circuits
 ``general``     all other circuits over a tile
 ``dense``       any circuit over a tile, in steps of time: what acts on the pixels from outside, and
                 effects that the others do not have; ``dense_rows``, ``dense_signal`` and
                 ``dense_events`` are its parts
-``tile``        what the two drivers share
+``tile``        what the two drivers share; ``claims`` hands strips out to threads
 ``order``       packed events into order
 
 Where the time goes

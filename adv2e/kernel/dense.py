@@ -21,6 +21,7 @@ from adv2e.effects.pixel.slew_limit import keep_first, limit_slew
 from adv2e.jit import allocating_kernel, kernel
 from adv2e.kernel import dense_events as events
 from adv2e.kernel import dense_signal as signal
+from adv2e.kernel.claims import claim
 from adv2e.kernel.dense_rows import (
     ADDED,
     AHEAD,
@@ -308,18 +309,22 @@ def _strip(
 
 @allocating_kernel
 def run_dense(
-    lo, hi, frames, before, share, starts, begins, last, circuit, run, injected, t_base, state,
-    scratch, keys, times,
+    claimed, most, frames, before, share, starts, begins, last, circuit, run, injected, t_base,
+    state, scratch, keys, times,
 ):  # fmt: skip
-    """Advance the pixels lo..hi over a run.
+    """Advance strips that nobody else works on over a run.
 
     The other arguments, and what is returned, are those of :func:`adv2e.kernel.exact.run_exact`.
     """
     number = np.int64(0)
-    for s in range(lo, hi, WIDTH):
-        count = min(WIDTH, hi - s)
-        number, keys, times = _strip(
-            s, count, frames, before, share, starts, begins, last, circuit, run, injected, t_base,
-            state, scratch, keys, times, number,
-        )  # fmt: skip
+    for _ in range(most):
+        lo, hi = claim(claimed, state.shape[1])
+        if lo == hi:
+            break
+        for s in range(lo, hi, WIDTH):
+            count = min(WIDTH, hi - s)
+            number, keys, times = _strip(
+                s, count, frames, before, share, starts, begins, last, circuit, run, injected,
+                t_base, state, scratch, keys, times, number,
+            )  # fmt: skip
     return number, keys, times

@@ -10,9 +10,9 @@ import numpy as np
 
 from adv2e.effects.pixel.leak import fill_falls
 from adv2e.jit import allocating_kernel, kernel
-from adv2e.kernel import batch, exchange, screen, special
+from adv2e.kernel import batch, exchange, rest, screen, special
+from adv2e.kernel.claims import claim
 from adv2e.kernel.quadrature import Rule
-from adv2e.kernel.rest import solve_at_rest
 from adv2e.kernel.tile import load, solve_one, with_room
 from adv2e.kernel.workspace import EXACT, S_LAG, S_REFERENCE, S_X, STRIP, Circuit
 
@@ -114,14 +114,6 @@ def _lower_references(lo, count, state, rows, falls):
 
 
 @kernel
-def _lower_all_references(lo, count, state, falls):
-    """Take the fall from the references of all pixels."""
-    reference = state[S_REFERENCE, lo : lo + count]
-    for k in range(count):
-        reference[k] -= falls[k]
-
-
-@kernel
 def _screen(rows, end, length, circuit, rule):
     screen.screen(
         rows, end, _f(circuit.dark * length), _f(circuit.per_dn * length),
@@ -191,39 +183,6 @@ def _advance_strip(
     return n, keys, times
 
 
-@allocating_kernel
-def _rest_strip(
-    lo, count, start, ta, length, circuit, rule, t_base, state, scratch, keys, times, n
-):  # fmt: skip
-    """Advance one strip over one interval in which no light changes and no lag is left."""
-    rows, falls = scratch.rows, scratch.falls
-    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
-    end = _f(ta + length - start)
-    if leaks:
-        _leak_strip(lo, count, length, circuit, state, rows, falls, scratch.means)
-    if not screen.anything_due(rows, end):
-        if leaks:
-            screen.fall_at_rest(rows)
-            _lower_all_references(lo, count, state, falls)
-        return n, keys, times
-    screen.screen_at_rest(rows, end)
-    m = screen.flagged(rows, scratch.pixels)
-    if circuit.leak_jitter > 0.0:
-        n, keys, times = _solve_flagged(
-            lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
-        )
-    else:
-        for j in range(m):
-            k = scratch.pixels[j]
-            n, keys, times = solve_at_rest(
-                k, lo + k, start, ta, length, t_base, circuit, state, rows, falls, keys, times, n
-            )
-    if leaks:
-        _lower_references(lo, count, state, rows, falls)
-    screen.step_on(rows)
-    return n, keys, times
-
-
 @allocating_kernel  # it returns arrays, whose references have to be counted
 def _rule(rules, f):
     """Return the quadrature of interval f."""
@@ -232,6 +191,48 @@ def _rule(rules, f):
         rules.nodes[f, :count], rules.weights[f, :count],
         rules.nodes_dead[f, :dead], rules.weights_dead[f, :dead],
     )  # fmt: skip
+
+
+@allocating_kernel
+def _solve_irregular(
+    lo, b, count, m, f, starts, circuit, rules, t_base, state, scratch, keys, times, n
+):  # fmt: skip
+    """Solve the m flagged pixels of a block at rest whose leak draws a new speed at every event."""
+    rows, falls, pixels = scratch.rows, scratch.falls, scratch.pixels
+    size = min(rest.BLOCK, count - b)
+    for j in range(m):
+        rows[screen.LAG_1 + pixels[j]] = _f(0.0)
+    n, keys, times = _solve_flagged(
+        lo, m, starts[0], starts[f], starts[f + 1] - starts[f], t_base, circuit, _rule(rules, f),
+        state, scratch, keys, times, n,
+    )  # fmt: skip
+    rest.fall_of_block(lo + b, b, size, 1.0, circuit, state, falls, scratch.means)
+    for k in range(b, b + size):
+        rows[screen.FALL + k] = falls[k]
+    # their numbers are gone
+    rest.flag_block(b, size, _f(starts[f + 1] - starts[0]), rows, pixels)
+    return n, keys, times
+
+
+@allocating_kernel
+def _rest_strip(
+    lo, count, first, last, starts, circuit, rules, t_base, state, scratch, keys, times, n
+):  # fmt: skip
+    """Advance one strip over the intervals first..last: no light changes, no lag is left."""
+    b, f, j, m, s = 0, first, 0, 0, 0.0
+    while b < count:
+        n, b, f, j, m, s = rest.go_through(
+            lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, scratch.rows,
+            scratch.falls, scratch.means, scratch.pixels, keys, times, n,
+        )  # fmt: skip
+        if b < count and circuit.leak_jitter > 0.0:
+            n, keys, times = _solve_irregular(
+                lo, b, count, m, f, starts, circuit, rules, t_base, state, scratch, keys, times, n
+            )
+            j = m
+        elif b < count:
+            keys, times = with_room(keys, times, n, n + 1)
+    return n, keys, times
 
 
 @allocating_kernel
@@ -245,38 +246,55 @@ def _strip(
     start = starts[0]
     load(frames, before[0], share[0], lo, count, floor, rows)
     _open_strip(lo, count, start, circuit, state, rows)
-    settled = screen.is_settled(rows)
-    for f in range(starts.shape[0] - 1):
-        length = starts[f + 1] - starts[f]
+    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
+    intervals = starts.shape[0] - 1
+    settled, resting = screen.is_settled(rows), False
+    f = 0
+    while f < intervals:
         still = _rests(frames, f, before, share, lo, count)
         if not still:
             load(frames, before[f + 1], share[f + 1], lo, count, floor, rows)
             still = screen.is_still(rows)
-        rule = _rule(rules, f)
         if still and settled:
+            if not resting:
+                if leaks:
+                    _leak_strip(lo, count, 1.0, circuit, state, rows, scratch.falls, scratch.means)
+                rest.begin_rest(_f(starts[f] - start), rows)
+                resting = True
+            last = f + 1
+            while last < intervals and _rests(frames, last, before, share, lo, count):
+                last += 1
             n, keys, times = _rest_strip(
-                lo, count, start, starts[f], length, circuit, rule, t_base, state, scratch, keys,
-                times, n,
-            )  # fmt: skip
-        else:
-            n, keys, times = _advance_strip(
-                lo, count, start, starts[f], length, circuit, rule, t_base, state, scratch, keys,
-                times, n,
-            )  # fmt: skip
+                lo, count, f, last, starts, circuit, rules, t_base, state, scratch, keys, times, n
+            )
+            f = last
+            continue
+        if resting and leaks:
+            rest.end_rest(lo, count, circuit, state, rows)
+        resting = False
+        n, keys, times = _advance_strip(
+            lo, count, start, starts[f], starts[f + 1] - starts[f], circuit, _rule(rules, f),
+            t_base, state, scratch, keys, times, n,
+        )  # fmt: skip
         settled = still and (settled or screen.is_settled(rows))
+        f += 1
     _close_strip(lo, count, circuit, state, rows)
     return n, keys, times
 
 
 @allocating_kernel
 def run_exact(
-    lo, hi, frames, before, share, starts, begins, last, circuit, rules, t_base,
+    claimed, most, frames, before, share, starts, begins, last, circuit, rules, t_base,
     state, scratch, keys, times,
 ):  # fmt: skip
-    """Advance the pixels lo..hi over the intervals between neighbouring frames.
+    """Advance strips that nobody else works on over the intervals between neighbouring frames.
 
     Parameters
     ----------
+    claimed : (1,)
+        See :mod:`adv2e.kernel.claims`.
+    most : int
+        Strips after which to return, though there may be more.
     frames : Frames
     before, share : (intervals + 1[ + 1],)
         The light at the start and at the end of each interval is `share` of the way from frame
@@ -296,10 +314,12 @@ def run_exact(
     events written, and the arrays that hold them (larger ones where the given ones were full)
     """
     n = np.int64(0)
-    for s in range(lo, hi, STRIP):
-        count = min(STRIP, hi - s)
+    for _ in range(most):
+        lo, hi = claim(claimed, state.shape[1])
+        if lo == hi:
+            break
         n, keys, times = _strip(
-            s, count, frames, before, share, starts, circuit, rules, t_base,
+            lo, hi - lo, frames, before, share, starts, circuit, rules, t_base,
             state, scratch, keys, times, n,
         )  # fmt: skip
     return n, keys, times

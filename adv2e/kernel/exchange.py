@@ -74,7 +74,7 @@ from adv2e.kernel.workspace import (
 )
 
 _LEAVING, _STAYING = A1, KAPPA  # rows that hold nothing between two searches
-_EARLY = 1.0 - 1e-6  # single precision must not make a due time late
+EARLY = 1.0 - 1e-6  # single precision must not make a due time late
 _NO_TIME = 1e300
 
 
@@ -107,11 +107,11 @@ def watch(k, i, x1, start, circuit, state, rows):
     if hold >= 0.0:
         rows[SCREEN_ON + k] = NEVER
         rows[SCREEN_OFF + k] = NEVER
-        rows[DUE + k] = (hold - start) * _EARLY
+        rows[DUE + k] = (hold - start) * EARLY
     else:
         rows[SCREEN_ON + k] = state[S_ON, i] - MARGIN
         rows[SCREEN_OFF + k] = state[S_OFF, i] - MARGIN
-        rows[DUE + k] = min(next_noise(i, circuit, state) - start, NEVER) * _EARLY
+        rows[DUE + k] = min(next_noise(i, circuit, state) - start, NEVER) * EARLY
 
 
 @kernel
@@ -214,7 +214,7 @@ def _finish(j, lo, start, state, rows, pixels, lanes):
     rows[SCREEN_ON + k] = NEVER if held else lanes[ON + j] - MARGIN
     rows[SCREEN_OFF + k] = NEVER if held else lanes[OFF + j] - MARGIN
     due = hold if held else lanes[NOISE + j]
-    rows[DUE + k] = min(due - start, NEVER) * _EARLY
+    rows[DUE + k] = min(due - start, NEVER) * EARLY
 
 
 @kernel

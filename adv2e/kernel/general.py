@@ -7,8 +7,9 @@ import numpy as np
 from adv2e.effects.pixel.leak import fill_falls
 from adv2e.jit import allocating_kernel, kernel
 from adv2e.kernel import screen, special, stepped
+from adv2e.kernel.claims import claim
 from adv2e.kernel.tile import load, solve_one
-from adv2e.kernel.workspace import EXACT, S_LAG, S_LAG2, S_OFF, S_ON, S_REFERENCE, S_X, STRIP
+from adv2e.kernel.workspace import EXACT, S_LAG, S_LAG2, S_OFF, S_ON, S_REFERENCE, S_X
 
 
 @kernel
@@ -125,15 +126,17 @@ def _strip(
 
 @allocating_kernel
 def run_general(
-    lo, hi, frames, before, share, starts, begins, last, circuit, rules, t_base,
+    claimed, most, frames, before, share, starts, begins, last, circuit, rules, t_base,
     state, scratch, keys, times,
 ):  # fmt: skip
-    """Advance the pixels lo..hi; see :func:`adv2e.kernel.exact.run_exact`."""
+    """Advance strips that nobody else works on; see :func:`adv2e.kernel.exact.run_exact`."""
     n = np.int64(0)
-    for s in range(lo, hi, STRIP):
-        count = min(STRIP, hi - s)
+    for _ in range(most):
+        lo, hi = claim(claimed, state.shape[1])
+        if lo == hi:
+            break
         n, keys, times = _strip(
-            s, count, frames, before, share, starts, begins, last, circuit, t_base, state, scratch,
-            keys, times, n,
+            lo, hi - lo, frames, before, share, starts, begins, last, circuit, t_base, state,
+            scratch, keys, times, n,
         )  # fmt: skip
     return n, keys, times

@@ -93,14 +93,17 @@ def _exponent(light, span, d, z, on_log, dark, per_dn, slope):
     return a * v, d * span * per_dn * moving * v * v, z * v, v
 
 
-@kernel
-def _set_up(lanes, count, dark, per_dn, slope):
-    """Light and its integral at each place, and the parameters of the quadrature."""
+@inlined
+def _set_up_from(began, light_began, lanes, count, dark, per_dn, slope):
+    """Light and its integral at each place, and the parameters of the quadrature.
+
+    `began` and `light_began` are the rows of where the integral begins, and of the light there.
+    """
     for k in range(count):
-        span = lanes[PLACE + k] - lanes[BASE + k]
+        span = lanes[PLACE + k] - lanes[began + k]
         d = lanes[DX + k] * span
         on_log = lanes[LOG + k] > 0.5
-        light, mean, z = _light_after(lanes[I0 + k], d, on_log, slope)
+        light, mean, z = _light_after(lanes[light_began + k], d, on_log, slope)
         lanes[LIGHT_E + k] = light
         lanes[SUM_E + k] = span * mean
         a1, kappa, z, v = _exponent(light, span, d, z, on_log, dark, per_dn, slope)
@@ -109,24 +112,18 @@ def _set_up(lanes, count, dark, per_dn, slope):
         lanes[Z + k] = z
         lanes[UPTO + k] = v
         lanes[TOTAL + k] = 0.0
+
+
+@kernel
+def _set_up(lanes, count, dark, per_dn, slope):
+    """From the start of the piece on."""
+    _set_up_from(BASE, I0, lanes, count, dark, per_dn, slope)
 
 
 @kernel
 def _set_up_release(lanes, count, dark, per_dn, slope):
-    """As _set_up, from S on."""
-    for k in range(count):
-        span = lanes[PLACE + k] - lanes[S + k]
-        d = lanes[DX + k] * span
-        on_log = lanes[LOG + k] > 0.5
-        light, mean, z = _light_after(lanes[LIGHT_S + k], d, on_log, slope)
-        lanes[LIGHT_E + k] = light
-        lanes[SUM_E + k] = span * mean
-        a1, kappa, z, v = _exponent(light, span, d, z, on_log, dark, per_dn, slope)
-        lanes[A1 + k] = a1
-        lanes[KAPPA + k] = kappa
-        lanes[Z + k] = z
-        lanes[UPTO + k] = v
-        lanes[TOTAL + k] = 0.0
+    """From the last known place on."""
+    _set_up_from(S, LIGHT_S, lanes, count, dark, per_dn, slope)
 
 
 @kernel

@@ -82,8 +82,10 @@ STRIDE = STRIP + 16  # one cache line more: rows must not share cache sets
     UPTO,
     TOTAL,
     HIT,  # 1: to be looked at
-) = (row * STRIDE for row in range(17))
-SIZE = 17 * STRIDE
+    WHEN,  # at rest: when a pixel is to be looked at, on the clock of DUE
+    SOONEST,  # the earliest of these in each block
+) = (row * STRIDE for row in range(19))
+SIZE = 19 * STRIDE
 
 _f = np.float32
 _ZERO, _ONE, _TINY = _f(0.0), _f(1.0), _f(1e-30)
@@ -219,41 +221,6 @@ def screen(rows, end, dark, per_dn, knee_dn, slope, rule):
         _node(rows, _f(rule.nodes[c]), _f(rule.weights[c]))
     _end_lags(rows)
     _flag(rows, end, dark, per_dn, knee_dn)
-
-
-@kernel
-def anything_due(rows, end):
-    """Tell whether screen_at_rest would flag any pixel."""
-    hits = 0
-    for k in range(STRIP):
-        before = rows[AWAY_0 + k]
-        away = before + rows[FALL + k]
-        hits += (away >= rows[ON + k]) | (-before >= rows[OFF + k]) | (rows[DUE + k] < end)
-    return hits > 0
-
-
-@kernel
-def fall_at_rest(rows):
-    """Make the end of an interval at rest the start of the next, where nothing is flagged."""
-    for k in range(STRIP):
-        rows[AWAY_0 + k] += rows[FALL + k]
-
-
-@kernel
-def screen_at_rest(rows, end):
-    """As screen, where no light changes and no lag is left; tells whether any pixel is flagged."""
-    hits = 0
-    for k in range(STRIP):
-        before = rows[AWAY_0 + k]
-        away = before + rows[FALL + k]
-        rows[AWAY_1 + k] = away
-        hit = (away >= rows[ON + k]) | (-before >= rows[OFF + k]) | (rows[DUE + k] < end)
-        rows[HIT + k] = _ONE if hit else _ZERO
-        hits += 1 if hit else 0
-    for k in range(STRIP):
-        rows[LAG_1 + k] = _ZERO
-        rows[DX + k] = _ZERO
-    return hits > 0
 
 
 @kernel

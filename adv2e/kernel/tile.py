@@ -1,6 +1,7 @@
 """What the two drivers of a tile share: frames, scratch memory, and pixels solved one by one.
 
-A tile is a range of pixels over several intervals.  :mod:`adv2e.kernel.exact` advances the circuit
+A tile is some strips of pixels over several intervals, those that one call of a driver claims
+(:mod:`adv2e.kernel.claims`).  :mod:`adv2e.kernel.exact` advances the circuit
 that :mod:`adv2e.kernel.screen` covers, :mod:`adv2e.kernel.general` all others; both go strip by
 strip, and each strip through all of its intervals.
 """

@@ -37,6 +37,12 @@ from adv2e.sinks.spool import FrameSpool, StoredFrame
 from adv2e.sinks.staging import Staging
 from adv2e.sinks.work import OrderedWork
 
+_CACHE_BYTES = 512 << 10
+"""Memory for the index of chunks and images, as HDF5 counts it, a tenth of what it takes.
+
+Only the end of the index grows; but below this, storing many images takes longer.
+"""
+
 
 class MonashSink(FileSink):
     """An HDF5 file in the layout ``monash``; its bytes follow from its content.
@@ -85,6 +91,7 @@ class MonashSink(FileSink):
         # fixed: the oldest structures, which every reader knows and which hold no times
         self._file = h5py.File(self._temporary, "w", libver=("earliest", "v108"))
         pixel = np.dtype(np.int16 if max(self._shape) <= 32767 else np.uint16)
+        _bound_cache(self._file)
         columns = {
             "xs": Column(pixel, lambda events: events["x"]),
             "ys": Column(pixel, lambda events: events["y"]),
@@ -144,6 +151,17 @@ class MonashSink(FileSink):
             if part is not None:
                 with suppress(Exception):  # each must be closed, whatever became of the other
                     part.close()
+
+
+def _bound_cache(file: h5py.File) -> None:
+    """Keep HDF5 from holding what it has written of the index of the chunks.
+
+    By default that grows to some 15 MiB over half a billion events.
+    """
+    cache = file.id.get_mdc_config()
+    cache.set_initial_size = True
+    cache.initial_size = cache.min_size = cache.max_size = _CACHE_BYTES
+    file.id.set_mdc_config(cache)
 
 
 def _eight_bit(image: NDArray[Any]) -> NDArray[np.uint8]:

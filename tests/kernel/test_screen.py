@@ -7,7 +7,7 @@ import pytest
 from harness import quiet
 
 from adv2e.config.model import Leak, LogResponse, LowPass, Sampling
-from adv2e.kernel import quadrature, screen, stepped
+from adv2e.kernel import quadrature, rest, screen, stepped
 from adv2e.kernel.quadrature import Rule
 from adv2e.pixel import make_circuit
 
@@ -199,14 +199,20 @@ def test_at_rest_it_agrees_with_itself():
     assert screen.is_still(rows)
     assert screen.is_settled(rows)
     run(circuit, rows, 4000.0, end=4000.0)
-    whole = rows.copy()
-    assert screen.screen_at_rest(rows, np.float32(4000.0))
-    for which in (screen.HIT, screen.AWAY_1, screen.LAG_1):
-        assert np.array_equal(row(rows, which), row(whole, which))
+    whole = row(rows, screen.HIT)
     numbers = np.zeros(PIXELS + 16, np.int64)
     count = screen.flagged(rows, numbers)
     assert 20 < count < PIXELS // 2
-    assert np.array_equal(numbers[:count], np.flatnonzero(row(rows, screen.HIT)))
+    assert np.array_equal(numbers[:count], np.flatnonzero(whole))
+    rows[screen.FALL : screen.FALL + PIXELS] /= 4000.0  # a us
+    rest.begin_rest(np.float32(0.0), rows)
+    starts = np.array([0.0, 4000.0])
+    for b in range(0, PIXELS, rest.BLOCK):
+        size = min(rest.BLOCK, PIXELS - b)
+        due = np.flatnonzero(whole[b : b + size])
+        assert rest.next_due(b, 0, 1, starts, rows) == (0 if due.size else 1)
+        count = rest.flag_block(b, size, np.float32(4000.0), rows, numbers)
+        assert np.array_equal(numbers[:count], b + due)
 
 
 def test_stepped_forms_stay_between_their_steps():
