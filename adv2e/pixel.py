@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
 from collections.abc import Callable, Iterator
@@ -17,15 +16,11 @@ from adv2e import jit
 from adv2e.additions import Additions
 from adv2e.circuit import driver_of, make_circuit
 from adv2e.config.model import Pixel, Sampling
-from adv2e.effects.pixel.hot_pixels import fill_first_hot_times
-from adv2e.effects.pixel.leak import fill_first_factors
-from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
-from adv2e.effects.pixel.shot_noise import fill_first_candidates
-from adv2e.effects.pixel.thresholds import fill_levels, fill_random_reference
 from adv2e.errors import DataError
-from adv2e.events import EVENT_DTYPE, Events, empty_events
+from adv2e.events import Events, empty_events
+from adv2e.initial_state import initial_state, rest_poles
 from adv2e.intervals import Part
-from adv2e.kernel import order, stepped
+from adv2e.kernel import order
 from adv2e.kernel.claims import nothing_claimed
 from adv2e.kernel.dense import run_dense
 from adv2e.kernel.exact import run_exact
@@ -34,37 +29,15 @@ from adv2e.kernel.quadrature import rules_for
 from adv2e.kernel.tile import Frames, frames_of, scratch
 from adv2e.kernel.workspace import (
     PIXEL_BITS,
-    S_BEYOND,
-    S_FIRST,
-    S_HOLD,
-    S_HOT_DRAW,
-    S_HOT_TIME,
-    S_LAG2,
-    S_LEAK_DRAW,
-    S_LEAK_FACTOR,
-    S_NOISE,
-    S_NOISE_DRAW,
-    S_OFF,
-    S_ON,
-    S_REFERENCE,
-    S_SECOND,
-    S_SHOT_DRAW,
-    S_SHOT_TIME,
-    S_X,
     STRIP,
     pack_limit_us,
 )
+from adv2e.sorting import Parted, in_order
 from adv2e.stepping import Stepping
 
 _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP
 """Pixels of the largest tiles; their events are held twice for a moment."""
-
-_SORTED = 1 << 15
-"""Events that are sorted at a time."""
-
-_YIELDED = 1 << 20
-"""Events that are yielded at a time, or one slice of time's."""
 
 
 def thread_count(threads: int | None) -> int:
@@ -89,24 +62,6 @@ class _Worker:
         self.scratch = scratch()
         self.keys = np.empty(4096, np.int64)
         self.times = np.empty(4096 if exact_times else 0)
-
-
-class _Parted:
-    """Events of a tile, slice of time by slice."""
-
-    def __init__(
-        self, keys: NDArray[np.int64], times: NDArray[np.float64], count: int, per_us: float
-    ) -> None:
-        self.keys = np.empty(count, np.int64)
-        self.ends = np.empty(order.SLICES + 1, np.int64)
-        order.part_by_time(keys, count, per_us, self.ends, self.keys)
-        self.times = times[:count].copy()
-        # as they came, for the unrounded times that go with them
-        self.raw = keys[: self.times.size].copy()
-
-    def of(self, first: int, last: int) -> NDArray[np.int64]:
-        """Return the events of the slices first..last, the last one not counted."""
-        return self.keys[self.ends[first] : self.ends[last]]
 
 
 class PixelArray:
@@ -170,13 +125,14 @@ class PixelArray:
         self.threads = thread_count(threads)
         self.started = False
         self._driver = driver_of(pixel, self.circuit, additions, method)
-        self.state = self._first_state(pixel, seed, first, self._relative(t_ns))
-        if self._driver == "run_dense":
+        start, dense = self._relative(t_ns), self._driver == "run_dense"
+        self.state = initial_state(pixel, self.circuit, seed, first, start, dense, self.threads)
+        if dense:
             self._stepping = Stepping(
                 self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
-                self.origin_us, self._relative(t_ns), coarseness,
+                self.origin_us, start, coarseness,
             )  # fmt: skip
-            self._first_steps()
+            rest_poles(self.state, self.circuit, self._stepping)
         strips = -(-self.pixels // STRIP)
         self._most = -(-(tile or _TILE) // STRIP)
         # full tiles, and one for each thread that finds the rest, or nothing
@@ -188,73 +144,6 @@ class PixelArray:
 
     def _relative(self, t_ns: int) -> float:
         return (t_ns - self.origin_us * 1000) * 1e-3
-
-    def _first_state(
-        self, pixel: Pixel, seed: int, first: NDArray[Any], start: float
-    ) -> NDArray[Any]:
-        circuit = self.circuit
-        used = {
-            S_SHOT_DRAW: circuit.shot_rate > 0,
-            S_HOT_DRAW: circuit.hot_rate > 0,
-            S_LAG2: circuit.follower > 0,
-            S_LEAK_DRAW: circuit.leak_jitter > 0,
-            S_NOISE_DRAW: circuit.noise_rms > 0,
-        }
-        if self._driver == "run_dense":
-            used[S_BEYOND] = True
-        rows = 1 + max([S_OFF, *(row for row, on in used.items() if on)])
-        state = np.zeros((rows, self.pixels))
-        light = np.ascontiguousarray(first).reshape(-1)
-        stepped.load_strip(light, circuit, np.empty(self.pixels), state[S_X])
-        levels = pixel.thresholds
-        on, off = state[S_ON], state[S_OFF]
-        means, spare = (levels.on, levels.off), state[S_REFERENCE]
-        self._over_pixels(fill_levels, seed, *means, levels.mismatch, on, off, spare)
-        state[S_REFERENCE] = state[S_X]
-        state[S_HOLD] = -1.0
-        if pixel.initial_reference == "random":
-            fill_random_reference(seed, on, off, state[S_X], state[S_REFERENCE])
-        if circuit.shot_rate > 0:
-            times = state[S_SHOT_TIME]
-            draws = state[S_SHOT_DRAW]
-            self._over_pixels(fill_first_candidates, seed, circuit.shot_rate, start, times, draws)
-        if pixel.hot_pixels and circuit.hot_rate > 0:
-            share, times = pixel.hot_pixels.fraction, state[S_HOT_TIME]
-            fill_first_hot_times(seed, share, circuit.hot_rate, start, times)
-        if circuit.leak_jitter > 0:
-            factors = state[S_LEAK_FACTOR]
-            fill_first_factors(seed, circuit.leak_jitter, factors)
-        if circuit.noise_rms > 0:
-            noise = state[S_NOISE]
-            fill_first_noise(seed, circuit.noise_rms, noise)
-            if circuit.follower == 0:  # behind a second pole at rest it does not show yet
-                state[S_REFERENCE] += noise
-        return state
-
-    def _first_steps(self) -> None:
-        """Rows of the state that only the stepping path has; all poles are at rest."""
-        state, circuit = self.state, self.circuit
-        driven = self._stepping.first_driven(state[S_X])
-        state[S_FIRST] = driven
-        state[S_SECOND] = driven
-        state[S_REFERENCE] += driven - state[S_X] + self._stepping.first_signal()
-        if circuit.noise_rms > 0 and circuit.follower > 0:
-            # the noise was there before the first frame: a second pole without it, and references
-            # in the middle of its course, would take seconds to forget that
-            state[S_SECOND] += state[S_NOISE]
-            state[S_REFERENCE] += state[S_NOISE]
-
-    def _over_pixels(self, fill: Callable[..., None], *arguments: Any) -> None:
-        """Call `fill` for ranges of pixels, in threads: drawing for all of them takes its time."""
-        if self.threads == 1:
-            fill(0, self.pixels, *arguments)
-            return
-        borders = np.linspace(0, self.pixels, self.threads + 1).astype(int).tolist()
-        with ThreadPoolExecutor(self.threads) as pool:
-            for done in [
-                pool.submit(fill, lo, hi, *arguments) for lo, hi in itertools.pairwise(borders)
-            ]:
-                done.result()
 
     def advance(
         self,
@@ -305,7 +194,7 @@ class PixelArray:
         parted = advance(part, frames, starts, t_base, per_us, pool)
         self.started = True
         self._keep_times(parted)
-        yield from self._in_order(parted, t_base, pool)
+        yield from in_order(parted, self.columns, self.origin_us + t_base, pool)
 
     def _advance_whole(
         self,
@@ -315,7 +204,7 @@ class PixelArray:
         t_base: int,
         per_us: float,
         pool: ThreadPoolExecutor | None,
-    ) -> list[_Parted]:
+    ) -> list[Parted]:
         """Return the events of all tiles, solved interval by interval."""
         fastest = max(self.circuit.dark + 255.0 * self.circuit.per_dn, self.circuit.dark)
         rules = rules_for(np.diff(starts), fastest, self.circuit.dead_time)
@@ -339,7 +228,7 @@ class PixelArray:
         t_base: int,
         per_us: float,
         pool: ThreadPoolExecutor | None,
-    ) -> list[_Parted]:
+    ) -> list[Parted]:
         """Return the events of all tiles, in steps of time."""
         parted = []
         for steps, injected in self._stepping.runs(part, frames, starts):
@@ -356,62 +245,22 @@ class PixelArray:
         arguments: tuple[Any, ...],
         per_us: float,
         pool: ThreadPoolExecutor | None,
-    ) -> list[_Parted]:
+    ) -> list[Parted]:
         """Return the events of all tiles; `advance` is a driver, which finds its tile itself."""
         claimed = nothing_claimed()
 
-        def run(_: int) -> _Parted:
+        def run(_: int) -> Parted:
             worker = self._workers.get()
             n, worker.keys, worker.times = advance(
                 claimed, self._most, *arguments, worker.scratch, worker.keys, worker.times
             )
-            parted = _Parted(worker.keys, worker.times, n, per_us)
+            parted = Parted(worker.keys, worker.times, n, per_us)
             self._workers.put(worker)
             return parted
 
         return list((pool.map if pool else map)(run, range(self._tiles)))
 
-    def _keep_times(self, parted: list[_Parted]) -> None:
+    def _keep_times(self, parted: list[Parted]) -> None:
         times = np.concatenate([tile.times for tile in parted])
         keys = np.concatenate([tile.raw for tile in parted])
         self.last_times = times[np.argsort(keys, kind="stable")]
-
-    def _in_order(
-        self, parted: list[_Parted], t_base: int, pool: ThreadPoolExecutor | None
-    ) -> Iterator[Events]:
-        """Yield the events of all tiles, sorted, not many more than _YIELDED at a time."""
-        ends = np.sum([tile.ends for tile in parted], axis=0)
-        first = 0
-        while first < order.SLICES:
-            last = first + 1
-            while last < order.SLICES and ends[last + 1] - ends[first] <= _YIELDED:
-                last += 1
-            yield self._sorted_slices(parted, ends, first, last, t_base, pool)
-            first = last
-
-    def _sorted_slices(
-        self,
-        parted: list[_Parted],
-        ends: NDArray[np.int64],
-        first: int,
-        last: int,
-        t_base: int,
-        pool: ThreadPoolExecutor | None,
-    ) -> Events:
-        """Return the sorted events of the slices first..last."""
-        begin = ends[first]
-        events = np.empty(int(ends[last] - begin), EVENT_DTYPE)
-        # as many slices at a time as sort in cache
-        borders = [first]
-        for s in range(first + 1, last + 1):
-            if s == last or ends[s + 1] - ends[borders[-1]] > _SORTED:
-                borders.append(s)
-
-        def sort(lo: int, hi: int) -> None:
-            keys = np.concatenate([tile.of(lo, hi) for tile in parted])
-            keys.sort()
-            t0 = self.origin_us + t_base
-            order.unpack(keys, self.columns, t0, events[ends[lo] - begin : ends[hi] - begin])
-
-        list((pool.map if pool else map)(sort, borders[:-1], borders[1:]))
-        return events

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from harness import advance, quiet, start
 
-from adv2e import pixel as pixel_module
+from adv2e import sorting
 from adv2e.config.model import LowPass, Thresholds
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE
@@ -157,7 +157,7 @@ def test_the_largest_number_that_can_be_packed(t0):
 @pytest.mark.parametrize("yielded", [1, 5_000, 1 << 20])
 def test_tiles_are_put_together_in_order(monkeypatch, threads, times_ns, yielded):
     """Bursts of several tiles at a few times: many ties, more events than are sorted at once."""
-    monkeypatch.setattr(pixel_module, "_YIELDED", yielded)
+    monkeypatch.setattr(sorting, "_YIELDED", yielded)
     rng = np.random.default_rng(3)
     rows, columns = 30, 300
     light = rng.choice([2.0, 40.0, 250.0], (len(times_ns), rows, columns)).astype(np.float32)
