@@ -10,7 +10,7 @@ from adv2e.effects.pixel.low_pass import UPDATES
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.errors import UsageError
 from adv2e.kernel.exact import covers
-from adv2e.kernel.workspace import Circuit
+from adv2e.kernel.workspace import EXACT, Circuit
 
 _NO_KNEE = 1e300
 _PER_US = 1e-6
@@ -62,8 +62,10 @@ def driver_of(pixel: Pixel, circuit: Circuit, additions: Additions | None, metho
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
     new = circuit.slew > 0 or circuit.overshoot != 0 or pixel.thresholds.drift_per_s != 0
-    # the series of the general path need a first pole before the second
+    # steps take a tenth of the time of series for each pixel, which need a first pole, too
+    exact = not circuit.filtered or circuit.update == EXACT
+    second = circuit.follower > 0 and exact and circuit.noise_rms == 0
     alone = circuit.follower > 0 and not circuit.filtered
-    if method == "dense" or additions is not None or new or alone:
+    if method == "dense" or additions is not None or new or second or alone:
         return "run_dense"
     return "run_exact" if covers(circuit) else "run_general"

@@ -3,11 +3,13 @@
 How long a step of ``exact`` may be follows from what :mod:`adv2e.kernel.dense_signal` leaves out.
 The cubic through values and slopes at both ends of a step of h departs from the signal by at most
 h^4 y''''/384, for a lag u behind a corner w by u (w h)^4/384; as the signal moves by u w, that is a
-time of h (w h)^3/384: 0.03 us at the longest step and w h = 1/2, its limit.  The change c of the
-corner over the step counts in second order, terms of c (w h)^2.  Steps end where x bends, at the
-frames; where the light passes the knee of the log map, or the slew limit sets in, within a step,
-its slope bends there, which leaves some 0.1 us.  Leak is a cubic, noise and courses are lines
-within each step: they are as good as ``step_us`` resolves them.  Against dense solutions of the
+time of h (w h)^3/384: 0.03 us at the longest step and w h = 1/2, its limit with one pole.  The
+change c of the corner over the step counts in second order, terms of c (w h)^2.  Steps end where x
+bends, at the frames; where the light passes the knee of the log map, or the slew limit sets in,
+within a step, its slope bends there, which leaves some 0.1 us.  Leak is a cubic, noise and courses
+are lines within each step: they are as good as ``step_us`` resolves them.  Behind a second pole
+events may come where the signal creeps, and what the signal lacks is many times that in time: steps are half
+as long (at w h = 1/2, one event of 50 was 5 us off; 0.8 us at 1/4).  Against dense solutions of the
 circuit all times agree within 1 us, most within 0.05 us.
 
 Photoreceptor noise is drawn at each step, so in every pixel at most ``photoreceptor_noise.step`` of
@@ -38,8 +40,8 @@ _Planned = tuple[Run, Injected]
 LONGEST_US = 100.0
 """Longest step."""
 
-_SHARE = 0.5
-"""Longest step as a share of the shortest time constant."""
+_SHARE, _SHARE_OF_TWO = 0.5, 0.25
+"""Longest step as a share of the shortest time constant, of one pole and of two."""
 
 _FEWEST, _SHORT_US = 4, 10.0
 """Steps of an interval, unless they are shorter than this: the light may grow by e-folds in it."""
@@ -63,7 +65,7 @@ def steps_of(
     circuit: Circuit,
     step_us: float = math.inf,
     brightest: float = _WHITE,
-    longest_us: float = LONGEST_US,
+    coarseness: float = 1.0,
 ) -> int:
     """Return how many steps ``exact`` makes of a straight piece of x.
 
@@ -76,17 +78,18 @@ def steps_of(
         Longest step that resolves what is added.
     brightest : float
         Light in the piece, if it is above white [DN].
-    longest_us : float
-        Longest step that is precise enough.
+    coarseness : float
+        Factor on the longest step that is precise enough, as far as steps stay stable.
     """
-    limit = min(longest_us, step_us)
+    limit = min(coarseness * LONGEST_US, step_us)
     fastest = max(circuit.dark + max(brightest, _WHITE) * circuit.per_dn, circuit.dark)
+    share = min(_SHARE, coarseness * _SHARE_OF_TWO) if circuit.follower > 0.0 else _SHARE
     if circuit.filtered:
-        limit = min(limit, _SHARE / fastest if fastest > 0 else limit)
+        limit = min(limit, share / fastest if fastest > 0 else limit)
         if circuit.noise_rms > 0.0:
             limit = min(limit, circuit.noise_step / fastest if fastest > 0 else limit)
     if circuit.follower > 0.0:
-        limit = min(limit, _SHARE / circuit.follower)
+        limit = min(limit, share / circuit.follower)
     few = min(_FEWEST, math.ceil(length_us / _SHORT_US))
     return max(1, few, math.ceil(length_us / limit))
 
@@ -106,8 +109,8 @@ class Stepping:
     start_us : float
         Time of the first frame, from there.
     coarseness : float
-        Factor on the longest step, but not on that which resolves what is added: leaps would be
-        spread.
+        Factor on the longest step that is precise enough, but not on that which resolves what is
+        added: leaps would be spread.
     """
 
     def __init__(
@@ -118,7 +121,7 @@ class Stepping:
         self._additions = additions
         self._drift, self._origin, self._start = drift_per_s, origin_us, start_us
         self._step_us = additions.step_us if additions else math.inf
-        self._longest_us = coarseness * LONGEST_US
+        self._coarseness = coarseness
         at = np.array([start_us])
         widths = (self._course(name, at).shape[1] for name in _COURSES)
         self._width = sum(width for width in widths if width > 1)
@@ -164,7 +167,7 @@ class Stepping:
         if exact:
             for f, brightest in enumerate(_brightest(part, frames, lengths.size)):
                 steps[f] = steps_of(
-                    lengths[f] / pieces, circuit, self._step_us, brightest, self._longest_us
+                    lengths[f] / pieces, circuit, self._step_us, brightest, self._coarseness
                 )
         for first, first_step, stop, stop_step in self._cuts(pieces, steps):
             times = _instants(starts, pieces * steps, first, first_step, stop, stop_step)

@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 
 _QUIET = 2.5
 _SIGNATURE = 12
-_WORSE = 5.0
+_WORSE = 9.0
+"""Deviations by which a statistic gets worse that is not put down to details of a simulation."""
 
 BORDER = "its fit runs to the end of the physical range"
 BY_CHANCE = "what it gains on data it was not fitted to, chance could gain"

@@ -98,7 +98,7 @@ class Simulator:
 def _method(config: Config) -> str:
     """Return how to solve the pixel: in steps where solving it exactly takes far longer."""
     pixel = config.pixel
-    slow = pixel.source_follower is not None or pixel.photoreceptor_noise is not None
+    slow = pixel.photoreceptor_noise is not None
     exact = pixel.low_pass is None or pixel.low_pass.update == "exact"
     return "dense" if slow and exact else "auto"
 
