@@ -8,9 +8,9 @@ change c of the corner over the step counts in second order, terms of c (w h)^2.
 bends, at the frames; where the light passes the knee of the log map, or the slew limit sets in,
 within a step, its slope bends there, which leaves some 0.1 us.  Leak is a cubic, noise and courses
 are lines within each step: they are as good as ``step_us`` resolves them.  Behind a second pole
-events may come where the signal creeps, and what the signal lacks is many times that in time: steps are half
-as long (at w h = 1/2, one event of 50 was 5 us off; 0.8 us at 1/4).  Against dense solutions of the
-circuit all times agree within 1 us, most within 0.05 us.
+events may come where the signal creeps, and what the signal lacks is many times that in time: steps
+are half as long (at w h = 1/2, one event of 50 was 5 us off; 0.8 us at 1/4).  Against dense
+solutions of the circuit all times agree within 1 us, most within 0.05 us.
 
 Photoreceptor noise is drawn at each step, so in every pixel at most ``photoreceptor_noise.step`` of
 the correlation time at white apart; the solved path draws at that share of each pixel's own.
