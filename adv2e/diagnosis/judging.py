@@ -81,9 +81,10 @@ def _loudness(after: Model, before: Model, observed: Array) -> float:
 def _worse(after: Model, before: Model, observed: Array) -> tuple[int, float] | None:
     """Return which statistic a model makes worst, and how far it stands out then [deviations].
 
-    None if no statistic gets worse by more than chance and an imperfect fit make it.
+    None if no statistic gets worse by more than details of a simulation make, or none then stands
+    out more than anything did before.
     """
     now, then = np.abs(after.z(observed)), np.abs(before.z(observed))
     worst = int(np.argmax(now - then))
-    much = now[worst] > max(then[worst] + _WORSE, 2.0 * then[worst])
+    much = now[worst] > max(then[worst] + _WORSE, 2.0 * then[worst], then.max())
     return (worst, float(now[worst])) if much else None
