@@ -62,10 +62,9 @@ def driver_of(pixel: Pixel, circuit: Circuit, additions: Additions | None, metho
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
     new = circuit.slew > 0 or circuit.overshoot != 0 or pixel.thresholds.drift_per_s != 0
-    # steps take a tenth of the time of series for each pixel, which need a first pole, too
-    exact = not circuit.filtered or circuit.update == EXACT
-    second = circuit.follower > 0 and exact and circuit.noise_rms == 0
-    alone = circuit.follower > 0 and not circuit.filtered
-    if method == "dense" or additions is not None or new or second or alone:
+    # series for each pixel take ten times as long as steps do, and need a first pole, too
+    exact = circuit.update == EXACT and circuit.noise_rms == 0
+    second = circuit.follower > 0 and (exact or not circuit.filtered)
+    if method == "dense" or additions is not None or new or second:
         return "run_dense"
     return "run_exact" if covers(circuit) else "run_general"
