@@ -148,22 +148,22 @@ class Bench:
 
         How precise the fits are is told by its simulations.
         """
-        joint, _ = self.fitted(fits, sd, BOTH)
+        joint = self.fitted(fits, sd, BOTH)
         state = self.state(joint.config)
         if joint.derivative.size:
             fitter = self.fitter(BOTH, sd)
             fitter.set_covariance(joint, state.models[BOTH].sample, _SEEDS)
-        return dataclasses.replace(state, fits=_parted(joint, fits))
+        return dataclasses.replace(state, fits=parted(joint, fits))
 
-    def fitted(self, fits: tuple[Fit, ...], sd: Array, view: int) -> tuple[Fit, tuple[Fit, ...]]:
-        """Return all effects fitted together in a view of the data, joined and one by one."""
+    def fitted(self, fits: tuple[Fit, ...], sd: Array, view: int) -> Fit:
+        """Return the fit of all effects together in a view of the data."""
         joint = _joined(fits, self.declared)
         fitter = self.fitter(view, sd)
         for _ in range(_ROUNDS):
             fitter.improve([joint], range(11, 11 + _SEEDS))
             if joint.moved < _SETTLED:
                 break
-        return joint, _parted(joint, fits)
+        return joint
 
     def misfit(self, state: State, view: int = BOTH) -> float:
         """Return how far the recording is from a model."""
@@ -183,14 +183,13 @@ def _joined(fits: tuple[Fit, ...], declared: Config) -> Fit:
     return Fit(Candidate(name, knobs, (), extra), declared, place, reach=_REACH)
 
 
-def _parted(joint: Fit, fits: tuple[Fit, ...]) -> tuple[Fit, ...]:
+def parted(joint: Fit, fits: tuple[Fit, ...]) -> tuple[Fit, ...]:
     """Return the effects of a joined fit, each with its own place and covariance."""
     result, start = [], 0
     for fit in fits:
         stop = start + len(fit.candidate.knobs)
         own = slice(start, stop)
-        part = Fit(fit.candidate, fit.base, joint.place[own], joint.misfit)
-        part.covariance = joint.covariance[own, own]
-        result.append(part)
+        place, covariance = joint.place[own], joint.covariance[own, own]
+        result.append(Fit(fit.candidate, fit.base, place, joint.misfit, covariance=covariance))
         start = stop
     return tuple(result)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.bench import MANY, Bench, State
+from adv2e.diagnosis.bench import MANY, Bench, State, parted
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations, scored
 from adv2e.diagnosis.interpolation import InterpolationError
@@ -175,7 +175,9 @@ class Search:
     def _attempt(self, state: State, trial: Trial, grounds: Sequence[State]) -> _Attempt:
         """Return the model with a trial's effect more, fitted to its end and judged."""
         bench = self.bench
-        joint, fits = bench.fitted((*state.fits, trial.fit), trial.models[parts.FIT].sd, parts.FIT)
+        together = (*state.fits, trial.fit)
+        joint = bench.fitted(together, trial.models[parts.FIT].sd, parts.FIT)
+        fits = parted(joint, together)
         grown = State(joint.config, fits, bench.tried(joint.config))
         against: list[str] = []
         for ground in grounds:

@@ -8,7 +8,7 @@ from made_up_laboratory import EFFECTS, STATISTICS, MadeUpLaboratory, candidates
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.bench import Rejections
+from adv2e.diagnosis.bench import Rejections, parted
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.diagnose import _verdict, finding_of
@@ -122,8 +122,8 @@ def test_two_effects_are_both_found(period, rate):
 
 def refitted(search, fits):
     """Return the model with all `fits`, fitted together."""
-    joint, fits = search.bench.fitted(fits, search.declared.models[BOTH].sd, BOTH)
-    return search.bench.state(joint.config, fits)
+    joint = search.bench.fitted(fits, search.declared.models[BOTH].sd, BOTH)
+    return search.bench.state(joint.config, parted(joint, fits))
 
 
 def test_backward_drops_what_the_others_do_without():
