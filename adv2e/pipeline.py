@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 
 from adv2e import __version__
 from adv2e.config import Config, to_dict
+from adv2e.cores import default_threads
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.user import user_sources
 from adv2e.events import Events
 from adv2e.heap import return_large_blocks
 from adv2e.overlap import ReadAhead, WriteBehind
 from adv2e.simulation import events_from_light, is_compiled
-from adv2e.sinks import Sink, default_threads, format_name, open_sink
+from adv2e.sinks import Sink, format_name, open_sink
 from adv2e.sources import open_source
 from adv2e.sources.base import Source
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
@@ -16,6 +15,7 @@ from adv2e import jit
 from adv2e.additions import Additions
 from adv2e.circuit import driver_of, make_circuit
 from adv2e.config.model import Pixel, Sampling
+from adv2e.cores import default_threads
 from adv2e.errors import DataError
 from adv2e.events import Events, empty_events
 from adv2e.initial_state import initial_state, rest_poles
@@ -42,11 +42,7 @@ _TILE = 16 * STRIP
 
 def thread_count(threads: int | None) -> int:
     """Return `threads`, or the number of cores this process may use."""
-    if threads is not None:
-        return max(1, threads)
-    if hasattr(os, "sched_getaffinity"):
-        return max(1, len(os.sched_getaffinity(0)))
-    return os.cpu_count() or 1
+    return default_threads() if threads is None else max(1, threads)
 
 
 def is_compiled(pixel: Pixel, sampling: Sampling, additions: Additions | None = None) -> bool:

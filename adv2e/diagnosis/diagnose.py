@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from adv2e import __version__
 from adv2e.config import Config, to_dict
+from adv2e.cores import default_threads
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate
@@ -84,7 +84,7 @@ def diagnose(
     evidence = affordable(evidence, declared)
     light = light_of(evidence, declared)
     scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
-    with closing(Simulator(evidence, threads or _cores(), progress)) as simulator:
+    with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
         nuisances: dict[str, float] = {}
         if free_thresholds:
             declared, nuisances = _with_fitted_thresholds(evidence, declared, simulator, scene)
@@ -99,7 +99,7 @@ def diagnose(
             scene,
             markers,
             dict(zip(seeds, streams, strict=True)),
-            lambda fewer: Simulator(fewer, threads or _cores()),
+            lambda fewer: Simulator(fewer, threads or default_threads()),
         )
         laboratory = Laboratory(simulator, scene, markers, error.bias if error else None)
         measured = Placed.of(evidence.stream, scene)
@@ -186,12 +186,6 @@ def _with_fitted_thresholds(
         declared,
         counts(evidence.stream),
     )
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _verdict(search: Search, outcome: Outcome) -> Verdict:

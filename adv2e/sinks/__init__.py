@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from adv2e.cores import default_threads
 from adv2e.errors import OutputError, UsageError
 from adv2e.sinks.base import Sink, describe
-from adv2e.sinks.work import default_threads
 
-__all__ = ["FORMATS", "LAYOUTS", "Sink", "default_threads", "format_name", "open_sink"]
+__all__ = ["FORMATS", "LAYOUTS", "Sink", "format_name", "open_sink"]
 
 
 @dataclass(frozen=True, kw_only=True)
