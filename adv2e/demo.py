@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from adv2e.errors import OutputError
 from adv2e.pipeline import Summary, convert
+from adv2e.reading import Reading
 from adv2e.recordings import read_recording
 from adv2e.rendering import Style, render_recording
 from adv2e.rendering.timeline import caption
@@ -87,17 +88,17 @@ def run_demo(
     scene = Scene()
     size = {"width": WIDTH, "height": HEIGHT}
     write_video(scene, clip, **size, fps=FPS, duration_s=DURATION_S, overwrite=True)
-    summary = convert(
-        str(clip),
-        str(events),
-        config=config,
-        with_frames=True,
-        overwrite=True,
-        preview=str(film),
-        threads=threads,
-        progress=progress,
-        log=log,
-    )
+    with Reading(str(clip), threads=threads) as reading:
+        summary = convert(
+            reading,
+            str(events),
+            config=config,
+            with_frames=True,
+            overwrite=True,
+            preview=str(film),
+            progress=progress,
+            log=log,
+        )
 
     def describe(since_us: int, count: int) -> str:
         doing = "at rest" if scene.speed(since_us * 1e-6) < _RESTS else "moving"

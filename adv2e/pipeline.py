@@ -8,7 +8,7 @@ With one thread, that one does everything.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,22 +19,17 @@ from numpy.typing import NDArray
 
 from adv2e import __version__
 from adv2e.config import Config, to_dict
-from adv2e.cores import default_threads
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.user import user_sources
 from adv2e.events import Events
-from adv2e.heap import return_large_blocks
-from adv2e.overlap import ReadAhead, WriteBehind
+from adv2e.overlap import WriteBehind
+from adv2e.reading import Decoding, Reading, Still
 from adv2e.simulation import events_from_light, is_compiled
 from adv2e.sinks import Sink, format_name, open_sink
-from adv2e.sources import open_source
 from adv2e.sources.base import Source
 
 if TYPE_CHECKING:
     from adv2e.rendering import Preview
-
-AHEAD_BYTES = 16 << 20
-"""Memory for frames that were decoded and not taken yet."""
 
 BEHIND_BYTES = 16 << 20
 """Memory for events and frames that were made and not written yet."""
@@ -72,20 +67,6 @@ def _call_now(_: int, function: Callable[..., None], *arguments: Any) -> None:
     function(*arguments)
 
 
-@dataclass(frozen=True)
-class _Still:
-    """A frame: time [ns], light [DN] or grey values, and, where it is kept, what is seen of it."""
-
-    t_ns: int
-    light: NDArray[Any]
-    picture: NDArray[Any] | None
-
-    @property
-    def nbytes(self) -> int:
-        """Memory that it takes."""
-        return self.light.nbytes + (0 if self.picture is None else self.picture.nbytes)
-
-
 class _Output:
     """What frames and events go to: the sink, the preview if there is one, and the counts."""
 
@@ -111,7 +92,7 @@ class _Output:
 class _Passing:
     """Frames on their way to the pixel: counts them, and hands on what is kept of them."""
 
-    def __init__(self, stills: Iterable[_Still], output: _Output, call: _Call) -> None:
+    def __init__(self, stills: Iterable[Still], output: _Output, call: _Call) -> None:
         self._stills, self._output, self._call = stills, output, call
         self.count = 0
         self.first_ns = 0
@@ -139,21 +120,15 @@ def default_output(source: str) -> str:
 
 
 def convert(
-    source: str,
+    reading: Reading,
     output: str | None,
     *,
     config: Config,
-    fps: float | None = None,
-    timestamps: str | Path | None = None,
-    start_s: float | None = None,
-    stop_s: float | None = None,
-    t0: str = "auto",
     format: str | None = None,
     layout: str | None = None,
     with_frames: bool = False,
     overwrite: bool = False,
     preview: str | None = None,
-    threads: int | None = None,
     progress: bool = False,
     log: Callable[[str], None] = lambda text: None,
 ) -> Summary:
@@ -161,17 +136,15 @@ def convert(
 
     Parameters
     ----------
-    source, output : str
-        Input; output path ("-": text to stdout; None: see :func:`default_output`).
+    reading : Reading
+        Input, within its context.
+    output : str, optional
+        Output path ("-": text to stdout; None: see :func:`default_output`).
     config : Config
-    fps, timestamps, start_s, stop_s, t0
-        See :func:`adv2e.sources.open_source`.
     format, layout, with_frames, overwrite
         See :func:`adv2e.sinks.open_sink`; DAVIS240C folders and zips always hold the frames.
     preview : str, optional
         Picture or film of the events to write beside.
-    threads : int, optional
-        Threads that compute; default: all cores.  The files do not depend on it.
     progress : bool
         Show a progress bar on stderr.
     log : callable
@@ -183,17 +156,8 @@ def convert(
         For anything wrong with input or output; then no output file is left.
     """
     began = time.perf_counter()
-    return_large_blocks()
-    recording = open_source(
-        source,
-        fps=fps,
-        timestamps=Path(timestamps) if timestamps else None,
-        start_s=start_s,
-        stop_s=stop_s,
-        t0=t0,
-    )
-    target = output or default_output(source)
-    workers = recording.threads = threads or default_threads()
+    recording, workers = reading.source, reading.threads
+    target = output or default_output(reading.path)
     with ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
@@ -216,10 +180,7 @@ def convert(
             call = stack.enter_context(WriteBehind(BEHIND_BYTES)).call
         decoder = _decoder_for(recording, config)
         table = _table_for_the_kernel(decoder, config)
-        stills: Iterator[_Still] = _stills(recording, decoder, table is not None, out.wants_frames)
-        if workers > 1:
-            ahead = ReadAhead(stills, cost=lambda still: still.nbytes, limit=AHEAD_BYTES)
-            stills = stack.enter_context(ahead)
+        stills = reading.stills(Decoding(decoder, table is not None, out.wants_frames))
         if not is_compiled(config):
             log("compiling the pixel's kernel (once; about half a minute)")
         frames = _Passing(_progress(stills, recording.count, progress), out, call)
@@ -317,32 +278,10 @@ def _pieces(events: Events) -> Iterator[Events]:
         yield events[begin : begin + size].copy()
 
 
-def _stills(
-    recording: Source, decoder: LightDecoder, coded: bool, keep_pictures: bool
-) -> Generator[_Still, None, None]:
-    """Yield the frames of the source: light or, `coded`, as they were read."""
-    for frame in recording.frames():
-        picture = _viewable(frame.image, decoder.full_scale) if keep_pictures else None
-        light = frame.image if coded else decoder.decode(frame.image)
-        still = _Still(frame.t_ns, light, picture)
-        # large frames fill the memory: none stays longer than it is needed
-        del frame, light, picture
-        yield still
-        del still
-
-
-def _progress(stills: Iterator[_Still], count: int | None, shown: bool) -> Iterable[_Still]:
+def _progress(stills: Iterator[Still], count: int | None, shown: bool) -> Iterable[Still]:
     """Return the frames, with a progress bar on stderr if it is to be shown."""
     if not shown:
         return stills
     from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and most runs in scripts need none
 
     return tqdm(stills, total=count, unit="frame", leave=False)
-
-
-def _viewable(image: NDArray[Any], full_scale: float) -> NDArray[Any]:
-    """Return the frame as 8 or 16 bit, for storing beside the events."""
-    if image.dtype in (np.uint8, np.uint16):
-        return image
-    scaled = np.clip(np.rint(image * (65535.0 / full_scale)), 0, 65535)
-    return scaled.astype(np.uint16)

@@ -58,8 +58,8 @@ def pipeline(monkeypatch):
     module.calls = []
     module.ending = Summary
 
-    def convert(source, output, **options):
-        module.calls.append((source, output, options))
+    def convert(reading, output, **options):
+        module.calls.append((reading, output, options))
         return module.ending()
 
     module.convert = convert

@@ -86,6 +86,46 @@ def test_code_that_is_there_runs_without_what_only_the_compiler_needs(start):
     assert said(start(1, 1.5, code=told)) == ["20", "25.0", "1", "True"]
 
 
+DRIVER = """
+import numpy as np
+from adv2e.inner import inner
+from adv2e.jit import driver, kernel
+
+@driver
+def first(count):
+    made = np.empty(count)
+    for k in range(count):
+        made[k] = inner(k)
+        if k > 5:
+            raise ValueError("too many")
+    return made
+
+@kernel
+def caller(x):
+    return first(x)
+"""
+DRIVE = """
+import sys
+from adv2e.driver import caller, first
+print(first(3).sum(), sum(first.stats.cache_hits.values()))
+print("numba.np.arrayobj" in sys.modules)
+for run in (first, caller):
+    try:
+        run(9)
+    except Exception as error:
+        print(type(error).__name__, "cannot call" in str(error), "too many" in str(error))
+"""
+
+
+def test_a_driver_is_loaded_without_what_only_other_code_would_need(package, start):
+    (package / "driver.py").write_text(DRIVER)
+    refused = ["ValueError", "False", "True", "TypeError", "True", "False"]
+    assert said(start(code=DRIVE)) == ["6.0", "0", "True", *refused]
+    assert said(start(code=DRIVE)) == ["6.0", "1", "False", *refused]
+    (package / "inner.py").write_text(INNER.replace("x + 1", "x + 2"))
+    assert said(start(code=DRIVE)) == ["9.0", "0", "True", *refused]
+
+
 def test_a_read_only_installation_is_served_and_not_touched(package, start):
     before = {path: path.stat().st_mtime_ns for path in package.rglob("*")}
     for path in (*before, package):

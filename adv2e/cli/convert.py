@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,8 @@ SECONDS = options.FiniteNumber(min=0)
 
 @click.command("convert")
 @click.argument("source", metavar="INPUT")
-@options.common_options
+@options.late_config_options
+@options.run_options
 @click.option("--fps", type=options.FiniteNumber(min=0, min_open=True), help="Frames a second.")
 @click.option(
     "--timestamps",
@@ -57,7 +59,7 @@ def command(
     source: str,
     output: str | None,
     overwrite: bool,
-    config: Config,
+    config: Callable[[], Config],
     threads: int | None,
     progress: bool,
     log: Log,
@@ -91,26 +93,32 @@ def command(
         raise click.UsageError("--fps and --timestamps both give the times of the frames: keep one")
     if start is not None and stop is not None and stop <= start:
         raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
-    from adv2e.pipeline import convert
+    from adv2e.reading import Reading
 
-    gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
-    summary = convert(
+    reading = Reading(
         source,
-        output,
-        config=config,
         fps=fps,
         timestamps=timestamps,
         start_s=start,
         stop_s=stop,
         t0=t0,
-        format=format_,
-        layout=layout,
-        with_frames=with_frames,
-        overwrite=overwrite,
-        preview=preview,
         threads=threads,
-        progress=progress,
-        log=log,
     )
+    with reading:  # it reads while all else that is needed is imported
+        from adv2e.pipeline import convert
+
+        gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
+        summary = convert(
+            reading,
+            output,
+            config=config(),
+            format=format_,
+            layout=layout,
+            with_frames=with_frames,
+            overwrite=overwrite,
+            preview=preview,
+            progress=progress,
+            log=log,
+        )
     if log.level >= 0:
         click.echo(summary.text(), err=output == "-")

@@ -11,11 +11,14 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from adv2e.cli.run import VERBOSITY
+
+if TYPE_CHECKING:
+    from adv2e.config import Config
 
 Body = TypeVar("Body", bound=Callable[..., Any])
 
@@ -48,8 +51,12 @@ class FiniteNumber(click.FloatRange):
         return number
 
 
-def config_options(body: Body) -> Body:
-    """Add -c, --set, --seed and --effect; the command gets ``config``."""
+def late_config_options(body: Body) -> Body:
+    """Add -c, --set, --seed and --effect; the command gets ``config``, a function.
+
+    It returns the Config.  A command that has other things to begin with calls it after those:
+    configurations know of compiled code, and importing Numba takes its time.
+    """
 
     @click.option(
         "-c",
@@ -87,16 +94,29 @@ def config_options(body: Body) -> Body:
         effect_files: tuple[str, ...],
         **kw: Any,
     ) -> Any:
-        from adv2e.config import load_config
+        def config() -> Config:
+            from adv2e.config import load_config
 
-        effects = []
-        if effect_files:
-            from adv2e.effects.user import load_effects
+            effects = []
+            if effect_files:
+                from adv2e.effects.user import load_effects
 
-            effects = [effect for name in effect_files for effect in load_effects(name)]
-        return body(*args, config=load_config(config_files, sets, seed, effects), **kw)
+                effects = [effect for name in effect_files for effect in load_effects(name)]
+            return load_config(config_files, sets, seed, effects)
+
+        return body(*args, config=config, **kw)
 
     return with_config  # type: ignore[return-value]
+
+
+def config_options(body: Body) -> Body:
+    """Add -c, --set, --seed and --effect; the command gets ``config``, a Config."""
+
+    @functools.wraps(body)
+    def with_config(*args: Any, config: Callable[[], Config], **kw: Any) -> Any:
+        return body(*args, config=config(), **kw)
+
+    return late_config_options(with_config)  # type: ignore[return-value]
 
 
 def output_options(body: Body) -> Body:
@@ -160,8 +180,13 @@ def progress_option(body: Body) -> Body:
     return with_progress  # type: ignore[return-value]
 
 
-def common_options(body: Body) -> Body:
-    """Add all of them: the command gets config, output, overwrite, threads, progress and log."""
+def run_options(body: Body) -> Body:
+    """Add those of any work: the command gets output, overwrite, threads, progress and log."""
     for decorator in (progress_option, verbosity_options, threads_option, output_options):
         body = decorator(body)
-    return config_options(body)
+    return body
+
+
+def common_options(body: Body) -> Body:
+    """Add all of them: the command gets config, output, overwrite, threads, progress and log."""
+    return config_options(run_options(body))

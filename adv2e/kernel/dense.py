@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.pixel.photoreceptor_noise import fill_normals
 from adv2e.effects.pixel.slew_limit import keep_first, limit_slew
-from adv2e.jit import allocating_kernel, kernel
+from adv2e.jit import allocating_kernel, driver, kernel
 from adv2e.kernel import dense_events as events
 from adv2e.kernel import dense_signal as signal
 from adv2e.kernel.claims import claim
@@ -307,7 +307,7 @@ def _strip(
     return number, keys, times
 
 
-@allocating_kernel
+@driver
 def run_dense(
     claimed, most, frames, before, share, starts, begins, last, circuit, run, injected, t_base,
     state, scratch, keys, times,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.effects.pixel.leak import fill_falls
-from adv2e.jit import allocating_kernel, kernel
+from adv2e.jit import allocating_kernel, driver, kernel
 from adv2e.kernel import batch, exchange, rest, screen, special
 from adv2e.kernel.claims import claim
 from adv2e.kernel.quadrature import Rule
@@ -282,7 +282,7 @@ def _strip(
     return n, keys, times
 
 
-@allocating_kernel
+@driver
 def run_exact(
     claimed, most, frames, before, share, starts, begins, last, circuit, rules, t_base,
     state, scratch, keys, times,

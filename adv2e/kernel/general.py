@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.effects.pixel.leak import fill_falls
-from adv2e.jit import allocating_kernel, kernel
+from adv2e.jit import allocating_kernel, driver, kernel
 from adv2e.kernel import screen, special, stepped
 from adv2e.kernel.claims import claim
 from adv2e.kernel.tile import load, solve_one
@@ -124,7 +124,7 @@ def _strip(
     return n, keys, times
 
 
-@allocating_kernel
+@driver
 def run_general(
     claimed, most, frames, before, share, starts, begins, last, circuit, rules, t_base,
     state, scratch, keys, times,

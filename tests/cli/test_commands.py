@@ -14,6 +14,7 @@ from adv2e.cli import COMMANDS, main
 from adv2e.cli.options import Log
 from adv2e.config import Config, all_keys, load_config, shipped
 from adv2e.config.model import Pixel
+from adv2e.cores import default_threads
 from adv2e.effects import EFFECTS, STAGES
 
 
@@ -53,22 +54,23 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         *("--layout", "dsec", "--with-frames", "--preview", "p.gif"),
     )
     assert outcome.status == 0
-    ((source, output, options),) = pipeline.calls
-    assert (source, output) == ("frames", "out.h5")
-    log = options.pop("log")
-    assert options == {
-        "config": load_config(["ideal"], ["sampling.L=3"], 7),
+    ((reading, output, options),) = pipeline.calls
+    assert (reading.path, output, reading.threads) == ("frames", "out.h5", 2)
+    assert reading.given == {
         "fps": None,
         "timestamps": Path("t.txt"),
         "start_s": 0.5,
         "stop_s": 2.0,
         "t0": "keep",
+    }
+    log = options.pop("log")
+    assert options == {
+        "config": load_config(["ideal"], ["sampling.L=3"], 7),
         "format": "h5",
         "layout": "dsec",
         "with_frames": True,
         "overwrite": True,
         "preview": "p.gif",
-        "threads": 2,
         "progress": True,
     }
     assert log.level == 0
@@ -76,13 +78,13 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
 
 def test_convert_by_default(adv2e, pipeline):
     adv2e("convert", "clip.mp4")
-    ((source, output, options),) = pipeline.calls
-    assert (source, output) == ("clip.mp4", None)
+    ((reading, output, options),) = pipeline.calls
+    assert (reading.path, output, reading.threads) == ("clip.mp4", None, default_threads())
     assert options["config"] == Config()
-    assert options["t0"] == "auto"
+    assert reading.given.pop("t0") == "auto"
+    assert set(reading.given.values()) == {None}
     assert options["progress"] is False  # stderr is not a terminal here
-    for name in ("fps", "timestamps", "start_s", "stop_s", "format", "layout", "threads"):
-        assert options[name] is None
+    assert options["format"] is options["layout"] is None
 
 
 def test_progress_is_shown_on_a_terminal_unless_quiet(adv2e, pipeline, monkeypatch):

@@ -1,0 +1,182 @@
+"""The frames of a source on their way to the pixel, read ahead of it.
+
+Reading begins before anybody has said what the frames are to become: to import Numba takes a
+process longer than to decode a short video.  What was read until then waits as it is.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator, Iterator
+from concurrent.futures import Future
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.cores import default_threads
+from adv2e.errors import Adv2eError
+from adv2e.heap import return_large_blocks
+from adv2e.overlap import ReadAhead
+from adv2e.sources import open_source
+from adv2e.sources.base import Frame, Source
+
+if TYPE_CHECKING:
+    from adv2e.effects.frames.encoding import LightDecoder
+
+AHEAD_BYTES = 16 << 20
+"""Memory for frames that were decoded and not taken yet."""
+
+EARLY_BYTES = 32 << 20
+"""Memory for frames that were read before it was known what they are to become."""
+
+
+@dataclass(frozen=True)
+class Still:
+    """A frame: time [ns], light [DN] or grey values, and, where it is kept, what is seen of it."""
+
+    t_ns: int
+    light: NDArray[Any]
+    picture: NDArray[Any] | None
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes."""
+        return self.light.nbytes + (0 if self.picture is None else self.picture.nbytes)
+
+
+@dataclass(frozen=True)
+class Decoding:
+    """What frames are to become.
+
+    Parameters
+    ----------
+    decoder : LightDecoder
+    coded : bool
+        They stay as they were read: the kernel decodes them itself.
+    with_pictures : bool
+        What is seen of them is kept, too.
+    """
+
+    decoder: LightDecoder
+    coded: bool
+    with_pictures: bool
+
+    def still(self, frame: Frame) -> Still:
+        """Return a frame as the pixel wants it."""
+        picture = None
+        if self.with_pictures:
+            picture = _viewable(frame.image, self.decoder.full_scale)
+        light = frame.image if self.coded else self.decoder.decode(frame.image)
+        return Still(frame.t_ns, light, picture)
+
+
+class Reading:
+    """A source, and the reading of its frames; to be used as a context, once.
+
+    With more than one thread, frames are read in a thread of their own from the beginning of the
+    context on; with one, when they are taken.
+
+    Parameters
+    ----------
+    path, fps, timestamps, start_s, stop_s, t0
+        See :func:`adv2e.sources.open_source`.
+    threads : int, optional
+        Threads that the whole conversion may compute with; default: all cores.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        *,
+        fps: float | None = None,
+        timestamps: str | Path | None = None,
+        start_s: float | None = None,
+        stop_s: float | None = None,
+        t0: str = "auto",
+        threads: int | None = None,
+    ) -> None:
+        self.path = path
+        self.threads = threads or default_threads()
+        self.given: dict[str, Any] = {
+            "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0
+        }  # fmt: skip
+        self._opened: Source | Adv2eError | None = None
+        self._decoding: Future[Decoding] = Future()
+        self._stills: Iterator[Still] = iter(())
+        self._at_end = ExitStack()
+
+    @property
+    def source(self) -> Source:
+        """The source.
+
+        Raises
+        ------
+        Adv2eError
+            It could not be opened.
+        """
+        if isinstance(self._opened, Adv2eError):
+            raise self._opened
+        assert self._opened is not None, "not entered"
+        return self._opened
+
+    def stills(self, decoding: Decoding) -> Iterator[Still]:
+        """Return the frames, as `decoding` says; raises what goes wrong with them."""
+        self._decoding.set_result(decoding)
+        return self._stills
+
+    def __enter__(self) -> Reading:
+        return_large_blocks()
+        try:
+            source = self._opened = open_source(self.path, **self.given)
+        except Adv2eError as error:  # the other parts of the command may be wrong, too
+            self._opened = error
+            return self
+        source.threads = self.threads
+        self._stills = _stills(source.frames(), self._decoding)
+        if self.threads > 1:
+            ahead = ReadAhead(self._stills, cost=lambda still: still.nbytes, limit=AHEAD_BYTES)
+            self._stills = self._at_end.enter_context(ahead)
+            self._at_end.callback(self._decoding.cancel)  # its thread may wait for it
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._at_end.__exit__(kind, error, trace)
+
+
+def _stills(frames: Iterator[Frame], decoding: Future[Decoding]) -> Generator[Still, None, None]:
+    """Yield the frames once it is known what they are to become, some of them read before."""
+    waiting: deque[Frame] = deque()
+    room = EARLY_BYTES
+    # large frames fill the memory: none stays longer than it is needed
+    for frame in frames:
+        waiting.append(frame)
+        room -= frame.image.nbytes
+        del frame
+        if room <= 0 or decoding.done():
+            break
+    known = decoding.result()
+    while waiting:
+        yield known.still(waiting.popleft())
+    for frame in frames:
+        still = known.still(frame)
+        del frame
+        yield still
+        del still
+
+
+def _viewable(image: NDArray[Any], full_scale: float) -> NDArray[Any]:
+    """Return the frame as 8 or 16 bit, for storing beside the events."""
+    if image.dtype in (np.uint8, np.uint16):
+        return image
+    scaled = np.clip(np.rint(image * (65535.0 / full_scale)), 0, 65535)
+    return scaled.astype(np.uint16)
