@@ -19,9 +19,12 @@ from adv2e.reports.result import Masked
 LEAST_EVENTS = 1000
 """Below that nothing can be told."""
 
-AFFORDABLE = 12_000_000
-"""Pixels times instants of one simulation; a diagnosis takes a thousand of them and more."""
+AFFORDABLE_S = 0.2
+"""What one simulation may take, in one thread; a diagnosis takes some thousands of them [s]."""
 
+# about what a simulation and the statistics of its events take, in one thread [s]
+_INSTANT_S = 20e-9  # of one pixel
+_EVENT_S = 300e-9
 _STEPPED = 10
 _BLOCK = 8
 _SMALLEST = 48
@@ -154,16 +157,23 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
     instants = (len(evidence.frames) - 1) * declared.sampling.L
     low_pass = declared.pixel.low_pass
     each = 1 if low_pass is None or low_pass.update == "exact" else _STEPPED
-    pixels = AFFORDABLE / (instants * each)
-    if evidence.width * evidence.height <= pixels:
-        return evidence
-    share = (pixels / (evidence.width * evidence.height)) ** 0.5
-    width, height = (
-        min(length, max(_SMALLEST, round(length * share / _BLOCK) * _BLOCK))
-        for length in (evidence.width, evidence.height)
-    )
-    left, top = _busiest(evidence, width, height)
-    return _cropped(evidence, left, top, width, height)
+
+    def cost_s(part: Evidence) -> float:
+        pixels = part.width * part.height
+        return _INSTANT_S * each * instants * pixels + _EVENT_S * len(part.stream)
+
+    kept, share = evidence, 1.0
+    while cost_s(kept) > AFFORDABLE_S:
+        # where events crowd, a part of the pixels costs more than its share
+        share *= 0.98 * AFFORDABLE_S / cost_s(kept)
+        width, height = (
+            min(length, max(_SMALLEST, round(length * share**0.5 / _BLOCK) * _BLOCK))
+            for length in (evidence.width, evidence.height)
+        )
+        if (width, height) == (kept.width, kept.height):
+            break
+        kept = _cropped(evidence, *_busiest(evidence, width, height), width, height)
+    return kept
 
 
 def _busiest(evidence: Evidence, width: int, height: int) -> tuple[int, int]:

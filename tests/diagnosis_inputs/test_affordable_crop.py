@@ -26,9 +26,11 @@ def recording():
     return Evidence("spot", frames, TIMES, stream, WIDTH, HEIGHT)
 
 
-def limit(monkeypatch, pixels, steps=1):
+def limit(monkeypatch, pixels, steps=1, event_s=0.0):
     instants = (len(TIMES) - 1) * CONFIG.sampling.L
-    monkeypatch.setattr(evidence_module, "AFFORDABLE", pixels * instants * steps)
+    monkeypatch.setattr(evidence_module, "_INSTANT_S", 1.0)
+    monkeypatch.setattr(evidence_module, "_EVENT_S", event_s)
+    monkeypatch.setattr(evidence_module, "AFFORDABLE_S", 1.001 * pixels * instants * steps)
 
 
 def test_what_is_affordable_stays_as_it_is(monkeypatch):
@@ -64,6 +66,19 @@ def test_a_stepped_filter_costs_more(monkeypatch):
     assert affordable(whole, stepped).width < WIDTH
     limit(monkeypatch, WIDTH * HEIGHT, steps=10)
     assert affordable(whole, stepped) is whole
+
+
+def test_events_cost_too_and_a_crop_where_they_crowd_is_smaller(monkeypatch):
+    whole = recording()
+    instants = (len(TIMES) - 1) * CONFIG.sampling.L
+    # all events are in one corner: each crop around them costs them in full
+    event_s = WIDTH * HEIGHT * instants / 4 / len(whole.stream)
+    limit(monkeypatch, WIDTH * HEIGHT)
+    assert affordable(whole, CONFIG) is whole
+    limit(monkeypatch, WIDTH * HEIGHT, event_s=event_s)
+    crop = affordable(whole, CONFIG)
+    assert len(crop.stream) == len(whole.stream)
+    assert 0.5 < crop.width * crop.height / (WIDTH * HEIGHT) <= 0.75
 
 
 @pytest.mark.parametrize("pixels", [1, 48 * 48])
