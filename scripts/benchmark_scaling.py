@@ -21,12 +21,13 @@ from typing import Any
 
 import click
 from benchmarks.clips import Clip, default_folder, stored
-from benchmarks.machine import busy_line, cores, machine_line, versions_line
+from benchmarks.machine import busy_line, machine_line, versions_line
 from benchmarks.processes import Job, JobError, Log, Measured, number, run_rounds
 from benchmarks.report import peak_text, table
 from benchmarks.settings import ALL, IDEAL, Plan, stepped
 from study_knee_report import load_pyplot
 
+from adv2e.cores import default_threads
 from adv2e.errors import Adv2eError
 
 BASE = Clip(width=346, height=260, frames=97)
@@ -110,7 +111,8 @@ def samples(setup: Setup) -> Iterator[Sample]:
         for axis, value, label, clip in varied_clips(setup):
             job = setup.job(f"{axis} {label}, {curve}", clip, effects)
             yield Sample(axis, value, curve, label, job)
-        for count in range(1, cores() + 1) if cores() <= 4 else _powers(cores()):
+        most = default_threads()
+        for count in range(1, most + 1) if most <= 4 else _powers(most):
             job = setup.job(f"threads {count}, {curve}", setup.base, effects, count)
             yield Sample(_THREADS, count, curve, str(count), job)
     yield from _stepped(setup)

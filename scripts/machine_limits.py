@@ -27,11 +27,12 @@ import click
 import h5py
 import numba
 import numpy as np
-from benchmarks.machine import cores, machine_line
+from benchmarks.machine import machine_line
 from benchmarks.processes import number
 from benchmarks.report import table
 from numpy.typing import NDArray
 
+from adv2e.cores import default_threads
 from adv2e.events import Events, make_events, sort_events
 from adv2e.sinks import open_sink
 from adv2e.sinks.text import text_blocks
@@ -105,7 +106,7 @@ class Effort:
 @click.option("--threads", type=click.IntRange(min=1), help="[default: all cores]")
 def main(quick: bool, threads: int | None) -> None:
     """Print what this machine can do, as a table."""
-    threads = threads or cores()
+    threads = threads or default_threads()
     effort = Effort(64, 300_000, 3, threads) if quick else Effort(256, 2_000_000, 15, threads)
     click.echo(f"{machine_line()}, numba {numba.__version__}, numpy {np.__version__}\n")
     click.echo(report([*memory(effort), *exponentials(effort), *events_written(effort)]))

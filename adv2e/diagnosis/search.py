@@ -139,18 +139,34 @@ class Search:
         return self.probability(state) < LEVEL and self.explained(state) < NEARLY
 
     def _grown(self, state: State) -> State | None:
-        """Return the model with one effect more, or two that hold only together."""
+        """Return the model with one effect more, or two that hold only together.
+
+        Where one holds but another that does not explains far more, the one is no name for what is
+        missing: it stands in for a part of the other.
+        """
         attempts = self._attempts(state, [state])
-        grown = self._best(attempts, state)
-        if grown is not None or len(state.fits) + 2 > MOST_EFFECTS:
-            return grown
         # with one of two effects, something still stands out; but the one gains, and is physical
-        hidden = [one for one in attempts if not {BORDER, BY_CHANCE} & set(one.objections)]
-        if not hidden:
+        physical = [one for one in attempts if not {BORDER, BY_CHANCE} & set(one.objections)]
+        if not physical:
             return None
-        first = max(hidden, key=lambda one: self.bench.likelihood(one.state, parts.JUDGE))
-        self.bench.log(f"on trial: {', '.join(first.state.names)}")
-        return self._best(self._attempts(first.state, [first.state, state]), state)
+        first = max(physical, key=self._judged)
+        holding = [self._judged(one) for one in physical if not one.objections]
+        if holding and max(holding) > self._judged(first) - _CATCHES_UP:
+            return self._best(attempts, state)
+        grown = None
+        if len(state.fits) + 2 <= MOST_EFFECTS:
+            self.bench.log(f"on trial: {', '.join(first.state.names)}")
+            grown = self._best(self._attempts(first.state, [first.state, state]), state)
+        if grown is None:
+            why = f"holds, but {first.state.names[-1]}, which does not, explains far more"
+            for one in physical:
+                if not one.objections:
+                    self.bench.rejections.add(one.state.fits[-1], why, final=True)
+        return grown
+
+    def _judged(self, attempt: _Attempt) -> float:
+        """Return the log likelihood of the data that the attempt was not fitted to."""
+        return self.bench.likelihood(attempt.state, parts.JUDGE)
 
     def _attempts(self, state: State, grounds: Sequence[State]) -> list[_Attempt]:
         """Return models with one effect more, judged against all `grounds`.

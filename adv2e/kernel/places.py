@@ -94,11 +94,8 @@ def _exponent(light, span, d, z, on_log, dark, per_dn, slope):
 
 
 @inlined
-def _set_up_from(began, light_began, lanes, count, dark, per_dn, slope):
-    """Light and its integral at each place, and the parameters of the quadrature.
-
-    `began` and `light_began` are the rows of where the integral begins, and of the light there.
-    """
+def _set_up(began, light_began, lanes, count, dark, per_dn, slope):
+    """Light and its integral at each place, and the parameters of the quadrature."""
     for k in range(count):
         span = lanes[PLACE + k] - lanes[began + k]
         d = lanes[DX + k] * span
@@ -115,18 +112,6 @@ def _set_up_from(began, light_began, lanes, count, dark, per_dn, slope):
 
 
 @kernel
-def _set_up(lanes, count, dark, per_dn, slope):
-    """From the start of the piece on."""
-    _set_up_from(BASE, I0, lanes, count, dark, per_dn, slope)
-
-
-@kernel
-def _set_up_release(lanes, count, dark, per_dn, slope):
-    """From the last known place on."""
-    _set_up_from(S, LIGHT_S, lanes, count, dark, per_dn, slope)
-
-
-@kernel
 def _node(lanes, count, node, weight):
     """Add one node of the quadrature."""
     square = node * node
@@ -135,34 +120,39 @@ def _node(lanes, count, node, weight):
         lanes[TOTAL + k] += weight * special.exp(-t)
 
 
-@kernel
-def evaluate(lanes, count, length, circuit, rule):
-    """Lag, light and integral of the light since BASE of each lane at its place."""
+@inlined
+def _evaluate_from(
+    began, light_began, lag_began, lanes, count, length, circuit, nodes, weights
+):  # fmt: skip
+    """Lag, light and integral of the light of each lane at its place.
+
+    The integral begins at the place in row `began`, where light and lag are in `light_began` and
+    `lag_began`.
+    """
     dark = circuit.dark * length
     per_dn = circuit.per_dn * length
-    _set_up(lanes, count, dark, per_dn, circuit.slope)
-    for c in range(rule.nodes.shape[0]):
-        _node(lanes, count, rule.nodes[c], rule.weights[c])
+    _set_up(began, light_began, lanes, count, dark, per_dn, circuit.slope)
+    for c in range(nodes.shape[0]):
+        _node(lanes, count, nodes[c], weights[c])
     for k in range(count):
-        span = lanes[PLACE + k] - lanes[BASE + k]
+        span = lanes[PLACE + k] - lanes[began + k]
         t = dark * span + per_dn * lanes[SUM_E + k]
         gone = lanes[DX + k] * span * lanes[UPTO + k] * lanes[TOTAL + k]
-        lanes[LAG_E + k] = special.exp(-t) * lanes[U0 + k] - gone
+        lanes[LAG_E + k] = special.exp(-t) * lanes[lag_began + k] - gone
+
+
+@kernel
+def evaluate(lanes, count, length, circuit, rule):
+    """From the start of the piece on."""
+    _evaluate_from(BASE, I0, U0, lanes, count, length, circuit, rule.nodes, rule.weights)
 
 
 @kernel
 def evaluate_release(lanes, count, length, circuit, rule):
-    """As evaluate, from S, which is at most a dead time before the place."""
-    dark = circuit.dark * length
-    per_dn = circuit.per_dn * length
-    _set_up_release(lanes, count, dark, per_dn, circuit.slope)
-    for c in range(rule.nodes_dead.shape[0]):
-        _node(lanes, count, rule.nodes_dead[c], rule.weights_dead[c])
-    for k in range(count):
-        span = lanes[PLACE + k] - lanes[S + k]
-        t = dark * span + per_dn * lanes[SUM_E + k]
-        gone = lanes[DX + k] * span * lanes[UPTO + k] * lanes[TOTAL + k]
-        lanes[LAG_E + k] = special.exp(-t) * lanes[LAG_S + k] - gone
+    """From the last known place on, which is at most a dead time before."""
+    _evaluate_from(
+        S, LIGHT_S, LAG_S, lanes, count, length, circuit, rule.nodes_dead, rule.weights_dead
+    )
 
 
 @kernel

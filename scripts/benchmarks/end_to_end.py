@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from adv2e.cores import default_threads
 from benchmarks.clips import as_srgb, encoded, stored
-from benchmarks.machine import cores
 from benchmarks.processes import Job, Log, Measured, number, run_rounds
 from benchmarks.report import peak_text, table
 from benchmarks.settings import CAMERAS, CUTOFF_HZ, IDEAL, THRESHOLD, Peers, Plan
@@ -205,8 +205,8 @@ def decides(parts: Sequence[Measured]) -> str:
     slowest = max(chosen, key=lambda name: chosen[name])
     shares = ", ".join(f"{name} {number(value)} s" for name, value in chosen.items())
     return (
-        f"To HDF5, noise off, L = 1, on {cores()} cores: {shares}; {slowest} decides. Overlapped"
-        f" without loss they would take {number(chosen[slowest])} s, one after the other"
+        f"To HDF5, noise off, L = 1, on {default_threads()} cores: {shares}; {slowest} decides."
+        f" Overlapped without loss they would take {number(chosen[slowest])} s, one after the other"
         f" {number(sum(chosen.values()))} s, beside"
         f" {number(named[_DECIDING['the start']])} s to start."
     )

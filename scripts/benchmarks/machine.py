@@ -7,6 +7,7 @@ import platform
 from collections.abc import Iterable
 from pathlib import Path
 
+from adv2e.cores import default_threads
 from benchmarks.processes import Measured, number
 
 
@@ -20,13 +21,6 @@ def processor() -> str:
     return next(named, platform.machine())
 
 
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def memory_gib() -> float | None:
     """Return the size of the memory [GiB]; None: not known."""
     try:
@@ -38,7 +32,7 @@ def memory_gib() -> float | None:
 def machine_line() -> str:
     """Return processor, cores, memory and system."""
     memory = memory_gib()
-    parts = [processor(), f"{cores()} cores", f"{memory:.0f} GiB" if memory else ""]
+    parts = [processor(), f"{default_threads()} cores", f"{memory:.0f} GiB" if memory else ""]
     parts += [f"{platform.system()} {platform.machine()}", f"Python {platform.python_version()}"]
     return ", ".join(part for part in parts if part)
 

@@ -8,6 +8,7 @@ from made_up_laboratory import EFFECTS, STATISTICS, MadeUpLaboratory, candidates
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import parts
+from adv2e.diagnosis import search as search_module
 from adv2e.diagnosis.bench import Rejections, parted
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.detectable import detectable
@@ -118,6 +119,22 @@ def test_two_effects_are_both_found(period, rate):
     for fit in outcome.state.fits:
         assert fit.covariance.shape == (1, 1)
         assert finding_of(fit).interval
+
+
+def test_what_holds_is_no_name_where_what_does_not_explains_far_more(monkeypatch):
+    def objecting(fit, grown, ground, bench):
+        return [] if grown.names == ("leak",) else ["something else stands out"]
+
+    monkeypatch.setattr(search_module, "objections", objecting)
+    truth = ["pixel.refractory.period_us=1900", "pixel.leak.rate_hz=1.2"]
+    library = [*candidates("refractory"), *candidates("leak")]
+    search, outcome = searched(truth, library=library)
+    assert outcome.state.names == ()
+    assert _verdict(search, outcome) == "unexplained"
+    assert "refractory, which does not, explains far more" in outcome.rejected["leak"].reason
+    assert outcome.rejected["refractory"].reason == "something else stands out"
+    _, outcome = searched(["pixel.leak.rate_hz=4"], library=library)
+    assert outcome.state.names == ("leak",)
 
 
 def refitted(search, fits):
