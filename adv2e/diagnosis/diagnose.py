@@ -30,10 +30,11 @@ from adv2e.diagnosis.markers.timing import strongest_lines
 from adv2e.diagnosis.nuisances import fit_thresholds
 from adv2e.diagnosis.picture import Gallery
 from adv2e.diagnosis.scene import Placed, Scene
-from adv2e.diagnosis.search import LEVEL, NEARLY, PARTLY, Outcome, Search
+from adv2e.diagnosis.search import Outcome, Search
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 from adv2e.diagnosis.stream import Stream
-from adv2e.reports.result import Diagnosis, Finding, Rejected, Signature, Verdict
+from adv2e.diagnosis.verdict import sentence_of, verdict_of
+from adv2e.reports.result import Diagnosis, ErrorRow, Finding, Rejected, Signature
 
 Array = NDArray[np.float64]
 
@@ -112,30 +113,37 @@ def diagnose(
         candidates = [one for one in library(declared, hints) if one.name not in without]
         search = Search(laboratory, observed, declared, candidates, error, log)
         outcome = search.run()
-        verdict = _verdict(search, outcome)
-        kept = outcome.state if verdict not in ("consistent", "unexplained") else search.declared
         seeds = range(20_000, 20_000 + _DRAWS)
-        before = [Placed.of(simulator.stream(declared, seed), scene) for seed in seeds]
-        after = before
+
+        def drawn(state: State) -> list[Placed]:
+            return [Placed.of(simulator.stream(state.config, seed), scene) for seed in seeds]
+
+        def errors(before: Sequence[Placed], after: Sequence[Placed]) -> list[ErrorRow]:
+            def last(placed: Placed) -> Stream:
+                return of_part(placed.stream, scene.parts, parts.LAST)
+
+            return error_rows(last(measured), list(map(last, before)), list(map(last, after)))
+
+        kept = outcome.state
+        before = after = drawn(search.declared)
         if kept is not search.declared:
-            after = [Placed.of(simulator.stream(kept.config, seed), scene) for seed in seeds]
+            after = drawn(kept)
+        rows = errors(before, after)
+        verdict = verdict_of(outcome, rows[0])
+        if verdict in ("consistent", "unexplained") and kept is not search.declared:
+            kept, after = search.declared, before
+            rows = errors(before, after)
         gallery = Gallery(scene, measured, before, after)
-
-        def last(placed: Placed) -> Any:
-            return of_part(placed.stream, scene.parts, parts.LAST)
-
         return Diagnosis(
             verdict=verdict,
-            sentence=_sentence(verdict, kept, outcome),
+            sentence=sentence_of(verdict, kept, outcome),
             recording=evidence.name,
             declared=declared_name,
             effects=[finding_of(fit) for fit in kept.fits],
             alternatives=outcome.alternatives if kept.fits else [],
             nuisances=nuisances,
             rejected=_rejected(outcome, kept, candidates),
-            errors=error_rows(
-                last(measured), [last(one) for one in before], [last(one) for one in after]
-            ),
+            errors=rows,
             global_p_before=search.probability(search.declared, parts.LAST),
             global_p_after=search.probability(kept, parts.LAST),
             signatures=_signatures(search, observed, kept, laboratory.markers),
@@ -186,38 +194,6 @@ def _with_fitted_thresholds(
         declared,
         counts(evidence.stream),
     )
-
-
-def _verdict(search: Search, outcome: Outcome) -> Verdict:
-    if not outcome.state.fits:
-        return "consistent" if outcome.probability >= LEVEL else "unexplained"
-    if outcome.probability < LEVEL and outcome.explained < NEARLY:
-        return "partly_explained" if outcome.explained >= PARTLY else "unexplained"
-    return "not_identifiable" if outcome.alternatives else "explained"
-
-
-def _sentence(verdict: Verdict, kept: State, outcome: Outcome) -> str:
-    names = " and ".join(kept.names)
-    if verdict == "consistent":
-        return (
-            "The recording is what the declared model makes: nothing is missing that can be seen."
-        )
-    if verdict == "unexplained":
-        best = " and ".join(outcome.state.names)
-        most = f" (at most {outcome.explained:.0%} of it: {best})" if best else ""
-        return f"Something is missing in the declared model that no effect known explains{most}."
-    if verdict == "partly_explained":
-        return (
-            f"The declared model lacks {names}; that explains {outcome.explained:.0%} of the"
-            " residual, and something is left."
-        )
-    if verdict == "not_identifiable":
-        others = ", ".join(outcome.alternatives)
-        return f"The declared model lacks an effect: {names}, or as well {others}."
-    if outcome.probability < LEVEL:
-        share = f"{outcome.explained:.1%}"
-        return f"The declared model lacks {names}; that explains {share} of the residual."
-    return f"The declared model lacks {names}; with that, nothing is left that can be seen."
 
 
 def finding_of(fit: Fit) -> Finding:

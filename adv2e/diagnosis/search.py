@@ -33,9 +33,6 @@ LEVEL = 0.01
 """Probability below which chance is not believed to make a residual."""
 
 MOST_EFFECTS = 4
-PARTLY = 0.8
-"""Share of the residual that effects must explain to be named when something is left."""
-
 NEARLY = 0.98
 """Share of the residual beyond which what is left is put down to the fit, not to another effect."""
 

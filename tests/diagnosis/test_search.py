@@ -12,13 +12,24 @@ from adv2e.diagnosis import search as search_module
 from adv2e.diagnosis.bench import Rejections, parted
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.detectable import detectable
-from adv2e.diagnosis.diagnose import _verdict, finding_of
+from adv2e.diagnosis.diagnose import finding_of
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.judging import chance_gain
 from adv2e.diagnosis.markers import BOTH
-from adv2e.diagnosis.search import LEVEL, PARTLY, Search
+from adv2e.diagnosis.search import LEVEL, Search
+from adv2e.diagnosis.verdict import verdict_of
+from adv2e.reports.result import ErrorRow, Estimate
 
 RECORDING = 70_000
+
+
+def error(before, after, floor, spread=0.02):
+    """Return a row of errors, each with an interval of that width."""
+    ends = (Estimate(v, (v - spread / 2, v + spread / 2)) for v in (before, after, floor))
+    return ErrorRow("error", *ends)
+
+
+GONE = error(0.8, 0.4, 0.4)
 
 
 def searched(truth=(), laboratory=None, library=None, beyond=0.0, seed=RECORDING, declared=None):
@@ -41,7 +52,7 @@ def outside(size):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_nothing_missing_is_consistent(seed):
     search, outcome = searched(seed=RECORDING + seed)
-    assert _verdict(search, outcome) == "consistent"
+    assert verdict_of(outcome, GONE) == "consistent"
     assert outcome.state is search.declared
     assert outcome.state.names == ()
     assert outcome.probability >= LEVEL
@@ -59,9 +70,9 @@ def test_nothing_missing_is_consistent(seed):
     ],
 )
 def test_one_effect_is_named(name, sets, value):
-    search, outcome = searched([sets])
+    _, outcome = searched([sets])
     assert outcome.state.names == (name,)
-    assert _verdict(search, outcome) == "explained"
+    assert verdict_of(outcome, GONE) == "explained"
     finding = finding_of(outcome.state.fits[0])
     (key,) = (key for key in finding.parameters if key == sets.partition("=")[0])
     low, high = finding.interval[key]
@@ -85,34 +96,40 @@ def test_of_the_forms_of_an_effect_the_plainest_that_does_is_taken():
 
 def test_effects_that_look_alike_are_alternatives():
     laboratory = MadeUpLaboratory(alike={"pixel.leak.rate_hz": "pixel.shot_noise.rate_hz"})
-    search, outcome = searched(["pixel.leak.rate_hz=4"], laboratory)
+    _, outcome = searched(["pixel.leak.rate_hz=4"], laboratory)
     found = {*outcome.state.names, *outcome.alternatives}
     assert found == {"leak", "shot_noise"}
     assert len(outcome.state.names) == len(outcome.alternatives) == 1
-    assert _verdict(search, outcome) == "not_identifiable"
+    assert verdict_of(outcome, GONE) == "not_identifiable"
 
 
 def test_what_no_effect_makes_is_not_explained():
-    search, outcome = searched(beyond=outside(25.0))
+    _, outcome = searched(beyond=outside(25.0))
     assert outcome.probability < LEVEL
-    assert _verdict(search, outcome) == "unexplained"
+    assert verdict_of(outcome, GONE) == "unexplained"
     assert set(outcome.rejected) | set(outcome.state.names) == set(EFFECTS)
 
 
 def test_an_effect_beside_something_unknown_is_a_part():
-    search, outcome = searched(["pixel.refractory.period_us=8000"], beyond=outside(12.0))
+    _, outcome = searched(["pixel.refractory.period_us=8000"], beyond=outside(12.0))
     assert outcome.state.names[0] == "refractory"
     assert outcome.probability < LEVEL
-    assert outcome.explained >= PARTLY
-    assert _verdict(search, outcome) == "partly_explained"
+    assert outcome.explained >= 0.8
+    assert verdict_of(outcome, GONE) == "partly_explained"
+    # the statistics alone do not make a name: the events have to come where they were measured
+    assert verdict_of(outcome, error(0.8, 0.48, 0.4)) == "unexplained"
+    assert verdict_of(outcome, error(0.8, 0.43, 0.4)) == "partly_explained"
+    # but where the error tells nothing, they decide
+    assert verdict_of(outcome, error(0.41, 0.41, 0.4)) == "partly_explained"
+    assert verdict_of(outcome, error(math.nan, math.nan, math.nan)) == "partly_explained"
 
 
 @pytest.mark.parametrize(("period", "rate"), [(5000.0, 1.0), (900.0, 1.0), (15_000.0, 0.7)])
 def test_two_effects_are_both_found(period, rate):
     truth = [f"pixel.refractory.period_us={period}", f"pixel.leak.rate_hz={rate}"]
-    search, outcome = searched(truth)
+    _, outcome = searched(truth)
     assert set(outcome.state.names) == {"refractory", "leak"}
-    assert _verdict(search, outcome) == "explained"
+    assert verdict_of(outcome, GONE) == "explained"
     config = outcome.state.config
     assert config.pixel.refractory.period_us == pytest.approx(period, rel=0.1)
     assert config.pixel.leak.rate_hz == pytest.approx(rate, rel=0.2)
@@ -128,9 +145,9 @@ def test_what_holds_is_no_name_where_what_does_not_explains_far_more(monkeypatch
     monkeypatch.setattr(search_module, "objections", objecting)
     truth = ["pixel.refractory.period_us=1900", "pixel.leak.rate_hz=1.2"]
     library = [*candidates("refractory"), *candidates("leak")]
-    search, outcome = searched(truth, library=library)
+    _, outcome = searched(truth, library=library)
     assert outcome.state.names == ()
-    assert _verdict(search, outcome) == "unexplained"
+    assert verdict_of(outcome, GONE) == "unexplained"
     assert "refractory, which does not, explains far more" in outcome.rejected["leak"].reason
     assert outcome.rejected["refractory"].reason == "something else stands out"
     _, outcome = searched(["pixel.leak.rate_hz=4"], library=library)
@@ -171,14 +188,14 @@ def test_backward_keeps_what_is_needed():
 
 def test_what_is_left_out_of_the_library_is_not_named():
     library = [one for one in candidates() if one.name != "refractory"]
-    search, outcome = searched(["pixel.refractory.period_us=6000"], library=library)
+    _, outcome = searched(["pixel.refractory.period_us=6000"], library=library)
     assert "refractory" not in (*outcome.state.names, *outcome.rejected)
-    assert _verdict(search, outcome) == "unexplained"
+    assert verdict_of(outcome, GONE) == "unexplained"
 
 
 def test_an_empty_library_explains_nothing():
     search, outcome = searched(["pixel.refractory.period_us=6000"], library=[])
-    assert _verdict(search, outcome) == "unexplained"
+    assert verdict_of(outcome, GONE) == "unexplained"
     assert outcome.rejected == {}
     assert detectable(search.bench, search.declared, []) == []
 
@@ -186,16 +203,16 @@ def test_an_empty_library_explains_nothing():
 def test_a_fit_at_the_end_of_its_range_is_not_taken():
     knob = Knob("pixel.leak.rate_hz", 1e-3, 2.0)
     library = [Candidate("leak", (knob,), ((0.5,), (1.0,)))]
-    search, outcome = searched(["pixel.leak.rate_hz=2.6"], library=library)
+    _, outcome = searched(["pixel.leak.rate_hz=2.6"], library=library)
     assert outcome.state.names == ()
     assert "end of the physical range" in outcome.rejected["leak"].reason
-    assert _verdict(search, outcome) == "unexplained"
+    assert verdict_of(outcome, GONE) == "unexplained"
 
 
 def test_the_declared_model_is_the_ground():
     declared = load_config([], ["pixel.leak.rate_hz=2"])
-    search, outcome = searched(["pixel.leak.rate_hz=2"], declared=declared)
-    assert _verdict(search, outcome) == "consistent"
+    _, outcome = searched(["pixel.leak.rate_hz=2"], declared=declared)
+    assert verdict_of(outcome, GONE) == "consistent"
     _, outcome = searched(["pixel.leak.rate_hz=0.2"], declared=declared)
     assert outcome.state.names == ("leak",)
     assert outcome.state.config.pixel.leak.rate_hz == pytest.approx(0.2, rel=0.4)
@@ -243,7 +260,7 @@ def test_two_effects_that_hide_one_another_are_found_together():
     single = search._attempts(search.declared, [search.declared])
     assert all(one.objections for one in single)
     assert set(outcome.state.names) == {"refractory", "leak"}
-    assert _verdict(search, outcome) == "explained"
+    assert verdict_of(outcome, GONE) == "explained"
     assert outcome.state.config.pixel.refractory.period_us == pytest.approx(4000.0, rel=0.1)
 
 
@@ -254,9 +271,9 @@ def test_an_effect_that_makes_something_worse_is_not_taken():
     largest = int(np.argmax(np.abs(pattern)))
     beyond = 0.9 * pattern
     beyond[largest] *= -1.0
-    search, outcome = searched(laboratory=laboratory, library=candidates("leak"), beyond=beyond)
+    _, outcome = searched(laboratory=laboratory, library=candidates("leak"), beyond=beyond)
     assert f"makes 'statistic {largest}' worse" in outcome.rejected["leak"].reason
-    assert _verdict(search, outcome) == "unexplained"
+    assert verdict_of(outcome, GONE) == "unexplained"
 
 
 def test_a_look_alike_says_what_it_cannot_be_told_from():

@@ -1,0 +1,79 @@
+"""What the end of a search says of the recording: the verdict, and a sentence for it."""
+
+from __future__ import annotations
+
+from adv2e.diagnosis.bench import State
+from adv2e.diagnosis.search import LEVEL, NEARLY, Outcome
+from adv2e.reports.result import ErrorRow, Verdict
+
+_PARTLY = 0.8
+"""Share of the residual that effects must explain to be named when something is left."""
+
+_ERROR_PARTLY = 0.9
+"""The same of what the error can fall by, on the data that is looked at last."""
+
+
+def verdict_of(outcome: Outcome, error: ErrorRow) -> Verdict:
+    """Return the verdict.
+
+    Parameters
+    ----------
+    outcome : Outcome
+        Where the search ended.
+    error : ErrorRow
+        Of the declared model and of that where the search ended.
+    """
+    if not outcome.state.fits:
+        return "consistent" if outcome.probability >= LEVEL else "unexplained"
+    if outcome.probability < LEVEL and outcome.explained < NEARLY:
+        partly = outcome.explained >= _PARTLY and _mostly_gone(error)
+        return "partly_explained" if partly else "unexplained"
+    return "not_identifiable" if outcome.alternatives else "explained"
+
+
+def _mostly_gone(error: ErrorRow) -> bool:
+    """Tell whether the error fell by most of what it can, or tells nothing of the effect.
+
+    Statistics fall for any effect that does some of what is missing; events come where they are
+    measured only for those that do it where and when it happens.
+    """
+    before, after, floor = error.before, error.after, error.floor
+    if before.interval is None or floor.interval is None:
+        return True
+    if not before.interval[0] > floor.interval[1]:  # or there is none
+        return True
+    return before.value - after.value >= _ERROR_PARTLY * (before.value - floor.value)
+
+
+def sentence_of(verdict: Verdict, kept: State, outcome: Outcome) -> str:
+    """Return the verdict in a sentence.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    kept : State
+        The model that is reported: the declared one where nothing is named.
+    outcome : Outcome
+        Where the search ended.
+    """
+    names = " and ".join(kept.names)
+    if verdict == "consistent":
+        return (
+            "The recording is what the declared model makes: nothing is missing that can be seen."
+        )
+    if verdict == "unexplained":
+        best = " and ".join(outcome.state.names)
+        most = f" (at most {outcome.explained:.0%} of it: {best})" if best else ""
+        return f"Something is missing in the declared model that no effect known explains{most}."
+    if verdict == "partly_explained":
+        return (
+            f"The declared model lacks {names}; that explains {outcome.explained:.0%} of the"
+            " residual, and something is left."
+        )
+    if verdict == "not_identifiable":
+        others = ", ".join(outcome.alternatives)
+        return f"The declared model lacks an effect: {names}, or as well {others}."
+    if outcome.probability < LEVEL:
+        share = f"{outcome.explained:.1%}"
+        return f"The declared model lacks {names}; that explains {share} of the residual."
+    return f"The declared model lacks {names}; with that, nothing is left that can be seen."
