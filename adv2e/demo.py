@@ -97,6 +97,7 @@ def run_demo(
             overwrite=True,
             preview=str(film),
             progress=progress,
+            compile_apart=True,
             log=log,
         )
 

@@ -130,6 +130,7 @@ def convert(
     overwrite: bool = False,
     preview: str | None = None,
     progress: bool = False,
+    compile_apart: bool = False,
     log: Callable[[str], None] = lambda text: None,
 ) -> Summary:
     """Convert one video, image sequence or recording to events.
@@ -147,6 +148,8 @@ def convert(
         Picture or film of the events to write beside.
     progress : bool
         Show a progress bar on stderr.
+    compile_apart : bool
+        Have what is not compiled yet compiled by a process of its own.
     log : callable
         Takes lines for people.
 
@@ -180,9 +183,11 @@ def convert(
             call = stack.enter_context(WriteBehind(BEHIND_BYTES)).call
         decoder = _decoder_for(recording, config)
         table = _table_for_the_kernel(decoder, config)
-        stills = reading.stills(Decoding(decoder, table is not None, out.wants_frames))
         if not is_compiled(config):
             log("compiling the pixel's kernel (once; about half a minute)")
+            if compile_apart and not user_sources(config):
+                _compile_apart(recording, config, target, workers)
+        stills = reading.stills(Decoding(decoder, table is not None, out.wants_frames))
         frames = _Passing(_progress(stills, recording.count, progress), out, call)
         for events in events_from_light(frames.light(), config, threads=workers, table=table):
             for piece in _pieces(events):
@@ -199,6 +204,19 @@ def convert(
         events=out.events,
         on=out.on,
         seconds=time.perf_counter() - began,
+    )
+
+
+def _compile_apart(recording: Source, config: Config, target: str, threads: int) -> None:
+    from adv2e.compiling import compile_apart  # noqa: PLC0415 - once in the life of a release
+
+    compile_apart(
+        config,
+        dtype=recording.dtype,
+        colour=recording.colour,
+        encoding=_encoding(recording, config),
+        output=target,
+        threads=threads,
     )
 
 

@@ -118,6 +118,7 @@ def command(
             overwrite=overwrite,
             preview=preview,
             progress=progress,
+            compile_apart=True,
             log=log,
         )
     if log.level >= 0:

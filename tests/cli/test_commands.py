@@ -72,6 +72,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "overwrite": True,
         "preview": "p.gif",
         "progress": True,
+        "compile_apart": True,
     }
     assert log.level == 0
 
