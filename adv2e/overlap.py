@@ -17,6 +17,8 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
@@ -67,6 +69,26 @@ class _Channel(Generic[Item]):
             self._closed = True
             self._items.clear()
             self._changed.notify_all()
+
+
+@contextmanager
+def worker_pool(threads: int) -> Iterator[ThreadPoolExecutor]:
+    """Give a pool of threads to a generator; leaving the block waits for them, but not always.
+
+    A generator that nobody exhausts is closed where it becomes garbage.  That may be in any thread
+    at any moment, one in which :mod:`threading` holds its own locks among them; who waits there for
+    a thread to end, waits for ever.  The threads end by themselves then.
+    """
+    pool = ThreadPoolExecutor(threads)
+    try:
+        yield pool
+    except GeneratorExit:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    except BaseException:
+        pool.shutdown()
+        raise
+    pool.shutdown()
 
 
 class ReadAhead(Generic[Item]):

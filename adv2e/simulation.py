@@ -13,7 +13,6 @@ True
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from typing import Any
 
@@ -30,6 +29,7 @@ from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.intervals import Intervals
 from adv2e.ordering import InOrder
+from adv2e.overlap import worker_pool
 from adv2e.pixel import PixelArray, thread_count
 from adv2e.sources.base import check_values
 
@@ -189,7 +189,7 @@ def _pixel_events(
         additions=additions,
         **how,
     )
-    with ThreadPoolExecutor(workers) if workers > 1 else nullcontext() as pool:
+    with worker_pool(workers) if workers > 1 else nullcontext() as pool:
         order = InOrder()
         intervals = Intervals(t_ns, first, config.sampling, threads=workers)
         for part in intervals.parts(source):

@@ -7,7 +7,7 @@ import time
 import pytest
 from processes import running_python
 
-from adv2e.overlap import ReadAhead, WriteBehind
+from adv2e.overlap import ReadAhead, WriteBehind, worker_pool
 
 
 def own_threads():
@@ -212,7 +212,7 @@ class TestWriteBehind:
 
 INTERRUPTED = """
 import signal, threading, time
-from adv2e.overlap import ReadAhead, WriteBehind
+from adv2e.overlap import ReadAhead, WriteBehind, worker_pool
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def numbers():
@@ -241,3 +241,32 @@ def test_an_interrupt_while_waiting_for_room_ends_both_threads():
         out, err = process.communicate(timeout=20)
     assert (process.returncode, err) == (0, "")
     assert out.splitlines() == ["source closed", "interrupted ['MainThread']"]
+
+
+def pooled():
+    with worker_pool(2) as pool:
+        yield pool
+        yield pool.submit(int, "7")
+
+
+def test_a_pool_waits_for_its_threads_at_the_end_and_on_errors():
+    before = threading.active_count()
+    _, seven = pooled()
+    assert seven.result() == 7
+    assert threading.active_count() == before
+    with pytest.raises(ZeroDivisionError), worker_pool(2) as pool:
+        late = pool.submit(time.sleep, 0.05)
+        raise ZeroDivisionError
+    assert late.done()
+    assert threading.active_count() == before
+
+
+def test_a_generator_may_be_closed_where_nobody_can_wait_for_its_threads():
+    """As by the collector of garbage, in the midst of anything: here in a thread of the pool."""
+    before = threading.active_count()
+    made = pooled()
+    pool = next(made)
+    assert pool.submit(made.close).result(timeout=10) is None
+    wait_until(lambda: threading.active_count() == before)
+    with pytest.raises(RuntimeError):
+        pool.submit(int)

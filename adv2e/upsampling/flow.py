@@ -27,12 +27,12 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.overlap import worker_pool
 from adv2e.upsampling.kernels import compose, splat
 from adv2e.upsampling.linear import LinearUpsampler, check_pair
 from adv2e.upsampling.motion import Motion, estimate_motion
@@ -59,7 +59,7 @@ class FlowUpsampler:
             return warp(first, second, *motion, step / self.L)
 
         if self.threads > 1:
-            with ThreadPoolExecutor(self.threads) as pool:
+            with worker_pool(self.threads) as pool:
                 # no more at a time than threads, so that memory does not grow with L
                 for start in range(1, self.L, self.threads):
                     yield from pool.map(frame, range(start, min(start + self.threads, self.L)))
