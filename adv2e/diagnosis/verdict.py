@@ -35,11 +35,14 @@ def _mostly_gone(error: ErrorRow) -> bool:
     """Tell whether the error fell by most of what it can, or tells nothing of the effect.
 
     Statistics fall for any effect that does some of what is missing; events come where they are
-    measured only for those that do it where and when it happens.
+    measured only for those that do it where and when it happens.  Simulations that are farther from
+    one another than from the recording do by chance what happens there for a reason.
     """
     before, after, floor = error.before, error.after, error.floor
-    if before.interval is None or floor.interval is None:
+    if before.interval is None or after.interval is None or floor.interval is None:
         return True
+    if after.interval[1] < floor.interval[0]:
+        return False
     if not before.interval[0] > floor.interval[1]:  # or there is none
         return True
     return before.value - after.value >= _ERROR_PARTLY * (before.value - floor.value)

@@ -119,6 +119,8 @@ def test_an_effect_beside_something_unknown_is_a_part():
     # the statistics alone do not make a name: the events have to come where they were measured
     assert verdict_of(outcome, error(0.8, 0.48, 0.4)) == "unexplained"
     assert verdict_of(outcome, error(0.8, 0.43, 0.4)) == "partly_explained"
+    # nor does chance, where the recording has none
+    assert verdict_of(outcome, error(0.3, 0.32, 0.35)) == "unexplained"
     # but where the error tells nothing, they decide
     assert verdict_of(outcome, error(0.41, 0.41, 0.4)) == "partly_explained"
     assert verdict_of(outcome, error(math.nan, math.nan, math.nan)) == "partly_explained"
