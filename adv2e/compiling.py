@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config, from_dict, to_dict
+from adv2e.jit import keeps_code
 
 _ROWS, _COLUMNS = 40, 64
 """Of the small frames; large enough for motion to be looked for."""
@@ -31,7 +32,8 @@ def compile_apart(
 ) -> None:
     """Compile what a conversion needs, in another process; wait for it.
 
-    It may fail, or leave something out: what is not there is compiled when it is needed.
+    It may fail, or leave something out: what is not there is compiled when it is needed.  Where this
+    process would not find the code, nothing is done.
 
     Parameters
     ----------
@@ -44,6 +46,8 @@ def compile_apart(
     threads : int
         Of the conversion.
     """
+    if not keeps_code():
+        return
     values = to_dict(config)
     values["frames"]["encoding"] = encoding
     request = {

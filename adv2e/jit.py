@@ -156,3 +156,8 @@ def inlined(function: Function) -> Function:
 def is_cached(name: str) -> bool:
     """Tell whether there is compiled code of the function `name`, of these sources."""
     return any(_FOLDER.rglob(f"*{name}*.nbc"))
+
+
+def keeps_code() -> bool:
+    """Tell whether other processes find what is compiled in this one."""
+    return _FOLDER.name.startswith("kernels-")

@@ -107,6 +107,9 @@ def test_a_compiler_that_fails_is_no_error(monkeypatch, capfd):
     compile_for_test()
     monkeypatch.setattr(compiling.sys, "executable", "/no/such/python")
     compile_for_test()
+    monkeypatch.setattr(compiling, "keeps_code", lambda: False)  # nobody would find it
+    monkeypatch.setattr(compiling.subprocess, "run", None)
+    compile_for_test()
     assert capfd.readouterr() == ("", "")
 
 
