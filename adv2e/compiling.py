@@ -32,8 +32,8 @@ def compile_apart(
 ) -> None:
     """Compile what a conversion needs, in another process; wait for it.
 
-    It may fail, or leave something out: what is not there is compiled when it is needed.  Where this
-    process would not find the code, nothing is done.
+    It may fail, or leave something out: what is not there is compiled when it is needed.  Nothing
+    is done where this process would not find the code.
 
     Parameters
     ----------
