@@ -79,16 +79,14 @@ def worker_pool(threads: int) -> Iterator[ThreadPoolExecutor]:
     at any moment, one in which :mod:`threading` holds its own locks among them; who waits there for
     a thread to end, waits for ever.  The threads end by themselves then.
     """
-    pool = ThreadPoolExecutor(threads)
+    pool, abandoned = ThreadPoolExecutor(threads), False
     try:
         yield pool
     except GeneratorExit:
-        pool.shutdown(wait=False, cancel_futures=True)
+        abandoned = True
         raise
-    except BaseException:
-        pool.shutdown()
-        raise
-    pool.shutdown()
+    finally:
+        pool.shutdown(wait=not abandoned, cancel_futures=abandoned)
 
 
 class ReadAhead(Generic[Item]):

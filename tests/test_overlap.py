@@ -6,12 +6,9 @@ import time
 
 import pytest
 from processes import running_python
+from threads import own_threads, wait_until
 
 from adv2e.overlap import ReadAhead, WriteBehind, worker_pool
-
-
-def own_threads():
-    return [thread for thread in threading.enumerate() if thread.name.startswith("adv2e-")]
 
 
 @pytest.fixture(autouse=True)
@@ -19,13 +16,6 @@ def _no_thread_is_left():
     assert own_threads() == []
     yield
     assert own_threads() == []
-
-
-def wait_until(true):
-    end = time.monotonic() + 10
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.001)
 
 
 class Made:

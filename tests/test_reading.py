@@ -1,8 +1,8 @@
-import threading
 import time
 
 import numpy as np
 import pytest
+from threads import own_threads, wait_until
 
 from adv2e import reading as module
 from adv2e.effects.frames.encoding import LightDecoder
@@ -11,10 +11,6 @@ from adv2e.reading import Decoding, Reading
 from adv2e.sources.base import Source
 
 FRAMES = np.random.default_rng(3).integers(0, 256, (40, 6, 8, 3), dtype=np.uint8)
-
-
-def own_threads():
-    return [thread for thread in threading.enumerate() if thread.name.startswith("adv2e-")]
 
 
 @pytest.fixture
@@ -40,13 +36,6 @@ def loaded(monkeypatch):
 def as_light(source, *, coded=False, with_pictures=False):
     decoder = LightDecoder("srgb", source.full_scale, source.dtype, source.colour)
     return Decoding(decoder, coded, with_pictures)
-
-
-def wait_until(true):
-    end = time.monotonic() + 10
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.001)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
