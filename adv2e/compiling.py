@@ -28,7 +28,14 @@ _ROWS, _COLUMNS = 40, 64
 
 
 def compile_apart(
-    config: Config, *, dtype: np.dtype[Any], colour: bool, encoding: str, output: str, threads: int
+    config: Config,
+    *,
+    dtype: np.dtype[Any],
+    colour: bool,
+    encoding: str,
+    format: str,
+    layout: str | None,
+    threads: int,
 ) -> None:
     """Compile what a conversion needs, in another process; wait for it.
 
@@ -41,8 +48,8 @@ def compile_apart(
         Without effects of the user's own.
     dtype, colour, encoding
         Of the frames; see :class:`adv2e.sources.base.Source`.
-    output : str
-        Where the events go, for the format.
+    format, layout
+        Of the output; see :func:`adv2e.sinks.open_sink`.
     threads : int
         Of the conversion.
     """
@@ -54,7 +61,8 @@ def compile_apart(
         "config": values,
         "dtype": dtype.str,
         "colour": colour,
-        "suffix": Path(output).suffix,
+        "format": format,
+        "layout": layout,
         "threads": threads,
     }
     with suppress(OSError):
@@ -86,9 +94,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="adv2e-compiling-") as folder:
         source = Path(folder) / "frames.npy"
         np.save(source, _frames(np.dtype(request["dtype"]), request["colour"]))
-        target = Path(folder) / f"events{request['suffix']}"
+        target = str(Path(folder) / "events")
+        how = {key: request[key] for key in ("format", "layout")}
         with Reading(str(source), fps=100.0, threads=request["threads"]) as reading:
-            convert(reading, str(target), config=from_dict(request["config"]))
+            convert(reading, target, config=from_dict(request["config"]), **how)
 
 
 if __name__ == "__main__":

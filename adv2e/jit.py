@@ -1,4 +1,7 @@
-"""The one decorator for compiled functions, and where their machine code is kept.
+"""Decorators for compiled functions, and where their machine code is kept.
+
+A compiled function is a :func:`kernel`, or an :func:`entry` where Python calls it: the code of an
+entry is kept so that it runs without Numba, which is imported only to compile.
 
 Numba's own cache looks only at the file that a function stands in, so a function that calls an
 edited one from another file would run as its old self.  The cache folder is therefore named after
@@ -20,21 +23,24 @@ import os
 import shutil
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cached_property, update_wrapper
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numba
-
-from adv2e.machine_code import LateCache
+from adv2e.machine_code import file_of, lay_out, load, read_code, write_code
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent
 _UNUSED_S = 30 * 24 * 3600.0
 _USE_NOTED_S = 24 * 3600.0
+_PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+_LOADING = threading.Lock()
 
 
 def sources() -> list[Path]:
@@ -43,7 +49,7 @@ def sources() -> list[Path]:
     Those that use the decorator, and the whole kernel: offsets and sizes of rows, which compiled
     code takes in as constants, stand in files without a compiled function.
     """
-    ours = _PACKAGE / "jit.py", _PACKAGE / "machine_code.py"
+    ours = [_PACKAGE / f"{name}.py" for name in ("jit", "machine_code", "translation")]
     return [
         path
         for path in sorted(_PACKAGE.rglob("*.py"))
@@ -53,7 +59,10 @@ def sources() -> list[Path]:
 
 def _digest() -> str:
     """Return a digest of every source file that compiled code is made of."""
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    digest = hashlib.sha256(f"{sys.version_info[:2]}".encode())
+    spec = find_spec("numba")  # its version, without importing it
+    if spec is not None and spec.origin is not None:
+        digest.update(Path(spec.origin).with_name("_version.py").read_bytes())
     for path in sources():
         digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
@@ -109,15 +118,79 @@ def note_use(folder: Path) -> None:
 _FOLDER = cache_folder()
 
 
-def _compile(
-    function: Function, *, cache: bool = False, alone: bool = False, **options: Any
-) -> Function:
-    compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath={"contract"}, **options)(
-        function
-    )
-    if cache:
-        compiled._cache = LateCache(function, _FOLDER, alone=alone)
-    return compiled  # type: ignore[no-any-return]
+def _numba() -> Any:
+    """Return :mod:`adv2e.translation`, which takes as long to import as all else together."""
+    from adv2e import translation  # noqa: PLC0415
+
+    return translation
+
+
+class _Compiled:
+    """A function for other compiled functions, and for whoever calls it seldom.
+
+    All that Numba wants to know of a compiled function is asked of `dispatcher`, which is made,
+    and Numba imported, when it is first wanted.
+    """
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        update_wrapper(self, function)
+        self._function = function
+        self._options = options
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "dispatcher":
+            # without a lock: whoever compiles another function may ask for it, and wait for Numba's
+            made = _numba().make_dispatcher(self._function, _FOLDER, **self._options)
+            return self.__dict__.setdefault(name, made)
+        if name.startswith("__"):  # asked of all objects, by whoever copies or inspects
+            raise AttributeError(name)
+        return getattr(self.dispatcher, name)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.dispatcher(*arguments)
+
+
+class _Entry(_Compiled):
+    """A function that Python calls: with code that is there, Numba is not needed."""
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        super().__init__(function, **options)
+        self._calls: dict[Any, Callable[[list[Any]], Any] | None] = {}
+
+    def __call__(self, *arguments: Any) -> Any:
+        kind, contents = lay_out(arguments)
+        if kind not in self._calls:
+            with _LOADING:
+                if kind not in self._calls:
+                    self._calls[kind] = self._code(kind, arguments)
+        call = self._calls[kind]
+        return call(contents) if call else self.dispatcher(*arguments)
+
+    def _code(self, kind: Any, arguments: tuple[Any, ...]) -> Callable[[list[Any]], Any] | None:
+        name = f"{self._function.__module__}.{self._function.__qualname__}"
+        path = file_of(_FOLDER, name, kind)
+        code = read_code(path)
+        if code is None:
+            code = _numba().translate(self.dispatcher, arguments)
+            write_code(path, code)
+        return load(code, kind)
+
+
+class _Intrinsic:
+    """A function that writes code for LLVM itself."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.__doc__ = function.__doc__
+        self._function = function
+
+    @cached_property
+    def _numba_type_(self) -> Any:
+        return _numba().type_of_intrinsic(self._made)
+
+    @cached_property
+    def _made(self) -> Any:
+        # Numba knows it as long as it is there
+        return _numba().make_intrinsic(self._function)
 
 
 def kernel(function: Function) -> Function:
@@ -126,36 +199,39 @@ def kernel(function: Function) -> Function:
     Without Numba's run-time (``_nrt``) there is no counting of references to arrays, which costs
     more than the arithmetic of a short function.
     """
-    return _compile(function, cache=True, _nrt=False)
+    return _wrapped(_Compiled, function, cached=True, _nrt=False)
 
 
-def allocating_kernel(function: Function) -> Function:
-    """Compile a `function` that makes arrays, cached likewise."""
-    return _compile(function, cache=True)
+def entry(function: Function) -> Function:
+    """Compile a kernel that Python calls often, or at the start: Numba is imported to compile only.
 
-
-def driver(function: Function) -> Function:
-    """Compile a `function` that may make arrays and that no compiled function calls.
-
-    It is loaded in a quarter of the time, as nothing is kept of it but its machine code.
+    It takes numbers, arrays, and tuples and named tuples of these, all by position, and returns
+    numbers or nothing; what returns anything else, Numba calls.
     """
-    compiled: Any = _compile(function, cache=True, alone=True)
-
-    def refuse(*_: Any) -> None:
-        raise TypeError(f"{function.__name__} is a driver, which compiled code cannot call")
-
-    compiled.get_call_template = refuse
-    return compiled  # type: ignore[no-any-return]
+    return _wrapped(_Entry, function, cached=True, _nrt=False)
 
 
 def inlined(function: Function) -> Function:
     """Compile `function` into each of its callers: for long functions with one caller."""
-    return _compile(function, inline="always", _nrt=False)
+    return _wrapped(_Compiled, function, cached=False, inline="always", _nrt=False)
+
+
+def intrinsic(plainly: Function) -> Callable[[Callable[..., Any]], Function]:
+    """Make a function an intrinsic; `plainly` does the same where nothing is compiled."""
+
+    def make(function: Callable[..., Any]) -> Any:
+        return plainly if _PLAIN else _Intrinsic(function)
+
+    return make
+
+
+def _wrapped(how: type[_Compiled], function: Function, **options: Any) -> Function:
+    return function if _PLAIN else how(function, **options)  # type: ignore[return-value]
 
 
 def is_cached(name: str) -> bool:
     """Tell whether there is compiled code of the function `name`, of these sources."""
-    return any(_FOLDER.rglob(f"*{name}*.nbc"))
+    return any(_FOLDER.glob(f"*.{name}-*.code")) or any(_FOLDER.rglob(f"*.{name}-*.nbc"))
 
 
 def keeps_code() -> bool:

@@ -1,145 +1,217 @@
-"""Machine code in files: Numba's cache, made to bear what happens to files, and quick to load.
+"""Machine code without the compiler: called, kept in files, and loaded in some milliseconds.
 
-What is quick relies on how Numba keeps code, which it may change: it is done with the releases of
-Numba that were tried, and with any other the cache works as Numba's own.
+Numba takes as long to import as a small conversion to compute, and only whoever compiles needs it.
+What it makes of a function that Python calls (:mod:`adv2e.translation`) therefore lies in files
+that LLVM alone loads, and is called with all arguments laid out in memory as C lays out a struct.
+
+LLVM is used by its package ``llvmlite``, which Numba is built on and brings along.
 """
 
 from __future__ import annotations
 
-import secrets
-from collections.abc import Callable
+import ctypes
+import hashlib
+import json
+import os
+import struct
+import threading
+import zlib
+from collections.abc import Callable, Hashable
 from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import numba
-from numba.core import caching
-from numba.core.runtime import nrt
+import numpy as np
 
-_FunctionCache: Any = caching.FunctionCache  # it has no types
-_Implementation: Any = caching.CompileResultCacheImpl
-_nrt: Any = nrt
-_llvm = _nrt.ll
-
-_TRIED = numba.version_info[:2] <= (0, 68)
-_PROCESS = secrets.token_hex(4)
+_NUMBERS = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q"}
+_NUMBERS |= {"f4": "f", "f8": "d", "b1": "?"}
+_BEYOND_INT64 = 1 << 63
+_CALLED = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
+_LOADING = threading.Lock()
 
 
-def _provide_runtime(context: Any) -> None:
-    """Let code from the cache find what it calls of Numba's run-time.
+@dataclass(frozen=True)
+class Code:
+    """Machine code of a function for arguments of one kind."""
 
-    It brings along what counts references and calls functions in C for the rest.  Numba would
-    compile the former first, for what it may compile itself, which takes longer than to load the
-    pixel; it does so when it compiles.  A function that is not found would end the process.
+    symbol: str
+    """Where it begins: int symbol(const void *arguments, void *returned), 0: all went well."""
+    returned: str
+    """Format of the number that it returns, as of `struct`, of several in brackets; "": none."""
+    needed: tuple[str, ...]
+    """Functions in other libraries that it calls."""
+    binary: bytes
+    """An object file."""
+
+
+NOT_SO = Code("", "", (), b"")
+"""Stands for code that can be made, loaded or called by Numba only."""
+
+
+class Refused(TypeError):
+    """A value of a kind that machine code is not called with."""
+
+
+def lay_out(values: tuple[Any, ...]) -> tuple[Hashable, list[Any]]:
+    """Return the kind of a tuple of values, and all that is in them, one after the other.
+
+    Raises
+    ------
+    Refused
+        A value is no number, no array and no tuple of these.
     """
-    if not _TRIED:
-        _nrt.rtsys.initialize(context)
-        return
-    for name, address in _nrt._nrt.c_helpers.items():
-        _llvm.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+    kinds: list[Hashable] = [type(values)]
+    contents: list[Any] = []
+    for value in values:
+        if isinstance(value, np.ndarray):
+            kinds.append(_lay_out_array(value, contents))
+        elif isinstance(value, tuple):
+            kind, inner = lay_out(value)
+            kinds.append(kind)
+            contents += inner
+        else:
+            kinds.append(_kind_of_number(value))
+            contents.append(value)
+    return tuple(kinds), contents
 
 
-class Cache(_FunctionCache):  # type: ignore[misc]
-    """Numba's cache of one function, made to bear what happens to files.
+def _lay_out_array(array: np.ndarray[Any, Any], contents: list[Any]) -> Hashable:
+    flags = array.flags
+    layout = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
+    # first what counts references in Numba: nothing does
+    contents += [0, 0, array.size, array.itemsize, array.__array_interface__["data"][0]]
+    contents += array.shape
+    contents += array.strides
+    return _Array(array.dtype, array.ndim, layout, flags.writeable, flags.aligned)
 
-    What cannot be read counts as missing, what cannot be written is not kept.  Machine code lies
-    under names that no other process gives: two processes that fill the cache at once would else
-    number the code of two signatures alike, and one of them would later run as the other.
+
+class _Array(NamedTuple):
+    dtype: np.dtype[Any]
+    axes: int
+    layout: str
+    writeable: bool
+    aligned: bool
+
+
+def _kind_of_number(value: Any) -> str:
+    if isinstance(value, bool):
+        return "?"
+    if isinstance(value, int):
+        return "q" if value < _BEYOND_INT64 else "Q"
+    if isinstance(value, float):
+        return "d"
+    if isinstance(value, np.generic) and value.dtype.str[1:] in _NUMBERS:
+        return _NUMBERS[value.dtype.str[1:]]
+    raise Refused(f"{type(value).__name__} is neither a number nor an array")
+
+
+def _format(kind: Any) -> tuple[str, str]:
+    """Return the format of a kind, and of a number that is aligned as all of it is."""
+    if isinstance(kind, str):
+        return kind, kind
+    if isinstance(kind, _Array):
+        return f"PPqqP{2 * kind.axes}q", "P"
+    parts = [_format(one) for one in kind[1:]]
+    widest = max((align for _, align in parts), key=struct.calcsize, default="B")
+    return f"0{widest}" + "".join(part for part, _ in parts) + f"0{widest}", widest
+
+
+def described(kind: Any) -> str:
+    """Return a kind in words that are the same in every process."""
+    if isinstance(kind, str):
+        return kind
+    if isinstance(kind, _Array):
+        return repr((kind.dtype.descr, *kind[1:]))
+    names = getattr(kind[0], "_fields", ())
+    return f"{kind[0].__qualname__}{names}({', '.join(map(described, kind[1:]))})"
+
+
+@cache
+def _llvm() -> Any:
+    """Return LLVM, ready to load code for this machine."""
+    # late, so that what never computes, such as `adv2e --help`, does without
+    import llvmlite.binding as llvm  # noqa: PLC0415
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm
+
+
+@cache
+def machine() -> str:
+    """Return what names the processor, and how Numba is told to use it."""
+    llvm = _llvm()
+    told = [f"{name}={value}" for name, value in sorted(os.environ.items()) if "NUMBA_CPU" in name]
+    features = llvm.get_host_cpu_features().flatten()
+    return " ".join([llvm.get_default_triple(), llvm.get_host_cpu_name(), features, *told])
+
+
+@cache
+def _engine() -> Any:
+    """Return what holds the code; from here on LLVM finds by name what the process has."""
+    llvm = _llvm()
+    target = llvm.Target.from_default_triple().create_target_machine(jit=True)
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), target)
+
+
+def load(code: Code, kind: Any) -> Callable[[list[Any]], Any] | None:
+    """Return a function that runs `code` on the contents of values of its kind (:func:`lay_out`).
+
+    None: it is NOT_SO, this process lacks what the code calls, or LLVM does not find its way in it.
+    While the code runs, the interpreter lock is released; the caller keeps the arrays alive.
     """
+    with _LOADING:
+        engine = _engine()
+        if not code.symbol or not all(map(_llvm().address_of_symbol, code.needed)):
+            return None  # LLVM would end the process
+        engine.add_object_file(_llvm().ObjectFileRef.from_data(code.binary))
+        engine.finalize_object()
+        address = engine.get_function_address(code.symbol)
+    if not address:
+        return None
+    function = _CALLED(address)
+    several = code.returned.startswith("(")
+    layout, result = struct.Struct("@" + _format(kind)[0]), struct.Struct(code.returned.strip("()"))
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
-        files = self._cache_file
-        files._data_name_pattern = files._data_name_pattern.replace(
-            "{number:d}", f"{_PROCESS}-{{number:d}}"
-        )
+    def call(contents: list[Any]) -> Any:
+        returned = ctypes.create_string_buffer(result.size)
+        if function(layout.pack(*contents), returned) != 0:
+            raise MemoryError("no memory for more events")
+        numbers = result.unpack(returned)
+        return numbers if several else numbers[0] if numbers else None
 
-    def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return the compiled code for a signature, or None.
+    return call
 
-        Numba first gets ready to compile, as long as all other imports take; code that is there
-        needs only the run-time.  If more is to be compiled, Numba sees to that by itself.
-        """
-        try:
-            _provide_runtime(context)
-            return self._load_overload(signature, context)
-        except Exception:  # a file cut short may raise anything, another Numba may do it otherwise
-            with suppress(Exception):
-                return super().load_overload(signature, context)
+
+def file_of(folder: Path, name: str, kind: Any) -> Path:
+    """Return the file for the code of the function `name` for one kind on this machine."""
+    digest = hashlib.sha256(f"{machine()} {described(kind)}".encode()).hexdigest()[:24]
+    return folder / f"{name}-{digest}.code"
+
+
+def read_code(path: Path) -> Code | None:
+    """Return the code in a file; None where there is none, or not all of it."""
+    try:
+        head, _, binary = path.read_bytes().partition(b"\n")
+        known = json.loads(head)
+        if zlib.crc32(binary) != known.pop("crc32"):
             return None
-
-    def save_overload(self, signature: Any, code: Any) -> None:
-        """Keep the compiled code for a signature, if that is possible."""
-        with suppress(OSError):
-            try:
-                super().save_overload(signature, code)
-            except OSError:
-                raise
-            except Exception:  # the index is damaged: begin a new one
-                self.flush()
-                super().save_overload(signature, code)
+        return Code(**{**known, "needed": tuple(known["needed"])}, binary=binary)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
 
 
-class _MachineCodeOnly(_Implementation):  # type: ignore[misc]
-    """Keeps of a compiled function what running it takes.
-
-    Numba keeps the code before its translation, too, for other functions to be compiled with, and
-    what Numba's own functions in it see by name, which is for functions that call Python; reading
-    the one and importing the modules of the other takes three quarters of loading.
-    """
-
-    def reduce(self, code: Any) -> Any:
-        """Return what is written."""
-        kept = super().reduce(code)
-        if not _TRIED:
-            return kept
-        (name, kind, (machine_code, _)), *others, environments = kept
-        own = tuple(one for one in environments if not _is_numbas(one))
-        # names that Numba asks the machine code for, once it has found them here
-        known = code.fndesc.llvm_cpython_wrapper_name, code.fndesc.llvm_func_name
-        lines = [f'define void @"{name}"() {{ ret void }}' for name in known]
-        places = {code.fndesc.env_name, *(one.env_name for one in own)}
-        lines += [f'@"{place}" = common global i8* null' for place in sorted(places)]
-        stub = _llvm.parse_assembly("\n".join(lines)).as_bitcode()
-        library = name, kind, (machine_code, stub)
-        return (library, *others, own)
-
-
-def _is_numbas(environment: Any) -> bool:
-    return str(environment.globals["__name__"]).startswith("numba.")
-
-
-class _CacheAlone(Cache):
-    """The cache of a function that no other compiled function calls."""
-
-    _impl_class = _MachineCodeOnly
-
-
-class LateCache:
-    """A :class:`Cache` made when something is asked of it: of most functions nothing ever is.
-
-    Parameters
-    ----------
-    function : callable
-    folder : Path
-        Where all caches are.
-    alone : bool
-        No compiled function calls it.
-    """
-
-    def __init__(self, function: Callable[..., Any], folder: Path, *, alone: bool = False) -> None:
-        self._function = function
-        self._folder = folder
-        self._class = _CacheAlone if alone else Cache
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "_made":
-            config: Any = numba.config  # its attributes are made at run time
-            before = config.CACHE_DIR
-            config.CACHE_DIR = str(self._folder)
-            try:
-                self._made = self._class(self._function)  # as the option `cache` does
-            finally:
-                config.CACHE_DIR = before
-            return self._made
-        return getattr(self._made, name)
+def write_code(path: Path, code: Code) -> None:
+    """Keep code in a file, if that is possible; other processes see all of it or nothing."""
+    head = {key: value for key, value in asdict(code).items() if key != "binary"}
+    head["crc32"] = zlib.crc32(code.binary)
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}-{threading.get_ident()}")
+    with suppress(OSError):
+        try:
+            unfinished.write_bytes(json.dumps(head).encode() + b"\n" + code.binary)
+            unfinished.replace(path)
+        finally:
+            with suppress(OSError):
+                unfinished.unlink()

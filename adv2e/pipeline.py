@@ -186,7 +186,8 @@ def convert(
         if not is_compiled(config):
             log("compiling the pixel's kernel (once; about half a minute)")
             if compile_apart and not user_sources(config):
-                _compile_apart(recording, config, target, workers)
+                name = "txt" if target == "-" else format_name(Path(target), format)
+                _compile_apart(recording, config, name, layout, workers)
         stills = reading.stills(Decoding(decoder, table is not None, out.wants_frames))
         frames = _Passing(_progress(stills, recording.count, progress), out, call)
         for events in events_from_light(frames.light(), config, threads=workers, table=table):
@@ -207,7 +208,9 @@ def convert(
     )
 
 
-def _compile_apart(recording: Source, config: Config, target: str, threads: int) -> None:
+def _compile_apart(
+    recording: Source, config: Config, format: str, layout: str | None, threads: int
+) -> None:
     from adv2e.compiling import compile_apart  # noqa: PLC0415 - once in the life of a release
 
     compile_apart(
@@ -215,7 +218,8 @@ def _compile_apart(recording: Source, config: Config, target: str, threads: int)
         dtype=recording.dtype,
         colour=recording.colour,
         encoding=_encoding(recording, config),
-        output=target,
+        format=format,
+        layout=layout,
         threads=threads,
     )
 

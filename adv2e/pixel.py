@@ -26,6 +26,7 @@ from adv2e.kernel.dense import run_dense
 from adv2e.kernel.exact import run_exact
 from adv2e.kernel.general import run_general
 from adv2e.kernel.quadrature import rules_for
+from adv2e.kernel.room import Room
 from adv2e.kernel.tile import Frames, frames_of, scratch
 from adv2e.kernel.workspace import (
     PIXEL_BITS,
@@ -56,8 +57,7 @@ class _Worker:
 
     def __init__(self, exact_times: bool) -> None:
         self.scratch = scratch()
-        self.keys = np.empty(4096, np.int64)
-        self.times = np.empty(4096 if exact_times else 0)
+        self.room = Room(exact_times)
 
 
 class PixelArray:
@@ -247,12 +247,12 @@ class PixelArray:
 
         def run(_: int) -> Parted:
             worker = self._workers.get()
-            n, worker.keys, worker.times = advance(
-                claimed, self._most, *arguments, worker.scratch, worker.keys, worker.times
-            )
-            parted = Parted(worker.keys, worker.times, n, per_us)
-            self._workers.put(worker)
-            return parted
+            try:
+                room = worker.room
+                n = advance(claimed, self._most, *arguments, worker.scratch, *room.lend())
+                return Parted(room.keys, room.times, n, per_us)
+            finally:
+                self._workers.put(worker)
 
         return list((pool.map if pool else map)(run, range(self._tiles)))
 

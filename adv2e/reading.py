@@ -1,7 +1,7 @@
 """The frames of a source on their way to the pixel, read ahead of it.
 
-Reading begins before anybody has said what the frames are to become: to import Numba takes a
-process longer than to decode a short video.  What was read until then waits as it is.
+Reading begins before anybody has said what the frames are to become: what a configuration needs
+takes as long to import as a short video to decode.  What was read until then waits as it is.
 """
 
 from __future__ import annotations

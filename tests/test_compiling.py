@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from adv2e import compiling
 from adv2e.config import Config, load_config
 from adv2e.pipeline import _compile_apart
+from adv2e.sinks import format_name
 from adv2e.sources import open_source
 from adv2e.synthetic import Scene
 from adv2e.synthetic.clips import write_video
@@ -17,11 +19,13 @@ CODE = """
 import gc, sys
 {body}
 gc.unfreeze()
-from numba.core.registry import CPUDispatcher
+from adv2e.jit import _Entry
+from adv2e.machine_code import described
 for one in gc.get_objects():
-    if isinstance(one, CPUDispatcher):
-        for signature in one.overloads:
-            print("code", one.py_func.__module__, one.py_func.__name__, signature)
+    if type(one) is _Entry:
+        for kind in one._calls:
+            print("code", one.__module__, one.__name__, described(kind))
+print("numba" in sys.modules)
 """
 CONVERSION = """
 from adv2e.cli import main
@@ -34,15 +38,17 @@ SMALL = "from adv2e.compiling import main; main()"
 
 
 def codes(body, *arguments, request=""):
-    """Return all code that a process loaded or compiled."""
+    """Return all code that a process loaded or compiled, and whether it imported Numba."""
     done = subprocess.run(
         [sys.executable, "-c", CODE.format(body=body), *map(str, arguments)],
         input=request,
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
-    return {line for line in done.stdout.splitlines() if line.startswith("code ")}
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    return {line for line in lines if line.startswith("code ")}, lines[-1]
 
 
 @pytest.fixture
@@ -79,14 +85,15 @@ def test_nothing_is_left_to_compile(sources, monkeypatch, name, target, sets):
     source = open_source(sources / name, fps=None if name.endswith("avi") else 50.0)
     with monkeypatch.context() as patch:
         patch.setattr(compiling.subprocess, "run", run)
-        _compile_apart(source, load_config([], sets), target, 2)
-    made = codes(SMALL, request=requests[0])
+        _compile_apart(source, load_config([], sets), format_name(Path(target), None), None, 2)
+    made, _ = codes(SMALL, request=requests[0])
     rate = [] if name.endswith("avi") else ["--fps", "50"]
     options = [option for one in sets for option in ("--set", one)]
     arguments = ["convert", sources / name, "-o", sources / target, "--threads", "2", *rate]
-    needed = codes(CONVERSION, *arguments, *options)
+    needed, asked_numba = codes(CONVERSION, *arguments, *options)
     assert len(needed) > 5
     assert needed <= made
+    assert asked_numba == "False"
 
 
 def test_a_conversion_has_it_compiled_elsewhere_once(adv2e, sources, monkeypatch):
@@ -96,9 +103,14 @@ def test_a_conversion_has_it_compiled_elsewhere_once(adv2e, sources, monkeypatch
     outcome = adv2e("convert", sources / "clip.avi", "-o", sources / "a.txt")
     assert (outcome.status, len(asked)) == (0, 1)
     assert (asked[0]["colour"], asked[0]["encoding"]) == (True, "srgb")
+    assert (asked[0]["format"], asked[0]["layout"]) == ("txt", None)
     monkeypatch.setattr("adv2e.pipeline.is_compiled", lambda config: True)
     adv2e("convert", sources / "clip.avi", "-o", sources / "b.txt")
     assert len(asked) == 1
+    monkeypatch.setattr("adv2e.pipeline.is_compiled", lambda config: False)
+    adv2e("convert", sources / "clip.avi", "-o", "-")
+    adv2e("convert", sources / "clip.avi", "-o", sources / "c.out", "--format", "h5")
+    assert [one["format"] for one in asked[1:]] == ["txt", "h5"]
     assert (sources / "a.txt").read_bytes() == (sources / "b.txt").read_bytes()
 
 
@@ -119,6 +131,7 @@ def compile_for_test():
         dtype=np.dtype(np.uint8),
         colour=False,
         encoding="linear",
-        output="out.h5",
+        format="h5",
+        layout=None,
         threads=1,
     )

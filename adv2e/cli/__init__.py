@@ -95,9 +95,9 @@ class Program(click.Group):
 def _rare_collection() -> Iterator[None]:
     """Let the body make many objects before Python looks for cycles among them.
 
-    Importing Numba makes a hundred thousand that stay, and compiling a million; looking through
-    them again and again, while they are made and once more at the end of the program, would take
-    longer than a short run may.
+    Imports make tens of thousands that stay, and compiling a million; looking through them again
+    and again, while they are made and once more at the end of the program, would take longer than a
+    short run may.
     """
     before = gc.get_threshold()
     gc.set_threshold(200_000, 20, 20)

@@ -55,7 +55,7 @@ def late_config_options(body: Body) -> Body:
     """Add -c, --set, --seed and --effect; the command gets ``config``, a function.
 
     It returns the Config.  A command that has other things to begin with calls it after those:
-    configurations know of compiled code, and importing Numba takes its time.
+    configurations know of all effects, and importing these takes its time.
     """
 
     @click.option(

@@ -23,6 +23,7 @@
                 effects that the others do not have; ``dense_rows``, ``dense_signal`` and
                 ``dense_events`` are its parts
 ``tile``        what the two drivers share; ``claims`` hands strips out to threads
+``room``        memory for events, which grows while they are made
 ``order``       packed events into order
 
 Where the time goes
@@ -56,7 +57,4 @@ second; processor time on an Intel Xeon, by ``perf``).  Of the difference, ends 
 about 30 parts of a hundred (a rule of 4 nodes from the event on), pixels into lanes and out 20,
 noise events 17, as they are drawn one by one, the further places and events 20, and leak and the
 first draws of all pixels 5 each.
-
-Not in these figures: a process that has just imported Numba searches it for garbage once, some 40
-ms, as long as half of a clip of 480 such frames of which nine tenths rest.
 """

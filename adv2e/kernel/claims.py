@@ -8,33 +8,12 @@ work, or so small that calling the kernel costs as much as pixels at rest do.
 from __future__ import annotations
 
 import threading
-from typing import Any
 
-import numba
 import numpy as np
-from numba.core import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from adv2e.jit import kernel
+from adv2e.jit import intrinsic, kernel
 from adv2e.kernel.workspace import STRIP
-
-
-@intrinsic
-def _count_up_atomically(_, counter):
-    """Add one to the only entry of an array of int64, as one step among threads.
-
-    Returns what it was before.
-    """
-
-    def generate(context, builder, signature, arguments):
-        entry = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        one = context.get_constant(types.int64, 1)
-        # nothing but the count passes between the threads: no order of other memory is needed
-        return builder.atomic_rmw("add", entry, one, "monotonic")
-
-    return types.int64(counter), generate
-
 
 _LOCK = threading.Lock()
 
@@ -46,8 +25,21 @@ def _count_up_plainly(counter):
         return int(counter[0]) - 1
 
 
-_config: Any = numba.config  # its attributes are made at run time
-_count_up = _count_up_plainly if _config.DISABLE_JIT else _count_up_atomically
+@intrinsic(_count_up_plainly)
+def _count_up(_, counter):
+    """Add one to the only entry of an array of int64, as one step among threads.
+
+    Returns what it was before.
+    """
+    from numba.core import types  # noqa: PLC0415 - for the compiler only
+
+    def generate(context, builder, signature, arguments):
+        entry = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        one = context.get_constant(types.int64, 1)
+        # nothing but the count passes between the threads: no order of other memory is needed
+        return builder.atomic_rmw("add", entry, one, "monotonic")
+
+    return types.int64(counter), generate
 
 
 def nothing_claimed() -> NDArray[np.int64]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.pixel.photoreceptor_noise import fill_normals
 from adv2e.effects.pixel.slew_limit import keep_first, limit_slew
-from adv2e.jit import allocating_kernel, driver, kernel
+from adv2e.jit import entry, kernel
 from adv2e.kernel import dense_events as events
 from adv2e.kernel import dense_signal as signal
 from adv2e.kernel.claims import claim
@@ -49,7 +49,7 @@ from adv2e.kernel.dense_rows import (
     XB,
 )
 from adv2e.kernel.general import load_light, samples
-from adv2e.kernel.tile import with_room
+from adv2e.kernel.room import tell_where, with_room
 from adv2e.kernel.workspace import (
     EXACT,
     S_FIRST,
@@ -223,7 +223,7 @@ def _screen_step(lo, count, n, m, end, h, circuit, run, rows):
     return events.screen(n, end, circuit.leak * h, circuit.photo_leak * h, on, off, rows)
 
 
-@allocating_kernel
+@kernel
 def _fire_step(
     lo, n, m, ta, h, share, t_base, circuit, run, injected, state, scratch, keys, times, number
 ):  # fmt: skip
@@ -247,7 +247,7 @@ def _fire_step(
     return number, keys, times
 
 
-@allocating_kernel
+@kernel
 def _strip(
     lo, count, frames, before, share, starts, begins, last, circuit, run, injected, t_base, state,
     scratch, keys, times, number,
@@ -307,10 +307,10 @@ def _strip(
     return number, keys, times
 
 
-@driver
+@entry
 def run_dense(
     claimed, most, frames, before, share, starts, begins, last, circuit, run, injected, t_base,
-    state, scratch, keys, times,
+    state, scratch, keys, times, places,
 ):  # fmt: skip
     """Advance strips that nobody else works on over a run.
 
@@ -327,4 +327,5 @@ def run_dense(
                 s, count, frames, before, share, starts, begins, last, circuit, run, injected,
                 t_base, state, scratch, keys, times, number,
             )  # fmt: skip
-    return number, keys, times
+    tell_where(keys, times, places)
+    return number

@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.effects.pixel.leak import fill_falls
-from adv2e.jit import allocating_kernel, driver, kernel
+from adv2e.jit import entry, kernel
 from adv2e.kernel import batch, exchange, rest, screen, special
 from adv2e.kernel.claims import claim
 from adv2e.kernel.quadrature import Rule
-from adv2e.kernel.tile import load, solve_one, with_room
+from adv2e.kernel.room import tell_where, with_room
+from adv2e.kernel.tile import load, solve_one
 from adv2e.kernel.workspace import EXACT, S_LAG, S_REFERENCE, S_X, STRIP, Circuit
 
 _f = np.float32
@@ -129,7 +130,7 @@ def _return(k, i, start, circuit, state, rows):
     exchange.watch(k, i, x1, start, circuit, state, rows)
 
 
-@allocating_kernel
+@kernel
 def _solve_flagged(
     lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
 ):  # fmt: skip
@@ -162,7 +163,7 @@ def _solve_flagged(
     return n, keys, times
 
 
-@allocating_kernel
+@kernel
 def _advance_strip(
     lo, count, start, ta, length, circuit, rule, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
@@ -183,7 +184,7 @@ def _advance_strip(
     return n, keys, times
 
 
-@allocating_kernel  # it returns arrays, whose references have to be counted
+@kernel
 def _rule(rules, f):
     """Return the quadrature of interval f."""
     count, dead = rules.counts[f], rules.counts_dead[f]
@@ -193,7 +194,7 @@ def _rule(rules, f):
     )  # fmt: skip
 
 
-@allocating_kernel
+@kernel
 def _solve_irregular(
     lo, b, count, m, f, starts, circuit, rules, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
@@ -214,7 +215,7 @@ def _solve_irregular(
     return n, keys, times
 
 
-@allocating_kernel
+@kernel
 def _rest_strip(
     lo, count, first, last, starts, circuit, rules, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
@@ -235,7 +236,7 @@ def _rest_strip(
     return n, keys, times
 
 
-@allocating_kernel
+@kernel
 def _strip(
     lo, count, frames, before, share, starts, circuit, rules, t_base,
     state, scratch, keys, times, n,
@@ -282,10 +283,10 @@ def _strip(
     return n, keys, times
 
 
-@driver
+@entry
 def run_exact(
     claimed, most, frames, before, share, starts, begins, last, circuit, rules, t_base,
-    state, scratch, keys, times,
+    state, scratch, keys, times, places,
 ):  # fmt: skip
     """Advance strips that nobody else works on over the intervals between neighbouring frames.
 
@@ -309,9 +310,12 @@ def run_exact(
     rules : Rules
         Quadrature for each interval.
 
+    keys, times, places
+        Room for events; see :class:`adv2e.kernel.room.Room`.
+
     Returns
     -------
-    events written, and the arrays that hold them (larger ones where the given ones were full)
+    events written
     """
     n = np.int64(0)
     for _ in range(most):
@@ -322,4 +326,5 @@ def run_exact(
             lo, hi - lo, frames, before, share, starts, circuit, rules, t_base,
             state, scratch, keys, times, n,
         )  # fmt: skip
-    return n, keys, times
+    tell_where(keys, times, places)
+    return n

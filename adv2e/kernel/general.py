@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.effects.pixel.leak import fill_falls
-from adv2e.jit import allocating_kernel, driver, kernel
+from adv2e.jit import entry, kernel
 from adv2e.kernel import screen, special, stepped
 from adv2e.kernel.claims import claim
+from adv2e.kernel.room import tell_where
 from adv2e.kernel.tile import load, solve_one
 from adv2e.kernel.workspace import EXACT, S_LAG, S_LAG2, S_OFF, S_ON, S_REFERENCE, S_X
 
@@ -77,7 +78,7 @@ def _swap(count, columns):
         columns[1, k] = columns[3, k]
 
 
-@allocating_kernel
+@kernel
 def _strip(
     lo, count, frames, before, share, starts, begins, last, circuit, t_base, state,
     scratch, keys, times, n,
@@ -124,10 +125,10 @@ def _strip(
     return n, keys, times
 
 
-@driver
+@entry
 def run_general(
     claimed, most, frames, before, share, starts, begins, last, circuit, rules, t_base,
-    state, scratch, keys, times,
+    state, scratch, keys, times, places,
 ):  # fmt: skip
     """Advance strips that nobody else works on; see :func:`adv2e.kernel.exact.run_exact`."""
     n = np.int64(0)
@@ -139,4 +140,5 @@ def run_general(
             lo, hi - lo, frames, before, share, starts, begins, last, circuit, t_base, state,
             scratch, keys, times, n,
         )  # fmt: skip
-    return n, keys, times
+    tell_where(keys, times, places)
+    return n

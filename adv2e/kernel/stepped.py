@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adv2e.jit import kernel
+from adv2e.jit import entry, kernel
 from adv2e.kernel import special
 from adv2e.kernel.workspace import (
     EULER,
@@ -27,7 +27,7 @@ AT_REST = 1e-12
 """Lag below which a pixel counts as resting [ln units]."""
 
 
-@kernel
+@entry
 def load_strip(frame, circuit, light, x):
     """Light that counts, and log intensity, of one strip of a frame [DN]."""
     knee_dn = circuit.slope * circuit.knee

@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.jit import allocating_kernel, kernel
+from adv2e.jit import kernel
 from adv2e.kernel import dense_rows, lanes, screen
+from adv2e.kernel.room import with_room
 from adv2e.kernel.solve import solve_interval
 from adv2e.kernel.workspace import S_LAG, SAVED, STRIP, workspace
 
@@ -87,26 +88,7 @@ def _restore(i, state, ws):
         state[row, i] = ws[SAVED, row]
 
 
-@allocating_kernel
-def _grown(old, used, needed):
-    """Return a longer array with the first `used` entries of the old one."""
-    new = np.empty(2 * old.shape[0] + needed, old.dtype)
-    for k in range(used):  # a loop: assigning slices costs two seconds of compile time
-        new[k] = old[k]
-    return new
-
-
-@allocating_kernel
-def with_room(keys, times, used, needed):
-    """Return the two arrays of events, longer where they cannot hold `needed`."""
-    if needed > keys.shape[0]:
-        if times.shape[0] > 0:
-            times = _grown(times, used, needed)
-        keys = _grown(keys, used, needed)
-    return keys, times
-
-
-@allocating_kernel
+@kernel
 def solve_one(
     i, start, base, step, end, ta, length, t_base, circuit, state, ws, keys, times, n
 ):  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import EVENT_DTYPE, Events, empty_events, sort_events
-from adv2e.jit import kernel
+from adv2e.jit import entry
 
 _LARGEST = np.iinfo(np.uint16).max
 
@@ -135,7 +135,7 @@ class Gatherer:
         return events
 
 
-@kernel
+@entry
 def _examine(t: Any, x: Any, y: Any, p: Any) -> Any:
     """Count steps back in time, ties out of (y, x, p) order, and neighbours that are equal."""
     back = 0

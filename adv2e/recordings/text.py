@@ -16,7 +16,7 @@ from typing import IO, Any
 import numpy as np
 
 from adv2e.errors import DataError
-from adv2e.jit import kernel
+from adv2e.jit import entry, kernel
 from adv2e.recordings.base import Recording, described_geometry, parse_description
 from adv2e.recordings.gather import Gatherer
 
@@ -92,7 +92,7 @@ def _number(data: Any, start: int, stop: int, decimals: int) -> Any:
     return (-value if negative else value), (_WHOLE if whole else _ROUNDED)
 
 
-@kernel
+@entry
 def parse_lines(data: Any, decimals: int, t: Any, x: Any, y: Any, p: Any) -> Any:
     """Read the lines in `data` into columns; return (events, lines, line that is wrong or 0)."""
     count = 0
@@ -134,7 +134,7 @@ def parse_lines(data: Any, decimals: int, t: Any, x: Any, y: Any, p: Any) -> Any
     return count, line, 0
 
 
-@kernel
+@entry
 def has_decimal_times(data: Any) -> bool:
     """Tell whether the first field of any line has a point or an exponent."""
     inside = True  # the first field, or what is before it

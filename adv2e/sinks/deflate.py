@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.jit import kernel
+from adv2e.jit import entry, kernel
 from adv2e.sinks.huffman import make_code
 
 _SYMBOLS = 286
@@ -313,7 +313,7 @@ def _end(memory: Any, sums: Any) -> Any:
     return size
 
 
-@kernel
+@entry
 def _deflate_planes(ranks: Any, memory: Any, sums: Any) -> Any:
     """Make a stream of the columns of `ranks` (values, bytes), one block each."""
     _begin(memory)
@@ -331,7 +331,7 @@ def _deflate_planes(ranks: Any, memory: Any, sums: Any) -> Any:
     return _end(memory, sums)
 
 
-@kernel
+@entry
 def _deflate_words(words: Any, data: Any, memory: Any, sums: Any) -> Any:
     """Make a stream of 64-bit words; `data` are their bytes."""
     _begin(memory)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import EVENT_DTYPE, Events
-from adv2e.jit import kernel
+from adv2e.jit import entry, kernel
 from adv2e.sinks.base import FileSink, to_json
 from adv2e.sinks.staging import Staging
 
@@ -47,7 +47,7 @@ def _fill_prefix(prefix: Any, negative: bool, seconds: int) -> int:
     return length
 
 
-@kernel
+@entry
 def format_lines(
     t: Any, x: Any, y: Any, p: Any, numbers: Any, lengths: Any, triples: Any, prefix: Any, out: Any
 ) -> int:

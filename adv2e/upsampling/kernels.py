@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from adv2e.jit import kernel
+from adv2e.jit import entry, kernel
 
 ONE_SIDED = 1000.0
 """Least score of a motion whose pixel is seen in its own frame only."""
@@ -68,7 +68,7 @@ def cubic(image: NDArray[Any], x: float, y: float) -> float:
     return limited
 
 
-@kernel
+@entry
 def mismatch(
     u: NDArray[Any], v: NDArray[Any], here: NDArray[Any], there: NDArray[Any], out: NDArray[Any]
 ) -> None:
@@ -79,7 +79,7 @@ def mismatch(
             out[y, x] = abs(here[y, x] - _bilinear(there, x + u[y, x], y + v[y, x]))
 
 
-@kernel
+@entry
 def find_lost(
     u: NDArray[Any], v: NDArray[Any], ru: NDArray[Any], rv: NDArray[Any], lost: NDArray[Any]
 ) -> None:
@@ -98,7 +98,7 @@ def find_lost(
                 lost[y, x] = True
 
 
-@kernel
+@entry
 def fill_lost(
     u: NDArray[Any], v: NDArray[Any], lost: NDArray[Any], g: NDArray[Any], distance: NDArray[Any]
 ) -> None:
@@ -132,7 +132,7 @@ def fill_lost(
                         v[y, x] = v[ny, nx]
 
 
-@kernel
+@entry
 def splat(
     u: NDArray[Any],
     v: NDArray[Any],
@@ -165,7 +165,7 @@ def splat(
                         source[ty, tx] = y * columns + x
 
 
-@kernel
+@entry
 def compose(
     a: NDArray[Any],
     b: NDArray[Any],

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from adv2e.jit import kernel
+from adv2e.jit import entry
 
 
-@kernel
+@entry
 def sum_slopes(
     t: Any, pixel: Any, on: Any, cell: Any, times: Any, lags: Any, slope: Any, sums: Any
 ) -> None:
@@ -37,7 +37,7 @@ def sum_slopes(
             sums[j, cell[i]] += s if on[i] else -s
 
 
-@kernel
+@entry
 def sum_slopes_beside(
     t: Any,
     pixel: Any,
@@ -73,7 +73,7 @@ def sum_slopes_beside(
             sums[2 * j + 1, part[i]] += sign * below
 
 
-@kernel
+@entry
 def count_gaps(
     t: Any, pixel: Any, part: Any, width: int, borders: Any, near: Any, gaps: Any, rows: Any
 ) -> None:
@@ -106,7 +106,7 @@ def count_gaps(
                         rows[part[i], m, 1] += 1.0
 
 
-@kernel
+@entry
 def since_neighbours(t: Any, pixel: Any, on: Any, width: int, last: Any, since: Any) -> None:
     """Find how long ago the latest event of the four neighbouring pixels was.
 

@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.effects.hooks import Frames, Hooks
-from adv2e.jit import kernel
+from adv2e.jit import entry
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def _under_hats(at: Array, times: Array) -> Array:
     return np.asarray(up * up / (2.0 * before) + down - down * down / (2.0 * behind))
 
 
-@kernel
+@entry
 def _sharpen(
     blurred: NDArray[Any],
     first: NDArray[Any],

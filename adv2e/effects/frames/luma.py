@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from adv2e.jit import kernel
+from adv2e.jit import entry
 
 
-@kernel
+@entry
 def fill_luma(image: Any, red: Any, green: Any, blue: Any, luma: Any) -> None:
     """Set `luma` (pixels,) to the sum of a table for each channel of `image` (pixels, 3)."""
     for k in range(luma.shape[0]):

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from adv2e import rng
-from adv2e.jit import inlined, kernel
+from adv2e.jit import entry, inlined
 from adv2e.kernel.workspace import S_HOT_DRAW, S_HOT_TIME, Array, Circuit
 from adv2e.parameters import Fit, Section, parameter
 
@@ -49,7 +49,7 @@ def next_hot_time(i: int, circuit: Circuit, state: Array) -> None:
     state[S_HOT_TIME, i] += wait / circuit.hot_rate
 
 
-@kernel
+@entry
 def fill_first_hot_times(
     seed: int, fraction: float, rate: float, start: float, times: Array
 ) -> None:

@@ -22,7 +22,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from adv2e import rng
-from adv2e.jit import inlined, kernel
+from adv2e.jit import entry, inlined, kernel
 from adv2e.kernel.workspace import (
     LEAK,
     LIGHT,
@@ -108,7 +108,7 @@ def next_leak_factor(i: int, circuit: Circuit, state: Array) -> float:
     return factor
 
 
-@kernel
+@entry
 def fill_first_factors(seed: int, jitter: float, factors: Array) -> None:
     """Draw the leak speed of every pixel's first cycle."""
     for i in range(factors.shape[0]):

@@ -21,7 +21,7 @@ import math
 from dataclasses import dataclass
 
 from adv2e import rng
-from adv2e.jit import kernel
+from adv2e.jit import entry, kernel
 from adv2e.kernel.workspace import LAG, S_NOISE, S_NOISE_DRAW, Array, Circuit
 from adv2e.parameters import Fit, Section, parameter
 
@@ -58,7 +58,7 @@ def advance_noise(i: int, ws: Array, h: float, rate: float, circuit: Circuit, st
     ws[LAG, 1] += after - before
 
 
-@kernel
+@entry
 def fill_first_noise(seed: int, rms: float, noise: Array) -> None:
     """Draw the noise of every pixel at the start from its stationary distribution."""
     for i in range(noise.shape[0]):

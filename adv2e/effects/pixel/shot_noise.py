@@ -21,7 +21,7 @@ import math
 from dataclasses import dataclass
 
 from adv2e import rng
-from adv2e.jit import inlined, kernel
+from adv2e.jit import entry, inlined
 from adv2e.kernel.workspace import S_SHOT_DRAW, S_SHOT_TIME, Array, Circuit
 from adv2e.parameters import Fit, Section, parameter
 
@@ -59,7 +59,7 @@ def candidate_polarity(i: int, light: float, circuit: Circuit, state: Array) -> 
     return 1 if v < 0.5 else -1
 
 
-@kernel
+@entry
 def fill_first_candidates(
     lo: int, hi: int, seed: int, rate: float, start: float, times: Array, draws: Array
 ) -> None:

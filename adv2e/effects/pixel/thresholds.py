@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from adv2e import rng
-from adv2e.jit import kernel
+from adv2e.jit import entry, kernel
 from adv2e.kernel.workspace import Array
 from adv2e.parameters import Fit, Section, parameter
 
@@ -74,7 +74,7 @@ def _fill_normal_levels(
         levels[k] = level if level > FLOOR else FLOOR
 
 
-@kernel
+@entry
 def fill_levels(
     lo: int, hi: int, seed: int, mean_on: float, mean_off: float, mismatch: float, on: Array,
     off: Array, spare: Array,
@@ -90,7 +90,7 @@ def fill_levels(
             off[i] = mean_off if mean_off > FLOOR else FLOOR
 
 
-@kernel
+@entry
 def fill_random_reference(seed: int, on: Array, off: Array, x: Array, reference: Array) -> None:
     """Draw references so that x lies uniformly between the thresholds of each pixel."""
     for i in range(x.shape[0]):

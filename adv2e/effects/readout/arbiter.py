@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.hooks import Hooks, View
 from adv2e.events import Events, empty_events, make_events, sort_events
-from adv2e.jit import kernel
+from adv2e.jit import entry
 from adv2e.ordering import InOrder
 from adv2e.parameters import Fit, Section, parameter
 
@@ -56,7 +56,7 @@ class Arbiter(Section):
     )
 
 
-@kernel
+@entry
 def _serve(
     time: NDArray[Any],
     pixel: NDArray[Any],
