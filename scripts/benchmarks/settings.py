@@ -52,7 +52,7 @@ CAMERAS = {
     "240x180": Clip(width=240, height=180, frames=480),
     "346x260": Clip(width=346, height=260, frames=480),
     "1280x720": Clip(width=1280, height=720, frames=97),
-    "346x260, 9/10 at rest": Clip(width=346, height=260, frames=480, moving=0.1),
+    "346x260, 9/10 at rest": Clip(width=346, height=260, frames=1920, moving=0.1),
 }
 """Clips by name."""
 
