@@ -9,6 +9,7 @@ with all that decides what code is needed, fills the cache from which the large 
 
 from __future__ import annotations
 
+import gc
 import json
 import subprocess
 import sys
@@ -90,6 +91,7 @@ def main() -> None:
     from adv2e.pipeline import convert  # noqa: PLC0415
     from adv2e.reading import Reading  # noqa: PLC0415
 
+    gc.set_threshold(200_000, 20, 20)  # the compiler's million objects stay
     request = json.load(sys.stdin)
     with tempfile.TemporaryDirectory(prefix="adv2e-compiling-") as folder:
         source = Path(folder) / "frames.npy"

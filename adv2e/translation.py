@@ -87,9 +87,9 @@ def make_dispatcher(
     function: Callable[..., Any], folder: Path, *, cached: bool, **options: Any
 ) -> Any:
     """Return Numba's stand-in for a function, whose machine code is kept below `folder`."""
-    made: Any = _numba.njit(nogil=True, error_model="numpy", fastmath={"contract"}, **options)(
-        function
-    )
+    options |= {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+    # nobody calls it as a function of C: a twentieth of the time to compile
+    made: Any = _numba.njit(no_cfunc_wrapper=True, **options)(function)
     if cached:
         made._cache = _LateCache(function, folder)
     return made

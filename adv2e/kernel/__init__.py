@@ -28,16 +28,18 @@
 
 Where the time goes
 -------------------
-Figures of two cores of an AMD EPYC (Zen 5), by ``scripts/machine_limits.py`` and
-``scripts/benchmark.py``; one core, nanoseconds a pixel and frame unless it says otherwise.
+One core, nanoseconds a pixel and frame unless it says otherwise, by ``scripts/machine_limits.py``,
+``scripts/benchmark.py`` and ``perf``; the parts are of an AMD EPYC (Zen 5), in brackets what an
+Intel Xeon of half that speed takes.
 
 ==================================== ===========================================================
-what the machine allows              memory 35 GB/s (a float32 frame read once: 0.1), polynomials
-                                     of degree 6 in float32 12 G/s, event text 90 Mev/s, HDF5 with
-                                     deflate 14 Mev/s
-first pass, moving strip             2.5, of which 7 nodes of the quadrature 1.5: arithmetic bounds
-                                     it (two polynomials of degree 6 a node: 1.2 at the rate above)
-first pass, strip at rest            about 0.2: comparing the grey values
+what the machine allows              memory 35 (15) GB/s, so that a float32 frame is read in 0.1
+                                     (0.3); polynomials of degree 6 in float32 12 (7.8) G/s; event
+                                     text 90 (75) Mev/s; HDF5 with zlib 14 (12) Mev/s
+first pass, moving strip             2.5 (5.8), of which 7 nodes of the quadrature 1.5: arithmetic
+                                     bounds it (two polynomials of degree 6 a node: 1.2 at the rate
+                                     above); the rest is decoding, the logarithm and the bounds
+first pass, strip at rest            0.2 (0.5): comparing the grey values
 pixels that may fire (7 to 13 %)     40 each in lanes: 9 evaluating the integral, 7 the Taylor
                                      polynomial, the rest gathering, deciding and writing back
 a pixel in pieces                    about 200, two at the knee of the log map between two frames
@@ -47,14 +49,14 @@ a step of all pixels, ``dense``      5 to 9, of which poles 2 to 3, photorecepto
 sorting and unpacking                6 an event
 ==================================== ===========================================================
 
-Text and HDF5 are written at 57 and 11 Mev/s on both cores, so that a conversion with many events
-is bound by deflate, one with few by the pixel, and L = 1 at low motion by decoding.  We are over
-twice from the arithmetic limit wherever pixels fire: a lane is 40 ns where its arithmetic alone
-would be some 15, as what each pixel needs lies scattered.
+The pixel makes 5 to 11 Mev/s on both cores of the Xeon; text is written at 50 and HDF5, by a
+deflate of our own, at 19 to 25 Mev/s there.  So the pixel bounds a conversion, and decoding that of
+a video in which little moves.  We are over twice from the arithmetic limit wherever pixels fire: a
+lane is 40 ns where its arithmetic alone would be some 15, as what each pixel needs lies scattered.
 
-All effects with 5 Hz of shot noise cost 1.5 to 1.6 times what noise off does (346x260, 240 frames a
-second; processor time on an Intel Xeon, by ``perf``).  Of the difference, ends of dead times take
-about 30 parts of a hundred (a rule of 4 nodes from the event on), pixels into lanes and out 20,
-noise events 17, as they are drawn one by one, the further places and events 20, and leak and the
-first draws of all pixels 5 each.
+All effects with 5 Hz of shot noise cost 1.5 times what noise off does (346x260, 240 frames a
+second; processor time on the Xeon).  Of the difference, ends of dead times take about 30 parts of a
+hundred (a rule of 4 nodes from the event on), pixels into lanes and out 20, noise events 17, as
+they are drawn one by one, the further places and events 20, and leak and the first draws of all
+pixels 5 each.
 """
