@@ -169,10 +169,13 @@ class _Entry(_Compiled):
     def _code(self, kind: Any, arguments: tuple[Any, ...]) -> Callable[[list[Any]], Any] | None:
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         path = file_of(_FOLDER, name, kind)
-        code = read_code(path)
+        # the folder stands for the sources of this package alone
+        ours = _PACKAGE in Path(self._function.__code__.co_filename).resolve().parents
+        code = read_code(path) if ours else None
         if code is None:
             code = _numba().translate(self.dispatcher, arguments)
-            write_code(path, code)
+            if ours:
+                write_code(path, code)
         return load(code, kind)
 
 

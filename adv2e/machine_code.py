@@ -144,8 +144,10 @@ def machine() -> str:
     """Return what names the processor, and how Numba is told to use it."""
     llvm = _llvm()
     told = [f"{name}={value}" for name, value in sorted(os.environ.items()) if "NUMBA_CPU" in name]
-    features = llvm.get_host_cpu_features().flatten()
-    return " ".join([llvm.get_default_triple(), llvm.get_host_cpu_name(), features, *told])
+    named = [llvm.get_default_triple(), llvm.get_host_cpu_name()]
+    with suppress(RuntimeError):  # not every processor lists what it can
+        named.append(llvm.get_host_cpu_features().flatten())
+    return " ".join([*named, *told])
 
 
 @cache
@@ -162,25 +164,28 @@ def load(code: Code, kind: Any) -> Callable[[list[Any]], Any] | None:
     None: it is NOT_SO, this process lacks what the code calls, or LLVM does not find its way in it.
     While the code runs, the interpreter lock is released; the caller keeps the arrays alive.
     """
-    with _LOADING:
+    with _LOADING, suppress(RuntimeError):  # as LLVM raises
         engine = _engine()
         if not code.symbol or not all(map(_llvm().address_of_symbol, code.needed)):
             return None  # LLVM would end the process
         engine.add_object_file(_llvm().ObjectFileRef.from_data(code.binary))
         engine.finalize_object()
         address = engine.get_function_address(code.symbol)
-    if not address:
-        return None
-    function = _CALLED(address)
-    several = code.returned.startswith("(")
-    layout, result = struct.Struct("@" + _format(kind)[0]), struct.Struct(code.returned.strip("()"))
+        if address:
+            return _caller(_CALLED(address), code.returned, kind)
+    return None
+
+
+def _caller(function: Any, returned: str, kind: Any) -> Callable[[list[Any]], Any]:
+    several = returned.startswith("(")
+    layout, result = struct.Struct("@" + _format(kind)[0]), struct.Struct(returned.strip("()"))
 
     def call(contents: list[Any]) -> Any:
-        returned = ctypes.create_string_buffer(result.size)
-        if function(layout.pack(*contents), returned) != 0:
+        numbers = ctypes.create_string_buffer(result.size)
+        if function(layout.pack(*contents), numbers) != 0:
             raise MemoryError("no memory for more events")
-        numbers = result.unpack(returned)
-        return numbers if several else numbers[0] if numbers else None
+        made = result.unpack(numbers)
+        return made if several else made[0] if made else None
 
     return call
 

@@ -27,7 +27,13 @@ _config: Any = _numba.config
 _target: Any = registry.cpu_target
 _OWN = "NRT_", "numba_", "Numba"
 _PROCESS = secrets.token_hex(4)
-_RETURNED = {types.int64: "q", types.float64: "d", types.boolean: "?", types.none: ""}
+_RETURNED = {
+    types.int64: "q",
+    types.uint64: "Q",
+    types.float64: "d",
+    types.boolean: "?",
+    types.none: "",
+}
 
 
 class _Cache(_FunctionCache):  # type: ignore[misc]
