@@ -134,7 +134,7 @@ def test_an_entry_is_called_without_numba_once_its_code_is_there(package, start,
     [
         ("library.enable_object_caching()", "library.no_longer_there()"),
         ("compilers._FunctionCompiler", "compilers.NoLongerThere"),
-        ('types.float64: "d", ', ""),
+        ('types.float64: "d",', ""),
     ],
 )
 def test_another_numba_goes_its_own_way(package, start, changed):
