@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 from processes import running_python
+from threads import wait_until
 
 from adv2e import pipeline as conversion
 from adv2e.config import load_config
@@ -307,11 +308,8 @@ def started(source, output, *options, **more):
     return running_python(script, *arguments, **more)
 
 
-def wait_until(true, seconds=60):
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.01)
+def is_long(path):
+    return path.stat().st_size > 10**5
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -321,7 +319,7 @@ def test_a_signal_ends_a_conversion_without_a_trace(long_stack, tmp_path, name, 
     target = tmp_path / "results"
     target.mkdir()
     with started(long_stack, target / "out.txt", "--threads", threads) as process:
-        wait_until(lambda: any(path.stat().st_size > 10**5 for path in target.glob(".out.*.txt")))
+        wait_until(lambda: any(map(is_long, target.glob(".out.*.txt"))), seconds=60)
         process.send_signal(getattr(signal, name))
         _, err = process.communicate(timeout=20)
     assert process.returncode == status, err
