@@ -9,7 +9,8 @@ from benchmarks.processes import Measured, Spread, number
 
 SPEED_ABOUT = (
     "Frames in memory to sorted events in memory, compiled and warmed up (four frames; then the"
-    " garbage of the imports is collected, whatever the tool), each run in a process of its own,"
+    " garbage of the imports is collected, and 0.4 s waited for threads that spin, whatever the"
+    " tool), each run in a process of its own,"
     " rounds interleaved: median (least..most). Mpx-frames: pixels times frames, in"
     " millions, as the pixel sees them (after interpolation). Time: wall time relative to the first"
     " row of the table, paired by round. Peak memory is that of the whole process, with the"
