@@ -1,8 +1,8 @@
-import gc
 import signal
 import sys
 import threading
 import time
+import weakref
 
 import pytest
 from processes import running_python
@@ -194,10 +194,13 @@ class TestWriteBehind:
 
         with WriteBehind(10) as behind:
             done = threading.Event()
-            behind.call(1, lambda big: None, Big())
+            big = Big()
+            held = weakref.ref(big)
+            behind.call(1, lambda big: None, big)
+            del big
             behind.call(1, done.set)
             done.wait()
-            wait_until(lambda: not any(isinstance(thing, Big) for thing in gc.get_objects()))
+            wait_until(lambda: held() is None)
 
 
 INTERRUPTED = """
