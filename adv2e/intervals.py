@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from adv2e.config.model import Sampling
 from adv2e.errors import DataError
 from adv2e.upsampling import make_upsampler
+from adv2e.upsampling.sequence import Timed, neighbours
 
 FRAME_BYTES = 16 << 20
 """Memory for the frames of one part."""
@@ -78,11 +80,12 @@ class Intervals:
         self._L = sampling.L
         self._printed = sampling.last_interval == "printed"
         # without frames in between, there is nothing to interpolate
-        self._linear = sampling.interpolation == "linear" or sampling.L == 1
-        if not self._linear:
-            self._upsampler = make_upsampler(sampling.interpolation, sampling.L, threads=threads)
-        self._before_ns, self._before = t_ns, first
-        per_frame = self._L if self._linear else 1
+        linear = sampling.interpolation == "linear" or sampling.L == 1
+        self._upsampler = (
+            None if linear else make_upsampler(sampling.interpolation, sampling.L, threads=threads)
+        )
+        self._first = t_ns, first
+        per_frame = self._L if linear else 1
         frames = max(2, min(_MOST // per_frame + 2, FRAME_BYTES // max(1, first.nbytes)))
         # behind the border: up to two frames of it, and one that looks ahead
         dtype = first.dtype if first.dtype == np.uint8 else np.float32
@@ -107,43 +110,49 @@ class Intervals:
             A single frame, or times that do not increase.
         """
         ahead = 1 if self._printed else 0
-        number = 0
-        for number, (now_ns, now) in enumerate(frames, start=1):
-            if now_ns <= self._before_ns:
-                raise DataError(
-                    f"frame {number}: its time {now_ns * 1e-9:.9f} s is not after the one before"
-                    f" ({self._before_ns * 1e-9:.9f} s)"
-                )
-            for instant in self._between(now_ns, now):
-                self._instants.append(instant)
-                if len(self._instants) > self._size + ahead:
-                    yield self._part(len(self._instants) - 1 - ahead)
-                    self._drop(len(self._instants) - 1 - ahead)
-            self._before_ns = now_ns
-            if not self._linear:
-                self._before = now
-        if number == 0:
-            raise DataError("a single frame: at least two are needed")
+        for instant in self._cut(self._checked(frames)):
+            self._instants.append(instant)
+            if len(self._instants) > self._size + ahead:
+                yield self._part(len(self._instants) - 1 - ahead)
+                self._drop(len(self._instants) - 1 - ahead)
         if len(self._instants) > 1:
             yield self._part(len(self._instants) - 1)
+
+    def _checked(self, frames: Iterator[Timed]) -> Iterator[Timed]:
+        """Yield the frames as they are."""
+        number, before_ns = 0, self._first[0]
+        for number, (now_ns, now) in enumerate(frames, start=1):
+            if now_ns <= before_ns:
+                raise DataError(
+                    f"frame {number}: its time {now_ns * 1e-9:.9f} s is not after the one before"
+                    f" ({before_ns * 1e-9:.9f} s)"
+                )
+            yield now_ns, now
+            before_ns = now_ns
+        if number == 0:
+            raise DataError("a single frame: at least two are needed")
 
     def _hold(self, frame: NDArray[Any]) -> int:
         self._held[self._count] = frame
         self._count += 1
         return self._count - 2
 
-    def _between(self, now_ns: int, now: NDArray[Any]) -> Iterator[_Instant]:
-        """Yield the instants of one input interval."""
-        span, count = now_ns - self._before_ns, self._L
-        made = None if self._linear else self._upsampler.between(self._before, now)
-        if made is None:
-            self._hold(now)
-        for step in range(1, count + 1):
-            t_ns = self._before_ns + (span * step + count // 2) // count
-            if made is None:
-                yield _Instant(self._count - 2, step / count, t_ns, step == count)
-            else:
-                yield _Instant(self._hold(next(made)), 1.0, t_ns, step == count)
+    def _cut(self, frames: Iterator[Timed]) -> Iterator[_Instant]:
+        """Yield the instants of all intervals."""
+        upsampler, count = self._upsampler, self._L
+        if upsampler is None:
+            before_ns = self._first[0]
+            for now_ns, now in frames:
+                self._hold(now)
+                for step in range(1, count + 1):
+                    share, t_ns = step / count, _instant_ns(before_ns, now_ns, step, count)
+                    yield _Instant(self._count - 2, share, t_ns, step == count)
+                before_ns = now_ns
+            return
+        for (start_ns, a), (stop_ns, b), beside in neighbours(chain([self._first], frames)):
+            for step, made in enumerate(upsampler.between(a, b, beside), start=1):
+                t_ns = _instant_ns(start_ns, stop_ns, step, count)
+                yield _Instant(self._hold(made), 1.0, t_ns, step == count)
 
     def _part(self, intervals: int) -> Part:
         used = self._instants
@@ -170,3 +179,8 @@ class Intervals:
             _Instant(instant.before - first, instant.share, instant.t_ns, instant.ends)
             for instant in kept
         ]
+
+
+def _instant_ns(start_ns: int, stop_ns: int, step: int, count: int) -> int:
+    """Return the time of a step of an interval, to the nearest ns."""
+    return start_ns + ((stop_ns - start_ns) * step + count // 2) // count

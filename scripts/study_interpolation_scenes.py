@@ -98,6 +98,32 @@ def _pan(texture: Texture, speed: float, gain: float = 1.0) -> Light:
     return light
 
 
+def _swing(seed: int, reach: float, hz: float) -> Light:
+    """Return a disk that swings as a pendulum does, over a ground at rest."""
+    ground, bob = Texture(seed), Texture(seed + 1, 30.0)
+
+    def light(t_s: float, width: int, height: int) -> Image:
+        x, y = _pixels(width, height)
+        angle = math.sin(2.0 * math.pi * hz * t_s)
+        dx, dy = x - 0.5 * width - reach * angle, y - 0.5 * height + 0.2 * reach * angle * angle
+        return _over(ground.at(x, y), bob.at(dx + 64, dy + 64), np.hypot(dx, dy) - 0.2 * height)
+
+    return light
+
+
+def _bounce(seed: int, speed: float, every_s: float) -> Light:
+    """Return a disk that turns back at once, every `every_s`, over a ground at rest."""
+    ground, ball = Texture(seed), Texture(seed + 1, 30.0)
+
+    def light(t_s: float, width: int, height: int) -> Image:
+        x, y = _pixels(width, height)
+        way = speed * abs(t_s % (2.0 * every_s) - every_s)
+        dx, dy = x - 0.4 * width - way, y - 0.5 * height
+        return _over(ground.at(x, y), ball.at(dx + 64, dy + 64), np.hypot(dx, dy) - 0.2 * height)
+
+    return light
+
+
 def _disks(seed: int, speed: float, radius: float) -> Light:
     """Two disks that cross over a ground at rest, the second in front."""
     ground, first, second = Texture(seed), Texture(seed + 1, 140.0), Texture(seed + 2, 40.0)
@@ -167,6 +193,8 @@ def cases(seed: int) -> list[Case]:
     return [
         Case("pan, turn, disks", _scene(seed), lambda height: 0.6 * height),
         Case("pan", _pan(Texture(seed), 150.0), constant(150.0)),
+        Case("swing", _swing(seed, 15.0, 2.2), constant(2.0 * math.pi * 2.2 * 15.0)),
+        Case("bounce", _bounce(seed, 150.0, 0.21), constant(150.0)),
         Case("covering", _disks(seed, 240.0, 20.0), constant(240.0)),
         Case("thin lines", _lines(seed, 150.0), constant(150.0)),
         Case("brightness changes", _flicker(seed), constant(100.0)),

@@ -7,7 +7,6 @@ is found by next to nothing.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis.keys import user_effects
 from adv2e.upsampling import make_upsampler
+from adv2e.upsampling.sequence import neighbours
 
 Instants = tuple[list[int], NDArray[np.float32]]
 """Times [ns], and the light at them [DN], (instants, rows, columns)."""
@@ -52,10 +52,9 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     count = config.sampling.L
     upsampler = make_upsampler(config.sampling.interpolation, count)
     times, found = times_ns[:1], [light[0]]
-    frames = zip(times_ns, light, strict=True)
-    for (t0, before), (t1, after) in itertools.pairwise(frames):
+    for (t0, first), (t1, second), beside in neighbours(zip(times_ns, light, strict=True)):
         times += [t0 + ((t1 - t0) * k + count // 2) // count for k in range(1, count + 1)]
-        found += list(upsampler.between(before, after))
+        found += list(upsampler.between(first, second, beside))
     return times, np.array(found, np.float32)
 
 

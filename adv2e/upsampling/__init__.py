@@ -14,18 +14,23 @@ from numpy.typing import NDArray
 
 from adv2e.errors import ConfigError
 from adv2e.upsampling.linear import LinearUpsampler
+from adv2e.upsampling.sequence import NOTHING, Beside
 
 
 class Upsampler(Protocol):
     """Makes the frames inside one input interval."""
 
-    def between(self, a: NDArray[Any], b: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    def between(
+        self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING
+    ) -> Iterator[NDArray[Any]]:
         """Yield the light at l/L of the way from `a` to `b`, l = 1..L; the last is `b` itself.
 
         Parameters
         ----------
         a, b : (rows, columns) float32 or float64
             Light of two neighbouring frames [DN], linear; left as they are.
+        beside : Beside, optional
+            The frames before and after them, which tell how paths bend; straight without.
 
         Yields
         ------

@@ -1,21 +1,23 @@
 r"""Interpolation along the motion: edges move from one frame to the next instead of fading.
 
 Optical flow is found in both directions (:mod:`adv2e.upsampling.motion`).  For the time l/L of the
-interval every pixel of both frames is sent its share of the way [1]_; where several arrive, the one
-whose light agrees best with the other frame is in front.  The light there is that of both frames at
-the ends of this path, blended by l/L; of one frame where the other does not see it; and blended in
-place where no motion is known, as :mod:`adv2e.upsampling.linear` does everywhere.  Light is
-moved linear and unrounded; only the motion is found on a logarithmic 8-bit picture.
+interval every pixel of both frames is sent its share of the way [1]_, which bends as the frames
+before and after the interval tell (:mod:`adv2e.upsampling.acceleration`); where several arrive, the
+one whose light agrees best with the other frame is in front.  The light there is that of both
+frames at the ends of this path, blended by l/L; of one frame where the other does not see it; and
+blended in place where no motion is known, as :mod:`adv2e.upsampling.linear` does everywhere.  Light
+is moved linear and unrounded; only the motion is found on a logarithmic 8-bit picture.
 
 A pixel at rest that has the same light in both frames keeps it to the last bit, unless something
 moves over it.  Frames too small for the search (see `SMALLEST`), equal frames and cuts are
 interpolated linearly.
 
-What it cannot do: motion is straight and even within an interval; light that changes while it
-moves is blended; things smaller than their step from frame to frame, steps above about a fifth of
-the picture's height, and textures that repeat within a few steps are mostly not found and fade as
-with linear; the noise of dim frames is carried along, which makes more false events than blending
-it in place.  ``scripts/study_interpolation.py`` has the numbers.
+What it cannot do: motion changes no faster than evenly from interval to interval, so that what is
+hit moves straight and evenly from frame to frame; light that changes while it moves is blended;
+things smaller than their step from frame to frame, steps above about a fifth of the picture's
+height, and textures that repeat within a few steps are mostly not found and fade as with linear;
+the noise of dim frames is carried along, which makes more false events than blending it in place.
+``scripts/study_interpolation.py`` has the numbers.
 
 References
 ----------
@@ -33,9 +35,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.overlap import worker_pool
+from adv2e.upsampling.acceleration import Bend, Side, bends, straight
 from adv2e.upsampling.kernels import compose, splat
 from adv2e.upsampling.linear import LinearUpsampler, check_pair
 from adv2e.upsampling.motion import Motion, estimate_motion
+from adv2e.upsampling.sequence import NOTHING, Beside
+
+Array = NDArray[Any]
+Pair = tuple[Motion, Motion]
 
 
 class FlowUpsampler:
@@ -45,18 +52,20 @@ class FlowUpsampler:
         self.L = L
         self.threads = threads
         self._linear = LinearUpsampler(L)
+        self._known: list[tuple[Array, Array, Pair | None]] = []
 
-    def between(self, a: NDArray[Any], b: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    def between(self, a: Array, b: Array, beside: Beside = NOTHING) -> Iterator[Array]:
         """Yield `L` frames, the last `b` itself; see :class:`adv2e.upsampling.Upsampler`."""
         check_pair(a, b)
-        motion = estimate_motion(a, b) if self.L > 1 else None
+        motion = self._motion(a, b) if self.L > 1 else None
         if motion is None:
             yield from self._linear.between(a, b)
             return
+        bent = bends(*motion, *self._sides(a, b, beside))
         first, second = np.ascontiguousarray(a), np.ascontiguousarray(b)
 
-        def frame(step: int) -> NDArray[Any]:
-            return warp(first, second, *motion, step / self.L)
+        def frame(step: int) -> Array:
+            return warp(first, second, *motion, step / self.L, bent)
 
         if self.threads > 1:
             with worker_pool(self.threads) as pool:
@@ -67,10 +76,33 @@ class FlowUpsampler:
             yield from map(frame, range(1, self.L))
         yield b
 
+    def _sides(self, a: Array, b: Array, beside: Beside) -> tuple[Side | None, Side | None]:
+        """Return the motion to what lies beside; none at all where only one side is there."""
+        if beside.before is None or beside.after is None:
+            return None, None
+        before, after = self._motion(beside.before, a), self._motion(b, beside.after)
+        if before is None or after is None:
+            return None, None
+        return Side(before[1], beside.span_before), Side(after[0], beside.span_after)
+
+    def _motion(self, a: Array, b: Array) -> Pair | None:
+        """Return the motion between two frames, found once for the three intervals that ask."""
+        for first, second, found in self._known:
+            if first is a and second is b:
+                return found
+        found = estimate_motion(a, b)
+        self._known = [*self._known[-2:], (a, b, found)]
+        return found
+
 
 def warp(
-    a: NDArray[Any], b: NDArray[Any], there: Motion, back: Motion, fraction: float
-) -> NDArray[Any]:
+    a: Array,
+    b: Array,
+    there: Motion,
+    back: Motion,
+    fraction: float,
+    bent: tuple[Bend, Bend] | None = None,
+) -> Array:
     """Return the light at `fraction` of the way from `a` to `b`.
 
     Parameters
@@ -81,17 +113,23 @@ def warp(
         From `a` to `b` and from `b` to `a`.
     fraction : float
         Above 0 and below 1.
+    bent : tuple of Bend, optional
+        Of the paths of `a` and of `b`; straight without.
     """
     out = np.empty_like(a)
-    compose(a, b, *_arrivals(there, fraction), *_arrivals(back, 1.0 - fraction), fraction, out)
+    first, second = (straight(there), straight(back)) if bent is None else bent
+    from_a = _arrivals(there, first, fraction)
+    from_b = _arrivals(back, second, 1.0 - fraction)
+    compose(a, b, *from_a, *from_b, fraction, out)
     return out
 
 
 def _arrivals(
-    motion: Motion, share: float
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Return flat u and v, and who arrives where with which score after `share` of the way."""
+    motion: Motion, bend: Bend, share: float
+) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Return flat motion and bend, and who arrives where with which score after `share`."""
     best = np.empty_like(motion.score)
     source = np.zeros(motion.score.shape, np.int32)
-    splat(motion.u, motion.v, motion.score, share, best, source)
-    return motion.u.reshape(-1), motion.v.reshape(-1), best, source
+    splat(motion.u, motion.v, *bend, motion.score, share, best, source)
+    u, v, p, q = (part.reshape(-1) for part in (motion.u, motion.v, *bend))
+    return u, v, p, q, best, source

@@ -1,7 +1,9 @@
 """Compiled loops of the motion-compensated interpolation.
 
-Motion is in two planes (u: columns, v: rows) of the pixels of its own frame.  Positions outside
-the frame take the light of the nearest pixel of its border: there is nothing better to know.
+Motion is in two planes (u: columns, v: rows) of the pixels of its own frame, and so is its bend
+(p, q): at a share f of the interval a pixel of the first frame is f (u, v) - f (1 - f) (p, q) from
+where it was.  Positions outside the frame take the light of the nearest pixel of its border: there
+is nothing better to know.
 """
 
 from __future__ import annotations
@@ -136,6 +138,8 @@ def fill_lost(
 def splat(
     u: NDArray[Any],
     v: NDArray[Any],
+    p: NDArray[Any],
+    q: NDArray[Any],
     score: NDArray[Any],
     fraction: float,
     best: NDArray[Any],
@@ -147,6 +151,7 @@ def splat(
     of equals.  `source` is the flat index of the winner, `best` its score (UNKNOWN: nobody).
     """
     rows, columns = score.shape
+    aside = fraction * (1.0 - fraction)
     for y in range(rows):
         for x in range(columns):
             best[y, x] = UNKNOWN
@@ -155,7 +160,8 @@ def splat(
             own = score[y, x]
             if own >= UNKNOWN:
                 continue
-            gx, gy = x + fraction * u[y, x], y + fraction * v[y, x]
+            gx = x + fraction * u[y, x] - aside * p[y, x]
+            gy = y + fraction * v[y, x] - aside * q[y, x]
             i, j = math.floor(gx), math.floor(gy)
             for ty in range(max(j, 0), min(j + 2 if gy > j else j + 1, rows)):
                 for tx in range(max(i, 0), min(i + 2 if gx > i else i + 1, columns)):
@@ -171,10 +177,14 @@ def compose(
     b: NDArray[Any],
     ua: NDArray[Any],
     va: NDArray[Any],
+    pa: NDArray[Any],
+    qa: NDArray[Any],
     best_a: NDArray[Any],
     source_a: NDArray[Any],
     ub: NDArray[Any],
     vb: NDArray[Any],
+    pb: NDArray[Any],
+    qb: NDArray[Any],
     best_b: NDArray[Any],
     source_b: NDArray[Any],
     fraction: float,
@@ -187,26 +197,32 @@ def compose(
     """
     rows, columns = a.shape
     rest = 1.0 - fraction
+    aside = fraction * rest
     for y in range(rows):
         for x in range(columns):
             from_a, from_b = best_a[y, x], best_b[y, x]
             here, there = source_a[y, x], source_b[y, x]
             if min(from_a, from_b) < ONE_SIDED:
-                u, v = (ua[here], va[here]) if from_a <= from_b else (-ub[there], -vb[there])
-                if u == 0.0 and v == 0.0:
-                    p, q = a[y, x], b[y, x]
+                if from_a <= from_b:
+                    u, v, dx, dy = ua[here], va[here], aside * pa[here], aside * qa[here]
                 else:
-                    p = cubic(a, x - fraction * u, y - fraction * v)
-                    q = cubic(b, x + rest * u, y + rest * v)
+                    u, v, dx, dy = -ub[there], -vb[there], aside * pb[there], aside * qb[there]
+                if u == 0.0 and v == 0.0:
+                    one, two = a[y, x], b[y, x]
+                else:
+                    one = cubic(a, x + dx - fraction * u, y + dy - fraction * v)
+                    two = cubic(b, x + dx + rest * u, y + dy + rest * v)
             elif from_a < UNKNOWN or from_b < UNKNOWN:
                 if from_a < UNKNOWN:
-                    p = cubic(a, x - fraction * ua[here], y - fraction * va[here])
+                    dx, dy = aside * pa[here], aside * qa[here]
+                    one = cubic(a, x + dx - fraction * ua[here], y + dy - fraction * va[here])
                 if from_b < UNKNOWN:
-                    q = cubic(b, x - rest * ub[there], y - rest * vb[there])
+                    dx, dy = aside * pb[there], aside * qb[there]
+                    two = cubic(b, x + dx - rest * ub[there], y + dy - rest * vb[there])
                 if from_a >= UNKNOWN:
-                    p = q
+                    one = two
                 if from_b >= UNKNOWN:
-                    q = p
+                    two = one
             else:
-                p, q = a[y, x], b[y, x]
-            out[y, x] = p + fraction * (q - p)
+                one, two = a[y, x], b[y, x]
+            out[y, x] = one + fraction * (two - one)

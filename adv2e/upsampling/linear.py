@@ -15,6 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.upsampling.sequence import NOTHING, Beside
+
 
 def blend(a: NDArray[Any], difference: NDArray[Any], fraction: float) -> NDArray[Any]:
     """Return a + fraction difference, in one pass over memory.
@@ -40,8 +42,11 @@ class LinearUpsampler:
     def __init__(self, L: int) -> None:
         self.L = L
 
-    def between(self, a: NDArray[Any], b: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    def between(
+        self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING
+    ) -> Iterator[NDArray[Any]]:
         """Yield `L` frames, the last `b` itself; see :class:`adv2e.upsampling.Upsampler`."""
+        del beside  # a line through two points
         check_pair(a, b)
         difference = np.subtract(b, a)
         for step in range(1, self.L):

@@ -22,6 +22,7 @@ from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.events import Events
 from adv2e.simulation import events_from_light
 from adv2e.upsampling import make_upsampler
+from adv2e.upsampling.sequence import neighbours
 from real.recording import Real, still_rate
 
 SCORE = "relative_5_bins_smoothed"
@@ -83,8 +84,8 @@ class Bench:
             frames = list(begin(active_hooks(bare), self._decoded(config), config.seed))
             upsampler = make_upsampler(sampling.interpolation, sampling.L, threads=2)
             made = frames[:1]
-            for (t0, a), (t1, b) in itertools.pairwise(frames):
-                between = enumerate(upsampler.between(a, b), start=1)
+            for (t0, a), (t1, b), beside in neighbours(frames):
+                between = enumerate(upsampler.between(a, b, beside), start=1)
                 made += [(t0 + (t1 - t0) * k // sampling.L, light) for k, light in between]
             self._made[key] = made
         return self._made[key]

@@ -51,7 +51,7 @@ def test_splat_lets_the_lower_score_win_and_drops_what_leaves():
     score = np.full((3, 5), UNKNOWN, np.float32)
     score[1] = [0.2, 0.1, 0.3, UNKNOWN, 0.0]
     best, source = zeros(), np.full((3, 5), -1, np.int32)
-    splat(u, v, score, 1.0, best, source)
+    splat(u, v, zeros(u.shape), zeros(u.shape), score, 1.0, best, source)
     assert source[1, 2] == 5 + 1
     assert best[1, 2] == pytest.approx(0.1)
     reached = best < UNKNOWN
@@ -64,8 +64,19 @@ def test_splat_between_pixels_reaches_the_four_around():
     score = np.full((3, 5), UNKNOWN, np.float32)
     score[0, 1] = 0.5
     best, source = zeros(), np.full((3, 5), -1, np.int32)
-    splat(u, v, score, 0.5, best, source)
+    splat(u, v, zeros(u.shape), zeros(u.shape), score, 0.5, best, source)
     assert np.argwhere(best < UNKNOWN).tolist() == [[0, 2], [0, 3], [1, 2], [1, 3]]
+
+
+def test_splat_sends_what_bends_less_far_at_first():
+    # of 4 columns and 2 rows bent by (4, -4): at the half 2 - 1 columns and 1 + 1 rows
+    u, v, p, q = zeros(), zeros(), zeros(), zeros()
+    u[0, 1], v[0, 1], p[0, 1], q[0, 1] = 4.0, 2.0, 4.0, -4.0
+    score = np.full((3, 5), UNKNOWN, np.float32)
+    score[0, 1] = 0.5
+    best, source = zeros(), np.full((3, 5), -1, np.int32)
+    splat(u, v, p, q, score, 0.5, best, source)
+    assert np.argwhere(best < UNKNOWN).tolist() == [[2, 2]]
 
 
 @pytest.mark.parametrize("steps", [(1.4, 0.2), (1.1, 0.8)])
@@ -75,7 +86,7 @@ def test_splat_lets_the_nearer_of_equals_win(steps):
     u[0, 1:3] = steps
     score = np.array([[UNKNOWN, 0.5, 0.5, UNKNOWN, UNKNOWN]], np.float32)
     best, source = zeros((1, 5)), np.full((1, 5), -1, np.int32)
-    splat(u, v, score, 1.0, best, source)
+    splat(u, v, zeros(u.shape), zeros(u.shape), score, 1.0, best, source)
     assert source[0, 2] == (2 if steps[1] < steps[0] - 1.0 else 1)
 
 
@@ -107,15 +118,17 @@ def test_lost_pixels_without_any_seen_one_stay_unknown():
     assert np.all(distance == UNKNOWN)
 
 
-def composed(best_a, best_b, u_a=0.0, u_b=0.0, fraction=0.25):
+def composed(best_a, best_b, u_a=0.0, u_b=0.0, fraction=0.25, p_a=0.0, p_b=0.0):
     """Return the middle pixel of a row where the middle pixels of both frames arrive."""
     a, b = plane([10, 20, 30, 40, 50]), plane([100, 110, 120, 130, 140])
-    ua, ub, flat = np.full(5, u_a, np.float32), np.full(5, u_b, np.float32), zeros(5)
+    ua, ub, pa, pb = (np.full(5, value, np.float32) for value in (u_a, u_b, p_a, p_b))
+    flat = zeros(5)
     source = np.arange(5, dtype=np.int32)[None]
     bests = (np.full((1, 5), best, np.float32) for best in (best_a, best_b))
     out = zeros((1, 5))
+    of_a, of_b = ((u, flat, p, flat) for u, p in ((ua, pa), (ub, pb)))
     best_of_a, best_of_b = bests
-    compose(a, b, ua, flat, best_of_a, source, ub, flat, best_of_b, source, fraction, out)
+    compose(a, b, *of_a, best_of_a, source, *of_b, best_of_b, source, fraction, out)
     return float(out[0, 2])
 
 
@@ -137,3 +150,13 @@ def test_not_known_is_blended_in_place():
 def test_lost_in_both_is_blended_along_both_motions():
     expected = 0.75 * 27.5 + 0.25 * 120
     assert composed(ONE_SIDED, ONE_SIDED, u_a=1.0) == pytest.approx(expected)
+
+
+def test_light_is_taken_from_the_ends_of_a_path_that_bends():
+    # a quarter of the way bent by 4/3 columns is a quarter of a column behind the straight one
+    bend = 4.0 / 3.0
+    expected = 0.75 * 30.0 + 0.25 * 130.0
+    assert composed(0.1, 0.2, u_a=1.0, p_a=bend) == pytest.approx(expected)
+    assert composed(0.2, 0.1, u_a=9.0, u_b=-1.0, p_b=bend) == pytest.approx(expected)
+    assert composed(ONE_SIDED, UNKNOWN, u_a=1.0, p_a=bend) == pytest.approx(30.0)
+    assert composed(UNKNOWN, ONE_SIDED, u_b=-1.0, p_b=bend) == pytest.approx(130.0)

@@ -1,0 +1,60 @@
+"""A sequence of frames as its intervals, each with the frames beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+Timed = tuple[int, NDArray[Any]]
+"""Time [ns] and light [DN] of a frame."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """The frames before and after an interval.
+
+    Attributes
+    ----------
+    before, after : (rows, columns), or None
+        Light [DN]; None: there is none.
+    span_before, span_after : float
+        Time from there to the interval and from the interval to there, in units of the interval.
+    """
+
+    before: NDArray[Any] | None = None
+    after: NDArray[Any] | None = None
+    span_before: float = 1.0
+    span_after: float = 1.0
+
+
+NOTHING = Beside()
+
+
+def neighbours(frames: Iterable[Timed]) -> Iterator[tuple[Timed, Timed, Beside]]:
+    """Yield each pair of neighbours with what lies beside it; reads one frame ahead.
+
+    Parameters
+    ----------
+    frames : iterable of (int, (rows, columns))
+        Times increase.
+    """
+    coming = iter(frames)
+    before: Timed | None = None
+    first, second = next(coming, None), next(coming, None)
+    while first is not None and second is not None:
+        after = next(coming, None)
+        span = second[0] - first[0]
+        yield (
+            first,
+            second,
+            Beside(
+                before=None if before is None else before[1],
+                after=None if after is None else after[1],
+                span_before=1.0 if before is None else (first[0] - before[0]) / span,
+                span_after=1.0 if after is None else (after[0] - second[0]) / span,
+            ),
+        )
+        before, first, second = first, second, after
