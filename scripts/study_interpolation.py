@@ -33,7 +33,7 @@ from study_knee_report import load_pyplot
 
 from adv2e.comparison.grids import Grid, smoothed, voxel_grid
 from adv2e.comparison.windows import cut, frame_windows
-from adv2e.config.model import Config, Pixel, Sampling
+from adv2e.config.model import Config, Frames, Pixel, Sampling
 from adv2e.errors import Adv2eError
 from adv2e.events import Events
 from adv2e.simulation import events_from_light
@@ -41,6 +41,9 @@ from adv2e.upsampling import make_upsampler
 
 RATES = (24.0, 30.0, 60.0)
 """Frames a second."""
+
+EXPOSURE_PARTS = 33
+"""Pictures that are averaged to an exposed frame."""
 
 BINS = 5
 """Temporal bins of a frame interval, as in ``adv2e compare``."""
@@ -74,6 +77,15 @@ def frame_times_ns(duration_s: float, rate: float) -> list[int]:
     return [round(k * 1e9 / rate) for k in range(round(duration_s * rate) + 1)]
 
 
+def exposed(case: Case, setup: Setup, rate: float) -> Iterator[tuple[int, Image]]:
+    """Yield frames that average the light over their exposures."""
+    middles = (np.arange(EXPOSURE_PARTS) + 0.5) / EXPOSURE_PARTS - 0.5
+    for t_ns in frame_times_ns(setup.duration_s(case), rate):
+        times = t_ns * 1e-9 + case.exposure_s * middles
+        parts = [case.light(float(t_s), setup.width, setup.height) for t_s in times]
+        yield t_ns, np.mean(parts, axis=0, dtype=np.float32)
+
+
 def rendered(case: Case, setup: Setup, rate: float) -> Iterator[tuple[int, Image]]:
     for t_ns in frame_times_ns(setup.duration_s(case), rate):
         yield t_ns, case.light(t_ns * 1e-9, setup.width, setup.height)
@@ -82,7 +94,8 @@ def rendered(case: Case, setup: Setup, rate: float) -> Iterator[tuple[int, Image
 def filmed(case: Case, setup: Setup, rate: float) -> Iterator[tuple[int, Image]]:
     """Yield the frames as a camera gives them: with read noise and rounded, where the case says."""
     rng = np.random.default_rng([setup.seed, 4])
-    for t_ns, light in rendered(case, setup, rate):
+    frames = exposed if case.exposure_s else rendered
+    for t_ns, light in frames(case, setup, rate):
         if case.read_noise:
             noisy = np.rint(light + case.read_noise * rng.standard_normal(light.shape))
             yield t_ns, np.clip(noisy, 0, 255).astype(np.float32)
@@ -104,7 +117,10 @@ def made_events(case: Case, setup: Setup, rate: float, method: str) -> Events:
     if method == "perfect":
         light = rendered(case, setup, rate * setup.L)
         return events(light, configuration(setup, "linear", 1))
-    return events(filmed(case, setup, rate), configuration(setup, method, setup.L))
+    config = configuration(setup, method, setup.L)
+    if case.declared:
+        config = replace(config, frames=Frames(exposure_us=1e6 * case.exposure_s))
+    return events(filmed(case, setup, rate), config)
 
 
 def distance(true: Events, made: Events, times_ns: list[int], setup: Setup) -> float:

@@ -40,6 +40,10 @@ class Case:
     duration_s: float = 0.5
     read_noise: float = 0.0
     """Noise of the frames [DN, rms]; with it they are rounded to whole DN."""
+    exposure_s: float = 0.0
+    """Time over which a frame averages the light, about its own."""
+    declared: bool = True
+    """Whether the simulator is told of the exposure."""
 
     def true_hz(self, height: int) -> float:
         """Return the rate at which the true light is rendered, a multiple of TRUE_HZ."""
@@ -195,6 +199,14 @@ def cases(seed: int) -> list[Case]:
         Case("pan", _pan(Texture(seed), 150.0), constant(150.0)),
         Case("swing", _swing(seed, 15.0, 2.2), constant(2.0 * math.pi * 2.2 * 15.0)),
         Case("bounce", _bounce(seed, 150.0, 0.21), constant(150.0)),
+        Case("exposed", _pan(Texture(seed), 150.0), constant(150.0), exposure_s=0.012),
+        Case(
+            "exposed, not told",
+            _pan(Texture(seed), 150.0),
+            constant(150.0),
+            exposure_s=0.012,
+            declared=False,
+        ),
         Case("covering", _disks(seed, 240.0, 20.0), constant(240.0)),
         Case("thin lines", _lines(seed, 150.0), constant(150.0)),
         Case("brightness changes", _flicker(seed), constant(100.0)),

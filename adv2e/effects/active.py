@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from adv2e.config.model import Config, Frames, Pixel, Readout
+from adv2e.config.model import Config, Frames, Pixel, Readout, Sampling
 from adv2e.effects import STAGES
 from adv2e.effects.frames.black_level import BlackLevelHooks
 from adv2e.effects.frames.clock_drift import ClockDriftHooks
@@ -12,6 +12,7 @@ from adv2e.effects.frames.clock_offset import ClockOffsetHooks
 from adv2e.effects.frames.exposure_blur import ExposureBlurHooks
 from adv2e.effects.frames.flicker import FlickerHooks
 from adv2e.effects.frames.misregistration import MisregistrationHooks
+from adv2e.effects.frames.motion_blur import MotionBlurHooks
 from adv2e.effects.hooks import Hooks
 from adv2e.effects.pixel.dark_current import DarkCurrentHooks
 from adv2e.effects.pixel.dead_pixels import DeadPixelsHooks
@@ -29,7 +30,7 @@ def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
     tick of the time stamps is the last of all.
     """
     own = {
-        "frames": _of_frames(config.frames),
+        "frames": _of_frames(config.frames, config.sampling),
         "pixel": _of_pixel(config.pixel),
         "readout": _of_readout(config.readout, config.frames) if config.readout else [],
     }
@@ -44,7 +45,7 @@ def _of_stage(hooks: Iterable[Hooks], stage: str) -> list[Hooks]:
     return [hook for hook in hooks if hook.stage == stage]
 
 
-def _of_frames(frames: Frames) -> list[Hooks]:
+def _of_frames(frames: Frames, sampling: Sampling) -> list[Hooks]:
     hooks: list[Hooks] = []
     if frames.clock_drift_ppm:
         hooks.append(ClockDriftHooks(frames.clock_drift_ppm))
@@ -53,7 +54,8 @@ def _of_frames(frames: Frames) -> list[Hooks]:
     if frames.black_level_dn:
         hooks.append(BlackLevelHooks(frames.black_level_dn))
     if frames.exposure_us:
-        hooks.append(ExposureBlurHooks(frames.exposure_us))
+        moves = sampling.interpolation == "flow"
+        hooks.append((MotionBlurHooks if moves else ExposureBlurHooks)(frames.exposure_us))
     if any(frames.shift_px):
         hooks.append(MisregistrationHooks(frames.shift_px))
     if frames.flicker is not None and frames.flicker.depth:

@@ -5,7 +5,9 @@ r"""Exposure blur: a frame is the mean of the light over its exposure, the event
 with T = ``frames.exposure_us`` and t the time of the frame, the middle of its exposure.  The pixel
 sees the light itself, so what the exposure took away is put back: the light at the times of the
 frames is sought whose means are the frames.  Changes faster than 1/T are not in the frames and
-cannot come back; noise of the frames grows with what does.
+cannot come back; noise of the frames grows with what does.  Between the frames light is linear in
+time here; where it is interpolated along the motion, :mod:`adv2e.effects.frames.motion_blur` takes
+the place of this module.
 
 With B the matrix of the mean over the exposure, its rows having sum 1 and the variance T^2/12 of
 the exposure, twenty steps of the Richardson-Lucy iteration are taken from the frames themselves,

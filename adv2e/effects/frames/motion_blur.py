@@ -1,0 +1,219 @@
+r"""Exposure blur of what moves: a frame smears it along its way, the events see it sharp.
+
+.. math:: DN_{frame}(x) = \frac{1}{T} \int_{-T/2}^{T/2} DN(x - v \tau)\, d\tau
+
+with T = ``frames.exposure_us`` and v the velocity at the time of the frame, the middle of its
+exposure.  This takes the place of :mod:`adv2e.effects.frames.exposure_blur` where frames are
+interpolated along the motion.  That module puts back what frames tell of changes in time, and so
+nothing where the exposure is shorter than the frame interval; this one what they tell of motion.
+
+Velocity comes from the optical flow to the frames before and after, as the slope of a path through
+all three (:mod:`adv2e.upsampling.acceleration`); from one of them where the other does not show the
+pixel; and from the slower where the two differ by more than half, as of what was hit meanwhile.  It
+holds for all pixels over which what moves was smeared, the longest smear first.
+
+With B the mean along the smear through each pixel, which is its own transpose but for changes of v
+from pixel to pixel, ten steps of the Richardson-Lucy iteration are taken from the frame itself,
+
+.. math:: y \leftarrow y \cdot B \left( DN_{frame} / B y \right).
+
+Light stays positive, and the same to the last bit where nothing moves.  What is finer than the
+smear is not in the frame and cannot come back, and noise of the frames grows with what does; what
+moves too fast for the flow to be found stays blurred.
+
+References
+----------
+.. [1] W. H. Richardson, "Bayesian-Based Iterative Method of Image Restoration", JOSA 62(1), 1972,
+   doi:10.1364/JOSA.62.000055.
+.. [2] Y.-W. Tai, P. Tan, M. S. Brown, "Richardson-Lucy Deblurring for Scenes under a Projective
+   Motion Path", IEEE TPAMI 33(8), 2011, doi:10.1109/TPAMI.2010.222 (a path for every pixel).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.effects.hooks import Frames, Hooks
+from adv2e.jit import entry
+from adv2e.upsampling.kernels import ONE_SIDED, UNKNOWN, cubic
+from adv2e.upsampling.motion import Motion, estimate_motion
+
+Image = NDArray[np.float32]
+
+_ITERATIONS = 10
+_FOOT_DN = 0.5
+"""Added to the light meanwhile: what is zero would stay zero, and what is dark follow its noise."""
+
+_LEAST_PX = 0.1
+"""Shorter smears are none."""
+
+_AGREE_PX = 0.5
+_AGREE = 0.5
+_OUTLIERS_PX = 5
+
+
+@entry
+def spread(u: NDArray[Any], v: NDArray[Any], wide_u: NDArray[Any], wide_v: NDArray[Any]) -> None:
+    """Fill `wide_u` and `wide_v` with the longest smear that passes over each pixel.
+
+    Parameters
+    ----------
+    u, v : (rows, columns)
+        Columns and rows over which what is at a pixel is smeared, half to either side [px].
+    """
+    rows, columns = u.shape
+    for y in range(rows):
+        for x in range(columns):
+            wide_u[y, x], wide_v[y, x] = u[y, x], v[y, x]
+    for y in range(rows):
+        for x in range(columns):
+            du, dv = u[y, x], v[y, x]
+            length = du * du + dv * dv
+            steps = math.ceil(max(abs(du), abs(dv)) * 0.5)
+            for step in range(-steps, steps + 1):
+                if step == 0:
+                    continue
+                share = 0.5 * step / steps
+                i, j = round(y + share * dv), round(x + share * du)
+                if 0 <= i < rows and 0 <= j < columns:
+                    here = wide_u[i, j] * wide_u[i, j] + wide_v[i, j] * wide_v[i, j]
+                    if here < length:
+                        wide_u[i, j], wide_v[i, j] = du, dv
+
+
+@entry
+def smear(light: NDArray[Any], u: NDArray[Any], v: NDArray[Any], out: NDArray[Any]) -> None:
+    """Fill `out` with the mean of `light` along the smear through each pixel.
+
+    Samples stand at the middles of equal parts of half a pixel or less.  Where there is no smear
+    it is the light to the last bit.
+    """
+    rows, columns = light.shape
+    for y in range(rows):
+        for x in range(columns):
+            du, dv = u[y, x], v[y, x]
+            if du == 0.0 and dv == 0.0:
+                out[y, x] = light[y, x]
+                continue
+            count = math.ceil(2.0 * max(abs(du), abs(dv))) + 1
+            total = 0.0
+            for k in range(count):
+                share = (k + 0.5) / count - 0.5
+                total += cubic(light, x - share * du, y - share * dv)
+            out[y, x] = total / count
+
+
+def velocity(
+    after: Motion | None, span_after: float, before: Motion | None, span_before: float
+) -> tuple[Image, Image] | None:
+    """Return columns and rows a unit of time at a frame; None: no motion is known.
+
+    Parameters
+    ----------
+    after, before : Motion or None
+        From the frame to the next and to the one before.
+    span_after, span_before : float
+        Time to them, above 0.
+    """
+    sides = [
+        (motion, span)
+        for motion, span in ((after, span_after), (before, -span_before))
+        if motion is not None
+    ]
+    if not sides:
+        return None
+    one = [
+        tuple(_known(part, motion) / np.float32(span) for part in (motion.u, motion.v))
+        for motion, span in sides
+    ]
+    if len(sides) == 1:
+        found = one[0]
+    else:
+        (u, v), (ru, rv) = one
+        # the slope at 0 of the parabola through three points
+        share = np.float32(span_before / (span_after + span_before))
+        both = u * share + ru * (1 - share), v * share + rv * (1 - share)
+        fast, slow = np.hypot(u, v), np.hypot(ru, rv)
+        apart = np.hypot(u - ru, v - rv)
+        unit = min(span_after, span_before)
+        differ = apart > _AGREE * np.maximum(fast, slow) + _AGREE_PX / unit
+        seen, also = (motion.score < ONE_SIDED for motion, _ in sides)
+        first = (seen & ~also) | ((seen == also) & differ & (fast <= slow))
+        second = (also & ~seen) | ((seen == also) & differ & (fast > slow))
+        found = (
+            np.where(first, u, np.where(second, ru, both[0])),
+            np.where(first, v, np.where(second, rv, both[1])),
+        )
+    smooth = [cv2.medianBlur(np.asarray(part, np.float32), _OUTLIERS_PX) for part in found]
+    return smooth[0], smooth[1]  # type: ignore[return-value]
+
+
+def _known(part: Image, motion: Motion) -> Image:
+    return np.where(motion.score < UNKNOWN, part, np.float32(0.0))
+
+
+def sharpened(light: NDArray[Any], u: Image, v: Image) -> NDArray[Any]:
+    """Return the light of a frame in which each pixel is smeared over (u, v) pixels.
+
+    Parameters
+    ----------
+    light : (rows, columns)
+        Of the frame [DN].
+    u, v : (rows, columns)
+        Columns and rows over which what is at a pixel is smeared, half to either side.
+    """
+    short = np.hypot(u, v) < _LEAST_PX
+    wide_u, wide_v = np.empty_like(u), np.empty_like(v)
+    none = np.float32(0.0)
+    spread(np.where(short, none, u), np.where(short, none, v), wide_u, wide_v)
+    blurred = np.maximum(light, 0) + light.dtype.type(_FOOT_DN)
+    sharp, mean, factor = blurred.copy(), np.empty_like(blurred), np.empty_like(blurred)
+    for _ in range(_ITERATIONS):
+        smear(sharp, wide_u, wide_v, mean)
+        smear(blurred / mean, wide_u, wide_v, factor)
+        sharp *= factor
+    at_rest = (wide_u == 0.0) & (wide_v == 0.0)
+    return np.where(at_rest, light, np.maximum(sharp - light.dtype.type(_FOOT_DN), 0))
+
+
+class MotionBlurHooks(Hooks):
+    """Puts back what an exposure of `exposure_us` smeared."""
+
+    name = "exposure_blur"
+    stage = "frames"
+
+    def __init__(self, exposure_us: float) -> None:
+        super().__init__()
+        self._exposure = exposure_us * 1e3
+
+    def light(self, frames: Frames) -> Frames:
+        """Yield the light at the times of the frames, one behind."""
+        before: Motion | None = None
+        span_before = 1.0
+        for (t_ns, light), following in _pairs(frames):
+            after, span_after = None, 1.0
+            back: Motion | None = None
+            if following is not None:
+                next_ns, other = following
+                span_after = float(next_ns - t_ns)
+                pair = estimate_motion(light, other) if span_after > 0 else None
+                after, back = pair or (None, None)
+            found = velocity(after, span_after, before, span_before)
+            if found is None:
+                yield t_ns, light
+            else:
+                u, v = (part * np.float32(self._exposure) for part in found)
+                yield t_ns, sharpened(np.ascontiguousarray(light), u, v)
+            before, span_before = back, span_after
+
+
+def _pairs(frames: Frames) -> Iterator[tuple[Any, Any]]:
+    """Yield each frame with the one that follows, the last with None."""
+    return itertools.pairwise(itertools.chain(frames, [None]))
