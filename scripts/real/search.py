@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from adv2e.comparison.windows import Windows
 from adv2e.config import Config
-from adv2e.diagnosis.candidates import Candidate
+from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.library import Hints, library
 from real.model import Bench
 
 LEAST_GAIN = 0.005
 """An effect is added if it lowers the score by as much as this."""
 PASSES = 2
-"""Rounds in which all that was added is refined together, at most."""
-MOST = 7
-"""Effects at most."""
+"""Rounds in which all that was added is refined together after each addition, at most."""
+MOST = 9
+"""Effects at most, with choices of the simulation."""
 NOISE_HZ = 0.1
-"""An effect is not added if it moves still pixels farther from the measured rate by more [Hz]:
-noise at random costs this score less than events in the wrong place, and is no explanation."""
+"""An effect of the camera is not added if it moves still pixels farther from the measured rate by
+more [Hz]: noise at random costs this score less than events in the wrong place, and is no
+explanation."""
 
 EXACT = Candidate("exact filter", (), ((),), (("pixel.low_pass.update", "exact"),))
 """Replaces the printed filter, whose gain is known to be wrong, whatever that does to the score."""
@@ -34,17 +35,17 @@ OWN = (
         (("sampling.interpolation", "flow"), ("sampling.last_interval", "corrected")),
     ),
     Candidate("initial_reference", (), ((),), (("pixel.initial_reference", "random"),)),
-    *(
-        Candidate(
-            "log_response",
-            (),
-            ((),),
-            (("pixel.log_response.linear_below", knee), ("pixel.log_response.floor", 0.5)),
-        )
-        for knee in (0.0, 2.72, 40.0)
+    Candidate(
+        "log_response",
+        (Knob("pixel.log_response.linear_below", 0.5, 100.0),),
+        ((2.72,), (10.0,), (40.0,)),
+        (("pixel.log_response.floor", 0.5),),
     ),
 )
-"""What is no effect of the camera, but of how its frames were simulated."""
+"""What is no effect of the camera, but of how its frames were simulated.
+
+Where references start is among it: what pixels saw before is not known, and one of them that starts
+near a threshold fires at the noise of the frames, which is no noise of the camera's."""
 
 UNSEEN = {
     "thresholds": "matched to the totals each time",
@@ -107,9 +108,9 @@ def forward(
 ) -> Iterator[Added]:
     """Yield the model after each effect that was added, the first as declared but thresholds.
 
-    `only`: names of the effects of the camera to try; empty: all.
+    The keys of all that was added before are refined each time, and those left out are tried again
+    when nothing more is found.  `only`: names of the effects of the camera to try; empty: all.
     """
-    chain: list[Added] = []
     config = bench.matched(declared, windows)
     yield Added.plain("thresholds", config, *bench.score(config, windows, seeds))
     here = _trial(bench, EXACT, (), config, windows, seeds)
@@ -117,61 +118,71 @@ def forward(
     measured_hz = bench.still_hz(windows)
     camera = library(declared, Hints(windows.duration_s, (), 1))
     camera = [one for one in camera if one.name not in UNSEEN and (not only or one.name in only)]
-    own = list(OWN)
-    for group in (own, camera):
-        left = group if group is own else [*own, *camera]
-        for _ in range(MOST):
+    found: dict[Candidate, tuple[float, ...]] = {}
+    for group in (OWN, (*OWN, *camera)):
+        left = _not_in(found, group)
+        at = len(found)  # when all of the group were tried last
+        while len(found) < MOST:
             tried = [t for one in left for t in _probed(bench, one, here.config, windows, seeds)]
-            noisier = [trial for trial in tried if trial.noisier(here, measured_hz)]
+            noisier = [
+                trial
+                for trial in tried
+                if trial.candidate not in OWN and trial.noisier(here, measured_hz)
+            ]
             tried = [trial for trial in tried if trial not in noisier]
-            if not tried:
-                break
             if noisier:
                 names = ", ".join(f"{trial.text()} {trial.score:.3f}" for trial in noisier)
                 say(f"  make noise of their own in still pixels: {names}")
             tried.sort(key=lambda trial: trial.score)
             nearest = ", ".join(f"{t.text()} {t.score:.3f}" for t in tried[:6])
             say(f"  {here.score:.3f}; next: {nearest}")
-            best = _refined(bench, tried[0], here.config, windows, seeds)
+            best = _refined(bench, tried[0], here.config, windows, seeds) if tried else here
             if here.score - best.score < LEAST_GAIN:
-                break
-            here = best
-            chain.append(best)
-            own = [one for one in own if one.name != here.candidate.name]
-            left = own if group is not camera else [*own, *_promising(tried[1:], here, own)]
-            yield here
-    together = _together(bench, chain, here, windows, seeds)
-    if together is not here:
-        yield together
+                if at == len(found):
+                    break
+                left, at = _not_in(found, group), len(found)
+                continue
+            found[best.candidate] = best.values
+            here = _together(bench, found, best, windows, seeds)
+            yield replace(here, candidate=best.candidate, values=found[best.candidate])
+            left = _not_in(found, _promising(tried))
+    knobs = tuple(knob for candidate in found for knob in candidate.knobs)
+    if len(knobs) > 1:
+        values = tuple(value for values in found.values() for value in values)
+        yield replace(here, candidate=Candidate("all of it", knobs, ()), values=values)
+
+
+def _not_in(found: Iterable[Candidate], group: Iterable[Candidate]) -> list[Candidate]:
+    names = {one.name for one in found}
+    return [one for one in group if one.name not in names]
 
 
 def _together(
-    bench: Bench, chain: Sequence[Added], last: Added, windows: Windows, seeds: Sequence[int]
+    bench: Bench,
+    found: dict[Candidate, tuple[float, ...]],
+    last: Added,
+    windows: Windows,
+    seeds: Sequence[int],
 ) -> Added:
-    """Return the last model with the keys of all effects refined, now that all are there."""
-    values = {one.candidate: one.values for one in chain if one.candidate.knobs}
+    """Return the last model with the keys of all that was found refined, and keep them there."""
     here = last
+    if len(found) < 2:
+        return here
     for _ in range(PASSES):
         before = here.score
-        for candidate, value in list(values.items()):
-            current = replace(here, candidate=candidate, values=value)
+        for candidate in [one for one in found if one.knobs]:
+            current = replace(here, candidate=candidate, values=found[candidate])
             better = _refined(bench, current, here.config, windows, seeds)
             if better.score < here.score:
-                here, values[candidate] = better, better.values
+                here, found[candidate] = better, better.values
         if before - here.score < LEAST_GAIN:
             break
-    if here is last:
-        return last
-    knobs = tuple(knob for candidate in values for knob in candidate.knobs)
-    refined = Candidate("all refined together", knobs, ())
-    return replace(here, candidate=refined, values=tuple(v for one in values.values() for v in one))
+    return here
 
 
-def _promising(tried: Sequence[Added], added: Added, own: Sequence[Candidate]) -> list[Candidate]:
-    """Return the better half of what was tried of the camera, without what is added, each once."""
-    kept = [trial.candidate for trial in tried[: -(-len(tried) // 2)]]
-    left = [one for one in dict.fromkeys(kept) if one.name != added.candidate.name]
-    return [one for one in left if one not in own]
+def _promising(tried: Sequence[Added]) -> list[Candidate]:
+    """Return the better half of what was tried, each once."""
+    return list(dict.fromkeys(trial.candidate for trial in tried[: -(-len(tried) // 2)]))
 
 
 def _probed(
