@@ -9,7 +9,6 @@ with all that decides what code is needed, fills the cache from which the large 
 
 from __future__ import annotations
 
-import gc
 import json
 import subprocess
 import sys
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config, from_dict, to_dict
+from adv2e.garbage import collect_seldom
 from adv2e.jit import keeps_code
 
 _ROWS, _COLUMNS = 40, 64
@@ -91,7 +91,7 @@ def main() -> None:
     from adv2e.pipeline import convert  # noqa: PLC0415
     from adv2e.reading import Reading  # noqa: PLC0415
 
-    gc.set_threshold(200_000, 20, 20)  # the compiler's million objects stay
+    collect_seldom()
     request = json.load(sys.stdin)
     with tempfile.TemporaryDirectory(prefix="adv2e-compiling-") as folder:
         source = Path(folder) / "frames.npy"

@@ -167,15 +167,15 @@ class _Entry(_Compiled):
         return call(contents) if call else self.dispatcher(*arguments)
 
     def _code(self, kind: Any, arguments: tuple[Any, ...]) -> Callable[[list[Any]], Any] | None:
+        # the folder stands for the sources of this package alone
+        if _PACKAGE not in Path(self._function.__code__.co_filename).resolve().parents:
+            return load(_numba().translate(self.dispatcher, arguments), kind)
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         path = file_of(_FOLDER, name, kind)
-        # the folder stands for the sources of this package alone
-        ours = _PACKAGE in Path(self._function.__code__.co_filename).resolve().parents
-        code = read_code(path) if ours else None
+        code = read_code(path)
         if code is None:
             code = _numba().translate(self.dispatcher, arguments)
-            if ours:
-                write_code(path, code)
+            write_code(path, code)
         return load(code, kind)
 
 
@@ -197,12 +197,8 @@ class _Intrinsic:
 
 
 def kernel(function: Function) -> Function:
-    """Compile `function`, cached in :func:`cache_folder`; it must not make arrays.
-
-    Without Numba's run-time (``_nrt``) there is no counting of references to arrays, which costs
-    more than the arithmetic of a short function.
-    """
-    return _wrapped(_Compiled, function, cached=True, _nrt=False)
+    """Compile `function`, cached in :func:`cache_folder`; it must not make arrays."""
+    return _wrapped(_Compiled, function, cached=True)
 
 
 def entry(function: Function) -> Function:
@@ -211,12 +207,12 @@ def entry(function: Function) -> Function:
     It takes numbers, arrays, and tuples and named tuples of these, all by position, and returns
     numbers or nothing; what returns anything else, Numba calls.
     """
-    return _wrapped(_Entry, function, cached=True, _nrt=False)
+    return _wrapped(_Entry, function, cached=True)
 
 
 def inlined(function: Function) -> Function:
     """Compile `function` into each of its callers: for long functions with one caller."""
-    return _wrapped(_Compiled, function, cached=False, inline="always", _nrt=False)
+    return _wrapped(_Compiled, function, cached=False, inline="always")
 
 
 def intrinsic(plainly: Function) -> Callable[[Callable[..., Any]], Function]:

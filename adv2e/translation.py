@@ -92,8 +92,12 @@ class _LateCache:
 def make_dispatcher(
     function: Callable[..., Any], folder: Path, *, cached: bool, **options: Any
 ) -> Any:
-    """Return Numba's stand-in for a function, whose machine code is kept below `folder`."""
-    options |= {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+    """Return Numba's stand-in for a function, whose machine code is kept below `folder`.
+
+    Without Numba's run-time (``_nrt``) there is no counting of references to arrays, which costs
+    more than the arithmetic of a short function.
+    """
+    options |= {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
     # nobody calls it as a function of C: a twentieth of the time to compile
     made: Any = _numba.njit(no_cfunc_wrapper=True, **options)(function)
     if cached:

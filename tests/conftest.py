@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import signal
 import sys
 from collections.abc import Iterator
@@ -12,9 +11,9 @@ from typing import NamedTuple
 import pytest
 
 from adv2e.cli import main
+from adv2e.garbage import collect_seldom
 
-# the compiler's million objects stay: to search them for garbage took a fourteenth of the run
-gc.set_threshold(200_000, 20, 20)
+collect_seldom()  # to search the compiler's objects for cycles took a fourteenth of the run
 
 LONGEST_S = 400
 """After that a test hangs.  Where it does so is printed before; see faulthandler_timeout."""

@@ -15,6 +15,7 @@ import click
 
 from adv2e import __version__
 from adv2e.cli.run import flush_stdout, reporting, stopping_on_signals
+from adv2e.garbage import collect_seldom
 
 COMMANDS = {
     "convert": "Turn a video or frames into events.",
@@ -95,12 +96,9 @@ class Program(click.Group):
 def _rare_collection() -> Iterator[None]:
     """Let the body make many objects before Python looks for cycles among them.
 
-    Imports make tens of thousands that stay, and compiling a million; looking through them again
-    and again, while they are made and once more at the end of the program, would take longer than a
-    short run may.
+    At the end of the program it does not look at all.
     """
-    before = gc.get_threshold()
-    gc.set_threshold(200_000, 20, 20)
+    before = collect_seldom()
     atexit.register(gc.freeze)
     try:
         yield
