@@ -1,12 +1,13 @@
 """In-between frames made once for many simulations, where making them takes longer than all else.
 
-Frames along the motion depend on the frames alone, so they can be given to the pixels as if they
-had been recorded.  What acts on the light of each frame is laid over them: it moves the motion that
-is found by next to nothing.
+Frames along the motion depend on the frames and their exposure alone, so they can be given to the
+pixels as if they had been recorded.  What else acts on the light of each frame is laid over them:
+it moves the motion that is found by next to nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.keys import user_effects
+from adv2e.effects.frames.motion_blur import MotionBlurHooks
 from adv2e.upsampling import make_upsampler
-from adv2e.upsampling.sequence import neighbours
+from adv2e.upsampling.sequence import Timed, neighbours
 
 Instants = tuple[list[int], NDArray[np.float32]]
 """Times [ns], and the light at them [DN], (instants, rows, columns)."""
@@ -32,14 +34,13 @@ def is_made_once(config: Config) -> bool:
         sampling.interpolation != "linear"
         and sampling.L > 1
         and sampling.last_interval != "printed"
-        and not config.frames.exposure_us
         and (config.readout is None or config.readout.frame_coupling is None)
         and not any(getattr(user, name) is not None for name in user_effects(config))
     )
 
 
 def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Instants:
-    """Return the frames and what is between them.
+    """Return the frames and what is between them, sharp where they are exposed.
 
     Parameters
     ----------
@@ -51,13 +52,22 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     """
     count = config.sampling.L
     upsampler = make_upsampler(config.sampling.interpolation, count)
-    times, found = times_ns[:1], [light[0]]
-    for (t0, first), (t1, second), beside in neighbours(zip(times_ns, light, strict=True)):
+    frames: Iterator[Timed] = zip(times_ns, light, strict=True)
+    if config.frames.exposure_us:
+        frames = MotionBlurHooks(config.frames.exposure_us).light(frames)
+    times: list[int] = []
+    found: list[NDArray[np.float32]] = []
+    for (t0, first), (t1, second), beside in neighbours(frames):
+        if not times:
+            times.append(t0)
+            found.append(first)
         times += [t0 + ((t1 - t0) * k + count // 2) // count for k in range(1, count + 1)]
         found += list(upsampler.between(first, second, beside))
     return times, np.array(found, np.float32)
 
 
 def as_recorded(config: Config) -> Config:
-    """Return `config` for frames between which nothing is to be made."""
-    return replace(config, sampling=replace(config.sampling, L=1, interpolation="linear"))
+    """Return `config` for frames between which nothing is to be made, and that are sharp."""
+    frames = replace(config.frames, exposure_us=0.0)
+    sampling = replace(config.sampling, L=1, interpolation="linear")
+    return replace(config, frames=frames, sampling=sampling)

@@ -80,7 +80,8 @@ class Simulator:
     def _light(self, config: Config) -> Instants:
         """Return the light of the frames, made once for each way to read their numbers."""
         frames, sampling = config.frames, config.sampling
-        between = (sampling.interpolation, sampling.L) if is_made_once(config) else None
+        made_once = sampling.interpolation, sampling.L, frames.exposure_us
+        between = made_once if is_made_once(config) else None
         key = (frames.encoding, frames.full_scale, between)
         with self._lock:
             if key not in self._decoded:

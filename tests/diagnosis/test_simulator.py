@@ -118,24 +118,39 @@ def test_coarser_steps_of_time_make_the_same_events(simulator, monkeypatch):
 FLOW = [*LINEAR, "sampling.interpolation=flow", "sampling.L=4", "sampling.last_interval=corrected"]
 
 
-def test_frames_along_the_motion_are_made_once_and_the_same(simulator, monkeypatch):
+def moving(k):
+    """Return a texture after `k` steps, large enough for its motion to be found."""
+    x, y = np.meshgrid(np.arange(48.0) - 2.3 * k, np.arange(40.0) + 0.7 * k)
+    waves = np.sin(0.5 * x + 0.2 * y) + np.sin(0.31 * y - 0.13 * x) + np.sin(0.22 * x)
+    return (100.0 + 30.0 * waves).astype(np.uint8)
+
+
+@pytest.mark.parametrize("exposed", [[], ["frames.exposure_us=6000"]])
+def test_frames_along_the_motion_are_made_once_and_the_same(monkeypatch, exposed):
     made = []
     monkeypatch.setattr(
         "adv2e.diagnosis.instants.make_upsampler",
         lambda *arguments: made.append(1) or make_upsampler(*arguments),
     )
-    config = load_config([], [*FLOW, "pixel.refractory.period_us=300"])
-    light = zip(EVIDENCE.times_ns, light_of(EVIDENCE, config), strict=True)
+    frames = [moving(k) for k in range(8)]
+    evidence = Evidence("made up", frames, 0.01 * np.arange(8), random_stream(10), 48, 40)
+    simulator = Simulator(evidence, 2)
+    config = load_config([], [*FLOW, "pixel.refractory.period_us=300", *exposed])
+    light = zip(evidence.times_ns, light_of(evidence, config), strict=True)
     whole = np.concatenate(list(events_from_light(light, replace(config, seed=5))))
-    whole = whole[whole["t"] < 200_000]
+    whole = whole[whole["t"] < 70_000]
+    assert len(whole) > 1000
     np.testing.assert_array_equal(simulator.stream(config, 5).t, whole["t"])
-    simulator.stream(load_config([], [*FLOW, "pixel.leak.rate_hz=4"]), 6)
+    simulator.stream(load_config([], [*FLOW, "pixel.leak.rate_hz=4", *exposed]), 6)
     assert len(made) == 1
+    simulator.stream(load_config([], [*FLOW, "frames.exposure_us=3000"]), 5)
+    assert len(made) == 2
+    simulator.close()
 
 
 @pytest.mark.parametrize(
     "sets",
-    [["frames.exposure_us=3000"], ["readout.frame_coupling.amplitude=0.05"], ["sampling.L=1"]],
+    [["readout.frame_coupling.amplitude=0.05"], ["sampling.L=1"]],
 )
 def test_where_frames_matter_they_are_the_recorded_ones(simulator, monkeypatch, sets):
     monkeypatch.setattr("adv2e.diagnosis.simulations.made", None)
