@@ -57,6 +57,13 @@ class Frames(Section):
         meaning="light that the decoded frames lack at every brightness",
         fit=Fit(-20.0, 20.0, 0.0),
     )
+    black_depth_dn: float = parameter(
+        0.0,
+        unit="DN",
+        meaning="how far light falls on inside areas that the frames clip at 0",
+        at_least=0,
+        fit=Fit(0.0, 20.0, 0.0),
+    )
     exposure_us: float = parameter(
         0.0,
         unit="us",

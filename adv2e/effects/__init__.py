@@ -51,7 +51,7 @@ EFFECTS = (
     Effect("frames", "encoding", ("frames.encoding", "frames.full_scale")),
     Effect("frames", "clock_drift", ("frames.clock_drift_ppm",)),
     Effect("frames", "clock_offset", ("frames.clock_offset_us",)),
-    Effect("frames", "black_level", ("frames.black_level_dn",)),
+    Effect("frames", "black_level", ("frames.black_level_dn", "frames.black_depth_dn")),
     Effect("frames", "exposure_blur", ("frames.exposure_us",)),
     Effect("frames", "misregistration", ("frames.shift_px",)),
     Effect("frames", "flicker"),

@@ -51,8 +51,8 @@ def _of_frames(frames: Frames, sampling: Sampling) -> list[Hooks]:
         hooks.append(ClockDriftHooks(frames.clock_drift_ppm))
     if frames.clock_offset_us:
         hooks.append(ClockOffsetHooks(frames.clock_offset_us))
-    if frames.black_level_dn:
-        hooks.append(BlackLevelHooks(frames.black_level_dn))
+    if frames.black_level_dn or frames.black_depth_dn:
+        hooks.append(BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn))
     if frames.exposure_us:
         moves = sampling.interpolation == "flow"
         hooks.append((MotionBlurHooks if moves else ExposureBlurHooks)(frames.exposure_us))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.comparison.windows import Windows
 from adv2e.config import Config
@@ -19,6 +20,9 @@ PASSES = 2
 """Rounds in which all that was added is refined together after each addition, at most."""
 MOST = 9
 """Effects at most, with choices of the simulation."""
+STEPS = (0.3, 0.15, 0.07)
+MOVES = 4
+"""Steps of the search over all keys at the end, and how often each is repeated, at most."""
 NOISE_HZ = 0.1
 NOISES = ("leak", "photo_leak", "shot_noise", "photoreceptor_noise", "hot_pixels")
 """What makes events by itself is not added if it moves still pixels farther from the measured rate
@@ -37,6 +41,14 @@ OWN = (
         (("sampling.interpolation", "flow"), ("sampling.last_interval", "corrected")),
     ),
     Candidate("initial_reference", (), ((),), (("pixel.initial_reference", "random"),)),
+    Candidate(
+        "clipped_black",
+        (
+            Knob("frames.black_level_dn", 0.02, 100.0),
+            Knob("frames.black_depth_dn", 0.01, 100.0),
+        ),
+        ((9.0, 3.0), (14.0, 5.0)),
+    ),
     Candidate(
         "log_response",
         (Knob("pixel.log_response.linear_below", 0.5, 100.0),),
@@ -145,10 +157,8 @@ def forward(
             here = _together(bench, found, best, windows, seeds)
             yield replace(here, candidate=best.candidate, values=found[best.candidate])
             left = _not_in(found, _promising(tried))
-    knobs = tuple(knob for candidate in found for knob in candidate.knobs)
-    if len(knobs) > 1:
-        values = tuple(value for values in found.values() for value in values)
-        yield replace(here, candidate=Candidate("all of it", knobs, ()), values=values)
+    if sum(len(candidate.knobs) for candidate in found) > 1:
+        yield _settled(bench, found, here, windows, seeds)
 
 
 def _not_in(found: Iterable[Candidate], group: Iterable[Candidate]) -> list[Candidate]:
@@ -177,6 +187,68 @@ def _together(
         if before - here.score < LEAST_GAIN:
             break
     return here
+
+
+def _settled(
+    bench: Bench,
+    found: dict[Candidate, tuple[float, ...]],
+    last: Added,
+    windows: Windows,
+    seeds: Sequence[int],
+) -> Added:
+    """Return the last model with all keys sought together: a pattern search [1]_.
+
+    References
+    ----------
+    .. [1] R. Hooke, T. A. Jeeves, "Direct Search Solution of Numerical and Statistical Problems",
+       JACM 8(2), 1961, doi:10.1145/321062.321069.
+    """
+    counts = [len(candidate.knobs) for candidate in found]
+    knobs = tuple(knob for candidate in found for knob in candidate.knobs)
+    start = [
+        place
+        for candidate, values in found.items()
+        for place in np.asarray(candidate.inner(values), float)
+    ]
+    unit = np.array(
+        [1.0 if knob.log else max(abs(p), 1.0) for knob, p in zip(knobs, start, strict=True)]
+    )
+    whole = Candidate("all of it", knobs, ())
+
+    def at(place: NDArray[np.float64]) -> Added:
+        config = last.config
+        for candidate, part in zip(found, np.split(place, np.cumsum(counts)[:-1]), strict=True):
+            config = candidate.applied(config, part)
+        config = bench.matched(config, windows)
+        values = tuple(knob.outer(inner) for knob, inner in zip(knobs, place, strict=True))
+        return Added(whole, values, config, *bench.score(config, windows, seeds))
+
+    def around(
+        place: NDArray[np.float64], best: Added, step: float
+    ) -> tuple[NDArray[np.float64], Added]:
+        for k in range(len(knobs)):
+            for sign in (1.0, -1.0):
+                other = place.copy()
+                other[k] += sign * step * unit[k]
+                trial = at(other)
+                if trial.score < best.score:
+                    place, best = other, trial
+                    break
+        return place, best
+
+    here = np.array(start)
+    best = replace(last, candidate=whole, values=tuple(v for one in found.values() for v in one))
+    for step in STEPS:
+        for _ in range(MOVES):
+            found_at, better = around(here, best, step)
+            if better.score >= best.score:
+                break
+            ahead = 2.0 * found_at - here
+            here, best = found_at, better
+            trial = at(ahead)
+            if trial.score < best.score:
+                here, best = ahead, trial
+    return best
 
 
 def _promising(tried: Sequence[Added]) -> list[Candidate]:

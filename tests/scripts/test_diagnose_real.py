@@ -115,6 +115,41 @@ def test_noise_in_still_pixels_is_no_explanation(scripts):
     assert not Added.plain("unknown", load_config(), 0.7).noisier(before, None)
 
 
+class Valley:
+    """A bench whose score is least at 14 DN, 5 DN and 2 ms, along a valley that no key follows."""
+
+    tried = 0
+
+    def matched(self, config, windows):
+        return config
+
+    def score(self, config, windows, seeds):
+        self.tried += 1
+        frames = config.frames
+        level, depth = np.log([frames.black_level_dn / 14.0, frames.black_depth_dn / 5.0])
+        late = frames.clock_offset_us / 1000.0 - 2.0
+        return 0.5 + (level - depth) ** 2 + 0.1 * (level + depth) ** 2 + 0.02 * late**2, None
+
+
+def test_the_last_search_moves_all_keys_together(scripts):
+    from real.search import OWN, Added, _settled
+
+    (clipped,) = (one for one in OWN if one.name == "clipped_black")
+    offset = Candidate("clock_offset", (Knob("frames.clock_offset_us", -1e6, 1e6, False, 1e3),), ())
+    found = {clipped: (7.0, 3.5), offset: (600.0,)}
+    config = load_config([], [
+        "frames.black_level_dn=7", "frames.black_depth_dn=3.5", "frames.clock_offset_us=600",
+    ])  # fmt: skip
+    bench = Valley()
+    last = Added.plain("last", config, *bench.score(config, None, ()))
+    best = _settled(bench, found, last, None, ())
+    assert best.values == pytest.approx((14.0, 5.0, 2000.0), rel=0.1)
+    assert best.config.frames.black_level_dn == best.values[0]
+    assert best.score == pytest.approx(0.5, abs=3e-3)
+    assert bench.tried < 120
+    assert best.text().startswith("all of it (black_level_dn 1")
+
+
 def test_every_second_frame_and_the_ends_stay(scripts, recording):
     from real.recording import read
 
