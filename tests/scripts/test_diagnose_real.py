@@ -132,11 +132,10 @@ class Valley:
 
 
 def test_the_last_search_moves_all_keys_together(scripts):
-    from real.search import OWN, Added, _settled
+    from real.search import CLIPPED_BLACK, Added, _settled
 
-    (clipped,) = (one for one in OWN if one.name == "clipped_black")
     offset = Candidate("clock_offset", (Knob("frames.clock_offset_us", -1e6, 1e6, False, 1e3),), ())
-    found = {clipped: (7.0, 3.5), offset: (600.0,)}
+    found = {CLIPPED_BLACK: (7.0, 3.5), offset: (600.0,)}
     config = load_config([], [
         "frames.black_level_dn=7", "frames.black_depth_dn=3.5", "frames.clock_offset_us=600",
     ])  # fmt: skip
@@ -190,6 +189,7 @@ def test_tables_before_and_after_each_effect(scripts, recording, declared, tmp_p
     from real import search
 
     monkeypatch.setattr(search, "OWN", ())
+    monkeypatch.setattr(search, "CLIPPED_BLACK", BLACK_LEVEL)
     monkeypatch.setattr(search, "library", lambda *_: [BLACK_LEVEL])
 
     out = tmp_path / "table.md"
