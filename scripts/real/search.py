@@ -43,7 +43,7 @@ OWN = (
     Candidate("initial_reference", (), ((),), (("pixel.initial_reference", "random"),)),
     Candidate(
         "log_response",
-        (Knob("pixel.log_response.linear_below", 0.5, 100.0),),
+        (Knob("pixel.log_response.linear_below", 1.01, 100.0),),
         ((2.72,), (10.0,), (40.0,)),
         (("pixel.log_response.floor", 0.5),),
     ),
