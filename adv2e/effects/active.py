@@ -12,7 +12,6 @@ from adv2e.effects.frames.clock_offset import ClockOffsetHooks
 from adv2e.effects.frames.exposure_blur import ExposureBlurHooks
 from adv2e.effects.frames.flicker import FlickerHooks
 from adv2e.effects.frames.misregistration import MisregistrationHooks
-from adv2e.effects.frames.motion_blur import MotionBlurHooks
 from adv2e.effects.hooks import Hooks
 from adv2e.effects.pixel.dark_current import DarkCurrentHooks
 from adv2e.effects.pixel.dead_pixels import DeadPixelsHooks
@@ -54,13 +53,21 @@ def _of_frames(frames: Frames, sampling: Sampling) -> list[Hooks]:
     if frames.black_level_dn or frames.black_depth_dn:
         hooks.append(BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn))
     if frames.exposure_us:
-        moves = sampling.interpolation == "flow"
-        hooks.append((MotionBlurHooks if moves else ExposureBlurHooks)(frames.exposure_us))
+        hooks.append(_of_exposure(frames.exposure_us, sampling.interpolation))
     if any(frames.shift_px):
         hooks.append(MisregistrationHooks(frames.shift_px))
     if frames.flicker is not None and frames.flicker.depth:
         hooks.append(FlickerHooks(frames.flicker))
     return hooks
+
+
+def _of_exposure(exposure_us: float, interpolation: str) -> Hooks:
+    if interpolation != "flow":
+        return ExposureBlurHooks(exposure_us)
+    # imported late: few conversions need it, and all would load its compiled loops
+    from adv2e.effects.frames.motion_blur import MotionBlurHooks  # noqa: PLC0415
+
+    return MotionBlurHooks(exposure_us)
 
 
 def _of_pixel(pixel: Pixel) -> list[Hooks]:

@@ -140,13 +140,13 @@ def velocity(
         # the slope at 0 of the parabola through three points
         share = np.float32(span_before / (span_after + span_before))
         both = u * share + ru * (1 - share), v * share + rv * (1 - share)
-        fast, slow = np.hypot(u, v), np.hypot(ru, rv)
+        speed, other = np.hypot(u, v), np.hypot(ru, rv)
         apart = np.hypot(u - ru, v - rv)
         unit = min(span_after, span_before)
-        differ = apart > _AGREE * np.maximum(fast, slow) + _AGREE_PX / unit
+        differ = apart > _AGREE * np.maximum(speed, other) + _AGREE_PX / unit
         seen, also = (motion.score < ONE_SIDED for motion, _ in sides)
-        first = (seen & ~also) | ((seen == also) & differ & (fast <= slow))
-        second = (also & ~seen) | ((seen == also) & differ & (fast > slow))
+        first = (seen & ~also) | ((seen == also) & differ & (speed <= other))
+        second = (also & ~seen) | ((seen == also) & differ & (speed > other))
         found = (
             np.where(first, u, np.where(second, ru, both[0])),
             np.where(first, v, np.where(second, rv, both[1])),
