@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from adv2e.config.model import Sampling
 from adv2e.errors import DataError
 from adv2e.upsampling import make_upsampler
-from adv2e.upsampling.sequence import Timed, neighbours
+from adv2e.upsampling.sequence import Timed, instant_ns, neighbours
 
 FRAME_BYTES = 16 << 20
 """Memory for the frames of one part."""
@@ -145,13 +145,13 @@ class Intervals:
             for now_ns, now in frames:
                 self._hold(now)
                 for step in range(1, count + 1):
-                    share, t_ns = step / count, _instant_ns(before_ns, now_ns, step, count)
+                    share, t_ns = step / count, instant_ns(before_ns, now_ns, step, count)
                     yield _Instant(self._count - 2, share, t_ns, step == count)
                 before_ns = now_ns
             return
         for (start_ns, a), (stop_ns, b), beside in neighbours(chain([self._first], frames)):
             for step, made in enumerate(upsampler.between(a, b, beside), start=1):
-                t_ns = _instant_ns(start_ns, stop_ns, step, count)
+                t_ns = instant_ns(start_ns, stop_ns, step, count)
                 yield _Instant(self._hold(made), 1.0, t_ns, step == count)
 
     def _part(self, intervals: int) -> Part:
@@ -179,8 +179,3 @@ class Intervals:
             _Instant(instant.before - first, instant.share, instant.t_ns, instant.ends)
             for instant in kept
         ]
-
-
-def _instant_ns(start_ns: int, stop_ns: int, step: int, count: int) -> int:
-    """Return the time of a step of an interval, to the nearest ns."""
-    return start_ns + ((stop_ns - start_ns) * step + count // 2) // count

@@ -17,7 +17,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.keys import user_effects
 from adv2e.effects.frames.motion_blur import MotionBlurHooks
 from adv2e.upsampling import make_upsampler
-from adv2e.upsampling.sequence import Timed, neighbours
+from adv2e.upsampling.sequence import Timed, instant_ns, neighbours
 
 Instants = tuple[list[int], NDArray[np.float32]]
 """Times [ns], and the light at them [DN], (instants, rows, columns)."""
@@ -61,7 +61,7 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
         if not times:
             times.append(t0)
             found.append(first)
-        times += [t0 + ((t1 - t0) * k + count // 2) // count for k in range(1, count + 1)]
+        times += [instant_ns(t0, t1, k, count) for k in range(1, count + 1)]
         found += list(upsampler.between(first, second, beside))
     return times, np.array(found, np.float32)
 

@@ -33,6 +33,11 @@ class Beside:
 NOTHING = Beside()
 
 
+def instant_ns(start_ns: int, stop_ns: int, step: int, count: int) -> int:
+    """Return the time of a step of an interval of `count`, to the nearest ns."""
+    return start_ns + ((stop_ns - start_ns) * step + count // 2) // count
+
+
 def neighbours(frames: Iterable[Timed]) -> Iterator[tuple[Timed, Timed, Beside]]:
     """Yield each pair of neighbours with what lies beside it; reads one frame ahead.
 

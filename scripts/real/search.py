@@ -205,25 +205,17 @@ def _settled(
     .. [1] R. Hooke, T. A. Jeeves, "Direct Search Solution of Numerical and Statistical Problems",
        JACM 8(2), 1961, doi:10.1145/321062.321069.
     """
-    counts = [len(candidate.knobs) for candidate in found]
     knobs = tuple(knob for candidate in found for knob in candidate.knobs)
-    start = [
-        place
-        for candidate, values in found.items()
-        for place in np.asarray(candidate.inner(values), float)
-    ]
-    unit = np.array(
-        [1.0 if knob.log else max(abs(p), 1.0) for knob, p in zip(knobs, start, strict=True)]
-    )
+    values = tuple(value for values in found.values() for value in values)
     whole = Candidate("all of it", knobs, ())
+    here = np.array(whole.inner(values))
+    unit = np.array(
+        [1.0 if knob.log else max(abs(p), 1.0) for knob, p in zip(knobs, here, strict=True)]
+    )
 
     def at(place: NDArray[np.float64]) -> Added:
-        config = last.config
-        for candidate, part in zip(found, np.split(place, np.cumsum(counts)[:-1]), strict=True):
-            config = candidate.applied(config, part)
-        config = bench.matched(config, windows)
-        values = tuple(knob.outer(inner) for knob, inner in zip(knobs, place, strict=True))
-        return Added(whole, values, config, *bench.score(config, windows, seeds))
+        outer = tuple(knob.outer(inner) for knob, inner in zip(knobs, place, strict=True))
+        return _trial(bench, whole, outer, last.config, windows, seeds)
 
     def around(
         place: NDArray[np.float64], best: Added, step: float
@@ -238,8 +230,7 @@ def _settled(
                     break
         return place, best
 
-    here = np.array(start)
-    best = replace(last, candidate=whole, values=tuple(v for one in found.values() for v in one))
+    best = replace(last, candidate=whole, values=values)
     for step in STEPS:
         for _ in range(MOVES):
             found_at, better = around(here, best, step)
