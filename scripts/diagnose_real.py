@@ -23,15 +23,17 @@ import click
 from real.model import SCORE, Bench, Judged
 from real.peers import peer_rows
 from real.recording import Real, halves, read
-from real.search import UNSEEN, Added, forward
+from real.search import Search
 from real.stability import MOST as UNSTABLE
 from real.stability import Stability, compare_halved, stable_score
 from real.table import line, number
+from real.tried import UNSEEN, Added
 
 from adv2e.comparison.distances import distances
 from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows, cut
-from adv2e.config import load_config
+from adv2e.config import Config, load_config, to_dict
+from adv2e.diagnosis.keys import flat
 from adv2e.diagnosis.nuisances import totals
 from adv2e.errors import Adv2eError, OutputError
 from adv2e.events import Events, empty_events
@@ -99,6 +101,7 @@ def _preamble(declared: str, only: Sequence[str]) -> str:
         f"Declared: {declared}. Distances relative to the measured grid, median over frame"
         " intervals, means over two seeds, on the second half of the intervals, which nothing was"
         " fitted to; 1 is as far as no events. In brackets: the distance between the two seeds."
+        f" 'mean': '{COLUMNS[SCORE]}' without the simulation's own chance, as of a mean of many."
         " 'over time' is the error of `adv2e compare`. Events and ON share: simulated over"
         f" measured. Camera effects tried: {tried}."
     )
@@ -117,7 +120,7 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
     config = load_config([declared], seed=seed)
     as_declared = Added.plain("as declared", config)
     steps = [Step(as_declared, bench.judge(config, second, seeds))]
-    for added in forward(bench, config, first, (seed,), say, only):
+    for added in Search(bench, first, say).run(config, only):
         settled = replace(added, config=bench.matched(added.config, first, tolerance=0.01))
         steps.append(Step(settled, bench.judge(settled.config, second, seeds)))
         say(f"{added.text()}: {added.score:.3f}, held out {steps[-1].judged.values[SCORE]:.3f}")
@@ -132,7 +135,7 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
         [
             f"## {real.name}",
             _table(real, steps, second),
-            _found(last),
+            _found(last, config),
             _bound(stability, alone),
             _beside_peers(real, last),
         ]
@@ -158,11 +161,12 @@ def _stability(
 def _table(real: Real, steps: list[Step], windows: Windows) -> str:
     measured = cut(real.events, windows.start, windows.stop)
     share = totals(measured)[0] / len(measured)
-    names = ["added", "ON / OFF threshold [ln]", "events", "ON share", *COLUMNS.values()]
+    names = ["added", "ON / OFF threshold [ln]", "events", "ON share", *COLUMNS.values(), "mean"]
     lines = [line(names), line(["---"] * len(names))]
     for step in steps:
         levels, judged = step.added.config.pixel.thresholds, step.judged
         cells = [f"{number(judged.values[n])} ({number(judged.floor[n])})" for n in COLUMNS]
+        cells.append(number(judged.without_chance(SCORE)))
         lines.append(
             line(
                 [
@@ -177,7 +181,7 @@ def _table(real: Real, steps: list[Step], windows: Windows) -> str:
     split = half_split(real.events, windows, *real.size)
     nothing = distances(real.events, empty_events(), windows, *real.size).values
     for label, values in (("half split (Poisson)", split), ("no events at all", nothing)):
-        lines.append(line([label, "", "", "", *_cells(values)]))
+        lines.append(line([label, "", "", "", *_cells(values), ""]))
     return "\n".join(lines)
 
 
@@ -185,11 +189,19 @@ def _cells(values: Floor) -> list[str]:
     return [number(values[name]) for name in COLUMNS]
 
 
-def _found(last: Step) -> str:
-    ratio = last.judged.events_ratio
+def _found(last: Step, declared: Config) -> str:
+    ratio, config = last.judged.events_ratio, last.added.config
+    before = dict(flat(to_dict(declared)))
+    keys = [
+        f"{key}={f'{value:.5g}' if isinstance(value, float) else value}"
+        for key, value in flat(to_dict(config))
+        if value != before.get(key)
+    ]
     return (
         f"After the last step the second half has {ratio:.2f} times the measured events, with"
-        " thresholds that match the totals of the first."
+        " thresholds that match the totals of the first. Keys that differ from those declared: "
+        + ", ".join(f"`{key}`" for key in keys)
+        + "."
     )
 
 

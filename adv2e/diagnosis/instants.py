@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.keys import user_effects
-from adv2e.effects.frames.motion_blur import MotionBlurHooks
+from adv2e.effects.active import exposure_hooks
 from adv2e.upsampling import make_upsampler
 from adv2e.upsampling.sequence import Timed, instant_ns, neighbours
 
@@ -50,11 +50,11 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     light : (frames, rows, columns)
         [DN]
     """
-    count = config.sampling.L
-    upsampler = make_upsampler(config.sampling.interpolation, count)
+    way, count = config.sampling.interpolation, config.sampling.L
+    upsampler = make_upsampler(way, count)
     frames: Iterator[Timed] = zip(times_ns, light, strict=True)
     if config.frames.exposure_us:
-        frames = MotionBlurHooks(config.frames.exposure_us).light(frames)
+        frames = exposure_hooks(config.frames.exposure_us, way).light(frames)
     times: list[int] = []
     found: list[NDArray[np.float32]] = []
     for (t0, first), (t1, second), beside in neighbours(frames):

@@ -53,7 +53,7 @@ def _of_frames(frames: Frames, sampling: Sampling) -> list[Hooks]:
     if frames.black_level_dn or frames.black_depth_dn:
         hooks.append(BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn))
     if frames.exposure_us:
-        hooks.append(_of_exposure(frames.exposure_us, sampling.interpolation))
+        hooks.append(exposure_hooks(frames.exposure_us, sampling.interpolation))
     if any(frames.shift_px):
         hooks.append(MisregistrationHooks(frames.shift_px))
     if frames.flicker is not None and frames.flicker.depth:
@@ -61,7 +61,8 @@ def _of_frames(frames: Frames, sampling: Sampling) -> list[Hooks]:
     return hooks
 
 
-def _of_exposure(exposure_us: float, interpolation: str) -> Hooks:
+def exposure_hooks(exposure_us: float, interpolation: str) -> Hooks:
+    """Return what puts back the light that an exposure took away, for a way to interpolate."""
     if interpolation != "flow":
         return ExposureBlurHooks(exposure_us)
     # imported late: few conversions need it, and all would load its compiled loops

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,23 +14,24 @@ from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
-from adv2e.config.model import Frames
+from adv2e.diagnosis.instants import as_recorded, made
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
-from adv2e.effects.active import active_hooks
-from adv2e.effects.composition import begin
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.events import Events
 from adv2e.simulation import events_from_light
-from adv2e.upsampling import make_upsampler
-from adv2e.upsampling.sequence import neighbours
 from real.recording import Real, still_rate
 
 SCORE = "relative_5_bins_smoothed"
-"""What the search goes by."""
+"""What the tables judge by."""
+SOUGHT = (SCORE, "relative_1_bin_smoothed")
+"""What the search goes by, their mean: by one alone, on few windows, it would fit chance."""
 NEAR = 0.03
 """Totals match to this while candidates are compared, relative."""
 BEYOND_US = 100_000
 """Frames are simulated to this long after the windows, as a clock offset may need them [us]."""
+
+KEPT = 4
+"""Ways to make in-between frames of which they are kept, at most."""
 
 Light = list[tuple[int, NDArray[Any]]]
 
@@ -43,6 +44,17 @@ class Judged:
     floor: Floor
     events_ratio: float
     on_share: float | None
+
+    def without_chance(self, name: str) -> float | None:
+        """Return how far the mean of many simulations would be: theirs apart is twice their chance.
+
+        Squared distances relative to one measured grid add up: of the mean, and of one simulation
+        about it.  Of the recording's own chance nothing is taken off.
+        """
+        value, apart = self.values[name], self.floor[name]
+        if value is None or apart is None:
+            return None
+        return float(np.sqrt(max(value**2 - 0.5 * apart**2, 0.0)))
 
 
 class Bench:
@@ -62,32 +74,26 @@ class Bench:
         """Return the events in the windows, from in-between frames made once."""
         self.simulations += 1
         if config.sampling.interpolation == "linear":
-            made = self.real.simulator(config, windows.stop + BEYOND_US, self.threads)(seed)
-            return cut(made, windows.start, windows.stop)
-        over = replace(config.frames, exposure_us=0.0)
-        sampling = replace(config.sampling, L=1, interpolation="linear")
-        lean = replace(config, frames=over, sampling=sampling, seed=seed)
-        light = self._instants(config)
+            whole = self.real.simulator(config, windows.stop + BEYOND_US, self.threads)(seed)
+            return cut(whole, windows.start, windows.stop)
+        lean = replace(as_recorded(config), seed=seed)
         until = (windows.stop + BEYOND_US) * 1000
-        used: Iterable[Any] = (pair for pair in light if pair[0] <= until)
+        used = ((t_ns, light) for t_ns, light in self._instants(config) if t_ns <= until)
         chunks = events_from_light(used, lean, threads=self.threads)
         return cut(np.concatenate(list(chunks)), windows.start, windows.stop)
 
     def _instants(self, config: Config) -> Light:
         """Return light between the frames, without black level and clock offset."""
-        only = Frames(exposure_us=config.frames.exposure_us)
         sampling = config.sampling
-        key = config.frames.encoding, only.exposure_us, sampling.interpolation, sampling.L
+        exposure_us = config.frames.exposure_us
+        key = config.frames.encoding, exposure_us, sampling.interpolation, sampling.L
         if key not in self._made:
-            bare = replace(config, frames=only, readout=None)
-            bare = replace(bare, pixel=replace(bare.pixel, dark_current=None, dead_pixels=None))
-            frames = list(begin(active_hooks(bare), self._decoded(config), config.seed))
-            upsampler = make_upsampler(sampling.interpolation, sampling.L, threads=2)
-            made = frames[:1]
-            for (t0, a), (t1, b), beside in neighbours(frames):
-                between = enumerate(upsampler.between(a, b, beside), start=1)
-                made += [(t0 + (t1 - t0) * k // sampling.L, light) for k, light in between]
-            self._made[key] = made
+            if len(self._made) == KEPT:
+                del self._made[next(iter(self._made))]
+            times_ns, frames = zip(*self._decoded(config), strict=True)
+            self._made[key] = list(
+                zip(*made(config, list(times_ns), np.array(frames)), strict=True)
+            )
         return self._made[key]
 
     def _decoded(self, config: Config) -> Iterator[tuple[int, NDArray[Any]]]:
@@ -114,15 +120,15 @@ class Bench:
     ) -> tuple[float, float | None]:
         """Return score and rate of the still pixels [Hz], means over seeds.
 
-        The score is the mean over the windows, not their median as in the tables: a search that
-        went by the median would fit the two windows in the middle.  It is infinite where there is
-        nothing to score.
+        The score is the mean over the windows of what is in `SOUGHT`, not their median as in the
+        tables: a search that went by the median would fit the two windows in the middle.  It is
+        infinite where there is nothing to score.
         """
         scores, rates = [], []
         for seed in seeds:
             events = self.quick(config, windows, seed)
             found = distances(self.real.events, events, windows, *self.real.size)
-            scores.append(pooled(found.per_window[SCORE], "mean"))
+            scores += [pooled(found.per_window[name], "mean") for name in SOUGHT]
             rates.append(still_rate(events, self.real.still, windows.duration_s))
         mean = pooled(scores, "mean")
         return np.inf if mean is None else mean, pooled(rates, "mean")

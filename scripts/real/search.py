@@ -3,286 +3,227 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.comparison.windows import Windows
 from adv2e.config import Config
 from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.library import Hints, library
 from real.model import Bench
+from real.pattern import Place, pattern_search
+from real.tried import EXACT, OWN, Added, of_the_camera
 
-LEAST_GAIN = 0.005
-"""An effect is added if it lowers the score by as much as this."""
+PRECISION = 0.001
+MOST_SEEDS = 4
+"""Simulated with seeds enough for the score to be known to this, at most so many."""
+LEAST_GAIN = 0.003
+"""An effect is added if it lowers the score by as much as this, and dropped if it no longer does:
+three times what the score is known to."""
 PASSES = 2
 """Rounds in which all that was added is refined together after each addition, at most."""
-MOST = 9
+MOST = 12
 """Effects at most, with choices of the simulation."""
 STEPS = (0.3, 0.15, 0.07)
 MOVES = 4
-"""Steps of the search over all keys at the end, and how often each is repeated, at most."""
-NOISE_HZ = 0.1
-NOISES = ("leak", "photo_leak", "shot_noise", "photoreceptor_noise", "hot_pixels")
-"""What makes events by itself is not added if it moves still pixels farther from the measured rate
-by more [Hz]: noise at random costs this score less than events in the wrong place, and is no
-explanation.  Other effects change the rate of still pixels through the thresholds that match the
-totals, by which noise of the frames fires, which is no noise of the camera's."""
-
-EXACT = Candidate("exact filter", (), ((),), (("pixel.low_pass.update", "exact"),))
-"""Replaces the printed filter, whose gain is known to be wrong, whatever that does to the score."""
-
-OWN = (
-    Candidate(
-        "interpolation",
-        (),
-        ((),),
-        (("sampling.interpolation", "flow"), ("sampling.last_interval", "corrected")),
-    ),
-    Candidate("initial_reference", (), ((),), (("pixel.initial_reference", "random"),)),
-    Candidate(
-        "log_response",
-        (Knob("pixel.log_response.linear_below", 1.01, 100.0),),
-        ((2.72,), (10.0,), (40.0,)),
-        (("pixel.log_response.floor", 0.5),),
-    ),
-)
-"""What is no effect of the camera, but of how its frames were simulated."""
-
-CLIPPED_BLACK = Candidate(
-    "clipped_black",
-    (
-        Knob("frames.black_level_dn", 0.02, 100.0),
-        Knob("frames.black_depth_dn", 0.01, 100.0),
-    ),
-    ((9.0, 3.0), (14.0, 5.0)),
-)
-"""Beside the black level of the library: how far light falls on where it is clipped at black."""
-
-UNSEEN = {
-    "thresholds": "matched to the totals each time",
-    "photoreceptor_noise": "solved pixel by pixel: too slow to search over",
-    "source_follower": "solved pixel by pixel: too slow to search over",
-    "timestamp_tick": "does not move this score",
-    "readout": "does not move this score at these rates",
-    "threshold_drift": "not within half a second",
-    "clock_drift": "not within half a second",
-    "hot_pixels": "a few pixels do not move this score",
-    "dead_pixels": "a few pixels do not move this score",
-    "frame_coupling": "bound to the frames, as is interpolation: not to be told here",
-}
-"""Effects of the library that are left out, and why."""
+"""Steps of the search over all keys, and how often each is repeated, at most."""
 
 
-@dataclass(frozen=True)
-class Added:
-    """An effect that was added, or the best of those that were not."""
-
-    candidate: Candidate
-    values: tuple[float, ...]
-    config: Config
-    score: float
-    still_hz: float | None
-
-    @classmethod
-    def plain(
-        cls, name: str, config: Config, score: float = np.nan, still_hz: float | None = None
-    ) -> Added:
-        """Return a step that adds no key."""
-        return cls(Candidate(name, (), ((),)), (), config, score, still_hz)
-
-    def noisier(self, before: Added, measured_hz: float | None) -> bool:
-        """Tell whether it takes the still pixels away from what was measured."""
-        if measured_hz is None or self.still_hz is None or before.still_hz is None:
-            return False
-        miss, was = abs(self.still_hz - measured_hz), abs(before.still_hz - measured_hz)
-        return miss > was + NOISE_HZ
-
-    def text(self) -> str:
-        """Return name and values."""
-        keys = self.candidate.parameters(self.candidate.inner(self.values))
-        named = ((key.rpartition(".")[2], value) for key, value in keys.items())
-        values = ", ".join(f"{key} {_short(value)}" for key, value in named)
-        return f"{self.candidate.name}{f' ({values})' if values else ''}"
+def enough_seeds(bench: Bench, config: Config, windows: Windows, first: int) -> tuple[int, ...]:
+    """Return with which seeds the mean score is known to `PRECISION`, from `first` on."""
+    seeds = tuple(range(first, first + MOST_SEEDS))
+    spread = np.std([bench.score(config, windows, (seed,))[0] for seed in seeds], ddof=1)
+    return seeds[: max(1, int(np.ceil((spread / PRECISION) ** 2)))]
 
 
-def _short(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+class Search:
+    """A search for a model of a recording, on one stretch of it.
 
-
-def forward(
-    bench: Bench,
-    declared: Config,
-    windows: Windows,
-    seeds: Sequence[int],
-    say: Callable[[str], None],
-    only: Sequence[str] = (),
-) -> Iterator[Added]:
-    """Yield the model after each effect that was added, the first as declared but thresholds.
-
-    The keys of all that was added before are refined each time, and those left out are tried again
-    when nothing more is found.  `only`: names of the effects of the camera to try; empty: all.
-    """
-    config = bench.matched(declared, windows)
-    yield Added.plain("thresholds", config, *bench.score(config, windows, seeds))
-    here = _trial(bench, EXACT, (), config, windows, seeds)
-    yield here
-    measured_hz = bench.still_hz(windows)
-    camera = [CLIPPED_BLACK, *library(declared, Hints(windows.duration_s, (), 1))]
-    camera = [one for one in camera if one.name not in UNSEEN and (not only or one.name in only)]
-    found: dict[Candidate, tuple[float, ...]] = {}
-    for group in (OWN, (*OWN, *camera)):
-        left = _not_in(found, group)
-        at = len(found)  # when all of the group were tried last
-        while len(found) < MOST:
-            tried = [t for one in left for t in _probed(bench, one, here.config, windows, seeds)]
-            noisier = [
-                trial
-                for trial in tried
-                if trial.candidate.name in NOISES and trial.noisier(here, measured_hz)
-            ]
-            tried = [trial for trial in tried if trial not in noisier]
-            if noisier:
-                names = ", ".join(f"{trial.text()} {trial.score:.3f}" for trial in noisier)
-                say(f"  make noise of their own in still pixels: {names}")
-            tried.sort(key=lambda trial: trial.score)
-            nearest = ", ".join(f"{t.text()} {t.score:.3f}" for t in tried[:6])
-            say(f"  {here.score:.3f}; next: {nearest}")
-            best = _refined(bench, tried[0], here.config, windows, seeds) if tried else here
-            if here.score - best.score < LEAST_GAIN:
-                if at == len(found):
-                    break
-                left, at = _not_in(found, group), len(found)
-                continue
-            found[best.candidate] = best.values
-            here = _together(bench, found, best, windows, seeds)
-            yield replace(here, candidate=best.candidate, values=found[best.candidate])
-            left = _not_in(found, _promising(tried))
-    if sum(len(candidate.knobs) for candidate in found) > 1:
-        yield _settled(bench, found, here, windows, seeds)
-
-
-def _not_in(found: Iterable[Candidate], group: Iterable[Candidate]) -> list[Candidate]:
-    names = {one.name for one in found}
-    return [one for one in group if one.name not in names]
-
-
-def _together(
-    bench: Bench,
-    found: dict[Candidate, tuple[float, ...]],
-    last: Added,
-    windows: Windows,
-    seeds: Sequence[int],
-) -> Added:
-    """Return the last model with the keys of all that was found refined, and keep them there."""
-    here = last
-    if len(found) < 2:
-        return here
-    for _ in range(PASSES):
-        before = here.score
-        for candidate in [one for one in found if one.knobs]:
-            current = replace(here, candidate=candidate, values=found[candidate])
-            better = _refined(bench, current, here.config, windows, seeds)
-            if better.score < here.score:
-                here, found[candidate] = better, better.values
-        if before - here.score < LEAST_GAIN:
-            break
-    return here
-
-
-def _settled(
-    bench: Bench,
-    found: dict[Candidate, tuple[float, ...]],
-    last: Added,
-    windows: Windows,
-    seeds: Sequence[int],
-) -> Added:
-    """Return the last model with all keys sought together: a pattern search [1]_.
-
-    References
+    Parameters
     ----------
-    .. [1] R. Hooke, T. A. Jeeves, "Direct Search Solution of Numerical and Statistical Problems",
-       JACM 8(2), 1961, doi:10.1145/321062.321069.
+    bench : Bench
+    windows : Windows
+        What the model is fitted to.
+    say : callable
+        Takes lines that tell how it goes.
     """
-    knobs = tuple(knob for candidate in found for knob in candidate.knobs)
-    values = tuple(value for values in found.values() for value in values)
-    whole = Candidate("all of it", knobs, ())
-    here = np.array(whole.inner(values))
-    unit = np.array(
-        [1.0 if knob.log else max(abs(p), 1.0) for knob, p in zip(knobs, here, strict=True)]
-    )
 
-    def at(place: NDArray[np.float64]) -> Added:
-        outer = tuple(knob.outer(inner) for knob, inner in zip(knobs, place, strict=True))
-        return _trial(bench, whole, outer, last.config, windows, seeds)
+    def __init__(self, bench: Bench, windows: Windows, say: Callable[[str], None]) -> None:
+        self._bench, self._windows, self._say = bench, windows, say
+        self._seeds: tuple[int, ...] = ()
+        self._found: dict[Candidate, tuple[float, ...]] = {}
+        self._measured_hz = bench.still_hz(windows)
 
-    def around(
-        place: NDArray[np.float64], best: Added, step: float
-    ) -> tuple[NDArray[np.float64], Added]:
-        for k in range(len(knobs)):
-            for sign in (1.0, -1.0):
-                other = place.copy()
-                other[k] += sign * step * unit[k]
-                trial = at(other)
-                if trial.score < best.score:
-                    place, best = other, trial
-                    break
-        return place, best
+    def run(self, declared: Config, only: Sequence[str] = ()) -> Iterator[Added]:
+        """Yield the model after each step, the first as declared but thresholds.
 
-    best = replace(last, candidate=whole, values=values)
-    for step in STEPS:
-        for _ in range(MOVES):
-            found_at, better = around(here, best, step)
-            if better.score >= best.score:
+        Choices of the simulation are tried first, effects of the camera with them then.  The keys
+        of all that was added before are refined with each.  When nothing more is found all keys are
+        sought together, which may make room for more.  What is no longer needed then is dropped.
+
+        Parameters
+        ----------
+        declared : Config
+        only : sequence of str
+            Names of the effects of the camera to try; empty: all.
+        """
+        here = self._measured(self._bench.matched(declared, self._windows))
+        yield here.named("thresholds")
+        low_pass = declared.pixel.low_pass
+        if low_pass is not None and low_pass.update != "exact":
+            yield (here := self.trial(EXACT, (), here.config))
+        base = here.config
+        for step in self._additions(OWN, here):
+            yield (here := step)
+        here = self._measured(here.config)  # with references at random chance is another
+        everything = [*OWN, *of_the_camera(declared, self._windows.duration_s, only)]
+        grown = True
+        while grown:
+            before = len(self._found)
+            for step in self._additions(everything, here):
+                yield (here := step)
+            grown = len(self._found) > before
+            if grown and sum(len(one.knobs) for one in self._found) > 1:
+                yield (here := self._settled(here).named("all keys together"))
+        for step in self._removals(base, here):
+            yield (here := step)
+
+    def _measured(self, config: Config) -> Added:
+        """Return how far a model is, with seeds enough for that from here on."""
+        self._seeds = enough_seeds(self._bench, config, self._windows, config.seed)
+        self._say(f"  seeds for each score: {len(self._seeds)}")
+        score = self._bench.score(config, self._windows, self._seeds)
+        return Added.plain("as it is", config, *score)
+
+    def trial(self, candidate: Candidate, values: Sequence[float], base: Config) -> Added:
+        """Return `base` with an effect, and how far it is."""
+        changed = candidate.applied(base, candidate.inner(values))
+        config = self._bench.matched(changed, self._windows)
+        score, still_hz = self._bench.score(config, self._windows, self._seeds)
+        return Added(candidate, tuple(values), config, score, still_hz)
+
+    def _additions(self, group: Sequence[Candidate], here: Added) -> Iterator[Added]:
+        """Yield the model with each effect of a group that brings it nearer, until none does."""
+        left, whole = self._untried(group), True
+        while True:
+            if len(self._found) >= MOST:
+                self._say(f"  {MOST} effects added: no more are tried")
+                return
+            tried = self._probed(left, here)
+            best = self.refined(tried[0], here.config) if tried else here
+            if here.score - best.score >= LEAST_GAIN:
+                here = self._kept(best)
+                yield replace(here, candidate=best.candidate, values=self._found[best.candidate])
+                left, whole = self._untried(_promising(tried)), False
+            elif whole:
+                return
+            else:  # those left out may have become worth it
+                left, whole = self._untried(group), True
+
+    def _untried(self, group: Iterable[Candidate]) -> list[Candidate]:
+        """Return those that set or fit a key which nothing that was found does."""
+        known = {key for one in self._found for key in _keys(one)}
+        return [one for one in group if not _keys(one) <= known]
+
+    def _probed(self, candidates: Sequence[Candidate], here: Added) -> list[Added]:
+        """Return all candidates where their fits may start, the nearest first."""
+        tried = [self.trial(one, probe, here.config) for one in candidates for probe in one.probes]
+        tried.sort(key=lambda one: one.score)
+        noisier = [one for one in tried if one.noisier(here, self._measured_hz)]
+        fair = [one for one in tried if one not in noisier]
+        self._say(f"  {here.score:.4f}; next: {_scores(fair[:6])}")
+        if noisier:
+            self._say(f"  make noise of their own in still pixels: {_scores(noisier)}")
+        return fair
+
+    def refined(self, best: Added, base: Config) -> Added:
+        """Return an effect with its keys at a better place, by steps that halve."""
+        candidate = best.candidate
+        for k, knob in enumerate(candidate.knobs):
+            step = 0.5 * _unit(knob, best.values[k])
+            for share in (1.0, 0.5):
+                here = np.array(candidate.inner(best.values))
+                for way in (-1.0, 1.0):
+                    place = here.copy()
+                    place[k] += way * share * step
+                    trial = self.trial(candidate, _outer(candidate.knobs, place), base)
+                    best = min(best, trial, key=lambda one: one.score)
+        return best
+
+    def _kept(self, best: Added) -> Added:
+        """Keep an effect, in place of those whose keys it holds; return all of it refined."""
+        for one in [one for one in self._found if _keys(one) <= _keys(best.candidate)]:
+            del self._found[one]
+        self._found[best.candidate] = best.values
+        here = best
+        if len(self._found) < 2:
+            return here
+        for _ in range(PASSES):
+            before = here.score
+            for candidate in [one for one in self._found if one.knobs]:
+                current = replace(here, candidate=candidate, values=self._found[candidate])
+                better = self.refined(current, here.config)
+                if better.score < here.score:
+                    here, self._found[candidate] = better, better.values
+            if before - here.score < LEAST_GAIN:
                 break
-            ahead = 2.0 * found_at - here
-            here, best = found_at, better
-            trial = at(ahead)
-            if trial.score < best.score:
-                here, best = ahead, trial
-    return best
+        return here
+
+    def _settled(self, last: Added) -> Added:
+        """Return the last model with all keys of what was found sought together."""
+        found = {
+            (knob.key, knob.part): (knob, value)
+            for one, values in self._found.items()
+            for knob, value in zip(one.knobs, values, strict=True)
+        }
+        knobs, values = zip(*found.values(), strict=True)
+        whole = Candidate("all keys", knobs, ())
+        units = np.array([_unit(knob, value) for knob, value in found.values()])
+
+        def at(place: Place) -> Added:
+            return self.trial(whole, _outer(knobs, place * units), last.config)
+
+        start = np.array(whole.inner(values)) / units
+        first = replace(last, candidate=whole, values=values)
+        best = pattern_search(at, start, first, STEPS, MOVES)
+        settled = dict(zip(found, best.values, strict=True))
+        for one in self._found:
+            self._found[one] = tuple(settled[knob.key, knob.part] for knob in one.knobs)
+        return best
+
+    def _removals(self, base: Config, here: Added) -> Iterator[Added]:
+        """Yield the model without each effect that is no longer needed, the latest first."""
+        for one in list(reversed(self._found)):
+            rest = {other: values for other, values in self._found.items() if other is not one}
+            config = base
+            for other, values in rest.items():
+                config = other.applied(config, other.inner(values))
+            without = self.trial(Candidate(f"without {one.name}", (), ((),)), (), config)
+            self._say(f"  {without.text()}: {without.score:.4f}")
+            if without.score - here.score < LEAST_GAIN:
+                here, self._found = without, rest
+                yield here
+
+
+def _keys(candidate: Candidate) -> frozenset[str]:
+    """Return the keys that a candidate fits, or sets where it fits none."""
+    fitted = {f"{knob.key}/{knob.part}" for knob in candidate.knobs}
+    return frozenset(fitted or {key for key, _ in candidate.extra})
+
+
+def _outer(knobs: Sequence[Knob], place: Place) -> tuple[float, ...]:
+    return tuple(knob.outer(inner) for knob, inner in zip(knobs, place, strict=True))
+
+
+def _unit(knob: Knob, value: float) -> float:
+    """Return what counts as one on a knob's scale: a factor of e, or the value itself."""
+    return 1.0 if knob.log else max(abs(knob.inner(value)), 1.0)
+
+
+def _scores(tried: Iterable[Added]) -> str:
+    return ", ".join(f"{one.text()} {one.score:.4f}" for one in tried)
 
 
 def _promising(tried: Sequence[Added]) -> list[Candidate]:
     """Return the better half of what was tried, each once."""
-    return list(dict.fromkeys(trial.candidate for trial in tried[: -(-len(tried) // 2)]))
-
-
-def _probed(
-    bench: Bench, candidate: Candidate, base: Config, windows: Windows, seeds: Sequence[int]
-) -> Iterator[Added]:
-    for probe in candidate.probes:
-        yield _trial(bench, candidate, tuple(probe), base, windows, seeds)
-
-
-def _trial(
-    bench: Bench,
-    candidate: Candidate,
-    values: tuple[float, ...],
-    base: Config,
-    windows: Windows,
-    seeds: Sequence[int],
-) -> Added:
-    changed = candidate.applied(base, candidate.inner(values))
-    config = bench.matched(changed, windows)
-    return Added(candidate, values, config, *bench.score(config, windows, seeds))
-
-
-def _refined(
-    bench: Bench, best: Added, base: Config, windows: Windows, seeds: Sequence[int]
-) -> Added:
-    """Return the effect with its keys at a better place, by steps that halve."""
-    candidate = best.candidate
-    for k in range(len(candidate.knobs)):
-        step = 0.5 if candidate.knobs[k].log else 0.5 * max(abs(candidate.inner(best.values)[k]), 1)
-        for share in (1.0, 0.5):
-            here = np.array(candidate.inner(best.values))
-            for sign in (-1.0, 1.0):
-                place = here.copy()
-                place[k] += sign * share * step
-                knobs = zip(candidate.knobs, place, strict=True)
-                values = tuple(knob.outer(inner) for knob, inner in knobs)
-                trial = _trial(bench, candidate, values, base, windows, seeds)
-                best = min(best, trial, key=lambda one: one.score)
-    return best
+    return list(dict.fromkeys(one.candidate for one in tried[: -(-len(tried) // 2)]))

@@ -69,18 +69,23 @@ def declared(tmp_path):
     return path
 
 
-def test_the_search_finds_the_black_level_that_made_the_events(scripts, recording, declared):
+def test_the_search_finds_the_black_level_that_made_the_events(
+    scripts, recording, declared, monkeypatch
+):
     from real.model import Bench
     from real.recording import halves, read
-    from real.search import _probed, _refined
+    from real.search import Search
 
     bench = Bench(read(str(recording)), 1)
     first, _ = halves(bench.real.windows)
-    config = load_config([declared])
-    before, _ = bench.score(bench.matched(config, first), first, (0,))
-    best = min(_probed(bench, BLACK_LEVEL, config, first, (0,)), key=lambda trial: trial.score)
-    best = _refined(bench, best, config, first, (0,))
-    assert best.score < 0.5 * before
+    said = []
+    monkeypatch.setattr("real.search.OWN", ())
+    monkeypatch.setattr("real.search.of_the_camera", lambda *_: [BLACK_LEVEL])
+    steps = list(Search(bench, first, said.append).run(load_config([declared])))
+    assert [step.candidate.name for step in steps] == ["thresholds", "black_level"]
+    before, best = steps
+    assert best.score < 0.5 * before.score
+    assert any("without black_level" in line for line in said)
     assert best.values[0] == pytest.approx(20.0, rel=0.25)
     assert best.config.pixel.thresholds.on == pytest.approx(0.2, rel=0.1)
     assert best.config.pixel.thresholds.off == pytest.approx(0.15, rel=0.1)
@@ -107,18 +112,29 @@ def test_in_between_frames_made_once_give_nearly_the_events_of_a_conversion(
 
 
 def test_noise_in_still_pixels_is_no_explanation(scripts):
-    from real.search import Added
+    from real.tried import Added
 
     before = Added.plain("before", load_config(), 0.8, still_hz=0.1)
-    assert Added.plain("noise", load_config(), 0.7, still_hz=1.0).noisier(before, 0.2)
-    assert not Added.plain("less", load_config(), 0.7, still_hz=0.2).noisier(before, 0.2)
-    assert not Added.plain("unknown", load_config(), 0.7).noisier(before, None)
+    assert Added.plain("leak", load_config(), 0.7, still_hz=1.0).noisier(before, 0.2)
+    assert not Added.plain("leak", load_config(), 0.7, still_hz=0.2).noisier(before, 0.2)
+    assert not Added.plain("leak", load_config(), 0.7).noisier(before, None)
+    assert not Added.plain("black_level", load_config(), 0.7, still_hz=1.0).noisier(before, 0.2)
+
+
+OFFSET = Candidate("clock_offset", (Knob("frames.clock_offset_us", -1e6, 1e6, False, 1e3),), ())
 
 
 class Valley:
-    """A bench whose score is least at 14 DN, 5 DN and 2 ms, along a valley that no key follows."""
+    """A bench whose score is least at 14 DN, 5 DN and 2 ms, along a valley that no key follows.
 
-    tried = 0
+    Chance adds `chance` times a number that depends on the seed.
+    """
+
+    def __init__(self, chance=0.0):
+        self.tried, self.chance = 0, chance
+
+    def still_hz(self, windows):
+        return None
 
     def matched(self, config, windows):
         return config
@@ -128,25 +144,76 @@ class Valley:
         frames = config.frames
         level, depth = np.log([frames.black_level_dn / 14.0, frames.black_depth_dn / 5.0])
         late = frames.clock_offset_us / 1000.0 - 2.0
-        return 0.5 + (level - depth) ** 2 + 0.1 * (level + depth) ** 2 + 0.02 * late**2, None
+        luck = self.chance * np.mean([(-1.0) ** seed for seed in seeds])
+        hills = (level - depth) ** 2 + 0.1 * (level + depth) ** 2 + 0.02 * late**2
+        return 0.5 + hills + luck, None
 
 
 def test_the_last_search_moves_all_keys_together(scripts):
-    from real.search import CLIPPED_BLACK, Added, _settled
+    from real.search import Search
+    from real.tried import CLIPPED_BLACK, Added
 
-    offset = Candidate("clock_offset", (Knob("frames.clock_offset_us", -1e6, 1e6, False, 1e3),), ())
-    found = {CLIPPED_BLACK: (7.0, 3.5), offset: (600.0,)}
+    bench = Valley()
+    search = Search(bench, None, print)
+    search._seeds = (0,)
+    search._found = {CLIPPED_BLACK: (7.0, 3.5), OFFSET: (600.0,)}
     config = load_config([], [
         "frames.black_level_dn=7", "frames.black_depth_dn=3.5", "frames.clock_offset_us=600",
     ])  # fmt: skip
-    bench = Valley()
-    last = Added.plain("last", config, *bench.score(config, None, ()))
-    best = _settled(bench, found, last, None, ())
+    best = search._settled(Added.plain("last", config, *bench.score(config, None, (0,))))
     assert best.values == pytest.approx((14.0, 5.0, 2000.0), rel=0.1)
     assert best.config.frames.black_level_dn == best.values[0]
     assert best.score == pytest.approx(0.5, abs=3e-3)
     assert bench.tried < 120
-    assert best.text().startswith("all of it (black_level_dn 1")
+    assert best.text().startswith("all keys (black_level_dn 1")
+    assert search._found[CLIPPED_BLACK] + search._found[OFFSET] == best.values
+
+
+def test_what_is_no_longer_needed_is_dropped(scripts):
+    from real.search import Search
+    from real.tried import CLIPPED_BLACK, Added
+
+    needless = Candidate("leak", (Knob("pixel.leak.rate_hz", 0.01, 10.0),), ())
+    search = Search(Valley(), None, print)
+    search._seeds = (0,)
+    search._found = {CLIPPED_BLACK: (14.0, 5.0), needless: (0.5,), OFFSET: (2000.0,)}
+    base = load_config([], ["frames.black_level_dn=5", "frames.black_depth_dn=5"])
+    left = list(search._removals(base, Added.plain("all", base, 0.5)))
+    assert [step.text() for step in left] == ["without leak"]
+    assert list(search._found) == [CLIPPED_BLACK, OFFSET]
+    assert left[0].config.pixel.leak == base.pixel.leak
+    assert left[0].config.frames.clock_offset_us == 2000.0
+
+
+def test_a_wider_effect_takes_the_place_of_a_narrower_one(scripts):
+    from real.search import Search
+    from real.tried import CLIPPED_BLACK, Added
+
+    search = Search(Valley(), None, print)
+    search._seeds = (0,)
+    search._found = {BLACK_LEVEL: (7.0,)}
+    assert search._untried([BLACK_LEVEL, CLIPPED_BLACK, OFFSET]) == [CLIPPED_BLACK, OFFSET]
+    config = load_config([], ["frames.black_level_dn=14", "frames.black_depth_dn=5"])
+    search._kept(Added(CLIPPED_BLACK, (14.0, 5.0), config, 0.5, None))
+    assert list(search._found) == [CLIPPED_BLACK]
+    assert search._untried([BLACK_LEVEL, CLIPPED_BLACK, OFFSET]) == [OFFSET]
+
+
+@pytest.mark.parametrize(("chance", "count"), [(0.0, 1), (1e-4, 1), (1e-3, 2), (0.1, 4)])
+def test_seeds_are_as_many_as_chance_asks_for(scripts, chance, count):
+    from real.search import enough_seeds
+
+    config = load_config([], ["frames.black_level_dn=14", "frames.black_depth_dn=5"])
+    assert enough_seeds(Valley(chance), config, None, 7) == tuple(range(7, 7 + count))
+
+
+def test_the_chance_of_the_simulation_is_taken_off(scripts):
+    from real.model import Judged
+
+    judged = Judged({"a": 0.5, "b": 0.1, "c": None}, {"a": 0.4, "b": 0.4, "c": None}, 1.0, 0.5)
+    assert judged.without_chance("a") == pytest.approx(np.sqrt(0.25 - 0.08))
+    assert judged.without_chance("b") == 0.0
+    assert judged.without_chance("c") is None
 
 
 def test_every_second_frame_and_the_ends_stay(scripts, recording):
@@ -186,12 +253,9 @@ def test_tiles_that_change_are_unstable_and_chance_is_not(scripts):
 
 def test_tables_before_and_after_each_effect(scripts, recording, declared, tmp_path, monkeypatch):
     import diagnose_real
-    from real import search
 
-    monkeypatch.setattr(search, "OWN", ())
-    monkeypatch.setattr(search, "CLIPPED_BLACK", BLACK_LEVEL)
-    monkeypatch.setattr(search, "library", lambda *_: [BLACK_LEVEL])
-
+    monkeypatch.setattr("real.search.OWN", ())
+    monkeypatch.setattr("real.search.of_the_camera", lambda *_: [BLACK_LEVEL])
     out = tmp_path / "table.md"
     arguments = [str(recording), "--declared", str(declared), "--threads", "1", "--out", str(out)]
     result = CliRunner().invoke(diagnose_real.main, arguments)
@@ -200,12 +264,11 @@ def test_tables_before_and_after_each_effect(scripts, recording, declared, tmp_p
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     labels = [row[0] for row in rows]
     assert labels[2:4] == ["as declared", "thresholds"]
-    assert labels[4].startswith("exact filter")
-    assert labels[5].startswith("black_level")
-    assert labels[6:] == ["half split (Poisson)", "no events at all"]
+    assert labels[4].startswith("black_level")
+    assert labels[5:] == ["half split (Poisson)", "no events at all"]
     smoothed = [float(row[5].split(" ")[0]) for row in rows[2:]]
-    assert smoothed[3] < smoothed[1]
-    assert smoothed[5] == 1.0
+    assert smoothed[2] < smoothed[1]
+    assert smoothed[4] == 1.0
     assert "Dropping every second frame" in text
     assert "Camera effects tried: all of the library but" in text
     assert "No other tools were run on this recording." in text

@@ -1,0 +1,124 @@
+"""What is tried in search of a model of a real recording, and what is not."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adv2e.config import Config
+from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.library import Hints, library
+
+NOISE_HZ = 0.1
+NOISES = ("leak", "photo_leak", "shot_noise", "photoreceptor_noise", "hot_pixels")
+"""What makes events by itself is not added if it moves still pixels farther from the measured rate
+by more [Hz]: noise at random costs this score less than events in the wrong place, and is no
+explanation.  Other effects change the rate of still pixels through the thresholds that match the
+totals, by which noise of the frames fires, which is no noise of the camera's."""
+
+EXACT = Candidate("exact filter", (), ((),), (("pixel.low_pass.update", "exact"),))
+"""Replaces the printed filter, whose gain is known to be wrong, whatever that does to the score."""
+
+OWN = (
+    Candidate(
+        "interpolation",
+        (),
+        ((),),
+        (("sampling.interpolation", "flow"), ("sampling.last_interval", "corrected")),
+    ),
+    Candidate("initial_reference", (), ((),), (("pixel.initial_reference", "random"),)),
+    Candidate(
+        "log_response",
+        (Knob("pixel.log_response.linear_below", 1.01, 100.0),),
+        ((2.72,), (10.0,), (40.0,)),
+        (("pixel.log_response.floor", 0.5),),
+    ),
+)
+"""What is no effect of the camera, but of how its frames were simulated."""
+
+CLIPPED_BLACK = Candidate(
+    "clipped_black",
+    (
+        Knob("frames.black_level_dn", 0.02, 100.0),
+        Knob("frames.black_depth_dn", 0.01, 100.0),
+    ),
+    ((9.0, 3.0), (14.0, 5.0)),
+)
+"""Beside the black level of the library: how far light falls on where it is clipped at black."""
+
+UNSEEN = {
+    "thresholds": "matched to the totals each time",
+    "photoreceptor_noise": "solved pixel by pixel: too slow to search over",
+    "source_follower": "solved pixel by pixel: too slow to search over",
+    "timestamp_tick": "does not move this score",
+    "readout": "does not move this score at these rates",
+    "threshold_drift": "not within half a second",
+    "clock_drift": "not within half a second",
+    "hot_pixels": "a few pixels do not move this score",
+    "dead_pixels": "a few pixels do not move this score",
+    "frame_coupling": "bound to the frames, as is interpolation: not to be told here",
+}
+"""Effects of the library that are left out, and why."""
+
+
+def of_the_camera(declared: Config, seconds: float, only: Collection[str] = ()) -> list[Candidate]:
+    """Return the effects of the camera to try; `only`: with these names, empty: all."""
+    found = [CLIPPED_BLACK, *library(declared, Hints(seconds, (), 1))]
+    return [one for one in found if one.name not in UNSEEN and (not only or one.name in only)]
+
+
+@dataclass(frozen=True)
+class Added:
+    """A model with the effect that was added last, or one that was tried.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        What was added; without knobs where no key is to be told.
+    values : tuple of float
+        Of its knobs.
+    config : Config
+        The model, its thresholds matched.
+    score : float
+    still_hz : float, optional
+        Rate of the still pixels [Hz].
+    """
+
+    candidate: Candidate
+    values: tuple[float, ...]
+    config: Config
+    score: float
+    still_hz: float | None
+
+    @classmethod
+    def plain(
+        cls, name: str, config: Config, score: float = np.nan, still_hz: float | None = None
+    ) -> Added:
+        """Return a step that adds no key."""
+        return cls(Candidate(name, (), ((),)), (), config, score, still_hz)
+
+    def named(self, name: str) -> Added:
+        """Return the model under the name of a step that adds no key."""
+        return replace(self, candidate=Candidate(name, (), ((),)), values=())
+
+    def noisier(self, before: Added, measured_hz: float | None) -> bool:
+        """Tell whether it is noise that takes the still pixels away from what was measured."""
+        if self.candidate.name not in NOISES:
+            return False
+        if measured_hz is None or self.still_hz is None or before.still_hz is None:
+            return False
+        miss, was = abs(self.still_hz - measured_hz), abs(before.still_hz - measured_hz)
+        return miss > was + NOISE_HZ
+
+    def text(self) -> str:
+        """Return name and values."""
+        keys = self.candidate.parameters(self.candidate.inner(self.values))
+        named = ((key.rpartition(".")[2], value) for key, value in keys.items())
+        values = ", ".join(f"{key} {_short(value)}" for key, value in named)
+        return f"{self.candidate.name}{f' ({values})' if values else ''}"
+
+
+def _short(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
