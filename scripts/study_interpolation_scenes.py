@@ -102,30 +102,36 @@ def _pan(texture: Texture, speed: float, gain: float = 1.0) -> Light:
     return light
 
 
-def _swing(seed: int, reach: float, hz: float) -> Light:
-    """Return a disk that swings as a pendulum does, over a ground at rest."""
-    ground, bob = Texture(seed), Texture(seed + 1, 30.0)
+def _ball(seed: int, path: Callable[[float, int, int], tuple[float, float]]) -> Light:
+    """Return a disk whose centre `path` gives, over a ground at rest."""
+    ground, disk = Texture(seed), Texture(seed + 1, 30.0)
 
     def light(t_s: float, width: int, height: int) -> Image:
         x, y = _pixels(width, height)
-        angle = math.sin(2.0 * math.pi * hz * t_s)
-        dx, dy = x - 0.5 * width - reach * angle, y - 0.5 * height + 0.2 * reach * angle * angle
-        return _over(ground.at(x, y), bob.at(dx + 64, dy + 64), np.hypot(dx, dy) - 0.2 * height)
+        column, row = path(t_s, width, height)
+        dx, dy = x - column, y - row
+        return _over(ground.at(x, y), disk.at(dx + 64, dy + 64), np.hypot(dx, dy) - 0.2 * height)
 
     return light
+
+
+def _swing(seed: int, reach: float, hz: float) -> Light:
+    """Return a disk that swings as a pendulum does."""
+
+    def path(t_s: float, width: int, height: int) -> tuple[float, float]:
+        angle = math.sin(2.0 * math.pi * hz * t_s)
+        return 0.5 * width + reach * angle, 0.5 * height - 0.2 * reach * angle * angle
+
+    return _ball(seed, path)
 
 
 def _bounce(seed: int, speed: float, every_s: float) -> Light:
-    """Return a disk that turns back at once, every `every_s`, over a ground at rest."""
-    ground, ball = Texture(seed), Texture(seed + 1, 30.0)
+    """Return a disk that turns back at once, every `every_s`."""
 
-    def light(t_s: float, width: int, height: int) -> Image:
-        x, y = _pixels(width, height)
-        way = speed * abs(t_s % (2.0 * every_s) - every_s)
-        dx, dy = x - 0.4 * width - way, y - 0.5 * height
-        return _over(ground.at(x, y), ball.at(dx + 64, dy + 64), np.hypot(dx, dy) - 0.2 * height)
+    def path(t_s: float, width: int, height: int) -> tuple[float, float]:
+        return 0.4 * width + speed * abs(t_s % (2.0 * every_s) - every_s), 0.5 * height
 
-    return light
+    return _ball(seed, path)
 
 
 def _disks(seed: int, speed: float, radius: float) -> Light:
