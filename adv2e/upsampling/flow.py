@@ -12,11 +12,11 @@ A pixel at rest that has the same light in both frames keeps it to the last bit,
 moves over it.  Frames too small for the search (see `SMALLEST`), equal frames and cuts are
 interpolated linearly.
 
-What it cannot do: motion changes no faster than evenly from interval to interval, so that what is
-hit moves straight and evenly from frame to frame; light that changes while it moves is blended;
-things smaller than their step from frame to frame, steps above about a fifth of the picture's
-height, and textures that repeat within a few steps are mostly not found and fade as with linear;
-the noise of dim frames is carried along, which makes more false events than blending it in place.
+What it cannot do: when something is hit is not told if that is in the middle of an interval, or
+twice in three of them; light that changes while it moves is blended; things smaller than their step
+from frame to frame, steps above about a fifth of the picture's height, and textures that repeat
+within a few steps are mostly not found and fade as with linear; the noise of dim frames is carried
+along, which makes more false events than blending it in place.
 ``scripts/study_interpolation.py`` has the numbers.
 
 References
@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.overlap import worker_pool
-from adv2e.upsampling.acceleration import Bend, Side, bends, straight
+from adv2e.upsampling.acceleration import Bend, Side, bends
 from adv2e.upsampling.kernels import compose, splat
 from adv2e.upsampling.linear import LinearUpsampler, check_pair
 from adv2e.upsampling.motion import Motion, estimate_motion
@@ -117,7 +117,7 @@ def warp(
         Of the paths of `a` and of `b`; straight without.
     """
     out = np.empty_like(a)
-    first, second = (straight(there), straight(back)) if bent is None else bent
+    first, second = (None, None) if bent is None else bent
     from_a = _arrivals(there, first, fraction)
     from_b = _arrivals(back, second, 1.0 - fraction)
     compose(a, b, *from_a, *from_b, fraction, out)
@@ -125,11 +125,12 @@ def warp(
 
 
 def _arrivals(
-    motion: Motion, bend: Bend, share: float
+    motion: Motion, bend: Bend | None, share: float
 ) -> tuple[Array, Array, Array, Array, Array, Array]:
     """Return flat motion and bend, and who arrives where with which score after `share`."""
     best = np.empty_like(motion.score)
     source = np.zeros(motion.score.shape, np.int32)
-    splat(motion.u, motion.v, *bend, motion.score, share, best, source)
-    u, v, p, q = (part.reshape(-1) for part in (motion.u, motion.v, *bend))
+    aside = (np.zeros_like(motion.u),) * 2 if bend is None else bend.at(share)
+    splat(motion.u, motion.v, *aside, motion.score, share, best, source)
+    u, v, p, q = (part.reshape(-1) for part in (motion.u, motion.v, *aside))
     return u, v, p, q, best, source

@@ -91,31 +91,64 @@ def test_pixels_at_rest_stay_to_the_bit():
 
 def test_the_bend_is_half_the_acceleration():
     # x = 3 t + 2 t^2: by 5 from t = 0 to 1, and back by 1 to t = -1; from t = 1 by 9 to t = 2
-    first, second = bends(even(5.0), even(-5.0), Side(even(-1.0), 1.0), Side(even(9.0), 1.0))
-    for c, d in (first, second):
-        np.testing.assert_allclose(c, 2.0, atol=1e-5)
-        np.testing.assert_allclose(d, 0.0, atol=1e-5)
+    for bend in bends(even(5.0), even(-5.0), Side(even(-1.0), 1.0), Side(even(9.0), 1.0)):
+        for share in (0.25, 0.5, 0.9):
+            c, d = bend.at(share)
+            np.testing.assert_allclose(c, 2.0, atol=1e-5)
+            np.testing.assert_allclose(d, 0.0, atol=1e-5)
 
 
 def test_the_lesser_bend_counts_and_none_where_they_disagree():
     straight, hit = Side(even(-5.0), 1.0), Side(even(-4.0, -3.0), 1.0)
     slower, faster = Side(even(4.6), 1.0), Side(even(7.0, 2.0), 1.0)
     for before, after in ((straight, hit), (hit, straight), (straight, straight)):
-        for c, d in bends(even(5.0), even(-5.0), before, after):
-            assert np.all(c == 0.0)
-            assert np.all(d == 0.0)
-    (c, _), _ = bends(even(5.0), even(-5.0), Side(even(-3.0), 1.0), faster)
-    np.testing.assert_allclose(c, 1.0, atol=1e-5)  # of 1 and (1, 1) the shorter
-    (c, _), (e, _) = bends(even(5.0), even(-5.0), Side(even(-3.0), 1.0), slower)
-    assert np.all(c == 0.0)  # faster before, slower after
-    assert np.all(e == 0.0)
+        for bend in bends(even(5.0), even(-5.0), before, after):
+            assert not np.any(bend.at(0.3))
+    first, _ = bends(even(5.0), even(-5.0), Side(even(-3.0), 1.0), faster)
+    np.testing.assert_allclose(first.at(0.3)[0], 1.0, atol=1e-5)  # of 1 and (1, 1) the shorter
+    for bend in bends(even(5.0), even(-5.0), Side(even(-3.0), 1.0), slower):
+        assert not np.any(bend.at(0.3))  # faster before, slower after
+
+
+@pytest.mark.parametrize(
+    ("when", "spans"), [(0.2, (1.0, 1.0)), (0.8, (1.0, 1.0)), (0.2, (2.0, 0.5))]
+)
+def test_what_is_hit_moves_straight_until_then_and_from_then_on(when, spans):
+    before, behind = np.array([8.0, -2.0]), np.array([-4.0, 3.0])  # pixels an interval
+    way = before * when + behind * (1.0 - when)
+    sides = (
+        Side(even(*(-before * spans[0])), spans[0]), Side(even(*(behind * spans[1])), spans[1])
+    )  # fmt: skip
+    first, second = bends(even(*way), even(*-way), *sides)
+    for share in (0.1, when, 0.5, 0.95):
+        there = before * min(share, when) + behind * max(share - when, 0.0)
+        aside = share * (1.0 - share)
+        for k in range(2):
+            found = share * way[k] - aside * first.at(share)[k]
+            np.testing.assert_allclose(found, there[k], atol=1e-4)
+            back = -(1.0 - share) * way[k] - aside * second.at(1.0 - share)[k]
+            np.testing.assert_allclose(way[k] + back, there[k], atol=1e-4)
+
+
+def test_a_hit_is_found_in_the_scene():
+    def hit(t):
+        """Return a disk that turns back at t = 0.7, over a texture at rest."""
+        x, y = pixels()
+        column = 40.0 + 6.0 * min(t, 0.7) - 7.0 * max(t - 0.7, 0.0)
+        inside = np.clip(0.5 + 11.0 - np.hypot(x - column, y - 32.0), 0.0, 1.0)
+        light = (1.0 - inside) * GROUND(x, y) + inside * 2.0 * FIGURE(x - column, y - 32.0)
+        return light.astype(np.float32)
+
+    bent, straight = made(hit, Beside(hit(-1.0), hit(2.0))), made(hit, Beside())
+    for number in range(3):
+        truth = hit(0.25 * (number + 1))
+        assert error(bent[number], truth) < 0.6 * error(straight[number], truth)
 
 
 def test_what_is_not_seen_in_both_frames_tells_nothing():
     unseen = even(-1.0, score=1000.0)
-    first, second = bends(even(5.0), even(-5.0), Side(unseen, 1.0), Side(even(9.0), 1.0))
-    assert np.all(first[0] == 0.0)
-    assert np.all(second[0] == 0.0)
+    for bend in bends(even(5.0), even(-5.0), Side(unseen, 1.0), Side(even(9.0), 1.0)):
+        assert not np.any(bend.at(0.4))
 
 
 def test_neighbours_of_a_sequence():
