@@ -29,7 +29,7 @@ def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
     tick of the time stamps is the last of all.
     """
     own = {
-        "frames": _of_frames(config.frames, config.sampling),
+        "frames": frame_hooks(config.frames, config.sampling),
         "pixel": _of_pixel(config.pixel),
         "readout": _of_readout(config.readout, config.frames) if config.readout else [],
     }
@@ -44,7 +44,8 @@ def _of_stage(hooks: Iterable[Hooks], stage: str) -> list[Hooks]:
     return [hook for hook in hooks if hook.stage == stage]
 
 
-def _of_frames(frames: Frames, sampling: Sampling) -> list[Hooks]:
+def frame_hooks(frames: Frames, sampling: Sampling) -> list[Hooks]:
+    """Return the effects on the light of the frames, in signal order."""
     hooks: list[Hooks] = []
     if frames.clock_drift_ppm:
         hooks.append(ClockDriftHooks(frames.clock_drift_ppm))
@@ -53,7 +54,7 @@ def _of_frames(frames: Frames, sampling: Sampling) -> list[Hooks]:
     if frames.black_level_dn or frames.black_depth_dn:
         hooks.append(BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn))
     if frames.exposure_us:
-        hooks.append(exposure_hooks(frames.exposure_us, sampling.interpolation))
+        hooks.append(_of_exposure(frames.exposure_us, sampling.interpolation))
     if any(frames.shift_px):
         hooks.append(MisregistrationHooks(frames.shift_px))
     if frames.flicker is not None and frames.flicker.depth:
@@ -61,8 +62,7 @@ def _of_frames(frames: Frames, sampling: Sampling) -> list[Hooks]:
     return hooks
 
 
-def exposure_hooks(exposure_us: float, interpolation: str) -> Hooks:
-    """Return what puts back the light that an exposure took away, for a way to interpolate."""
+def _of_exposure(exposure_us: float, interpolation: str) -> Hooks:
     if interpolation != "flow":
         return ExposureBlurHooks(exposure_us)
     # imported late: few conversions need it, and all would load its compiled loops

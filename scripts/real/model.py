@@ -14,7 +14,7 @@ from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
-from adv2e.diagnosis.instants import as_recorded, made
+from adv2e.diagnosis.instants import as_recorded, made, taken_in
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.events import Events
@@ -60,9 +60,8 @@ class Judged:
 class Bench:
     """Simulates a recording with configurations.
 
-    In-between frames along the motion take longer than all else, so they are made once for each
-    way to decode and sharpen the frames; black level and clock offset are laid over them, which
-    moves the motion found by next to nothing.
+    In-between frames along the motion take longer than all else, so they are made once for what
+    they depend on (:mod:`adv2e.diagnosis.instants`).
     """
 
     def __init__(self, real: Real, threads: int | None) -> None:
@@ -83,10 +82,9 @@ class Bench:
         return cut(np.concatenate(list(chunks)), windows.start, windows.stop)
 
     def _instants(self, config: Config) -> Light:
-        """Return light between the frames, without black level and clock offset."""
+        """Return light between the frames."""
         sampling = config.sampling
-        exposure_us = config.frames.exposure_us
-        key = config.frames.encoding, exposure_us, sampling.interpolation, sampling.L
+        key = config.frames.encoding, taken_in(config), sampling.interpolation, sampling.L
         if key not in self._made:
             if len(self._made) == KEPT:
                 del self._made[next(iter(self._made))]
