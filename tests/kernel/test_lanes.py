@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from harness import advance, by_pixel, quiet, start
+from lane_light import single, walks
 from reference.agreement import count_and_time_errors
 from reference.circuit import PURE, Circuit, Draws
 from reference.dense_ode import as_lists, find_events
 from reference.dense_signal import solve_signal, turning_points
 
 from adv2e import rng
-from adv2e.config.model import Leak, LogResponse, LowPass, Refractory, ShotNoise, Thresholds
+from adv2e.config.model import Leak, LogResponse, LowPass, Refractory, ShotNoise
 from adv2e.kernel import exact
-from adv2e.kernel.screen import LARGEST_STEP
-from adv2e.kernel.workspace import S_OFF, S_ON, STRIP
+from adv2e.kernel.workspace import S_OFF, S_ON
 
 FAR = 50.0
 """A threshold that nothing reaches [ln units]."""
@@ -25,11 +25,6 @@ def clock(intervals_ms):
     """Times of the knots [s], in whole nanoseconds, from the lengths of the intervals."""
     at = np.concatenate([[0.0], np.cumsum(intervals_ms)]) * 1e-3
     return np.round(at * 1e9) * 1e-9
-
-
-def single(light):
-    """Light as the kernel sees it: single precision, for both sides."""
-    return np.asarray(light).astype(np.float32).astype(np.float64)
 
 
 def sections_of(circuit):
@@ -105,20 +100,6 @@ def tangent_level(path, polarity, on=None):
     if polarity > 0:
         return float(np.max(away / (1.0 - leaked)))
     return float(np.max(-(away + on * leaked)))
-
-
-def walks(seed, knots, pixels, *, lo=21.0, hi=255.0, steps=(0.02, 0.3, 0.9), rest=0.2):
-    """Light that wanders by small and large steps, rests, and returns to earlier values."""
-    draw = np.random.default_rng(seed)
-    x = np.empty((knots, pixels))
-    x[0] = draw.uniform(math.log(lo), math.log(hi), pixels)
-    for k in range(1, knots):
-        step = draw.choice(steps, pixels) * draw.standard_normal(pixels)
-        step[draw.random(pixels) < rest] = 0.0
-        x[k] = np.clip(x[k - 1] + step, math.log(lo), math.log(hi))
-        returns = draw.random(pixels) < 0.15
-        x[k, returns] = x[draw.integers(0, k), returns]
-    return single(np.exp(x))
 
 
 # --- tangents and ties ---------------------------------------------------------------------------
@@ -402,87 +383,6 @@ def test_random_circuits_and_stimuli(seed):
         cutoff_hz=float(draw.choice([40.0, 300.0, 2000.0])),
     )
     check(light, clock(draw.choice([0.3, 1.0, 4.0, 12.0, 40.0], 5)), circuit, at_least=20)
-
-
-# --- strips and tiles ----------------------------------------------------------------------------
-
-CLIP = walks(7, 25, 13, lo=3.0, steps=(0.05, 0.1, 0.2))
-"""Light of 13 pixels without steps above an e-fold, which larger images repeat."""
-CLIP_NS = [k * 4_166_667 for k in range(len(CLIP))]
-
-
-LAST_BITS_US = 1e-8
-"""Machine code for many lanes and for few may round the last bits of a time differently."""
-
-SIZES = [1, 1023, 1024, 1025, STRIP - 1, STRIP, STRIP + 1, 2 * STRIP + 300]
-
-
-def repeated(light, pixels):
-    """Return which pixel of `light` each pixel of a larger image is, and that image."""
-    which = np.arange(pixels) * 5 % light.shape[1]
-    return which, light[:, which]
-
-
-def image(light, tile_size=None, **sections):
-    levels = Thresholds(on=0.08, off=0.07, mismatch=0.0)
-    leak = Leak(photo_rate_hz=8.0)
-    pixel = quiet(refractory=Refractory(), leak=leak, thresholds=levels, **sections)
-    array = start(light, CLIP_NS, pixel, tile=tile_size, exact_times=True)
-    return by_pixel(array, *advance(array, light, CLIP_NS))
-
-
-def one_by_one(light):
-    return [image(light[:, [k]])[0] for k in range(light.shape[1])]
-
-
-@pytest.mark.parametrize("pixels", SIZES)
-def test_images_give_what_their_pixels_alone_give(pixels):
-    assert np.abs(np.diff(np.log(CLIP), axis=0)).max() < LARGEST_STEP
-    alone = one_by_one(CLIP)
-    assert sum(map(len, alone)) > 50
-    which, light = repeated(CLIP, pixels)
-    found = count_and_time_errors(image(light, tile_size=STRIP), [alone[k] for k in which])
-    assert not found.differing
-    assert found.max_dt_us < LAST_BITS_US
-
-
-@pytest.mark.parametrize("pixels", SIZES)
-def test_flashes_give_what_their_pixels_alone_give(pixels):
-    clip = walks(7, len(CLIP), 13, lo=2.0, steps=(0.05, 0.5, 1.2))
-    alone = one_by_one(clip)
-    which, light = repeated(clip, pixels)
-    found = count_and_time_errors(image(light, tile_size=STRIP), [alone[k] for k in which])
-    assert found.count_b >= (100 if pixels > 1 else 5)
-    assert not found.differing
-    assert found.max_dt_us < LAST_BITS_US
-
-
-def test_noise_does_not_depend_on_the_size_of_the_image():
-    light = repeated(CLIP, 2 * STRIP + 300)[1]
-    whole = image(light, tile_size=STRIP, shot_noise=ShotNoise(rate_hz=100.0))
-    for part in (1, STRIP - 1, STRIP + 1):
-        cut = image(light[:, :part], shot_noise=ShotNoise(rate_hz=100.0))
-        found = count_and_time_errors(cut, whole[:part])
-        assert not found.differing
-        assert found.max_dt_us < LAST_BITS_US
-
-
-def test_what_neighbours_do_does_not_count():
-    """Each lane goes its own way, in whatever company: beside busy pixels, and beside resting ones.
-
-    Pixels turn, pass the knee, wait through dead times and make noise in all combinations.
-    """
-    clip = walks(11, len(CLIP), 2000, lo=8.0, steps=(0.05, 0.3, 1.2), rest=0.05)
-    noise = ShotNoise(rate_hz=100.0)
-    whole = image(clip, shot_noise=noise)
-    assert sum(map(len, whole)) > 50_000
-    for k in range(0, 2000, 16):
-        still = np.repeat(clip[:1], len(clip), axis=0)
-        still[:, k : k + 16] = clip[:, k : k + 16]
-        some = image(still, shot_noise=noise)[k : k + 16]
-        found = count_and_time_errors(some, whole[k : k + 16])
-        assert not found.differing
-        assert found.max_dt_us < LAST_BITS_US
 
 
 # --- faults that there were, and what single precision costs --------------------------------------
