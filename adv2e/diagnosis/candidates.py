@@ -72,12 +72,16 @@ class Candidate:
         Values from which the fit may start.
     extra : mapping
         Keys that are set besides, and not fitted.
+    left : float
+        Share of the residual that is put down to the fit where the model has this effect: more of
+        those that undo what cannot be undone in full.
     """
 
     name: str
     knobs: tuple[Knob, ...]
     probes: tuple[tuple[float, ...], ...]
     extra: tuple[tuple[str, Any], ...] = ()
+    left: float = 0.02
 
     def inner(self, values: Sequence[float]) -> list[float]:
         """Return where on the fitted scales values of the knobs are."""

@@ -226,7 +226,10 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
             ((0.3,), (1.5,), (6.0,)),
         ),
         Candidate(
-            "exposure_blur", (Knob("frames.exposure_us", 100.0, 2e5),), ((4000.0,), (15000.0,))
+            "exposure_blur",
+            (Knob("frames.exposure_us", 100.0, 2e5),),
+            ((4000.0,), (15000.0,)),
+            left=0.1,  # what changed faster than the exposure is not in the frames
         ),
         Candidate(
             "clock_offset",

@@ -33,8 +33,6 @@ LEVEL = 0.01
 """Probability below which chance is not believed to make a residual."""
 
 MOST_EFFECTS = 4
-NEARLY = 0.98
-"""Share of the residual beyond which what is left is put down to the fit, not to another effect."""
 
 _TRIED = 4
 _CATCHES_UP = 60.0  # log likelihood that a fit may gain when it is brought to its end
@@ -52,6 +50,8 @@ class Outcome:
         Of the residual left, where the search looked.
     explained : float
         Share of the declared model's residual that is gone.
+    complete : bool
+        Nothing is left for another effect: chance can make it, or it is put down to the fit.
     rejected : dict
         Last reason for each effect that was not added.
     """
@@ -59,6 +59,7 @@ class Outcome:
     state: State
     probability: float
     explained: float
+    complete: bool
     rejected: dict[str, Rejected]
 
     @property
@@ -130,10 +131,14 @@ class Search:
         state = self._backward(state)
         held = self.bench.rejections.held
         rejected = {name: why for name, why in held.items() if name not in state.names}
-        return Outcome(state, self.probability(state), self.explained(state), rejected)
+        complete = not self._is_something_left(state)
+        return Outcome(state, self.probability(state), self.explained(state), complete, rejected)
 
     def _is_something_left(self, state: State) -> bool:
-        return self.probability(state) < LEVEL and self.explained(state) < NEARLY
+        if self.probability(state) >= LEVEL:
+            return False
+        left = max((fit.candidate.left for fit in state.fits), default=0.0)
+        return self.explained(state) < 1.0 - left
 
     def _grown(self, state: State) -> State | None:
         """Return the model with one effect more, or two that hold only together.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from adv2e.diagnosis.bench import State
-from adv2e.diagnosis.search import LEVEL, NEARLY, Outcome
+from adv2e.diagnosis.search import LEVEL, Outcome
 from adv2e.reports.result import ErrorRow, Verdict
 
 _PARTLY = 0.8
@@ -25,7 +25,7 @@ def verdict_of(outcome: Outcome, error: ErrorRow) -> Verdict:
     """
     if not outcome.state.fits:
         return "consistent" if outcome.probability >= LEVEL else "unexplained"
-    if outcome.probability < LEVEL and outcome.explained < NEARLY:
+    if not outcome.complete:
         partly = outcome.explained >= _PARTLY and _mostly_gone(error)
         return "partly_explained" if partly else "unexplained"
     return "not_identifiable" if outcome.alternatives else "explained"

@@ -1,5 +1,6 @@
 """The search for what is missing, on a laboratory without simulations."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -124,6 +125,21 @@ def test_an_effect_beside_something_unknown_is_a_part():
     # but where the error tells nothing, they decide
     assert verdict_of(outcome, error(0.41, 0.41, 0.4)) == "partly_explained"
     assert verdict_of(outcome, error(math.nan, math.nan, math.nan)) == "partly_explained"
+
+
+def test_what_cannot_be_undone_in_full_leaves_more_that_is_put_down_to_the_fit():
+    library = [
+        dataclasses.replace(one, left=0.2 if one.name == "refractory" else one.left)
+        for one in candidates()
+    ]
+    told = ["pixel.refractory.period_us=8000"]
+    _, outcome = searched(told, library=library, beyond=outside(12.0))
+    assert outcome.state.names == ("refractory",)
+    assert outcome.probability < LEVEL
+    assert 0.8 <= outcome.explained < 0.98
+    assert verdict_of(outcome, GONE) == "explained"
+    _, outcome = searched(told, library=library, beyond=outside(40.0))
+    assert verdict_of(outcome, GONE) != "explained"
 
 
 @pytest.mark.parametrize(("period", "rate"), [(5000.0, 1.0), (900.0, 1.0), (15_000.0, 0.7)])

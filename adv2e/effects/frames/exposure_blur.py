@@ -10,12 +10,19 @@ time here; where it is interpolated along the motion, :mod:`adv2e.effects.frames
 the place of this module.
 
 With B the matrix of the mean over the exposure, its rows having sum 1 and the variance T^2/12 of
-the exposure, twenty steps of the Richardson-Lucy iteration are taken from the frames themselves,
+the exposure, fifty steps of the Richardson-Lucy iteration [1]_, [2]_ are taken from the frames
+themselves, with total variation in time to hold down what noise and ringing would make [3]_,
 
-.. math:: y \leftarrow y \cdot \frac{B^T (DN_{frame} / B y)}{B^T 1},
+.. math::
 
-which stays positive and, with so few steps, hardly follows noise.  It goes through the sequence in
-blocks, each solved with a margin of at least two exposures before and behind it.
+    y \leftarrow \frac{y}{1 - \lambda\, \Delta_k g} \cdot
+    \frac{B^T (DN_{frame} / B y)}{B^T 1}, \qquad
+    g_k = \frac{d_k}{\sqrt{d_k^2 + \epsilon^2}}, \quad
+    d_k = 2\, \frac{y_{k+1} - y_k}{y_{k+1} + y_k},
+
+lambda = 0.004, epsilon = 0.02: contrast from frame to frame, as the pixel sees it.  Light stays
+positive, and edges that passed within the exposure come back as steps.  It goes through the
+sequence in blocks, each solved with a margin of at least two exposures before and behind it.
 
 References
 ----------
@@ -23,7 +30,10 @@ References
    doi:10.1364/JOSA.62.000055.
 .. [2] L. B. Lucy, "An iterative technique for the rectification of observed distributions",
    Astronomical Journal 79, 1974, doi:10.1086/111605.
-.. [3] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency
+.. [3] N. Dey, L. Blanc-Feraud, C. Zimmer, P. Roux, Z. Kam, J.-C. Olivo-Marin, J. Zerubia,
+   "Richardson-Lucy Algorithm with Total Variation Regularization for 3D Confocal Microscope
+   Deconvolution", Microscopy Research and Technique 69(4), 2006, doi:10.1002/jemt.20294.
+.. [4] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency
    Global Shutter Spatiotemporal Vision Sensor", IEEE JSSC 49(10), 2014,
    doi:10.1109/JSSC.2014.2342715 (frames integrate, events do not).
 """
@@ -40,7 +50,11 @@ from adv2e.jit import entry
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 20
+_ITERATIONS = 50
+_VARIATION = 0.004
+_SOFT = 0.02
+"""Lambda and epsilon: what a step of light costs, and the contrast below which it costs less."""
+
 _LEAST_DN = 0.05
 """Light below this counts as this: what is zero would stay zero."""
 
@@ -108,6 +122,7 @@ def _sharpen(
     weights: NDArray[Any],
     norm: NDArray[Any],
     iterations: int,
+    variation: NDArray[Any],
     light: NDArray[Any],
     mean: NDArray[Any],
     factor: NDArray[Any],
@@ -123,12 +138,17 @@ def _sharpen(
     weights : (n, n), norm : (n,)
         Rows, and sums of the columns.
     iterations : int
+    variation : (2,)
+        Lambda and the square of epsilon.
     light : (n, pixels)
         In: where to begin.  Out: the light.
     mean, factor : (pixels,), (n, pixels)
         Memory to work in.
     """
     n, pixels = blurred.shape
+    cost, soft = variation
+    one = blurred.dtype.type(1)
+    two = one + one
     for _ in range(iterations):
         factor[:] = 0.0
         for k in range(n):
@@ -144,10 +164,15 @@ def _sharpen(
                 weight, row = weights[k, j], factor[j]
                 for p in range(pixels):
                     row[p] += weight * mean[p]
+        mean[:] = 0.0  # from here on the pull of the step before
         for k in range(n):
             row, now, scale = light[k], factor[k], norm[k]
+            coming = light[min(k + 1, n - 1)]
             for p in range(pixels):
-                row[p] *= now[p] * scale
+                step = two * (coming[p] - row[p]) / (coming[p] + row[p])
+                pull = step / np.sqrt(step * step + soft)
+                row[p] *= now[p] * scale / (one - cost * (pull - mean[p]))
+                mean[p] = pull
 
 
 def sharpened(
@@ -171,6 +196,7 @@ def sharpened(
     last = matrix.shape[1] - used[:, ::-1].argmax(axis=1)
     dtype = frames[0].dtype
     weights, norm = matrix.astype(dtype), (1.0 / matrix.sum(axis=0)).astype(dtype)
+    variation = np.array([_VARIATION, _SOFT * _SOFT], dtype)
     made = [np.empty_like(frame) for frame in frames[begin:end]]
     pixels = frames[0].size
     for lo in range(0, pixels, _STRIP):
@@ -179,7 +205,8 @@ def sharpened(
         np.maximum(blurred, dtype.type(_LEAST_DN), out=blurred)
         light, factor = blurred.copy(), np.empty_like(blurred)
         mean = np.empty(hi - lo, dtype)
-        _sharpen(blurred, first, last, weights, norm, _ITERATIONS, light, mean, factor)
+        rules = blurred, first, last, weights, norm, _ITERATIONS, variation
+        _sharpen(*rules, light, mean, factor)
         for frame, row in zip(made, light[begin:end], strict=True):
             frame.reshape(-1)[lo:hi] = row
     return made
