@@ -1,15 +1,14 @@
 """In-between frames made once for many simulations, where making them takes longer than all else.
 
-Frames along the motion depend on the frames and on what is taken in of their effects, so they can
-be given to the pixels as if they had been recorded.  Taken in is the exposure, with the black level
-that is added before it is undone.  What else acts on the light of each frame is laid over what was
-made: it moves the motion that is found by next to nothing.
+Frames along the motion depend on the frames and their exposure alone, so they can be given to the
+pixels as if they had been recorded.  What else acts on the light of each frame is laid over them:
+it moves the motion that is found by next to nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,20 +40,8 @@ def is_made_once(config: Config) -> bool:
     )
 
 
-def taken_in(config: Config) -> Frames:
-    """Return the effects on the frames that what is made of them depends on."""
-    frames = config.frames
-    if not frames.exposure_us:
-        return Frames()
-    return Frames(
-        black_level_dn=frames.black_level_dn,
-        black_depth_dn=frames.black_depth_dn,
-        exposure_us=frames.exposure_us,
-    )
-
-
 def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Instants:
-    """Return the frames and what is between them, with the effects that are taken in.
+    """Return the frames and what is between them, sharp where they are exposed.
 
     Parameters
     ----------
@@ -67,7 +54,7 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     count = config.sampling.L
     upsampler = make_upsampler(config.sampling.interpolation, count)
     frames: Iterator[Timed] = zip(times_ns, light, strict=True)
-    for hook in frame_hooks(taken_in(config), config.sampling):
+    for hook in frame_hooks(Frames(exposure_us=config.frames.exposure_us), config.sampling):
         frames = hook.light(frames)
     times: list[int] = []
     found: list[NDArray[np.float32]] = []
@@ -81,12 +68,7 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
 
 
 def as_recorded(config: Config) -> Config:
-    """Return `config` for what was made: nothing is to be made between, or taken in again."""
-    neutral, inside = Frames(), taken_in(config)
-    done = {
-        field.name: getattr(neutral, field.name)
-        for field in fields(Frames)
-        if getattr(inside, field.name) != getattr(neutral, field.name)
-    }
+    """Return `config` for frames between which nothing is to be made, and that are sharp."""
+    frames = replace(config.frames, exposure_us=0.0)
     sampling = replace(config.sampling, L=1, interpolation="linear")
-    return replace(config, frames=replace(config.frames, **done), sampling=sampling)
+    return replace(config, frames=frames, sampling=sampling)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.instants import Instants, as_recorded, is_made_once, made, taken_in
+from adv2e.diagnosis.instants import Instants, as_recorded, is_made_once, made
 from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
@@ -80,7 +80,7 @@ class Simulator:
     def _light(self, config: Config) -> Instants:
         """Return the light of the frames, made once for each way to read their numbers."""
         frames, sampling = config.frames, config.sampling
-        made_once = sampling.interpolation, sampling.L, taken_in(config)
+        made_once = sampling.interpolation, sampling.L, frames.exposure_us
         between = made_once if is_made_once(config) else None
         key = (frames.encoding, frames.full_scale, between)
         with self._lock:

@@ -51,10 +51,11 @@ def frame_hooks(frames: Frames, sampling: Sampling) -> list[Hooks]:
         hooks.append(ClockDriftHooks(frames.clock_drift_ppm))
     if frames.clock_offset_us:
         hooks.append(ClockOffsetHooks(frames.clock_offset_us))
-    if frames.black_level_dn or frames.black_depth_dn:
-        hooks.append(BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn))
     if frames.exposure_us:
         hooks.append(_of_exposure(frames.exposure_us, sampling.interpolation))
+    # after the frames are sharp: over a pedestal the dark would hardly become so in as many steps
+    if frames.black_level_dn or frames.black_depth_dn:
+        hooks.append(BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn))
     if any(frames.shift_px):
         hooks.append(MisregistrationHooks(frames.shift_px))
     if frames.flicker is not None and frames.flicker.depth:

@@ -14,7 +14,7 @@ from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
-from adv2e.diagnosis.instants import as_recorded, made, taken_in
+from adv2e.diagnosis.instants import as_recorded, made
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.events import Events
@@ -82,15 +82,15 @@ class Bench:
         return cut(np.concatenate(list(chunks)), windows.start, windows.stop)
 
     def _instants(self, config: Config) -> Light:
-        """Return light between the frames."""
-        sampling = config.sampling
-        key = config.frames.encoding, taken_in(config), sampling.interpolation, sampling.L
+        """Return light between the frames, without what is laid over it."""
+        frames, sampling = config.frames, config.sampling
+        key = frames.encoding, frames.exposure_us, sampling.interpolation, sampling.L
         if key not in self._made:
             if len(self._made) == KEPT:
                 del self._made[next(iter(self._made))]
-            times_ns, frames = zip(*self._decoded(config), strict=True)
+            times_ns, decoded = zip(*self._decoded(config), strict=True)
             self._made[key] = list(
-                zip(*made(config, list(times_ns), np.array(frames)), strict=True)
+                zip(*made(config, list(times_ns), np.array(decoded)), strict=True)
             )
         return self._made[key]
 
