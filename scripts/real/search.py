@@ -12,7 +12,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.candidates import Candidate, Knob
 from real.model import Bench
 from real.pattern import Place, pattern_search
-from real.tried import EXACT, OWN, Added, of_the_camera
+from real.tried import EXACT, OWN, Added, label, of_the_camera
 
 PRECISION = 0.001
 MOST_SEEDS = 4
@@ -198,7 +198,7 @@ class Search:
             config = base
             for other, values in rest.items():
                 config = other.applied(config, other.inner(values))
-            without = self.trial(Candidate(f"without {one.name}", (), ((),)), (), config)
+            without = self.trial(label(f"without {one.name}"), (), config)
             self._say(f"  {without.text()}: {without.score:.4f}")
             if without.score - here.score < LEAST_GAIN:
                 here, self._found = without, rest

@@ -69,6 +69,11 @@ def of_the_camera(declared: Config, seconds: float, only: Collection[str] = ()) 
     return [one for one in found if one.name not in UNSEEN and (not only or one.name in only)]
 
 
+def label(name: str) -> Candidate:
+    """Return what changes no key, for the name of a step."""
+    return Candidate(name, (), ((),))
+
+
 @dataclass(frozen=True)
 class Added:
     """A model with the effect that was added last, or one that was tried.
@@ -97,11 +102,11 @@ class Added:
         cls, name: str, config: Config, score: float = np.nan, still_hz: float | None = None
     ) -> Added:
         """Return a step that adds no key."""
-        return cls(Candidate(name, (), ((),)), (), config, score, still_hz)
+        return cls(label(name), (), config, score, still_hz)
 
     def named(self, name: str) -> Added:
         """Return the model under the name of a step that adds no key."""
-        return replace(self, candidate=Candidate(name, (), ((),)), values=())
+        return replace(self, candidate=label(name), values=())
 
     def noisier(self, before: Added, measured_hz: float | None) -> bool:
         """Tell whether it is noise that takes the still pixels away from what was measured."""

@@ -1,4 +1,4 @@
-"""What tests of scripts/benchmark.py share."""
+"""What tests of the benchmarks in scripts/ share."""
 
 from __future__ import annotations
 
