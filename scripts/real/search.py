@@ -124,7 +124,7 @@ class Search:
 
     def _removals(self, model: Model) -> Steps:
         """Yield the model without each effect that is no longer needed, the latest first."""
-        for one in list(reversed(model.found)):
+        for one in reversed([*model.found]):
             without = self._fit.without(model, one)
             self._say(f"  {without.here.text()}: {without.here.score:.4f}")
             if without.here.score - model.here.score < LEAST_GAIN:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import characterise_latency
 import pytest
+from characterisation.iebcs import read_levels
 
-SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 FOLDER = os.environ.get("ADV2E_REAL_DATA")
 
 pytestmark = pytest.mark.skipif(
@@ -15,10 +16,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def test_latencies_depart_from_one_over_light_by_a_floor(monkeypatch):
-    monkeypatch.syspath_prepend(SCRIPTS)
-    import characterise_latency
-
+def test_latencies_depart_from_one_over_light_by_a_floor():
     measured = characterise_latency.read(Path(FOLDER) / "latency-nist" / "latency_summary.csv")
     found = characterise_latency.one(measured, "CAM2", "CAM1", 1.0, seed=0)
     assert [effect.name for effect in found.effects] == ["source_follower"]
@@ -26,10 +24,7 @@ def test_latencies_depart_from_one_over_light_by_a_floor(monkeypatch):
     assert found.errors[0].after.value < 0.1
 
 
-def test_noise_rates_fall_as_the_light_rises(monkeypatch):
-    monkeypatch.syspath_prepend(SCRIPTS)
-    from characterisation.iebcs import read_levels
-
+def test_noise_rates_fall_as_the_light_rises():
     dark, room, bright = read_levels(Path(FOLDER) / "noise-iebcs")
     assert dark.mean_hz("off") > 1000 * room.mean_hz("off")
     assert bright.mean_hz("off") == 0.0

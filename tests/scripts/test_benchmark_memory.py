@@ -4,28 +4,20 @@ from __future__ import annotations
 
 import sys
 
+import benchmark_memory
 import numpy as np
 import pytest
+from benchmarks import memory
 
 
-@pytest.fixture
-def benchmark_memory(module):
-    return module("benchmark_memory")
-
-
-@pytest.fixture
-def memory(module):
-    return module("benchmarks.memory")
-
-
-def test_cases_have_names_of_their_own_and_cover_everything(benchmark_memory):
+def test_cases_have_names_of_their_own_and_cover_everything():
     every = list(benchmark_memory.cases([], []))
     assert len({case.name for case in every}) == len(every) == 3 * 2 * 2 * 3
     chosen = list(benchmark_memory.cases(["1280x720"], ["txt"]))
     assert {(case.size.name, case.format) for case in chosen} == {("1280x720", "txt")}
 
 
-def test_a_burst_swings_as_far_as_it_says(memory):
+def test_a_burst_swings_as_far_as_it_says():
     burst = memory.Burst(width=40, height=30, frames=3, fps=30.0, swing=1.2)
     frames = np.stack(list(burst.render())).astype(float)
     assert frames.shape == (3, 30, 40)
@@ -34,7 +26,7 @@ def test_a_burst_swings_as_far_as_it_says(memory):
     assert flipped == pytest.approx(2 * memory.FLIPPED * (1 - memory.FLIPPED), abs=0.05)
 
 
-def test_a_conversion_tells_its_peak_and_its_events(memory, tmp_path):
+def test_a_conversion_tells_its_peak_and_its_events(tmp_path):
     burst = memory.Burst(width=40, height=30, frames=4, fps=30.0, swing=1.2)
     clip = memory.stored_burst(burst, tmp_path)
     arguments = ["convert", str(clip), "--fps", "30", "-o", str(tmp_path / "a.txt")]
@@ -45,13 +37,13 @@ def test_a_conversion_tells_its_peak_and_its_events(memory, tmp_path):
         memory.convert({"options": {"arguments": arguments}})
 
 
-def test_progress_is_read_from_the_bar(memory):
+def test_progress_is_read_from_the_bar():
     assert memory.frames_taken("compiling\n") is None
     assert memory.frames_taken(" 1%| 12/900 [00:01\r 2%| 25/900 [00:02<01:10, 12unit/s]") == 25
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_a_run_is_watched_and_its_failure_told(memory):
+def test_a_run_is_watched_and_its_failure_told():
     script = (
         "import sys, time\n"
         "for k in range(5):\n"
@@ -67,7 +59,7 @@ def test_a_run_is_watched_and_its_failure_told(memory):
         memory.watched([sys.executable, "-c", "raise SystemExit('no such thing')"])
 
 
-def test_the_long_table_tells_each_tenth(benchmark_memory, memory):
+def test_the_long_table_tells_each_tenth():
     moments = [
         memory.Moment(k * 0.01 * (1 + (k > 900)), k, 100 + k / 100, k * 0.005)
         for k in range(1, 1001)
@@ -81,7 +73,7 @@ def test_the_long_table_tells_each_tenth(benchmark_memory, memory):
         benchmark_memory.long_table(moments[200:], 1000)
 
 
-def test_the_long_clip_goes_to_and_fro(benchmark_memory, monkeypatch, tmp_path):
+def test_the_long_clip_goes_to_and_fro(monkeypatch, tmp_path):
     small = benchmark_memory.Size(32, 24, 1.0, 30.0, 1.0, 4)
     monkeypatch.setattr(benchmark_memory, "LONG_SIZE", small)
     monkeypatch.setattr(benchmark_memory, "LONG_CYCLE", 4)

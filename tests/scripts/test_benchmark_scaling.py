@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import benchmark_scaling
+import machine_limits as limits
 import numpy as np
 import pytest
+from benchmarks import processes
 
 
 @pytest.fixture
-def scaling(module, monkeypatch):
-    found = module("benchmark_scaling")
-    monkeypatch.setattr(found, "stored", lambda clip, folder: folder / f"{clip.name}.npy")
-    return found
+def scaling(monkeypatch):
+    monkeypatch.setattr(
+        benchmark_scaling, "stored", lambda clip, folder: folder / f"{clip.name}.npy"
+    )
+    return benchmark_scaling
 
 
 @pytest.mark.parametrize("quick", [False, True])
@@ -31,9 +35,8 @@ def test_one_quantity_is_varied_at_a_time(scaling, tmp_path):
         assert len(changed) <= (3 if axis == "megapixels" else 1)
 
 
-def test_figure_and_table_hold_every_point(scaling, module, tmp_path):
+def test_figure_and_table_hold_every_point(scaling, tmp_path):
     pytest.importorskip("matplotlib")
-    processes = module("benchmarks.processes")
     points = list(scaling.samples(scaling.Setup(tmp_path, True, None)))
     report = {"wall_s": 1.0, "cpu_s": 2.0, "events": 50, "pixels": 10, "frames": 10, "versions": {}}
     measured = {
@@ -49,8 +52,7 @@ def test_figure_and_table_hold_every_point(scaling, module, tmp_path):
 
 
 @pytest.mark.parametrize(("kind", "error"), [(np.float32, 3e-7), (np.float64, 5e-8)])
-def test_polynomial_of_the_limits_is_the_exponential(module, kind, error):
-    limits = module("machine_limits")
+def test_polynomial_of_the_limits_is_the_exponential(kind, error):
     x = np.linspace(-1, 0, 1001).astype(kind)
     y = np.empty_like(x)
     name = "exp_polynomial32" if kind is np.float32 else "exp_polynomial64"
@@ -58,8 +60,7 @@ def test_polynomial_of_the_limits_is_the_exponential(module, kind, error):
     assert np.max(np.abs(y / np.exp(x.astype(float)) - 1)) < error
 
 
-def test_limits_are_rates(module):
-    limits = module("machine_limits")
+def test_limits_are_rates():
     effort = limits.Effort(megabytes=1, events=100, repeats=3, threads=1)
     ran = []
     limit = limits.rate("sums", 5.0, "M/s", effort, [lambda: ran.append(sum(range(1000)))])

@@ -7,8 +7,10 @@ import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
+import benchmark
 import numpy as np
 import pytest
+from benchmarks import settings
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 
@@ -26,12 +28,12 @@ def stand_in(monkeypatch):
 
 
 @pytest.fixture
-def tool(module, monkeypatch):
+def tool(monkeypatch):
     """Import a tool's module anew, over the stand-ins, and forget it afterwards."""
 
     def load(name):
         monkeypatch.delitem(sys.modules, f"benchmarks.tools.{name}", raising=False)
-        found = module(f"benchmarks.tools.{name}")
+        found = importlib.import_module(f"benchmarks.tools.{name}")
         monkeypatch.delitem(sys.modules, f"benchmarks.tools.{name}")
         return found
 
@@ -105,11 +107,10 @@ def v2e_folder(tmp_path, monkeypatch):
         sys.modules.pop(name, None)
 
 
-def test_v2e_is_taken_from_the_folder_named(module, stand_in, tool, v2e_folder, small):
-    peers = module("benchmark").find_peers(sys.executable, v2e_folder, [])
+def test_v2e_is_taken_from_the_folder_named(stand_in, tool, v2e_folder, small):
+    peers = benchmark.find_peers(sys.executable, v2e_folder, [])
     assert peers.v2e == v2e_folder
     stand_in("torch", set_num_threads=lambda count: None, __version__="0")
-    settings = module("benchmarks.settings")
     runs = [given for given in settings.peer_arguments(peers, 1) if given[1] == "v2e"]
     assert [name for name, _, _ in runs] == ["v2e, noise off", "v2e, all effects"]
     v2e = tool("v2e")
@@ -146,14 +147,14 @@ def test_eventcv_columns_are_taken_by_name(stand_in, tool):
     ]
 
 
-def test_missing_tools_are_noted(module):
+def test_missing_tools_are_noted():
     notes = []
-    peers = module("benchmark").find_peers(sys.executable, None, notes)
+    peers = benchmark.find_peers(sys.executable, None, notes)
     for name in ("eventcv", "evlib"):
         if importlib.util.find_spec(name) is None:
             assert name not in peers.tools
             assert any(note.startswith(f"{name} took no part: ModuleNotFound") for note in notes)
     assert peers.v2e is None
-    peers = module("benchmark").find_peers(sys.executable, SCRIPTS, notes)
+    peers = benchmark.find_peers(sys.executable, SCRIPTS, notes)
     assert peers.v2e is None
     assert any(note.startswith("v2e took no part") for note in notes)

@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 import subprocess
 from pathlib import Path
 
+import compare_commits as script
 import pytest
-
-SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
-
-
-@pytest.fixture
-def script(monkeypatch):
-    monkeypatch.syspath_prepend(SCRIPTS)
-    return importlib.import_module("compare_commits")
+from benchmarks import processes, settings
 
 
 @pytest.fixture
@@ -37,7 +30,7 @@ def repository(tmp_path):
     return folder
 
 
-def test_each_commit_is_taken_out_and_git_keeps_no_trace(script, repository, tmp_path):
+def test_each_commit_is_taken_out_and_git_keeps_no_trace(repository, tmp_path):
     before = script.checked_out("HEAD~1", tmp_path / "before", repository)
     after = script.checked_out("HEAD", tmp_path / "after", repository)
     assert (before / "adv2e" / "file.txt").read_text() == "before"
@@ -52,16 +45,15 @@ def test_each_commit_is_taken_out_and_git_keeps_no_trace(script, repository, tmp
     assert script.checked_out(".", tmp_path / "unused", repository) == repository
 
 
-def test_unknown_commit_is_told_in_one_line(script, repository, tmp_path):
+def test_unknown_commit_is_told_in_one_line(repository, tmp_path):
     with pytest.raises(script.JobError, match=r"^nonsense: fatal: not a valid object name.*$"):
         script.checked_out("nonsense", tmp_path / "nowhere", repository)
 
 
-def test_other_events_are_shouted(script):
+def test_other_events_are_shouted():
     def found(name, package, wall, digest):
         job = script.Job(name=name, package=package)
         report = {"wall_s": wall, "cpu_s": wall, "events": 7, "digest": digest, "versions": {}}
-        processes = importlib.import_module("benchmarks.processes")
         return script.Measured(job, [processes.Round(report, wall, 0.0)])
 
     every = [
@@ -78,10 +70,8 @@ def test_other_events_are_shouted(script):
     assert "DIFFERENT: 7 / 7" in rows[1]
 
 
-def test_settings_that_do_not_exist_are_an_error(script, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        importlib.import_module("benchmarks.settings"), "stored", lambda clip, folder: folder
-    )
+def test_settings_that_do_not_exist_are_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(settings, "stored", lambda clip, folder: folder)
     plan = script.Plan(tmp_path, True, 1)
     with pytest.raises(script.JobError, match="no setting has such a name"):
         script.pairs_of_jobs(plan, ["nothing"], [tmp_path])

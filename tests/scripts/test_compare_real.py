@@ -1,29 +1,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
+import compare_real
 import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from real.recording import read, still_pixels, still_rate
 
 from adv2e import simulate
+from adv2e.comparison.distances import distances
 from adv2e.config import load_config
+from adv2e.diagnosis.nuisances import TOLERANCE, match_totals
 from adv2e.events import make_events
 
-SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 WIDTH, HEIGHT, FRAMES = 16, 12, 7
 TIMES = np.arange(FRAMES) * 0.02
 ON, OFF = 0.3, 0.15
-
-
-@pytest.fixture
-def compare_real(monkeypatch):
-    monkeypatch.syspath_prepend(SCRIPTS)
-    import compare_real
-
-    return compare_real
 
 
 def moving_waves():
@@ -73,7 +67,7 @@ def run(command, *arguments):
     return result
 
 
-def test_a_table_has_a_row_for_each_configuration_and_the_two_marks(compare_real, recording):
+def test_a_table_has_a_row_for_each_configuration_and_the_two_marks(recording):
     result = run(compare_real, recording, "--configs", "adv2e,ideal")
     assert result.exit_code == 0
     assert result.stdout.startswith("Configurations named after a tool are that tool's parameters")
@@ -91,16 +85,14 @@ def test_a_table_has_a_row_for_each_configuration_and_the_two_marks(compare_real
     assert rows[-1][6:10] == ["1.00"] * 4
 
 
-def test_every_distance_in_the_table_is_defined_below_it(compare_real, recording):
+def test_every_distance_in_the_table_is_defined_below_it(recording):
     text = run(compare_real, recording, "--configs", "ideal").stdout
     names = next(iter(tables(text).values()))[0]
     for name in names[3:-1]:
         assert f"\n- {name}: " in text
 
 
-def test_identical_events_are_at_distance_zero(compare_real, recording):
-    from real.recording import read
-
+def test_identical_events_are_at_distance_zero(recording):
     real = read(str(recording))
     sets = [f"pixel.thresholds.on={ON}", f"pixel.thresholds.off={OFF}"]
     case = compare_real.Case("same", load_config(["ideal"], sets))
@@ -111,13 +103,7 @@ def test_identical_events_are_at_distance_zero(compare_real, recording):
     assert row.stream.events == inside.sum() > 100
 
 
-def test_the_floor_is_the_distance_between_seeds_relative_to_the_measured_events(
-    compare_real, recording
-):
-    from real.recording import read
-
-    from adv2e.comparison.distances import distances
-
+def test_the_floor_is_the_distance_between_seeds_relative_to_the_measured_events(recording):
     real = read(str(recording))
     config = load_config(["adv2e"], seed=3)
     row = compare_real.judged(
@@ -131,7 +117,7 @@ def test_the_floor_is_the_distance_between_seeds_relative_to_the_measured_events
     assert row.floor == distances(a, b, real.windows, WIDTH, HEIGHT, whole=real.events).values
 
 
-def test_matching_totals_finds_the_thresholds_the_events_were_made_with(compare_real, recording):
+def test_matching_totals_finds_the_thresholds_the_events_were_made_with(recording):
     result = run(compare_real, recording, "--configs", "ideal", "--match-totals")
     (_, rows), (heading, (_, _, row, *_)) = tables(result.stdout).items()
     assert len(rows) == 5
@@ -147,15 +133,13 @@ def test_matching_totals_finds_the_thresholds_the_events_were_made_with(compare_
     assert "match from 0.02 to 0.06 s" in result.stdout
 
 
-def test_totals_that_no_threshold_gives_are_marked(compare_real):
-    from adv2e.diagnosis.nuisances import TOLERANCE, match_totals
-
+def test_totals_that_no_threshold_gives_are_marked():
     _, _, miss = match_totals(lambda on, off: (int(50 / on), 400), (0.2, 0.2), (100, 200))
     assert miss == pytest.approx(1.0)
     assert miss > TOLERANCE
 
 
-def test_events_that_no_threshold_gives_are_marked_in_the_table(compare_real, tmp_path):
+def test_events_that_no_threshold_gives_are_marked_in_the_table(tmp_path):
     quiet = np.full((FRAMES, HEIGHT, WIDTH), 90, np.uint8)
     folder = write_recording(tmp_path / "quiet", quiet, ideal_events(moving_waves()))
     result = run(compare_real, folder, "--configs", "ideal", "--match-totals")
@@ -165,9 +149,7 @@ def test_events_that_no_threshold_gives_are_marked_in_the_table(compare_real, tm
     assert second[0].endswith("(!) †")
 
 
-def test_totals_that_depend_on_both_thresholds_are_matched(compare_real):
-    from adv2e.diagnosis.nuisances import TOLERANCE, match_totals
-
+def test_totals_that_depend_on_both_thresholds_are_matched():
     def count(on, off):
         return int(90_000 * on**-2.2 * off**0.4), int(70_000 * off**-1.1 * on**0.3)
 
@@ -176,9 +158,7 @@ def test_totals_that_depend_on_both_thresholds_are_matched(compare_real):
     assert (on, off) == pytest.approx((0.63, 0.34), rel=0.02)
 
 
-def test_still_pixels_keep_away_from_those_that_change(compare_real):
-    from real.recording import still_pixels, still_rate
-
+def test_still_pixels_keep_away_from_those_that_change():
     frames = np.full((5, HEIGHT, WIDTH), 100.0, np.float32)
     frames[1::2, 3, 2] = 110
     frames[:, 9, 14] += np.arange(5)  # a standard deviation of 1.4
@@ -190,12 +170,12 @@ def test_still_pixels_keep_away_from_those_that_change(compare_real):
     assert still_rate(events, still, 0.5) == 2 / (136 * 0.5)
 
 
-def test_an_interpolation_goes_for_all_configurations(compare_real, recording):
+def test_an_interpolation_goes_for_all_configurations(recording):
     result = run(compare_real, recording, "--configs", "ideal", "--interpolation", "linear")
     assert "| ideal, linear † |" in result.stdout
 
 
-def test_tables_go_to_a_file_and_progress_to_stderr(compare_real, recording, tmp_path):
+def test_tables_go_to_a_file_and_progress_to_stderr(recording, tmp_path):
     out = tmp_path / "table.md"
     result = run(compare_real, recording, "--configs", "ideal", "--out", out)
     assert result.stdout == ""
@@ -203,7 +183,7 @@ def test_tables_go_to_a_file_and_progress_to_stderr(compare_real, recording, tmp
     assert len(tables(out.read_text())) == 1
 
 
-def test_a_folder_without_events_fails_with_one_line_and_leaves_no_file(compare_real, tmp_path):
+def test_a_folder_without_events_fails_with_one_line_and_leaves_no_file(tmp_path):
     folder = write_recording(tmp_path / "empty", moving_waves(), [])
     out = tmp_path / "table.md"
     result = run(compare_real, folder, "--out", out)

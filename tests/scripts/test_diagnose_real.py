@@ -4,28 +4,29 @@ import os
 from pathlib import Path
 
 import cv2
+import diagnose_real
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from real.fit import Fit, Model, enough_seeds
+from real.model import BEYOND_US, SCORE, Bench, Judged
+from real.recording import halves, read
+from real.search import Search
+from real.stability import compare_halved, stable_score
+from real.tried import CLIPPED_BLACK, Added
 
 from adv2e import simulate
-from adv2e.comparison.windows import Windows
+from adv2e.comparison.windows import Windows, cut
 from adv2e.config import load_config
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.events import empty_events, make_events
 
-SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 REAL = os.environ.get("ADV2E_REAL_DATA")
 WIDTH, HEIGHT, FRAMES = 24, 16, 9
 TIMES = np.arange(FRAMES) * 0.02
 BLACK_LEVEL = Candidate(
     "black_level", (Knob("frames.black_level_dn", 0.02, 100.0),), ((2.0,), (14.0,))
 )
-
-
-@pytest.fixture
-def scripts(monkeypatch):
-    monkeypatch.syspath_prepend(SCRIPTS)
 
 
 def moving_waves():
@@ -69,13 +70,7 @@ def declared(tmp_path):
     return path
 
 
-def test_the_search_finds_the_black_level_that_made_the_events(
-    scripts, recording, declared, monkeypatch
-):
-    from real.model import Bench
-    from real.recording import halves, read
-    from real.search import Search
-
+def test_the_search_finds_the_black_level_that_made_the_events(recording, declared, monkeypatch):
     bench = Bench(read(str(recording)), 1)
     first, _ = halves(bench.real.windows)
     said = []
@@ -94,13 +89,8 @@ def test_the_search_finds_the_black_level_that_made_the_events(
 
 @pytest.mark.parametrize("sets", [[], ["frames.clock_offset_us=-3000", "frames.black_level_dn=4"]])
 def test_in_between_frames_made_once_give_nearly_the_events_of_a_conversion(
-    scripts, recording, declared, sets
+    recording, declared, sets
 ):
-    from real.model import BEYOND_US, Bench
-    from real.recording import read
-
-    from adv2e.comparison.windows import cut
-
     bench = Bench(read(str(recording)), 1)
     windows = bench.real.windows
     config = load_config([declared], ["sampling.interpolation=flow", *sets])
@@ -111,9 +101,7 @@ def test_in_between_frames_made_once_give_nearly_the_events_of_a_conversion(
     assert len(quick) == pytest.approx(len(whole), rel=0.01)
 
 
-def test_noise_in_still_pixels_is_no_explanation(scripts):
-    from real.tried import Added
-
+def test_noise_in_still_pixels_is_no_explanation():
     before = Added.plain("before", load_config(), 0.8, still_hz=0.1)
     assert Added.plain("leak", load_config(), 0.7, still_hz=1.0).noisier(before, 0.2)
     assert not Added.plain("leak", load_config(), 0.7, still_hz=0.2).noisier(before, 0.2)
@@ -153,8 +141,6 @@ class Valley:
 
 
 def fitted(bench, seeds=(0,)):
-    from real.fit import Fit
-
     fit = Fit(bench, None)
     fit.seeds = seeds
     return fit
@@ -162,17 +148,12 @@ def fitted(bench, seeds=(0,)):
 
 def model_of(found, sets=(), base=()):
     """A model in the valley."""
-    from real.fit import Model
-    from real.tried import Added
-
     config = load_config([], sets)
     score, _ = Valley().score(config, None, (0,))
     return Model(load_config([], base), found, Added.plain("last", config, score))
 
 
-def test_the_last_search_moves_all_keys_together(scripts):
-    from real.tried import CLIPPED_BLACK
-
+def test_the_last_search_moves_all_keys_together():
     bench = Valley()
     start = model_of({CLIPPED_BLACK: (7.0, 3.5), OFFSET: (600.0,)}, [
         "frames.black_level_dn=7", "frames.black_depth_dn=3.5", "frames.clock_offset_us=600",
@@ -186,10 +167,7 @@ def test_the_last_search_moves_all_keys_together(scripts):
     assert best.here.text() == "all keys together"
 
 
-def test_what_is_no_longer_needed_is_dropped(scripts):
-    from real.search import Search
-    from real.tried import CLIPPED_BLACK
-
+def test_what_is_no_longer_needed_is_dropped():
     needless = Candidate("leak", (Knob("pixel.leak.rate_hz", 0.01, 10.0),), ())
     search = Search(Valley(), EVERYTHING, print)
     search._fit.seeds = (0,)
@@ -207,9 +185,7 @@ def test_what_is_no_longer_needed_is_dropped(scripts):
     assert config.frames.clock_offset_us == 2000.0
 
 
-def test_a_wider_effect_takes_the_place_of_a_narrower_one(scripts):
-    from real.tried import CLIPPED_BLACK, Added
-
+def test_a_wider_effect_takes_the_place_of_a_narrower_one():
     sets = ["frames.black_level_dn=14", "frames.black_depth_dn=5"]
     start = model_of({BLACK_LEVEL: (7.0,)}, sets)
     every = [BLACK_LEVEL, CLIPPED_BLACK, OFFSET]
@@ -233,9 +209,7 @@ class Pass(Valley):
         return 0.5 + min(first, deeper), None
 
 
-def test_what_was_found_first_is_replaced_by_what_is_nearer(scripts, monkeypatch):
-    from real.search import Search
-
+def test_what_was_found_first_is_replaced_by_what_is_nearer(monkeypatch):
     level, depth = (
         Candidate(name, (Knob(f"frames.{name}_dn", 0.02, 100.0),), ((start,),))
         for name, start in (("black_level", 12.0), ("black_depth", 4.0))
@@ -256,25 +230,19 @@ def test_what_was_found_first_is_replaced_by_what_is_nearer(scripts, monkeypatch
 
 
 @pytest.mark.parametrize(("chance", "count"), [(0.0, 1), (1e-4, 1), (1e-3, 2), (0.1, 4)])
-def test_seeds_are_as_many_as_chance_asks_for(scripts, chance, count):
-    from real.fit import enough_seeds
-
+def test_seeds_are_as_many_as_chance_asks_for(chance, count):
     config = load_config([], ["frames.black_level_dn=14", "frames.black_depth_dn=5"])
     assert enough_seeds(Valley(chance), config, None, 7) == tuple(range(7, 7 + count))
 
 
-def test_the_chance_of_the_simulation_is_taken_off(scripts):
-    from real.model import Judged
-
+def test_the_chance_of_the_simulation_is_taken_off():
     judged = Judged({"a": 0.5, "b": 0.1, "c": None}, {"a": 0.4, "b": 0.4, "c": None}, 1.0, 0.5)
     assert judged.without_chance("a") == pytest.approx(np.sqrt(0.25 - 0.08))
     assert judged.without_chance("b") == 0.0
     assert judged.without_chance("c") is None
 
 
-def test_every_second_frame_and_the_ends_stay(scripts, recording):
-    from real.recording import read
-
+def test_every_second_frame_and_the_ends_stay(recording):
     thin = read(str(recording)).thinned()
     assert np.flatnonzero(thin.used).tolist() == [0, 2, 4, 6, 8]
     assert len(list(thin.frames())) == 5
@@ -285,9 +253,7 @@ def noisy(rng, x, count, on):
     return make_events(t, x + rng.integers(0, 8, count), np.full(count, 3), np.full(count, on))
 
 
-def test_tiles_that_change_are_unstable_and_chance_is_not(scripts):
-    from real.stability import compare_halved, stable_score
-
+def test_tiles_that_change_are_unstable_and_chance_is_not():
     rng = np.random.default_rng(1)
     windows = Windows("frame intervals", ((0, 40_000),), 1)
 
@@ -307,9 +273,7 @@ def test_tiles_that_change_are_unstable_and_chance_is_not(scripts):
     assert stable_score(measured, empty_events(), windows, found) == pytest.approx(1.0)
 
 
-def test_tables_before_and_after_each_effect(scripts, recording, declared, tmp_path, monkeypatch):
-    import diagnose_real
-
+def test_tables_before_and_after_each_effect(recording, declared, tmp_path, monkeypatch):
     monkeypatch.setattr("real.search.OWN", ())
     monkeypatch.setattr("real.search.of_the_camera", lambda *_: [BLACK_LEVEL])
     out = tmp_path / "table.md"
@@ -331,10 +295,7 @@ def test_tables_before_and_after_each_effect(scripts, recording, declared, tmp_p
 
 
 @pytest.mark.skipif(not REAL, reason="ADV2E_REAL_DATA does not name a folder of recordings")
-def test_flow_and_an_offset_come_nearer_to_the_slider_than_the_best_tool(scripts):
-    from real.model import SCORE, Bench
-    from real.recording import halves, read
-
+def test_flow_and_an_offset_come_nearer_to_the_slider_than_the_best_tool():
     bench = Bench(read(str(Path(str(REAL)) / "davis240c-slider-depth-chunk")), None)
     first, second = halves(bench.real.windows)
     sets = [

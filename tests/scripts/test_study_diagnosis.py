@@ -1,32 +1,23 @@
 """The study of the diagnosis: its order, its resuming, its scores and its tables."""
 
-import importlib
 import json
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import study_diagnosis as study
 from camera.catalogue import LIBRARY, OUTSIDE
 from click.testing import CliRunner
+from study_diagnosis_parts import cases, figure, results, scoring, tables
+from study_diagnosis_parts import run as study_run
 
-SCRIPTS = Path(__file__).parents[2] / "scripts"
 SETUP = {"width": 48, "height": 36, "seconds": 0.8, "fps": 500.0}
 
 
 @pytest.fixture
-def parts(monkeypatch):
-    monkeypatch.syspath_prepend(str(SCRIPTS))
-    names = ("cases", "results", "run", "scoring", "tables", "figure")
-    modules = {name: importlib.import_module(f"study_diagnosis_parts.{name}") for name in names}
-    return SimpleNamespace(study=importlib.import_module("study_diagnosis"), **modules)
-
-
-@pytest.fixture
-def plan(parts):
+def plan():
     def made(**options):
-        wanted = {"kinds": parts.cases.KINDS, "sizes": parts.cases.SIZES, "library": LIBRARY}
-        return parts.cases.Plan(**{**wanted, **options})
+        wanted = {"kinds": cases.KINDS, "sizes": cases.SIZES, "library": LIBRARY}
+        return cases.Plan(**{**wanted, **options})
 
     return made
 
@@ -52,59 +43,59 @@ def line_of(kind="library", effects=("refractory",), size="middle", verdict="exp
 # --- order ----------------------------------------------------------------------------------------
 
 
-def test_the_middle_size_comes_first_and_kinds_in_turn(parts, plan):
-    cases = plan().cases()
-    first = cases[:50]
-    assert [case.kind for case in first[:5]] == list(parts.cases.KINDS)
+def test_the_middle_size_comes_first_and_kinds_in_turn(plan):
+    made = plan().cases()
+    first = made[:50]
+    assert [case.kind for case in first[:5]] == list(cases.KINDS)
     assert {case.size for case in first} == {"middle", "none"}
-    counts = [sum(case.kind == kind for case in first) for kind in parts.cases.KINDS]
+    counts = [sum(case.kind == kind for case in first) for kind in cases.KINDS]
     assert counts == [10] * 5
-    sizes = [case.size for case in cases if case.kind == "library"]
+    sizes = [case.size for case in made if case.kind == "library"]
     assert set(sizes[: len(LIBRARY)]) == {"middle"}
     assert abs(sizes[:60].count("small") - sizes[:60].count("large")) <= 1
 
 
-def test_a_full_study_has_every_effect_in_every_size_once(parts, plan):
-    cases = plan(nothing=100).cases()
-    assert len({case.key for case in cases}) == len(cases)
-    assert sum(case.kind == "nothing" for case in cases) == 100
+def test_a_full_study_has_every_effect_in_every_size_once(plan):
+    made = plan(nothing=100).cases()
+    assert len({case.key for case in made}) == len(made)
+    assert sum(case.kind == "nothing" for case in made) == 100
     for kind, names in (("library", LIBRARY), ("leave-one-out", LIBRARY), ("outside", OUTSIDE)):
-        held = {(*case.effects, case.size) for case in cases if case.kind == kind}
-        assert held == {(name, size) for name in names for size in parts.cases.SIZES}
+        held = {(*case.effects, case.size) for case in made if case.kind == kind}
+        assert held == {(name, size) for name in names for size in cases.SIZES}
 
 
-def test_pairs_hold_every_effect_twice_and_never_one_thing_under_two_keys(parts):
-    made = parts.cases.pairs(["leak", "photo_leak", "flicker", "readout"])
+def test_pairs_hold_every_effect_twice_and_never_one_thing_under_two_keys():
+    made = cases.pairs(["leak", "photo_leak", "flicker", "readout"])
     assert made == [("photo_leak", "flicker"), ("flicker", "readout"), ("readout", "leak")]
 
 
 def test_only_keeps_the_pairs_of_an_effect(plan):
-    cases = plan(kinds=("pairs",), sizes=("middle",), only=("flicker",)).cases()
-    assert len(cases) == 2
-    assert all("flicker" in case.effects for case in cases)
+    made = plan(kinds=("pairs",), sizes=("middle",), only=("flicker",)).cases()
+    assert len(made) == 2
+    assert all("flicker" in case.effects for case in made)
 
 
-def test_shards_share_all_cases_out(parts, plan):
-    cases = plan().cases()
-    shares = [parts.cases.shard(cases, number, 7) for number in range(1, 8)]
-    assert sorted(case.key for part in shares for case in part) == sorted(c.key for c in cases)
+def test_shards_share_all_cases_out(plan):
+    made = plan().cases()
+    shares = [cases.shard(made, number, 7) for number in range(1, 8)]
+    assert sorted(case.key for part in shares for case in part) == sorted(c.key for c in made)
     assert max(map(len, shares)) - min(map(len, shares)) <= 1
 
 
-def test_scene_and_seed_follow_from_the_case_alone(parts):
-    one = parts.cases.Case("library", ("leak",), "middle", 0)
-    again = parts.cases.Case("leave-one-out", ("leak",), "middle", 0)
+def test_scene_and_seed_follow_from_the_case_alone():
+    one = cases.Case("library", ("leak",), "middle", 0)
+    again = cases.Case("leave-one-out", ("leak",), "middle", 0)
     assert one.seed(0) == one.seed(0)
     assert len({one.seed(0), one.seed(1), again.seed(0)}) == 3
-    many = [parts.cases.Case("nothing", (), "none", k).scene(0) for k in range(60)]
-    assert {many.count(name) > 8 for name in parts.cases.SCENES} == {True}
+    many = [cases.Case("nothing", (), "none", k).scene(0) for k in range(60)]
+    assert {many.count(name) > 8 for name in cases.SCENES} == {True}
 
 
-def test_only_what_is_left_out_is_left_out(parts):
-    hidden = parts.cases.Case("leave-one-out", ("leak",), "large", 0)
+def test_only_what_is_left_out_is_left_out():
+    hidden = cases.Case("leave-one-out", ("leak",), "large", 0)
     assert hidden.without == ("leak",)
     assert hidden.hidden == {"pixel": {"leak": {"rate_hz": 6.0}}}
-    pair = parts.cases.Case("pairs", ("leak", "event_loss"), "middle", 0)
+    pair = cases.Case("pairs", ("leak", "event_loss"), "middle", 0)
     assert pair.without == ()
     assert pair.hidden == {
         "pixel": {"leak": {"rate_hz": 2.0}},
@@ -115,34 +106,34 @@ def test_only_what_is_left_out_is_left_out(parts):
 # --- results --------------------------------------------------------------------------------------
 
 
-def test_lines_come_back_and_what_was_cut_off_does_not(parts, tmp_path):
+def test_lines_come_back_and_what_was_cut_off_does_not(tmp_path):
     file = tmp_path / "new" / "1-of-1.jsonl"
-    parts.results.append(file, line_of(repeat=0))
+    results.append(file, line_of(repeat=0))
     with file.open("a") as stream:
         stream.write('{"key": "cut of')
-    parts.results.append(file, line_of(repeat=1))
-    parts.results.append(file.with_name("2-of-2.jsonl"), line_of(repeat=2))
-    keys = [line["key"] for line in parts.results.read(file.parent)]
+    results.append(file, line_of(repeat=1))
+    results.append(file.with_name("2-of-2.jsonl"), line_of(repeat=2))
+    keys = [line["key"] for line in results.read(file.parent)]
     assert keys == [f"library/refractory/middle/{k}" for k in range(3)]
 
 
-def test_success_counts_over_failure_and_failures_are_done_again(parts):
+def test_success_counts_over_failure_and_failures_are_done_again():
     good, bad = line_of(), {**line_of(), "failed": "DataError: no"}
     other = {**line_of(repeat=1), "failed": "DataError: no"}
-    assert parts.results.latest([bad, good, bad, other]) == [good, other]
-    assert parts.results.finished([bad, good, other]) == {parts.results.identity(good)}
-    assert parts.results.finished([other]) == set()
+    assert results.latest([bad, good, bad, other]) == [good, other]
+    assert results.finished([bad, good, other]) == {results.identity(good)}
+    assert results.finished([other]) == set()
 
 
 @pytest.mark.parametrize(
     "change", [{"commit": "def"}, {"study_seed": 1}, {"setup": {**SETUP, "fps": 250.0}}]
 )
-def test_another_commit_seed_or_setup_is_other_work(parts, change):
-    assert parts.results.identity({**line_of(), **change}) != parts.results.identity(line_of())
+def test_another_commit_seed_or_setup_is_other_work(change):
+    assert results.identity({**line_of(), **change}) != results.identity(line_of())
 
 
 @pytest.fixture
-def quick_run(parts, monkeypatch, tmp_path):
+def quick_run(monkeypatch, tmp_path):
     """Run the command with a made-up diagnosis; return the keys of what it went through."""
     seen = []
 
@@ -150,25 +141,25 @@ def quick_run(parts, monkeypatch, tmp_path):
         seen.append(case.key)
         return {**line_of(setup=vars(setup)), "key": case.key, "study_seed": study_seed}
 
-    monkeypatch.setattr(parts.run, "diagnosed", diagnosed)
-    monkeypatch.setattr(parts.run, "commit", lambda: "abc")
+    monkeypatch.setattr(study_run, "diagnosed", diagnosed)
+    monkeypatch.setattr(study_run, "commit", lambda: "abc")
 
     def run(*arguments):
         seen.clear()
         command = ["run", str(tmp_path), "--kinds", "library", *arguments]
-        result = CliRunner().invoke(parts.study.main, command)
+        result = CliRunner().invoke(study.main, command)
         return list(seen) if result.exit_code == 0 else result.output
 
     return run
 
 
-def test_a_stopped_study_goes_on_where_it_was(quick_run, parts, monkeypatch):
+def test_a_stopped_study_goes_on_where_it_was(quick_run, monkeypatch):
     first = quick_run("--sizes", "middle", "--most", "5")
     rest = quick_run("--sizes", "middle")
     assert len(first) == 5
     assert len({*first, *rest}) == len(first) + len(rest) == len(LIBRARY)
     assert quick_run("--sizes", "middle") == []
-    monkeypatch.setattr(parts.run, "commit", lambda: "def")
+    monkeypatch.setattr(study_run, "commit", lambda: "def")
     assert quick_run("--sizes", "middle", "--most", "1") == first[:1]
 
 
@@ -191,26 +182,26 @@ def test_wrong_options_are_named(quick_run, arguments, said):
     assert said in quick_run(*arguments)
 
 
-def test_what_goes_wrong_is_part_of_the_line(parts, monkeypatch):
+def test_what_goes_wrong_is_part_of_the_line(monkeypatch):
     def broken(path):
         raise ValueError("no such thing")
 
-    monkeypatch.setattr(parts.run, "read_evidence", broken)
-    case = parts.cases.Case("library", ("leak",), "middle", 0)
-    setup = parts.run.Setup(8, 8, 0.1, 50.0)
-    line = parts.run.diagnosed(case, setup, 0, 1, lambda text: None)
+    monkeypatch.setattr(study_run, "read_evidence", broken)
+    case = cases.Case("library", ("leak",), "middle", 0)
+    setup = study_run.Setup(8, 8, 0.1, 50.0)
+    line = study_run.diagnosed(case, setup, 0, 1, lambda text: None)
     assert line["failed"].startswith("ValueError: no such thing (test_study_diagnosis.py:")
     assert line["hidden"] == {"pixel.leak.rate_hz": 2.0}
-    assert parts.scoring.outcome(line) == "failed"
+    assert scoring.outcome(line) == "failed"
     json.dumps(line)
 
 
 # --- scores ---------------------------------------------------------------------------------------
 
 
-def outcome_of(parts, effects, verdict, added, alternatives=(), kind="library"):
+def outcome_of(effects, verdict, added, alternatives=(), kind="library"):
     line = line_of(kind, effects, verdict=verdict, alternatives=list(alternatives))
-    return parts.scoring.outcome({**line, "found": [found(name) for name in added]})
+    return scoring.outcome({**line, "found": [found(name) for name in added]})
 
 
 @pytest.mark.parametrize(
@@ -229,8 +220,8 @@ def outcome_of(parts, effects, verdict, added, alternatives=(), kind="library"):
         ("consistent", [], [], "missed"),
     ],
 )
-def test_outcomes_of_one_effect(parts, verdict, added, alternatives, outcome):
-    assert outcome_of(parts, ("leak",), verdict, added, alternatives) == outcome
+def test_outcomes_of_one_effect(verdict, added, alternatives, outcome):
+    assert outcome_of(("leak",), verdict, added, alternatives) == outcome
 
 
 @pytest.mark.parametrize(
@@ -245,9 +236,9 @@ def test_outcomes_of_one_effect(parts, verdict, added, alternatives, outcome):
         ("consistent", [], [], "missed"),
     ],
 )
-def test_outcomes_of_two_effects(parts, verdict, added, alternatives, outcome):
+def test_outcomes_of_two_effects(verdict, added, alternatives, outcome):
     effects = ("leak", "flicker")
-    assert outcome_of(parts, effects, verdict, added, alternatives, "pairs") == outcome
+    assert outcome_of(effects, verdict, added, alternatives, "pairs") == outcome
 
 
 @pytest.mark.parametrize("kind", ["leave-one-out", "outside"])
@@ -260,13 +251,13 @@ def test_outcomes_of_two_effects(parts, verdict, added, alternatives, outcome):
         ("consistent", [], "missed"),
     ],
 )
-def test_no_name_is_right_where_the_library_lacks_it(parts, kind, verdict, added, outcome):
-    assert outcome_of(parts, ("leak",), verdict, added, kind=kind) == outcome
+def test_no_name_is_right_where_the_library_lacks_it(kind, verdict, added, outcome):
+    assert outcome_of(("leak",), verdict, added, kind=kind) == outcome
 
 
-def test_any_verdict_but_consistent_is_a_false_alarm(parts):
+def test_any_verdict_but_consistent_is_a_false_alarm():
     verdicts = ("consistent", "unexplained", "partly_explained", "explained")
-    seen = [outcome_of(parts, (), verdict, [], kind="nothing") for verdict in verdicts]
+    seen = [outcome_of((), verdict, [], kind="nothing") for verdict in verdicts]
     assert seen == ["consistent", *["false alarm"] * 3]
 
 
@@ -278,26 +269,26 @@ def fitted(**values):
     return {**line, "found": [found("leak", parameters, interval), found("flicker", {"a": 9.0})]}
 
 
-def test_parameters_are_compared_with_what_the_camera_did(parts):
+def test_parameters_are_compared_with_what_the_camera_did():
     line = fitted(**{"frames.shift_px": [0.8, -0.4]})
-    errors = parts.scoring.parameter_errors(line)
+    errors = scoring.parameter_errors(line)
     assert errors == pytest.approx({"pixel.leak.rate_hz": 0.075, "frames.shift_px": 0.2})
-    assert parts.scoring.is_near(line) is False
-    assert parts.scoring.is_near(fitted()) is True
-    assert parts.scoring.is_near(line_of()) is None
-    assert parts.scoring.covered(line) == [False, True]
+    assert scoring.is_near(line) is False
+    assert scoring.is_near(fitted()) is True
+    assert scoring.is_near(line_of()) is None
+    assert scoring.covered(line) == [False, True]
 
 
-def test_gammas_are_compared_as_numbers(parts):
-    assert parts.scoring.relative_error("gamma:1.2", "gamma:1.6") == pytest.approx(0.25)
-    assert parts.scoring.relative_error("gamma:1.2", "linear") is None
+def test_gammas_are_compared_as_numbers():
+    assert scoring.relative_error("gamma:1.2", "gamma:1.6") == pytest.approx(0.25)
+    assert scoring.relative_error("gamma:1.2", "linear") is None
 
 
-def test_intervals_of_shares(parts):
+def test_intervals_of_shares():
     # Wilson's interval, by R: prop.test(3, 100, correct=FALSE)
-    assert parts.scoring.interval(3, 100) == pytest.approx((0.01025, 0.08452), abs=2e-5)
-    assert parts.scoring.interval(0, 0) == (0.0, 1.0)
-    low, high = parts.scoring.interval(50, 50)
+    assert scoring.interval(3, 100) == pytest.approx((0.01025, 0.08452), abs=2e-5)
+    assert scoring.interval(0, 0) == (0.0, 1.0)
+    low, high = scoring.interval(50, 50)
     assert high == 1.0
     assert low == pytest.approx(50 / (50 + 1.96**2), abs=1e-3)
 
@@ -333,8 +324,8 @@ def row(text, name):
     return next(line for line in text.splitlines() if line.startswith(f"| {name} |"))
 
 
-def test_the_report_counts_what_happened(parts):
-    text = parts.tables.report(made_up(), "abc")
+def test_the_report_counts_what_happened():
+    text = tables.report(made_up(), "abc")
     assert "19 of 20: 95.0%" in row(text, "named, or among look-alikes")
     assert "1 of 20: 5.0%" in row(text, "wrong name accepted")
     assert "19 of 19" in row(text, "named: held-out error at most 1.1 of its floor")
@@ -348,8 +339,8 @@ def test_the_report_counts_what_happened(parts):
     assert f"20 of {len(LIBRARY)}" in row(text, "library")
 
 
-def test_failures_come_with_what_competed(parts):
-    _, _, failures = parts.tables.report(made_up(), "abc").partition("## What went wrong")
+def test_failures_come_with_what_competed():
+    _, _, failures = tables.report(made_up(), "abc").partition("## What went wrong")
     assert "library/flicker/middle/0" in failures
     assert "frames.flicker.depth = 0.15" in failures
     assert "shot_noise: score 12" in failures
@@ -357,37 +348,37 @@ def test_failures_come_with_what_competed(parts):
     assert "leave-one-out/flicker" not in failures
 
 
-def test_the_confusion_matrix_shares_look_alikes(parts):
+def test_the_confusion_matrix_shares_look_alikes():
     lines = [line for line in made_up() if line["kind"] == "library"]
-    matrix = parts.figure.confusion(lines)
+    matrix = figure.confusion(lines)
     place = LIBRARY.index
     assert matrix[place("leak")][[place("leak"), place("photo_leak")]].tolist() == [0.5, 0.5]
     assert matrix[place("flicker"), place("shot_noise")] == 1.0
     assert matrix.sum() == pytest.approx(len(lines))
-    missed = parts.figure.confusion([line_of(effects=("readout",), verdict="consistent")])
+    missed = figure.confusion([line_of(effects=("readout",), verdict="consistent")])
     assert np.argwhere(missed).tolist() == [[place("readout"), len(LIBRARY) + 1]]
 
 
-def test_report_writes_tables_and_figure_of_the_last_commit(parts, tmp_path):
+def test_report_writes_tables_and_figure_of_the_last_commit(tmp_path):
     pytest.importorskip("matplotlib")
     for line in made_up():
-        parts.results.append(tmp_path / "in" / "1-of-1.jsonl", line)
+        results.append(tmp_path / "in" / "1-of-1.jsonl", line)
     newer = {**line_of(effects=("leak",)), "commit": "def", "ended": 2}
-    parts.results.append(tmp_path / "in" / "1-of-1.jsonl", newer)
+    results.append(tmp_path / "in" / "1-of-1.jsonl", newer)
     command = ["report", str(tmp_path / "in"), "-o", str(tmp_path / "out")]
-    assert CliRunner().invoke(parts.study.main, command).exit_code == 0
+    assert CliRunner().invoke(study.main, command).exit_code == 0
     text = (tmp_path / "out" / "diagnosis.md").read_text()
     assert "Commit def" in text
     assert "1 of 1" in row(text, "named, or among look-alikes")
     assert (tmp_path / "out" / "diagnosis.png").read_bytes().startswith(b"\x89PNG")
-    older = CliRunner().invoke(parts.study.main, [*command, "--commit", "abc"])
+    older = CliRunner().invoke(study.main, [*command, "--commit", "abc"])
     assert "19 of 20" in older.output
-    unknown = CliRunner().invoke(parts.study.main, [*command, "--commit", "xyz"])
+    unknown = CliRunner().invoke(study.main, [*command, "--commit", "xyz"])
     assert "abc (73), def (1)" in unknown.output
 
 
-def test_a_folder_without_results_is_an_error_that_says_so(parts, tmp_path):
+def test_a_folder_without_results_is_an_error_that_says_so(tmp_path):
     command = ["report", str(tmp_path), "-o", str(tmp_path / "out")]
-    result = CliRunner().invoke(parts.study.main, command)
+    result = CliRunner().invoke(study.main, command)
     assert result.exit_code == 1
     assert "'run' makes them" in result.output

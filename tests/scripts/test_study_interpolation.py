@@ -2,33 +2,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+import study_interpolation as study
+import study_interpolation_scenes as scenes
 
 from adv2e.events import make_events
 
-SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 
-
-@pytest.fixture
-def study(monkeypatch):
-    monkeypatch.syspath_prepend(SCRIPTS)
-    import study_interpolation
-
-    return study_interpolation
-
-
-@pytest.fixture
-def scenes(monkeypatch):
-    monkeypatch.syspath_prepend(SCRIPTS)
-    import study_interpolation_scenes
-
-    return study_interpolation_scenes
-
-
-def test_nearest_is_of_the_same_pixel_and_polarity(study):
+def test_nearest_is_of_the_same_pixel_and_polarity():
     of = make_events([1000, 5000, 9000], [3, 3, 3], [1, 1, 1], [1, 1, 1])
     among = make_events(
         [1200, 1001, 4000, 5001, 9300], [3, 3, 3, 4, 3], [1, 1, 1, 1, 1], [1, 0, 1, 1, 1]
@@ -37,12 +20,12 @@ def test_nearest_is_of_the_same_pixel_and_polarity(study):
     assert study.nearest_ms(of, among, 8) == pytest.approx(0.3)
 
 
-def test_nearest_of_events_that_have_none_is_infinite(study):
+def test_nearest_of_events_that_have_none_is_infinite():
     of = make_events([1000, 2000, 3000], [3, 5, 6], [1, 1, 1], [1, 1, 1])
     assert math.isinf(study.nearest_ms(of, of[:1], 8))
 
 
-def test_distance_is_zero_to_itself_and_one_to_no_events(study):
+def test_distance_is_zero_to_itself_and_one_to_no_events():
     setup = study.Setup(8, 6, 0.1, 0)
     true = make_events([1000, 12_000, 41_000], [3, 5, 6], [1, 2, 4], [1, 0, 1])
     times_ns = study.frame_times_ns(0.1, 30.0)
@@ -50,13 +33,13 @@ def test_distance_is_zero_to_itself_and_one_to_no_events(study):
     assert study.distance(true, true[:0], times_ns, setup) == pytest.approx(1.0)
 
 
-def test_nothing_moves_far_between_true_pictures(scenes):
+def test_nothing_moves_far_between_true_pictures():
     for case in scenes.cases(0):
         assert case.true_hz(180) >= 2000.0
         assert case.speed(180) / case.true_hz(180) <= 0.25
 
 
-def test_clips_are_whole_frames_at_every_rate(study, scenes):
+def test_clips_are_whole_frames_at_every_rate():
     for case in scenes.cases(0):
         for longest_s in (0.5, 1 / 6):
             duration = min(longest_s, case.duration_s)
@@ -65,7 +48,7 @@ def test_clips_are_whole_frames_at_every_rate(study, scenes):
                 assert times_ns[-1] == pytest.approx(duration * 1e9, abs=1)
 
 
-def test_light_of_every_case_is_smooth_in_time(scenes):
+def test_light_of_every_case_is_smooth_in_time():
     for case in scenes.cases(0):
         step = 1.0 / case.true_hz(64)
         start = 0.05
@@ -77,7 +60,7 @@ def test_light_of_every_case_is_smooth_in_time(scenes):
         assert again.mean() < 0.5 * change.mean()
 
 
-def test_flow_is_nearer_than_linear_where_things_move(study, scenes):
+def test_flow_is_nearer_than_linear_where_things_move():
     setup = study.Setup(64, 48, 1 / 15, 0)
     pan = scenes.cases(0)[1]
     row = study.study(replace(pan, duration_s=1 / 12), setup)[1]

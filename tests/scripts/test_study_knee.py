@@ -1,31 +1,17 @@
 """The study of the knee runs on a miniature, and chooses by the rule that it states."""
 
-import importlib
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+import study_knee as study
+import study_knee_report as report
 
 from adv2e.effects.pixel.log_response import LogResponse
 from adv2e.errors import MissingExtraError
 
-SCRIPTS = Path(__file__).parents[2] / "scripts"
 
-
-@pytest.fixture
-def study(monkeypatch):
-    monkeypatch.syspath_prepend(str(SCRIPTS))
-    return importlib.import_module("study_knee")
-
-
-@pytest.fixture
-def report(monkeypatch):
-    monkeypatch.syspath_prepend(str(SCRIPTS))
-    return importlib.import_module("study_knee_report")
-
-
-def scores_of(report, distance, rest):
+def scores_of(distance, rest):
     maps = tuple(str(k) for k in range(len(distance)))
     scores = report.Scores.empty(("only",), (0.0,), 2, maps)
     for seed in range(2):
@@ -35,7 +21,7 @@ def scores_of(report, distance, rest):
     return scores
 
 
-def test_a_miniature_of_the_study_finds_the_old_knee_worse(study, monkeypatch):
+def test_a_miniature_of_the_study_finds_the_old_knee_worse(monkeypatch):
     monkeypatch.setattr(
         study, "MAPS", {"log": LogResponse(linear_below=0.0), "20": LogResponse(linear_below=20.0)}
     )
@@ -50,19 +36,19 @@ def test_a_miniature_of_the_study_finds_the_old_knee_worse(study, monkeypatch):
 
 
 @pytest.mark.parametrize("encoding", ["srgb", "linear"])
-def test_video_without_noise_is_off_by_half_a_code_at_most(study, encoding):
+def test_video_without_noise_is_off_by_half_a_code_at_most(encoding):
     light = np.linspace(0, 255, 4001, dtype=np.float32).reshape(1, 1, -1)
     codes = study.codes_of(study.filmed(light, 0.0, 0, encoding), encoding)
     assert np.abs(codes - study.codes_of(light, encoding)).max() <= 0.5 + 1e-3
 
 
-def test_fewest_false_events_decide_between_nearly_equal_distances(report):
-    scores = scores_of(report, distance=[0.50, 0.505, 0.60], rest=[2.0, 1.0, 0.0])
+def test_fewest_false_events_decide_between_nearly_equal_distances():
+    scores = scores_of(distance=[0.50, 0.505, 0.60], rest=[2.0, 1.0, 0.0])
     assert report.least(scores) == 0
     assert report.recommended(scores) == 1
 
 
-def test_missing_matplotlib_names_the_extra(report, monkeypatch):
+def test_missing_matplotlib_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingExtraError, match=r"adv2e\[studies\]"):
         report.load_pyplot()
