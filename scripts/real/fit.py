@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,12 +21,18 @@ LEAST_GAIN = 0.003
 """A lower score counts from here on: three times what it is known to."""
 PASSES = 2
 """Rounds in which all that was added is refined together after each addition, at most."""
+LEADING = 6
+"""So many of what is tried are tried with all seeds."""
 STEPS = (0.3, 0.15, 0.07)
 MOVES = 4
 """Steps of the search over all keys, and how often each is repeated, at most."""
 
 Found = Mapping[Candidate, tuple[float, ...]]
 """Effects with the values of their keys, in the order in which they were added."""
+
+
+Probe = tuple[Candidate, tuple[float, ...]]
+"""An effect, and values from which its fit may start."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +87,24 @@ class Fit:
         config = self.matched(candidate.applied(base, candidate.inner(values)))
         return Added(candidate, tuple(values), config, *self._score(config))
 
+    def ranked(self, probes: Iterable[Probe], base: Config) -> list[Added]:
+        """Return effects where their fits may start, the nearest first.
+
+        All are tried with one seed, and only those that then lead with all of them.
+        """
+        seeds, self.seeds = self.seeds, self.seeds[:1]
+        tried = [self.trial(candidate, values, base) for candidate, values in probes]
+        self.seeds = seeds
+        tried.sort(key=_score_of)
+        if len(seeds) > 1:
+            leading = [self._again(one) for one in tried[:LEADING]]
+            tried[:LEADING] = sorted(leading, key=_score_of)
+        return tried
+
+    def _again(self, tried: Added) -> Added:
+        score, still_hz = self._score(tried.config)
+        return replace(tried, score=score, still_hz=still_hz)
+
     def without(self, model: Model, one: Candidate) -> Model:
         """Return a model without an effect, all others as they are."""
         rest = {other: values for other, values in model.found.items() if other is not one}
@@ -100,7 +124,7 @@ class Fit:
                     place = here.copy()
                     place[k] += way * share * step
                     trial = self.trial(candidate, _outer(candidate.knobs, place), base)
-                    best = min(best, trial, key=lambda one: one.score)
+                    best = min(best, trial, key=_score_of)
         return best
 
     def kept(self, model: Model, best: Added) -> Model:
@@ -157,6 +181,10 @@ def keys(candidate: Candidate) -> frozenset[str]:
     """Return the keys that a candidate fits, or sets where it fits none."""
     fitted = {f"{knob.key}/{knob.part}" for knob in candidate.knobs}
     return frozenset(fitted or {key for key, _ in candidate.extra})
+
+
+def _score_of(tried: Added) -> float:
+    return tried.score
 
 
 def _outer(knobs: Sequence[Knob], place: Place) -> tuple[float, ...]:

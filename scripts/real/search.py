@@ -8,7 +8,7 @@ from dataclasses import replace
 from adv2e.comparison.windows import Windows
 from adv2e.config import Config
 from adv2e.diagnosis.candidates import Candidate
-from real.fit import LEAST_GAIN, Fit, Model, keys
+from real.fit import LEAST_GAIN, Fit, Model, Probe, keys
 from real.model import Bench
 from real.tried import EXACT, OWN, Added, of_the_camera
 
@@ -37,6 +37,7 @@ class Search:
         self._fit, self._say = Fit(bench, windows), say
         self._seconds = windows.duration_s
         self._measured_hz = bench.still_hz(windows)
+        self._noisy: set[Probe] = set()
 
     def run(self, declared: Config, only: Sequence[str] = ()) -> Iterator[Added]:
         """Yield the model after each step, the first as declared but thresholds.
@@ -111,13 +112,17 @@ class Search:
         return [one for one in group if model.lacks(one)]
 
     def _probed(self, candidates: Sequence[Candidate], here: Added) -> list[Added]:
-        """Return all candidates where their fits may start, the nearest first."""
-        trial = self._fit.trial
-        tried = [trial(one, probe, here.config) for one in candidates for probe in one.probes]
-        tried.sort(key=lambda one: one.score)
+        """Return all candidates where their fits may start, the nearest first.
+
+        What made noise of its own in still pixels once is not tried again.
+        """
+        probes = ((one, values) for one in candidates for values in one.probes)
+        quiet = (probe for probe in probes if probe not in self._noisy)
+        tried = self._fit.ranked(quiet, here.config)
         noisier = [one for one in tried if one.noisier(here, self._measured_hz)]
         fair = [one for one in tried if one not in noisier]
         self._say(f"  {here.score:.4f}; next: {_scores(fair[:6])}")
+        self._noisy.update((one.candidate, one.values) for one in noisier)
         if noisier:
             self._say(f"  make noise of their own in still pixels: {_scores(noisier)}")
         return fair
