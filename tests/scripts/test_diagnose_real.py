@@ -229,6 +229,9 @@ def test_what_was_found_first_is_replaced_by_what_is_nearer(monkeypatch):
     assert steps[-1].score == pytest.approx(0.5, abs=3e-3)
 
 
+IN_THE_VALLEY = load_config(["ideal"], ["frames.black_level_dn=14", "frames.black_depth_dn=5"])
+
+
 class Seen(Valley):
     """A valley that notes with how many seeds each late clock is scored; leak makes noise."""
 
@@ -248,7 +251,7 @@ class Seen(Valley):
 def test_only_what_leads_with_one_seed_is_tried_with_all():
     bench = Seen()
     probes = [(OFFSET, (1000.0 * late,)) for late in range(9)]
-    tried = fitted(bench, (0, 1, 2)).ranked(probes, load_config(["ideal"]))
+    tried = fitted(bench, (0, 1, 2)).ranked(probes, IN_THE_VALLEY)
     assert bench.seen[:9] == [(late, 1) for late in range(9)]
     assert sorted(bench.seen[9:]) == [(late, 3) for late in (0, 1, 2, 3, 4, 5)]
     assert [one.values[0] for one in tried[:3]] == [2000.0, 1000.0, 3000.0]
@@ -261,7 +264,7 @@ def test_what_made_noise_of_its_own_is_not_tried_again():
     search._fit.seeds = (0,)
     leak = Candidate("leak", (Knob("pixel.leak.rate_hz", 0.01, 10.0),), ((2.0,),))
     late = Candidate("clock_offset", OFFSET.knobs, ((2000.0,),))
-    here = Added.plain("here", load_config(["ideal"]), 1.0, still_hz=0.1)
+    here = Added.plain("here", IN_THE_VALLEY, 1.0, still_hz=0.1)
     for count in (2, 1):
         bench.seen.clear()
         assert [one.candidate for one in search._probed([leak, late], here)] == [late]
