@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -42,14 +42,14 @@ class State:
     fits : tuple of Fit
     models : tuple of Model
         One a view.
-    alternatives : frozenset of str
-        Effects that cannot be told from one of those that were added.
+    alternatives : mapping of str to frozenset of str
+        Of effects that were added, others that cannot be told from them.
     """
 
     config: Config
     fits: tuple[Fit, ...]
     models: tuple[Model, ...]
-    alternatives: frozenset[str] = frozenset()
+    alternatives: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:

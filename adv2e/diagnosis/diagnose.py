@@ -25,8 +25,8 @@ from adv2e.diagnosis.keys import without_user_effects
 from adv2e.diagnosis.lamps import lamps_of
 from adv2e.diagnosis.library import hints_of, library
 from adv2e.diagnosis.light import light_of, quantum_dn
+from adv2e.diagnosis.lines import strongest_lines
 from adv2e.diagnosis.markers import BOTH, Markers
-from adv2e.diagnosis.markers.timing import strongest_lines
 from adv2e.diagnosis.nuisances import fit_thresholds
 from adv2e.diagnosis.picture import Gallery
 from adv2e.diagnosis.scene import Placed, Scene
@@ -105,9 +105,14 @@ def diagnose(
         laboratory = Laboratory(simulator, scene, markers, error.bias if error else None)
         measured = Placed.of(evidence.stream, scene)
         observed = laboratory.markers.measure(measured)
-        lines = strongest_lines(measured.stream, [one.stream for one in pilot], scene)
+
+        def to_fit(stream: Stream) -> Stream:
+            return of_part(stream, scene.parts, parts.FIT)
+
+        fitted_to = to_fit(evidence.stream)
+        lines = strongest_lines(fitted_to, [to_fit(one.stream) for one in pilot], scene)
         lamps = lamps_of(
-            lines, measured.stream, declared, lambda lit: simulator.stream(lit, _LAMP_SEED)
+            lines, fitted_to, declared, lambda lit: to_fit(simulator.stream(lit, _LAMP_SEED))
         )
         hints = hints_of(evidence.stream.t, evidence.seconds, lamps)
         candidates = [one for one in library(declared, hints) if one.name not in without]

@@ -33,7 +33,8 @@ def lamps_of(
 
     A lamp's swing comes back in the difference of ON and OFF events, later by what the pixel's
     poles make of it.  A simulation with a lamp of phase zero, about as deep, tells how much it is,
-    so that the phase can be read off the measured events.
+    so that the phase can be read off the measured events.  What swings without a lamp is taken off:
+    motion may, and what is made up between frames does so at multiples of their rate.
 
     Parameters
     ----------
@@ -45,11 +46,13 @@ def lamps_of(
         Makes the stream of a configuration.
     """
     lamps: list[Lamp] = []
+    unlit = simulate(declared) if lines_hz else measured
     for hz in lines_hz:
         if any(_is_multiple(hz, lamp.hz) for lamp in lamps):
             continue
-        seen = swing(measured, hz)
-        lit = [swing(simulate(_lit(declared, hz, depth)), hz) for depth in _DEPTHS]
+        idle = swing(unlit, hz)
+        seen = swing(measured, hz) - idle
+        lit = [swing(simulate(_lit(declared, hz, depth)), hz) - idle for depth in _DEPTHS]
         alike = min(lit, key=lambda one: abs(abs(one) - abs(seen)))
         lamps.append(Lamp(hz, float(np.angle(seen * np.conj(alike)))))
     return lamps

@@ -20,6 +20,7 @@ References
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -153,19 +154,29 @@ class Model:
         """Return how often this model makes a misfit, or a largest deviation, as large.
 
         Twice the smaller of the two probabilities, each by rank among the simulations and, beyond
-        them, by the tail of a log-normal distribution fitted to them.
+        them, by the tail of a distribution fitted to them: log-normal for misfits, which are means
+        of many squares, and Gumbel's for the largest of many.
         """
         misfits, largest = self._left_out
-        found = (_tail(misfits, self.misfit(values)), _tail(largest, np.abs(self.z(values)).max()))
+        misfit, loudest = self.misfit(values), float(np.abs(self.z(values)).max())
+        found = (_tail(misfits, misfit, _log_normal), _tail(largest, loudest, _gumbel))
         return min(1.0, 2.0 * min(found))
 
 
-def _tail(sample: Array, value: float) -> float:
+def _tail(sample: Array, value: float, beyond: Callable[[Array, float], float]) -> float:
     """Return the probability of `value` or more under the distribution of `sample`."""
     rank = (1.0 + np.count_nonzero(sample >= value)) / (len(sample) + 1.0)
-    if value <= sample.max():
-        return float(rank)
+    return float(rank if value <= sample.max() else min(rank, beyond(sample, value)))
+
+
+def _log_normal(sample: Array, value: float) -> float:
     # without chance in the model, nothing is left over in its simulations
     log = np.log(np.maximum(sample, 1e-9))
     z = (math.log(value) - log.mean()) / max(float(log.std(ddof=1)), 1e-6)
-    return float(min(rank, 0.5 * math.erfc(z / math.sqrt(2.0))))
+    return 0.5 * math.erfc(z / math.sqrt(2.0))
+
+
+def _gumbel(sample: Array, value: float) -> float:
+    width = max(float(sample.std(ddof=1)), 1e-6) * math.sqrt(6.0) / math.pi
+    z = (value - float(sample.mean())) / width + np.euler_gamma
+    return -math.expm1(-math.exp(-z))

@@ -65,7 +65,8 @@ class Outcome:
     @property
     def alternatives(self) -> list[str]:
         """Effects that cannot be told from one of those that were added."""
-        return sorted(self.state.alternatives - set(self.state.names))
+        alike = frozenset().union(*self.state.alternatives.values())
+        return sorted(alike - set(self.state.names))
 
 
 @dataclass(frozen=True)
@@ -223,7 +224,7 @@ class Search:
         scores = [scored(self.bench, one.models, one.fits[-1].candidate) for one in holding]
         best = max(scores)
         chosen = holding[scores.index(best)]
-        alike = set(state.alternatives)
+        alike = set()
         for one, score in zip(holding, scores, strict=True):
             self.bench.log(f"  {' and '.join(one.names)}, on more data: score {score:.0f}")
             if one is chosen:
@@ -233,7 +234,10 @@ class Search:
                 alike.add(one.names[-1])
                 why = f"does as well as {chosen.names[-1]}, and cannot be told from it"
             self.bench.rejections.add(one.fits[-1], why, final=True)
-        return dataclasses.replace(chosen, alternatives=frozenset(alike))
+        if not alike:
+            return dataclasses.replace(chosen, alternatives=state.alternatives)
+        alternatives = {**state.alternatives, chosen.names[-1]: frozenset(alike)}
+        return dataclasses.replace(chosen, alternatives=alternatives)
 
     def _backward(self, state: State) -> State:
         """Drop effects without which the others, fitted again, do as well, one after another."""
@@ -244,5 +248,6 @@ class Search:
             if loss < _CLOSE:
                 self.bench.log(f"dropped {fit.candidate.name}: the others do without it")
                 self.bench.rejections.add(fit, "not needed beside the others", final=True)
-                return self._backward(dataclasses.replace(without, alternatives=state.alternatives))
+                alike = {n: a for n, a in state.alternatives.items() if n in without.names}
+                return self._backward(dataclasses.replace(without, alternatives=alike))
         return state

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from adv2e.diagnosis.metric import Model, Scale, _compressed, _tail
+from adv2e.diagnosis.metric import Model, Scale, _compressed, _gumbel, _log_normal, _tail
 
 STATISTICS, SEEDS = 200, 160
 
@@ -211,19 +211,38 @@ def test_sd_is_not_taken_for_less_than_half():
 
 def test_within_the_sample_the_rank_decides():
     sample = np.arange(1.0, 100.0)
-    assert _tail(sample, 0.5) == 1.0
-    assert _tail(sample, 50.0) == pytest.approx(51 / 100)
-    assert _tail(sample, 99.0) == pytest.approx(2 / 100)
+    assert _tail(sample, 0.5, None) == 1.0
+    assert _tail(sample, 50.0, None) == pytest.approx(51 / 100)
+    assert _tail(sample, 99.0, None) == pytest.approx(2 / 100)
 
 
 def test_beyond_the_sample_the_tail_falls_on():
     sample = np.exp(0.1 * np.random.default_rng(1).normal(size=160))
     values = sample.max() * np.array([1.0, 1.001, 1.1, 1.3, 2.0, 10.0])
-    found = [_tail(sample, value) for value in values]
+    found = [_tail(sample, value, _log_normal) for value in values]
     assert found == sorted(found, reverse=True)
     assert found[1] <= 1 / 161
     assert found[4] < 1e-6
     assert found[5] < 1e-50
+
+
+def test_the_tail_of_the_largest_is_that_of_the_largest_of_many():
+    draw = np.random.default_rng(2)
+    sample = np.abs(draw.normal(size=(4000, 300))).max(axis=1)
+    for value in (4.0, 4.5, 5.0):
+        exact = -np.expm1(300 * np.log1p(-2 * stats.norm.sf(value)))
+        assert exact <= _gumbel(sample, value) < 20 * exact
+    assert _gumbel(sample, 30.0) < 1e-20
+    assert _gumbel(np.full(5, 3.0), 3.1) < 1e-20
+
+
+def test_one_loud_statistic_of_heavy_tails_is_not_called_impossible():
+    draw = np.random.default_rng(6)
+    rows = draw.standard_t(6, size=(2000, STATISTICS))
+    model = Model.of(Scale.of(rows[:100], np.full(STATISTICS, 1e-3)), rows[100:200])
+    found = np.array([model.probability(row) for row in rows[200:]])
+    assert np.count_nonzero(found < 1e-3) <= stats.binom.ppf(0.999, 1800, 2e-3)
+    assert found.min() > 1e-6
 
 
 def test_a_model_without_chance_is_not_what_makes_other_recordings():

@@ -20,12 +20,13 @@ from made_up_streams import (
 )
 
 from adv2e.diagnosis import parts
+from adv2e.diagnosis.lines import strongest_lines
 from adv2e.diagnosis.markers import BOTH, VIEWS, Markers
 from adv2e.diagnosis.markers.intervals import Runs
 from adv2e.diagnosis.markers.neighbours import Neighbours
 from adv2e.diagnosis.markers.pixels import Pixels
 from adv2e.diagnosis.markers.stamps import Gaps, Ticks
-from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Spectrum, strongest_lines
+from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Spectrum
 from adv2e.diagnosis.parts import Parts
 
 SCENE = some_scene(seed=5)
@@ -243,15 +244,6 @@ def test_spectrum_sees_a_line_of_polarity():
     assert signed > total + 2.0
     chance = random_stream(8000, 7, stop_us=1_000_000)
     assert min(abs(hz - 137.0) for hz in strongest_lines(where.stream, [chance], scene)) < 0.5
-
-
-@pytest.mark.parametrize("frames", [3, 5, 8])
-def test_lines_of_short_recordings_are_frequencies(frames):
-    scene = some_scene(frames=frames)
-    one, other = (random_stream(1500, k, stop_us=10_000 * (frames - 1)) for k in (1, 2))
-    found = strongest_lines(one, [other], scene)
-    assert found
-    assert all(hz > 0.0 for hz in found)
 
 
 @pytest.mark.parametrize("tick", [2, 10, 500])

@@ -192,6 +192,19 @@ def test_backward_drops_what_the_others_do_without():
     assert "not needed" in search.bench.rejections.held["dark_current"].reason
 
 
+def test_alternatives_of_what_is_dropped_go_with_it():
+    laboratory = MadeUpLaboratory()
+    observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
+    search = Search(laboratory, observed, Config(), candidates())
+    fits = []
+    for name, value in (("dark_current", 0.05), ("leak", 4.0)):
+        (one,) = candidates(name)
+        fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
+    alike = {"dark_current": frozenset({"refractory"}), "leak": frozenset({"event_loss"})}
+    state = dataclasses.replace(refitted(search, tuple(fits)), alternatives=alike)
+    assert search._backward(state).alternatives == {"leak": frozenset({"event_loss"})}
+
+
 def test_backward_keeps_what_is_needed():
     truth = load_config([], ["pixel.leak.rate_hz=4", "pixel.refractory.period_us=2500"])
     laboratory = MadeUpLaboratory()

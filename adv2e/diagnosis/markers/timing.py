@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,6 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis.markers.base import LIGHT_NAMES, Entry, Raw, counts, share
 from adv2e.diagnosis.markers.counting import sum_slopes, sum_slopes_beside
 from adv2e.diagnosis.scene import BRIGHTNESSES, Placed, Scene
-from adv2e.diagnosis.stream import Stream
 
 LAGS_MS = (-20.0, -8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 _PAIRS_MS = ((-2.0, 4.0), (-8.0, 16.0))
@@ -195,6 +195,13 @@ class Phase:
         return np.asarray((number - whole / self._STEPS) / np.sqrt(whole / self._STEPS + 1)).ravel()
 
 
+def keeps_time(hz: NDArray[Any], scene: Scene) -> NDArray[np.bool_]:
+    """Tell which frequencies [Hz] are near whole multiples of the frame rate."""
+    rate = 1e6 * scene.intervals / (scene.times_us[-1] - scene.times_us[0])
+    near = np.abs(hz / rate - np.round(hz / rate)) * rate <= 1.5
+    return np.asarray(near & (hz >= rate - 2.0))
+
+
 class Spectrum:
     """Lines in the rate of the whole sensor, as lamps on the mains make."""
 
@@ -208,10 +215,8 @@ class Spectrum:
         self._start = scene.times_us[0]
         self._bins = max(64, int((scene.times_us[-1] - self._start) // self.BIN_US))
         self.hz = np.fft.rfftfreq(self._bins, self.BIN_US * 1e-6)
-        rate = 1e6 * scene.intervals / (scene.times_us[-1] - self._start)
         # what keeps time with the frames has statistics of its own
-        self.free = np.abs(self.hz / rate - np.round(self.hz / rate)) * rate > 1.5
-        self.free |= self.hz < rate - 2.0
+        self.free = ~keeps_time(self.hz, scene)
 
     @cached_property
     def entries(self) -> Sequence[Entry]:
@@ -254,50 +259,3 @@ class Spectrum:
         padded = np.pad(log, reach, mode="reflect")
         around = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
         return np.asarray(log - np.median(around, axis=1))
-
-
-_LINES = 2
-_LOWEST_LINE_HZ = 30.0
-_PADDING = 8
-
-
-def lines(stream: Stream, scene: Scene) -> list[tuple[float, float]]:
-    """Return the strongest lines in the rate of a stream, the strongest first.
-
-    Returns
-    -------
-    list of (frequency [Hz], height)
-        The height is the logarithm of the power over what is beside it.
-    """
-    spectrum = Spectrum(scene)
-    start, stop = scene.times_us[0], scene.times_us[-1]
-    bins = int((stop - start) // Spectrum.BIN_US)
-    hz = np.fft.rfftfreq(_PADDING * bins, Spectrum.BIN_US * 1e-6)
-    usable = (hz > _LOWEST_LINE_HZ) & (np.interp(hz, spectrum.hz, spectrum.free) > 0.5)
-    reach = 16 * _PADDING
-    step = np.minimum((stream.t - start) // Spectrum.BIN_US, bins - 1).astype(np.int64)
-    found: list[tuple[float, float]] = []
-    for sign in (np.ones(len(stream)), 2.0 * stream.on - 1.0):
-        rate = np.bincount(step, sign, minlength=bins)
-        rate = (rate - rate.mean()) * np.hanning(bins)
-        power = np.log(np.abs(np.fft.rfft(rate, _PADDING * bins)) ** 2 + 1.0)
-        around = np.lib.stride_tricks.sliding_window_view(
-            np.pad(power, reach, mode="reflect"), 2 * reach + 1
-        )
-        height = np.where(usable, power - np.median(around, axis=1), -np.inf)
-        for _ in range(_LINES):
-            best = int(np.argmax(height))
-            if all(abs(hz[best] - other) > 2.0 for other, _ in found):
-                found.append((float(hz[best]), float(height[best])))
-            height[np.abs(hz - hz[best]) < 5.0] = -np.inf
-    return sorted(found, key=lambda line: -line[1])
-
-
-def strongest_lines(stream: Stream, pilot: Sequence[Stream], scene: Scene) -> tuple[float, ...]:
-    """Return the frequencies [Hz] of the lines of a stream that stand out of simulations' lines.
-
-    At least the strongest one is returned, whatever it is worth.
-    """
-    usual = max(lines(one, scene)[0][1] for one in pilot)
-    first, *others = lines(stream, scene)
-    return (first[0], *(hz for hz, height in others if height > usual))
