@@ -32,6 +32,9 @@ Array = NDArray[np.float64]
 LEVEL = 0.01
 """Probability below which chance is not believed to make a residual."""
 
+PER_LOOK = LEVEL / 2.0
+"""The same of each look: at the data for fitting and judging, and at those looked at last."""
+
 MOST_EFFECTS = 4
 
 _TRIED = 4
@@ -46,18 +49,20 @@ class Outcome:
     Attributes
     ----------
     state : State
-    probability : float
-        Of the residual left, where the search looked.
+    probability, last : float
+        Of the residual left, where the search looked, and in the data looked at last.
     explained : float
         Share of the declared model's residual that is gone.
     complete : bool
-        Nothing is left for another effect: chance can make it, or it is put down to the fit.
+        Nothing is left for another effect, in either: chance can make it, or it is put down to the
+        fit.
     rejected : dict
         Last reason for each effect that was not added.
     """
 
     state: State
     probability: float
+    last: float
     explained: float
     complete: bool
     rejected: dict[str, Rejected]
@@ -132,14 +137,20 @@ class Search:
         state = self._backward(state)
         held = self.bench.rejections.held
         rejected = {name: why for name, why in held.items() if name not in state.names}
-        complete = not self._is_something_left(state)
-        return Outcome(state, self.probability(state), self.explained(state), complete, rejected)
+        return Outcome(
+            state,
+            self.probability(state),
+            self.probability(state, parts.LAST),
+            self.explained(state),
+            not any(self._is_something_left(state, view) for view in (BOTH, parts.LAST)),
+            rejected,
+        )
 
-    def _is_something_left(self, state: State) -> bool:
-        if self.probability(state) >= LEVEL:
+    def _is_something_left(self, state: State, view: int = BOTH) -> bool:
+        if self.probability(state, view) >= PER_LOOK:
             return False
         left = max((fit.candidate.left for fit in state.fits), default=0.0)
-        return self.explained(state) < 1.0 - left
+        return self.explained(state, view) < 1.0 - left
 
     def _grown(self, state: State) -> State | None:
         """Return the model with one effect more, or two that hold only together.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from adv2e.diagnosis.bench import State
-from adv2e.diagnosis.search import LEVEL, Outcome
+from adv2e.diagnosis.search import PER_LOOK, Outcome
 from adv2e.reports.result import ErrorRow, Verdict
 
 _PARTLY = 0.8
@@ -24,7 +24,7 @@ def verdict_of(outcome: Outcome, error: ErrorRow) -> Verdict:
         Of the declared model and of that where the search ended.
     """
     if not outcome.state.fits:
-        return "consistent" if outcome.probability >= LEVEL else "unexplained"
+        return "consistent" if outcome.complete else "unexplained"
     if not outcome.complete:
         partly = outcome.explained >= _PARTLY and _mostly_gone(error)
         return "partly_explained" if partly else "unexplained"
@@ -64,6 +64,12 @@ def sentence_of(verdict: Verdict, kept: State, outcome: Outcome) -> str:
         return (
             "The recording is what the declared model makes: nothing is missing that can be seen."
         )
+    only_last = outcome.probability >= PER_LOOK
+    if verdict == "unexplained" and only_last and not outcome.state.fits:
+        return (
+            "Nothing is missing in the data for fitting and judging, but in those looked at last"
+            f" something is, which chance makes {outcome.last:.0e} times."
+        )
     if verdict == "unexplained":
         best = " and ".join(outcome.state.names)
         most = f" (at most {outcome.explained:.0%} of it: {best})" if best else ""
@@ -71,12 +77,12 @@ def sentence_of(verdict: Verdict, kept: State, outcome: Outcome) -> str:
     if verdict == "partly_explained":
         return (
             f"The declared model lacks {names}; that explains {outcome.explained:.0%} of the"
-            " residual, and something is left."
+            f" residual, and something is left{' in the data looked at last' * only_last}."
         )
     if verdict == "not_identifiable":
         others = ", ".join(outcome.alternatives)
         return f"The declared model lacks an effect: {names}, or as well {others}."
-    if outcome.probability < LEVEL:
+    if min(outcome.probability, outcome.last) < PER_LOOK:
         share = f"{outcome.explained:.1%}"
         return f"The declared model lacks {names}; that explains {share} of the residual."
     return f"The declared model lacks {names}; with that, nothing is left that can be seen."

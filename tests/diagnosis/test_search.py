@@ -18,7 +18,7 @@ from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.judging import chance_gain
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.search import LEVEL, Search
-from adv2e.diagnosis.verdict import verdict_of
+from adv2e.diagnosis.verdict import sentence_of, verdict_of
 from adv2e.reports.result import ErrorRow, Estimate
 
 RECORDING = 70_000
@@ -33,9 +33,20 @@ def error(before, after, floor, spread=0.02):
 GONE = error(0.8, 0.4, 0.4)
 
 
-def searched(truth=(), laboratory=None, library=None, beyond=0.0, seed=RECORDING, declared=None):
+def searched(
+    truth=(),
+    laboratory=None,
+    library=None,
+    beyond=0.0,
+    seed=RECORDING,
+    declared=None,
+    last_truth=None,
+):
     laboratory = laboratory or MadeUpLaboratory()
     observed = laboratory.measure(load_config([], truth), seed, beyond)
+    if last_truth is not None:
+        other = laboratory.measure(load_config([], last_truth), seed, beyond)
+        observed[parts.LAST] = other[parts.LAST]
     library = candidates() if library is None else library
     search = Search(laboratory, observed, declared or Config(), library)
     return search, search.run()
@@ -58,6 +69,19 @@ def test_nothing_missing_is_consistent(seed):
     assert outcome.state.names == ()
     assert outcome.probability >= LEVEL
     assert (outcome.alternatives, outcome.rejected) == ([], {})
+
+
+def test_what_is_missing_in_the_last_part_alone_is_not_overlooked():
+    leak = ["pixel.leak.rate_hz=4"]
+    search, outcome = searched(last_truth=leak)
+    verdict = verdict_of(outcome, GONE)
+    assert verdict == "unexplained"
+    assert "looked at last" in sentence_of(verdict, search.declared, outcome)
+    _, outcome = searched(leak, last_truth=[*leak, "pixel.refractory.period_us=900"])
+    assert outcome.state.names == ("leak",)
+    verdict = verdict_of(outcome, GONE)
+    assert verdict == "partly_explained"
+    assert sentence_of(verdict, outcome.state, outcome).endswith("left in the data looked at last.")
 
 
 @pytest.mark.parametrize(
