@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from adv2e.config import Config, load_config
-from adv2e.config.files import read
-from adv2e.config.merge import merge_all, parse_set
-from adv2e.config.yaml12 import Value
+from adv2e.config import Config, load_config, written_keys
 
 
 @dataclass(frozen=True)
@@ -52,14 +49,5 @@ def read_declared(
         As :func:`adv2e.config.load_config`.
     """
     config = load_config(files, sets, seed)
-    layers = [*(read(name) for name in files), *(parse_set(text) for text in sets)]
     names = ", ".join([*(Path(name).name for name in files), *sets])
-    return Declared(names or "nothing", config, dict(_scalars(merge_all(layers), "")))
-
-
-def _scalars(tree: Value, path: str) -> Iterator[tuple[str, Any]]:
-    if isinstance(tree.content, dict):
-        for key, value in tree.content.items():
-            yield from _scalars(value, f"{path}.{key}" if path else key)
-    elif not isinstance(tree.content, list):
-        yield path, tree.content
+    return Declared(names or "nothing", config, written_keys(files, sets))

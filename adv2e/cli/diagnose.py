@@ -10,7 +10,7 @@ import click
 from adv2e.cli import options
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from adv2e.cli.options import Log
     from adv2e.config import Config
@@ -59,14 +59,20 @@ def command(
     """
     from pathlib import Path
 
+    from adv2e.config import written_keys
     from adv2e.diagnosis.diagnose import diagnose
     from adv2e.diagnosis.evidence import read_evidence
+    from adv2e.diagnosis.keys import without_user_effects
+    from adv2e.diagnosis.library import names
     from adv2e.diagnosis.report import write_reports
     from adv2e.pixel import is_compiled
     from adv2e.reports.files import check_folder
     from adv2e.reports.summary import summary_text
 
-    check_names(without)
+    check_names(without, names(config))
+    options_given = click.get_current_context().params
+    written = written_keys(options_given["config_files"], options_given["sets"])
+    config = without_user_effects(config, written)
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     check_folder(folder, overwrite=overwrite)
     evidence = read_evidence(recording)
@@ -76,7 +82,7 @@ def command(
         found = diagnose(
             evidence,
             config,
-            declared_name=", ".join(click.get_current_context().params["config_files"]),
+            declared_name=", ".join(options_given["config_files"]),
             without=without,
             free_thresholds=fit_thresholds,
             threads=threads,
@@ -87,15 +93,13 @@ def command(
     log(summary_text(found))
 
 
-def check_names(names: tuple[str, ...]) -> None:
-    """Raise UsageError for an effect that the library does not have."""
+def check_names(without: Sequence[str], known: Sequence[str]) -> None:
+    """Raise UsageError for an effect that is not known."""
     import difflib
 
-    from adv2e.diagnosis.library import names as known_names
     from adv2e.errors import UsageError
 
-    known = known_names() if names else []
-    for name in names:
+    for name in without:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean '{near[0]}'?" if near else f"one of {', '.join(known)}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ __all__ = [
     "to_annotated_yaml",
     "to_dict",
     "to_yaml",
+    "written_keys",
 ]
 
 
@@ -64,6 +65,28 @@ def load_config(
     from adv2e.effects.user import config_class  # noqa: PLC0415 - it needs the model itself
 
     return build(config_class(effects), merge_all([*(read(name) for name in files), *over]))
+
+
+def written_keys(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the keys that `files` and `sets` write, by path, with what they say; no lists.
+
+    A section without keys is one itself.
+
+    Raises
+    ------
+    ConfigError, UsageError
+        As :func:`load_config`.
+    """
+    layers = [*(read(name) for name in files), *(parse_set(text) for text in sets)]
+    return dict(_scalars(merge_all(layers), ""))
+
+
+def _scalars(tree: Value, path: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(tree.content, dict) and tree.content:
+        for key, value in tree.content.items():
+            yield from _scalars(value, f"{path}.{key}" if path else key)
+    elif not isinstance(tree.content, list):
+        yield path, tree.content
 
 
 def from_dict(

@@ -21,7 +21,6 @@ from adv2e.diagnosis.error import error_rows, of_part
 from adv2e.diagnosis.evidence import Evidence, affordable
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.interpolation import InterpolationError, interpolation_error
-from adv2e.diagnosis.keys import without_user_effects
 from adv2e.diagnosis.lamps import lamps_of
 from adv2e.diagnosis.library import hints_of, library
 from adv2e.diagnosis.light import light_of, quantum_dn
@@ -62,7 +61,8 @@ def diagnose(
     evidence : Evidence
     declared : Config
         What is known of the camera.  Effects of the user's own, for which it has sections, are
-        candidates as the built-in ones are.
+        candidates as the built-in ones are; those that are no knowledge of the camera are off
+        (:func:`adv2e.diagnosis.keys.without_user_effects`).
     declared_name : str
         Its file, for the report.
     without : sequence of str
@@ -81,7 +81,6 @@ def diagnose(
     Diagnosis
     """
     began = time.perf_counter()
-    declared = without_user_effects(declared)
     evidence = affordable(evidence, declared)
     light = light_of(evidence, declared)
     scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))

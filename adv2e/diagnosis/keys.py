@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from adv2e.config import Config, from_dict, to_dict
@@ -79,11 +79,23 @@ def user_effects(config: Config) -> Mapping[str, type[Hooks]]:
     return {} if user is None else type(user).effects
 
 
-def without_user_effects(config: Config) -> Config:
-    """Return the configuration with all effects of the user's own switched off."""
+def without_user_effects(config: Config, written: Collection[str] = ()) -> Config:
+    """Return the configuration with effects of the user's own switched off.
+
+    Parameters
+    ----------
+    config : Config
+    written : collection of str
+        Dotted keys that somebody wrote; effects with a section among them stay as they are.
+    """
     effects = user_effects(config)
-    if not effects:
+    off = [
+        name
+        for name in effects
+        if not any(f"{key}.".startswith(f"user.{name}.") for key in written)
+    ]
+    if not off:
         return config
     values = to_dict(config)
-    values["user"] = dict.fromkeys(effects)
+    values["user"] |= dict.fromkeys(off)
     return from_dict(values, "user", list(effects.values()))

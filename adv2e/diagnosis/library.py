@@ -66,8 +66,12 @@ def _keys_of(candidate: Candidate) -> list[str]:
 
 
 def _of_the_user(config: Config) -> list[Candidate]:
-    """Return the effects of the user's own: the parameters that say where they may be fitted."""
+    """Return the effects of the user's own: the parameters that say where they may be fitted.
+
+    One without such parameters is switched on as it is, if it is off.
+    """
     made = []
+    values = to_dict(config)
     for name, effect in user_effects(config).items():
         knobs, starts = [], []
         for item in dataclasses.fields(effect.Parameters):
@@ -82,7 +86,10 @@ def _of_the_user(config: Config) -> list[Candidate]:
         probes = [tuple(starts)]
         for k in range(len(knobs)):
             probes += [(*starts[:k], other[k], *starts[k + 1 :]) for other in (milder, more)]
-        made.append(Candidate(name, tuple(knobs), tuple(dict.fromkeys(probes))))
+        if knobs:
+            made.append(Candidate(name, tuple(knobs), tuple(dict.fromkeys(probes))))
+        elif get_key(values, f"user.{name}") is None:
+            made.append(Candidate(name, (), ((),), ((f"user.{name}", {}),)))
     return made
 
 
@@ -269,9 +276,10 @@ _BUILDERS = (
 )
 
 
-def names() -> list[str]:
-    """Return the names of all effects that can be found."""
-    return list(dict.fromkeys(one.name for one in _all(Config(), Hints(1.0, (Lamp(100.0),), 10))))
+def names(config: Config | None = None) -> list[str]:
+    """Return the names of all effects that can be found, with those of the user's own."""
+    built_in = (one.name for one in _all(Config(), Hints(1.0, (Lamp(100.0),), 10)))
+    return list(dict.fromkeys([*built_in, *(user_effects(config) if config else ())]))
 
 
 def hints_of(times_us: np.ndarray[Any, Any], seconds: float, lamps: Sequence[Lamp]) -> Hints:

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -219,6 +220,35 @@ def test_options_arrive(adv2e, made_up, tmp_path):
     assert call["config"].seed == 4
     assert str(folder) == "a.diagnosis"
     assert outcome.err.splitlines()[-1] == "the summary"
+
+
+TWICE = """
+from adv2e.effects.hooks import Hooks
+class Twice(Hooks):
+    def events(self, chunks):
+        yield from chunks
+"""
+
+
+@pytest.mark.parametrize(
+    ("options", "held"),
+    [
+        ((), False),
+        (("--set", "user.twice={}"), True),
+        (("-c", "mine.yaml"), True),
+        (("--without", "twice"), False),
+    ],
+)
+def test_effects_of_the_users_own_are_candidates_unless_they_are_declared(
+    adv2e, made_up, options, held
+):
+    Path("twice.py").write_text(TWICE)
+    Path("mine.yaml").write_text("user: {twice: {}}")
+    outcome = adv2e("diagnose", "a.zip", "--effect", "twice.py", *options)
+    assert outcome.status == 0, outcome.err
+    call, _ = made_up
+    assert (call["config"].user.twice is not None) is held
+    assert call["without"] == (("twice",) if "--without" in options else ())
 
 
 @pytest.mark.parametrize(

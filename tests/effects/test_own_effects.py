@@ -10,10 +10,13 @@ import pytest
 
 from adv2e import load_config, simulate
 from adv2e.config import Config, from_dict, to_annotated_yaml, to_dict, to_yaml
+from adv2e.diagnosis.keys import without_user_effects
+from adv2e.diagnosis.library import Hints, library, names
 from adv2e.effects.active import active_hooks
 from adv2e.effects.user import load_effects
 from adv2e.errors import ConfigError
 
+HINTS = Hints(1.0, (), 1)
 HEAD = """
 from __future__ import annotations
 from dataclasses import dataclass
@@ -202,3 +205,24 @@ def test_what_it_does_wrong_when_it_runs_names_file_and_line(adv2e, tmp_path, mo
     assert "mine.py:8: effect a: TypeError" in outcome.err
     assert outcome.err.count("\n") == 1
     assert not (tmp_path / "a.h5").exists()
+
+
+def test_an_effect_without_ranges_is_switched_on_by_a_diagnosis_where_it_is_off(load):
+    config = load_config([], effects=load(DIM))
+    assert [one.name for one in library(config, HINTS)][-1] != "dim"
+    off = without_user_effects(config)
+    assert off.user.dim is None
+    (dim,) = [one for one in library(off, HINTS) if one.name == "dim"]
+    assert dim.applied(off, []).user.dim.share == 0.5
+    assert names(off)[-1] == "dim"
+    assert "dim" not in names()
+
+
+@pytest.mark.parametrize("written", ["user.dim", "user.dim.share"])
+def test_what_is_written_of_an_effect_is_held(load, written):
+    config = load_config(
+        [], effects=load(DIM + DRIFT.replace("parameter(unit", "parameter(0.1, unit"))
+    )
+    kept = without_user_effects(config, [written, "user.dimmer", "pixel.leak"])
+    assert kept.user.dim == config.user.dim
+    assert kept.user.drive_drift is None
