@@ -14,11 +14,12 @@ from adv2e import __version__
 from adv2e.config import Config, to_dict
 from adv2e.cores import default_threads
 from adv2e.diagnosis import parts
+from adv2e.diagnosis.affordable import affordable
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.error import error_rows, of_part
-from adv2e.diagnosis.evidence import Evidence, affordable
+from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.interpolation import InterpolationError, interpolation_error
 from adv2e.diagnosis.lamps import lamps_of

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.config import Config
 from adv2e.diagnosis.stream import Stream
 from adv2e.errors import DataError
 from adv2e.events import Events
@@ -19,15 +18,8 @@ from adv2e.reports.result import Masked
 LEAST_EVENTS = 1000
 """Below that nothing can be told."""
 
-AFFORDABLE_S = 0.2
-"""What one simulation may take, in one thread; a diagnosis takes some thousands of them [s]."""
-
-# about what a simulation and the statistics of its events take, in one thread [s]
-_INSTANT_S = 20e-9  # of one pixel
-_EVENT_S = 300e-9
-_STEPPED = 10
-_BLOCK = 8
-_SMALLEST = 48
+_UNCOVERED = 10.0
+"""A pause at an end that is longer than the longest within by this factor is no pause."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +91,10 @@ def read_evidence(path: str | Path) -> Evidence:
             f"{recording.height}"
         )
     kept, masked = _between_frames(recording.events, times_s)
+    covered = _covered(kept, times_s)
+    if covered != slice(0, len(frames)):
+        frames, times_s, without = frames[covered], times_s[covered], times_s
+        masked.append(_uncovered(without, times_s))
     if len(kept) < LEAST_EVENTS:
         raise DataError(
             f"{path}: {len(kept)} events between its first and its last frame; at least"
@@ -141,71 +137,26 @@ def _between_frames(events: Events, times_s: NDArray[np.float64]) -> tuple[Event
     return events[inside], masked
 
 
-def affordable(evidence: Evidence, declared: Config) -> Evidence:
-    """Return the recording, cropped where simulating all of it many times would take too long.
+def _covered(events: Events, times_s: NDArray[np.float64]) -> slice:
+    """Return which frames lie within the time that the events cover.
 
-    A rectangle of the sensor's proportions is kept that holds as many events as any.  A pixel does
-    not depend on its neighbours, so that the crop sees what it saw in the whole, but for load of
-    the readout and for interpolation along motion at its border.
-
-    Parameters
-    ----------
-    evidence : Evidence
-    declared : Config
-        Its `sampling` and the form of its filter decide what a simulation costs.
+    Streams are often cut, or begin late; what no event was kept of did not happen without any.
     """
-    instants = (len(evidence.frames) - 1) * declared.sampling.L
-    low_pass = declared.pixel.low_pass
-    each = 1 if low_pass is None or low_pass.update == "exact" else _STEPPED
-
-    def cost_s(part: Evidence) -> float:
-        pixels = part.width * part.height
-        return _INSTANT_S * each * instants * pixels + _EVENT_S * len(part.stream)
-
-    kept, share = evidence, 1.0
-    while cost_s(kept) > AFFORDABLE_S:
-        # where events crowd, a part of the pixels costs more than its share
-        share *= 0.98 * AFFORDABLE_S / cost_s(kept)
-        width, height = (
-            min(length, max(_SMALLEST, round(length * share**0.5 / _BLOCK) * _BLOCK))
-            for length in (evidence.width, evidence.height)
-        )
-        if (width, height) == (kept.width, kept.height):
-            break
-        kept = _cropped(evidence, *_busiest(evidence, width, height), width, height)
-    return kept
+    everything = slice(0, len(times_s))
+    if len(events) < 2:
+        return everything
+    t_s = events["t"] * 1e-6
+    usual = max(_UNCOVERED * float(np.diff(t_s).max()), 2.0 * float(np.diff(times_s).max()))
+    first, last = 0, len(times_s) - 1
+    if t_s[0] - times_s[0] > usual:
+        first = int(np.searchsorted(times_s, t_s[0], "right")) - 1
+    if times_s[-1] - t_s[-1] > usual:
+        last = int(np.searchsorted(times_s, t_s[-1]))
+    return slice(first, last + 1) if last - first >= 2 else everything
 
 
-def _busiest(evidence: Evidence, width: int, height: int) -> tuple[int, int]:
-    """Return column and row, multiples of a block, at which a crop holds the most events."""
-    counts = np.bincount(evidence.stream.pixel, minlength=evidence.width * evidence.height)
-    sums = np.zeros((evidence.height + 1, evidence.width + 1), np.int64)
-    sums[1:, 1:] = counts.reshape(evidence.height, -1).cumsum(axis=0).cumsum(axis=1)
-    rows = np.arange(0, evidence.height - height + 1, _BLOCK)[:, None]
-    columns = np.arange(0, evidence.width - width + 1, _BLOCK)[None, :]
-    inside = sums[rows + height, columns + width] - sums[rows, columns + width]
-    inside += sums[rows, columns] - sums[rows + height, columns]
-    row, column = np.unravel_index(int(inside.argmax()), inside.shape)
-    return int(columns[0, column]), int(rows[row, 0])
-
-
-def _cropped(evidence: Evidence, left: int, top: int, width: int, height: int) -> Evidence:
-    stream = evidence.stream
-    y, x = np.divmod(stream.pixel, evidence.width)
-    inside = (x >= left) & (x < left + width) & (y >= top) & (y < top + height)
-    pixel = ((y - top) * width + (x - left))[inside].astype(np.int32)
-    kept = Stream(stream.t[inside], pixel, stream.on[inside], width, height)
-    what = f"pixels outside the {width}x{height} at column {left}, row {top}"
-    return replace(
-        evidence,
-        frames=[frame[top : top + height, left : left + width] for frame in evidence.frames],
-        stream=kept,
-        width=width,
-        height=height,
-        masked=[*evidence.masked, Masked(what, 1.0 - len(kept) / len(stream))],
-        notes=[
-            *evidence.notes,
-            f"cropped from {evidence.width}x{evidence.height} pixels, as all of them would take too"
-            " long to simulate often enough",
-        ],
-    )
+def _uncovered(whole_s: NDArray[np.float64], kept_s: NDArray[np.float64]) -> Masked:
+    before, after = kept_s[0] - whole_s[0], whole_s[-1] - kept_s[-1]
+    ends = ((before, "first"), (after, "last"))
+    which = " and ".join(f"{time:.3g} s at the {end} frames" for time, end in ends if time > 0.0)
+    return Masked(f"{which}, which the events do not cover", 0.0)

@@ -76,6 +76,32 @@ def test_nothing_is_masked_between_the_frames(record):
     assert len(evidence.stream) == 2000
 
 
+@pytest.mark.parametrize(
+    ("span", "kept", "which"),
+    [
+        ((0.0, 0.125), (0, 13), "0.07 s at the last frames"),
+        ((0.061, 0.2), (6, 20), "0.06 s at the first frames"),
+        ((0.061, 0.125), (6, 13), "0.06 s at the first frames and 0.07 s at the last frames"),
+    ],
+)
+def test_frames_that_the_events_do_not_cover_are_set_aside(record, span, kept, which):
+    images = [np.full((HEIGHT, WIDTH), 10 * k, np.uint8) for k in range(21)]
+    evidence = read_evidence(record(images=images, span=span))
+    first, last = kept
+    assert evidence.times_s == pytest.approx(0.01 * np.arange(first, last + 1))
+    assert [int(frame[0, 0]) // 10 for frame in evidence.frames] == list(range(first, last + 1))
+    (masked,) = evidence.masked
+    assert masked.what == f"{which}, which the events do not cover"
+    assert len(evidence.stream) == 2000
+
+
+def test_a_pause_at_the_end_like_others_is_one(record):
+    folder = record(images=[np.full((HEIGHT, WIDTH), 10 * k, np.uint8) for k in range(21)])
+    with (folder / "events.txt").open("a") as text:
+        text.write("0.120000000 1 1 1\n")
+    assert len(read_evidence(folder).frames) == 21
+
+
 def test_light_is_as_declared(record):
     evidence = read_evidence(record())
     linear, srgb = (load_config([], [f"frames.encoding={name}"]) for name in ("linear", "srgb"))

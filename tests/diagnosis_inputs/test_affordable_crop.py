@@ -5,8 +5,9 @@ import pytest
 
 from adv2e import simulate
 from adv2e.config import load_config
-from adv2e.diagnosis import evidence as evidence_module
-from adv2e.diagnosis.evidence import Evidence, affordable
+from adv2e.diagnosis import affordable as affordable_module
+from adv2e.diagnosis.affordable import affordable
+from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.stream import Stream
 
 WIDTH, HEIGHT = 96, 80
@@ -28,9 +29,9 @@ def recording():
 
 def limit(monkeypatch, pixels, steps=1, event_s=0.0):
     instants = (len(TIMES) - 1) * CONFIG.sampling.L
-    monkeypatch.setattr(evidence_module, "_INSTANT_S", 1.0)
-    monkeypatch.setattr(evidence_module, "_EVENT_S", event_s)
-    monkeypatch.setattr(evidence_module, "AFFORDABLE_S", 1.001 * pixels * instants * steps)
+    monkeypatch.setattr(affordable_module, "_INSTANT_S", 1.0)
+    monkeypatch.setattr(affordable_module, "_EVENT_S", event_s)
+    monkeypatch.setattr(affordable_module, "AFFORDABLE_S", 1.001 * pixels * instants * steps)
 
 
 def test_what_is_affordable_stays_as_it_is(monkeypatch):
@@ -87,3 +88,25 @@ def test_a_crop_is_not_smaller_than_statistics_allow(monkeypatch, pixels):
     crop = affordable(recording(), CONFIG)
     assert crop.width >= 48
     assert crop.height >= 48
+
+
+def test_of_long_recordings_the_busiest_stretch_is_kept(monkeypatch):
+    """Where the smallest crop is too much: 30 of 100 intervals, those with most of the events."""
+    draw = np.random.default_rng(1)
+    times = 2.0 + 0.01 * np.arange(101)
+    t = np.sort(np.rint(1e6 * np.r_[draw.uniform(2.0, 3.0, 500), draw.uniform(2.4, 2.7, 3000)]))
+    frames = [np.full((48, 48), k, np.uint8) for k in range(101)]
+    pixel = draw.integers(0, 48 * 48, t.size).astype(np.int32)
+    stream = Stream(t.astype(np.int64), pixel, pixel % 2 > 0, 48, 48)
+    monkeypatch.setattr(affordable_module, "_INSTANT_S", 1.0)
+    monkeypatch.setattr(affordable_module, "_EVENT_S", 0.0)
+    monkeypatch.setattr(affordable_module, "AFFORDABLE_S", 31.0 * 48 * 48 * CONFIG.sampling.L)
+    kept = affordable(Evidence("long", frames, times, stream, 48, 48), CONFIG)
+    assert (kept.width, kept.height, len(kept.frames)) == (48, 48, 31)
+    assert kept.times_s[[0, -1]] == pytest.approx([2.4, 2.7], abs=0.011)
+    assert kept.frames[0][0, 0] == round((kept.times_s[0] - 2.0) * 100)
+    inside = (t >= kept.times_s[0] * 1e6) & (t < kept.times_s[-1] * 1e6)
+    np.testing.assert_array_equal(kept.stream.t, t[inside])
+    assert kept.masked[-1].what == f"time outside {kept.times_s[0]:.3f} to {kept.times_s[-1]:.3f} s"
+    assert kept.masked[-1].share == pytest.approx(1 - inside.mean())
+    assert kept.notes[-1].startswith("0.3 of 1 s were looked at")
