@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from adv2e.diagnosis.library import hints_of, library
 from adv2e.diagnosis.light import light_of, quantum_dn
 from adv2e.diagnosis.lines import strongest_lines
 from adv2e.diagnosis.markers import BOTH, Markers
-from adv2e.diagnosis.nuisances import fit_thresholds
+from adv2e.diagnosis.nuisances import TOLERANCE, fit_thresholds
 from adv2e.diagnosis.picture import Gallery
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.search import Outcome, Search
@@ -88,8 +89,13 @@ def diagnose(
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
         nuisances: dict[str, float] = {}
         if free_thresholds:
-            declared, nuisances = _with_fitted_thresholds(evidence, declared, simulator, scene)
+            declared, nuisances, miss = _with_fitted_thresholds(
+                evidence, declared, simulator, scene
+            )
             log(f"thresholds that match the totals: {nuisances}")
+            if miss > TOLERANCE:
+                missed = f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}"
+                evidence = replace(evidence, notes=[*evidence.notes, missed])
         seeds = range(10_000, 10_000 + _PILOT)
         streams = simulator.map(lambda seed: simulator.stream(declared, seed), seeds)
         pilot = [Placed.of(stream, scene) for stream in streams]
@@ -188,7 +194,7 @@ def _about_interpolation(search: Search, error: InterpolationError | None) -> st
 
 def _with_fitted_thresholds(
     evidence: Evidence, declared: Config, simulator: Simulator, scene: Scene
-) -> tuple[Config, dict[str, float]]:
+) -> tuple[Config, dict[str, float], float]:
     def counts(stream: Stream) -> tuple[int, int]:
         fitted_to = of_part(stream, scene.parts, parts.FIT)
         on = int(np.count_nonzero(fitted_to.on))

@@ -105,8 +105,10 @@ THRESHOLDS = ("pixel.thresholds.on", "pixel.thresholds.off")
 
 def fit_thresholds(
     simulate: Callable[[Config], tuple[int, int]], declared: Config, measured: tuple[int, int]
-) -> tuple[Config, dict[str, float]]:
-    """Return the declared model with thresholds that match the totals, and their values by key.
+) -> tuple[Config, dict[str, float], float]:
+    """Return the declared model with thresholds that match the totals, their values by key, miss.
+
+    What is missed by is as in :func:`match_totals`.
 
     Parameters
     ----------
@@ -121,5 +123,5 @@ def fit_thresholds(
         return simulate(with_thresholds(declared, on, off))
 
     here = declared.pixel.thresholds
-    on, off, _ = match_totals(count, (here.on, here.off), measured)
-    return with_thresholds(declared, on, off), dict(zip(THRESHOLDS, (on, off), strict=True))
+    on, off, miss = match_totals(count, (here.on, here.off), measured)
+    return with_thresholds(declared, on, off), dict(zip(THRESHOLDS, (on, off), strict=True)), miss
