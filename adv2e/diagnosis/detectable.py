@@ -2,44 +2,137 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from adv2e.config import Config
 from adv2e.diagnosis.bench import Bench, State
 from adv2e.diagnosis.candidates import Candidate, neutral_value
 from adv2e.diagnosis.keys import about_key
 from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.metric import Model
+from adv2e.diagnosis.search import PER_LOOK
 from adv2e.reports.result import Detectable
 
-_POWER = 3.2  # deviations: 99 % below without the effect, 80 % above with it
-_SEEDS = (1, 2)  # those of the probes
+_SEEN = 0.8
+_ROUNDS = (range(1, 3), range(301, 305), range(305, 315))
+"""Seeds of the recordings that are simulated at each size; first those of the probes."""
+_FARTHEST = 10.0
+_SETTLED = 2.0
+"""Factor by which the last round may still change a size that is told."""
+_OF_RECORDINGS = 3
 
 
 def detectable(bench: Bench, declared: State, candidates: Sequence[Candidate]) -> list[Detectable]:
-    """Return the size of each effect that would have been seen 8 times in 10.
+    """Return the size of each effect that would have been seen about 8 times in 10.
 
-    From the mildest probe, as if what an effect changes grew in proportion to it.  Effects of which
-    no size within the physical range would have been seen are left out.
+    Recordings with the effect are simulated, from a mild probe on, and judged as the real one is;
+    how much more or less of it would just have been seen, as if what it changes grew in proportion,
+    is tried in the next round.  Effects of which no size within the physical range would have been
+    seen are left out.
     """
     mildest: dict[str, Candidate] = {}
     for candidate in candidates:
         if candidate.knobs:
             mildest.setdefault(candidate.name, candidate)
-    if not mildest:
-        return []
-    config = declared.config
-    configs = [one.applied(config, one.inner(one.probes[0])) for one in mildest.values()]
-    idle, *means = bench.fitter(BOTH).whites([config, *configs], _SEEDS)
-    seen = _POWER * declared.models[BOTH].spread * len(idle)
-    result = []
-    for candidate, mean in zip(mildest.values(), means, strict=True):
-        knob, value = candidate.knobs[0], candidate.probes[0][0]
-        strength = max(float(np.sum((mean - idle) ** 2)), 1e-9)
-        factor = float(np.sqrt(seen / strength))
-        neutral = neutral_value(config, knob)
-        size = value / factor if np.isinf(neutral) else neutral + factor * (value - neutral)
-        if knob.low <= size <= knob.high:
-            unit = about_key(config, knob.key).unit
-            result.append(Detectable(candidate.name, knob.key, size, unit))
-    return result
+    sizes = [_Size.of(candidate, declared.config) for candidate in mildest.values()]
+    model = declared.models[BOTH]
+    limits = _Limits.of(model)
+    simulator = bench.laboratory.simulator
+    simulator.likely = simulator.done + sum(map(len, _ROUNDS)) * len(sizes)
+    for seeds in _ROUNDS:
+        if not sizes:
+            break
+        configs = [size.config(declared.config) for size in sizes]
+        sample = bench.laboratory.many(configs, seeds)[:, :, BOTH]
+        for size, rows in zip(sizes, sample, strict=True):
+            recordings = bench.error.blurred(rows, BOTH, _OF_RECORDINGS)
+            factors = [limits.missing(model, row) for row in recordings]
+            size.change_by(float(np.quantile(factors, _SEEN)))
+        sizes = [size for size in sizes if math.isfinite(size.factor)]
+    return [size.found(declared.config) for size in sizes if size.is_settled]
+
+
+@dataclass
+class _Size:
+    """An effect, and how far its first key is from where it does nothing.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    neutral : float
+        The first key's value where the effect does nothing.
+    value, rest : float and tuple of float
+        Of the first key and the others.
+    factor : float
+        By which the last round changed it; infinite: it left the physical range.
+    """
+
+    candidate: Candidate
+    neutral: float
+    value: float
+    rest: tuple[float, ...]
+    factor: float = 1.0
+
+    @classmethod
+    def of(cls, candidate: Candidate, config: Config) -> _Size:
+        """Return the first probe that the physical range leaves room to grow from, if any."""
+        neutral = neutral_value(config, candidate.knobs[0])
+        made = [cls(candidate, neutral, probe[0], probe[1:]) for probe in candidate.probes]
+        return next((one for one in made if one._is_physical(one._changed(_FARTHEST))), made[0])
+
+    def config(self, declared: Config) -> Config:
+        values = (self.value, *self.rest)
+        return self.candidate.applied(declared, self.candidate.inner(values))
+
+    def change_by(self, factor: float) -> None:
+        wanted = self._changed(factor)
+        self.factor = factor if self._is_physical(wanted) else math.inf
+        self.value = wanted
+
+    def _changed(self, factor: float) -> float:
+        if math.isinf(self.neutral):
+            return self.value / factor
+        return self.neutral + factor * (self.value - self.neutral)
+
+    def _is_physical(self, value: float) -> bool:
+        return self.candidate.knobs[0].low <= value <= self.candidate.knobs[0].high
+
+    @property
+    def is_settled(self) -> bool:
+        return 1.0 / _SETTLED <= self.factor <= _SETTLED
+
+    def found(self, declared: Config) -> Detectable:
+        key = self.candidate.knobs[0].key
+        return Detectable(self.candidate.name, key, self.value, about_key(declared, key).unit)
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """From where on chance is not believed to make a misfit, or a largest deviation."""
+
+    misfit: float
+    largest: float
+
+    @classmethod
+    def of(cls, model: Model) -> _Limits:
+        return cls(*model.limits(PER_LOOK))
+
+    def missing(self, model: Model, recording: NDArray[np.float64]) -> float:
+        """Return by which factor an effect must be larger to be seen in a recording with it."""
+        # squares add up, single deviations grow in proportion
+        misfit = (model.misfit(recording) - model.floor) / (self.misfit - model.floor)
+        loudest = _plain(float(np.abs(model.z(recording)).max()))
+        usual = _plain(model.typical_largest)
+        deviation = (loudest - usual) / (_plain(self.largest) - usual)
+        factor = min(max(misfit, 1e-6) ** -0.5, 1.0 / max(deviation, 1e-6))
+        return float(min(max(factor, 1.0 / _FARTHEST), _FARTHEST))
+
+
+def _plain(compressed: float) -> float:
+    """Return deviations before they were compressed; see :mod:`adv2e.diagnosis.metric`."""
+    return 3.0 * math.sinh(compressed / 3.0)

@@ -23,6 +23,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,6 +163,27 @@ class Model:
         found = (_tail(misfits, misfit, _log_normal), _tail(largest, loudest, _gumbel))
         return min(1.0, 2.0 * min(found))
 
+    @cached_property
+    def typical_largest(self) -> float:
+        """Mean of the largest deviation of simulations of this very model."""
+        return float(self._left_out[1].mean())
+
+    def limits(self, probability: float) -> tuple[float, float]:
+        """Return the misfit, and the largest deviation, that have this probability or less."""
+        misfits, largest = self._left_out
+        share = 0.5 * probability  # the smaller of two decides
+        return (
+            _value(misfits, share, _log_normal_value),
+            _value(largest, share, _gumbel_value),
+        )
+
+
+def _value(sample: Array, share: float, beyond: Callable[[Array, float], float]) -> float:
+    """Return the value that `share` or less of the distribution of `sample` exceeds."""
+    rank = np.sort(sample)[::-1]
+    within = int(share * (len(sample) + 1.0))
+    return float(rank[within - 1] if within else max(rank[0], beyond(sample, share)))
+
 
 def _tail(sample: Array, value: float, beyond: Callable[[Array, float], float]) -> float:
     """Return the probability of `value` or more under the distribution of `sample`."""
@@ -174,6 +196,17 @@ def _log_normal(sample: Array, value: float) -> float:
     log = np.log(np.maximum(sample, 1e-9))
     z = (math.log(value) - log.mean()) / max(float(log.std(ddof=1)), 1e-6)
     return 0.5 * math.erfc(z / math.sqrt(2.0))
+
+
+def _log_normal_value(sample: Array, share: float) -> float:
+    log = np.log(np.maximum(sample, 1e-9))
+    z = NormalDist().inv_cdf(1.0 - share)
+    return math.exp(log.mean() + z * max(float(log.std(ddof=1)), 1e-6))
+
+
+def _gumbel_value(sample: Array, share: float) -> float:
+    width = max(float(sample.std(ddof=1)), 1e-6) * math.sqrt(6.0) / math.pi
+    return float(sample.mean()) + width * (-math.log(-math.log1p(-share)) - np.euler_gamma)
 
 
 def _gumbel(sample: Array, value: float) -> float:
