@@ -33,13 +33,15 @@ def objections(fit: Fit, grown: State, ground: State, bench: Bench) -> list[str]
         The two.
     bench : Bench
     """
-    after, before = grown.models[parts.JUDGE], ground.models[parts.JUDGE]
     observed = bench.observed[parts.JUDGE]
+    # as often as what is tried, by the same seeds: most of chance falls out of the difference
+    after, before = (bench.tried(one.config)[parts.JUDGE] for one in (grown, ground))
     found = []
-    if gain(after, before, observed) < chance_gain(after, before):
+    if gain(after, before, observed) < chance_gain(after, before, observed):
         found.append(BY_CHANCE)
     if fit.at_border:
         found.append(BORDER)
+    after, before = grown.models[parts.JUDGE], ground.models[parts.JUDGE]
     loud = _loudness(after, before, observed)
     if loud > _QUIET:
         found.append(f"what it changes most still stands out by {loud:.1f} deviations")
@@ -59,15 +61,23 @@ def gain(after: Model, before: Model, observed: Array) -> float:
     return after.log_likelihood(observed) - before.log_likelihood(observed)
 
 
-def chance_gain(after: Model, before: Model) -> float:
-    """Return what a model gains on recordings of the one before it, at most."""
+def chance_gain(after: Model, before: Model, observed: Array) -> float:
+    """Return what a model gains by chance over the one before it, at most.
+
+    On recordings of the one before it, and as far as the gain hangs on which simulations the two
+    were made of: where much is left, their chance is multiplied by it.
+
+    Parameters
+    ----------
+    after, before : Model
+        Of simulations with the same seeds.
+    observed : (statistics,)
+    """
     rows = before.sample
-    white = before.scale.whitening
-    zb = ((rows - before.mean) / before.sd) @ white.T
-    za = ((rows - after.mean) / after.sd) @ white.T
-    gains = 0.5 * np.sum(zb * zb - za * za, axis=1)
-    gains += np.log(before.sd).sum() - np.log(after.sd).sum()
-    return float(max(gains.mean() + 3.0 * gains.std(), 3.0))
+    gains = after.likelihood_of_others(rows) - before.likelihood_of_others(rows)
+    own = after.pull(observed) - before.pull(observed)
+    deviation = np.hypot(gains.std(), own.std(ddof=1) / np.sqrt(len(own)))
+    return float(max(gains.mean() + 3.0 * deviation, 3.0))
 
 
 def _loudness(after: Model, before: Model, observed: Array) -> float:

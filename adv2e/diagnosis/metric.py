@@ -126,20 +126,52 @@ class Model:
         white = self.scale.whitening @ self.z(values)
         return float(-0.5 * white @ white - np.log(self.sd).sum())
 
+    def pull(self, values: Array) -> Array:
+        """Return what each simulation adds to the log likelihood by its part in mean and deviation.
+
+        To first order (influence function), and so that the mean over simulations counts, (seeds,).
+        """
+        z, white = self.z(values), self.scale.whitening
+        downhill = white.T @ (white @ z)
+        inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
+        apart = (self.sample - self.mean) / self.sd
+        of_mean = apart @ (downhill / inflation)
+        free = self.sd > _LEAST_SD
+        of_sd = 0.5 * (apart**2 - 1.0) @ np.where(free, downhill * z - 1.0, 0.0)
+        return np.asarray(of_mean + of_sd)
+
+    def against_others(self, recordings: Array) -> tuple[Array, Array]:
+        """Return recordings as seen by the model without the simulation of the same place.
+
+        Parameters
+        ----------
+        recordings : (seeds, statistics)
+            In compressed deviations.
+
+        Returns
+        -------
+        z, sd : (seeds, statistics)
+            Deviations, and what they were divided by but for how well the mean is known.
+        """
+        n = len(self.sample)
+        total, square = self.sample.sum(axis=0), (self.sample**2).sum(axis=0)
+        mean = (total - self.sample) / (n - 1)
+        variance = (square - self.sample**2 - (n - 1) * mean**2) / (n - 2)
+        sd = np.maximum(np.sqrt(np.maximum(variance, 0.0)), _LEAST_SD)
+        return (recordings - mean) / (sd * math.sqrt(1.0 + 1.0 / (n - 1))), sd
+
+    def likelihood_of_others(self, recordings: Array) -> Array:
+        """Return the log likelihood of each row of :meth:`against_others`, but for a constant."""
+        z, sd = self.against_others(recordings)
+        white = z @ self.scale.whitening.T
+        return np.asarray(-0.5 * np.sum(white * white, axis=1) - np.log(sd).sum(axis=1))
+
     @cached_property
     def _left_out(self) -> tuple[Array, Array]:
         """Misfit and largest deviation of each simulation against all others."""
-        n = len(self.sample)
-        total, square = self.sample.sum(axis=0), (self.sample**2).sum(axis=0)
-        misfits, largest = np.empty(n), np.empty(n)
-        for k, row in enumerate(self.sample):
-            mean = (total - row) / (n - 1)
-            variance = ((square - row**2) - (n - 1) * mean**2) / (n - 2)
-            sd = np.maximum(np.sqrt(np.maximum(variance, 0.0)), _LEAST_SD)
-            z = (row - mean) / (sd * math.sqrt(1.0 + 1.0 / (n - 1)))
-            white = self.scale.whitening @ z
-            misfits[k], largest[k] = np.mean(white * white), np.abs(z).max()
-        return misfits, largest
+        z, _ = self.against_others(self.sample)
+        white = z @ self.scale.whitening.T
+        return np.mean(white * white, axis=1), np.abs(z).max(axis=1)
 
     @cached_property
     def floor(self) -> float:
