@@ -38,8 +38,10 @@ class NoiseProblem:
 
     What is compared is ln(rate + floor), the floor being the least rate that would have shown:
     as the table says, or that of one event (a tenth of the smallest rate where the table does not
-    say how many pixels were watched for how long), so that a rate of 0 counts as what it is.
-    Light is scaled so that `white` is 255 DN.
+    say how many pixels were watched for how long), so that a rate of 0 counts as what it is.  A
+    median over pixels is that of whole numbers of events, however many pixels there are: of Poisson
+    numbers with mean m it is within half an event of m - 1/3 [1]_, which is its error, and the
+    third its floor.  Light is scaled so that `white` is 255 DN.
 
     Parameters
     ----------
@@ -50,6 +52,11 @@ class NoiseProblem:
         Light of 255 DN, in the table's unit; default: the highest.
     assumed_error : float, optional
         Relative error of rows where the table does not say.
+
+    References
+    ----------
+    .. [1] K. P. Choi, "On the medians of gamma distributions and an equation of Ramanujan", Proc.
+       AMS 121(1), 1994, doi:10.1090/S0002-9939-1994-1195477-8.
     """
 
     what = "rate of noise events"
@@ -77,12 +84,17 @@ class NoiseProblem:
         watched = data.pixels[rows] * data.duration_s[rows]
         smallest = rate[rate > 0].min() if (rate > 0).any() else 1.0
         floor = np.where(np.isnan(watched), 0.1 * smallest, 1.0 / watched)
-        self.floor = np.where(np.isnan(data.least_hz[rows]), floor, data.least_hz[rows])
+        floor = np.where(np.isnan(data.least_hz[rows]), floor, data.least_hz[rows])
+        medians = np.array([kind.endswith("_median_hz") for kind in self._kinds], np.bool_)
+        whole = np.where(medians, 1.0 / self._duration, np.nan)  # rate of one event, if known
+        self.floor = np.fmax(floor, whole / 3.0)
         self.measured = np.log(rate + self.floor)
         self.light = data.light[rows]
         self.level = levels_of(data.light)[rows]
         self.judged = judged[rows]
-        given = np.sqrt((rate + self.floor) / watched) / (rate + self.floor)
+        events = np.sqrt((rate + self.floor) / watched)
+        given = np.where(np.isnan(whole), events, np.hypot(events, 0.5 * whole))
+        given /= rate + self.floor
         if assumed_error:
             given = np.full(rate.shape, assumed_error)
         repeats = [(kind, data.light[k]) for kind, k in cells]

@@ -143,3 +143,22 @@ def test_a_share_counts_as_the_rate_that_gives_it():
     assert found.effects[0].name == "leak"
     (value,) = found.effects[0].parameters.values()
     assert value == pytest.approx(0.012, rel=0.1)
+
+
+@pytest.mark.parametrize("seconds", [0.5, 2.0, 20.0])
+def test_medians_of_few_events_are_those_of_whole_numbers(seconds):
+    rng = np.random.default_rng(1)
+    shot = 0.5 * (1.0 - 0.75 * LUX / 1000)
+    counts = rng.poisson(shot * seconds, (2, 4000, 5))
+    lines = ["illuminance_lux,on_rate_hz,off_rate_hz,on_median_hz,off_median_hz,pixels,duration_s"]
+    for row in zip(LUX, *counts.mean(axis=1), *np.median(counts, axis=1), strict=True):
+        lines.append(",".join(f"{v:.6g}" for v in (row[0], *np.array(row[1:]) / seconds)))
+        lines[-1] += f",4000,{seconds}"
+    text = "\n".join(lines)
+    found = verdict_of(parse_table(text, "noise.csv"), ["pixel.shot_noise.rate_hz=1.0"])
+    assert found.verdict == "consistent"
+    named = verdict_of(parse_table(text, "noise.csv"))
+    assert [effect.name for effect in named.effects] == ["shot_noise"]
+    assert named.verdict == "explained"
+    (value,) = named.effects[0].parameters.values()
+    assert value == pytest.approx(1.0, rel=0.05)
