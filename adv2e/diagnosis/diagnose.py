@@ -247,9 +247,9 @@ def _signatures(search: Search, observed: Array, kept: State, markers: Markers) 
             entry.name,
             title,
             entry.meaning,
-            float(observed[view][k]),
-            float(means[0][k]),
-            float(means[1][k]),
+            entry.plain(float(observed[view][k])),
+            entry.plain(float(means[0][k])),
+            entry.plain(float(means[1][k])),
             float(z_before[k]),
             float(z_after[k]),
         )

@@ -56,6 +56,21 @@ def test_names_are_unique_and_meanings_are_given():
     assert len(set(titles)) >= len(titles) - 1  # intervals, and those at rest
 
 
+def test_numbers_of_events_are_told_as_such():
+    stream = random_stream(3000, 9)
+    values = MARKERS.measure(placed(stream, SCENE))
+    told = {
+        entry.name: entry.plain(value)
+        for entry, value in zip(MARKERS.entries, values[parts.LAST], strict=True)
+    }
+    inside = placed(stream, SCENE).part == parts.LAST
+    rates = MARKERS.groups[0].entries
+    assert sum(told[entry.name] for entry in rates) == pytest.approx(np.count_nonzero(inside))
+    for entry in MARKERS.entries:
+        is_told = entry.meaning.startswith("number of") and "deviations" not in entry.meaning
+        assert entry.is_number == (is_told and "pixels that" not in entry.meaning), entry
+
+
 @pytest.mark.parametrize("group", MARKERS.groups, ids=lambda group: type(group).__name__)
 def test_a_group_has_as_many_values_as_entries(group):
     raw = group.count(PILOT[0])

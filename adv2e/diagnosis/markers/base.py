@@ -18,10 +18,24 @@ Raw = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Entry:
-    """One marker statistic: its name and what it measures, in a sentence."""
+    """One marker statistic.
+
+    Attributes
+    ----------
+    name : str
+    meaning : str
+        What it measures, in a sentence.
+    is_number : bool
+        A number of events, which is compared as :func:`stabilised` puts it.
+    """
 
     name: str
     meaning: str
+    is_number: bool = False
+
+    def plain(self, value: float) -> float:
+        """Return the statistic as its meaning says, not as it is compared."""
+        return max(0.25 * value * value - 0.375, 0.0) if self.is_number else value
 
 
 class Group(Protocol):

@@ -50,6 +50,7 @@ class Intervals:
                 f"{pair} after {text}{where}",
                 f"number of events{where} that follow the one before in their pixel after {text},"
                 f" {pair.replace('-', ' then ')}",
+                is_number=True,
             )
             for text in self._texts
             for pair in _PAIRS
@@ -88,6 +89,7 @@ class Runs:
                 f"{place} {p} event of a run",
                 f"number of {p} events that are the {place} of a run without the other polarity"
                 " and without a gap of 50 ms",
+                is_number=True,
             )
             for place in self._PLACES
             for p in POLARITIES

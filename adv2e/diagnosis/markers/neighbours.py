@@ -32,6 +32,7 @@ class Neighbours:
                 f"{text} after a neighbour's {kind}",
                 f"number of events {text} after the latest event of {kind} polarity in the four"
                 " neighbouring pixels",
+                is_number=True,
             )
             for kind in ("other", "same")
             for text in texts

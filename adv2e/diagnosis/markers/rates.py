@@ -33,6 +33,7 @@ class Rates:
             Entry(
                 f"{p} events, {speed}, {light}",
                 f"number of {p} events where the picture is {light} and {speed}",
+                is_number=True,
             )
             for speed in SPEED_NAMES
             for light in LIGHT_NAMES
@@ -66,6 +67,7 @@ class Course:
             Entry(
                 f"{p} events, {where}, time {k + 1}/{self._steps}",
                 f"number of {p} events {where} in part {k + 1} of {self._steps} of the time",
+                is_number=True,
             )
             for k in range(self._steps)
             for where in ("at rest", "in motion")
@@ -106,6 +108,7 @@ class Load:
                 f"{p} events, load {k + 1}/{self._steps}",
                 f"number of {p} events at times when the declared model's rate over the whole"
                 f" sensor is in part {k + 1} of {self._steps}",
+                is_number=True,
             )
             for k in range(self._steps)
             for p in POLARITIES

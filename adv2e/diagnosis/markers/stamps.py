@@ -58,7 +58,9 @@ class Gaps:
         gaps.append(f">= {_GAPS_US[-1]} us")
         return [
             *(
-                Entry(f"next after {gap}", f"number of events {gap} after any other")
+                Entry(
+                    f"next after {gap}", f"number of events {gap} after any other", is_number=True
+                )
                 for gap in gaps
             ),
             *(
