@@ -172,8 +172,8 @@ class Phase:
         return [
             Entry(
                 f"{p} events, {where}, {k * 10}-{k * 10 + 10} % after a frame",
-                f"number of {p} events {where} in that part of the time between frames, less a tenth"
-                " of all of them, in deviations of chance",
+                f"number of {p} events {where} in that part of the time between frames, less a"
+                " tenth of all of them, in deviations of chance",
             )
             for k in range(self._STEPS)
             for where in ("at rest", "in motion")
