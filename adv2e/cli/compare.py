@@ -110,9 +110,7 @@ def _resimulation(
     if source is not None:
         frames, encoding = source.frames, source.encoding
     elif measured.frame_times_ns is not None:
-        stored = measured.metadata.get("source")
-        frames = measured.frames
-        encoding = stored.get("encoding", "linear") if isinstance(stored, dict) else "linear"
+        frames, encoding = measured.frames, measured.encoding
     else:
         raise DataError(
             f"{measured.path}: holds no frames to simulate with this configuration; give them with"

@@ -36,6 +36,8 @@ class Evidence:
     stream : Stream
         Events between the first frame and the last.
     width, height : int
+    encoding : str
+        What ``frames.encoding: auto`` means for the frames.
     masked : list of Masked
     notes : list of str
     """
@@ -46,6 +48,7 @@ class Evidence:
     stream: Stream
     width: int
     height: int
+    encoding: str = "linear"
     masked: list[Masked] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -107,6 +110,7 @@ def read_evidence(path: str | Path) -> Evidence:
         stream=Stream.of(kept, width, height),
         width=width,
         height=height,
+        encoding=recording.encoding,
         masked=masked,
         notes=list(recording.problems),
     )

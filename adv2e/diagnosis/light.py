@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
-from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images, full_scale_of
+from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 
 
 def light_of(evidence: Evidence, declared: Config) -> NDArray[np.float32]:
@@ -28,6 +28,6 @@ def _decoder(evidence: Evidence, declared: Config) -> tuple[LightDecoder, float]
     colour = image.ndim == 3
     encoding = declared.frames.encoding
     if encoding == "auto":
-        encoding = encoding_of_images(image.dtype, colour)
+        encoding = evidence.encoding
     full_scale = declared.frames.full_scale or full_scale_of(image.dtype)
     return LightDecoder(encoding, full_scale, image.dtype, colour), full_scale

@@ -9,8 +9,9 @@ from adv2e.reports.result import ErrorRow, Verdict
 _PARTLY = 0.8
 """Share of the residual that effects must explain to be named when something is left."""
 
-_ERROR_PARTLY = 0.9
-"""The same of what the error can fall by, on the data that is looked at last."""
+_ERROR_PARTLY, _ERROR_EXPLAINED = 0.9, 0.75
+"""The same of what the error can fall by, on the data that is looked at last, when something is
+left, and when all statistics are explained."""
 
 
 def verdict_of(outcome: Outcome, error: ErrorRow) -> Verdict:
@@ -25,27 +26,36 @@ def verdict_of(outcome: Outcome, error: ErrorRow) -> Verdict:
     """
     if not outcome.state.fits:
         return "consistent" if outcome.complete else "unexplained"
+    gone = _gone(error)
     if not outcome.complete:
-        partly = outcome.explained >= _PARTLY and _mostly_gone(error)
+        partly = outcome.explained >= _PARTLY and gone >= _ERROR_PARTLY and not _too_near(error)
         return "partly_explained" if partly else "unexplained"
+    if gone < _ERROR_EXPLAINED:
+        return "unexplained"
     return "not_identifiable" if outcome.alternatives else "explained"
 
 
-def _mostly_gone(error: ErrorRow) -> bool:
-    """Tell whether the error fell by most of what it can, or tells nothing of the effect.
+def _gone(error: ErrorRow) -> float:
+    """Return by how much of what it can the error fell; one where it tells nothing of the effect.
 
     Statistics fall for any effect that does some of what is missing; events come where they are
-    measured only for those that do it where and when it happens.  Simulations that are farther from
-    one another than from the recording do by chance what happens there for a reason.
+    measured only for those that do it where and when it happens.
     """
     before, after, floor = error.before, error.after, error.floor
-    if before.interval is None or after.interval is None or floor.interval is None:
-        return True
-    if after.interval[1] < floor.interval[0]:
-        return False
+    if before.interval is None or floor.interval is None:
+        return 1.0
     if not before.interval[0] > floor.interval[1]:  # or there is none
-        return True
-    return before.value - after.value >= _ERROR_PARTLY * (before.value - floor.value)
+        return 1.0
+    return (before.value - after.value) / (before.value - floor.value)
+
+
+def _too_near(error: ErrorRow) -> bool:
+    """Tell whether simulations are farther from one another than from the recording.
+
+    They do by chance what happens there for a reason.
+    """
+    after, floor = error.after.interval, error.floor.interval
+    return after is not None and floor is not None and after[1] < floor[0]
 
 
 def sentence_of(verdict: Verdict, kept: State, outcome: Outcome) -> str:
@@ -69,6 +79,12 @@ def sentence_of(verdict: Verdict, kept: State, outcome: Outcome) -> str:
         return (
             "Nothing is missing in the data for fitting and judging, but in those looked at last"
             f" something is, which chance makes {outcome.last:.0e} times."
+        )
+    if verdict == "unexplained" and outcome.complete:
+        return (
+            "Something is missing in the declared model that no effect known explains:"
+            f" {' and '.join(outcome.state.names)} would account for every statistic, but not for"
+            " where and when events come."
         )
     if verdict == "unexplained":
         best = " and ".join(outcome.state.names)

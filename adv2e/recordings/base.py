@@ -52,6 +52,16 @@ class Recording:
     problems: list[str] = field(default_factory=list)
     images: Callable[[], Iterator[Image]] = field(default=_no_images, repr=False)
 
+    @property
+    def encoding(self) -> str:
+        """What ``frames.encoding: auto`` means for the frames, as a conversion of them takes it.
+
+        Frames that cameras recorded beside events are linear; those that this program stored are
+        encoded as it read them.
+        """
+        stored = self.metadata.get("source")
+        return str(stored.get("encoding", "linear")) if isinstance(stored, dict) else "linear"
+
     def frames(self) -> Iterator[Frame]:
         """Yield the frames one by one, as often as asked.
 

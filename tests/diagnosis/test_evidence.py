@@ -115,6 +115,16 @@ def test_light_is_as_declared(record):
     assert quantum_dn(evidence, white) == 0.5
 
 
+def test_colour_frames_of_a_camera_are_linear_as_in_a_conversion(record):
+    shades = [np.full((HEIGHT, WIDTH, 3), 20 * k, np.uint8) for k in range(10)]
+    evidence = read_evidence(record(shades))
+    assert evidence.frames[0].ndim == 3
+    light = light_of(evidence, load_config())
+    np.testing.assert_allclose(light[:, 0, 0], 20.0 * np.arange(10), atol=0.1)
+    curved = load_config([], ["frames.encoding=srgb"])
+    assert light_of(evidence, curved)[5, 0, 0] < 60.0
+
+
 def test_step_of_16_bit_frames(record):
     evidence = read_evidence(record([np.full((HEIGHT, WIDTH), k, np.uint16) for k in range(10)]))
     assert quantum_dn(evidence, load_config()) == pytest.approx(255 / 65535)

@@ -86,6 +86,16 @@ def test_what_is_missing_in_the_last_part_alone_is_not_overlooked():
     assert sentence_of(verdict, outcome.state, outcome).endswith("left in the data looked at last.")
 
 
+def test_statistics_alone_are_no_explanation():
+    search, outcome = searched(["pixel.leak.rate_hz=4"])
+    assert verdict_of(outcome, error(1.19, 0.75, 0.64)) == "explained"
+    verdict = verdict_of(outcome, error(1.19, 0.88, 0.64))
+    assert verdict == "unexplained"
+    assert "leak would account" in sentence_of(verdict, search.declared, outcome)
+    assert verdict_of(outcome, error(0.65, 0.66, 0.64)) == "explained"  # says nothing of leak
+    assert verdict_of(outcome, error(0.45, 0.38, 0.42)) == "explained"
+
+
 @pytest.mark.parametrize(
     ("name", "sets", "value"),
     [
