@@ -82,7 +82,7 @@ def command(
         found = diagnose(
             evidence,
             config,
-            declared_name=", ".join(options_given["config_files"]),
+            declared_name=", ".join((*options_given["config_files"], *options_given["sets"])),
             without=without,
             free_thresholds=fit_thresholds,
             threads=threads,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e import __version__
-from adv2e.config import Config, to_dict
+from adv2e.config import Config
 from adv2e.cores import default_threads
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.affordable import affordable
@@ -23,6 +23,7 @@ from adv2e.diagnosis.error import error_rows, of_part
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.interpolation import InterpolationError, interpolation_error
+from adv2e.diagnosis.keys import as_found, own_of
 from adv2e.diagnosis.lamps import lamps_of
 from adv2e.diagnosis.library import hints_of, library
 from adv2e.diagnosis.light import light_of, quantum_dn
@@ -164,16 +165,18 @@ def diagnose(
             masked=evidence.masked,
             split=scene.parts.text(),
             notes=[*evidence.notes, _about_interpolation(search, error)],
-            model=to_dict(kept.config),
+            model=as_found(kept.config),
             facts={
                 "sensor": f"{evidence.width}x{evidence.height}",
                 "length": f"{evidence.seconds:.3f} s",
                 "events": f"{len(evidence.stream):,}",
                 "frames": f"{len(evidence.frames):,}",
                 "simulations": f"{simulator.done:,}",
+                "seed": str(declared.seed),
                 "time taken": f"{time.perf_counter() - began:.0f} s",
                 "adv2e": __version__,
             },
+            own=own_of(declared),
         )
 
 
@@ -210,11 +213,15 @@ def _with_fitted_thresholds(
 def finding_of(fit: Fit) -> Finding:
     """Return an effect that was added, with 95 % intervals of what was fitted."""
     parameters = fit.candidate.parameters(fit.place)
-    interval = {}
+    interval: dict[str, Any] = {}
     spread: Any = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if fit.covariance.size else []
     for knob, place, sd in zip(fit.candidate.knobs, fit.place, spread, strict=False):
-        name = knob.key if knob.part is None else f"{knob.key}[{knob.part}]"
-        interval[name] = (knob.outer(place - 1.96 * sd), knob.outer(place + 1.96 * sd))
+        low, high = knob.outer(place - 1.96 * sd), knob.outer(place + 1.96 * sd)
+        if knob.part is None:
+            interval[knob.key] = low, high
+        else:  # parts of a list come in their order
+            below, above = interval.get(knob.key, ((), ()))
+            interval[knob.key] = (*below, low), (*above, high)
     return Finding(fit.candidate.name, parameters, interval)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ from adv2e.config import Config, from_dict, to_dict
 from adv2e.config.build import all_keys
 from adv2e.effects.hooks import Hooks
 from adv2e.parameters import Parameter
+from adv2e.reports.result import Own
 
 
 def set_key(values: dict[str, Any], key: str, value: Any) -> None:
@@ -77,6 +79,29 @@ def user_effects(config: Config) -> Mapping[str, type[Hooks]]:
     """Return the effects of the user's own that a configuration has sections for, by name."""
     user = getattr(config, "user", None)
     return {} if user is None else type(user).effects
+
+
+def own_of(config: Config) -> Own:
+    """Return what is declared of the effects of the user's own that a configuration knows."""
+    effects = user_effects(config)
+    about = known_keys(type(config)) if effects else {}
+    return Own(
+        {path: one for path, one in about.items() if path.startswith("user.")},
+        {
+            name: (inspect.getdoc(effect) or "").partition("\n")[0]
+            for name, effect in effects.items()
+        },
+    )
+
+
+def as_found(config: Config) -> dict[str, Any]:
+    """Return a configuration as nested mappings, without effects of the user's own that are off.
+
+    Where none of them is on, it can be used without their files.
+    """
+    values = to_dict(config)
+    on = {name: keys for name, keys in values.pop("user", {}).items() if keys is not None}
+    return {**values, "user": on} if on else values
 
 
 def without_user_effects(config: Config, written: Collection[str] = ()) -> Config:

@@ -23,6 +23,8 @@ from adv2e.simulation import events_from_light
 
 Result = TypeVar("Result")
 
+_SEEDS = 1_000_000
+"""Of a diagnosis, fewer than these; each seed of the configuration has its own."""
 _KEPT = 4  # sets of decoded frames
 _COARSENESS = 2.5
 """Of the steps of time, where the pixel takes any: some us, which no statistic shows."""
@@ -58,14 +60,17 @@ class Simulator:
         self._pool.shutdown(cancel_futures=True)
 
     def stream(self, config: Config, seed: int) -> Stream:
-        """Return the events of one simulation, cut to the time of the frames."""
+        """Return the events of one simulation, cut to the time of the frames.
+
+        `seed` tells simulations of one diagnosis apart, the configuration's tells diagnoses apart.
+        """
         evidence = self._evidence
         times_ns, light = self._light(config)
         if is_made_once(config):
             config = as_recorded(config)
         chunks = events_from_light(
             zip(times_ns, light, strict=True),
-            dataclasses.replace(config, seed=seed),
+            dataclasses.replace(config, seed=(_SEEDS * config.seed + seed) % 2**63),
             threads=1,
             method=_method(config),
             coarseness=_COARSENESS,

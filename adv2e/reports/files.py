@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,7 +17,10 @@ NAMES = ("report.html", "report.json", "model.yaml")
 
 
 def check_folder(folder: str | Path, *, overwrite: bool = False) -> None:
-    """Check before long work that :func:`write_reports` will take `folder`; nothing is touched.
+    """Check before long work that :func:`write_reports` will take `folder`.
+
+    What is there is not touched; a folder is made for a moment where its own would be made, as
+    nothing else tells everywhere whether that can be done.
 
     Raises
     ------
@@ -24,6 +28,14 @@ def check_folder(folder: str | Path, *, overwrite: bool = False) -> None:
         As :func:`write_reports` raises it.
     """
     Staging(overwrite).folder(Path(folder), _foreign)
+    above = Path(folder).absolute().parent
+    while not above.exists():
+        above = above.parent
+    try:
+        with tempfile.TemporaryDirectory(prefix=".adv2e-", dir=above):
+            pass
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made in {above}: {error.strerror}") from None
 
 
 def write_reports(

@@ -17,7 +17,7 @@ from adv2e.reports.quantities import (
     unit_text,
     value_text,
 )
-from adv2e.reports.result import Diagnosis, Finding, Interval
+from adv2e.reports.result import Diagnosis, Finding, Interval, ListInterval, Own
 from adv2e.reports.tables import Column, table
 from adv2e.reports.wording import Wording
 
@@ -81,16 +81,16 @@ def added(diagnosis: Diagnosis) -> Markup:
         return tag("p", "Nothing.")
     parts = []
     for finding in diagnosis.effects:
-        summary = summary_of(finding.name, list(finding.parameters))
+        summary = summary_of(finding.name, list(finding.parameters), diagnosis.own)
         parts.append(tag("h3", finding.name))
         if summary:
             parts.append(tag("p", summary))
         if finding.parameters:
-            parts.append(_parameters(finding))
+            parts.append(_parameters(finding, diagnosis.own))
     return join(*parts)
 
 
-def _parameters(finding: Finding) -> Markup:
+def _parameters(finding: Finding, own: Own) -> Markup:
     columns = [
         Column("key"),
         Column("value", number=True),
@@ -101,12 +101,13 @@ def _parameters(finding: Finding) -> Markup:
     rows = []
     for path, value in finding.parameters.items():
         interval = finding.interval.get(path)
-        texts = _cell(value, interval), interval_text(interval), unit_text(unit_of(path))
-        rows.append((tag("code", path), *texts, meaning_of(path)))
+        texts = _cell(value, interval), interval_text(interval)
+        unit = unit_text(unit_of(path, own))
+        rows.append((tag("code", path), *texts, unit, meaning_of(path, own)))
     return table(f"Parameters of {finding.name}", columns, rows)
 
 
-def _cell(value: Any, interval: Interval | None = None) -> Markup | str:
+def _cell(value: Any, interval: Interval | ListInterval | None = None) -> Markup | str:
     """Return a value; a text may take several lines, a number may not."""
     text = value_text(value, interval)
     return tag("span", text, class_="text") if isinstance(value, str) else text

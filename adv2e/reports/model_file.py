@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from adv2e.config.yaml12 import scalar_text
 from adv2e.reports.markup import plain
 from adv2e.reports.quantities import interval_text, native, unit_of
-from adv2e.reports.result import Diagnosis
+from adv2e.reports.result import Diagnosis, Own
 from adv2e.reports.wording import Wording
 
 _WIDTH = 100
@@ -21,7 +22,7 @@ def model_text(diagnosis: Diagnosis, wording: Wording) -> str:
     Keys that were added, and nuisances, say so; every key that has a unit names it.
     """
     origins = _origins(diagnosis)
-    lines = list(_lines(native(diagnosis.model), "", 0, origins))
+    lines = list(_lines(native(diagnosis.model), "", 0, _Notes(origins, diagnosis.own)))
     return "\n".join([*_head(diagnosis, wording), "", *(lines or ["{}"]), ""])
 
 
@@ -55,18 +56,16 @@ def _origins(diagnosis: Diagnosis) -> dict[str, str]:
     return origins
 
 
-def _lines(
-    values: Mapping[str, Any], path: str, depth: int, origins: Mapping[str, str]
-) -> Iterator[str]:
+def _lines(values: Mapping[str, Any], path: str, depth: int, notes: _Notes) -> Iterator[str]:
     for name, value in values.items():
         full = f"{path}.{name}" if path else name
         # names that YAML 1.1 takes for a boolean, such as "on", are plain in YAML 1.2
         start = f"{'  ' * depth}{name if name.isidentifier() else scalar_text(name)}:"
         if isinstance(value, dict) and value:
-            yield f"{start}{_comment(full, origins)}"
-            yield from _lines(value, full, depth + 1, origins)
+            yield f"{start}{notes.comment(full)}"
+            yield from _lines(value, full, depth + 1, notes)
         else:
-            yield f"{start} {_flow(value)}{_comment(full, origins)}"
+            yield f"{start} {_flow(value)}{notes.comment(full)}"
 
 
 def _flow(value: Any) -> str:
@@ -77,9 +76,16 @@ def _flow(value: Any) -> str:
     return scalar_text(value)
 
 
-def _comment(path: str, origins: Mapping[str, str]) -> str:
-    unit = unit_of(path)
-    notes = [f"[{unit}]"] if unit else []
-    if path in origins:
-        notes.append(origins[path])
-    return f"  # {' '.join(plain(' '.join(notes)).split())}" if notes else ""
+@dataclass(frozen=True)
+class _Notes:
+    """What is said of keys: where values that were not declared are from, and units."""
+
+    origins: Mapping[str, str]
+    own: Own
+
+    def comment(self, path: str) -> str:
+        unit = unit_of(path, self.own)
+        notes = [f"[{unit}]"] if unit else []
+        if path in self.origins:
+            notes.append(self.origins[path])
+        return f"  # {' '.join(plain(' '.join(notes)).split())}" if notes else ""

@@ -12,7 +12,8 @@ import numpy as np
 
 from adv2e.config import Key, all_keys
 from adv2e.effects import EFFECTS
-from adv2e.reports.result import Estimate
+from adv2e.parameters import Parameter
+from adv2e.reports.result import NO_OWN, Estimate, Own
 
 NOTHING = "-"
 """Stands where there is no number."""
@@ -109,10 +110,15 @@ def key_named(path: str) -> Key | None:
     return _declared().get(path)
 
 
-def unit_of(path: str) -> str:
-    """Return the unit of the key `path`, empty where it has none or is not known."""
+def _about(path: str, own: Own) -> Parameter | None:
     key = key_named(path)
-    return key.about.unit if key is not None and key.about.unit != "-" else ""
+    return own.keys.get(path) if key is None else key.about
+
+
+def unit_of(path: str, own: Own = NO_OWN) -> str:
+    """Return the unit of the key `path`, empty where it has none or is not known."""
+    about = _about(path, own)
+    return about.unit if about is not None and about.unit != "-" else ""
 
 
 def unit_text(unit: str) -> str:
@@ -120,14 +126,16 @@ def unit_text(unit: str) -> str:
     return {"us": "µs", "-": ""}.get(unit, unit)
 
 
-def meaning_of(path: str) -> str:
+def meaning_of(path: str, own: Own = NO_OWN) -> str:
     """Return what the key `path` means, empty where that is not known."""
-    key = key_named(path)
-    return key.about.meaning if key is not None else ""
+    about = _about(path, own)
+    return about.meaning if about is not None else ""
 
 
-def summary_of(name: str, paths: Sequence[str] = ()) -> str:
+def summary_of(name: str, paths: Sequence[str] = (), own: Own = NO_OWN) -> str:
     """Return in a line what the effect `name` is; if no module is called that, by its keys."""
+    if name in own.summaries:
+        return own.summaries[name]
     for effect in EFFECTS:
         if effect.name == name:
             return effect.summary()

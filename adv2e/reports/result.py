@@ -9,10 +9,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.parameters import Parameter
+
 Verdict = Literal["consistent", "explained", "partly_explained", "not_identifiable", "unexplained"]
 
 Interval = tuple[float, float]
 """Lower and upper end of a 95 % interval."""
+ListInterval = tuple[tuple[float, ...], tuple[float, ...]]
+"""The same of a key that is a list."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class Finding:
 
     name: str
     parameters: Mapping[str, Any]
-    interval: Mapping[str, Interval]
+    interval: Mapping[str, Interval | ListInterval]
 
 
 @dataclass(frozen=True)
@@ -161,6 +165,25 @@ class Masked:
 
 
 @dataclass(frozen=True)
+class Own:
+    """What is declared of effects of the user's own.
+
+    Attributes
+    ----------
+    keys : mapping of str to Parameter
+        Their keys, by path.
+    summaries : mapping of str to str
+        What each effect is, by name.
+    """
+
+    keys: Mapping[str, Parameter] = field(default_factory=dict)
+    summaries: Mapping[str, str] = field(default_factory=dict)
+
+
+NO_OWN = Own()
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """Everything that a diagnosis found.
 
@@ -195,6 +218,8 @@ class Diagnosis:
         The configuration found, for ``model.yaml``.
     facts : mapping
         Small things for the end of the report: sizes, seeds, simulations, seconds, versions.
+    own : Own
+        Effects of the user's own that competed.
     """
 
     verdict: Verdict
@@ -217,3 +242,4 @@ class Diagnosis:
     notes: list[str]
     model: Mapping[str, Any]
     facts: Mapping[str, str]
+    own: Own = NO_OWN

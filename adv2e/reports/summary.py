@@ -50,7 +50,8 @@ def _parameters(diagnosis: Diagnosis) -> list[str]:
     for finding in diagnosis.effects:
         for path, value in finding.parameters.items():
             interval = finding.interval.get(path)
-            text = f"{finding.name}: {path} = {value_text(value, interval)} {unit_of(path)}"
+            text = f"{finding.name}: {path} = {value_text(value, interval)} "
+            text += unit_of(path, diagnosis.own)
             if interval is not None:
                 text = f"{text.rstrip()} ({interval_text(interval)})"
             lines += [f"  {line}" for line in _wrapped(text, 1)]

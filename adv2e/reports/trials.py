@@ -13,7 +13,7 @@ from adv2e.reports.quantities import (
     unit_text,
     value_text,
 )
-from adv2e.reports.result import Diagnosis, Finding, Rejected
+from adv2e.reports.result import NO_OWN, Diagnosis, Finding, Own, Rejected
 from adv2e.reports.separation import separation_of
 from adv2e.reports.tables import SHOWN, Column, table
 
@@ -28,7 +28,7 @@ def alternatives(diagnosis: Diagnosis) -> Markup:
     for name in dict.fromkeys(names):
         role = "explains it as well" if name in diagnosis.alternatives else "in the model found"
         heading = join(name, tag("span", role, class_="meaning"))
-        summary = summary_of(name, paths.get(name, []))
+        summary = summary_of(name, paths.get(name, []), diagnosis.own)
         rows.append((heading, summary, separation_of(name) or "not known"))
     columns = [Column("effect"), Column("what it is"), Column("what would show it")]
     lead = (
@@ -48,7 +48,7 @@ def _paths(diagnosis: Diagnosis) -> dict[str, list[str]]:
     return paths
 
 
-def rejected(given: Sequence[Rejected]) -> Markup:
+def rejected(given: Sequence[Rejected], own: Own = NO_OWN) -> Markup:
     """Return what was tried and not added, and why."""
     if not given:
         return tag("p", "Nothing else was tried.")
@@ -61,7 +61,7 @@ def rejected(given: Sequence[Rejected]) -> Markup:
     rows = []
     for one in given:
         tried = [
-            f"{path} = {value_text(value)} {unit_text(unit_of(path))}".rstrip()
+            f"{path} = {value_text(value)} {unit_text(unit_of(path, own))}".rstrip()
             for path, value in one.parameters.items()
         ]
         lines = [tag("span", text, class_="line") for text in tried or [NOTHING]]

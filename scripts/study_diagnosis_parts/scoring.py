@@ -115,12 +115,10 @@ def covered(line: Line) -> list[bool]:
     for one in line.get("found", ()):
         if one["name"] not in line["effects"]:
             continue
-        for name, (low, high) in one["interval"].items():
-            key, _, part = name.rstrip("]").partition("[")
+        for key, (low, high) in one["interval"].items():
             true = _numbers(line["truth"].get(key))
-            if true:
-                number = true[int(part) if part else 0]
-                found.append(bool(min(low, high) <= number <= max(low, high)))
+            for a, b, number in zip(_numbers(low), _numbers(high), true, strict=False):
+                found.append(min(a, b) <= number <= max(a, b))
     return found
 
 

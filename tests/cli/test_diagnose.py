@@ -214,7 +214,7 @@ def test_options_arrive(adv2e, made_up, tmp_path):
     call, folder = made_up
     assert (call["recording"], call["threads"]) == ("a.zip", 3)
     assert call["without"] == ("flicker", "leak")
-    assert call["declared_name"] == "davis346, mine.yaml"
+    assert call["declared_name"] == "davis346, mine.yaml, pixel.refractory.period_us=7"
     assert call["config"].pixel.leak is None
     assert call["config"].pixel.refractory.period_us == 7.0
     assert call["config"].seed == 4

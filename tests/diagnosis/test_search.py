@@ -21,6 +21,7 @@ from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Model, Scale
 from adv2e.diagnosis.search import LEVEL, PER_LOOK, Search
 from adv2e.diagnosis.verdict import sentence_of, verdict_of
+from adv2e.reports.quantities import interval_text
 from adv2e.reports.result import ErrorRow, Estimate
 
 RECORDING = 70_000
@@ -120,6 +121,18 @@ def test_one_effect_is_named(name, sets, value):
     assert name not in outcome.rejected
     assert set(outcome.rejected) <= set(EFFECTS)
     assert all(one.reason for one in outcome.rejected.values())
+
+
+def test_intervals_of_a_list_are_lists():
+    knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
+    fit = Fit(Candidate("misregistration", knobs, ()), Config(), np.array([1.0, -2.0]))
+    fit.covariance = np.diag([0.01, 0.04])
+    finding = finding_of(fit)
+    assert finding.parameters == {"frames.shift_px": [pytest.approx(0.3), pytest.approx(-0.6)]}
+    low, high = finding.interval["frames.shift_px"]
+    assert low == pytest.approx((0.3 - 0.3 * 0.196, -0.6 - 0.3 * 0.392))
+    assert high == pytest.approx((0.3 + 0.3 * 0.196, -0.6 + 0.3 * 0.392))
+    assert interval_text((low, high)) == "[0.2412, -0.7176] to [0.3588, -0.4824]"
 
 
 def test_of_the_forms_of_an_effect_the_plainest_that_does_is_taken():

@@ -10,11 +10,12 @@ import pytest
 
 from adv2e import load_config, simulate
 from adv2e.config import Config, from_dict, to_annotated_yaml, to_dict, to_yaml
-from adv2e.diagnosis.keys import without_user_effects
+from adv2e.diagnosis.keys import as_found, own_of, without_user_effects
 from adv2e.diagnosis.library import Hints, library, names
 from adv2e.effects.active import active_hooks
 from adv2e.effects.user import load_effects
 from adv2e.errors import ConfigError
+from adv2e.reports.quantities import meaning_of, summary_of, unit_of
 
 HINTS = Hints(1.0, (), 1)
 HEAD = """
@@ -218,6 +219,13 @@ def test_an_effect_without_ranges_is_switched_on_by_a_diagnosis_where_it_is_off(
     assert "dim" not in names()
 
 
+def test_a_model_without_own_effects_needs_none_of_their_files(load):
+    config = load_config([], effects=load(DIM))
+    assert from_dict(as_found(without_user_effects(config))) == Config()
+    assert as_found(config)["user"] == {"dim": {"share": 0.5}}
+    assert as_found(Config()) == to_dict(Config())
+
+
 @pytest.mark.parametrize("written", ["user.dim", "user.dim.share"])
 def test_what_is_written_of_an_effect_is_held(load, written):
     config = load_config(
@@ -226,3 +234,12 @@ def test_what_is_written_of_an_effect_is_held(load, written):
     kept = without_user_effects(config, [written, "user.dimmer", "pixel.leak"])
     assert kept.user.dim == config.user.dim
     assert kept.user.drive_drift is None
+
+
+def test_reports_know_unit_meaning_and_summary_of_own_effects(load):
+    own = own_of(load_config([], effects=load(DIM.replace('unit="-"', 'unit="us"'))))
+    assert unit_of("user.dim.share", own) == "us"
+    assert meaning_of("user.dim.share", own) == "what is left"
+    assert summary_of("dim", ["user.dim.share"], own) == "Takes light away."
+    assert unit_of("pixel.refractory.period_us", own) == "us"
+    assert own_of(Config()).keys == {}

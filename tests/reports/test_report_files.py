@@ -54,6 +54,12 @@ def test_a_folder_with_other_things_is_never_replaced(tmp_path):
     assert listing(tmp_path) == ["thesis.txt"]
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder that nobody can write to")
+def test_a_folder_that_cannot_be_made_is_told_before_the_work():
+    with pytest.raises(OutputError, match=r"^/proc/a/b: cannot be made in /proc: "):
+        check_folder("/proc/a/b")
+
+
 def test_a_free_name_is_left_untouched_by_the_check(tmp_path):
     check_folder(tmp_path / "a" / "b")
     assert listing(tmp_path) == []

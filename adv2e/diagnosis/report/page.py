@@ -29,7 +29,7 @@ def page(diagnosis: Diagnosis) -> str:
         ("What explains it as well", trials.alternatives(diagnosis)),
         ("The residual before and after", pictures or tag("p", "No picture was made.")),
         ("Signatures", residual.signatures(diagnosis.signatures)),
-        ("What was rejected", trials.rejected(diagnosis.rejected)),
+        ("What was rejected", trials.rejected(diagnosis.rejected, diagnosis.own)),
         ("What could have been seen", residual.detectable(diagnosis)),
         ("Data", residual.data(diagnosis)),
         ("Nuisances", findings.nuisances(diagnosis.nuisances)),

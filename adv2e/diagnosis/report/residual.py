@@ -109,7 +109,7 @@ def detectable(diagnosis: Diagnosis) -> Markup:
         (one.name, tag("code", one.key), short_text(one.size, 3), unit_text(one.unit))
         for one in diagnosis.detectable
     ]
-    caption = "Smallest change of each key that would have been seen about 8 times in 10"
+    caption = "Values of a key from which on an effect would have been seen about 8 times in 10"
     return table(caption, columns, rows, folded_from=2 * SHOWN)
 
 
