@@ -151,6 +151,7 @@ def problem_of(
         )
     else:
         problem = NoiseProblem(data, declared, judged, settings.white, settings.error)
+    problem.check(table.name)
     rest = int((~problem.judged).sum())
     if rest <= len(problem.nuisances) + 1:
         raise DataError(
@@ -188,12 +189,17 @@ def found_model(
 
 def _findings(model: Model, draws: Draws, problem: Problem) -> list[Finding]:
     intervals = _intervals(model, draws, problem)
-    found = []
+    found: list[Finding] = []
     for effect in model.effects:
         parameters = {free.key: model.values[free.key] for free in effect.free}
         if isinstance(problem, NoiseProblem) and HOT_RATE in parameters:
             parameters[HOT_FRACTION] = problem.hot_fraction
-        inside = {free.key: intervals[free.key] for free in effect.free}
+        inside: dict[str, Any] = {free.key: intervals[free.key] for free in effect.free}
+        same = next((one for one in found if one.name == effect.name), None)
+        if same is not None:  # two keys of one effect, added one after another
+            found.remove(same)
+            parameters = {**same.parameters, **parameters}
+            inside = {**same.interval, **inside}
         found.append(Finding(effect.name, parameters, inside))
     return found
 
@@ -285,7 +291,7 @@ def _split(problem: Problem, settings: Settings) -> str:
 
 
 def _sentence(chosen: Selection, problem: Problem) -> str:
-    names = " and ".join(chosen.after.names)
+    names = " and ".join(dict.fromkeys(chosen.after.names))
     change = f"held-out error {chosen.before.error:.3g} before, {chosen.after.error:.3g} after"
     if chosen.verdict == "consistent":
         return f"Nothing is missing: the declared model fits the {problem.what} within its errors."

@@ -28,6 +28,10 @@ class Declared:
     config: Config
     written: Mapping[str, Any]
 
+    def switched_off(self, section: str) -> bool:
+        """Tell whether it was written that an effect is not there."""
+        return section in self.written and self.written[section] is None
+
     def held(self, path: str, neutral: float | None) -> float | None:
         """Return the number written for a key; `neutral` where none is, or its section is off.
 

@@ -11,6 +11,7 @@ from adv2e.characterisation.declared import Declared
 from adv2e.characterisation.latency import first_crossing
 from adv2e.characterisation.measurements import Latencies
 from adv2e.characterisation.problem import Candidate, Free, Group, levels_of, row_errors
+from adv2e.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -25,6 +26,8 @@ THRESHOLD = {1: "pixel.thresholds.on", 0: "pixel.thresholds.off"}
 LEAST_ERROR = 0.02
 """Relative error of the light that a table states, at the least."""
 ASSUMED_ERROR = 0.05
+_FAST = 1e12  # rad/s
+_SOONEST_US = 1e-3
 NEVER = 20.0
 """Logarithm of the latency [us] where the model has no event, some 8 minutes: finite for fits."""
 
@@ -84,10 +87,9 @@ class LatencyProblem:
             Group(_title(*group), np.flatnonzero(self._group == k))
             for k, group in enumerate(self._groups)
         )
-        error = np.full(data.light.shape, assumed_error) if assumed_error else data.error
         cells = list(zip(self._group, self.light, self._contrast, strict=True))
         self.error, self.error_source = row_errors(
-            error, self.measured, cells, ASSUMED_ERROR, LEAST_ERROR
+            data.error, self.measured, cells, ASSUMED_ERROR, LEAST_ERROR, assumed_error
         )
         self.nuisances = self._nuisances()
         self.candidates = self._candidates(data)
@@ -105,6 +107,7 @@ class LatencyProblem:
         def number(key: str) -> float:
             return value(key, 0.0) or 0.0
 
+        without = self._without_low_pass and CUTOFF not in values
         cutoff, dark, stray = number(CUTOFF), number(DARK_CUTOFF), number(DARK_CURRENT)
         bright = 255.0 * light / self._white
         dim = bright * np.exp(-self._contrast)
@@ -115,17 +118,46 @@ class LatencyProblem:
         time = first_crossing(
             step,
             self._thresholds(values),
-            np.maximum(corner, 1e-9),
+            np.full(step.shape, _FAST) if without else np.maximum(corner, 1e-9),
             None if follower is None else 2.0 * np.pi * follower,
             value(SLEW, None),
         )
-        latency = 1e6 * time + number(OFFSET)
+        latency = np.maximum(1e6 * time + number(OFFSET), _SOONEST_US)
         return np.asarray(np.minimum(np.log(latency), NEVER), dtype=np.float64)
 
     @property
     def neutral(self) -> dict[str, float]:
         """Keys that this model has at a value other than the default, where not written."""
-        return {} if DARK_CUTOFF in self._declared.written else {DARK_CUTOFF: 0.0}
+        known = DARK_CUTOFF in self._declared.written or self._without_low_pass
+        return {} if known else {DARK_CUTOFF: 0.0}
+
+    @property
+    def _without_low_pass(self) -> bool:
+        """Whether the configuration says that there is none."""
+        return self._declared.switched_off("pixel.low_pass")
+
+    def check(self, name: str) -> None:
+        """Raise DataError for what cannot be fitted, or never makes an event.
+
+        Parameters
+        ----------
+        name : str
+            The table's.
+        """
+        free = {one.key for one in self.nuisances}
+        for k, group in enumerate(self.groups):
+            key = self._threshold_key(k)
+            if key in free and self.judged[group.rows].all():
+                raise DataError(
+                    f"{name}: --judge takes all rows of {group.title}: none is left to fit their"
+                    f" threshold to; declare {key.partition('[')[0]}, or judge by another column"
+                )
+            threshold, largest = self._threshold(k, {}), float(self._contrast[group.rows].max())
+            if key not in free and threshold >= largest:
+                raise DataError(
+                    f"{name}: steps of {largest:g} (ln), {group.title}, do not reach the threshold"
+                    f" of {threshold:g} ({key}): declare the camera's, or --contrast of the steps"
+                )
 
     def _thresholds(self, values: Mapping[str, float]) -> Array:
         by_group = np.array([self._threshold(k, values) for k in range(len(self._groups))])
@@ -149,7 +181,7 @@ class LatencyProblem:
     def _nuisances(self) -> tuple[Free, ...]:
         free = []
         written = self._declared.written
-        if CUTOFF not in written:
+        if CUTOFF not in written and not self._without_low_pass:
             share = np.log(2.0) * self._white / (2e-6 * np.pi)  # about half of the step
             start = float(np.median(share / (np.exp(self.measured) * self.light)))
             free.append(Free(CUTOFF, (start, 0.3 * start), 1e-5 * start, 1e5 * start))
@@ -180,9 +212,13 @@ class LatencyProblem:
             free = Free(CUTOFF, (start, 0.2 * start, 5 * start), 1e-5 * start, 1e5 * start)
             found.append(Candidate("low_pass", (free,)))
         dark = [1e6 / (2 * np.pi * slowest * factor) for factor in (1.0, 10.0)]
+        if self._without_low_pass:
+            white = [factor * start for start in dark for factor in (1.0, 30.0)]
+            found.append(Candidate("low_pass", (_free(CUTOFF, white),)))
+        else:
+            found.append(Candidate("low_pass", (_free(DARK_CUTOFF, dark),)))
         least = float(255.0 * data.light.min() / self._white)
         found += [
-            Candidate("low_pass", (_free(DARK_CUTOFF, dark),)),
             Candidate("dark_current", (_free(DARK_CURRENT, (least, 0.1 * least)),)),
             Candidate("source_follower", (_free(FOLLOWER, follower),)),
             Candidate("slew_limit", (_free(SLEW, slew),)),

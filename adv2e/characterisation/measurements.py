@@ -171,17 +171,25 @@ def _latencies(table: Table, column: str, light: Array, unit: str) -> Latencies:
 
 def _standard_error(table: Table, column: str) -> Array:
     """Return the standard error of each latency in the unit of its column; NaN: not given."""
-    unit = column.removeprefix("latency_")
+    unit = TIMES[column.removeprefix("latency_")]
     nothing = np.full(len(table), np.nan)
-    if f"latency_error_{unit}" in table.columns:
-        return table.numbers(f"latency_error_{unit}", at_least=0.0)
-    quartiles = [f"latency_q{q}_{unit}" for q in (25, 75)]
-    if f"latency_sd_{unit}" in table.columns:
-        spread = table.numbers(f"latency_sd_{unit}", at_least=0.0)
-    elif all(name in table.columns for name in quartiles):
-        low, high = (table.numbers(name, at_least=0.0) for name in quartiles)
+
+    def column_of(what: str) -> tuple[str, Array] | None:
+        for other, factor in TIMES.items():
+            name = f"latency_{what}_{other}"
+            if name in table.columns:
+                return name, table.numbers(name, at_least=0.0) * (factor / unit)
+        return None
+
+    if (error := column_of("error")) is not None:
+        return error[1]
+    lower, upper = column_of("q25"), column_of("q75")
+    if (sd := column_of("sd")) is not None:
+        spread = sd[1]
+    elif lower is not None and upper is not None:
+        (lower_name, low), (upper_name, high) = lower, upper
         for k in np.flatnonzero(high < low):
-            raise table.wrong(int(k), quartiles[1], f"must be at least {quartiles[0]}")
+            raise table.wrong(int(k), upper_name, f"must be at least {lower_name}")
         spread = (high - low) / 1.349  # of a normal distribution
     else:
         return nothing

@@ -95,11 +95,9 @@ class NoiseProblem:
         events = np.sqrt((rate + self.floor) / watched)
         given = np.where(np.isnan(whole), events, np.hypot(events, 0.5 * whole))
         given /= rate + self.floor
-        if assumed_error:
-            given = np.full(rate.shape, assumed_error)
         repeats = [(kind, data.light[k]) for kind, k in cells]
         self.error, self.error_source = row_errors(
-            given, self.measured, repeats, ASSUMED_ERROR, LEAST_ERROR
+            given, self.measured, repeats, ASSUMED_ERROR, LEAST_ERROR, assumed_error
         )
         self.light_unit = data.unit
         self.groups = tuple(
@@ -111,6 +109,9 @@ class NoiseProblem:
         self.candidates = self._candidates(rate)
         self.out_of_reach: Mapping[str, str] = _OUT_OF_REACH
         self.notes = self._notes(data)
+
+    def check(self, name: str) -> None:
+        """Nothing can be wrong with it that its table is not wrong with."""
 
     @staticmethod
     def _rate(data: Noise, kind: str, row: int) -> float:

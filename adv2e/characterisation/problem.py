@@ -103,7 +103,12 @@ class Problem(Protocol):
 
 
 def row_errors(
-    given: Array, measured: Array, cells: Sequence[tuple[object, ...]], assumed: float, least: float
+    given: Array,
+    measured: Array,
+    cells: Sequence[tuple[object, ...]],
+    assumed: float,
+    least: float,
+    stated: float | None = None,
 ) -> tuple[Array, str]:
     """Return the standard error of each row's logarithm, and where it comes from.
 
@@ -119,7 +124,11 @@ def row_errors(
         For rows that have neither an error nor a repeat anywhere.
     least : float
         Added in quadrature to those given: a table is not better than the light it states.
+    stated : float, optional
+        Of every row, whatever the table says.
     """
+    if stated is not None:
+        return np.full(measured.shape, stated), f"as stated: {100 * stated:g} %"
     repeats: dict[tuple[object, ...], list[int]] = {}
     for k, cell in enumerate(cells):
         repeats.setdefault(cell, []).append(k)

@@ -296,15 +296,16 @@ class Selector:
         return fit(residuals, starts, lower_, upper_, tolerance)
 
     def _constant(self) -> float:
-        """Return the held-out error of the mean of each group's fitted rows."""
+        """Return the held-out error of the mean of each group's fitted rows, or of all of them."""
         errors = []
         for fold, unit in zip(self._folds, self._units, strict=True):
             gaps = []
             for group in self.problem.groups:
                 rows = np.zeros_like(fold)
                 rows[group.rows] = True
-                if (rows & unit).any() and (rows & fold).any():
-                    mean = self.problem.measured[rows & fold].mean()
+                if (rows & unit).any():
+                    own = rows & fold
+                    mean = self.problem.measured[own if own.any() else fold].mean()
                     gaps.append(self.problem.measured[rows & unit] - mean)
             if gaps:
                 errors.append(float((np.concatenate(gaps) ** 2).mean()))

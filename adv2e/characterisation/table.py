@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.errors import DataError
+from adv2e.errors import DataError, UsageError
 
 DELIMITERS = ",;\t"
 
@@ -104,10 +104,12 @@ class Table:
         ------
         DataError
             There is no such column, or no such row; the text names what there is.
+        UsageError
+            `condition` has no such form.
         """
         column, equals, value = (part.strip() for part in condition.partition("="))
         if not equals or not column:
-            raise DataError(f"{option} {condition}: must be COLUMN=VALUE, such as camera=CAM2")
+            raise UsageError(f"{option} {condition}: must be COLUMN=VALUE, such as camera=CAM2")
         if column not in self.columns:
             there = ", ".join(self.columns)
             raise DataError(f"{self.name}: has no column {column!r} for {option} (there: {there})")

@@ -13,9 +13,11 @@ from scipy.optimize import brentq
 from adv2e.characterisation.characterise import Settings, characterise
 from adv2e.characterisation.declared import read_declared
 from adv2e.characterisation.latency import first_crossing
+from adv2e.characterisation.measurements import measurements_of
 from adv2e.characterisation.table import parse_table
 from adv2e.cli import main
 from adv2e.config import load_config
+from adv2e.errors import DataError
 
 LIGHT = np.array([1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 CUTOFF_HZ = 3000.0  # at the highest light
@@ -214,16 +216,79 @@ def test_semicolons_with_decimal_commas_comments_and_other_units_are_read():
 
 
 @pytest.mark.parametrize(
-    ("option", "complaint"),
+    ("option", "complaint", "status"),
     [
-        (["--where", "camera=A"], "has no column 'camera'"),
-        (["--judge", "latency_us=77"], "no row has latency_us = 77"),
-        (["--where", "latency_us"], "must be COLUMN=VALUE"),
+        (["--where", "camera=A"], "has no column 'camera'", 1),
+        (["--judge", "latency_us=77"], "no row has latency_us = 77", 1),
+        (["--where", "latency_us"], "must be COLUMN=VALUE", 2),
     ],
 )
-def test_conditions_that_select_nothing_are_told(tmp_path, option, complaint):
+def test_conditions_that_select_nothing_are_told(tmp_path, option, complaint, status):
     path = tmp_path / "t.csv"
     path.write_text("irradiance_W_m2,latency_us\n1,9\n2,5\n3,3\n4,2\n")
     result = CliRunner().invoke(main, ["characterise", str(path), *option])
-    assert result.exit_code == 1
+    assert result.exit_code == status
     assert complaint in result.output
+
+
+def test_a_group_of_rows_that_is_only_judged_has_no_threshold():
+    latency = [ode_latency_us(e) for e in np.tile(LIGHT, 2)]
+    measured = table(latency, np.tile(LIGHT, 2), polarity=np.repeat([1, 0], LIGHT.size))
+    with pytest.raises(DataError, match=r"--judge takes all rows of OFF: .*pixel\.thresholds\.off"):
+        verdict_of(measured, judge=("polarity=0",))
+    verdict_of(measured, ["pixel.thresholds.off=0.2"], judge=("polarity=0",))
+
+
+@pytest.mark.parametrize("sets", [(), ("pixel.thresholds.on=0.3",)])
+def test_steps_below_the_threshold_are_told(sets):
+    measured = table([ode_latency_us(e, step=0.25) for e in LIGHT])
+    with pytest.raises(
+        DataError, match=r"steps of 0\.1 \(ln\), ON, do not reach the threshold of 0\."
+    ):
+        verdict_of(measured, sets, contrast=0.1)
+
+
+def test_a_low_pass_that_was_declared_not_to_be_there_is_a_finding():
+    found = verdict_of(table([ode_latency_us(e) for e in LIGHT]), ["pixel.low_pass=null"])
+    assert "pixel.low_pass.cutoff_hz" not in found.nuisances
+    (effect,) = found.effects
+    assert effect.name == "low_pass"
+    assert effect.parameters["pixel.low_pass.cutoff_hz"] == pytest.approx(CUTOFF_HZ, rel=0.05)
+    follower = verdict_of(
+        table(np.full(LIGHT.size, 200.0)),
+        ["pixel.low_pass=null", "pixel.source_follower.cutoff_hz=178"],
+    )
+    assert follower.verdict == "consistent"
+    assert follower.model["pixel"]["low_pass"] is None
+
+
+def test_a_stated_error_takes_the_place_of_the_tables():
+    measured = table([ode_latency_us(e) for e in LIGHT])
+    found = verdict_of(measured, error=0.5)
+    assert "as stated: 50 %" in found.notes[-1]
+    assert found.errors[0].floor.value == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("us", 1.0), ("ms", 1e-3), ("s", 1e-6)])
+def test_errors_may_be_in_another_unit_than_latencies(unit, factor):
+    latency = np.array([ode_latency_us(e) for e in LIGHT])
+    lines = [f"irradiance_W_m2,latency_ms,latency_error_{unit}"]
+    lines += [
+        f"{e},{t / 1e3:.9g},{0.03 * t * factor:.9g}" for e, t in zip(LIGHT, latency, strict=True)
+    ]
+    held = measurements_of(parse_table("\n".join(lines), "t.csv"))
+    np.testing.assert_allclose(held.error, 0.03, rtol=1e-6)
+
+
+def test_an_offset_beyond_all_latencies_is_no_crash():
+    found = verdict_of(table([ode_latency_us(e) for e in LIGHT]), ["frames.clock_offset_us=-99999"])
+    assert np.isfinite(found.errors[0].before.value)
+
+
+def test_two_keys_of_one_effect_are_one_finding():
+    latency = [ode_latency_us(e, dark_hz=200.0) for e in LIGHT]
+    sets = ["pixel.low_pass.cutoff_hz=300", "pixel.low_pass.dark_cutoff_hz=5"]
+    found = verdict_of(table(latency), sets)
+    names = [effect.name for effect in found.effects]
+    assert len(names) == len(set(names))
+    assert "low_pass and low_pass" not in found.sentence
