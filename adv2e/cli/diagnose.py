@@ -10,7 +10,7 @@ import click
 from adv2e.cli import options
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from adv2e.cli.options import Log
     from adv2e.config import Config
@@ -62,7 +62,7 @@ def command(
     from adv2e.config import written_keys
     from adv2e.diagnosis.diagnose import diagnose
     from adv2e.diagnosis.evidence import read_evidence
-    from adv2e.diagnosis.keys import without_user_effects
+    from adv2e.diagnosis.keys import user_effects, without_user_effects
     from adv2e.diagnosis.library import names
     from adv2e.diagnosis.report import write_reports
     from adv2e.pixel import is_compiled
@@ -70,6 +70,7 @@ def command(
     from adv2e.reports.summary import summary_text
 
     check_names(without, names(config))
+    _check_own_names(user_effects(config), names())
     options_given = click.get_current_context().params
     written = written_keys(options_given["config_files"], options_given["sets"])
     config = without_user_effects(config, written)
@@ -104,6 +105,15 @@ def check_names(without: Sequence[str], known: Sequence[str]) -> None:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean '{near[0]}'?" if near else f"one of {', '.join(known)}"
             raise UsageError(f"--without {name}: no such effect, {hint}")
+
+
+def _check_own_names(own: Iterable[str], known: Sequence[str]) -> None:
+    """Raise UsageError for an effect of the user's own that has the name of a built-in one."""
+    from adv2e.errors import UsageError
+
+    for name in own:
+        if name in known:
+            raise UsageError(f"--effect: {name}: a built-in effect has that name; choose another")
 
 
 @contextmanager

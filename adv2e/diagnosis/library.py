@@ -18,6 +18,9 @@ from adv2e.diagnosis.candidates import Candidate, Knob, exponent
 from adv2e.diagnosis.keys import get_key, known_keys, user_effects
 from adv2e.diagnosis.lamps import Lamp
 
+_STAMPS = 20
+_ON_TICK = 0.99
+
 
 @dataclass(frozen=True)
 class Hints:
@@ -30,7 +33,7 @@ class Hints:
     lamps : tuple of Lamp
         Of the strongest lines in the rate.
     tick_us : int
-        Largest time of which all stamps are multiples.
+        Largest time of which nearly all stamps are multiples.
     """
 
     seconds: float
@@ -284,6 +287,18 @@ def names(config: Config | None = None) -> list[str]:
 
 def hints_of(times_us: np.ndarray[Any, Any], seconds: float, lamps: Sequence[Lamp]) -> Hints:
     """Return hints from the stamps of a recording's events [us]."""
-    # of the times themselves, not of differences: ticks count from zero
-    step = int(np.gcd.reduce(times_us)) if len(times_us) else 1
-    return Hints(seconds, tuple(lamps), max(1, step))
+    return Hints(seconds, tuple(lamps), _tick_of(times_us))
+
+
+def _tick_of(times_us: np.ndarray[Any, Any]) -> int:
+    """Return the largest time of which nearly all stamps are multiples [us].
+
+    Of the times themselves, not of differences: ticks count from zero.  Of few stamps at a time, so
+    that one which is wrong does not decide.
+    """
+    if len(times_us) < _STAMPS:
+        return max(1, int(np.gcd.reduce(times_us))) if len(times_us) else 1
+    groups = times_us[: len(times_us) // _STAMPS * _STAMPS].reshape(_STAMPS, -1)
+    steps, often = np.unique(np.gcd.reduce(groups, axis=0), return_counts=True)
+    step = max(1, int(steps[np.argmax(often)]))
+    return step if np.mean(times_us % step == 0) >= _ON_TICK else 1

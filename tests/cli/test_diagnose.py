@@ -251,6 +251,13 @@ def test_effects_of_the_users_own_are_candidates_unless_they_are_declared(
     assert call["without"] == (("twice",) if "--without" in options else ())
 
 
+def test_own_effects_need_names_of_their_own(adv2e, made_up):
+    Path("mine.py").write_text(TWICE.replace("Twice", "EventLoss"))
+    status, _, err = adv2e("diagnose", "a.zip", "--effect", "mine.py")
+    assert status == 2
+    assert "--effect: event_loss: a built-in effect has that name; choose another" in err
+
+
 @pytest.mark.parametrize(
     ("options", "lines"), [([], ["the summary"]), (["-v"], ["a step", "the summary"]), (["-q"], [])]
 )

@@ -133,6 +133,15 @@ def test_the_tick_of_stamps(tick, start):
     assert hints_of(t, 1.0, ()).tick_us == tick
 
 
+def test_single_stamps_off_the_tick_do_not_hide_it():
+    draw = np.random.default_rng(3)
+    t = 10 * np.sort(draw.integers(0, 100_000, 3000))
+    t[[7, 1500, 2999]] += 3
+    assert hints_of(t, 1.0, ()).tick_us == 10
+    t[::20] += 3
+    assert hints_of(t, 1.0, ()).tick_us == 1
+
+
 def test_stamps_that_say_nothing_of_a_tick():
     assert hints_of(np.array([], np.int64), 1.0, ()).tick_us == 1
     assert hints_of(np.array([0], np.int64), 1.0, (Lamp(50.0),)) == Hints(1.0, (Lamp(50.0),), 1)
