@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.candidates import Candidate
+from adv2e.diagnosis.candidates import Candidate, Knob, neutral_value
 from adv2e.diagnosis.fit import Fit, Fitter
 from adv2e.diagnosis.interpolation import InterpolationError
 from adv2e.diagnosis.markers import BOTH, VIEWS
@@ -92,6 +92,8 @@ class Bench:
         Of the statistics.
     log : callable
         Told of each step.
+    free : tuple of Knob
+        Keys that are not known: fitted with all effects, whatever these are.
     rejections : Rejections
     """
 
@@ -101,6 +103,7 @@ class Bench:
     scales: tuple[Scale, ...]
     error: InterpolationError
     log: Callable[[str], None]
+    free: tuple[Knob, ...] = ()
     rejections: Rejections = field(default_factory=Rejections)
 
     @classmethod
@@ -111,6 +114,7 @@ class Bench:
         declared: Config,
         error: InterpolationError | None,
         log: Callable[[str], None],
+        free: tuple[Knob, ...] = (),
     ) -> Bench:
         """Return the bench of a declared model, which is simulated for the scales."""
         error = error or InterpolationError.none(observed.shape)
@@ -121,7 +125,7 @@ class Bench:
             Scale.of(error.blurred(sample[:, view], view, _OF_SCALES), least)
             for view in range(VIEWS)
         )
-        return cls(laboratory, observed, declared, scales, error, log)
+        return cls(laboratory, observed, declared, scales, error, log, free)
 
     def fitter(self, view: int, sd: Array | None = None) -> Fitter:
         """Return what fits candidates in one view of the data."""
@@ -157,7 +161,7 @@ class Bench:
 
     def fitted(self, fits: tuple[Fit, ...], sd: Array, view: int) -> Fit:
         """Return the fit of all effects together in a view of the data."""
-        joint = _joined(fits, self.declared)
+        joint = _joined(fits, self.declared, self.free)
         fitter = self.fitter(view, sd)
         for _ in range(_ROUNDS):
             fitter.improve([joint], range(11, 11 + _SEEDS))
@@ -174,12 +178,13 @@ class Bench:
         return state.models[view].log_likelihood(self.observed[view])
 
 
-def _joined(fits: tuple[Fit, ...], declared: Config) -> Fit:
-    """Return one fit of all effects together."""
-    knobs = tuple(knob for fit in fits for knob in fit.candidate.knobs)
+def _joined(fits: tuple[Fit, ...], declared: Config, free: tuple[Knob, ...]) -> Fit:
+    """Return one fit of all effects together, and of the keys that are not known, the last."""
+    knobs = (*(knob for fit in fits for knob in fit.candidate.knobs), *free)
     extra = tuple(pair for fit in fits for pair in fit.candidate.extra)
     name = " and ".join(fit.candidate.name for fit in fits)
-    place = np.concatenate([fit.place for fit in fits])
+    unknown = [knob.inner(neutral_value(declared, knob)) for knob in free]
+    place = np.concatenate([*(fit.place for fit in fits), unknown])
     return Fit(Candidate(name, knobs, (), extra), declared, place, reach=_REACH)
 
 

@@ -29,7 +29,7 @@ from adv2e.diagnosis.library import hints_of, library
 from adv2e.diagnosis.light import light_of, quantum_dn
 from adv2e.diagnosis.lines import strongest_lines
 from adv2e.diagnosis.markers import BOTH, Markers
-from adv2e.diagnosis.nuisances import TOLERANCE, fit_thresholds
+from adv2e.diagnosis.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of
 from adv2e.diagnosis.picture import Gallery
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.search import Outcome, Search
@@ -88,12 +88,9 @@ def diagnose(
     light = light_of(evidence, declared)
     scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
-        nuisances: dict[str, float] = {}
         if free_thresholds:
-            declared, nuisances, miss = _with_fitted_thresholds(
-                evidence, declared, simulator, scene
-            )
-            log(f"thresholds that match the totals: {nuisances}")
+            declared, miss = _with_fitted_thresholds(evidence, declared, simulator, scene)
+            log(f"thresholds that match the totals: {thresholds_of(declared)}")
             if miss > TOLERANCE:
                 missed = f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}"
                 evidence = replace(evidence, notes=[*evidence.notes, missed])
@@ -123,7 +120,8 @@ def diagnose(
         )
         hints = hints_of(evidence.stream.t, evidence.seconds, lamps)
         candidates = [one for one in library(declared, hints) if one.name not in without]
-        search = Search(laboratory, observed, declared, candidates, error, log)
+        free = THRESHOLDS if free_thresholds else ()
+        search = Search(laboratory, observed, declared, candidates, error, log, free)
         outcome = search.run()
         seeds = range(20_000, 20_000 + _DRAWS)
 
@@ -153,7 +151,7 @@ def diagnose(
             declared=declared_name,
             effects=[finding_of(fit) for fit in kept.fits],
             alternatives=outcome.alternatives if kept.fits else [],
-            nuisances=nuisances,
+            nuisances=thresholds_of(kept.config) if free_thresholds else {},
             rejected=_rejected(outcome, kept, candidates),
             errors=rows,
             global_p_before=search.probability(search.declared, parts.LAST),
@@ -197,7 +195,7 @@ def _about_interpolation(search: Search, error: InterpolationError | None) -> st
 
 def _with_fitted_thresholds(
     evidence: Evidence, declared: Config, simulator: Simulator, scene: Scene
-) -> tuple[Config, dict[str, float], float]:
+) -> tuple[Config, float]:
     def counts(stream: Stream) -> tuple[int, int]:
         fitted_to = of_part(stream, scene.parts, parts.FIT)
         on = int(np.count_nonzero(fitted_to.on))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
+from adv2e.diagnosis.candidates import Knob
 from adv2e.effects.pixel.thresholds import FLOOR
 from adv2e.events import Events
 
@@ -99,16 +100,24 @@ def _slope(moved: NDArray[Any], gained: NDArray[Any], slope: NDArray[Any]) -> ND
     return np.asarray(np.clip(secant, -6.0, -0.7))
 
 
-THRESHOLDS = ("pixel.thresholds.on", "pixel.thresholds.off")
-"""Keys that :func:`fit_thresholds` fits."""
+THRESHOLDS = tuple(Knob(f"pixel.thresholds.{name}", FLOOR, LARGEST) for name in ("on", "off"))
+"""Keys that :func:`fit_thresholds` fits, and a search then refines with what it finds."""
+
+
+def thresholds_of(config: Config) -> dict[str, float]:
+    """Return the thresholds of a configuration, by key."""
+    levels = config.pixel.thresholds
+    return {
+        knob.key: value for knob, value in zip(THRESHOLDS, (levels.on, levels.off), strict=True)
+    }
 
 
 def fit_thresholds(
     simulate: Callable[[Config], tuple[int, int]], declared: Config, measured: tuple[int, int]
-) -> tuple[Config, dict[str, float], float]:
-    """Return the declared model with thresholds that match the totals, their values by key, miss.
+) -> tuple[Config, float]:
+    """Return the declared model with thresholds that match the totals, and what they miss by.
 
-    What is missed by is as in :func:`match_totals`.
+    As in :func:`match_totals`.
 
     Parameters
     ----------
@@ -124,4 +133,4 @@ def fit_thresholds(
 
     here = declared.pixel.thresholds
     on, off, miss = match_totals(count, (here.on, here.off), measured)
-    return with_thresholds(declared, on, off), dict(zip(THRESHOLDS, (on, off), strict=True)), miss
+    return with_thresholds(declared, on, off), miss

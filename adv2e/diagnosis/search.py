@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import MANY, Bench, State, parted
-from adv2e.diagnosis.candidates import Candidate
+from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations, scored
 from adv2e.diagnosis.interpolation import InterpolationError
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
@@ -96,6 +96,8 @@ class Search:
         Of the statistics.
     log : callable
         Told of each step.
+    free : tuple of Knob
+        Keys that are not known: fitted with all effects, and no effect themselves.
     """
 
     def __init__(
@@ -106,10 +108,15 @@ class Search:
         candidates: Sequence[Candidate],
         error: InterpolationError | None = None,
         log: Callable[[str], None] = lambda text: None,
+        free: tuple[Knob, ...] = (),
     ) -> None:
-        self._candidates, self._simulator = list(candidates), laboratory.simulator
+        unknown = {knob.key for knob in free}
+        self._candidates = [
+            one for one in candidates if not unknown & {knob.key for knob in one.knobs}
+        ]
+        self._simulator = laboratory.simulator
         self._simulator.likely = self._simulator.done + 2 * MANY
-        self.bench = Bench.of(laboratory, observed, declared, error, log)
+        self.bench = Bench.of(laboratory, observed, declared, error, log, free)
         self.declared = self.bench.state(declared, ())
 
     def probability(self, state: State, view: int = BOTH) -> float:

@@ -19,6 +19,7 @@ from adv2e.diagnosis.judging import chance_gain, gain
 from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Model, Scale
+from adv2e.diagnosis.nuisances import THRESHOLDS, thresholds_of
 from adv2e.diagnosis.search import LEVEL, PER_LOOK, Search
 from adv2e.diagnosis.verdict import sentence_of, verdict_of
 from adv2e.reports.quantities import interval_text
@@ -264,6 +265,22 @@ def test_backward_keeps_what_is_needed():
         fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
     state = refitted(search, tuple(fits))
     assert search._backward(state) is state
+
+
+def test_thresholds_that_are_not_known_are_fitted_with_what_is_found():
+    """Matched to the totals first, they have taken some of what is missing."""
+    wrong = load_config([], ["pixel.thresholds={on: 0.22, off: 0.19}"])
+    laboratory = MadeUpLaboratory()
+    observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
+    search = Search(laboratory, observed, wrong, candidates(), free=THRESHOLDS)
+    outcome = search.run()
+    assert outcome.state.names == ("leak",)
+    assert outcome.state.config.pixel.leak.rate_hz == pytest.approx(4.0, rel=0.1)
+    levels = thresholds_of(outcome.state.config)
+    assert list(levels.values()) == pytest.approx([0.2, 0.2], rel=0.02)
+    (fit,) = outcome.state.fits
+    assert fit.covariance.shape == (1, 1)
+    assert "thresholds" not in outcome.rejected
 
 
 def test_what_is_left_out_of_the_library_is_not_named():
