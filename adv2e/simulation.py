@@ -23,7 +23,7 @@ from adv2e import pixel
 from adv2e.config.model import Config
 from adv2e.effects.active import active_hooks
 from adv2e.effects.composition import additions_of, begin, changes_light, map_events
-from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images, full_scale_of
+from adv2e.effects.frames.encoding import LightDecoder, decoder_for, encoding_of_images
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.errors import DataError
 from adv2e.events import Events
@@ -123,11 +123,8 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
         raise DataError(
             f"frame 0: shape {image.shape}, must be (rows, columns) or (rows, columns, 3)"
         )
-    encoding = config.frames.encoding
-    if encoding == "auto":
-        encoding = encoding_of_images(image.dtype, colour)
-    full_scale = config.frames.full_scale or full_scale_of(image.dtype)
-    return LightDecoder(encoding, full_scale, image.dtype, colour)
+    auto = encoding_of_images(image.dtype, colour)
+    return decoder_for(config.frames, image.dtype, colour, auto=auto)
 
 
 def events_from_light(

@@ -114,10 +114,12 @@ def run(
     from study_diagnosis_parts import run as running  # noqa: PLC0415 - it loads the simulator
     from study_diagnosis_parts.camera import catalogue  # noqa: PLC0415
 
+    from adv2e.diagnosis.library import names as library_names  # noqa: PLC0415
+
     say = partial(click.echo, err=True)
     width, height = _size(size)
     setup = running.Setup(width, height, seconds, fps)
-    known = running.library_names()
+    known = library_names()
     lacking = [name for name in catalogue.LIBRARY if name not in known]
     if lacking:
         say(f"not in adv2e's library, skipped: {', '.join(lacking)}")

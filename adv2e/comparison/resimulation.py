@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config.model import Config
-from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.effects.frames.encoding import LightDecoder, decoder_for
 from adv2e.events import Events
 from adv2e.simulation import events_from_light
 from adv2e.sources.base import Frame
@@ -36,10 +36,9 @@ def resimulator(
     threads : int, optional
         Default: all cores.  The events do not depend on it.
     """
-    chosen = encoding if config.frames.encoding == "auto" else config.frames.encoding
 
     def simulate_events(seed: int) -> Events:
-        light = _light(frames(), chosen, config.frames.full_scale)
+        light = _light(frames(), config, encoding)
         chunks = events_from_light(light, replace(config, seed=seed), threads=threads)
         return np.concatenate(list(chunks))
 
@@ -47,12 +46,11 @@ def resimulator(
 
 
 def _light(
-    frames: Iterable[Frame], encoding: str, full_scale: float | None
+    frames: Iterable[Frame], config: Config, encoding: str
 ) -> Iterator[tuple[int, NDArray[Any]]]:
     decoder: LightDecoder | None = None
     for frame in frames:
         if decoder is None:
-            dtype = frame.image.dtype
-            white = full_scale or full_scale_of(dtype)
-            decoder = LightDecoder(encoding, white, dtype, frame.image.ndim == 3)
+            image = frame.image
+            decoder = decoder_for(config.frames, image.dtype, image.ndim == 3, auto=encoding)
         yield frame.t_ns, decoder.decode(frame.image)

@@ -16,7 +16,7 @@ from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
 from adv2e.diagnosis.instants import as_recorded, made
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
-from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.effects.frames.encoding import decoder_for
 from adv2e.events import Events
 from adv2e.simulation import events_from_light
 from real.recording import Real, still_rate
@@ -95,10 +95,8 @@ class Bench:
         return self._made[key]
 
     def _decoded(self, config: Config) -> Iterator[tuple[int, NDArray[Any]]]:
-        source, wanted = self.real.source, config.frames.encoding
-        encoding = source.encoding if wanted == "auto" else wanted
-        white = config.frames.full_scale or full_scale_of(source.dtype)
-        decoder = LightDecoder(encoding, white, source.dtype, source.colour)
+        source = self.real.source
+        decoder = decoder_for(config.frames, source.dtype, source.colour, auto=source.encoding)
         for frame in self.real.frames():
             yield frame.t_ns, decoder.decode(frame.image)
 

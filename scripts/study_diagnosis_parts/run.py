@@ -12,11 +12,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from adv2e.config import Config, load_config
+from adv2e.config import load_config
 from adv2e.diagnosis.diagnose import diagnose
 from adv2e.diagnosis.evidence import read_evidence
-from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.library import Hints, library
 from adv2e.reports.result import Diagnosis
 from study_diagnosis_parts.camera import REPOSITORY, camera, settings
 from study_diagnosis_parts.cases import Case
@@ -58,11 +56,6 @@ def commit() -> str:
 def _git(*arguments: str) -> str:
     command = ["git", "-C", str(REPOSITORY), *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-
-
-def library_names() -> set[str]:
-    """Return the effects that adv2e can add."""
-    return {one.name for one in library(Config(), Hints(1.0, (Lamp(100.0),), 10))}
 
 
 def diagnosed(

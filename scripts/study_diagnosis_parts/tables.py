@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
+from adv2e.diagnosis.search import LEVEL
 from study_diagnosis_parts import scoring
 from study_diagnosis_parts.camera import catalogue
 from study_diagnosis_parts.cases import (
@@ -20,9 +21,6 @@ from study_diagnosis_parts.cases import (
     Plan,
 )
 from study_diagnosis_parts.results import Line
-
-LEVEL = 0.01
-"""Probability at which the global test says that something is missing."""
 
 _SIZES = ("none", *SIZES)
 

@@ -18,12 +18,15 @@ References
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from adv2e.errors import ConfigError, DataError
+
+if TYPE_CHECKING:
+    from adv2e.config.model import Frames
 
 LUMA_WEIGHTS = (0.2126, 0.7152, 0.0722)
 """Shares of red, green and blue light in luma."""
@@ -177,3 +180,19 @@ class LightDecoder:
         red, green, blue = self._tables
         fill_luma(pixels, red, green, blue, light.reshape(-1))
         return light
+
+
+def decoder_for(frames: Frames, dtype: DTypeLike, colour: bool, *, auto: str) -> LightDecoder:
+    """Return the decoder that a configuration asks for.
+
+    Parameters
+    ----------
+    frames : Frames
+        The configuration's section.
+    dtype, colour
+        Of the frames; see :class:`LightDecoder`.
+    auto : str
+        What ``encoding: auto`` means for them.
+    """
+    encoding = auto if frames.encoding == "auto" else frames.encoding
+    return LightDecoder(encoding, frames.full_scale or full_scale_of(dtype), dtype, colour)
