@@ -48,12 +48,16 @@ class Simulator:
         threads: int,
         progress: Callable[[int, int], None] = lambda done, likely: None,
     ) -> None:
-        self._evidence, self._progress = evidence, progress
+        self._evidence, self._threads, self._progress = evidence, threads, progress
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
         self._decoded: dict[Any, Instants] = {}
         self._lock, self._counting = threading.Lock(), threading.Lock()
         self.done = 0
         self.likely = 0
+
+    def of(self, evidence: Evidence) -> Simulator:
+        """Return the same for another recording; nobody is told of its progress."""
+        return Simulator(evidence, self._threads)
 
     def close(self) -> None:
         """Drop what has not begun."""

@@ -12,8 +12,8 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis import search as search_module
 from adv2e.diagnosis.bench import Rejections, parted
 from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.conclusion import finding_of
 from adv2e.diagnosis.detectable import detectable
-from adv2e.diagnosis.diagnose import finding_of
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.judging import chance_gain, gain
 from adv2e.diagnosis.keys import with_keys

@@ -1,0 +1,151 @@
+"""From where a search ended to what is reported of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.bench import State
+from adv2e.diagnosis.candidates import Candidate
+from adv2e.diagnosis.error import error_rows, of_part
+from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.picture import Gallery
+from adv2e.diagnosis.ready import Ready
+from adv2e.diagnosis.scene import Placed
+from adv2e.diagnosis.search import Outcome, Search
+from adv2e.diagnosis.stream import Stream
+from adv2e.diagnosis.verdict import verdict_of
+from adv2e.reports.result import ErrorRow, Finding, Rejected, Signature, Verdict
+
+Array = NDArray[np.float64]
+
+DRAWS = 12
+"""Simulations of each model that the errors are made of."""
+
+_FIRST_DRAW = 20_000
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What is said of a recording.
+
+    Attributes
+    ----------
+    verdict : str
+    kept : State
+        The model that is reported: the declared one where nothing is named.
+    errors : list of ErrorRow
+        Of the declared model, and of the one that is reported.
+    gallery : Gallery
+        Pictures of both.
+    """
+
+    verdict: Verdict
+    kept: State
+    errors: list[ErrorRow]
+    gallery: Gallery
+
+
+def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
+    """Look at the last part of the data, and decide."""
+    scene, simulator = ready.laboratory.scene, ready.laboratory.simulator
+
+    def drawn(state: State) -> list[Placed]:
+        seeds = range(_FIRST_DRAW, _FIRST_DRAW + DRAWS)
+        return [Placed.of(simulator.stream(state.config, seed), scene) for seed in seeds]
+
+    def errors(before: Sequence[Placed], after: Sequence[Placed]) -> list[ErrorRow]:
+        def last(placed: Placed) -> Stream:
+            return of_part(placed.stream, scene.parts, parts.LAST)
+
+        return error_rows(last(ready.measured), list(map(last, before)), list(map(last, after)))
+
+    kept, declared = outcome.state, search.declared
+    before = after = drawn(declared)
+    if kept is not declared:
+        after = drawn(kept)
+    rows = errors(before, after)
+    verdict = verdict_of(outcome, rows[0])
+    if verdict in ("consistent", "unexplained") and kept is not declared:
+        kept, after = declared, before
+        rows = errors(before, after)
+    return Conclusion(verdict, kept, rows, Gallery(scene, ready.measured, before, after))
+
+
+def finding_of(fit: Fit) -> Finding:
+    """Return an effect that was added, with 95 % intervals of what was fitted."""
+    parameters = fit.candidate.parameters(fit.place)
+    interval: dict[str, Any] = {}
+    spread: Any = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if fit.covariance.size else []
+    for knob, place, sd in zip(fit.candidate.knobs, fit.place, spread, strict=False):
+        low, high = knob.outer(place - 1.96 * sd), knob.outer(place + 1.96 * sd)
+        if knob.part is None:
+            interval[knob.key] = low, high
+        else:  # parts of a list come in their order
+            below, above = interval.get(knob.key, ((), ()))
+            interval[knob.key] = (*below, low), (*above, high)
+    return Finding(fit.candidate.name, parameters, interval)
+
+
+def rejected_of(outcome: Outcome, kept: State, candidates: Sequence[Candidate]) -> list[Rejected]:
+    """Return the effects that were not added, in the library's order."""
+    names = list(dict.fromkeys(candidate.name for candidate in candidates))
+    held = dict(outcome.rejected)
+    if outcome.state is not kept:
+        for fit in outcome.state.fits:
+            held[fit.candidate.name] = Rejected(
+                fit.candidate.name,
+                "explains a part, but too much is left to name it",
+                fit.candidate.parameters(fit.place),
+            )
+    return [held[name] for name in names if name in held and name not in kept.names]
+
+
+def signatures_of(ready: Ready, search: Search, kept: State) -> list[Signature]:
+    """Return every statistic of the last part: as measured, before and after."""
+    observed, markers = ready.observed, ready.laboratory.markers
+    view = parts.LAST
+    before, after = search.declared.models[view], kept.models[view]
+    scale = search.bench.scales[view]
+    z_before, z_after = before.z(observed[view]), after.z(observed[view])
+
+    def value(mean: Array) -> Array:
+        return np.asarray(scale.mean + scale.sd * 3.0 * np.sinh(mean / 3.0))
+
+    means = value(before.mean), value(after.mean)
+    return [
+        Signature(
+            entry.name,
+            title,
+            entry.meaning,
+            entry.plain(float(observed[view][k])),
+            entry.plain(float(means[0][k])),
+            entry.plain(float(means[1][k])),
+            float(z_before[k]),
+            float(z_after[k]),
+        )
+        for k, (entry, title) in enumerate(zip(markers.entries, markers.titles, strict=True))
+    ]
+
+
+def about_interpolation(ready: Ready, search: Search) -> str:
+    """Say what the statistics owe to the interpolation between frames."""
+    error = ready.error
+    if error is None:
+        return (
+            "too few frames to leave any out: what the interpolation between them does to the"
+            " residual is not known, and may be all of it"
+        )
+    size = error.size(search.bench.scales[BOTH].sd, BOTH)
+    text = (
+        f"interpolation between the frames moves a statistic by {size:.2g} deviations (root mean"
+        " square), as simulations with every second frame left out tell; taken off, and counted as"
+        " uncertain by as much"
+    )
+    return text + (": the frames hardly resolve the motion" if size > 1.0 else "")

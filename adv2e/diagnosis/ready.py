@@ -1,0 +1,148 @@
+"""A recording made ready for the search: its scene and statistics, and the effects that compete."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config import Config
+from adv2e.diagnosis import parts
+from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.error import of_part
+from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.interpolation import InterpolationError, interpolation_error
+from adv2e.diagnosis.lamps import Lamp, lamps_of
+from adv2e.diagnosis.library import hints_of, library
+from adv2e.diagnosis.light import light_of, quantum_dn
+from adv2e.diagnosis.lines import strongest_lines
+from adv2e.diagnosis.markers import Markers
+from adv2e.diagnosis.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of
+from adv2e.diagnosis.scene import Placed, Scene
+from adv2e.diagnosis.simulations import Laboratory, Simulator
+from adv2e.diagnosis.stream import Stream
+
+PILOT = 16
+"""Simulations of the declared model that tell what to expect."""
+
+_FIRST_PILOT = 10_000
+_MATCHING_SEED = 9_999
+_LAMP_SEED = 9_998
+
+
+@dataclass(frozen=True)
+class Ready:
+    """What a search begins with.
+
+    Attributes
+    ----------
+    evidence : Evidence
+    declared : Config
+        With thresholds that match the totals, where they were not known.
+    laboratory : Laboratory
+    error : InterpolationError, optional
+        Of the statistics; None: too few frames to tell.
+    measured : Placed
+        The recording's events.
+    observed : (views, statistics)
+    candidates : list of Candidate
+    free : tuple of Knob
+        Keys that are not known.
+    """
+
+    evidence: Evidence
+    declared: Config
+    laboratory: Laboratory
+    error: InterpolationError | None
+    measured: Placed
+    observed: NDArray[np.float64]
+    candidates: list[Candidate]
+    free: tuple[Knob, ...]
+
+
+def make_ready(
+    evidence: Evidence,
+    declared: Config,
+    simulator: Simulator,
+    without: Sequence[str],
+    free_thresholds: bool,
+    log: Callable[[str], None],
+) -> Ready:
+    """Simulate the declared model, so that the recording can be compared with it.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    declared : Config
+    simulator : Simulator
+        Of the recording.
+    without : sequence of str
+        Effects that do not compete.
+    free_thresholds : bool
+        Whether thresholds are not known.
+    log : callable
+        Takes lines for people.
+    """
+    light = light_of(evidence, declared)
+    scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
+    if free_thresholds:
+        declared, miss = _with_fitted_thresholds(evidence, declared, simulator, scene)
+        log(f"thresholds that match the totals: {thresholds_of(declared)}")
+        if miss > TOLERANCE:
+            missed = f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}"
+            evidence = replace(evidence, notes=[*evidence.notes, missed])
+    seeds = range(_FIRST_PILOT, _FIRST_PILOT + PILOT)
+    streams = simulator.map(lambda seed: simulator.stream(declared, seed), seeds)
+    markers = Markers(scene, [Placed.of(stream, scene) for stream in streams])
+    known = dict(zip(seeds, streams, strict=True))
+    error = interpolation_error(evidence, declared, scene, markers, known, simulator.of)
+    measured = Placed.of(evidence.stream, scene)
+    laboratory = Laboratory(simulator, scene, markers, error.bias if error else None)
+    lamps = _lamps(evidence, declared, simulator, scene, streams)
+    hints = hints_of(evidence.stream.t, evidence.seconds, lamps)
+    return Ready(
+        evidence,
+        declared,
+        laboratory,
+        error,
+        measured,
+        markers.measure(measured),
+        [one for one in library(declared, hints) if one.name not in without],
+        THRESHOLDS if free_thresholds else (),
+    )
+
+
+def _lamps(
+    evidence: Evidence,
+    declared: Config,
+    simulator: Simulator,
+    scene: Scene,
+    pilot: Sequence[Stream],
+) -> list[Lamp]:
+    """Return the lamps that may have lit the scene, by the data that effects are fitted to."""
+
+    def to_fit(stream: Stream) -> Stream:
+        return of_part(stream, scene.parts, parts.FIT)
+
+    measured = to_fit(evidence.stream)
+    lines = strongest_lines(measured, list(map(to_fit, pilot)), scene)
+    return lamps_of(
+        lines, measured, declared, lambda lit: to_fit(simulator.stream(lit, _LAMP_SEED))
+    )
+
+
+def _with_fitted_thresholds(
+    evidence: Evidence, declared: Config, simulator: Simulator, scene: Scene
+) -> tuple[Config, float]:
+    def counts(stream: Stream) -> tuple[int, int]:
+        fitted_to = of_part(stream, scene.parts, parts.FIT)
+        on = int(np.count_nonzero(fitted_to.on))
+        return on, len(fitted_to) - on
+
+    return fit_thresholds(
+        lambda config: counts(simulator.stream(config, _MATCHING_SEED)),
+        declared,
+        counts(evidence.stream),
+    )
