@@ -149,9 +149,9 @@ def problem_of(
         problem = LatencyProblem(
             data, declared, judged, settings.white, settings.contrast, settings.error
         )
+        problem.check(table.name)
     else:
         problem = NoiseProblem(data, declared, judged, settings.white, settings.error)
-    problem.check(table.name)
     rest = int((~problem.judged).sum())
     if rest <= len(problem.nuisances) + 1:
         raise DataError(

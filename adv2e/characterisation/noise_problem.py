@@ -110,9 +110,6 @@ class NoiseProblem:
         self.out_of_reach: Mapping[str, str] = _OUT_OF_REACH
         self.notes = self._notes(data)
 
-    def check(self, name: str) -> None:
-        """Nothing can be wrong with it that its table is not wrong with."""
-
     @staticmethod
     def _rate(data: Noise, kind: str, row: int) -> float:
         """Return a cell as a rate [Hz]; a share as that of Poisson events which gives it."""

@@ -106,10 +106,7 @@ def _shortened(evidence: Evidence, intervals: int) -> Evidence:
     before = np.searchsorted(stream.t, times_s * 1e6)
     first = int(np.argmax(before[intervals:] - before[:-intervals]))
     last = first + intervals
-    inside = slice(before[first], before[last])
-    kept = Stream(
-        stream.t[inside], stream.pixel[inside], stream.on[inside], stream.width, stream.height
-    )
+    kept = stream.between(times_s[first] * 1e6, times_s[last] * 1e6)
     what = f"time outside {times_s[first]:.3f} to {times_s[last]:.3f} s"
     return replace(
         evidence,

@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 MANY, SOME = 100, 32
 """Simulations of a model that is kept, and of one that is tried."""
 
-_OF_SCALES, _OF_MODELS = 1, 2
+_OF_SCALES, _OF_MODELS, OF_RECORDINGS = 1, 2, 3
+"""What simulations stand for, each with draws of its own of what is uncertain in them."""
 _SEEDS = 6
 _ROUNDS = 4
 _SETTLED = 0.25  # deviations

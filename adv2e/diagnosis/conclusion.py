@@ -115,10 +115,7 @@ def signatures_of(ready: Ready, search: Search, kept: State) -> list[Signature]:
     scale = search.bench.scales[view]
     z_before, z_after = before.z(observed[view]), after.z(observed[view])
 
-    def value(mean: Array) -> Array:
-        return np.asarray(scale.mean + scale.sd * 3.0 * np.sinh(mean / 3.0))
-
-    means = value(before.mean), value(after.mean)
+    means = scale.values_of(before.mean), scale.values_of(after.mean)
     return [
         Signature(
             entry.name,

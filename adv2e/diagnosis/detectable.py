@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.bench import Bench, State
+from adv2e.diagnosis.bench import OF_RECORDINGS, Bench, State
 from adv2e.diagnosis.candidates import Candidate, neutral_value
 from adv2e.diagnosis.keys import about_key
 from adv2e.diagnosis.markers import BOTH
-from adv2e.diagnosis.metric import Model
+from adv2e.diagnosis.metric import Model, expanded
 from adv2e.diagnosis.search import PER_LOOK
 from adv2e.reports.result import Detectable
 
@@ -24,7 +24,6 @@ _ROUNDS = (range(1, 3), range(301, 305), range(305, 315))
 _FARTHEST = 10.0
 _SETTLED = 2.0
 """Factor by which the last round may still change a size that is told."""
-_OF_RECORDINGS = 3
 
 
 def detectable(bench: Bench, declared: State, candidates: Sequence[Candidate]) -> list[Detectable]:
@@ -50,7 +49,7 @@ def detectable(bench: Bench, declared: State, candidates: Sequence[Candidate]) -
         configs = [size.config(declared.config) for size in sizes]
         sample = bench.laboratory.many(configs, seeds)[:, :, BOTH]
         for size, rows in zip(sizes, sample, strict=True):
-            recordings = bench.error.blurred(rows, BOTH, _OF_RECORDINGS)
+            recordings = bench.error.blurred(rows, BOTH, OF_RECORDINGS)
             factors = [limits.missing(model, row) for row in recordings]
             size.change_by(float(np.quantile(factors, _SEEN)))
         sizes = [size for size in sizes if math.isfinite(size.factor)]
@@ -126,13 +125,8 @@ class _Limits:
         """Return by which factor an effect must be larger to be seen in a recording with it."""
         # squares add up, single deviations grow in proportion
         misfit = (model.misfit(recording) - model.floor) / (self.misfit - model.floor)
-        loudest = _plain(float(np.abs(model.z(recording)).max()))
-        usual = _plain(model.typical_largest)
-        deviation = (loudest - usual) / (_plain(self.largest) - usual)
+        loudest = expanded(np.abs(model.z(recording)).max())
+        usual = expanded(model.typical_largest)
+        deviation = float((loudest - usual) / (expanded(self.largest) - usual))
         factor = min(max(misfit, 1e-6) ** -0.5, 1.0 / max(deviation, 1e-6))
         return float(min(max(factor, 1.0 / _FARTHEST), _FARTHEST))
-
-
-def _plain(compressed: float) -> float:
-    """Return deviations before they were compressed; see :mod:`adv2e.diagnosis.metric`."""
-    return 3.0 * math.sinh(compressed / 3.0)

@@ -30,18 +30,18 @@ def objections(fit: Fit, grown: State, ground: State, bench: Bench) -> list[str]
     fit : Fit
         Of the model.
     grown, ground : State
-        The two.
+        The two, the first as :meth:`~adv2e.diagnosis.bench.Bench.tried`.
     bench : Bench
     """
     observed = bench.observed[parts.JUDGE]
+    after, before = grown.models[parts.JUDGE], ground.models[parts.JUDGE]
     # as often as what is tried, by the same seeds: most of chance falls out of the difference
-    after, before = (bench.tried(one.config)[parts.JUDGE] for one in (grown, ground))
+    as_often = bench.tried(ground.config)[parts.JUDGE]
     found = []
-    if gain(after, before, observed) < chance_gain(after, before, observed):
+    if gain(after, as_often, observed) < chance_gain(after, as_often, observed):
         found.append(BY_CHANCE)
     if fit.at_border:
         found.append(BORDER)
-    after, before = grown.models[parts.JUDGE], ground.models[parts.JUDGE]
     loud = _loudness(after, before, observed)
     if loud > _QUIET:
         found.append(f"what it changes most still stands out by {loud:.1f} deviations")

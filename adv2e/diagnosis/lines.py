@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.markers.timing import keeps_time
+from adv2e.diagnosis.markers.timing import Spectrum, above_beside, keeps_time
 from adv2e.diagnosis.scene import Scene
 from adv2e.diagnosis.stream import Stream
 
-BIN_US = 1000
-LOWEST_HZ = 30.0
-
+_LOWEST_HZ = 30.0
 _LEAST_BINS = 16
 _PADDING = 8
 _BESIDE = 16 * _PADDING
@@ -67,22 +65,19 @@ class _Heights:
 
     @classmethod
     def of(cls, stream: Stream, scene: Scene) -> _Heights:
-        start = scene.times_us[0]
-        bins = int((scene.times_us[-1] - start) // BIN_US)
+        start, bin_us = scene.times_us[0], Spectrum.BIN_US
+        bins = int((scene.times_us[-1] - start) // bin_us)
         if bins < _LEAST_BINS:
             return cls(np.empty(0), np.empty((2, 0)), scene)
-        hz = np.fft.rfftfreq(_PADDING * bins, BIN_US * 1e-6)
-        step = np.minimum((stream.t - start) // BIN_US, bins - 1).astype(np.int64)
+        hz = np.fft.rfftfreq(_PADDING * bins, bin_us * 1e-6)
+        step = np.minimum((stream.t - start) // bin_us, bins - 1).astype(np.int64)
         heights = []
         for sign in (np.ones(len(stream)), 2.0 * stream.on - 1.0):
             rate = np.bincount(step, sign, minlength=bins)
             rate = (rate - rate.mean()) * np.hanning(bins)
             power = np.log(np.abs(np.fft.rfft(rate, _PADDING * bins)) ** 2 + 1.0)
-            around = np.lib.stride_tricks.sliding_window_view(
-                np.pad(power, _BESIDE, mode="reflect"), 2 * _BESIDE + 1
-            )
-            heights.append(power - np.median(around, axis=1))
-        above = hz > LOWEST_HZ
+            heights.append(above_beside(power, _BESIDE))
+        above = hz > _LOWEST_HZ
         return cls(hz[above], np.array(heights)[:, above], scene)
 
     def peaks(self, where: NDArray[np.bool_]) -> list[tuple[float, float]]:

@@ -72,6 +72,10 @@ class Scale:
         """Return statistics (..., statistics) in compressed deviations."""
         return _compressed((values - self.mean) / self.sd)
 
+    def values_of(self, compressed: Array) -> Array:
+        """Return the statistics (..., statistics) of compressed deviations."""
+        return np.asarray(self.mean + self.sd * expanded(compressed))
+
     @cached_property
     def whitening(self) -> Array:
         """Matrix that takes compressed deviations to uncorrelated ones."""
@@ -80,6 +84,11 @@ class Scale:
 
 def _compressed(z: Array) -> Array:
     return np.asarray(_KNEE * np.arcsinh(z / _KNEE))
+
+
+def expanded(compressed: Array | float) -> Array:
+    """Return deviations as they were before they were compressed."""
+    return np.asarray(_KNEE * np.sinh(np.asarray(compressed) / _KNEE))
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,17 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from adv2e.config import Config, to_dict
+from adv2e.config import Config, load_config, to_dict
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.keys import get_key
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.library import Hints, library
 from adv2e.diagnosis.markers import BOTH, VIEWS, Entry
+from adv2e.diagnosis.search import Search
 
 STATISTICS = 40
+RECORDING = 70_000
+"""Seed of recordings."""
 HINTS = Hints(1.0, (Lamp(100.0),), 1)
 
 RESPONSES = {
@@ -104,3 +107,23 @@ class MadeUpLaboratory:
 
     def many(self, configs, seeds):
         return np.array([self.ensemble(config, seeds) for config in configs])
+
+
+def searched(
+    truth=(),
+    laboratory=None,
+    library=None,
+    beyond=0.0,
+    seed=RECORDING,
+    declared=None,
+    last_truth=None,
+):
+    """Return the search on a made-up recording, and its outcome."""
+    laboratory = laboratory or MadeUpLaboratory()
+    observed = laboratory.measure(load_config([], truth), seed, beyond)
+    if last_truth is not None:
+        other = laboratory.measure(load_config([], last_truth), seed, beyond)
+        observed[parts.LAST] = other[parts.LAST]
+    library = candidates() if library is None else library
+    search = Search(laboratory, observed, declared or Config(), library)
+    return search, search.run()

@@ -5,27 +5,28 @@ import math
 
 import numpy as np
 import pytest
-from made_up_laboratory import EFFECTS, STATISTICS, MadeUpLaboratory, candidates
+from made_up_laboratory import (
+    EFFECTS,
+    RECORDING,
+    STATISTICS,
+    MadeUpLaboratory,
+    candidates,
+    searched,
+)
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis import parts
 from adv2e.diagnosis import search as search_module
 from adv2e.diagnosis.bench import Rejections, parted
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.conclusion import finding_of
 from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.fit import Fit
-from adv2e.diagnosis.judging import chance_gain, gain
-from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.markers import BOTH
-from adv2e.diagnosis.metric import Model, Scale
 from adv2e.diagnosis.nuisances import THRESHOLDS, thresholds_of
-from adv2e.diagnosis.search import LEVEL, PER_LOOK, Search
+from adv2e.diagnosis.search import LEVEL, Search
 from adv2e.diagnosis.verdict import sentence_of, verdict_of
 from adv2e.reports.quantities import interval_text
 from adv2e.reports.result import ErrorRow, Estimate
-
-RECORDING = 70_000
 
 
 def error(before, after, floor, spread=0.02):
@@ -35,25 +36,6 @@ def error(before, after, floor, spread=0.02):
 
 
 GONE = error(0.8, 0.4, 0.4)
-
-
-def searched(
-    truth=(),
-    laboratory=None,
-    library=None,
-    beyond=0.0,
-    seed=RECORDING,
-    declared=None,
-    last_truth=None,
-):
-    laboratory = laboratory or MadeUpLaboratory()
-    observed = laboratory.measure(load_config([], truth), seed, beyond)
-    if last_truth is not None:
-        other = laboratory.measure(load_config([], last_truth), seed, beyond)
-        observed[parts.LAST] = other[parts.LAST]
-    library = candidates() if library is None else library
-    search = Search(laboratory, observed, declared or Config(), library)
-    return search, search.run()
 
 
 def outside(size):
@@ -222,6 +204,12 @@ def test_what_holds_is_no_name_where_what_does_not_explains_far_more(monkeypatch
     assert outcome.state.names == ("leak",)
 
 
+def fits_of(*effects):
+    """Return unfinished fits of effects with one key each: (name, value)."""
+    found = [(candidates(name)[0], value) for name, value in effects]
+    return tuple(Fit(one, Config(), np.array(one.inner((value,)))) for one, value in found)
+
+
 def refitted(search, fits):
     """Return the model with all `fits`, fitted together."""
     joint = search.bench.fitted(fits, search.declared.models[BOTH].sd, BOTH)
@@ -232,11 +220,8 @@ def test_backward_drops_what_the_others_do_without():
     laboratory = MadeUpLaboratory()
     observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
     search = Search(laboratory, observed, Config(), candidates())
-    fits = []
-    for name, value in (("dark_current", 0.05), ("leak", 4.0)):
-        (one,) = candidates(name)
-        fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
-    state = refitted(search, tuple(fits))
+    fits = fits_of(("dark_current", 0.05), ("leak", 4.0))
+    state = refitted(search, fits)
     assert state.names == ("dark_current", "leak")
     assert search._backward(state).names == ("leak",)
     assert "not needed" in search.bench.rejections.held["dark_current"].reason
@@ -246,12 +231,9 @@ def test_alternatives_of_what_is_dropped_go_with_it():
     laboratory = MadeUpLaboratory()
     observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
     search = Search(laboratory, observed, Config(), candidates())
-    fits = []
-    for name, value in (("dark_current", 0.05), ("leak", 4.0)):
-        (one,) = candidates(name)
-        fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
+    fits = fits_of(("dark_current", 0.05), ("leak", 4.0))
     alike = {"dark_current": frozenset({"refractory"}), "leak": frozenset({"event_loss"})}
-    state = dataclasses.replace(refitted(search, tuple(fits)), alternatives=alike)
+    state = dataclasses.replace(refitted(search, fits), alternatives=alike)
     assert search._backward(state).alternatives == {"leak": frozenset({"event_loss"})}
 
 
@@ -259,11 +241,8 @@ def test_backward_keeps_what_is_needed():
     truth = load_config([], ["pixel.leak.rate_hz=4", "pixel.refractory.period_us=2500"])
     laboratory = MadeUpLaboratory()
     search = Search(laboratory, laboratory.measure(truth, RECORDING), Config(), candidates())
-    fits = []
-    for name, value in (("refractory", 2500.0), ("leak", 4.0)):
-        (one,) = candidates(name)
-        fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
-    state = refitted(search, tuple(fits))
+    fits = fits_of(("refractory", 2500.0), ("leak", 4.0))
+    state = refitted(search, fits)
     assert search._backward(state) is state
 
 
@@ -322,64 +301,6 @@ def test_the_same_recording_has_the_same_result():
     assert one.rejected == two.rejected
 
 
-def test_chance_alone_gains_less_than_it_may():
-    laboratory = MadeUpLaboratory()
-    search, outcome = searched(["pixel.leak.rate_hz=1"], laboratory)
-    bench = search.bench
-    before, after = (
-        bench.tried(one.config)[parts.JUDGE] for one in (search.declared, outcome.state)
-    )
-    limit = chance_gain(after, before, search.declared.models[parts.JUDGE].scale.mean)
-    gains = [
-        after.log_likelihood(row[parts.JUDGE]) - before.log_likelihood(row[parts.JUDGE])
-        for row in laboratory.ensemble(Config(), range(80_000, 80_300))
-    ]
-    assert np.mean(np.array(gains) > limit) < 0.02
-
-
-@pytest.mark.parametrize("misfit", [0.0, 10.0, 30.0])
-@pytest.mark.parametrize("shared", [0, 32])
-def test_a_model_that_does_nothing_gains_what_chance_may(misfit, shared):
-    """Also where much is left, which multiplies the chance of the simulations."""
-    draw = np.random.default_rng([int(misfit), shared])
-    mixing = 0.25 * draw.normal(size=(5, 200))
-
-    def sample(count):
-        return draw.normal(size=(count, 5)) @ mixing + 0.8 * draw.normal(size=(count, 200))
-
-    passed = 0
-    for _ in range(150):
-        scale = Scale.of(sample(100), np.full(200, 0.01))
-        rows = sample(32)
-        others = np.concatenate([rows[:shared], sample(32 - shared)]) + 1e-9
-        before, after = Model.of(scale, rows), Model.of(scale, others)
-        observed = sample(1)[0] + draw.normal(size=200) * np.sqrt(misfit)
-        passed += gain(after, before, observed) >= chance_gain(after, before, observed)
-    assert passed <= 3
-
-
-def test_what_would_have_been_seen():
-    search, _ = searched()
-    found = {one.name: one for one in detectable(search.bench, search.declared, candidates())}
-    assert set(found) == set(EFFECTS)
-    assert found["refractory"].unit == "us"
-    assert found["refractory"].key == "pixel.refractory.period_us"
-    model = search.declared.models[BOTH]
-    for one in found.values():
-        truth = with_keys(Config(), {one.key: one.size})
-        rows = search.bench.laboratory.ensemble(truth, range(90_000, 90_200))[:, BOTH]
-        seen = np.mean([model.probability(row) < PER_LOOK for row in rows])
-        assert 0.5 < seen < 0.99, one  # of ten recordings each
-
-
-def test_of_what_cannot_be_seen_no_size_is_told():
-    laboratory = MadeUpLaboratory()
-    laboratory.patterns["pixel.refractory.period_us"] = np.zeros(STATISTICS)
-    search, _ = searched(laboratory=laboratory)
-    found = detectable(search.bench, search.declared, candidates())
-    assert {one.name for one in found} == set(EFFECTS) - {"refractory"}
-
-
 def test_two_effects_that_hide_one_another_are_found_together():
     """Alone, either leaves so much of the other that what it changes most stands out."""
     laboratory = MadeUpLaboratory(strength=60.0)
@@ -418,11 +339,8 @@ def test_backward_drops_one_after_another():
     laboratory = MadeUpLaboratory()
     observed = laboratory.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
     search = Search(laboratory, observed, Config(), candidates())
-    fits = []
-    for name, value in (("dark_current", 0.05), ("event_loss", 0.002), ("leak", 4.0)):
-        (one,) = candidates(name)
-        fits.append(Fit(one, Config(), np.array(one.inner((value,)))))
-    assert search._backward(refitted(search, tuple(fits))).names == ("leak",)
+    fits = fits_of(("dark_current", 0.05), ("event_loss", 0.002), ("leak", 4.0))
+    assert search._backward(refitted(search, fits)).names == ("leak",)
 
 
 def test_the_reason_of_the_best_form_is_kept():

@@ -203,6 +203,13 @@ def keeps_time(hz: NDArray[Any], scene: Scene) -> NDArray[np.bool_]:
     return np.asarray(near & (hz >= rate - 2.0))
 
 
+def above_beside(log: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
+    """Return logarithms of power less the median of those within `reach` places."""
+    padded = np.pad(log, reach, mode="reflect")
+    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+    return np.asarray(log - np.median(around, axis=1))
+
+
 class Spectrum:
     """Lines in the rate of the whole sensor, as lamps on the mains make."""
 
@@ -255,8 +262,4 @@ class Spectrum:
         """Return log power less that of the frequencies beside."""
         window = np.hanning(self._bins)
         power = np.abs(np.fft.rfft((rate - rate.mean()) * window)) ** 2 + 1.0
-        log = np.log(power)
-        reach = max(3, int(np.searchsorted(self.hz, 12.0)))
-        padded = np.pad(log, reach, mode="reflect")
-        around = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
-        return np.asarray(log - np.median(around, axis=1))
+        return above_beside(np.log(power), max(3, int(np.searchsorted(self.hz, 12.0))))

@@ -1,0 +1,32 @@
+"""Sizes that would have been seen: recordings with them are, about 8 times in 10."""
+
+import numpy as np
+from made_up_laboratory import EFFECTS, STATISTICS, MadeUpLaboratory, candidates, searched
+
+from adv2e.config import Config
+from adv2e.diagnosis.detectable import detectable
+from adv2e.diagnosis.keys import with_keys
+from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.search import PER_LOOK
+
+
+def test_what_would_have_been_seen():
+    search, _ = searched()
+    found = {one.name: one for one in detectable(search.bench, search.declared, candidates())}
+    assert set(found) == set(EFFECTS)
+    assert found["refractory"].unit == "us"
+    assert found["refractory"].key == "pixel.refractory.period_us"
+    model = search.declared.models[BOTH]
+    for one in found.values():
+        truth = with_keys(Config(), {one.key: one.size})
+        rows = search.bench.laboratory.ensemble(truth, range(90_000, 90_200))[:, BOTH]
+        seen = np.mean([model.probability(row) < PER_LOOK for row in rows])
+        assert 0.5 < seen < 0.99, one  # of ten recordings each
+
+
+def test_of_what_cannot_be_seen_no_size_is_told():
+    laboratory = MadeUpLaboratory()
+    laboratory.patterns["pixel.refractory.period_us"] = np.zeros(STATISTICS)
+    search, _ = searched(laboratory=laboratory)
+    found = detectable(search.bench, search.declared, candidates())
+    assert {one.name for one in found} == set(EFFECTS) - {"refractory"}
