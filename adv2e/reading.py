@@ -157,16 +157,22 @@ def _stills(frames: Iterator[Frame], decoding: Future[Decoding]) -> Generator[St
     """Yield the frames once it is known what they are to become, some of them read before."""
     waiting: deque[Frame] = deque()
     room = EARLY_BYTES
+    wrong: Adv2eError | None = None
     # large frames fill the memory: none stays longer than it is needed
-    for frame in frames:
-        waiting.append(frame)
-        room -= frame.image.nbytes
-        del frame
-        if room <= 0 or decoding.done():
-            break
+    try:
+        for frame in frames:
+            waiting.append(frame)
+            room -= frame.image.nbytes
+            del frame
+            if room <= 0 or decoding.done():
+                break
+    except Adv2eError as error:  # those before it come first
+        wrong = error
     known = decoding.result()
     while waiting:
         yield known.still(waiting.popleft())
+    if wrong is not None:
+        raise wrong
     for frame in frames:
         still = known.still(frame)
         del frame
