@@ -36,6 +36,7 @@ def diagnose(
     declared_name: str = "",
     without: Sequence[str] = (),
     free_thresholds: bool = False,
+    sizes: bool = True,
     threads: int | None = None,
     progress: Callable[[int, int], None] = lambda done, likely: None,
     log: Callable[[str], None] = lambda text: None,
@@ -55,6 +56,9 @@ def diagnose(
         Effects that the library is to do without.
     free_thresholds : bool
         Whether thresholds are not known: they are fitted first, as a nuisance.
+    sizes : bool
+        Whether to find out which size of each effect would have been seen, which takes some 400
+        simulations and changes nothing else.
     threads : int, optional
         Simulations at a time; default: all cores.  The result does not depend on it.
     progress : callable
@@ -92,7 +96,7 @@ def diagnose(
             signatures=signatures_of(ready, search, kept),
             curves=found.gallery.curves(),
             maps=found.gallery.maps(),
-            detectable=detectable(search.bench, search.declared, candidates),
+            detectable=detectable(search.bench, search.declared, candidates) if sizes else [],
             masked=evidence.masked,
             split=ready.laboratory.scene.parts.text(),
             notes=[*evidence.notes, about_interpolation(ready, search)],

@@ -11,15 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from adv2e.config import Config, to_dict
 from adv2e.diagnosis.candidates import Candidate, Knob, exponent
 from adv2e.diagnosis.keys import get_key, known_keys, user_effects
 from adv2e.diagnosis.lamps import Lamp
-
-_STAMPS = 20
-_ON_TICK = 0.99
+from adv2e.diagnosis.stamps import service_times, tick_of
+from adv2e.diagnosis.stream import Stream
 
 
 @dataclass(frozen=True)
@@ -34,11 +31,14 @@ class Hints:
         Of the strongest lines in the rate.
     tick_us : int
         Largest time of which nearly all stamps are multiples.
+    service_ns : (float, float), optional
+        Times that an event and a row take, where stamps look as if they had waited for a channel.
     """
 
     seconds: float
     lamps: tuple[Lamp, ...]
     tick_us: int
+    service_ns: tuple[float, float] | None = None
 
 
 def library(declared: Config, hints: Hints) -> list[Candidate]:
@@ -211,7 +211,10 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
         Candidate(
             "readout",
             (Knob("readout.arbiter.event_ns", 1.0, 1e6), Knob("readout.arbiter.row_ns", 1.0, 1e7)),
-            ((300.0, 3000.0), (2000.0, 10000.0), (3000.0, 30000.0)),
+            (
+                *((300.0, 3000.0), (2000.0, 10000.0), (3000.0, 30000.0)),
+                *([hints.service_ns] if hints.service_ns else []),
+            ),
         ),
         Candidate(
             "event_loss",
@@ -285,20 +288,6 @@ def names(config: Config | None = None) -> list[str]:
     return list(dict.fromkeys([*built_in, *(user_effects(config) if config else ())]))
 
 
-def hints_of(times_us: np.ndarray[Any, Any], seconds: float, lamps: Sequence[Lamp]) -> Hints:
-    """Return hints from the stamps of a recording's events [us]."""
-    return Hints(seconds, tuple(lamps), _tick_of(times_us))
-
-
-def _tick_of(times_us: np.ndarray[Any, Any]) -> int:
-    """Return the largest time of which nearly all stamps are multiples [us].
-
-    Of the times themselves, not of differences: ticks count from zero.  Of few stamps at a time, so
-    that one which is wrong does not decide.
-    """
-    if len(times_us) < _STAMPS:
-        return max(1, int(np.gcd.reduce(times_us))) if len(times_us) else 1
-    groups = times_us[: len(times_us) // _STAMPS * _STAMPS].reshape(_STAMPS, -1)
-    steps, often = np.unique(np.gcd.reduce(groups, axis=0), return_counts=True)
-    step = max(1, int(steps[np.argmax(often)]))
-    return step if np.mean(times_us % step == 0) >= _ON_TICK else 1
+def hints_of(stream: Stream, seconds: float, lamps: Sequence[Lamp]) -> Hints:
+    """Return hints from the stamps of a recording's events."""
+    return Hints(seconds, tuple(lamps), tick_of(stream.t), service_times(stream))

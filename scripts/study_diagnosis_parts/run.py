@@ -85,7 +85,12 @@ def diagnosed(
             recorded = time.perf_counter()
             declared = load_config([path.with_name("recording.declared.yaml")])
             found = diagnose(
-                read_evidence(path), declared, without=case.without, threads=threads, log=noted
+                read_evidence(path),
+                declared,
+                without=case.without,
+                sizes=False,
+                threads=threads,
+                log=noted,
             )
         line |= outcome(found)
         line["truth"] = {key: _value(recorder.truth, key) for key in _fitted(found)}

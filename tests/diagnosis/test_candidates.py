@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from camera.catalogue import LIBRARY
 from hypothesis import given
@@ -12,7 +11,7 @@ from adv2e.config import Config, load_config, shipped, to_dict
 from adv2e.diagnosis.candidates import Candidate, neutral_value
 from adv2e.diagnosis.keys import about_key, flat, get_key, set_key
 from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.library import Hints, hints_of, library, names
+from adv2e.diagnosis.library import Hints, library, names
 
 HINTS = Hints(0.3, (Lamp(100.0), Lamp(63.5, 1.2)), 10)
 CONFIGS = [None, *shipped()]
@@ -120,31 +119,6 @@ def test_ticks_are_a_candidate_where_all_stamps_have_one(tick, there):
     for one in found:
         assert one.applied(Config(), []).readout.tick_us == tick
         assert one.parameters([]) == {"readout.tick_us": float(tick)}
-
-
-# --- hints ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("tick", [1, 7, 30, 64, 300, 1000])
-@pytest.mark.parametrize("start", [0, 9_999_000, 1_467_939_975_000_000])
-def test_the_tick_of_stamps(tick, start):
-    draw = np.random.default_rng(tick)
-    t = tick * (start // tick + np.sort(draw.integers(0, 10_000, 500)))
-    assert hints_of(t, 1.0, ()).tick_us == tick
-
-
-def test_single_stamps_off_the_tick_do_not_hide_it():
-    draw = np.random.default_rng(3)
-    t = 10 * np.sort(draw.integers(0, 100_000, 3000))
-    t[[7, 1500, 2999]] += 3
-    assert hints_of(t, 1.0, ()).tick_us == 10
-    t[::20] += 3
-    assert hints_of(t, 1.0, ()).tick_us == 1
-
-
-def test_stamps_that_say_nothing_of_a_tick():
-    assert hints_of(np.array([], np.int64), 1.0, ()).tick_us == 1
-    assert hints_of(np.array([0], np.int64), 1.0, (Lamp(50.0),)) == Hints(1.0, (Lamp(50.0),), 1)
 
 
 # --- knobs ---------------------------------------------------------------------------------------

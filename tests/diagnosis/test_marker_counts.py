@@ -11,7 +11,7 @@ from adv2e.diagnosis.markers.intervals import BORDERS_MS, Intervals, Runs
 from adv2e.diagnosis.markers.neighbours import Neighbours
 from adv2e.diagnosis.markers.pixels import Pixels
 from adv2e.diagnosis.markers.rates import Course, Load, Rates
-from adv2e.diagnosis.markers.stamps import TICKS_US, Gaps, Ticks
+from adv2e.diagnosis.markers.stamps import TICKS_US, Gaps, RowGaps, Ticks
 from adv2e.diagnosis.markers.timing import LAGS_MS, Drift, Lag, Phase, Shift, Spectrum
 
 SCENE = some_scene(seed=5)
@@ -221,6 +221,23 @@ def test_gaps(stream):
             if gap < reach:
                 near[part, n] += [1, pixel // WIDTH == pixel0 // WIDTH]
     same(Gaps().count(where), np.hstack([gaps, near.reshape(PARTS, -1)]))
+
+
+@several
+@given(streams())
+def test_gaps_between_rows(stream):
+    where = placed(stream, SCENE)
+    found = [[] for _ in range(PARTS)]
+    for (t0, pixel0, *_), (t, pixel, _, part) in itertools.pairwise(events(where)):
+        if pixel // WIDTH != pixel0 // WIDTH:
+            found[part].append(t - t0)
+    counted = RowGaps().count(where)
+    assert list(counted.sum(axis=1)) == [len(gaps) for gaps in found]
+    for row, gaps in zip(counted, found, strict=True):
+        if gaps:
+            expected = np.quantile(gaps, [0.1, 0.25, 0.5, 0.75], method="inverted_cdf")
+            off = np.abs(np.exp(RowGaps().values(row)) - expected)
+            assert np.all(off <= 0.501 + 0.08 * expected)  # bins of a microsecond, or of 7 %
 
 
 @several

@@ -25,7 +25,7 @@ from adv2e.diagnosis.markers import BOTH, VIEWS, Markers
 from adv2e.diagnosis.markers.intervals import Runs
 from adv2e.diagnosis.markers.neighbours import Neighbours
 from adv2e.diagnosis.markers.pixels import Pixels
-from adv2e.diagnosis.markers.stamps import Gaps, Ticks
+from adv2e.diagnosis.markers.stamps import Gaps, RowGaps, Ticks
 from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Spectrum
 from adv2e.diagnosis.parts import Parts
 
@@ -281,6 +281,17 @@ def test_gaps_see_rows_that_are_read_together():
     assert rows["same row within 3 us"] > 0.9
     assert any_row["same row within 3 us"] < 0.2
     assert rows["next after 1-2 us"] > 50
+
+
+@pytest.mark.parametrize("row_us", [20.0, 20.8, 24.0, 170.0])
+def test_gaps_between_rows_see_the_time_that_a_row_takes(row_us):
+    draw = np.random.default_rng(8)
+    rows = int(STOP_US // row_us)
+    t = np.arange(rows) * row_us
+    y = np.arange(rows) % HEIGHT
+    found = statistics(RowGaps(), placed(stream_of(t, draw.integers(0, WIDTH, rows), y, 1), SCENE))
+    for name in ("25 % of gaps between rows", "50 % of gaps between rows"):
+        assert np.exp(found[name]) == pytest.approx(row_us, rel=0.05)
 
 
 def test_neighbours_see_pairs():

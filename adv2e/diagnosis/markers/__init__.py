@@ -18,7 +18,7 @@ from adv2e.diagnosis.markers.intervals import Intervals, Runs
 from adv2e.diagnosis.markers.neighbours import Neighbours
 from adv2e.diagnosis.markers.pixels import Pixels
 from adv2e.diagnosis.markers.rates import Course, Load, Rates
-from adv2e.diagnosis.markers.stamps import Gaps, Ticks
+from adv2e.diagnosis.markers.stamps import Gaps, RowGaps, Ticks
 from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Spectrum
 from adv2e.diagnosis.scene import Placed, Scene
 
@@ -63,6 +63,7 @@ class Markers:
             Spectrum(scene),
             Ticks(),
             Gaps(),
+            RowGaps(),
             Neighbours(),
             self.pixels,
         ]

@@ -17,6 +17,11 @@ TICKS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
 _ON_TICK = np.array([[t % tick == 0 for tick in TICKS_US] for t in range(TICKS_US[-1])], float)
 _GAPS_US = (1, 2, 3, 5, 8, 12, 20, 40, 80, 160)
 _NEAR_US = (3, 12, 40, 160)
+_QUANTILES = (0.1, 0.25, 0.5, 0.75)
+_BIN_BORDERS_US = np.r_[
+    np.arange(-0.5, 100.0), np.unique(np.rint(np.geomspace(100.0, 1e5, 100)))[1:] + 0.5
+]
+"""Of the gaps counted: each one of whole microseconds by itself, longer ones within 7 %."""
 
 
 class Ticks:
@@ -88,3 +93,45 @@ class Gaps:
         """Return the statistics."""
         gaps, near = raw[: len(_GAPS_US) + 1], raw[len(_GAPS_US) + 1 :]
         return np.concatenate([stabilised(gaps), (near[1::2] + 0.5) / (near[::2] + 1.0)])
+
+
+class RowGaps:
+    """Quantiles of the times between neighbouring events of the stream that are of two rows.
+
+    A busy readout gives all of them the time that it takes for a row, however it differs.
+    """
+
+    title = "gaps between rows"
+    least = 0.02
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        return [
+            Entry(
+                f"{100 * q:g} % of gaps between rows",
+                f"logarithm of the time in us that {100 * q:g} % of events follow the one before"
+                " in the stream sooner than, of those that follow one of another row",
+            )
+            for q in _QUANTILES
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        stream = placed.stream
+        row = stream.pixel // stream.width
+        other = np.flatnonzero(np.diff(row)) + 1
+        gap = stream.t[other] - stream.t[other - 1]
+        cell = np.searchsorted(_BIN_BORDERS_US[1:-1], gap)
+        return counts(placed.part[other], cell, len(_BIN_BORDERS_US) - 1)
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics."""
+        up_to = np.cumsum(raw)
+        if up_to[-1] == 0.0:
+            return np.zeros(len(_QUANTILES))
+        wanted = np.array(_QUANTILES) * up_to[-1]
+        k = np.searchsorted(up_to, wanted)
+        in_bin = 1.0 - (up_to[k] - wanted) / raw[k]
+        gap = _BIN_BORDERS_US[k] + in_bin * np.diff(_BIN_BORDERS_US)[k]
+        return np.asarray(np.log(np.maximum(gap, 0.5)))

@@ -1,0 +1,61 @@
+"""What the stamps of a recording say of its readout: where fits start.
+
+Fits do not find the times of an arbiter by steps from anywhere: stamps of a busy channel form a
+comb, and a comb of other times is as far from it as none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.stream import Stream
+
+_STAMPS = 20
+_ON_TICK = 0.99
+
+_LEAST_US = 3
+"""Least time of a row that stands out from stamps of whole microseconds."""
+_LONGEST_US = 20_000
+_RARELY = 0.01
+_STANDS_OUT = 2.0
+_NOTHING_NS = 20.0
+
+
+def tick_of(times_us: NDArray[np.int64]) -> int:
+    """Return the largest time of which nearly all stamps are multiples [us].
+
+    Of the times themselves, not of differences: ticks count from zero.  Of few stamps at a time, so
+    that one which is wrong does not decide.
+    """
+    if len(times_us) < _STAMPS:
+        return max(1, int(np.gcd.reduce(times_us))) if len(times_us) else 1
+    groups = times_us[: len(times_us) // _STAMPS * _STAMPS].reshape(_STAMPS, -1)
+    steps, often = np.unique(np.gcd.reduce(groups, axis=0), return_counts=True)
+    step = max(1, int(steps[np.argmax(often)]))
+    return step if np.mean(times_us % step == 0) >= _ON_TICK else 1
+
+
+def service_times(stream: Stream) -> tuple[float, float] | None:
+    """Return the times that an event and the selection of a row seem to take [ns].
+
+    An arbiter (:mod:`adv2e.effects.readout.arbiter`) lets no two events of different rows out in
+    less than the time of both, and what waits for it leaves just that time later.  None where
+    stamps do not look so.
+    """
+    row, column = np.divmod(stream.pixel.astype(np.int64), stream.width)
+    gap, down, right = np.diff(stream.t), np.diff(row), np.diff(column)
+    between_rows = gap[(down != 0) & (gap < _LONGEST_US)]
+    often = np.bincount(between_rows, minlength=_LONGEST_US + 5)
+    both_us = int(np.argmax(often))
+    # what came by chance is nearly as frequent a little later
+    by_chance = often[both_us + 2 : both_us + 5]
+    if both_us < _LEAST_US or often[both_us] < _STANDS_OUT * by_chance.max():
+        return None
+    if often[: both_us - 1].sum() > _RARELY * len(between_rows):
+        return None
+    waited = np.maximum(often[both_us - 1 : both_us + 2] - by_chance, 0)
+    both_ns = 1e3 * (both_us + float(np.average([-1, 0, 1], weights=waited)))
+    latched = gap[(down == 0) & (right > 0) & (gap < both_us - 1)]
+    event_ns = max(1e3 * float(latched.mean()), _NOTHING_NS) if len(latched) else _NOTHING_NS
+    return event_ns, max(both_ns - event_ns, _NOTHING_NS)

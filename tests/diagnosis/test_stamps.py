@@ -1,0 +1,100 @@
+"""What stamps say of a readout, on streams whose readout is known."""
+
+import numpy as np
+import pytest
+from made_up_streams import stream_of
+
+from adv2e.config import Config
+from adv2e.diagnosis.lamps import Lamp
+from adv2e.diagnosis.library import Hints, hints_of, library
+from adv2e.diagnosis.stamps import service_times, tick_of
+
+SIDE = 48
+
+
+def hints(t):
+    return hints_of(stream_of(t, 0, 0, 1), 1.0, (Lamp(50.0),))
+
+
+# --- ticks ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tick", [1, 7, 30, 64, 300, 1000])
+@pytest.mark.parametrize("start", [0, 9_999_000, 1_467_939_975_000_000])
+def test_the_tick_of_stamps(tick, start):
+    draw = np.random.default_rng(tick)
+    t = tick * (start // tick + np.sort(draw.integers(0, 10_000, 500)))
+    assert tick_of(t) == hints(t).tick_us == tick
+
+
+def test_single_stamps_off_the_tick_do_not_hide_it():
+    draw = np.random.default_rng(3)
+    t = 10 * np.sort(draw.integers(0, 100_000, 3000))
+    t[[7, 1500, 2999]] += 3
+    assert tick_of(t) == 10
+    t[::20] += 3
+    assert tick_of(t) == 1
+
+
+@pytest.mark.parametrize("t", [[], [0]])
+def test_stamps_that_say_nothing(t):
+    assert hints(t) == Hints(1.0, (Lamp(50.0),), 1)
+
+
+# --- arbiters ------------------------------------------------------------------------------------
+
+
+def requests(mean_gap_us, count=6000, seed=1):
+    """Return times, columns and rows of events that ask to be read, as edges do: near each other"""
+    draw = np.random.default_rng(seed)
+    groups = np.repeat(np.sort(draw.random(count // 4)) * mean_gap_us * count, 4)
+    t = groups + draw.random(count) * 3.0
+    order = np.argsort(t)
+    return t[order], draw.integers(0, SIDE, count)[order], draw.integers(0, SIDE, count)[order]
+
+
+def read_out(t, x, y, event_us, row_us):
+    """Return the stream of a channel that takes the row that has waited longest, and all of it."""
+    waiting, out, free = list(zip(t, x, y, strict=True)), [], 0.0
+    while waiting:
+        row = waiting[0][2]
+        latch = max(free, waiting[0][0]) + row_us
+        served = [one for one in waiting if one[2] == row and one[0] <= latch]
+        waiting = [one for one in waiting if one not in served]
+        free = latch
+        for column in sorted({column for _, column, _ in served}):
+            free += event_us
+            out.append((round(free), column, row))
+    return stream_of(*np.array(out).T, 1, SIDE, SIDE)
+
+
+@pytest.mark.parametrize(
+    ("event_us", "row_us"), [(0.5, 4.0), (2.0, 10.0), (4.0, 20.0), (1.3, 7.4), (0.1, 60.0)]
+)
+@pytest.mark.parametrize("busy", [0.3, 1.5])
+def test_times_of_an_arbiter(event_us, row_us, busy):
+    stream = read_out(*requests((event_us + row_us) / busy), event_us, row_us)
+    found = service_times(stream)
+    assert found is not None
+    assert sum(found) == pytest.approx(1e3 * (event_us + row_us), abs=300.0)
+    assert found[0] == pytest.approx(1e3 * event_us, abs=300.0)
+
+
+@pytest.mark.parametrize("tick", [1, 10, 500])
+@pytest.mark.parametrize("mean_gap_us", [2.0, 20.0, 200.0, 5000.0])
+def test_no_arbiter(tick, mean_gap_us):
+    t, x, y = requests(mean_gap_us)
+    assert service_times(stream_of(t // tick * tick, x, y, 1, SIDE, SIDE)) is None
+
+
+def test_all_events_of_one_row():
+    t, x, _ = requests(20.0)
+    assert service_times(stream_of(t, x, 0, 1, SIDE, SIDE)) is None
+
+
+def test_a_fit_starts_there():
+    def probes(hint):
+        made = library(Config(), Hints(1.0, (), 1, hint))
+        return next(one for one in made if one.name == "readout").probes
+
+    assert probes((700.0, 8000.0)) == (*probes(None), (700.0, 8000.0))
