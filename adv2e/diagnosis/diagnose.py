@@ -83,7 +83,7 @@ def diagnose(
         kept = found.kept
         return Diagnosis(
             verdict=found.verdict,
-            sentence=sentence_of(found.verdict, kept, outcome),
+            sentence=sentence_of(found.verdict, kept, outcome, declared),
             recording=evidence.name,
             declared=declared_name,
             effects=[finding_of(fit) for fit in kept.fits],

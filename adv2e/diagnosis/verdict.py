@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
+from adv2e.config import Config
 from adv2e.diagnosis.bench import State
+from adv2e.diagnosis.candidates import Candidate, neutral_value
+from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.search import PER_LOOK, Outcome
 from adv2e.reports.result import ErrorRow, Verdict
 
@@ -58,7 +64,7 @@ def _too_near(error: ErrorRow) -> bool:
     return after is not None and floor is not None and after[1] < floor[0]
 
 
-def sentence_of(verdict: Verdict, kept: State, outcome: Outcome) -> str:
+def sentence_of(verdict: Verdict, kept: State, outcome: Outcome, declared: Config) -> str:
     """Return the verdict in a sentence.
 
     Parameters
@@ -68,8 +74,8 @@ def sentence_of(verdict: Verdict, kept: State, outcome: Outcome) -> str:
         The model that is reported: the declared one where nothing is named.
     outcome : Outcome
         Where the search ended.
+    declared : Config
     """
-    names = " and ".join(kept.names)
     if verdict == "consistent":
         return (
             "The recording is what the declared model makes: nothing is missing that can be seen."
@@ -90,15 +96,35 @@ def sentence_of(verdict: Verdict, kept: State, outcome: Outcome) -> str:
         best = " and ".join(outcome.state.names)
         most = f" (at most {outcome.explained:.0%} of it: {best})" if best else ""
         return f"Something is missing in the declared model that no effect known explains{most}."
+    wrong = f"The declared model {_wrong(kept.fits, declared)}"
     if verdict == "partly_explained":
         return (
-            f"The declared model lacks {names}; that explains {outcome.explained:.0%} of the"
+            f"{wrong}; that explains {outcome.explained:.0%} of the"
             f" residual, and something is left{' in the data looked at last' * only_last}."
         )
     if verdict == "not_identifiable":
         others = ", ".join(outcome.alternatives)
-        return f"The declared model lacks an effect: {names}, or as well {others}."
+        return f"{wrong}, or as well {others}."
     if min(outcome.probability, outcome.last) < PER_LOOK:
         share = f"{outcome.explained:.1%}"
-        return f"The declared model lacks {names}; that explains {share} of the residual."
-    return f"The declared model lacks {names}; with that, nothing is left that can be seen."
+        return f"{wrong}; that explains {share} of the residual."
+    return f"{wrong}; with what was fitted, nothing is left that can be seen."
+
+
+def _wrong(fits: Sequence[Fit], declared: Config) -> str:
+    """Return what the declared model lacks, and what it has, but otherwise."""
+    has = [_has(declared, fit.candidate) for fit in fits]
+    lacks, other = (
+        " and ".join(fit.candidate.name for fit, there in zip(fits, has, strict=True) if there is k)
+        for k in (False, True)
+    )
+    told = [f"lacks {lacks}"] * bool(lacks) + [f"is wrong in {other}"] * bool(other)
+    return " and ".join(told)
+
+
+def _has(declared: Config, candidate: Candidate) -> bool:
+    """Tell whether a configuration has an effect already, of whatever size."""
+    if not candidate.knobs:
+        return False
+    value = neutral_value(declared, candidate.knobs[0])
+    return value != 0.0 and math.isfinite(value)

@@ -70,7 +70,7 @@ def test_a_missing_effect_is_named_whatever_the_threads(adv2e, recordings, short
     for threads in (1, 2):
         out = tmp_path / str(threads)
         made, err = found(adv2e, recordings, "dead", out, "--threads", threads)
-        assert f"{made['verdict']}: The declared model lacks refractory" in err
+        assert f"{made['verdict']}: The declared model is wrong in refractory" in err
         reports.append(made)
     for made in reports:
         assert made["facts"].pop("time taken")

@@ -36,6 +36,7 @@ def error(before, after, floor, spread=0.02):
 
 
 GONE = error(0.8, 0.4, 0.4)
+DECLARED = Config()
 
 
 def outside(size):
@@ -62,12 +63,36 @@ def test_what_is_missing_in_the_last_part_alone_is_not_overlooked():
     search, outcome = searched(last_truth=leak)
     verdict = verdict_of(outcome, GONE)
     assert verdict == "unexplained"
-    assert "looked at last" in sentence_of(verdict, search.declared, outcome)
+    assert "looked at last" in sentence_of(verdict, search.declared, outcome, DECLARED)
     _, outcome = searched(leak, last_truth=[*leak, "pixel.refractory.period_us=900"])
     assert outcome.state.names == ("leak",)
     verdict = verdict_of(outcome, GONE)
     assert verdict == "partly_explained"
-    assert sentence_of(verdict, outcome.state, outcome).endswith("left in the data looked at last.")
+    told = sentence_of(verdict, outcome.state, outcome, DECLARED)
+    assert told.endswith("left in the data looked at last.")
+
+
+@pytest.mark.parametrize(
+    ("sets", "wrong"),
+    [
+        (["pixel.leak.rate_hz=4"], "lacks leak"),
+        (["pixel.thresholds.off=0.26"], "is wrong in thresholds"),
+        (
+            ["pixel.refractory.period_us=5000", "pixel.thresholds.off=0.26"],
+            "lacks refractory and is wrong in thresholds",
+        ),
+    ],
+)
+def test_the_sentence_tells_what_is_lacking_from_what_is_otherwise(sets, wrong):
+    _, outcome = searched(sets)
+    bare = Config(pixel=dataclasses.replace(Config().pixel, leak=None, refractory=None))
+    told = sentence_of("explained", outcome.state, outcome, bare)
+    assert (
+        told
+        == f"The declared model {wrong}; with what was fitted, nothing is left that can be seen."
+    )
+    told = sentence_of("explained", outcome.state, outcome, outcome.state.config)
+    assert "lacks" not in told
 
 
 def test_statistics_alone_are_no_explanation():
@@ -75,7 +100,7 @@ def test_statistics_alone_are_no_explanation():
     assert verdict_of(outcome, error(1.19, 0.75, 0.64)) == "explained"
     verdict = verdict_of(outcome, error(1.19, 0.88, 0.64))
     assert verdict == "unexplained"
-    assert "leak would account" in sentence_of(verdict, search.declared, outcome)
+    assert "leak would account" in sentence_of(verdict, search.declared, outcome, DECLARED)
     assert verdict_of(outcome, error(0.65, 0.66, 0.64)) == "explained"  # says nothing of leak
     assert verdict_of(outcome, error(0.45, 0.38, 0.42)) == "explained"
 
