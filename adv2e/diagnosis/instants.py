@@ -1,8 +1,8 @@
-"""In-between frames made once for many simulations, where making them takes longer than all else.
+"""Frames made once for many simulations, where making them takes longer than all else.
 
-Frames along the motion depend on the frames and their exposure alone, so they can be given to the
-pixels as if they had been recorded.  What else acts on the light of each frame is laid over them:
-it moves the motion that is found by next to nothing.
+Sharp frames, and those along the motion, depend on the frames and their exposure alone, so they can
+be given to the pixels as if they had been recorded.  What else acts on the light of each frame is
+laid over them: it moves the motion that is found by next to nothing.
 """
 
 from __future__ import annotations
@@ -25,23 +25,28 @@ Instants = tuple[list[int], NDArray[np.float32]]
 
 
 def is_made_once(config: Config) -> bool:
-    """Tell whether in-between frames may be given as frames.
+    """Tell whether sharp or in-between frames may be given as frames.
 
-    Not where an effect needs to know which of them were recorded, and not with linear
-    interpolation, which costs nothing.
+    Not where an effect needs to know which of them were recorded, and not where making them costs
+    nothing: linear interpolation, of frames as they are.
     """
     sampling, user = config.sampling, getattr(config, "user", None)
     return (
-        sampling.interpolation != "linear"
-        and sampling.L > 1
+        (_is_along_motion(config) or config.frames.exposure_us > 0.0)
         and sampling.last_interval != "printed"
         and (config.readout is None or config.readout.frame_coupling is None)
         and not any(getattr(user, name) is not None for name in user_effects(config))
     )
 
 
+def _is_along_motion(config: Config) -> bool:
+    return config.sampling.interpolation != "linear" and config.sampling.L > 1
+
+
 def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Instants:
-    """Return the frames and what is between them, sharp where they are exposed.
+    """Return the frames, sharp where they are exposed, and what is between them.
+
+    Linear interpolation is left to the pixels.
 
     Parameters
     ----------
@@ -51,11 +56,13 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     light : (frames, rows, columns)
         [DN]
     """
-    count = config.sampling.L
-    upsampler = make_upsampler(config.sampling.interpolation, count)
     frames: Iterator[Timed] = zip(times_ns, light, strict=True)
     for hook in frame_hooks(Frames(exposure_us=config.frames.exposure_us), config.sampling):
         frames = hook.light(frames)
+    if not _is_along_motion(config):
+        return times_ns, np.array([sharp for _, sharp in frames], np.float32)
+    count = config.sampling.L
+    upsampler = make_upsampler(config.sampling.interpolation, count)
     times: list[int] = []
     found: list[NDArray[np.float32]] = []
     for (t0, first), (t1, second), beside in neighbours(frames):
@@ -68,7 +75,9 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
 
 
 def as_recorded(config: Config) -> Config:
-    """Return `config` for frames between which nothing is to be made, and that are sharp."""
+    """Return `config` for what :func:`made` makes: sharp frames, and all that is between them."""
     frames = replace(config.frames, exposure_us=0.0)
+    if not _is_along_motion(config):
+        return replace(config, frames=frames)
     sampling = replace(config.sampling, L=1, interpolation="linear")
     return replace(config, frames=frames, sampling=sampling)

@@ -36,6 +36,8 @@ PER_LOOK = LEVEL / 2.0
 """The same of each look: at the data for fitting and judging, and at those looked at last."""
 
 MOST_EFFECTS = 4
+_LEAST_OF_THE_LEFT = 0.5 / MOST_EFFECTS
+"""Least share of what is left that an effect must take away for the search to go on."""
 
 _TRIED = 4
 _CATCHES_UP = 60.0  # log likelihood that a fit may gain when it is brought to its end
@@ -135,7 +137,7 @@ class Search:
         self.bench.log(f"declared model: probability of the residual {self.probability(state):.2g}")
         while self._is_something_left(state) and len(state.fits) < MOST_EFFECTS:
             grown = self._grown(state)
-            if grown is None:
+            if grown is None or self._is_patch(state, grown):
                 break
             state = grown
             self.bench.log(
@@ -158,6 +160,23 @@ class Search:
             return False
         left = max((fit.candidate.left for fit in state.fits), default=0.0)
         return self.explained(state, view) < 1.0 - left
+
+    def _is_patch(self, state: State, grown: State) -> bool:
+        """Tell whether an addition takes away so little that effects like it will not do.
+
+        The largest of the few effects that may be added makes more of what is left.
+        """
+        model = state.models[BOTH]
+        before, after = self.bench.misfit(state), self.bench.misfit(grown)
+        if before < model.limits(PER_LOOK)[0] or not self._is_something_left(grown):
+            return False  # single statistics stand out, or nothing
+        share = (before - after) / (before - model.floor)
+        if share >= _LEAST_OF_THE_LEFT:
+            return False
+        self.bench.log(f"  {grown.names[-1]} takes away {share:.0%} of what is left: too little")
+        why = f"takes away no more than {max(share, 0.0):.0%} of what is left"
+        self.bench.rejections.add(grown.fits[-1], why, final=True)
+        return True
 
     def _grown(self, state: State) -> State | None:
         """Return the model with one effect more, or two that hold only together.

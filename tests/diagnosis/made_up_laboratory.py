@@ -117,6 +117,7 @@ def searched(
     seed=RECORDING,
     declared=None,
     last_truth=None,
+    log=lambda text: None,
 ):
     """Return the search on a made-up recording, and its outcome."""
     laboratory = laboratory or MadeUpLaboratory()
@@ -125,5 +126,5 @@ def searched(
         other = laboratory.measure(load_config([], last_truth), seed, beyond)
         observed[parts.LAST] = other[parts.LAST]
     library = candidates() if library is None else library
-    search = Search(laboratory, observed, declared or Config(), library)
+    search = Search(laboratory, observed, declared or Config(), library, log=log)
     return search, search.run()

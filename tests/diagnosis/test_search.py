@@ -168,6 +168,24 @@ def test_what_no_effect_makes_is_not_explained():
     assert set(outcome.rejected) | set(outcome.state.names) == set(EFFECTS)
 
 
+def test_patches_on_something_unknown_are_not_laid_one_on_another(monkeypatch):
+    monkeypatch.setattr(search_module, "objections", lambda *of_what: [])
+    told = []
+    _, outcome = searched(
+        ["pixel.refractory.period_us=3000"], beyond=outside(60.0), log=told.append
+    )
+    assert outcome.state.names == ()
+    assert sum("too little" in line for line in told) == 1
+    assert sum("of what is left" in one.reason for one in outcome.rejected.values()) == 1
+    # an effect that is large beside what is unknown goes in, and nothing on top of it
+    told.clear()
+    _, outcome = searched(
+        ["pixel.refractory.period_us=8000"], beyond=outside(12.0), log=told.append
+    )
+    assert outcome.state.names == ("refractory",)
+    assert "too little" in told[-1]
+
+
 def test_an_effect_beside_something_unknown_is_a_part():
     _, outcome = searched(["pixel.refractory.period_us=8000"], beyond=outside(12.0))
     assert outcome.state.names[0] == "refractory"

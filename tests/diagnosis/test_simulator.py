@@ -14,6 +14,7 @@ from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Laboratory, Simulator
+from adv2e.effects.active import frame_hooks
 from adv2e.simulation import events_from_light
 from adv2e.stepping import steps_of
 from adv2e.upsampling import make_upsampler
@@ -146,6 +147,32 @@ def test_frames_along_the_motion_are_made_once_and_the_same(monkeypatch, exposed
     assert len(made) == 1
     simulator.stream(load_config([], [*FLOW, "frames.exposure_us=3000"]), 5)
     assert len(made) == 2
+    simulator.close()
+
+
+def test_frames_are_made_sharp_once_and_the_same(monkeypatch):
+    made = []
+    monkeypatch.setattr(
+        "adv2e.diagnosis.instants.frame_hooks",
+        lambda *arguments: made.append(1) or frame_hooks(*arguments),
+    )
+    simulator = Simulator(EVIDENCE, 2)
+    laid_over = [
+        "frames.black_level_dn=3",
+        "frames.clock_offset_us=700",
+        "frames.shift_px=[0.2, 0]",
+    ]
+    config = load_config([], [*LINEAR, "frames.exposure_us=15000", *laid_over])
+    light = zip(EVIDENCE.times_ns, light_of(EVIDENCE, config), strict=True)
+    whole = np.concatenate(list(events_from_light(light, replace(config, seed=5))))
+    whole = whole[whole["t"].clip(0, 199_999) == whole["t"]]
+    assert len(whole) > 500
+    np.testing.assert_array_equal(simulator.stream(config, 5).t, whole["t"])
+    simulator.stream(load_config([], [*LINEAR, "frames.exposure_us=15000"]), 6)
+    assert len(made) == 1
+    blurred = load_config([], [*LINEAR, *laid_over])
+    assert not np.array_equal(simulator.stream(blurred, 5).t, whole["t"])
+    assert len(made) == 1
     simulator.close()
 
 

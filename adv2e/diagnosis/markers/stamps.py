@@ -22,6 +22,7 @@ _BIN_BORDERS_US = np.r_[
     np.arange(-0.5, 100.0), np.unique(np.rint(np.geomspace(100.0, 1e5, 100)))[1:] + 0.5
 ]
 """Of the gaps counted: each one of whole microseconds by itself, longer ones within 7 %."""
+_BIN_OF = np.searchsorted(_BIN_BORDERS_US[1:-1], np.arange(int(_BIN_BORDERS_US[-1]) + 1))
 
 
 class Ticks:
@@ -121,9 +122,8 @@ class RowGaps:
         stream = placed.stream
         row = stream.pixel // stream.width
         other = np.flatnonzero(np.diff(row)) + 1
-        gap = stream.t[other] - stream.t[other - 1]
-        cell = np.searchsorted(_BIN_BORDERS_US[1:-1], gap)
-        return counts(placed.part[other], cell, len(_BIN_BORDERS_US) - 1)
+        gap = np.minimum(stream.t[other] - stream.t[other - 1], len(_BIN_OF) - 1)
+        return counts(placed.part[other], _BIN_OF[gap], len(_BIN_BORDERS_US) - 1)
 
     def values(self, raw: Raw) -> NDArray[np.float64]:
         """Return the statistics."""
