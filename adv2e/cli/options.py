@@ -122,7 +122,18 @@ def config_options(body: Body) -> Body:
 def output_options(body: Body) -> Body:
     """Add -o and --overwrite; the command gets ``output`` (or None) and ``overwrite``."""
     body = click.option("--overwrite", is_flag=True, help="Replace an output that exists.")(body)
-    return click.option("-o", "--output", metavar="OUT", help="Where to write.")(body)
+    return click.option(
+        "-o", "--output", metavar="OUT", help="Where to write.", callback=_not_empty
+    )(body)
+
+
+def _not_empty(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """Refuse an empty name: a variable of a shell that is not set would mean the default."""
+    if value == "":
+        raise click.BadParameter(
+            "is empty: name what to write, or leave the option out", ctx, param
+        )
+    return value
 
 
 def threads_option(body: Body) -> Body:

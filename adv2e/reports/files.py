@@ -11,7 +11,7 @@ from adv2e.reports.model_file import model_text
 from adv2e.reports.record import record_text
 from adv2e.reports.result import Diagnosis
 from adv2e.reports.wording import Wording
-from adv2e.sinks.staging import Staging
+from adv2e.sinks.staging import Staging, nearest_there
 
 NAMES = ("report.html", "report.json", "model.yaml")
 
@@ -28,9 +28,7 @@ def check_folder(folder: str | Path, *, overwrite: bool = False) -> None:
         As :func:`write_reports` raises it.
     """
     Staging(overwrite).folder(Path(folder), _foreign)
-    above = Path(folder).absolute().parent
-    while not above.exists():
-        above = above.parent
+    above = nearest_there(Path(folder).absolute())
     try:
         with tempfile.TemporaryDirectory(prefix=".adv2e-", dir=above):
             pass

@@ -90,9 +90,7 @@ class Staging:
 
     def _add(self, output: _Output) -> Path:
         self._check_free(output)
-        above = output.final.parent
-        while not os.path.lexists(above):
-            above = above.parent
+        above = nearest_there(output.final)
         if not above.is_dir():
             raise OutputError(f"{output.named}: {above} is not a folder")
         self._outputs.append(output)
@@ -169,6 +167,14 @@ class Staging:
                 shutil.rmtree(gone)
         self.discard()
         return not any(os.path.lexists(output.temporary) for output in self._outputs)
+
+
+def nearest_there(path: Path) -> Path:
+    """Return what a file or folder would be made in: the nearest above it that exists."""
+    above = path.parent
+    while not os.path.lexists(above):
+        above = above.parent
+    return above
 
 
 def _output(path: Path) -> _Output:

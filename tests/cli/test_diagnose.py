@@ -113,6 +113,46 @@ def test_a_camera_as_declared_is_consistent(adv2e, recordings, short, tmp_path):
     assert model == load_config([recordings / "none.declared.yaml"])
 
 
+BROKEN = """
+from dataclasses import dataclass
+
+from adv2e.effects.hooks import Hooks
+from adv2e.parameters import Fit, Section, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrokenParameters(Section):
+    "Raises."
+
+    share: float = parameter(0.1, unit="-", meaning="share", at_least=0, fit=Fit(0.0, 0.5, 0.1))
+
+
+class Broken(Hooks):
+    "Raises."
+
+    stage = "readout"
+    Parameters = BrokenParameters
+
+    def events(self, chunks):
+        for events in chunks:
+            yield events[: len(events) // 0]
+"""
+
+
+def test_an_own_effect_that_raises_is_named_with_its_line(adv2e, recordings, short, tmp_path):
+    effect, out = tmp_path / "broken.py", tmp_path / "out"
+    effect.write_text(BROKEN, "utf-8")
+    status, _, err = adv2e(
+        "diagnose", recordings / "dead.zip", "-c", recordings / "dead.declared.yaml", "-o", out,
+        *WITHOUT, "--effect", effect,
+    )  # fmt: skip
+    assert status == 1
+    line = 1 + BROKEN.splitlines().index("            yield events[: len(events) // 0]")
+    assert err.splitlines()[-1].startswith("adv2e: error: ")
+    assert f"broken.py:{line}: effect broken: ZeroDivisionError: " in err
+    assert not out.exists()
+
+
 def test_an_effect_that_does_not_exist(adv2e, tmp_path):
     status, out, err = adv2e("diagnose", tmp_path / "a.zip", "--without", "refractry")
     assert (status, out) == (2, "")
