@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from adv2e.config import Config
-from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.evidence import LEAST_EVENTS, Evidence
 from adv2e.diagnosis.stream import Stream
+from adv2e.errors import DataError
 from adv2e.reports.result import Masked
 
 AFFORDABLE_S = 0.2
@@ -36,6 +37,11 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
     evidence : Evidence
     declared : Config
         Its `sampling` and the form of its filter decide what a simulation costs.
+
+    Raises
+    ------
+    DataError
+        Too few events are left.
     """
     low_pass = declared.pixel.low_pass
     each = 1 if low_pass is None or low_pass.update == "exact" else _STEPPED
@@ -62,6 +68,12 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
         if intervals < _FEWEST:
             break
         kept = _shortened(whole, intervals)
+    if kept is not evidence and len(kept.stream) < LEAST_EVENTS:
+        raise DataError(
+            f"{evidence.name}: {len(kept.stream)} events in the {kept.width}x{kept.height} pixels"
+            f" and {kept.seconds:.3g} s that can be simulated often enough; at least {LEAST_EVENTS}"
+            " are needed"
+        )
     return kept
 
 

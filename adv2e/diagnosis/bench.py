@@ -183,10 +183,11 @@ def _joined(fits: tuple[Fit, ...], declared: Config, free: tuple[Knob, ...]) -> 
     """Return one fit of all effects together, and of the keys that are not known, the last."""
     knobs = (*(knob for fit in fits for knob in fit.candidate.knobs), *free)
     extra = tuple(pair for fit in fits for pair in fit.candidate.extra)
+    defaults = tuple(pair for fit in fits for pair in fit.candidate.defaults)
     name = " and ".join(fit.candidate.name for fit in fits)
     unknown = [knob.inner(neutral_value(declared, knob)) for knob in free]
     place = np.concatenate([*(fit.place for fit in fits), unknown])
-    return Fit(Candidate(name, knobs, (), extra), declared, place, reach=_REACH)
+    return Fit(Candidate(name, knobs, (), extra, defaults), declared, place, reach=_REACH)
 
 
 def parted(joint: Fit, fits: tuple[Fit, ...]) -> tuple[Fit, ...]:

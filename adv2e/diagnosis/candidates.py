@@ -34,6 +34,8 @@ class Knob:
         Place in a key that is a list.
     text : str
         How a key that is text holds the number, such as ``gamma:{}``.
+    neutral : float, optional
+        Where the effect does nothing; default: what the configuration holds, or nothing.
     """
 
     key: str
@@ -43,6 +45,7 @@ class Knob:
     scale: float = 1.0
     part: int | None = None
     text: str = ""
+    neutral: float | None = None
 
     def inner(self, value: float) -> float:
         """Return where on the fitted scale `value` is."""
@@ -70,8 +73,10 @@ class Candidate:
     knobs : tuple of Knob
     probes : tuple of tuple of float
         Values from which the fit may start.
-    extra : mapping
+    extra : tuple of (str, value)
         Keys that are set besides, and not fitted.
+    defaults : tuple of (str, value)
+        Keys that are set where the section that they lie in is off.
     left : float
         Share of the residual that is put down to the fit where the model has this effect: more of
         those that undo what cannot be undone in full.
@@ -81,6 +86,7 @@ class Candidate:
     knobs: tuple[Knob, ...]
     probes: tuple[tuple[float, ...], ...]
     extra: tuple[tuple[str, Any], ...] = ()
+    defaults: tuple[tuple[str, Any], ...] = ()
     left: float = 0.02
 
     def inner(self, values: Sequence[float]) -> list[float]:
@@ -89,7 +95,11 @@ class Candidate:
 
     def applied(self, config: Config, inner: Places) -> Config:
         """Return `config` with this effect."""
-        return from_values(self._set(to_dict(config), inner), self.name, config)
+        values = to_dict(config)
+        for key, value in self.defaults:
+            if get_key(values, key.rpartition(".")[0]) is None:
+                set_key(values, key, value)
+        return from_values(self._set(values, inner), self.name, config)
 
     def parameters(self, inner: Places) -> dict[str, Any]:
         """Return the keys that this effect sets, and their values."""
@@ -126,9 +136,9 @@ _OFF_AT_INFINITY = (
 
 def neutral_value(config: Config, knob: Knob) -> float:
     """Return the value of a knob at which `config` is as it was: what it holds, or nothing."""
+    if knob.neutral is not None:
+        return knob.neutral
     held = get_key(to_dict(config), knob.key)
-    if knob.text:
-        return exponent(str(held))
     if knob.part is not None and isinstance(held, (list, tuple)):
         held = held[knob.part]
     if isinstance(held, (int, float)):

@@ -98,10 +98,13 @@ def rejected_of(outcome: Outcome, kept: State, candidates: Sequence[Candidate]) 
     names = list(dict.fromkeys(candidate.name for candidate in candidates))
     held = dict(outcome.rejected)
     if outcome.state is not kept:
+        why = "explains a part, but too much is left to name it"
+        if outcome.complete:
+            why = "would account for every statistic, but not for where and when events come"
         for fit in outcome.state.fits:
             held[fit.candidate.name] = Rejected(
                 fit.candidate.name,
-                "explains a part, but too much is left to name it",
+                why,
                 fit.candidate.parameters(fit.place),
             )
     return [held[name] for name in names if name in held and name not in kept.names]

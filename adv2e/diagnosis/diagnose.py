@@ -74,9 +74,15 @@ def diagnose(
     evidence = affordable(evidence, declared)
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
         ready = make_ready(evidence, declared, simulator, without, free_thresholds, log)
-        declared, evidence, candidates = ready.declared, ready.evidence, ready.candidates
+        declared, evidence = ready.declared, ready.evidence
         search = Search(
-            ready.laboratory, ready.observed, declared, candidates, ready.error, log, ready.free
+            ready.laboratory,
+            ready.observed,
+            declared,
+            ready.candidates,
+            ready.error,
+            log,
+            ready.free,
         )
         outcome = search.run()
         found = conclude(ready, search, outcome)
@@ -89,14 +95,16 @@ def diagnose(
             effects=[finding_of(fit) for fit in kept.fits],
             alternatives=outcome.alternatives if kept.fits else [],
             nuisances=thresholds_of(kept.config) if free_thresholds else {},
-            rejected=rejected_of(outcome, kept, candidates),
+            rejected=rejected_of(outcome, kept, search.candidates),
             errors=found.errors,
             global_p_before=search.probability(search.declared, parts.LAST),
             global_p_after=search.probability(kept, parts.LAST),
             signatures=signatures_of(ready, search, kept),
             curves=found.gallery.curves(),
             maps=found.gallery.maps(),
-            detectable=detectable(search.bench, search.declared, candidates) if sizes else [],
+            detectable=detectable(search.bench, search.declared, search.candidates)
+            if sizes
+            else [],
             masked=evidence.masked,
             split=ready.laboratory.scene.parts.text(),
             notes=[*evidence.notes, about_interpolation(ready, search)],

@@ -13,10 +13,10 @@ from typing import Any
 
 from adv2e.config import Config, to_dict
 from adv2e.diagnosis.candidates import Candidate, Knob, exponent
+from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.keys import get_key, known_keys, user_effects
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.stamps import service_times, tick_of
-from adv2e.diagnosis.stream import Stream
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class Hints:
         Of the strongest lines in the rate.
     tick_us : int
         Largest time of which nearly all stamps are multiples.
+    encoding : str
+        What ``frames.encoding: auto`` means for the frames.
     service_ns : (float, float), optional
         Times that an event and a row take, where stamps look as if they had waited for a channel.
     """
@@ -38,6 +40,7 @@ class Hints:
     seconds: float
     lamps: tuple[Lamp, ...]
     tick_us: int
+    encoding: str = "linear"
     service_ns: tuple[float, float] | None = None
 
 
@@ -179,7 +182,7 @@ def _of_the_comparator(now: _Now, times: _Times, values: Any, hints: Hints) -> l
             "photo_leak",
             (Knob("pixel.leak.photo_rate_hz", 1e-2, 1000.0),),
             ((1.5,), (5.0,), (15.0,)),
-            (("pixel.leak.rate_hz", 0.0),) if get_key(values, "pixel.leak") is None else (),
+            defaults=(("pixel.leak.rate_hz", 0.0),),
         ),
         Candidate(
             "shot_noise", (Knob("pixel.shot_noise.rate_hz", 1e-3, 500.0),),
@@ -261,13 +264,14 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
             ("frames.flicker.phase_rad", lamp.phase_rad),
         )
         made.append(Candidate("flicker", (depth,), ((0.06,), (0.15,), (0.35,)), read_off))
-    made += _encodings(values)
+    made += _encodings(values, hints)
     return made
 
 
-def _encodings(values: Mapping[str, Any]) -> list[Candidate]:
-    here = exponent(str(get_key(values, "frames.encoding")))
-    gamma = Knob("frames.encoding", 0.2, 5.0, text="gamma:{}")
+def _encodings(values: Mapping[str, Any], hints: Hints) -> list[Candidate]:
+    held = str(get_key(values, "frames.encoding"))
+    here = exponent(hints.encoding if held == "auto" else held)
+    gamma = Knob("frames.encoding", 0.2, 5.0, text="gamma:{}", neutral=here)
     return [
         Candidate("frame_encoding", (gamma,), tuple((here * f,) for f in (0.8, 1.15, 1.5))),
     ]
@@ -288,6 +292,9 @@ def names(config: Config | None = None) -> list[str]:
     return list(dict.fromkeys([*built_in, *(user_effects(config) if config else ())]))
 
 
-def hints_of(stream: Stream, seconds: float, lamps: Sequence[Lamp]) -> Hints:
-    """Return hints from the stamps of a recording's events."""
-    return Hints(seconds, tuple(lamps), tick_of(stream.t), service_times(stream))
+def hints_of(evidence: Evidence, lamps: Sequence[Lamp]) -> Hints:
+    """Return hints from a recording, and the lamps that may have lit it."""
+    stream = evidence.stream
+    return Hints(
+        evidence.seconds, tuple(lamps), tick_of(stream.t), evidence.encoding, service_times(stream)
+    )

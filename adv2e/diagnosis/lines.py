@@ -18,6 +18,7 @@ _PADDING = 8
 _BESIDE = 16 * _PADDING
 _MOST = 2
 _APART_HZ = 5.0
+_SAME_HZ = 2.0
 
 
 def strongest_lines(stream: Stream, pilot: Sequence[Stream], scene: Scene) -> tuple[float, ...]:
@@ -88,7 +89,11 @@ class _Heights:
                 best = int(np.argmax(height))
                 if np.isneginf(height[best]):
                     break
-                if all(abs(self.hz[best] - other) > 2.0 for other, _ in found):
-                    found.append((float(self.hz[best]), float(height[best])))
+                line = float(self.hz[best]), float(height[best])
+                same = [k for k, (hz, _) in enumerate(found) if abs(hz - line[0]) <= _SAME_HZ]
+                if not same:
+                    found.append(line)
+                elif line[1] > found[same[0]][1]:  # it stands out more of ON less OFF
+                    found[same[0]] = line
                 height[np.abs(self.hz - self.hz[best]) < _APART_HZ] = -np.inf
         return sorted(found, key=lambda line: -line[1])

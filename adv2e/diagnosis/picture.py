@@ -73,7 +73,7 @@ class Gallery:
             self._curve(
                 "Light before and after an event",
                 "time before the event [ms]",
-                "mean change of log light in its direction",
+                "mean change of log light in its direction, at most 20 [1/s]",
                 middle,
                 self._lags,
             ),
@@ -186,7 +186,7 @@ def _gap_counts(borders_ms: Array, same: bool) -> _Measure:
     def measure(placed: Placed) -> Array:
         stream = placed.stream
         used = (stream.since >= 0) & ((stream.on == stream.on_before) == same)
-        gap = np.maximum(stream.since[used] * 1e-3, borders_ms[0])
+        gap = np.clip(stream.since[used] * 1e-3, borders_ms[0], borders_ms[-1])
         return np.histogram(gap, borders_ms)[0].astype(np.float64)
 
     return measure

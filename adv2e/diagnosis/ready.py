@@ -101,7 +101,7 @@ def make_ready(
     measured = Placed.of(evidence.stream, scene)
     laboratory = Laboratory(simulator, scene, markers, error.bias if error else None)
     lamps = _lamps(evidence, declared, simulator, scene, streams)
-    hints = hints_of(evidence.stream, evidence.seconds, lamps)
+    hints = hints_of(evidence, lamps)
     return Ready(
         evidence,
         declared,

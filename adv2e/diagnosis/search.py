@@ -100,6 +100,11 @@ class Search:
         Told of each step.
     free : tuple of Knob
         Keys that are not known: fitted with all effects, and no effect themselves.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        Those that compete.
     """
 
     def __init__(
@@ -113,7 +118,7 @@ class Search:
         free: tuple[Knob, ...] = (),
     ) -> None:
         unknown = {knob.key for knob in free}
-        self._candidates = [
+        self.candidates = [
             one for one in candidates if not unknown & {knob.key for knob in one.knobs}
         ]
         self._simulator = laboratory.simulator
@@ -215,8 +220,8 @@ class Search:
         fit has ended, an effect may be behind another for that alone: all that are close are tried.
         Others are, one after another, where none of these holds.
         """
-        self._simulator.likely = self._simulator.done + likely_simulations(self._candidates)
-        trials = finalists(self.bench, state, self._candidates)
+        self._simulator.likely = self._simulator.done + likely_simulations(self.candidates)
+        trials = finalists(self.bench, state, self.candidates)
         best: dict[str, Trial] = {}
         for trial in trials:
             best.setdefault(trial.name, trial)
@@ -278,7 +283,7 @@ class Search:
 
     def _backward(self, state: State) -> State:
         """Drop effects without which the others, fitted again, do as well, one after another."""
-        for fit in state.fits[:-1] if len(state.fits) > 1 else ():
+        for fit in state.fits[:-1]:
             rest = tuple(other for other in state.fits if other is not fit)
             without = self.bench.settled(rest, state.models[BOTH].sd)
             loss = self.bench.likelihood(state) - self.bench.likelihood(without)

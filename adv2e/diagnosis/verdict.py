@@ -124,7 +124,5 @@ def _wrong(fits: Sequence[Fit], declared: Config) -> str:
 
 def _has(declared: Config, candidate: Candidate) -> bool:
     """Tell whether a configuration has an effect already, of whatever size."""
-    if not candidate.knobs:
-        return False
-    value = neutral_value(declared, candidate.knobs[0])
-    return value != 0.0 and math.isfinite(value)
+    values = (neutral_value(declared, knob) for knob in candidate.knobs)
+    return any(value != 0.0 and math.isfinite(value) for value in values)

@@ -206,7 +206,39 @@ def test_a_knob_may_be_part_of_a_text():
     ],
 )
 def test_the_value_of_a_knob_at_which_nothing_changes(key, part, sets, value):
-    assert neutral_value(load_config([], sets), KNOBS[key, part]) == value
+    declared = load_config([], sets)
+    knobs = {(knob.key, knob.part): knob for one in library(declared, HINTS) for knob in one.knobs}
+    assert neutral_value(declared, knobs[key, part]) == value
+
+
+def test_what_auto_means_for_the_frames_decides_where_nothing_changes():
+    def tone(sets, means):
+        made = library(load_config([], sets), Hints(1.0, (), 1, means))
+        return next(one for one in made if one.name == "frame_encoding")
+
+    linear, srgb = tone([], "linear"), tone([], "srgb")
+    assert [neutral_value(Config(), one.knobs[0]) for one in (linear, srgb)] == [1.0, 2.2]
+    assert [value for (value,) in srgb.probes] == pytest.approx(
+        [2.2 * value for (value,) in linear.probes]
+    )
+    assert tone(["frames.encoding=gamma:1.4"], "srgb") == tone(
+        ["frames.encoding=gamma:1.4"], "linear"
+    )
+
+
+def test_light_leaks_leave_other_leaks_as_they_are():
+    declared = load_config(["ideal"])
+    assert declared.pixel.leak is None
+    leak, photo = (
+        next(one for one in library(declared, HINTS) if one.name == name)
+        for name in ("leak", "photo_leak")
+    )
+    alone = photo.applied(declared, photo.inner([5.0]))
+    assert alone.pixel.leak.rate_hz == 0.0
+    assert alone.pixel.leak.photo_rate_hz == pytest.approx(5.0)
+    both = photo.applied(leak.applied(declared, leak.inner([2.0])), photo.inner([5.0]))
+    assert both.pixel.leak.rate_hz == pytest.approx(2.0)
+    assert photo.parameters(photo.inner([5.0])) == {"pixel.leak.photo_rate_hz": pytest.approx(5.0)}
 
 
 @pytest.mark.parametrize("name", CONFIGS)

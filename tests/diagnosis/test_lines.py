@@ -30,6 +30,22 @@ def test_lamps_are_found_whatever_the_frame_rate(hz, fps):
     assert found[0] == pytest.approx(hz, abs=0.5)
 
 
+def test_a_line_of_all_events_and_of_their_signs_is_as_high_as_the_higher():
+    """A lamp shows in both, or a faint line of all events would put a strong one behind others."""
+    draw = np.random.default_rng(4)
+    lamp, other = lit(100.0, 1.0, 3, depth=0.9), lit(141.0, 1.0, 4, depth=0.35)
+    t = draw.integers(0, 1_000_000, 30_000)
+    t = t[draw.random(t.size) < 0.5 + 0.07 * np.cos(2e-4 * np.pi * t)]
+    beside = stream_of(t, *draw.integers(0, 12, (2, t.size)), draw.integers(0, 2, t.size))
+    parts = (lamp, other, beside)
+    stream = stream_of(
+        np.concatenate([one.t for one in parts]), 0, 0, np.concatenate([one.on for one in parts])
+    )
+    pilot = [random_stream(len(stream), seed, stop_us=1_000_000) for seed in range(8)]
+    found = strongest_lines(stream, pilot, seen_at(23.7, 1.0))
+    assert found[0] == pytest.approx(100.0, abs=0.5)
+
+
 def test_what_simulations_have_in_time_with_the_frames_is_no_lamp():
     pilot = [lit(100.0, 1.0, seed, depth=0.5) for seed in range(8)]
     found = strongest_lines(lit(100.0, 1.0, 9, depth=0.45), pilot, seen_at(25.0, 1.0))

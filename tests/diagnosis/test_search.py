@@ -18,7 +18,7 @@ from adv2e.config import Config, load_config
 from adv2e.diagnosis import search as search_module
 from adv2e.diagnosis.bench import Rejections, parted
 from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.conclusion import finding_of
+from adv2e.diagnosis.conclusion import finding_of, rejected_of
 from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.markers import BOTH
@@ -95,12 +95,25 @@ def test_the_sentence_tells_what_is_lacking_from_what_is_otherwise(sets, wrong):
     assert "lacks" not in told
 
 
+@pytest.mark.parametrize("shift", ["[0, 2]", "[2, 0]"])
+def test_any_key_of_an_effect_makes_it_one_that_is_there(shift):
+    knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
+    fit = Fit(Candidate("misregistration", knobs, ()), DECLARED, np.zeros(2))
+    _, outcome = searched(["pixel.leak.rate_hz=4"])
+    state = dataclasses.replace(outcome.state, fits=(fit,))
+    for sets, wrong in (([f"frames.shift_px={shift}"], "is wrong in"), ([], "lacks")):
+        told = sentence_of("explained", state, outcome, load_config([], sets))
+        assert f"The declared model {wrong} misregistration" in told
+
+
 def test_statistics_alone_are_no_explanation():
     search, outcome = searched(["pixel.leak.rate_hz=4"])
     assert verdict_of(outcome, error(1.19, 0.75, 0.64)) == "explained"
     verdict = verdict_of(outcome, error(1.19, 0.88, 0.64))
     assert verdict == "unexplained"
     assert "leak would account" in sentence_of(verdict, search.declared, outcome, DECLARED)
+    refused = {one.name: one for one in rejected_of(outcome, search.declared, candidates())}
+    assert refused["leak"].reason.startswith("would account for every statistic")
     assert verdict_of(outcome, error(0.65, 0.66, 0.64)) == "explained"  # says nothing of leak
     assert verdict_of(outcome, error(0.45, 0.38, 0.42)) == "explained"
 

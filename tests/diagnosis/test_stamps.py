@@ -5,6 +5,7 @@ import pytest
 from made_up_streams import stream_of
 
 from adv2e.config import Config
+from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.library import Hints, hints_of, library
 from adv2e.diagnosis.stamps import service_times, tick_of
@@ -13,7 +14,8 @@ SIDE = 48
 
 
 def hints(t):
-    return hints_of(stream_of(t, 0, 0, 1), 1.0, (Lamp(50.0),))
+    evidence = Evidence("made up", [], np.array([0.0, 1.0]), stream_of(t, 0, 0, 1), 1, 1, "srgb")
+    return hints_of(evidence, (Lamp(50.0),))
 
 
 # --- ticks ---------------------------------------------------------------------------------------
@@ -38,7 +40,7 @@ def test_single_stamps_off_the_tick_do_not_hide_it():
 
 @pytest.mark.parametrize("t", [[], [0]])
 def test_stamps_that_say_nothing(t):
-    assert hints(t) == Hints(1.0, (Lamp(50.0),), 1)
+    assert hints(t) == Hints(1.0, (Lamp(50.0),), 1, "srgb")
 
 
 # --- arbiters ------------------------------------------------------------------------------------
@@ -94,7 +96,7 @@ def test_all_events_of_one_row():
 
 def test_a_fit_starts_there():
     def probes(hint):
-        made = library(Config(), Hints(1.0, (), 1, hint))
+        made = library(Config(), Hints(1.0, (), 1, service_ns=hint))
         return next(one for one in made if one.name == "readout").probes
 
     assert probes((700.0, 8000.0)) == (*probes(None), (700.0, 8000.0))

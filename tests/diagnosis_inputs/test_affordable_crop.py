@@ -9,6 +9,7 @@ from adv2e.diagnosis import affordable as affordable_module
 from adv2e.diagnosis.affordable import affordable
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.stream import Stream
+from adv2e.errors import DataError
 
 WIDTH, HEIGHT = 96, 80
 TIMES = np.arange(6) * 0.01
@@ -110,3 +111,14 @@ def test_of_long_recordings_the_busiest_stretch_is_kept(monkeypatch):
     assert kept.masked[-1].what == f"time outside {kept.times_s[0]:.3f} to {kept.times_s[-1]:.3f} s"
     assert kept.masked[-1].share == pytest.approx(1 - inside.mean())
     assert kept.notes[-1].startswith("0.3 of 1 s were looked at")
+
+
+def test_a_crop_with_too_few_events_is_told(monkeypatch):
+    whole = recording()
+    limit(monkeypatch, WIDTH * HEIGHT // 3)
+    monkeypatch.setattr(affordable_module, "LEAST_EVENTS", len(whole.stream) + 1)
+    expected = f"spot: {len(whole.stream)} events in the 56x48 pixels and 0.05 s that can be"
+    with pytest.raises(DataError, match=expected):
+        affordable(whole, CONFIG)
+    limit(monkeypatch, WIDTH * HEIGHT)  # the reader has checked what is not cropped
+    assert affordable(whole, CONFIG) is whole

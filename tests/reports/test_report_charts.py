@@ -240,6 +240,12 @@ def test_maps_are_enlarged_and_upright():
     assert 'alt="a &quot;map&quot;"' in image
 
 
+@pytest.mark.parametrize("shape", [(480, 1), (1, 480), (100, 2)])
+def test_maps_of_narrow_sensors_are_no_larger_than_others(shape):
+    shown = picture(map_image(np.zeros(shape), "map"))
+    assert max(shown.shape) <= 900
+
+
 def test_large_maps_are_averaged():
     values = np.full((4, 1000), 2.0)
     values[:2, :3] = [[1, 2, NAN], [NAN, NAN, NAN]]

@@ -26,7 +26,7 @@ class Entry:
     meaning : str
         What it measures, in a sentence.
     is_number : bool
-        A number of events, which is compared as :func:`stabilised` puts it.
+        A number, of events or pixels, which is compared as :func:`stabilised` puts it.
     """
 
     name: str

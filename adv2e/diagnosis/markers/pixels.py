@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.markers.base import Entry, Raw
+from adv2e.diagnosis.markers.base import Entry, Raw, stabilised
 from adv2e.diagnosis.scene import Placed, Scene
 
 HALVES = 2
@@ -51,11 +51,13 @@ class Pixels:
             Entry("ON persists", "how excess of ON in one half of the time returns in the other"),
             Entry("OFF persists", "how excess of OFF in one half of the time returns in the other"),
             Entry("ON becomes OFF", "how excess of ON in one half goes with OFF in the other"),
-            Entry("loudest pixels", "excess of the loudest hundredth of the pixels"),
-            Entry("loudest pixel", "excess of the loudest pixel"),
-            Entry(_SILENT, "number of pixels that should have fired and did not"),
-            Entry("rows", "spread of rows over that of pixels"),
-            Entry("columns", "spread of columns over that of pixels"),
+            Entry(
+                "loudest pixels", "logarithm of one and the mean excess of the loudest hundredth"
+            ),
+            Entry("loudest pixel", "logarithm of one and the excess of the loudest pixel"),
+            Entry(_SILENT, "number of pixels that should have fired and did not", is_number=True),
+            Entry("rows", "logarithm of the variance of the mean excess of a row"),
+            Entry("columns", "logarithm of the variance of the mean excess of a column"),
             Entry("beside", "how excess goes with that of the pixel beside"),
             Entry("below", "how excess goes with that of the pixel below"),
             Entry("towards the corners", "excess towards the corners, ON and OFF"),
@@ -110,7 +112,7 @@ class Pixels:
                 _product(residual[0, 1], residual[1, 0]) + _product(residual[0, 0], residual[1, 1]),
                 np.log1p(max(0.0, float(ordered[-top:].mean()))),
                 np.log1p(max(0.0, float(ordered[-1]))),
-                2.0 * np.sqrt(silent.sum() + 0.375),
+                float(stabilised(silent.sum())),
                 float(np.log(np.var(both.mean(axis=1)) + 1e-3)),
                 float(np.log(np.var(both.mean(axis=0)) + 1e-3)),
                 _product(both[:, 1:], both[:, :-1]),

@@ -97,7 +97,7 @@ def map_image(values: Map, description: str) -> Markup:
         Alternative text.
     """
     values = reduced(values, reduction(values))
-    factor = max(1, -(-_WIDTH // values.shape[1]))
+    factor = max(1, -(-_WIDTH // max(values.shape)))
     picture = colours(values).repeat(factor, axis=0).repeat(factor, axis=1)
     done, data = cv2.imencode(".png", picture[:, :, ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
     assert done
