@@ -33,7 +33,7 @@ from adv2e.comparison.distances import distances
 from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config, load_config, to_dict
-from adv2e.diagnosis.keys import flat
+from adv2e.config.paths import flat
 from adv2e.diagnosis.nuisances import totals
 from adv2e.errors import Adv2eError, OutputError
 from adv2e.events import Events, empty_events

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
@@ -15,10 +14,11 @@ from adv2e.characterisation.declared import Declared
 from adv2e.characterisation.latency_problem import LatencyProblem
 from adv2e.characterisation.measurements import Latencies, measurements_of
 from adv2e.characterisation.noise_problem import HOT_FRACTION, HOT_RATE, NoiseProblem
-from adv2e.characterisation.problem import Problem
+from adv2e.characterisation.problem import Problem, held_rows, is_key
 from adv2e.characterisation.selection import Draws, Model, Selection, Selector
 from adv2e.characterisation.table import Table
 from adv2e.config import to_dict
+from adv2e.config.paths import set_key
 from adv2e.errors import DataError
 from adv2e.reports.result import (
     Band,
@@ -33,8 +33,6 @@ from adv2e.reports.result import (
 )
 
 Array = NDArray[np.float64]
-
-_CURVE_POINTS = 60
 
 
 @dataclass(frozen=True)
@@ -57,6 +55,8 @@ class Settings:
         Of the drawn tables.
     draws : int
         How many are drawn.
+    tick : callable
+        Called with a line of progress.
     """
 
     where: Sequence[str] = ()
@@ -168,22 +168,15 @@ def found_model(
 
     Keys that were not written stand as they were fitted: effects that are not found are off.
     """
-    tree = copy.deepcopy(to_dict(declared.config))
+    tree = to_dict(declared.config)
     values = dict(model.values)
     if isinstance(problem, NoiseProblem) and HOT_RATE in values:
         values[HOT_FRACTION] = problem.hot_fraction
     for key, value in problem.neutral.items():
         values.setdefault(key, value)
-    for path, value in values.items():
-        if "[" in path:
-            continue
-        *sections, name = path.split(".")
-        at = tree
-        for section in sections:
-            if not isinstance(at.get(section), dict):
-                at[section] = {}
-            at = at[section]
-        at[name] = value
+    for key, value in values.items():
+        if is_key(key):
+            set_key(tree, key, value)
     return tree
 
 
@@ -227,19 +220,16 @@ def _alternatives(chosen: Selection) -> list[str]:
 
 
 def _errors(chosen: Selection, problem: Problem) -> list[ErrorRow]:
-    floor = float(np.sqrt((problem.error**2).mean()))
-    held = f"root mean square of ln(measured/predicted) {problem.what}, on light held out"
+    held = f"weighted root mean square of ln(measured/predicted) {problem.what}, on light held out"
+    floor = float(np.sqrt(chosen.floors.mean()))
     rows = [_row(held, chosen.before.error, chosen.after.error, floor)]
-    levels = np.unique(problem.level[_held(problem)])
+    levels = np.unique(problem.level[held_rows(problem)])
     for k, level in enumerate(levels if levels.size > 1 else ()):
         light = float(problem.light[problem.level == level][0])
-        before, after = (float(m.errors[k] ** 0.5) for m in (chosen.before, chosen.after))
-        rows.append(_row(f"the same, at {light:g} {problem.light_unit}", before, after, floor))
+        at_level = (chosen.before.errors[k], chosen.after.errors[k], chosen.floors[k])
+        name = f"the same, at {light:g} {problem.light_unit}"
+        rows.append(_row(name, *(float(square**0.5) for square in at_level)))
     return rows
-
-
-def _held(problem: Problem) -> NDArray[np.bool_]:
-    return problem.judged if problem.judged.any() else ~problem.judged
 
 
 def _row(name: str, before: float, after: float, floor: float) -> ErrorRow:
@@ -278,7 +268,7 @@ def _band(problem: Problem, model: Model, draws: Draws, rows: NDArray[np.int64])
         values = dict(zip(keys, np.exp(logs).tolist(), strict=True))
         return np.exp(problem.predict(values)[rows])
 
-    many = np.array([at(logs) for logs in draws.logs[:_CURVE_POINTS]])
+    many = np.array([at(logs) for logs in draws.logs])
     low, high = np.quantile(many, (0.025, 0.975), axis=0)
     return Band(at(model.fit.logs), low, high)
 

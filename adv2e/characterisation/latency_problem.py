@@ -55,8 +55,8 @@ class LatencyProblem:
         Light of 255 DN, in the table's unit; default: the highest.
     contrast : float
         Size of the steps [ln] where the table does not say.
-    assumed_error : float, optional
-        Relative error of rows where the table does not say.
+    stated_error : float, optional
+        Relative error of every row, whatever the table says.
     """
 
     what = "latency"
@@ -69,7 +69,7 @@ class LatencyProblem:
         judged: NDArray[np.bool_],
         white: float | None = None,
         contrast: float = 1.0,
-        assumed_error: float | None = None,
+        stated_error: float | None = None,
     ) -> None:
         self.measured = np.log(data.latency_us)
         self.light, self.level, self.judged = data.light, levels_of(data.light), judged
@@ -89,17 +89,16 @@ class LatencyProblem:
         )
         cells = list(zip(self._group, self.light, self._contrast, strict=True))
         self.error, self.error_source = row_errors(
-            data.error, self.measured, cells, ASSUMED_ERROR, LEAST_ERROR, assumed_error
+            data.error, self.measured, cells, ASSUMED_ERROR, LEAST_ERROR, stated_error
         )
         self.nuisances = self._nuisances()
         self.candidates = self._candidates(data)
         self.out_of_reach: Mapping[str, str] = _OUT_OF_REACH
         self.notes = self._notes(data, contrast)
 
-    def predict(self, values: Mapping[str, float], light: Array | None = None) -> Array:
+    def predict(self, values: Mapping[str, float]) -> Array:
         """Return ln of the latency [us], (rows,)."""
         held = self._declared.held
-        light = self.light if light is None else light
 
         def value(key: str, neutral: float | None) -> float | None:
             return values[key] if key in values else held(key, neutral)
@@ -109,7 +108,7 @@ class LatencyProblem:
 
         without = self._without_low_pass and CUTOFF not in values
         cutoff, dark, stray = number(CUTOFF), number(DARK_CUTOFF), number(DARK_CURRENT)
-        bright = 255.0 * light / self._white
+        bright = 255.0 * self.light / self._white
         dim = bright * np.exp(-self._contrast)
         step = np.log((bright + stray) / (dim + stray))
         after = np.where(self._polarity == 1, bright, dim) + stray

@@ -123,14 +123,19 @@ def measurements_of(table: Table) -> Latencies | Noise:
     column = light_column(table)
     light = table.numbers(column, above=0.0)
     table.require(column, "a number")
-    if np.unique(light).size < LEAST_LEVELS:
-        raise DataError(
-            f"{table.name}: {column}: has {np.unique(light).size} different values, at least"
-            f" {LEAST_LEVELS} are needed to hold one out"
-        )
+    _check_levels(table, light, f"{column}: has")
     if times:
         return _latencies(table, times[0], light, LIGHTS[column])
     return _noise(table, light, LIGHTS[column])
+
+
+def _check_levels(table: Table, light: Array, has: str) -> None:
+    levels = np.unique(light).size
+    if levels < LEAST_LEVELS:
+        raise DataError(
+            f"{table.name}: {has} {levels} different values of light, at least {LEAST_LEVELS} are"
+            " needed to hold one out"
+        )
 
 
 def light_column(table: Table) -> str:
@@ -214,4 +219,6 @@ def _noise(table: Table, light: Array, unit: str) -> Noise:
     if any(name.endswith("_share") for name in rates) and np.isnan(duration).any():
         raise DataError(f"{table.name}: a share needs the column duration_s, in every row")
     least = table.numbers("least_hz", above=0.0) if "least_hz" in table.columns else nothing
+    told = ~np.all(np.isnan(list(rates.values())), axis=0)
+    _check_levels(table, light[told], f"{' and '.join(rates)}: rows with a number have")
     return Noise(light, unit, rates, pixels, duration, least)

@@ -50,8 +50,8 @@ class NoiseProblem:
     judged : (rows,) of bool
     white : float, optional
         Light of 255 DN, in the table's unit; default: the highest.
-    assumed_error : float, optional
-        Relative error of rows where the table does not say.
+    stated_error : float, optional
+        Relative error of every row, whatever the table says.
 
     References
     ----------
@@ -68,7 +68,7 @@ class NoiseProblem:
         declared: Declared,
         judged: NDArray[np.bool_],
         white: float | None = None,
-        assumed_error: float | None = None,
+        stated_error: float | None = None,
     ) -> None:
         self._declared = declared
         self._white = white or float(data.light.max())
@@ -97,7 +97,7 @@ class NoiseProblem:
         given /= rate + self.floor
         repeats = [(kind, data.light[k]) for kind, k in cells]
         self.error, self.error_source = row_errors(
-            given, self.measured, repeats, ASSUMED_ERROR, LEAST_ERROR, assumed_error
+            given, self.measured, repeats, ASSUMED_ERROR, LEAST_ERROR, stated_error
         )
         self.light_unit = data.unit
         self.groups = tuple(
@@ -124,9 +124,9 @@ class NoiseProblem:
         """Return the rates at `light`, in the table's unit."""
         return noise_rates(self._sources(values), light / self._white)
 
-    def predict(self, values: Mapping[str, float], light: Array | None = None) -> Array:
+    def predict(self, values: Mapping[str, float]) -> Array:
         """Return ln(rate + floor) [Hz], (rows,)."""
-        rates = self.rates(values, self.light if light is None else light)
+        rates = self.rates(values, self.light)
         share = np.minimum(
             rates.leak * np.where(np.isnan(self._duration), 0, self._duration), 0.999
         )

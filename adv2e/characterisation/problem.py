@@ -31,11 +31,6 @@ class Free:
     lower: float
     upper: float
 
-    @property
-    def in_configuration(self) -> bool:
-        """Whether `key` is a path in the configuration."""
-        return "[" not in self.key
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -95,11 +90,21 @@ class Problem(Protocol):
     groups: tuple[Group, ...]
     notes: tuple[str, ...]
 
-    def predict(self, values: Mapping[str, float], light: Array | None = None) -> Array:
-        """Return the logarithms that the model predicts, (n,), finite.
+    def predict(self, values: Mapping[str, float]) -> Array:
+        """Return the logarithms that the model predicts, (n,), finite."""
 
-        `light`: instead of the table's.
-        """
+
+def is_key(name: str) -> bool:
+    """Tell whether what is fitted is a key of the configuration, not something else of the table.
+
+    `name`: as :attr:`Free.key` has it.
+    """
+    return "[" not in name
+
+
+def held_rows(problem: Problem) -> NDArray[np.bool_]:
+    """Return which rows errors are told of: those kept for judging, or else all, (n,)."""
+    return problem.judged if problem.judged.any() else ~problem.judged
 
 
 def row_errors(

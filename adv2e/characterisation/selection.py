@@ -14,12 +14,13 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.characterisation.fit import Fit, fit
-from adv2e.characterisation.problem import Candidate, Free, Problem
+from adv2e.characterisation.problem import Candidate, Free, Problem, held_rows
 
 Array = NDArray[np.float64]
 
@@ -101,6 +102,8 @@ class Selection:
         Every other set, and why it was not taken.
     constant : float
         Held-out error of a constant.
+    floors : (levels,)
+        What :attr:`Model.errors` would be of the true model.
     """
 
     before: Model
@@ -109,6 +112,7 @@ class Selection:
     alternatives: list[Model]
     tried: list[tuple[Model, str]]
     constant: float
+    floors: Array
 
 
 class Selector:
@@ -138,7 +142,7 @@ class Selector:
         self._drawn: dict[tuple[Candidate, ...], Draws] = {}
         fitted = ~problem.judged
         self._fitted = fitted
-        held = problem.judged if problem.judged.any() else fitted
+        held = held_rows(problem)
         self._units = [held & (problem.level == k) for k in np.unique(problem.level[held])]
         if len(self._units) == 1:  # judged at one level: its rows
             self._units = [np.arange(held.size) == k for k in np.flatnonzero(held)]
@@ -146,16 +150,20 @@ class Selector:
             fitted & ~unit if not problem.judged.any() else fitted for unit in self._units
         ]
 
+    @property
+    def floors(self) -> Array:
+        """What :attr:`Model.errors` would be of the true model, (levels,)."""
+        return np.array([self._mean_square(self.problem.error, unit) for unit in self._units])
+
     def select(self) -> Selection:
         """Return the verdict with all models tried."""
         problem = self.problem
         before = self.model(())
         before = replace(before, p=self.drawn(before).p)
         assert before.p is not None
-        constant = self._constant()
         self._tick(f"declared model: held-out error {before.error:.3f}, p = {before.p:.3f}")
         if before.p >= SIGNIFICANT:
-            return Selection(before, before, "consistent", [], [], constant)
+            return self._selection(before, before, "consistent", [], [])
         current, sets = before, {}
         for size in range(1, min(MOST_EFFECTS, len(problem.candidates)) + 1):
             found = [
@@ -176,7 +184,7 @@ class Selector:
             assert current.p is not None
             if current.p >= SIGNIFICANT:
                 break
-        return self._judge(before, current, sets, constant)
+        return self._judge(before, current, sets)
 
     def _determined(self, chosen: tuple[Candidate, ...]) -> bool:
         """Whether every fold has more rows than parameters."""
@@ -184,18 +192,17 @@ class Selector:
         keys = [free.key for effect in chosen for free in effect.free]
         return len(set(keys)) == len(keys) and all(fold.sum() > count for fold in self._folds)
 
-    def _judge(
-        self, before: Model, after: Model, sets: dict[int, list[Model]], constant: float
-    ) -> Selection:
+    def _judge(self, before: Model, after: Model, sets: dict[int, list[Model]]) -> Selection:
         if after is before:
-            return Selection(
-                before, before, "unexplained", [], self._refused(before, sets, [], before), constant
-            )
+            refused = self._refused(before, sets, [], before)
+            return self._selection(before, before, "unexplained", [], refused)
         assert after.p is not None
         explained = after.p >= SIGNIFICANT
-        if not explained and (after.error**2 > (1.0 - SKILL) * min(before.error, constant) ** 2):
+        if not explained and (
+            after.error**2 > (1.0 - SKILL) * min(before.error, self._constant) ** 2
+        ):
             refused = self._refused(before, sets, [], before)
-            return Selection(before, before, "unexplained", [], refused, constant)
+            return self._selection(before, before, "unexplained", [], refused)
         alternatives = [
             rival
             for rival in sets[len(after.effects)]
@@ -208,7 +215,17 @@ class Selector:
         else:
             verdict = "explained" if explained else "partly_explained"
         refused = self._refused(before, sets, alternatives, after)
-        return Selection(before, after, verdict, alternatives, refused, constant)
+        return self._selection(before, after, verdict, alternatives, refused)
+
+    def _selection(
+        self,
+        before: Model,
+        after: Model,
+        verdict: str,
+        alternatives: list[Model],
+        tried: list[tuple[Model, str]],
+    ) -> Selection:
+        return Selection(before, after, verdict, alternatives, tried, self._constant, self.floors)
 
     def _as_well(self, rival: Model, best: Model) -> bool:
         """Whether a rival's misfit is larger by no more than chance makes, 997 times in 1000.
@@ -251,9 +268,12 @@ class Selector:
             if not self.problem.judged.any():
                 part = self._fit(free, fold, [found.logs, _starts(free)[0]])
             gap = self.problem.measured - self._predict(free, part.logs)
-            weight = self.problem.error[unit] ** -2.0
-            errors[k] = float((weight * gap[unit] ** 2).sum() / weight.sum())
+            errors[k] = self._mean_square(gap, unit)
         return Model(effects, free, found, errors)
+
+    def _mean_square(self, gap: Array, unit: NDArray[np.bool_]) -> float:
+        """Return the mean square of rows, each weighted by the inverse square of its error."""
+        return float(np.average(gap[unit] ** 2, weights=self.problem.error[unit] ** -2.0))
 
     def drawn(self, model: Model) -> Draws:
         """Fit the model to tables drawn from it: normal errors about its logarithms."""
@@ -295,20 +315,19 @@ class Selector:
         lower_, upper_ = (np.log([getattr(f, side) for f in free]) for side in ("lower", "upper"))
         return fit(residuals, starts, lower_, upper_, tolerance)
 
+    @cached_property
     def _constant(self) -> float:
         """Return the held-out error of the mean of each group's fitted rows, or of all of them."""
         errors = []
         for fold, unit in zip(self._folds, self._units, strict=True):
-            gaps = []
+            gap = np.zeros_like(self.problem.measured)
             for group in self.problem.groups:
                 rows = np.zeros_like(fold)
                 rows[group.rows] = True
-                if (rows & unit).any():
-                    own = rows & fold
-                    mean = self.problem.measured[own if own.any() else fold].mean()
-                    gaps.append(self.problem.measured[rows & unit] - mean)
-            if gaps:
-                errors.append(float((np.concatenate(gaps) ** 2).mean()))
+                own = rows & fold
+                mean = self.problem.measured[own if own.any() else fold].mean()
+                gap[rows] = self.problem.measured[rows] - mean
+            errors.append(self._mean_square(gap, unit))
         return float(np.sqrt(np.mean(errors)))
 
 

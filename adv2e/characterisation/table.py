@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,7 +66,7 @@ class Table:
             if not text:
                 continue
             try:
-                value = float(text.replace(",", ".") if self.decimal_comma else text)
+                value = self._number(text)
             except ValueError:
                 raise self.wrong(k, column, "must be a number") from None
             if not math.isfinite(value):
@@ -77,6 +77,9 @@ class Table:
                 raise self.wrong(k, column, f"must be at least {at_least:g}")
             values[k] = value
         return values
+
+    def _number(self, text: str) -> float:
+        return float(text.replace(",", ".") if self.decimal_comma else text)
 
     def wrong(self, row: int, column: str, text: str) -> DataError:
         """Return the error that says `text` of one cell."""
@@ -113,8 +116,7 @@ class Table:
         if column not in self.columns:
             there = ", ".join(self.columns)
             raise DataError(f"{self.name}: has no column {column!r} for {option} (there: {there})")
-        same = _equal_to(value)
-        found = [same(text) for text in self.texts(column)]
+        found = [self._same(text, value) for text in self.texts(column)]
         if not any(found):
             there = ", ".join(sorted(set(self.texts(column)))[:12])
             raise DataError(
@@ -122,20 +124,11 @@ class Table:
             )
         return found
 
-
-def _equal_to(value: str) -> Callable[[str], bool]:
-    try:
-        number = float(value)
-    except ValueError:
-        return lambda text: text == value
-
-    def same(text: str) -> bool:
+    def _same(self, text: str, value: str) -> bool:
         try:
-            return float(text) == number
+            return self._number(text) == self._number(value)
         except ValueError:
             return text == value
-
-    return same
 
 
 def read_table(path: str | Path) -> Table:

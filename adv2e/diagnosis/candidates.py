@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config, to_dict
-from adv2e.diagnosis.keys import flat, from_values, get_key, set_key
+from adv2e.config.paths import flat, get_key, set_key
+from adv2e.diagnosis.keys import from_values
 
 Places = Sequence[float] | NDArray[np.float64]
 """A place on each knob's scale."""

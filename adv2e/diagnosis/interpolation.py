@@ -7,7 +7,9 @@ A third of it is taken off all simulations (Richardson extrapolation [1]_).  How
 change itself tells, and that with three of four frames left out, which is larger where the frames
 hardly resolve the motion:
 
-.. math:: \delta = \max(|d_2| / 3,\ |d_4| / 12).
+.. math:: \delta = \max(|d_2| / 3,\ |d_4| / 12),
+
+and half as much again as :math:`|d_2| / 3` where there are too few frames for that.
 
 Recordings of a scene in motion at 100 to 500 frames a second, by a camera simulated without
 interpolation, depart from the plain simulations by 0.37 to 0.44 of :math:`d_2`.

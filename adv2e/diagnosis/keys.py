@@ -8,40 +8,10 @@ from typing import Any
 
 from adv2e.config import Config, from_dict, to_dict
 from adv2e.config.build import all_keys
+from adv2e.config.paths import set_key
 from adv2e.effects.hooks import Hooks
 from adv2e.parameters import Parameter
 from adv2e.reports.result import Own
-
-
-def set_key(values: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted `key` in nested mappings; a section that is null becomes one."""
-    *above, last = key.split(".")
-    for name in above:
-        if not isinstance(values.get(name), dict):
-            values[name] = {}
-        values = values[name]
-    values[last] = value
-
-
-def get_key(values: Mapping[str, Any], key: str) -> Any:
-    """Return what a dotted `key` holds, None if it or its section is absent or null."""
-    found: Any = values
-    for name in key.split("."):
-        if not isinstance(found, Mapping):
-            return None
-        found = found.get(name)
-    return found
-
-
-def flat(values: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
-    """Return nested mappings as dotted keys."""
-    result: list[tuple[str, Any]] = []
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            result += flat(value, f"{above}{name}.")
-        else:
-            result.append((f"{above}{name}", value))
-    return result
 
 
 def with_keys(config: Config, keys: Mapping[str, Any]) -> Config:

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from adv2e.config import Config, to_dict
+from adv2e.config.paths import get_key
 from adv2e.diagnosis.candidates import Candidate, Knob, exponent
 from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.keys import get_key, known_keys, user_effects
+from adv2e.diagnosis.keys import known_keys, user_effects
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.stamps import service_times, tick_of
 

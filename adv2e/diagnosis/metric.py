@@ -187,11 +187,6 @@ class Model:
         """Mean misfit of simulations of this very model."""
         return float(self._left_out[0].mean())
 
-    @cached_property
-    def spread(self) -> float:
-        """Deviation of the misfit of simulations of this very model."""
-        return float(self._left_out[0].std(ddof=1))
-
     def probability(self, values: Array) -> float:
         """Return how often this model makes a misfit, or a largest deviation, as large.
 

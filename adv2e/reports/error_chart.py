@@ -16,7 +16,7 @@ from adv2e.reports.ticks import linear_ticks, tick_labels
 WIDTH = 720
 _START, _END, _VALUES = 130, 520, 536
 _LINE = 17
-_ROLES = (("before", "before"), ("after", "after"), ("floor", "floor"))
+_ROLES = ("before", "after", "floor")
 _SHAPES = {
     "before": "M0 -6L6 0L0 6L-6 0Z",
     "after": "M-5 0A5 5 0 1 1 5 0A5 5 0 1 1 -5 0Z",
@@ -57,10 +57,10 @@ def _row(row: ErrorRow, axis: Axis, y: float) -> tuple[Markup, float]:
     for line in wrapped(row.name, WIDTH):
         y += LINE_HEIGHT
         parts.append(place_text(0, y, line, class_="label name"))
-    for role, word in _ROLES:
+    for role in _ROLES:
         y += _LINE
         estimate: Estimate = getattr(row, role)
-        parts.append(place_text(_START - 14, y, word, text_anchor="end"))
+        parts.append(place_text(_START - 14, y, role, text_anchor="end"))
         parts.append(place_text(_VALUES, y, estimate_text(estimate), class_="number"))
         if _has_scale(row):
             parts.append(_mark(estimate, row.before.value, axis, y - 4, role))

@@ -20,7 +20,7 @@ class Wording:
     floor : str
         What the floor of the errors is.
     bands : str
-        What the bands of a curve are drawn around.
+        What the bands of a curve show.
     others : str
         What the keys of ``model.yaml`` are that are neither added nor nuisances.
     """

@@ -10,10 +10,11 @@ from click.testing import CliRunner
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from adv2e.characterisation.characterise import Settings, characterise
+from adv2e.characterisation.characterise import Settings, characterise, problem_of
 from adv2e.characterisation.declared import read_declared
 from adv2e.characterisation.latency import first_crossing
 from adv2e.characterisation.measurements import measurements_of
+from adv2e.characterisation.selection import Selector
 from adv2e.characterisation.table import parse_table
 from adv2e.cli import main
 from adv2e.config import load_config
@@ -196,6 +197,8 @@ def test_the_command_writes_a_report_and_a_model_that_loads(tmp_path):
         ("irradiance_W_m2,delay\n1,2\n", "latency_us"),
         ("irradiance_W_m2,latency_us,on_rate_hz\n1,2,3\n", "either"),
         ("irradiance_W_m2,latency_us\n1,2\n2,3\n", "at least 3"),
+        ("illuminance_lux,on_rate_hz\n1,\n10,\n100,\n", "rows with a number have 0 different"),
+        ("illuminance_lux,on_rate_hz\n1,2\n10,\n100,3\n", "on_rate_hz: rows with a number have 2"),
         ("irradiance_W_m2,latency_us,polarity\n1,2,up\n2,3,1\n3,4,1\n", "t.csv:2: polarity"),
     ],
 )
@@ -213,6 +216,8 @@ def test_semicolons_with_decimal_commas_comments_and_other_units_are_read():
     measured = parse_table(text + "0,1;30;4;0,01\n", "t.csv")
     assert measured.numbers("latency_ms").tolist() == [0.5, 0.2, 0.1]
     assert measured.lines == (4, 5, 6)
+    for value in ("0,1", "0,10", "0.1"):
+        assert measured.matching(f"latency_ms={value}", "--where") == [False, False, True]
 
 
 @pytest.mark.parametrize(
@@ -267,6 +272,28 @@ def test_a_stated_error_takes_the_place_of_the_tables():
     found = verdict_of(measured, error=0.5)
     assert "as stated: 50 %" in found.notes[-1]
     assert found.errors[0].floor.value == pytest.approx(0.5)
+
+
+def test_floors_are_what_the_errors_of_the_rows_make_of_the_true_model():
+    """Tables of a true model, drawn again and again, of rows that are known by 1 to 30 %."""
+    relative = np.where(np.arange(3 * LIGHT.size) % 3 == 0, 0.01, 0.3)
+    relative[: LIGHT.size] = 0.3  # the dimmest levels hardly
+    light = np.repeat(LIGHT, 3)
+    ideal = np.repeat([ode_latency_us(e) for e in LIGHT], 3)
+    draw = np.random.default_rng(8)
+    squares, floors = [], []
+    for _ in range(60):
+        latency = ideal * np.exp(relative * draw.standard_normal(ideal.size))
+        measured = table(latency, light, 0.0, latency_error_us=relative * latency)
+        sets = [f"pixel.low_pass.cutoff_hz={CUTOFF_HZ}", "pixel.low_pass.dark_cutoff_hz=0"]
+        problem = problem_of(measured, read_declared([], sets), Settings())
+        selector = Selector(problem, seed=0, draws=1)
+        squares.append(selector.model(()).errors)
+        floors.append(selector.floors)
+    low, high = (np.quantile(np.sqrt(floors), q) for q in (0.05, 0.95))
+    assert high > 5 * low
+    ratio = np.sqrt(np.mean(squares, axis=0) / np.mean(floors, axis=0))
+    np.testing.assert_allclose(ratio, 1.0, atol=0.35)
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("us", 1.0), ("ms", 1e-3), ("s", 1e-6)])

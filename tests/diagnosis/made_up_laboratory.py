@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from adv2e.config import Config, load_config, to_dict
+from adv2e.config.paths import get_key
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.keys import get_key
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.library import Hints, library
 from adv2e.diagnosis.markers import BOTH, VIEWS, Entry

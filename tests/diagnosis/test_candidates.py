@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adv2e.config import Config, load_config, shipped, to_dict
+from adv2e.config.paths import flat, get_key, set_key
 from adv2e.diagnosis.candidates import Candidate, neutral_value
-from adv2e.diagnosis.keys import about_key, flat, get_key, set_key
+from adv2e.diagnosis.keys import about_key
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.library import Hints, library, names
 

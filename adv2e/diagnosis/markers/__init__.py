@@ -44,7 +44,6 @@ class Markers:
     def __init__(self, scene: Scene, pilot: Sequence[Placed]) -> None:
         counter = Pixels(scene)
         expected = np.mean([counter.count(placed) for placed in pilot], axis=0)
-        self.pixels = Pixels(scene, expected)
         seconds = np.diff(scene.times_us) * 1e-6
         events = np.mean(
             [np.bincount(placed.interval, minlength=scene.intervals) for placed in pilot], axis=0
@@ -65,7 +64,7 @@ class Markers:
             Gaps(),
             RowGaps(),
             Neighbours(),
-            self.pixels,
+            Pixels(scene, expected),
         ]
         self.entries: list[Entry] = [entry for group in self.groups for entry in group.entries]
         self.least = np.concatenate(
