@@ -26,6 +26,7 @@ from real.recording import Real, halves, read
 from real.search import Search
 from real.stability import MOST as UNSTABLE
 from real.stability import Stability, compare_halved, stable_score
+from real.table import COLUMNS as TITLES
 from real.table import line, number
 from real.tried import UNSEEN, Added
 
@@ -35,14 +36,11 @@ from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config, load_config, to_dict
 from adv2e.config.paths import flat
 from adv2e.diagnosis.nuisances import totals
-from adv2e.errors import Adv2eError, OutputError
+from adv2e.errors import Adv2eError, DataError, OutputError
 from adv2e.events import Events, empty_events
 
 COLUMNS = {
-    "relative_5_bins": "5 bins",
-    SCORE: "smoothed 5",
-    "relative_1_bin_smoothed": "smoothed 1",
-    "error": "over time",
+    name: TITLES[name] for name in ("relative_5_bins", SCORE, "relative_1_bin_smoothed", "error")
 }
 
 
@@ -111,6 +109,9 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
     """Return what was found for one recording, as Markdown."""
     began = time.perf_counter()
     first, second = halves(real.windows)
+    for windows, which in ((first, "first"), (second, "second")):
+        if not len(cut(real.events, windows.start, windows.stop)):
+            raise DataError(f"{real.name}: no events in the {which} half of its frame intervals")
     bench = Bench(real, threads)
     seeds = (seed + 1, seed + 2)
 

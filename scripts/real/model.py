@@ -14,7 +14,7 @@ from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
-from adv2e.diagnosis.instants import as_recorded, made
+from adv2e.diagnosis.instants import as_recorded, is_made_once, made
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
 from adv2e.effects.frames.encoding import decoder_for
 from adv2e.events import Events
@@ -72,7 +72,7 @@ class Bench:
     def quick(self, config: Config, windows: Windows, seed: int) -> Events:
         """Return the events in the windows, from in-between frames made once."""
         self.simulations += 1
-        if config.sampling.interpolation == "linear":
+        if not is_made_once(config):
             whole = self.real.simulator(config, windows.stop + BEYOND_US, self.threads)(seed)
             return cut(whole, windows.start, windows.stop)
         lean = replace(as_recorded(config), seed=seed)
@@ -84,7 +84,10 @@ class Bench:
     def _instants(self, config: Config) -> Light:
         """Return light between the frames, without what is laid over it."""
         frames, sampling = config.frames, config.sampling
-        key = frames.encoding, frames.exposure_us, sampling.interpolation, sampling.L
+        key = (
+            *(frames.encoding, frames.full_scale, frames.exposure_us),
+            *(sampling.interpolation, sampling.L),
+        )
         if key not in self._made:
             if len(self._made) == KEPT:
                 del self._made[next(iter(self._made))]

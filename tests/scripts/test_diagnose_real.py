@@ -70,6 +70,21 @@ def declared(tmp_path):
     return path
 
 
+@pytest.mark.parametrize(("which", "span"), [("second", (0.0, 0.05)), ("first", (0.11, 0.16))])
+def test_a_half_without_events_is_told(recording, declared, which, span):
+    """The first and the last event stay, between which all intervals lie."""
+    path = recording / "events.txt"
+    first, *lines, last = path.read_text().splitlines(keepends=True)
+    kept = [line for line in lines if span[0] <= float(line.split()[0]) < span[1]]
+    path.write_text("".join([first, *kept, last]))
+    result = CliRunner().invoke(
+        diagnose_real.main, [str(recording), "--declared", str(declared), "--out", "-"]
+    )
+    assert result.exit_code == 1
+    told = f"no events in the {which} half of its frame intervals"
+    assert told in result.output
+
+
 def test_the_search_finds_the_black_level_that_made_the_events(recording, declared, monkeypatch):
     bench = Bench(read(str(recording)), 1)
     first, _ = halves(bench.real.windows)
