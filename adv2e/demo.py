@@ -13,6 +13,7 @@ from adv2e.reading import Reading
 from adv2e.recordings import read_recording
 from adv2e.rendering import Style, render_recording
 from adv2e.rendering.timeline import caption
+from adv2e.sinks.staging import check_free
 from adv2e.synthetic import Scene
 from adv2e.synthetic.clips import write_video
 
@@ -69,32 +70,33 @@ def run_demo(
     folder: Path,
     config: Config,
     *,
+    overwrite: bool = False,
     threads: int | None = None,
     progress: bool = False,
     log: Callable[[str], None] = lambda text: None,
 ) -> Demo:
-    """Make clip, events, picture and film in `folder`; files of an earlier run are replaced.
+    """Make clip, events, picture and film in `folder`.
 
     Raises
     ------
     OutputError
-        `folder` cannot be made or written to.
+        `folder` cannot be made or written to, or holds one of them and `overwrite` is false.
     """
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"{folder}: is not a folder")
-    folder.mkdir(parents=True, exist_ok=True)
     clip, events = folder / "clip.avi", folder / "clip.events.h5"
     picture, film = folder / "clip.events.png", folder / "clip.events.mp4"
+    check_free([clip, events, picture, film], overwrite)
     scene = Scene()
     size = {"width": WIDTH, "height": HEIGHT}
-    write_video(scene, clip, **size, fps=FPS, duration_s=DURATION_S, overwrite=True)
+    write_video(scene, clip, **size, fps=FPS, duration_s=DURATION_S, overwrite=overwrite)
     with Reading(str(clip), threads=threads) as reading:
         summary = convert(
             reading,
             str(events),
             config=config,
             with_frames=True,
-            overwrite=True,
+            overwrite=overwrite,
             preview=str(film),
             progress=progress,
             compile_apart=True,
@@ -112,6 +114,6 @@ def run_demo(
         style=Style(window_us=WINDOW_US),
         at_s=INSTANTS_S,
         caption=describe,
-        overwrite=True,
+        overwrite=overwrite,
     )
     return Demo(clip, events, picture, film, summary)

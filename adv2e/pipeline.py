@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 
 from adv2e import __version__
 from adv2e.config import Config, to_dict
-from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.effects.frames.encoding import LightDecoder, check_white
 from adv2e.effects.user import user_sources
 from adv2e.events import Events
 from adv2e.overlap import WriteBehind
 from adv2e.reading import Decoding, Reading, Still
 from adv2e.simulation import events_from_light, is_compiled
 from adv2e.sinks import Sink, format_name, open_sink
+from adv2e.sinks.staging import check_apart
 from adv2e.sources.base import Source
 
 if TYPE_CHECKING:
@@ -160,7 +161,12 @@ def convert(
     """
     began = time.perf_counter()
     recording, workers = reading.source, reading.threads
+    if recording.largest is not None:
+        check_white(recording.largest, recording.path, config.frames)
     target = output or default_output(reading.path)
+    for written in (target, preview):
+        if written not in (None, "-"):
+            check_apart(written, reading.inputs)
     with ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
@@ -181,6 +187,8 @@ def convert(
         # can be interrupted in it
         if workers > 1 and target != "-":
             call = stack.enter_context(WriteBehind(BEHIND_BYTES)).call
+        for doubt in recording.doubts:
+            log(doubt)
         decoder = _decoder_for(recording, config)
         table = _table_for_the_kernel(decoder, config)
         if not is_compiled(config):

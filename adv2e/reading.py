@@ -124,6 +124,12 @@ class Reading:
         assert self._opened is not None, "not entered"
         return self._opened
 
+    @property
+    def inputs(self) -> tuple[str | Path, ...]:
+        """What is read: the source, and the list of times if there is one."""
+        timestamps = self.given["timestamps"]
+        return (self.path,) if timestamps is None else (self.path, timestamps)
+
     def stills(self, decoding: Decoding) -> Iterator[Still]:
         """Return the frames, as `decoding` says; raises what goes wrong with them."""
         self._decoding.set_result(decoding)

@@ -12,7 +12,9 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import math
+import threading
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from contextlib import nullcontext
 from typing import Any
 
@@ -23,9 +25,9 @@ from adv2e import pixel
 from adv2e.config.model import Config
 from adv2e.effects.active import active_hooks
 from adv2e.effects.composition import additions_of, begin, changes_light, map_events
-from adv2e.effects.frames.encoding import LightDecoder, decoder_for, encoding_of_images
+from adv2e.effects.frames.encoding import LightDecoder, check_white, decoder_for, encoding_of_images
 from adv2e.effects.hooks import Frames, Hooks
-from adv2e.errors import DataError
+from adv2e.errors import ConfigError, DataError
 from adv2e.events import Events
 from adv2e.intervals import Intervals
 from adv2e.ordering import InOrder
@@ -66,9 +68,19 @@ def simulate(
     Raises
     ------
     DataError
-        Fewer than two frames, times that do not increase, frames of different sizes or types, NaN.
+        Fewer than two frames, times that do not increase, frames of different sizes or types, NaN,
+        another number of times than frames where both have a length.
+    ConfigError
+        `config` is none.
     """
-    config = config or Config()
+    config = Config() if config is None else config
+    if not isinstance(config, Config):
+        raise ConfigError(
+            "config: must be a Config, as adv2e.load_config returns it, got"
+            f" {type(config).__name__}"
+        )
+    if isinstance(frames, Sized) and isinstance(times, Sized) and len(frames) != len(times):
+        raise DataError(f"{len(times)} times for {len(frames)} frames")
     raw = _Raw(frames, times, config)
     yield from events_from_light(
         raw.light(), config, threads=threads, table=raw.table, effects=effects
@@ -104,9 +116,12 @@ class _Raw:
 
     def _checked(self, number: int, image: NDArray[Any]) -> tuple[int, NDArray[Any]]:
         try:
-            t_ns = round(float(next(self._times)) * 1e9)
+            t_s = float(next(self._times))
         except StopIteration:
             raise DataError(f"frame {number}: has no time (there are fewer times)") from None
+        if not math.isfinite(t_s):
+            raise DataError(f"frame {number}: its time is {t_s}, must be a number of seconds")
+        t_ns = round(t_s * 1e9)
         first = self._first
         if image.shape != first.shape or image.dtype != first.dtype:
             raise DataError(
@@ -123,6 +138,8 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
         raise DataError(
             f"frame 0: shape {image.shape}, must be (rows, columns) or (rows, columns, 3)"
         )
+    if image.dtype.kind == "f" and image.size:
+        check_white(float(image.max()), "frame 0", config.frames)
     auto = encoding_of_images(image.dtype, colour)
     return decoder_for(config.frames, image.dtype, colour, auto=auto)
 
@@ -186,7 +203,9 @@ def _pixel_events(
         additions=additions,
         **how,
     )
-    with worker_pool(workers) if workers > 1 else nullcontext() as pool:
+    # the main thread cannot be interrupted in compiled code
+    apart = workers > 1 or threading.current_thread() is threading.main_thread()
+    with worker_pool(workers) if apart else nullcontext() as pool:
         order = InOrder()
         intervals = Intervals(t_ns, first, config.sampling, threads=workers)
         for part in intervals.parts(source):

@@ -11,7 +11,7 @@ import adv2e
 from adv2e import intervals, simulation
 from adv2e.config import Config
 from adv2e.config.model import Frames, Sampling
-from adv2e.errors import DataError
+from adv2e.errors import ConfigError, DataError
 from adv2e.events import is_sorted, sort_events
 
 
@@ -93,7 +93,11 @@ def test_colour_is_srgb_and_grey_is_linear_unless_told():
     [
         ([], [], "no frames"),
         (frames(1), times(1), "single frame"),
-        (frames(3), [0.0, 0.1], "frame 2: has no time"),
+        (frames(3), iter([0.0, 0.1]), "frame 2: has no time"),
+        (frames(3), [0.0, 0.1], "2 times for 3 frames"),
+        (frames(3), times(4), "4 times for 3 frames"),
+        (frames(3), [0.0, np.nan, 0.2], "frame 1: its time is nan"),
+        ([255.0 * np.ones((4, 4))] * 2, times(2), "floats up to 255, where 1 is white"),
         (frames(3), [0.0, 0.1, 0.1], "frame 2"),
         (frames(3), [0.0, 0.1, 0.05], "not after"),
         ([*frames(2), frames(1, (5, 5))[0]], times(3), "frame 2"),
@@ -106,6 +110,11 @@ def test_bad_input_is_one_clear_line(images, at, text):
     with pytest.raises(DataError, match=text) as caught:
         run(images, at)
     assert "\n" not in str(caught.value)
+
+
+def test_a_configuration_must_be_one():
+    with pytest.raises(ConfigError, match=r"must be a Config, as adv2e\.load_config .* got dict"):
+        run(frames(), times(), {"pixel": None})
 
 
 def test_memory_does_not_grow_with_length():

@@ -58,11 +58,12 @@ def defaults() -> None:
 
 @group.command()
 @click.argument("file")
-def check(file: str) -> None:
+@options.effect_option
+def check(file: str, effect_files: tuple[str, ...]) -> None:
     """Check a configuration file: exit status 0 if it is right, 1 if not."""
     from adv2e.config import load_config
 
-    load_config([file])
+    load_config([file], effects=options.own_effects(effect_files))
     click.echo(f"{file}: ok")
 
 

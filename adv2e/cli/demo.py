@@ -22,13 +22,21 @@ if TYPE_CHECKING:
     default=Path("adv2e-demo"),
     show_default=True,
     metavar="DIR",
-    help="Folder to make; what an earlier demo left in it is replaced.",
+    help="Folder to make.",
 )
+@click.option("--overwrite", is_flag=True, help="Replace what an earlier demo left in it.")
 @options.config_options
 @options.threads_option
 @options.progress_option
 @options.verbosity_options
-def command(output: Path, config: Config, threads: int | None, progress: bool, log: Log) -> None:
+def command(
+    output: Path,
+    overwrite: bool,
+    config: Config,
+    threads: int | None,
+    progress: bool,
+    log: Log,
+) -> None:
     """Make a sample clip, convert it and render the events.
 
     The clip is a textured scene with disks of high contrast that moves, rests, moves and rests.
@@ -40,6 +48,8 @@ def command(output: Path, config: Config, threads: int | None, progress: bool, l
     """
     from adv2e.demo import run_demo
 
-    demo = run_demo(output, config, threads=threads, progress=progress, log=log)
+    demo = run_demo(
+        output, config, overwrite=overwrite, threads=threads, progress=progress, log=log
+    )
     if log.level >= 0:
         click.echo(demo.text())

@@ -19,6 +19,7 @@ from adv2e.cli.run import VERBOSITY
 
 if TYPE_CHECKING:
     from adv2e.config import Config
+    from adv2e.effects.hooks import Hooks
 
 Body = TypeVar("Body", bound=Callable[..., Any])
 
@@ -51,6 +52,27 @@ class FiniteNumber(click.FloatRange):
         return number
 
 
+def effect_option(body: Body) -> Body:
+    """Add --effect; the command gets ``effect_files``, a tuple, for :func:`own_effects`."""
+    return click.option(
+        "--effect",
+        "effect_files",
+        metavar="FILE.py",
+        multiple=True,
+        help="Effects of your own; their parameters are user.NAME in the configuration."
+        " Repeatable.",
+    )(body)
+
+
+def own_effects(files: tuple[str, ...]) -> list[type[Hooks]]:
+    """Return the effects that files hold."""
+    if not files:
+        return []
+    from adv2e.effects.user import load_effects
+
+    return [effect for name in files for effect in load_effects(name)]
+
+
 def late_config_options(body: Body) -> Body:
     """Add -c, --set, --seed and --effect; the command gets ``config``, a function.
 
@@ -77,14 +99,7 @@ def late_config_options(body: Body) -> Body:
     @click.option(
         "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all random numbers."
     )
-    @click.option(
-        "--effect",
-        "effect_files",
-        metavar="FILE.py",
-        multiple=True,
-        help="Effects of your own; their parameters are user.NAME in the configuration."
-        " Repeatable.",
-    )
+    @effect_option
     @functools.wraps(body)
     def with_config(
         *args: Any,
@@ -97,12 +112,7 @@ def late_config_options(body: Body) -> Body:
         def config() -> Config:
             from adv2e.config import load_config
 
-            effects = []
-            if effect_files:
-                from adv2e.effects.user import load_effects
-
-                effects = [effect for name in effect_files for effect in load_effects(name)]
-            return load_config(config_files, sets, seed, effects)
+            return load_config(config_files, sets, seed, own_effects(effect_files))
 
         return body(*args, config=config, **kw)
 

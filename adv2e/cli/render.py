@@ -93,7 +93,7 @@ def command(
 
     \b
     Examples:
-      adv2e render clip.events.h5 -o clip.mp4
+      adv2e render clip.events.h5 -o events.mp4
       adv2e render clip.events.h5 -o slow.gif --start 0.2 --stop 0.4 --speed 0.1
       adv2e render urban.zip -o urban.png --at 1.5 --at 2.5 --window 10 --style grey
     """

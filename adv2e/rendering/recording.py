@@ -14,6 +14,7 @@ from adv2e.errors import DataError
 from adv2e.rendering.preview import Preview
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Caption, caption
+from adv2e.sinks.staging import check_apart
 
 if TYPE_CHECKING:
     from adv2e.events import Events
@@ -62,6 +63,7 @@ def render_recording(
     OutputError, UsageError
         See :class:`Preview`.
     """
+    check_apart(path, [recording.path])
     begin_us, until_us = _span_us(recording)
     lasts = f"{recording.path}: lasts {(until_us - begin_us) * 1e-6:.3f} s"
     frames = frames and recording.frame_times_ns is not None and recording.frame_times_ns.size > 0

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.cores import default_threads
-from adv2e.errors import OutputError, UsageError
+from adv2e.errors import UsageError
 from adv2e.sinks.base import Sink, describe
 
 __all__ = ["FORMATS", "LAYOUTS", "Sink", "format_name", "open_sink"]
@@ -182,7 +182,7 @@ def format_name(path: Path, format: str | None) -> str:
 
     Raises
     ------
-    UsageError, OutputError
+    UsageError
         There is no such format.
     """
     if format is not None:
@@ -194,7 +194,7 @@ def format_name(path: Path, format: str | None) -> str:
         if suffix in about.suffixes:
             return name
     known = [suffix for about in FORMATS.values() for suffix in about.suffixes if suffix]
-    raise OutputError(
+    raise UsageError(
         f"{path}: unknown suffix '{suffix}', must be one of {', '.join(known)},"
         f" none (a DAVIS240C folder), or choose with --format: {', '.join(FORMATS)}"
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -167,6 +167,30 @@ class Staging:
                 shutil.rmtree(gone)
         self.discard()
         return not any(os.path.lexists(output.temporary) for output in self._outputs)
+
+
+def check_free(outputs: Iterable[Path], overwrite: bool) -> None:
+    """Check before any work that all files may be written; errors are those of :class:`Staging`."""
+    staging = Staging(overwrite)
+    for output in outputs:
+        staging.file(output)
+
+
+def check_apart(output: str | Path, inputs: Iterable[str | Path]) -> None:
+    """Refuse to write where something is read from, whether it may be replaced or not.
+
+    Raises
+    ------
+    OutputError
+        `output` is one of `inputs`, or a folder that holds one.
+    """
+    final = Path(output).resolve()
+    for one in inputs:
+        there = Path(one).resolve()
+        if final == there or (final.exists() and there.exists() and final.samefile(there)):
+            raise OutputError(f"{output}: is the input, which would be lost; choose another name")
+        if final in there.parents and final.is_dir():
+            raise OutputError(f"{output}: holds the input {one}; choose another name")
 
 
 def nearest_there(path: Path) -> Path:

@@ -63,12 +63,23 @@ def open_source(
     """
     given = GivenTimes(fps, Path(timestamps) if timestamps is not None else None)
     selection = Selection(start_s, stop_s, t0)
-    path = Path(path)
+    if not str(path):
+        raise DataError("the input has no name: give a video, a folder of images or a recording")
+    named, path = str(path), Path(path)
     if not path.exists():
-        raise DataError(f"{path}: no such file or folder")
+        raise DataError(f"{named}: no such file or folder{_advice(named)}")
     opener = importlib.import_module(_opener(path))
     source: Source = opener.open_source(path, given, selection)
     return source
+
+
+def _advice(path: str) -> str:
+    """Return what to do about a path that is not there, where it looks like something else."""
+    if "://" in path:
+        return "; addresses are not read: download it first"
+    if any(character in path for character in "*?%"):
+        return "; patterns are not read: give the folder of the images"
+    return ""
 
 
 def _opener(path: Path) -> str:

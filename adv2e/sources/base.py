@@ -138,6 +138,10 @@ class Source(ABC):
         What ``encoding: auto`` means here, ``srgb`` or ``linear``.
     full_scale : float
         Number that means white, from the data type.
+    largest : float or None
+        Largest number of the first frame, where frames are floats.
+    doubts : list of str
+        Things to tell the user before any work.
     notes : list of str
         Things to tell the user.
     threads : int
@@ -149,6 +153,8 @@ class Source(ABC):
         self.kind = kind
         self.selection = selection
         self.has_clock = has_clock
+        self.largest: float | None = None
+        self.doubts: list[str] = []
         self.notes: list[str] = []
         self.count: int | None = None
         self.threads = 1

@@ -11,6 +11,9 @@ from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Image, Selection, Shot, Source, check_values
 from adv2e.sources.times import FrameRate, Stamp, parse_times, read_text
 
+_LONG_S = 10.0
+"""Mean time between frames from which on their times are doubted [s]."""
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -119,9 +122,14 @@ class ListedSource(Source):
         self._describe(image, shots[0].label)
         check_values(image, shots[0].label)
         self.encoding = encoding or self.encoding
-        if image.dtype.kind == "f" and image.max() > 1:
+        apart_s = (shots[-1].t_ns - shots[0].t_ns) * 1e-9 / (len(shots) - 1)
+        if has_clock and apart_s > _LONG_S:
+            self.doubts.append(f"{path}: frames are {apart_s:,.0f} s apart; times are in seconds")
+        if image.dtype.kind == "f":
+            self.largest = float(image.max())
+        if self.largest is not None and self.largest > 1:
             self.notes.append(
-                f"values above 1.0 (up to {image.max():g} in the first frame); white is 1.0 unless"
+                f"values above 1.0 (up to {self.largest:g} in the first frame); white is 1.0 unless"
                 " frames.full_scale says otherwise"
             )
 

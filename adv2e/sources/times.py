@@ -136,7 +136,10 @@ def _stamp(text: str, unit_ns: int, line: int, label: str, name: str | None = No
     try:
         t_ns = parse_ns(text, unit_ns)
     except ValueError as error:
-        raise DataError(f"{label} line {line}: {error}; a time is expected there") from error
+        unit = "seconds" if unit_ns == NS_PER_S else "us"
+        raise DataError(
+            f"{label} line {line}: {error}; a time in {unit} is expected there"
+        ) from error
     if name is not None and name.startswith("#"):
         name = None
     return Stamp(t_ns, line, name)

@@ -157,6 +157,24 @@ def test_config_check(adv2e, tmp_path):
     assert outcome.err == (f"adv2e: error: {bad}:1: seed: must be a whole number, got 'x'\n")
 
 
+def test_config_check_knows_effects_of_ones_own(adv2e, tmp_path):
+    effect, saved = tmp_path / "off.py", tmp_path / "saved.yaml"
+    effect.write_text(
+        "from dataclasses import dataclass\n"
+        "from adv2e.effects.hooks import Hooks\n"
+        "from adv2e.parameters import Section\n\n"
+        "@dataclass(frozen=True, kw_only=True)\n"
+        "class Nothing(Section):\n    'None.'\n\n"
+        "class Off(Hooks):\n    'Does nothing.'\n    stage = 'readout'\n    Parameters = Nothing\n"
+        "    def events(self, chunks):\n        yield from chunks\n"
+    )
+    shown = adv2e("config", "show", "--effect", effect)
+    assert shown.status == 0, shown.err
+    saved.write_text(shown.out)
+    assert adv2e("config", "check", saved, "--effect", effect) == (0, f"{saved}: ok\n", "")
+    assert "--effect FILE.py" in adv2e("config", "check", saved).err
+
+
 def test_config_help_names_what_is_shipped(adv2e):
     out = adv2e("config", "--help").out
     assert all(re.search(rf"\b{name}\b", out) for name in shipped())

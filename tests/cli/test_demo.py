@@ -44,7 +44,10 @@ def test_makes_clip_events_picture_and_film_and_says_what(adv2e, small, tmp_path
 
     # again: the same events, and what is not ours is kept
     (folder / "mine.txt").write_text("mine")
-    assert adv2e("demo", "-o", folder, "-q", "--threads", 1).out == ""
+    outcome = adv2e("demo", "-o", folder, "-q", "--threads", 1)
+    assert outcome.status == 1
+    assert "clip.avi: exists already; --overwrite replaces it" in outcome.err
+    assert adv2e("demo", "-o", folder, "-q", "--threads", 1, "--overwrite").out == ""
     assert np.array_equal(read_recording(folder / "clip.events.h5").events, events)
     assert sorted(path.name for path in folder.iterdir()) == [*FILES, "mine.txt"]
 

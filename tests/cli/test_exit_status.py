@@ -96,6 +96,7 @@ def test_vv_shows_no_traceback_of_a_mistake_of_the_user(adv2e, pipeline):
         (["convert", "a", "--seed", "1.5"], "Invalid value for '--seed'"),
         (["convert", "a", "--set", "pixel.leak"], "--set pixel.leak: must be KEY=VALUE"),
         (["convert", "a", "--set", "pixel.leek=null"], "did you mean 'leak'?"),
+        (["render", "a", "-o", "a.foo"], "a film ends in .mp4, .avi or .gif"),
         (["convert", "a", "-o", ""], "Invalid value for '-o' / '--output': is empty"),
         (["convert", "a", "--fps", "0"], "Invalid value for '--fps'"),
         (["convert", "a", "--fps", "nan"], "nan is not a finite number"),

@@ -208,7 +208,7 @@ def test_suffix_in_capitals_is_known(tmp_path):
 
 
 def test_unknown_suffix_lists_what_exists(tmp_path):
-    with pytest.raises(OutputError, match=r"out\.xyz: unknown suffix '\.xyz'.*\.txt.*\.h5") as info:
+    with pytest.raises(UsageError, match=r"out\.xyz: unknown suffix '\.xyz'.*\.txt.*\.h5") as info:
         open_at(tmp_path / "out.xyz")
     assert "\n" not in str(info.value)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import weakref
 
 import numpy as np
@@ -120,6 +121,20 @@ def test_a_selection_of_fewer_than_two_frames_is_refused(stack, options, message
 def test_missing_input(tmp_path):
     with pytest.raises(DataError, match=r"none\.mp4: no such file or folder"):
         open_source(tmp_path / "none.mp4")
+
+
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("frames/%04d.png", "give the folder of the images"),
+        ("frames/*.png", "give the folder of the images"),
+        ("https://a.b/c.mp4", "https://a.b/c.mp4: no such file or folder; addresses are not read"),
+        ("", "the input has no name"),
+    ],
+)
+def test_a_missing_input_that_looks_like_something_else(name, advice):
+    with pytest.raises(DataError, match=re.escape(advice)):
+        open_source(name)
 
 
 @pytest.mark.parametrize("name", ["clip.doc", "clip", "frame.png"])

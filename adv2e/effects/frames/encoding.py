@@ -49,6 +49,10 @@ def check_encoding(encoding: str) -> None:
     )
 
 
+_NO_WHITE = 16.0
+"""Light this many times white is not taken for meant."""
+
+
 def full_scale_of(dtype: DTypeLike) -> float:
     """Return the number that means white in frames of `dtype`: 255, 65535 or 1.0.
 
@@ -66,6 +70,32 @@ def full_scale_of(dtype: DTypeLike) -> float:
 def encoding_of_images(dtype: DTypeLike, colour: bool) -> str:
     """Return what ``encoding: auto`` means for still images and arrays: 8-bit colour is sRGB."""
     return "srgb" if colour and np.dtype(dtype) == np.uint8 else "linear"
+
+
+def check_white(largest: float, label: str, frames: Frames) -> None:
+    """Refuse floats that are far above white, unless somebody said what white is.
+
+    A pixel that sees light a hundred times too bright is another one, and takes a thousand times as
+    long to simulate.
+
+    Parameters
+    ----------
+    largest : float
+        Of the numbers of a frame.
+    label : str
+        What it is called.
+    frames : Frames
+
+    Raises
+    ------
+    DataError
+        Naming `label`, the largest number, and the key that says what is white.
+    """
+    if frames.full_scale is None and largest > _NO_WHITE:
+        raise DataError(
+            f"{label}: floats up to {largest:g}, where 1 is white; say what is, with"
+            " frames.full_scale=255 or another number (1, if they are right)"
+        )
 
 
 def decode_values(values: NDArray[Any], encoding: str, full_scale: float) -> NDArray[Any]:
