@@ -170,15 +170,12 @@ def effect_table(lines: Sequence[Line]) -> str:
 
 def left_out_table(lines: Sequence[Line]) -> str:
     """Return what was said where the true name was not to be had."""
-    accepted = sum(scoring.outcome(one) == scoring.WRONG for one in lines)
-    alike = sum(
-        scoring.outcome(one) == scoring.WRONG and bool(_neighbours(one) & _given(one))
-        for one in lines
-    )
+    wrong = [one for one in lines if scoring.outcome(one) == scoring.WRONG]
+    alike = [one for one in wrong if _neighbours(one) & _given(one)]
+    which = f" ({', '.join(name for one in alike for name in one['effects'])})" if alike else ""
     text = (
-        f"A name was accepted with nothing left to explain: {share(accepted, len(lines))}; of"
-        f" these, with the same thing under another key: {alike}"
-        f" ({', '.join(' / '.join(pair) for pair in SAME)})."
+        f"A name was accepted with nothing left to explain: {share(len(wrong), len(lines))}; of"
+        f" these, with the same thing under another key: {len(alike)}{which}."
     )
     return f"{text}\n\n{_strangers(lines)}"
 
