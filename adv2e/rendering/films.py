@@ -9,9 +9,10 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from adv2e.errors import OutputError, UsageError
+from adv2e.errors import UsageError
 from adv2e.rendering.gif import GifWriter, palette
 from adv2e.rendering.layout import Cell, compose, default_scale, sheet
+from adv2e.rendering.output import NotWritten
 from adv2e.rendering.styles import Picture, Style
 
 CODES = {".mp4": "mp4v", ".avi": "FFV1"}
@@ -56,7 +57,7 @@ class VideoFile:
 
     Raises
     ------
-    OutputError
+    NotWritten
         The file cannot be written.
     """
 
@@ -76,7 +77,7 @@ class VideoFile:
             code = cv2.VideoWriter.fourcc(*CODES[self._path.suffix.lower()])
             self._writer = cv2.VideoWriter(str(self._path), code, self._fps, self._size)
             if not self._writer.isOpened():
-                raise OutputError(f"{self._path.parent}: cannot write a video there")
+                raise NotWritten("a video cannot be written there")
         self._writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
         self._count += 1
 
@@ -87,10 +88,7 @@ class VideoFile:
         held = int(written.get(cv2.CAP_PROP_FRAME_COUNT)) if written.isOpened() else 0
         written.release()
         if held != self._count:
-            raise OutputError(
-                f"{self._path.parent}: the film holds {held} of {self._count} pictures"
-                " (is the disk full?)"
-            )
+            raise NotWritten(f"holds {held} of {self._count} pictures (is the disk full?)")
 
     def close(self) -> None:
         """Let go of the file."""
@@ -172,7 +170,7 @@ class Sheet:
         cells = [self._cells[int(place)][1] for place in places]
         picture = sheet(cells, self._style, self._scale)
         if not cv2.imwrite(str(self._path), picture[:, :, ::-1]):
-            raise OutputError(f"{self._path.parent}: cannot write a .png picture there")
+            raise NotWritten("a .png picture cannot be written there")
 
     def close(self) -> None:
         """Forget the cells."""

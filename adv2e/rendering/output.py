@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from adv2e.errors import OutputError
 from adv2e.sinks.staging import Staging
+
+_OF_WRITING = (errno.EFBIG, errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EACCES)
+
+
+class NotWritten(OutputError):
+    """A picture or film could not be written; says how, and leaves out where."""
 
 
 @contextmanager
@@ -18,7 +26,7 @@ def replacing(path: Path, overwrite: bool) -> Iterator[Path]:
     Raises
     ------
     OutputError
-        `path` exists and `overwrite` is false, or it cannot be a file.
+        `path` exists and `overwrite` is false, or it cannot be a file, or cannot be written.
     """
     staging = Staging(overwrite)
     part = staging.file(path)
@@ -26,6 +34,10 @@ def replacing(path: Path, overwrite: bool) -> Iterator[Path]:
         staging.prepare()
         yield part
         staging.commit()
-    except BaseException:
+    except BaseException as error:
         staging.discard()
+        if isinstance(error, NotWritten):
+            raise OutputError(f"{path}: {error}") from error
+        if isinstance(error, OSError) and error.errno in _OF_WRITING:
+            raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
         raise

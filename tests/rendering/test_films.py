@@ -54,7 +54,7 @@ def test_odd_sizes_gain_a_line(tmp_path):
 
 
 def test_video_that_cannot_be_written(tmp_path):
-    with pytest.raises(OutputError, match="cannot write a video there"):
+    with pytest.raises(OutputError, match="a video cannot be written there"):
         write(tmp_path / "absent" / "film.mp4", [noise(16, 16)])
 
 
@@ -122,5 +122,5 @@ def test_sheet_in_place_of_which_there_is_a_folder(tmp_path):
     (tmp_path / "sheet.png").mkdir()
     album = Sheet(tmp_path / "sheet.png", 1, Style(), scale=1)
     add_all(album, 1)
-    with pytest.raises(OutputError, match=r"cannot write a \.png picture there"):
+    with pytest.raises(OutputError, match=r"a \.png picture cannot be written there"):
         album.finish()

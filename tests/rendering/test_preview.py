@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
+from processes import running_python
 
 from adv2e.errors import OutputError, UsageError
 from adv2e.events import empty_events, make_events
@@ -26,6 +30,30 @@ def test_only_the_finished_file_is_left(tmp_path, suffix):
     make(path)
     assert list(tmp_path.iterdir()) == [path]
     assert path.stat().st_size > 1000
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs resource limits")
+@pytest.mark.parametrize("suffix", [".mp4", ".gif", ".png"])
+def test_a_full_disk_is_told_with_the_name_of_the_file(tmp_path, suffix):
+    code = """
+import resource
+import sys
+from pathlib import Path
+sys.path[:0] = sys.argv[2:]
+from adv2e.errors import OutputError
+from test_preview import make
+resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))
+try:
+    make(Path(sys.argv[1]))
+except OutputError as error:
+    print(error)
+"""
+    path = tmp_path / f"view{suffix}"
+    with running_python(code, path, *Path(__file__).parents[:2], text=True) as process:
+        out, err = process.communicate(timeout=60)
+    assert out.startswith(f"{path}: "), err
+    assert out.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_film_has_the_pictures_of_its_duration(tmp_path):
