@@ -37,6 +37,8 @@ class Knob:
         How a key that is text holds the number, such as ``gamma:{}``.
     neutral : float, optional
         Where the effect does nothing; default: what the configuration holds, or nothing.
+    of_pixels : bool
+        A share of the pixels, of which a chip has a drawn number.
     """
 
     key: str
@@ -47,6 +49,7 @@ class Knob:
     part: int | None = None
     text: str = ""
     neutral: float | None = None
+    of_pixels: bool = False
 
     def inner(self, value: float) -> float:
         """Return where on the fitted scale `value` is."""

@@ -78,13 +78,23 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
     return Conclusion(verdict, kept, rows, Gallery(scene, ready.measured, before, after))
 
 
-def finding_of(fit: Fit) -> Finding:
-    """Return an effect that was added, with 95 % intervals of what was fitted."""
+def finding_of(fit: Fit, pixels: int) -> Finding:
+    """Return an effect that was added, with 95 % intervals of what was fitted.
+
+    Parameters
+    ----------
+    fit : Fit
+    pixels : int
+        Of the recording: of a share of them, no more can be known than so many draws tell.
+    """
     parameters = fit.candidate.parameters(fit.place)
     interval: dict[str, Any] = {}
     spread: Any = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if fit.covariance.size else []
     for knob, place, sd in zip(fit.candidate.knobs, fit.place, spread, strict=False):
-        low, high = knob.outer(place - 1.96 * sd), knob.outer(place + 1.96 * sd)
+        # on its logarithmic scale
+        counted = (knob.outer(place) * pixels) ** -0.5 if knob.of_pixels else 0.0
+        reach = 1.96 * max(sd, counted)
+        low, high = knob.outer(place - reach), knob.outer(place + reach)
         if knob.part is None:
             interval[knob.key] = low, high
         else:  # parts of a list come in their order

@@ -192,13 +192,15 @@ def _of_the_comparator(now: _Now, times: _Times, values: Any, hints: Hints) -> l
         Candidate(
             "hot_pixels",
             (
-                Knob("pixel.hot_pixels.fraction", 2e-4, 0.2),
+                Knob("pixel.hot_pixels.fraction", 2e-4, 0.2, of_pixels=True),
                 Knob("pixel.hot_pixels.rate_hz", 1.0, 2e4),
             ),
             ((0.003, 40.0), (0.01, 150.0)),
         ),
         Candidate(
-            "dead_pixels", (Knob("pixel.dead_pixels.fraction", 2e-4, 0.9),), ((0.005,), (0.03,))
+            "dead_pixels",
+            (Knob("pixel.dead_pixels.fraction", 2e-4, 0.9, of_pixels=True),),
+            ((0.005,), (0.03,)),
         ),
     ]  # fmt: skip
 

@@ -13,6 +13,7 @@ from made_up_laboratory import (
     candidates,
     searched,
 )
+from scipy.stats import chi2
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import search as search_module
@@ -132,7 +133,7 @@ def test_one_effect_is_named(name, sets, value):
     _, outcome = searched([sets])
     assert outcome.state.names == (name,)
     assert verdict_of(outcome, GONE) == "explained"
-    finding = finding_of(outcome.state.fits[0])
+    finding = finding_of(outcome.state.fits[0], 100)
     (key,) = (key for key in finding.parameters if key == sets.partition("=")[0])
     low, high = finding.interval[key]
     assert low < finding.parameters[key] < high
@@ -148,12 +149,22 @@ def test_intervals_of_a_list_are_lists():
     knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
     fit = Fit(Candidate("misregistration", knobs, ()), Config(), np.array([1.0, -2.0]))
     fit.covariance = np.diag([0.01, 0.04])
-    finding = finding_of(fit)
+    finding = finding_of(fit, 100)
     assert finding.parameters == {"frames.shift_px": [pytest.approx(0.3), pytest.approx(-0.6)]}
     low, high = finding.interval["frames.shift_px"]
     assert low == pytest.approx((0.3 - 0.3 * 0.196, -0.6 - 0.3 * 0.392))
     assert high == pytest.approx((0.3 + 0.3 * 0.196, -0.6 + 0.3 * 0.392))
     assert interval_text((low, high)) == "[0.2412, -0.7176] to [0.3588, -0.4824]"
+
+
+def test_of_a_share_of_pixels_no_more_is_known_than_its_number_tells():
+    (dead,) = candidates("dead_pixels")
+    fit = Fit(dead, Config(), np.array(dead.inner([0.01])), covariance=np.array([[0.001**2]]))
+    for pixels, near in ((400, 0.5), (40_000, 0.01)):
+        found = finding_of(fit, pixels).interval["pixel.dead_pixels.fraction"]
+        n = 0.01 * pixels
+        counted = 0.5 * np.array([chi2.ppf(0.025, 2 * n), chi2.ppf(0.975, 2 * n + 2)])  # Garwood's
+        assert list(found) == pytest.approx(counted / pixels, rel=near)
 
 
 def test_of_the_forms_of_an_effect_the_plainest_that_does_is_taken():
@@ -241,7 +252,7 @@ def test_two_effects_are_both_found(period, rate):
     assert config.pixel.leak.rate_hz == pytest.approx(rate, rel=0.2)
     for fit in outcome.state.fits:
         assert fit.covariance.shape == (1, 1)
-        assert finding_of(fit).interval
+        assert finding_of(fit, 100).interval
 
 
 def test_what_holds_is_no_name_where_what_does_not_explains_far_more(monkeypatch):
