@@ -106,7 +106,7 @@ def progress_table(lines: Sequence[Line]) -> str:
             for size in _SIZES
         ]
         rows.append([kind, *cells])
-    return table(("kind", "-", *SIZES), rows)
+    return table(("kind", "no effect", *SIZES), rows)
 
 
 def pooled_table(lines: Sequence[Line]) -> str:
