@@ -79,7 +79,7 @@ def worker_pool(threads: int) -> Iterator[ThreadPoolExecutor]:
     at any moment, one in which :mod:`threading` holds its own locks among them; who waits there for
     a thread to end, waits for ever.  The threads end by themselves then.
     """
-    pool, abandoned = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-work"), False
+    pool, abandoned = ThreadPoolExecutor(threads), False
     try:
         yield pool
     except GeneratorExit:

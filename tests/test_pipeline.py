@@ -408,12 +408,10 @@ def test_a_full_disk_ends_a_conversion_at_once(long_stack, tmp_path, name):
 @pytest.mark.parametrize(
     ("threads", "output", "expected"),
     [
-        # the main thread cannot be interrupted in compiled code
-        ("1", "a.h5", {"adv2e-work"}),
-        ("1", "-", {"adv2e-work"}),
-        ("2", "a.h5", {"adv2e-work", "adv2e-read", "adv2e-write", "adv2e-sink"}),
-        # but in a write that blocks
-        ("2", "-", {"adv2e-work", "adv2e-read"}),
+        ("1", "a.h5", set()),
+        ("1", "-", set()),
+        ("2", "a.h5", {"adv2e-read", "adv2e-write", "adv2e-sink"}),
+        ("2", "-", {"adv2e-read"}),  # a write that blocks can be interrupted in the main thread
     ],
 )
 def test_one_thread_computes_where_one_is_asked_for(
@@ -431,8 +429,8 @@ def test_one_thread_computes_where_one_is_asked_for(
     assert adv2e("convert", video, "-o", output, "--threads", threads, "--no-progress").status == 0
     ours = {name for name in names if name.startswith("adv2e-")}
     assert ours == expected
-    if threads == "1":
-        assert names == expected
+    if threads == "1":  # that of the pixel, as the main thread cannot be interrupted in its code
+        assert len(names) == 1
 
 
 def test_progress_counts_the_frames(adv2e, video, tmp_path):
