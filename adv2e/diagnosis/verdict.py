@@ -32,27 +32,29 @@ def verdict_of(outcome: Outcome, error: ErrorRow) -> Verdict:
     """
     if not outcome.state.fits:
         return "consistent" if outcome.complete else "unexplained"
-    gone = _gone(error)
+    gone, at_most = _gone(error)
     if not outcome.complete:
         partly = outcome.explained >= _PARTLY and gone >= _ERROR_PARTLY and not _too_near(error)
         return "partly_explained" if partly else "unexplained"
-    if gone < _ERROR_EXPLAINED:
+    if at_most < _ERROR_EXPLAINED:
         return "unexplained"
     return "not_identifiable" if outcome.alternatives else "explained"
 
 
-def _gone(error: ErrorRow) -> float:
-    """Return by how much of what it can the error fell; one where it tells nothing of the effect.
+def _gone(error: ErrorRow) -> tuple[float, float]:
+    """Return by how much of what it can the error fell, and by how much at most (97.5 %).
 
-    Statistics fall for any effect that does some of what is missing; events come where they are
-    measured only for those that do it where and when it happens.
+    One where the error tells nothing of the effect.  Statistics fall for any effect that does some
+    of what is missing; events come where they are measured only for those that do it where and when
+    it happens.
     """
     before, after, floor = error.before, error.after, error.floor
-    if before.interval is None or floor.interval is None:
-        return 1.0
+    if before.interval is None or floor.interval is None or after.interval is None:
+        return 1.0, 1.0
     if not before.interval[0] > floor.interval[1]:  # or there is none
-        return 1.0
-    return (before.value - after.value) / (before.value - floor.value)
+        return 1.0, 1.0
+    room = before.value - floor.value
+    return (before.value - after.value) / room, (before.value - after.interval[0]) / room
 
 
 def _too_near(error: ErrorRow) -> bool:

@@ -115,6 +115,9 @@ def test_statistics_alone_are_no_explanation():
     assert "leak would account" in sentence_of(verdict, search.declared, outcome, DECLARED)
     refused = {one.name: one for one in rejected_of(outcome, search.declared, candidates())}
     assert refused["leak"].reason.startswith("would account for every statistic")
+    # but chance may have made it
+    assert verdict_of(outcome, error(1.19, 0.80, 0.64, 0.04)) == "unexplained"
+    assert verdict_of(outcome, error(1.19, 0.80, 0.64, 0.06)) == "explained"
     assert verdict_of(outcome, error(0.65, 0.66, 0.64)) == "explained"  # says nothing of leak
     assert verdict_of(outcome, error(0.45, 0.38, 0.42)) == "explained"
 
