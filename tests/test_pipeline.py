@@ -2,18 +2,14 @@
 
 import json
 import shutil
-import signal
 import subprocess
 import sys
 import threading
-import time
 
 import cv2
 import h5py
 import numpy as np
 import pytest
-from processes import running_python
-from threads import wait_until
 
 from adv2e import pipeline as conversion
 from adv2e.config import load_config
@@ -313,96 +309,6 @@ def test_files_do_not_depend_on_the_size_of_the_pieces(adv2e, folder, tmp_path, 
     monkeypatch.setattr(conversion, "BEHIND_BYTES", 2000)
     adv2e("convert", folder, "-o", tmp_path / name, "--threads", "2", "--overwrite")
     assert (tmp_path / name).read_bytes() == whole
-
-
-@pytest.fixture
-def long_stack(tmp_path):
-    """Frames that take minutes to convert, with many events."""
-    path = tmp_path / "long.npy"
-    stack = np.lib.format.open_memmap(path, "w+", np.uint8, (100_000, 24, 32))
-    for k in range(10):
-        stack[k::10] = picture(k)
-    stack.flush()
-    return path
-
-
-def started(source, output, *options, **more):
-    """Start a conversion in a process of its own, with signals as in a terminal."""
-    script = (
-        "import signal, sys; from adv2e.cli import main;"
-        "signal.signal(signal.SIGINT, signal.default_int_handler);"
-        "signal.signal(signal.SIGTERM, signal.SIG_DFL);"
-        "main(sys.argv[1:])"
-    )
-    arguments = ["convert", source, "--fps", "100", "-o", output, "--set", "sampling.L=1", *options]
-    return running_python(script, *arguments, **more)
-
-
-def is_long(path):
-    return path.stat().st_size > 10**5
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("threads", ["1", "2"])
-@pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
-def test_a_signal_ends_a_conversion_without_a_trace(long_stack, tmp_path, name, status, threads):
-    target = tmp_path / "results"
-    target.mkdir()
-    with started(long_stack, target / "out.txt", "--threads", threads) as process:
-        wait_until(lambda: any(map(is_long, target.glob(".out.*.txt"))), seconds=60)
-        process.send_signal(getattr(signal, name))
-        _, err = process.communicate(timeout=20)
-    assert process.returncode == status, err
-    assert len(err.splitlines()) == 1
-    assert list(target.iterdir()) == []
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("threads", ["1", "2"])
-def test_a_signal_ends_a_conversion_in_the_midst_of_compiled_code(tmp_path, threads):
-    """Times in us where seconds are read: one call makes the leak events of days."""
-    stack, times = tmp_path / "stack.npy", tmp_path / "times.txt"
-    np.save(stack, np.array([picture(k) for k in range(20)]))
-    times.write_text("".join(f"{33_333 * k}\n" for k in range(20)))
-    options = ["--timestamps", times, "-o", tmp_path / "out.txt", "--threads", threads]
-    with running_python(
-        "import sys; from adv2e.cli import main; main(sys.argv[1:])",
-        *("convert", stack, *options, "--no-progress"),
-        text=True,
-    ) as process:
-        assert "stack.npy: frames are 33,333 s apart; times are in seconds" in (
-            process.stderr.readline()
-        )
-        time.sleep(1.0)
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(timeout=20) == 143
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["stack.npy", "times.txt"]
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_an_interrupt_ends_a_conversion_whose_reader_has_stopped_reading(long_stack):
-    with started(long_stack, "-") as process:
-        assert process.stdout.read(100).startswith(b"0.0")
-        time.sleep(1)  # the pipe is full by now
-        process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=20) == 130
-
-
-@pytest.mark.parametrize("name", ["out.txt", "out.h5", "out.zip", "out"])
-def test_a_full_disk_ends_a_conversion_at_once(long_stack, tmp_path, name):
-    resource = pytest.importorskip("resource")
-    target = tmp_path / "results"
-    target.mkdir()
-
-    def limit():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (10**6, 10**6))
-
-    with started(long_stack, target / name, "-q", preexec_fn=limit) as process:
-        _, err = process.communicate(timeout=60)
-    assert process.returncode == 1
-    (line,) = err.decode().splitlines()
-    assert f"{target / name}: cannot be written: File too large" in line
-    assert list(target.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -148,10 +148,3 @@ def neutral_value(config: Config, knob: Knob) -> float:
     if isinstance(held, (int, float)):
         return float(held)
     return math.inf if knob.key in _OFF_AT_INFINITY else 0.0
-
-
-def exponent(encoding: str) -> float:
-    """Return the exponent that an encoding has, or is about as steep as."""
-    if encoding.startswith("gamma:"):
-        return float(encoding.partition(":")[2])
-    return 2.2 if encoding == "srgb" else 1.0

@@ -13,7 +13,7 @@ from typing import Any
 
 from adv2e.config import Config, to_dict
 from adv2e.config.paths import get_key
-from adv2e.diagnosis.candidates import Candidate, Knob, exponent
+from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.keys import known_keys, user_effects
 from adv2e.diagnosis.lamps import Lamp
@@ -273,11 +273,18 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
 
 def _encodings(values: Mapping[str, Any], hints: Hints) -> list[Candidate]:
     held = str(get_key(values, "frames.encoding"))
-    here = exponent(hints.encoding if held == "auto" else held)
+    here = _exponent(hints.encoding if held == "auto" else held)
     gamma = Knob("frames.encoding", 0.2, 5.0, text="gamma:{}", neutral=here)
     return [
         Candidate("frame_encoding", (gamma,), tuple((here * f,) for f in (0.8, 1.15, 1.5))),
     ]
+
+
+def _exponent(encoding: str) -> float:
+    """Return the exponent that an encoding has, or is about as steep as."""
+    if encoding.startswith("gamma:"):
+        return float(encoding.partition(":")[2])
+    return 2.2 if encoding == "srgb" else 1.0
 
 
 _BUILDERS = (

@@ -115,12 +115,11 @@ def sentence_of(verdict: Verdict, kept: State, outcome: Outcome, declared: Confi
 
 def _wrong(fits: Sequence[Fit], declared: Config) -> str:
     """Return what the declared model lacks, and what it has, but otherwise."""
-    has = [_has(declared, fit.candidate) for fit in fits]
-    lacks, other = (
-        " and ".join(fit.candidate.name for fit, there in zip(fits, has, strict=True) if there is k)
-        for k in (False, True)
-    )
-    told = [f"lacks {lacks}"] * bool(lacks) + [f"is wrong in {other}"] * bool(other)
+    told = []
+    for there, what in ((False, "lacks"), (True, "is wrong in")):
+        names = [fit.candidate.name for fit in fits if _has(declared, fit.candidate) is there]
+        if names:
+            told.append(f"{what} {' and '.join(names)}")
     return " and ".join(told)
 
 

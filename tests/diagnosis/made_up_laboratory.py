@@ -14,6 +14,7 @@ from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.library import Hints, library
 from adv2e.diagnosis.markers import BOTH, VIEWS, Entry
 from adv2e.diagnosis.search import Search
+from adv2e.reports.result import ErrorRow, Estimate
 
 STATISTICS = 40
 RECORDING = 70_000
@@ -32,6 +33,16 @@ RESPONSES = {
 """What a key does to statistics: how much of its own pattern; nothing at its default."""
 
 EFFECTS = ("refractory", "leak", "shot_noise", "dark_current", "event_loss", "thresholds")
+
+
+def error(before, after, floor, spread=0.02):
+    """Return a row of errors, each with an interval of that width."""
+    ends = (Estimate(v, (v - spread / 2, v + spread / 2)) for v in (before, after, floor))
+    return ErrorRow("error", *ends)
+
+
+GONE = error(0.8, 0.4, 0.4)
+"""Errors of a model that explains all that can be explained."""
 
 
 def candidates(*names):

@@ -30,3 +30,11 @@ def test_of_what_cannot_be_seen_no_size_is_told():
     search, _ = searched(laboratory=laboratory)
     found = detectable(search.bench, search.declared, candidates())
     assert {one.name for one in found} == set(EFFECTS) - {"refractory"}
+
+
+def test_an_effect_too_weak_to_be_seen_at_any_size_is_left_out():
+    laboratory = MadeUpLaboratory()
+    laboratory.patterns["readout.loss.fraction"] = 1e-3 * laboratory.patterns["pixel.leak.rate_hz"]
+    search, _ = searched(laboratory=laboratory)
+    found = {one.name for one in detectable(search.bench, search.declared, candidates())}
+    assert found == set(EFFECTS) - {"event_loss"}

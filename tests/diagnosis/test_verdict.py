@@ -1,0 +1,102 @@
+"""What is said at the end of a search: verdict, sentence, findings and their intervals."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from made_up_laboratory import GONE, candidates, error, searched
+from scipy.stats import chi2
+
+from adv2e.config import Config, load_config
+from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.conclusion import finding_of, rejected_of
+from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.verdict import sentence_of, verdict_of
+from adv2e.reports.quantities import interval_text
+
+DECLARED = Config()
+
+
+def test_what_is_missing_in_the_last_part_alone_is_not_overlooked():
+    leak = ["pixel.leak.rate_hz=4"]
+    search, outcome = searched(last_truth=leak)
+    verdict = verdict_of(outcome, GONE)
+    assert verdict == "unexplained"
+    assert "looked at last" in sentence_of(verdict, search.declared, outcome, DECLARED)
+    _, outcome = searched(leak, last_truth=[*leak, "pixel.refractory.period_us=900"])
+    assert outcome.state.names == ("leak",)
+    verdict = verdict_of(outcome, GONE)
+    assert verdict == "partly_explained"
+    told = sentence_of(verdict, outcome.state, outcome, DECLARED)
+    assert told.endswith("left in the data looked at last.")
+
+
+@pytest.mark.parametrize(
+    ("sets", "wrong"),
+    [
+        (["pixel.leak.rate_hz=4"], "lacks leak"),
+        (["pixel.thresholds.off=0.26"], "is wrong in thresholds"),
+        (
+            ["pixel.refractory.period_us=5000", "pixel.thresholds.off=0.26"],
+            "lacks refractory and is wrong in thresholds",
+        ),
+    ],
+)
+def test_the_sentence_tells_what_is_lacking_from_what_is_otherwise(sets, wrong):
+    _, outcome = searched(sets)
+    bare = Config(pixel=dataclasses.replace(Config().pixel, leak=None, refractory=None))
+    told = sentence_of("explained", outcome.state, outcome, bare)
+    assert (
+        told
+        == f"The declared model {wrong}; with what was fitted, nothing is left that can be seen."
+    )
+    told = sentence_of("explained", outcome.state, outcome, outcome.state.config)
+    assert "lacks" not in told
+
+
+@pytest.mark.parametrize("shift", ["[0, 2]", "[2, 0]"])
+def test_any_key_of_an_effect_makes_it_one_that_is_there(shift):
+    knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
+    fit = Fit(Candidate("misregistration", knobs, ()), DECLARED, np.zeros(2))
+    _, outcome = searched(["pixel.leak.rate_hz=4"])
+    state = dataclasses.replace(outcome.state, fits=(fit,))
+    for sets, wrong in (([f"frames.shift_px={shift}"], "is wrong in"), ([], "lacks")):
+        told = sentence_of("explained", state, outcome, load_config([], sets))
+        assert f"The declared model {wrong} misregistration" in told
+
+
+def test_statistics_alone_are_no_explanation():
+    search, outcome = searched(["pixel.leak.rate_hz=4"])
+    assert verdict_of(outcome, error(1.19, 0.75, 0.64)) == "explained"
+    verdict = verdict_of(outcome, error(1.19, 0.88, 0.64))
+    assert verdict == "unexplained"
+    assert "leak would account" in sentence_of(verdict, search.declared, outcome, DECLARED)
+    refused = {one.name: one for one in rejected_of(outcome, search.declared, candidates())}
+    assert refused["leak"].reason.startswith("would account for every statistic")
+    # but chance may have made it
+    assert verdict_of(outcome, error(1.19, 0.80, 0.64, 0.04)) == "unexplained"
+    assert verdict_of(outcome, error(1.19, 0.80, 0.64, 0.06)) == "explained"
+    assert verdict_of(outcome, error(0.65, 0.66, 0.64)) == "explained"  # says nothing of leak
+    assert verdict_of(outcome, error(0.45, 0.38, 0.42)) == "explained"
+
+
+def test_intervals_of_a_list_are_lists():
+    knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
+    fit = Fit(Candidate("misregistration", knobs, ()), Config(), np.array([1.0, -2.0]))
+    fit.covariance = np.diag([0.01, 0.04])
+    finding = finding_of(fit, 100)
+    assert finding.parameters == {"frames.shift_px": [pytest.approx(0.3), pytest.approx(-0.6)]}
+    low, high = finding.interval["frames.shift_px"]
+    assert low == pytest.approx((0.3 - 0.3 * 0.196, -0.6 - 0.3 * 0.392))
+    assert high == pytest.approx((0.3 + 0.3 * 0.196, -0.6 + 0.3 * 0.392))
+    assert interval_text((low, high)) == "[0.2412, -0.7176] to [0.3588, -0.4824]"
+
+
+def test_of_a_share_of_pixels_no_more_is_known_than_its_number_tells():
+    (dead,) = candidates("dead_pixels")
+    fit = Fit(dead, Config(), np.array(dead.inner([0.01])), covariance=np.array([[0.001**2]]))
+    for pixels, near in ((400, 0.5), (40_000, 0.01)):
+        found = finding_of(fit, pixels).interval["pixel.dead_pixels.fraction"]
+        n = 0.01 * pixels
+        counted = 0.5 * np.array([chi2.ppf(0.025, 2 * n), chi2.ppf(0.975, 2 * n + 2)])  # Garwood's
+        assert list(found) == pytest.approx(counted / pixels, rel=near)
