@@ -6,7 +6,7 @@ import pytest
 
 from adv2e.errors import OutputError
 from adv2e.synthetic import Scene
-from adv2e.synthetic.clips import encode_srgb, write_images, write_video
+from adv2e.synthetic.clips import encode_srgb, write_video
 from adv2e.synthetic.scene import BRIGHTEST, DARKEST, GO_S, PERIOD_S, RAMP_S
 
 REST = 0.7  # a time at which the scene rests
@@ -110,23 +110,3 @@ def test_a_clip_is_not_replaced_unless_asked(tmp_path):
     write_video(Scene(), path, width=16, height=12, duration_s=0.1, overwrite=True)
     assert path.stat().st_size > 100
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_folder_of_images_with_their_times(tmp_path):
-    folder = tmp_path / "clip"
-    write_images(Scene(), folder, width=32, height=24, fps=30, duration_s=0.1)
-    lines = (folder / "images.txt").read_text().splitlines()
-    assert lines == [
-        "0.000000000 images/frame_00000000.png",
-        "0.033333333 images/frame_00000001.png",
-        "0.066666667 images/frame_00000002.png",
-    ]
-    image = cv2.imread(str(folder / "images/frame_00000002.png"), cv2.IMREAD_UNCHANGED)
-    assert image.shape == (24, 32, 3)
-    assert np.array_equal(image[:, :, 0], encode_srgb(Scene().light(2 / 30, 32, 24)))
-
-
-def test_folder_of_images_is_never_replaced(tmp_path):
-    with pytest.raises(OutputError, match="exists"):
-        write_images(Scene(), tmp_path, width=16, height=12, duration_s=0.1)
-    assert list(tmp_path.iterdir()) == []

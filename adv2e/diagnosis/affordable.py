@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from adv2e.config import Config
-from adv2e.diagnosis.evidence import LEAST_EVENTS, Evidence
+from adv2e.diagnosis.evidence import Evidence, check_events
 from adv2e.diagnosis.stream import Stream
-from adv2e.errors import DataError
 from adv2e.reports.result import Masked
 
 AFFORDABLE_S = 0.2
@@ -68,12 +67,10 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
         if intervals < _FEWEST:
             break
         kept = _shortened(whole, intervals)
-    if kept is not evidence and len(kept.stream) < LEAST_EVENTS:
-        raise DataError(
-            f"{evidence.name}: {len(kept.stream)} events in the {kept.width}x{kept.height} pixels"
-            f" and {kept.seconds:.3g} s that can be simulated often enough; at least {LEAST_EVENTS}"
-            " are needed"
-        )
+    if kept is not evidence:
+        size, length = f"{kept.width}x{kept.height} pixels", f"{kept.seconds:.3g} s"
+        where = f"in the {size} and {length} that can be simulated often enough"
+        check_events(len(kept.stream), evidence.name, where)
     return kept
 
 

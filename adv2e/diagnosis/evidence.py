@@ -98,11 +98,7 @@ def read_evidence(path: str | Path) -> Evidence:
     if covered != slice(0, len(frames)):
         frames, times_s, without = frames[covered], times_s[covered], times_s
         masked.append(_uncovered(without, times_s))
-    if len(kept) < LEAST_EVENTS:
-        raise DataError(
-            f"{path}: {len(kept)} events between its first and its last frame; at least"
-            f" {LEAST_EVENTS} are needed"
-        )
+    check_events(len(kept), path, "between its first and its last frame")
     return Evidence(
         name=str(path),
         frames=frames,
@@ -131,6 +127,17 @@ def _check_alike(path: str | Path, frames: list[NDArray[Any]]) -> None:
 def _form(frame: NDArray[Any]) -> str:
     height, width = frame.shape[:2]
     return f"{width}x{height} {'colour' if frame.ndim == 3 else 'grey'} {frame.dtype}"
+
+
+def check_events(number: int, name: object, where: str) -> None:
+    """Refuse to diagnose fewer events than statistics can be made of.
+
+    Raises
+    ------
+    DataError
+    """
+    if number < LEAST_EVENTS:
+        raise DataError(f"{name}: {number} events {where}; at least {LEAST_EVENTS} are needed")
 
 
 def _between_frames(events: Events, times_s: NDArray[np.float64]) -> tuple[Events, list[Masked]]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.diagnosis.markers.base import excess
 from adv2e.diagnosis.markers.intervals import BORDERS_MS
 from adv2e.diagnosis.markers.timing import LAGS_MS
 from adv2e.diagnosis.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
@@ -178,8 +179,7 @@ class Gallery:
             return np.bincount(pixel, minlength=scene.pixels).astype(np.float64)
 
         mean = np.mean([number(placed) for placed in simulated], axis=0)
-        excess = (number(self._measured) - mean) / np.sqrt(mean + 1.0)
-        return np.asarray(excess.reshape(scene.height, scene.width))
+        return excess(number(self._measured), mean).reshape(scene.height, scene.width)
 
 
 def _gap_counts(borders_ms: Array, same: bool) -> _Measure:

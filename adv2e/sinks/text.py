@@ -21,6 +21,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.errors import OutputError
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.jit import entry, kernel
 from adv2e.sinks.base import FileSink, to_json
@@ -155,18 +156,28 @@ class TextSink(FileSink):
 
 
 class StandardOutput:
-    """Events as text on standard output, flushed with every write.
-
-    A closed pipe raises BrokenPipeError.
-    """
+    """Events as text on standard output, flushed with every write."""
 
     wants_frames = False
 
     def write_events(self, events: Events) -> None:
-        """Write the lines of `events`."""
-        for block in text_blocks(events):
-            sys.stdout.buffer.write(block)
-        sys.stdout.buffer.flush()
+        """Write the lines of `events`.
+
+        Raises
+        ------
+        BrokenPipeError
+            Nobody reads them any more.
+        OutputError
+            They cannot be written, as when they go to a file and the disk is full.
+        """
+        try:
+            for block in text_blocks(events):
+                sys.stdout.buffer.write(block)
+            sys.stdout.buffer.flush()
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise OutputError(f"standard output: cannot be written: {error.strerror}") from error
 
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         """Do nothing: text holds no frames."""

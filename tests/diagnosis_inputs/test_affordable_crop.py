@@ -6,6 +6,7 @@ import pytest
 from adv2e import simulate
 from adv2e.config import load_config
 from adv2e.diagnosis import affordable as affordable_module
+from adv2e.diagnosis import evidence as evidence_module
 from adv2e.diagnosis.affordable import affordable
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.stream import Stream
@@ -116,7 +117,7 @@ def test_of_long_recordings_the_busiest_stretch_is_kept(monkeypatch):
 def test_a_crop_with_too_few_events_is_told(monkeypatch):
     whole = recording()
     limit(monkeypatch, WIDTH * HEIGHT // 3)
-    monkeypatch.setattr(affordable_module, "LEAST_EVENTS", len(whole.stream) + 1)
+    monkeypatch.setattr(evidence_module, "LEAST_EVENTS", len(whole.stream) + 1)
     expected = f"spot: {len(whole.stream)} events in the 56x48 pixels and 0.05 s that can be"
     with pytest.raises(DataError, match=expected):
         affordable(whole, CONFIG)

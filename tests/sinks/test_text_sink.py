@@ -3,6 +3,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -139,6 +140,20 @@ def test_closed_pipe_raises_broken_pipe(monkeypatch):
     finally:
         with pytest.raises(BrokenPipeError):
             pipe.close()  # what is left in its buffer
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_full_disk_under_standard_output_is_named(monkeypatch):
+    with (
+        pytest.raises(OSError, match="No space"),  # what is left in its buffer, at the end
+        Path("/dev/full").open("w") as full,
+    ):
+        monkeypatch.setattr(sys, "stdout", full)
+        with (
+            pytest.raises(OutputError, match=r"standard output: .*No space"),
+            open_sink("-", width=2, height=2, metadata={}) as sink,
+        ):
+            sink.write_events(make_events([1], [0], [0], [1]))
 
 
 @pytest.mark.parametrize("options", [{"format": "h5"}, {"layout": "monash"}])

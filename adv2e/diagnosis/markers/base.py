@@ -74,6 +74,14 @@ def stabilised(number: Raw) -> NDArray[np.float64]:
     return np.asarray(2.0 * np.sqrt(np.maximum(number, 0.0) + 0.375))
 
 
+def excess(number: Raw, mean: Raw) -> NDArray[np.float64]:
+    """Return what numbers of events are above their mean, in deviations of chance.
+
+    It is zero where nothing is expected and nothing came.
+    """
+    return np.asarray((number - mean) / np.sqrt(mean + 1.0))
+
+
 def share(part: Raw, whole: Raw | float) -> NDArray[np.float64]:
     """Return part of whole, zero where there is nothing."""
     return np.asarray(part / np.maximum(whole, 1.0))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.markers.base import Entry, Raw, stabilised
+from adv2e.diagnosis.markers.base import Entry, Raw, excess, stabilised
 from adv2e.diagnosis.scene import Placed, Scene
 
 HALVES = 2
@@ -76,15 +76,6 @@ class Pixels:
         which = np.eye(parts.COUNT)  # so that a sum over parts knows what to expect
         return np.concatenate([number.reshape(parts.COUNT, cells), which], axis=1)
 
-    def excess(self, raw: Raw, expected: Raw) -> NDArray[np.float64]:
-        """Return the excess of events in deviations of chance, (halves, polarities, rows, columns).
-
-        It is zero where nothing is expected and nothing came.
-        """
-        shape = (HALVES, 2, self._height, self._width)
-        number, mean = raw.reshape(shape), expected.reshape(shape)
-        return np.asarray((number - mean) / np.sqrt(mean + 1.0))
-
     def values(self, raw: Raw) -> NDArray[np.float64]:
         """Return the statistics."""
         assert self._expected is not None
@@ -92,12 +83,12 @@ class Pixels:
         mean = (which @ self._expected)[: -parts.COUNT]
         shape = (HALVES, 2, self._height, self._width)
         n, mu = number.reshape(shape), mean.reshape(shape)
-        residual = self.excess(number, mean)
+        residual = excess(n, mu)
         whole_n, whole_mu = n.sum(axis=0), mu.sum(axis=0)
-        off, on = (whole_n - whole_mu) / np.sqrt(whole_mu + 1.0)
-        both = (whole_n.sum(axis=0) - whole_mu.sum(axis=0)) / np.sqrt(whole_mu.sum(axis=0) + 1.0)
-        total_mu = whole_mu.sum(axis=0)
-        silent = (whole_n.sum(axis=0) == 0) & (total_mu > 4.0)
+        off, on = excess(whole_n, whole_mu)
+        total_n, total_mu = whole_n.sum(axis=0), whole_mu.sum(axis=0)
+        both = excess(total_n, total_mu)
+        silent = (total_n == 0) & (total_mu > 4.0)
         ordered = np.sort(both, axis=None)
         top = max(1, both.size // 100)
         y, x = np.mgrid[-1.0 : 1.0 : self._height * 1j, -1.0 : 1.0 : self._width * 1j]
