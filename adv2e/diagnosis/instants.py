@@ -7,8 +7,10 @@ laid over them: it moves the motion that is found by next to nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,33 @@ from adv2e.upsampling.sequence import Timed, instant_ns, neighbours
 
 Instants = tuple[list[int], NDArray[np.float32]]
 """Times [ns], and the light at them [DN], (instants, rows, columns)."""
+
+_KEPT = 4
+"""Ways to make frames of which they are kept: those tried one beside another."""
+
+
+class Kept:
+    """Frames of a recording, read and made once for each way to do that; for many threads."""
+
+    def __init__(self) -> None:
+        self._held: dict[Any, Instants] = {}
+        self._lock = threading.Lock()
+
+    def of(self, config: Config, read: Callable[[], Instants]) -> Instants:
+        """Return what `read` does, the frames, and what is :func:`made` of them where that is done.
+
+        It goes with :func:`as_recorded`.
+        """
+        frames, sampling = config.frames, config.sampling
+        once = is_made_once(config)
+        how = (sampling.interpolation, sampling.L, frames.exposure_us) if once else None
+        key = (frames.encoding, frames.full_scale, how)
+        with self._lock:
+            if key not in self._held:
+                while len(self._held) >= _KEPT:
+                    del self._held[next(iter(self._held))]
+                self._held[key] = made(config, *read()) if once else read()
+            return self._held[key]
 
 
 def is_made_once(config: Config) -> bool:
@@ -75,7 +104,9 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
 
 
 def as_recorded(config: Config) -> Config:
-    """Return `config` for what :func:`made` makes: sharp frames, and all that is between them."""
+    """Return `config` for what is made once: sharp frames, and all that is between them."""
+    if not is_made_once(config):
+        return config
     frames = replace(config.frames, exposure_us=0.0)
     if not _is_along_motion(config):
         return replace(config, frames=frames)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.instants import Instants, as_recorded, is_made_once, made
+from adv2e.diagnosis.instants import Instants, Kept, as_recorded
 from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
@@ -25,7 +25,6 @@ Result = TypeVar("Result")
 
 _SEEDS = 1_000_000
 """Of a diagnosis, fewer than these; each seed of the configuration has its own."""
-_KEPT = 4  # sets of decoded frames
 _COARSENESS = 2.5
 """Of the steps of time, where the pixel takes any: some us, which no statistic shows."""
 
@@ -50,8 +49,7 @@ class Simulator:
     ) -> None:
         self._evidence, self._threads, self._progress = evidence, threads, progress
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
-        self._decoded: dict[Any, Instants] = {}
-        self._lock, self._counting = threading.Lock(), threading.Lock()
+        self._frames, self._counting = Kept(), threading.Lock()
         self.done = 0
         self.likely = 0
 
@@ -69,12 +67,14 @@ class Simulator:
         `seed` tells simulations of one diagnosis apart, the configuration's tells diagnoses apart.
         """
         evidence = self._evidence
-        times_ns, light = self._light(config)
-        if is_made_once(config):
-            config = as_recorded(config)
+
+        def read() -> Instants:
+            return evidence.times_ns, light_of(evidence, config)
+
+        times_ns, light = self._frames.of(config, read)
         chunks = events_from_light(
             zip(times_ns, light, strict=True),
-            dataclasses.replace(config, seed=(_SEEDS * config.seed + seed) % 2**63),
+            dataclasses.replace(as_recorded(config), seed=(_SEEDS * config.seed + seed) % 2**63),
             threads=1,
             method=_method(config),
             coarseness=_COARSENESS,
@@ -85,20 +85,6 @@ class Simulator:
             self._progress(self.done, self.likely)
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
-
-    def _light(self, config: Config) -> Instants:
-        """Return the light of the frames, made once for each way to read their numbers."""
-        frames, sampling = config.frames, config.sampling
-        made_once = sampling.interpolation, sampling.L, frames.exposure_us
-        between = made_once if is_made_once(config) else None
-        key = (frames.encoding, frames.full_scale, between)
-        with self._lock:
-            if key not in self._decoded:
-                while len(self._decoded) >= _KEPT:
-                    del self._decoded[next(iter(self._decoded))]
-                times_ns, light = self._evidence.times_ns, light_of(self._evidence, config)
-                self._decoded[key] = made(config, times_ns, light) if between else (times_ns, light)
-            return self._decoded[key]
 
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""

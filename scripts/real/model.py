@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
-from adv2e.diagnosis.instants import as_recorded, is_made_once, made
+from adv2e.diagnosis.instants import Instants, Kept, as_recorded, is_made_once
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
 from adv2e.effects.frames.encoding import decoder_for
 from adv2e.events import Events
@@ -29,11 +27,6 @@ NEAR = 0.03
 """Totals match to this while candidates are compared, relative."""
 BEYOND_US = 100_000
 """Frames are simulated to this long after the windows, as a clock offset may need them [us]."""
-
-KEPT = 4
-"""Ways to make in-between frames of which they are kept, at most."""
-
-Light = list[tuple[int, NDArray[Any]]]
 
 
 @dataclass(frozen=True)
@@ -66,7 +59,7 @@ class Bench:
 
     def __init__(self, real: Real, threads: int | None) -> None:
         self.real, self.threads = real, threads
-        self._made: dict[Any, Light] = {}
+        self._frames = Kept()
         self.simulations = 0
 
     def quick(self, config: Config, windows: Windows, seed: int) -> Events:
@@ -75,33 +68,19 @@ class Bench:
         if not is_made_once(config):
             whole = self.real.simulator(config, windows.stop + BEYOND_US, self.threads)(seed)
             return cut(whole, windows.start, windows.stop)
-        lean = replace(as_recorded(config), seed=seed)
         until = (windows.stop + BEYOND_US) * 1000
-        used = ((t_ns, light) for t_ns, light in self._instants(config) if t_ns <= until)
+        made = zip(*self._frames.of(config, lambda: self._read(config)), strict=True)
+        used = ((t_ns, light) for t_ns, light in made if t_ns <= until)
+        lean = replace(as_recorded(config), seed=seed)
         chunks = events_from_light(used, lean, threads=self.threads)
         return cut(np.concatenate(list(chunks)), windows.start, windows.stop)
 
-    def _instants(self, config: Config) -> Light:
-        """Return light between the frames, without what is laid over it."""
-        frames, sampling = config.frames, config.sampling
-        key = (
-            *(frames.encoding, frames.full_scale, frames.exposure_us),
-            *(sampling.interpolation, sampling.L),
-        )
-        if key not in self._made:
-            if len(self._made) == KEPT:
-                del self._made[next(iter(self._made))]
-            times_ns, decoded = zip(*self._decoded(config), strict=True)
-            self._made[key] = list(
-                zip(*made(config, list(times_ns), np.array(decoded)), strict=True)
-            )
-        return self._made[key]
-
-    def _decoded(self, config: Config) -> Iterator[tuple[int, NDArray[Any]]]:
+    def _read(self, config: Config) -> Instants:
+        """Return the light of the frames, without what is laid over it."""
         source = self.real.source
         decoder = decoder_for(config.frames, source.dtype, source.colour, auto=source.encoding)
-        for frame in self.real.frames():
-            yield frame.t_ns, decoder.decode(frame.image)
+        frames = list(self.real.frames())
+        return [one.t_ns for one in frames], np.array([decoder.decode(one.image) for one in frames])
 
     def matched(self, config: Config, windows: Windows, tolerance: float = NEAR) -> Config:
         """Return `config` with thresholds that match the totals in the windows."""

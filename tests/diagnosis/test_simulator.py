@@ -181,7 +181,7 @@ def test_frames_are_made_sharp_once_and_the_same(monkeypatch):
     [["readout.frame_coupling.amplitude=0.05"], ["sampling.L=1"]],
 )
 def test_where_frames_matter_they_are_the_recorded_ones(simulator, monkeypatch, sets):
-    monkeypatch.setattr("adv2e.diagnosis.simulations.made", None)
+    monkeypatch.setattr("adv2e.diagnosis.instants.made", None)
     extra = ["readout.frame_coupling.tau_us=300"] if "coupling" in sets[0] else []
     assert len(simulator.stream(load_config([], [*FLOW, *sets, *extra]), 1)) > 0
 
