@@ -13,18 +13,23 @@ from adv2e.reports.quantities import (
     value_text,
 )
 from adv2e.reports.result import Diagnosis
+from adv2e.reports.standing_out import standing_out
 
 WIDTH = 100
 _MOST_PARAMETERS = 5
+_MOST_STANDING = 3
 
 
 def summary_text(diagnosis: Diagnosis) -> str:
     """Return verdict, effects, error and p before and after: under 15 lines of :data:`WIDTH`.
 
-    Where there are more parameters than that, it says how many.
+    Where there are more parameters than that, it says how many.  Where nothing is named, it says
+    what stands out most.
     """
     lines = _wrapped(f"{diagnosis.verdict}: {diagnosis.sentence}", 4)
     lines += _parameters(diagnosis)
+    if diagnosis.verdict == "unexplained":
+        lines += _standing(diagnosis)
     if diagnosis.alternatives:
         lines += _wrapped(f"as well: {', '.join(diagnosis.alternatives)}", 2)
     for row in diagnosis.errors[:1]:
@@ -59,3 +64,14 @@ def _parameters(diagnosis: Diagnosis) -> list[str]:
         return lines
     more = len(lines) - _MOST_PARAMETERS + 1
     return [*lines[: _MOST_PARAMETERS - 1], f"  and {more} more parameters"]
+
+
+def _standing(diagnosis: Diagnosis) -> list[str]:
+    lines = []
+    for one in standing_out(diagnosis.signatures)[:_MOST_STANDING]:
+        measured, expected = (
+            number_text(value) for value in (one.farthest.measured, one.farthest.after)
+        )
+        text = f"{one.group}: {one.farthest.meaning}: {measured}, expected {expected}"
+        lines += [f"  {line}" for line in _wrapped(text, 2)]
+    return lines

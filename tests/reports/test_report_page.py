@@ -102,6 +102,7 @@ def test_headings_come_in_order(full):
         "Error before and after",
         "What was added",
         "What explains it as well",
+        "What stands out",
         "The residual before and after",
         "Signatures",
         "What was rejected",
@@ -146,7 +147,7 @@ def test_the_page_says_what_was_found(full):
 def test_the_page_of_a_table_holds_what_a_table_can_show():
     outline = Outline(characterisation_report.page(everything()))
     assert outline.headings[0] == ("h1", "Characterisation of office_zigzag.zip")
-    absent = ("Signatures", "What could have been seen")
+    absent = ("What stands out", "Signatures", "What could have been seen")
     assert not {text for _, text in outline.headings} & set(absent)
     for part in ("no line in the spectrum beyond chance", "Blocks of 0.5 s", "standard errors"):
         assert part in outline.text

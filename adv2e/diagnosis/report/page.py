@@ -27,6 +27,7 @@ def page(diagnosis: Diagnosis) -> str:
         ("Error before and after", findings.errors(diagnosis, WORDING)),
         ("What was added", findings.added(diagnosis)),
         ("What explains it as well", trials.alternatives(diagnosis)),
+        ("What stands out", residual.groups(diagnosis.signatures)),
         ("The residual before and after", pictures or tag("p", "No picture was made.")),
         ("Signatures", residual.signatures(diagnosis.signatures)),
         ("What was rejected", trials.rejected(diagnosis.rejected, diagnosis.own)),

@@ -17,10 +17,8 @@ from adv2e.reports.quantities import (
     unit_text,
 )
 from adv2e.reports.result import Diagnosis, ResidualMap, Signature
+from adv2e.reports.standing_out import LARGE_Z, standing_out
 from adv2e.reports.tables import SHOWN, Column, table
-
-LARGE_Z = 3.0
-"""Distances in standard deviations from here on are marked."""
 
 
 def maps(given: Sequence[ResidualMap]) -> Markup:
@@ -56,6 +54,33 @@ def _map(title: str, model: str, values: Map) -> Markup:
     return tag("figure", caption, image)
 
 
+def groups(given: Sequence[Signature]) -> Markup:
+    """Return what stands out, by group of statistics: what an effect that is missing has to do."""
+    found = standing_out(given)
+    if not found:
+        return tag("p", f"No statistic is {LARGE_Z:g} deviations or more off.")
+    columns = [Column("group"), Column("farthest off")] + [
+        Column(name, number=True)
+        for name in ("measured", "before", "after", "beyond before", "beyond after")
+    ]
+    rows = [
+        (
+            one.group,
+            one.farthest.meaning,
+            *_values(one.farthest),
+            f"{one.before} of {one.number}",
+            f"{one.after} of {one.number}",
+        )
+        for one in found
+    ]
+    lead = (
+        "Of each group of marker statistics the one farthest off, as measured and as simulated, and"
+        f" how many are beyond ±{LARGE_Z:g} deviations. What is missing has to do all of it; the"
+        " curves and maps show when and where."
+    )
+    return join(tag("p", lead), table("Groups of statistics, on held-out data", columns, rows))
+
+
 def signatures(given: Sequence[Signature]) -> Markup:
     """Return the marker statistics, the most telling ones first."""
     if not given:
@@ -86,8 +111,11 @@ def _signature(one: Signature) -> tuple[object, ...]:
     name = join(
         tag("span", one.name, title=one.meaning), tag("span", one.meaning, class_="meaning")
     )
-    values = (number_text(value) for value in (one.measured, one.before, one.after))
-    return name, one.group, *values, _z(one.z_before), _z(one.z_after)
+    return name, one.group, *_values(one), _z(one.z_before), _z(one.z_after)
+
+
+def _values(one: Signature) -> list[str]:
+    return [number_text(value) for value in (one.measured, one.before, one.after)]
 
 
 def _z(z: float) -> Markup | str:

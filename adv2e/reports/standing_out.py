@@ -1,0 +1,67 @@
+"""What stands out of a residual: of each group of marker statistics, the one farthest off.
+
+Neighbouring statistics of a group tell much the same, so that the groups that stand out, and how,
+say more of what is missing than a list of the largest distances.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from adv2e.reports.result import Signature
+
+LARGE_Z = 3.0
+"""Distances in standard deviations from here on stand out."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A group of statistics, and what of it stands out.
+
+    Attributes
+    ----------
+    group : str
+    number : int
+        Its statistics.
+    before, after : int
+        Those that stand out from the declared model, and from the model found.
+    farthest : Signature
+        The one farthest from the model found, if any stands out there, or from the declared one.
+    """
+
+    group: str
+    number: int
+    before: int
+    after: int
+    farthest: Signature
+
+
+def standing_out(signatures: Sequence[Signature]) -> list[Standing]:
+    """Return the groups of which a statistic stands out from either model, the farthest first.
+
+    Those that stand out from the model found come before the others.
+    """
+    groups: dict[str, list[Signature]] = {}
+    for one in signatures:
+        groups.setdefault(one.group, []).append(one)
+    found = [_standing(group, members) for group, members in groups.items()]
+    return sorted((one for one in found if one.before or one.after), key=_rank)
+
+
+def _standing(group: str, members: Sequence[Signature]) -> Standing:
+    before = sum(_size(one.z_before) > LARGE_Z for one in members)
+    after = sum(_size(one.z_after) > LARGE_Z for one in members)
+    farthest = max(members, key=lambda one: _size(one.z_after if after else one.z_before))
+    return Standing(group, len(members), before, after, farthest)
+
+
+def _rank(one: Standing) -> tuple[bool, float]:
+    farthest = one.farthest
+    return not one.after, -_size(farthest.z_after if one.after else farthest.z_before)
+
+
+def _size(z: float) -> float:
+    """Return a distance without its sign; one that is not known is none."""
+    return 0.0 if math.isnan(z) else abs(z)

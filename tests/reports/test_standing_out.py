@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from made_up_diagnosis import everything
+
+from adv2e.diagnosis.report.residual import groups
+from adv2e.reports.result import Signature
+from adv2e.reports.standing_out import standing_out
+from adv2e.reports.summary import summary_text
+
+NAN = float("nan")
+
+
+def signature(name, group, z_before, z_after):
+    return Signature(name, group, f"what {name} means", 12.0, 345.0, 67.0, z_before, z_after)
+
+
+SIGNATURES = [
+    signature("a1", "a", -3.5, 0.2),
+    signature("b1", "b", 9.0, 1.0),
+    signature("a2", "a", 2.9, -2.9),
+    signature("c1", "c", 4.0, -3.1),
+    signature("b2", "b", -20.0, NAN),
+    signature("c2", "c", -50.0, 2.0),
+    signature("d1", "d", 2.0, 2.0),
+    signature("e1", "e", NAN, -30.0),
+    signature("f1", "f", NAN, NAN),
+]
+
+
+def test_groups_that_still_stand_out_come_first_the_farthest_before_the_others():
+    found = standing_out(SIGNATURES)
+    assert [(one.group, one.farthest.name) for one in found] == [
+        ("e", "e1"),
+        ("c", "c1"),  # of the model found, which is what is left
+        ("b", "b2"),
+        ("a", "a1"),
+    ]
+    assert [(one.number, one.before, one.after) for one in found] == [
+        (1, 0, 1),
+        (2, 2, 1),
+        (2, 2, 0),
+        (2, 1, 0),
+    ]
+
+
+def test_nothing_stands_out_of_chance():
+    quiet = [signature(f"s{k}", "g", 0.9 * k, -0.9 * k) for k in range(4)]
+    assert standing_out(quiet) == []
+    assert "No statistic is 3 deviations or more off." in groups(quiet)
+
+
+def test_the_page_tells_how_each_group_stands_out():
+    text = groups(SIGNATURES)
+    assert text.index("what e1 means") < text.index("what c1 means") < text.index("what b2 means")
+    assert "what c2 means" not in text
+    assert "2 of 2" in text
+    assert "345" in text
+
+
+@pytest.mark.parametrize("verdict", ["unexplained", "partly_explained", "consistent"])
+def test_the_summary_tells_it_where_nothing_is_named(verdict):
+    text = summary_text(replace(everything(), verdict=verdict, effects=[], signatures=SIGNATURES))
+    lines = [
+        "  e: what e1 means: 12.0, expected 67.0",
+        "  c: what c1 means: 12.0, expected 67.0",
+        "  b: what b2 means: 12.0, expected 67.0",
+    ]
+    told = [line for line in text.splitlines() if "expected" in line]
+    assert told == (lines if verdict == "unexplained" else [])
+
+
+def test_the_summary_stays_short_where_much_stands_out():
+    long = [signature("word " * 60, f"group {k} " * 20, 9.0, 9.0) for k in range(9)]
+    unexplained = replace(everything(), verdict="unexplained", effects=[], signatures=long)
+    lines = summary_text(replace(unexplained, sentence="word " * 300)).splitlines()
+    assert len(lines) < 15
+    assert max(map(len, lines)) <= 100
