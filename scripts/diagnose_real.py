@@ -10,6 +10,9 @@ alone: how far the events are before and after each effect::
 
 Two more numbers tell how far to trust them: how much of the simulation hangs on interpolation, told
 by dropping every second frame, and the score where it does not.
+
+A search can take an hour or two.  Ctrl-C (or ``timeout -s INT 3600``) ends it, and the table is of
+what was found until then.
 """
 
 from __future__ import annotations
@@ -121,10 +124,17 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
     config = load_config([declared], seed=seed)
     as_declared = Added.plain("as declared", config)
     steps = [Step(as_declared, bench.judge(config, second, seeds))]
-    for added in Search(bench, first, say).run(config, only):
-        settled = replace(added, config=bench.matched(added.config, first, tolerance=0.01))
-        steps.append(Step(settled, bench.judge(settled.config, second, seeds)))
-        say(f"{added.text()}: {added.score:.3f}, held out {steps[-1].judged.values[SCORE]:.3f}")
+    ended = True
+    try:
+        for added in Search(bench, first, say).run(config, only):
+            settled = replace(added, config=bench.matched(added.config, first, tolerance=0.01))
+            steps.append(Step(settled, bench.judge(settled.config, second, seeds)))
+            say(f"{added.text()}: {added.score:.3f}, held out {steps[-1].judged.values[SCORE]:.3f}")
+    except KeyboardInterrupt:
+        if len(steps) == 1:  # nothing to tell
+            raise
+        ended = False
+        say("interrupted: judging what was found so far")
     last = replace(
         steps[-1], judged=bench.judge(steps[-1].added.config, second, seeds, in_full=True)
     )
@@ -136,7 +146,7 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
         [
             f"## {real.name}",
             _table(real, steps, second),
-            _found(last, config),
+            _found(last, config, ended),
             _bound(stability, alone),
             _beside_peers(real, last),
         ]
@@ -190,7 +200,7 @@ def _cells(values: Floor) -> list[str]:
     return [number(values[name]) for name in COLUMNS]
 
 
-def _found(last: Step, declared: Config) -> str:
+def _found(last: Step, declared: Config, ended: bool) -> str:
     ratio, config = last.judged.events_ratio, last.added.config
     before = dict(flat(to_dict(declared)))
     keys = [
@@ -203,6 +213,7 @@ def _found(last: Step, declared: Config) -> str:
         " thresholds that match the totals of the first. Keys that differ from those declared: "
         + ", ".join(f"`{key}`" for key in keys)
         + "."
+        + " The search was interrupted: there may be more to find." * (not ended)
     )
 
 

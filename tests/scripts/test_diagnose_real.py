@@ -330,14 +330,49 @@ def test_tiles_that_change_are_unstable_and_chance_is_not():
     assert stable_score(measured, empty_events(), windows, found) == pytest.approx(1.0)
 
 
+def run_script(recording, declared, out):
+    arguments = [str(recording), "--declared", str(declared), "--threads", "1", "--out", str(out)]
+    return CliRunner().invoke(diagnose_real.main, arguments)
+
+
+def labels_of(text):
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    return [row[0] for row in rows]
+
+
+@pytest.mark.parametrize("steps", [0, 2])
+def test_an_interrupted_search_leaves_what_it_found(
+    recording, declared, tmp_path, monkeypatch, steps
+):
+    class Interrupted:
+        def __init__(self, *_):
+            pass
+
+        def run(self, config, only):
+            for name in ("first", "second")[:steps]:
+                yield Added.plain(name, config)
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(diagnose_real, "Search", Interrupted)
+    result = run_script(recording, declared, tmp_path / "table.md")
+    if not steps:
+        assert result.exit_code == 1
+        assert not (tmp_path / "table.md").exists()
+        return
+    assert result.exit_code == 0, result.output
+    text = (tmp_path / "table.md").read_text(encoding="utf-8")
+    assert labels_of(text)[2:5] == ["as declared", "first", "second"]
+    assert "The search was interrupted: there may be more to find." in text
+
+
 def test_tables_before_and_after_each_effect(recording, declared, tmp_path, monkeypatch):
     monkeypatch.setattr("real.search.OWN", ())
     monkeypatch.setattr("real.search.of_the_camera", lambda *_: [BLACK_LEVEL])
     out = tmp_path / "table.md"
-    arguments = [str(recording), "--declared", str(declared), "--threads", "1", "--out", str(out)]
-    result = CliRunner().invoke(diagnose_real.main, arguments)
+    result = run_script(recording, declared, out)
     assert result.exit_code == 0, result.output
     text = out.read_text(encoding="utf-8")
+    assert "interrupted" not in text
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     labels = [row[0] for row in rows]
     assert labels[2:4] == ["as declared", "thresholds"]
