@@ -32,6 +32,7 @@ def report(lines: Sequence[Line], commit: str) -> str:
         "## How much was run\n\n" + progress_table(lines),
         "## Effects in the library, middle size: pooled\n\n" + pooled_table(lines),
         "## Nothing missing: false alarms\n\n" + alarm_table(lines),
+        "## Effects in the library: three sizes\n\n" + sizes_table(lines),
         *_by_size("Effects in the library", lines, LIBRARY, effect_table),
         *_by_size("Effect left out of the library", lines, LEFT_OUT, left_out_table),
         *_by_size("Effects outside the library", lines, OUTSIDE, outside_table),
@@ -166,6 +167,33 @@ def effect_table(lines: Sequence[Line]) -> str:
             _names(group),
         ])  # fmt: skip
     return table(header, rows)
+
+
+def sizes_table(lines: Sequence[Line]) -> str:
+    """Return what was said of each effect of the library at each size, in few words.
+
+    Other names stand where the true one was not added, in brackets those that do as well.  Without
+    a name it is the verdict; nothing stands where a case was not run.
+    """
+    rows = []
+    for name, group in _grouped(_of(lines, LIBRARY)):
+        cells = [
+            "; ".join(_in_short(one, name) for one in group if one["size"] == size)
+            for size in SIZES
+        ]
+        rows.append([name, *cells])
+    return table(("effect", *SIZES), rows)
+
+
+def _in_short(line: Line, name: str) -> str:
+    kind = scoring.outcome(line)
+    if kind == scoring.FAILED or not line["found"]:
+        return kind
+    text = scoring.names(line)
+    errors = scoring.parameter_errors(line)
+    worst = f" {100 * max(errors.values()):.1f} %" if errors else ""
+    left = ", something left" if line["verdict"] == "partly_explained" else ""
+    return f"{text.removeprefix(name).strip()}{worst}{left}".strip()
 
 
 def left_out_table(lines: Sequence[Line]) -> str:

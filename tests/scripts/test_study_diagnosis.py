@@ -382,3 +382,23 @@ def test_a_folder_without_results_is_an_error_that_says_so(tmp_path):
     result = CliRunner().invoke(study.main, command)
     assert result.exit_code == 1
     assert "'run' makes them" in result.output
+
+
+def test_the_table_of_sizes_says_in_short_what_was_said():
+    key = "pixel.refractory.period_us"
+    near = {"found": [found("refractory", {key: 2100.0})], "truth": {key: 2000.0}}
+    lines = [
+        line_of(size="middle", **near),
+        line_of(size="small", verdict="consistent"),
+        line_of(size="large", verdict="partly_explained", alternatives=["slew_limit"], **near),
+        line_of(effects=("black_level",), found=[found("dark_current")], size="large"),
+        line_of(effects=("leak",), failed="ValueError: no (a.py:1)", size="small"),
+        line_of(effects=("leak",), verdict="unexplained"),
+        line_of(kind="leave-one-out", effects=("shot_noise",)),
+    ]
+    rows = [row.split("|")[1:-1] for row in tables.sizes_table(lines).splitlines()[2:]]
+    assert {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows} == {
+        "refractory": ["missed", "5.0 %", "(or slew_limit) 5.0 %, something left"],
+        "leak": ["failed", "unexplained", ""],
+        "black_level": ["", "", "dark_current"],
+    }
