@@ -5,12 +5,14 @@ The cubic through values and slopes at both ends of a step of h departs from the
 h^4 y''''/384, for a lag u behind a corner w by u (w h)^4/384; as the signal moves by u w, that is a
 time of h (w h)^3/384: 0.03 us at the longest step and w h = 1/2, its limit with one pole.  The
 change c of the corner over the step counts in second order, terms of c (w h)^2.  Steps end where x
-bends, at the frames; where the light passes the knee of the log map, or the slew limit sets in,
-within a step, its slope bends there, which leaves some 0.1 us.  Leak is a cubic, noise and courses
-are lines within each step: they are as good as ``step_us`` resolves them.  Behind a second pole
-events may come where the signal creeps, and what the signal lacks is many times that in time: steps
-are half as long (at w h = 1/2, one event of 50 was 5 us off; 0.8 us at 1/4).  Against dense
-solutions of the circuit all times agree within 1 us, most within 0.05 us.
+bends, at the frames; where the light passes the knee of the log map within a step, its slope bends
+there, which leaves some 0.1 us.  Where a slew limit sets in or ends, its curvature leaps: an event
+of that step may be off by h (w h)/13 (1.15 us were found at w h = 0.15), so that steps are shorter
+with it, for 0.3 us.  Leak is a cubic, noise and courses are lines within each step: they are as
+good as ``step_us`` resolves them.  Behind a second pole events may come where the signal creeps,
+and what the signal lacks is many times that in time: steps are half as long (at w h = 1/2, one
+event of 50 was 5 us off; 0.8 us at 1/4).  Against dense solutions of the circuit all times agree
+within 1 us, most within 0.05 us.
 
 Photoreceptor noise is drawn at each step, so in every pixel at most ``photoreceptor_noise.step`` of
 the correlation time at white apart; the solved path draws at that share of each pixel's own.
@@ -42,6 +44,10 @@ LONGEST_US = 100.0
 
 _SHARE, _SHARE_OF_TWO = 0.5, 0.25
 """Longest step as a share of the shortest time constant, of one pole and of two."""
+
+_BEND_US = 4.0
+"""Longest step squared times the corner [us], with a slew limit: events of the step in which that
+sets in or ends are off by up to a thirteenth of it."""
 
 _FEWEST, _SHORT_US = 4, 10.0
 """Steps of an interval, unless they are shorter than this: the light may grow by e-folds in it."""
@@ -88,6 +94,8 @@ def steps_of(
         limit = min(limit, share / fastest if fastest > 0 else limit)
         if circuit.noise_rms > 0.0:
             limit = min(limit, circuit.noise_step / fastest if fastest > 0 else limit)
+    if circuit.slew > 0.0 and fastest > 0.0:
+        limit = min(limit, coarseness * math.sqrt(_BEND_US / fastest))
     if circuit.follower > 0.0:
         limit = min(limit, share / circuit.follower)
     few = min(_FEWEST, math.ceil(length_us / _SHORT_US))

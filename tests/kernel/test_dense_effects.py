@@ -60,7 +60,8 @@ def test_slew_limit(per_s, follower_hz):
 def test_slew_limit_of_no_account_changes_nothing():
     found = solve(LIGHT, TIMES, pixel(slew_limit=SlewLimit(per_s=1e6)))
     plain = solve(LIGHT, TIMES, pixel(), method="dense")
-    assert all(np.array_equal(a, b) for a, b in zip(found, plain, strict=True))
+    for a, b in zip(found, plain, strict=True):  # but the steps, which are shorter
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-7)
 
 
 def test_slew_limit_holds_for_the_stepped_forms_too():

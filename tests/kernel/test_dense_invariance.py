@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from harness import EVERYTHING, QUIET, advance, quiet, solve, start
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from adv2e import stepping
@@ -175,6 +175,9 @@ def test_whatever_the_light_events_are_in_order_and_apart(light, fraction, slew,
 
 @settings(max_examples=60, deadline=None)
 @given(light=lights, slew=st.floats(5.0, 200.0), threshold=st.floats(0.05, 0.5))
+@example(  # ends its ramp within a step, just before an event
+    light=[[255.0, 0, 0], [71.0, 0, 0], [208.0, 0, 0], [8.0, 0, 0]], slew=90.0, threshold=0.19140625
+)
 def test_slew_limit_keeps_events_apart(light, slew, threshold):
     """No two events of one polarity are nearer than the limit allows, but for 1 us."""
     times = np.arange(len(light)) * 0.01
