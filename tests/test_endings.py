@@ -6,13 +6,9 @@ import time
 
 import numpy as np
 import pytest
+from pictures import picture
 from processes import running_python
 from threads import wait_until
-
-
-def picture(k, shape=(24, 32)):
-    y, x = np.mgrid[: shape[0], : shape[1]]
-    return (120 + 100 * np.sin(0.4 * (x - 2 * k)) * np.cos(0.3 * y)).astype(np.uint8)
 
 
 @pytest.fixture

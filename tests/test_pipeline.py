@@ -10,17 +10,13 @@ import cv2
 import h5py
 import numpy as np
 import pytest
+from pictures import picture
 
 from adv2e import pipeline as conversion
 from adv2e.config import load_config
 from adv2e.events import empty_events
 from adv2e.recordings import read_recording
 from adv2e.simulation import events_from_light
-
-
-def picture(k, shape=(24, 32)):
-    y, x = np.mgrid[: shape[0], : shape[1]]
-    return (120 + 100 * np.sin(0.4 * (x - 2 * k)) * np.cos(0.3 * y)).astype(np.uint8)
 
 
 @pytest.fixture

@@ -53,13 +53,17 @@ def standing_out(signatures: Sequence[Signature]) -> list[Standing]:
 def _standing(group: str, members: Sequence[Signature]) -> Standing:
     before = sum(_size(one.z_before) > LARGE_Z for one in members)
     after = sum(_size(one.z_after) > LARGE_Z for one in members)
-    farthest = max(members, key=lambda one: _size(one.z_after if after else one.z_before))
+    farthest = max(members, key=lambda one: _distance(one, after))
     return Standing(group, len(members), before, after, farthest)
 
 
 def _rank(one: Standing) -> tuple[bool, float]:
-    farthest = one.farthest
-    return not one.after, -_size(farthest.z_after if one.after else farthest.z_before)
+    return not one.after, -_distance(one.farthest, one.after)
+
+
+def _distance(one: Signature, after: int) -> float:
+    """Return the distance from the model found if `after` stand out there, else from declared."""
+    return _size(one.z_after if after else one.z_before)
 
 
 def _size(z: float) -> float:

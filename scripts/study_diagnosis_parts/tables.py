@@ -154,7 +154,6 @@ def effect_table(lines: Sequence[Line]) -> str:
     header = ("effect", *scoring.OF_ONE, "worst parameter", "error / floor", "named")
     rows = []
     for name, group in _grouped(lines):
-        errors = [max(found.values()) for one in group if (found := scoring.parameter_errors(one))]
         raised = [
             one["error"]["after"] / max(one["error"]["floor"], 1e-12)
             for one in group
@@ -162,7 +161,7 @@ def effect_table(lines: Sequence[Line]) -> str:
         ]
         rows.append([
             name, *_counts(group, scoring.OF_ONE),
-            f"{100 * max(errors):.1f} %" if errors else "",
+            _worst(group),
             f"{max(raised):.2f}" if raised else "",
             _names(group),
         ])  # fmt: skip
@@ -189,11 +188,14 @@ def _in_short(line: Line, name: str) -> str:
     kind = scoring.outcome(line)
     if kind == scoring.FAILED or not line["found"]:
         return kind
-    text = scoring.names(line)
-    errors = scoring.parameter_errors(line)
-    worst = f" {100 * max(errors.values()):.1f} %" if errors else ""
-    left = ", something left" if line["verdict"] == "partly_explained" else ""
-    return f"{text.removeprefix(name).strip()}{worst}{left}".strip()
+    said = f"{scoring.names(line).removeprefix(name).strip()} {_worst([line])}".strip()
+    return f"{said}, something left" if line["verdict"] == "partly_explained" else said
+
+
+def _worst(lines: Sequence[Line]) -> str:
+    """Return the error of the parameter farthest from the truth."""
+    errors = [max(found.values()) for one in lines if (found := scoring.parameter_errors(one))]
+    return f"{100 * max(errors):.1f} %" if errors else ""
 
 
 def left_out_table(lines: Sequence[Line]) -> str:

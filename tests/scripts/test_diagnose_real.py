@@ -335,9 +335,8 @@ def run_script(recording, declared, out):
     return CliRunner().invoke(diagnose_real.main, arguments)
 
 
-def labels_of(text):
-    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
-    return [row[0] for row in rows]
+def rows_of(text):
+    return [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
 
 
 @pytest.mark.parametrize("steps", [0, 2])
@@ -361,7 +360,7 @@ def test_an_interrupted_search_leaves_what_it_found(
         return
     assert result.exit_code == 0, result.output
     text = (tmp_path / "table.md").read_text(encoding="utf-8")
-    assert labels_of(text)[2:5] == ["as declared", "first", "second"]
+    assert [row[0] for row in rows_of(text)][2:5] == ["as declared", "first", "second"]
     assert "The search was interrupted: there may be more to find." in text
 
 
@@ -373,7 +372,7 @@ def test_tables_before_and_after_each_effect(recording, declared, tmp_path, monk
     assert result.exit_code == 0, result.output
     text = out.read_text(encoding="utf-8")
     assert "interrupted" not in text
-    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    rows = rows_of(text)
     labels = [row[0] for row in rows]
     assert labels[2:4] == ["as declared", "thresholds"]
     assert labels[4].startswith("black_level")
