@@ -16,6 +16,7 @@ from adv2e.diagnosis.fit import Fit, Fitter
 from adv2e.diagnosis.interpolation import InterpolationError
 from adv2e.diagnosis.markers import BOTH, VIEWS
 from adv2e.diagnosis.metric import Model, Scale
+from adv2e.diagnosis.resampling import Resampling
 from adv2e.diagnosis.simulations import Laboratory
 from adv2e.reports.result import Rejected
 
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 MANY, SOME = 100, 32
 """Simulations of a model that is kept, and of one that is tried."""
 
-_OF_SCALES, _OF_MODELS, OF_RECORDINGS = 1, 2, 3
+_OF_SCALES, _OF_MODELS, OF_RECORDINGS, _OF_SHIFTED = 1, 2, 3, 4
 """What simulations stand for, each with draws of its own of what is uncertain in them."""
 _SEEDS = 6
 _ROUNDS = 4
@@ -91,6 +92,8 @@ class Bench:
         One a view.
     error : InterpolationError
         Of the statistics.
+    resampling : Resampling
+        Of models that shift the frames.
     log : callable
         Told of each step.
     free : tuple of Knob
@@ -103,6 +106,7 @@ class Bench:
     declared: Config
     scales: tuple[Scale, ...]
     error: InterpolationError
+    resampling: Resampling
     log: Callable[[str], None]
     free: tuple[Knob, ...] = ()
     rejections: Rejections = field(default_factory=Rejections)
@@ -126,27 +130,38 @@ class Bench:
             Scale.of(error.blurred(sample[:, view], view, _OF_SCALES), least)
             for view in range(VIEWS)
         )
-        return cls(laboratory, observed, declared, scales, error, log, free)
+        resampling = Resampling(laboratory, declared)
+        return cls(laboratory, observed, declared, scales, error, resampling, log, free)
 
-    def fitter(self, view: int, sd: Array | None = None) -> Fitter:
-        """Return what fits candidates in one view of the data."""
-        return Fitter(self.laboratory, self.scales[view], self.observed[view], view, sd)
+    def fitter(self, view: int, near: Config, sd: Array | None = None) -> Fitter:
+        """Return what fits candidates in one view of the data, to models near one.
 
-    def models(self, sample: Any) -> tuple[Model, ...]:
-        """Return the models of simulations, (seeds, views, statistics)."""
-        return tuple(
-            Model.of(self.scales[view], self.error.blurred(sample[:, view], view, _OF_MODELS))
-            for view in range(VIEWS)
-        )
+        Simulations with shifted frames are as far off as those of that model.
+        """
+        shifted = self.resampling.error(near)
+        goal = self.observed[view] + (0.0 if shifted is None else shifted.bias[view])
+        return Fitter(self.laboratory, self.scales[view], goal, view, sd)
+
+    def models(self, config: Config, sample: Any) -> tuple[Model, ...]:
+        """Return the models of a configuration's simulations, (seeds, views, statistics)."""
+        shifted = self.resampling.error(config)
+
+        def of(view: int) -> Model:
+            rows = self.error.blurred(sample[:, view], view, _OF_MODELS)
+            if shifted is not None:
+                rows = shifted.blurred(rows - shifted.bias[view], view, _OF_SHIFTED)
+            return Model.of(self.scales[view], rows)
+
+        return tuple(map(of, range(VIEWS)))
 
     def tried(self, config: Config) -> tuple[Model, ...]:
         """Return the models of a configuration, simulated often enough to judge it."""
-        return self.models(self.laboratory.ensemble(config, range(1, SOME + 1)))
+        return self.models(config, self.laboratory.ensemble(config, range(1, SOME + 1)))
 
     def state(self, config: Config, fits: tuple[Fit, ...] = ()) -> State:
         """Return a model, simulated often enough to build on it."""
         sample = self.laboratory.ensemble(config, range(1, MANY + 1))
-        return State(config, fits, self.models(sample))
+        return State(config, fits, self.models(config, sample))
 
     def settled(self, fits: tuple[Fit, ...], sd: Array) -> State:
         """Return the model of effects fitted together to the data for fitting and judging.
@@ -156,15 +171,15 @@ class Bench:
         joint = self.fitted(fits, sd, BOTH)
         state = self.state(joint.config)
         if joint.derivative.size:
-            fitter = self.fitter(BOTH, sd)
+            fitter = self.fitter(BOTH, joint.config, sd)
             fitter.set_covariance(joint, state.models[BOTH].sample, _SEEDS)
         return dataclasses.replace(state, fits=parted(joint, fits))
 
     def fitted(self, fits: tuple[Fit, ...], sd: Array, view: int) -> Fit:
         """Return the fit of all effects together in a view of the data."""
         joint = _joined(fits, self.declared, self.free)
-        fitter = self.fitter(view, sd)
         for _ in range(_ROUNDS):
+            fitter = self.fitter(view, joint.config, sd)
             fitter.improve([joint], range(11, 11 + _SEEDS))
             if joint.moved < _SETTLED:
                 break

@@ -47,7 +47,7 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     left = [one for one in candidates if one.name not in state.names]
     if not left:
         return []
-    fitter = bench.fitter(parts.FIT)
+    fitter = bench.fitter(parts.FIT, state.config)
     fits = fitter.probe(left, state.config, (1, 2))
     nothing = fitter.misfit(state.config, (1, 2))
     dropped: list[Fit] = []
@@ -61,10 +61,11 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     dropped = [fit for k, fit in enumerate(fits) if k >= _FINALISTS or fit.misfit > far] + dropped
     fits = [fit for fit in fits[:_FINALISTS] if fit.misfit <= far]
     fitter.improve(fits, (3, 4, 5))
-    sample = bench.laboratory.many([fit.config for fit in fits], range(1, SOME + 1))
+    configs = [fit.config for fit in fits]
+    sample = bench.laboratory.many(configs, range(1, SOME + 1))
     trials = [
         Trial(fit, models, scored(bench, models, fit.candidate))
-        for fit, models in zip(fits, map(bench.models, sample), strict=True)
+        for fit, models in zip(fits, map(bench.models, configs, sample), strict=True)
     ]
     trials.sort(key=lambda trial: -trial.score)
     bench.rejections.new_round()

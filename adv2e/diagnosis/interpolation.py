@@ -49,6 +49,8 @@ _FEWEST = 5
 class InterpolationError:
     """Error of each statistic that is due to interpolation, in every view.
 
+    Between frames, and between pixels (:mod:`adv2e.diagnosis.resampling`).
+
     Attributes
     ----------
     bias : (views, statistics)
@@ -75,11 +77,11 @@ class InterpolationError:
             With all frames, every second and every fourth, of the same seeds; `quarter` may be
             missing.
         """
-        change = _beyond_chance(half - full)
+        change = beyond_chance(half - full)
         known = np.abs(change) / 3.0
         if quarter is None:
             return cls(change / (2.0**_ORDER - 1.0), 1.5 * known)
-        further = np.abs(_beyond_chance(quarter - full))
+        further = np.abs(beyond_chance(quarter - full))
         return cls(change / (2.0**_ORDER - 1.0), np.maximum(known, further / 12.0))
 
     def blurred(self, sample: Array, view: int, stream: int) -> Array:
@@ -95,7 +97,7 @@ class InterpolationError:
         return float(np.sqrt(np.mean((self.bias[view] / sd) ** 2)))
 
 
-def _beyond_chance(differences: Any) -> Array:
+def beyond_chance(differences: Any) -> Array:
     """Return the mean over seeds, less what chance puts into it."""
     mean = differences.mean(axis=0)
     error = differences.std(axis=0, ddof=1) / np.sqrt(len(differences))

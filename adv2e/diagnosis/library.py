@@ -257,7 +257,10 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
         ),
         Candidate("clock_drift", (drift,), ((-1500.0,), (1500.0,), (-6000.0,), (6000.0,))),
         Candidate(
-            "misregistration", shift, ((0.3, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.0, -0.3))
+            "misregistration",
+            shift,
+            ((0.3, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.0, -0.3)),
+            left=0.05,  # what is finer than a pixel is not in the frames
         ),
     ]  # fmt: skip
     for lamp in hints.lamps:

@@ -6,6 +6,7 @@ import dataclasses
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +19,7 @@ from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.stream import Stream
+from adv2e.effects.frames.misregistration import shifted
 from adv2e.events import empty_events
 from adv2e.simulation import events_from_light
 
@@ -50,12 +52,22 @@ class Simulator:
         self._evidence, self._threads, self._progress = evidence, threads, progress
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
         self._frames, self._counting = Kept(), threading.Lock()
+        self._light: Callable[[Config], Instants] = self._recorded
         self.done = 0
         self.likely = 0
 
     def of(self, evidence: Evidence) -> Simulator:
         """Return the same for another recording; nobody is told of its progress."""
         return Simulator(evidence, self._threads)
+
+    def there_and_back(self, config: Config, shift_px: tuple[float, float]) -> Simulator:
+        """Return the same for `config` and frames that were moved by `shift_px` and back."""
+        times_ns, light = self._light(config)
+        x, y = shift_px
+        moved = np.array([shifted(shifted(one, (x, y)), (-x, -y)) for one in light])
+        made = self.of(self._evidence)
+        made._light = lambda _: (times_ns, moved)
+        return made
 
     def close(self) -> None:
         """Drop what has not begun."""
@@ -67,11 +79,7 @@ class Simulator:
         `seed` tells simulations of one diagnosis apart, the configuration's tells diagnoses apart.
         """
         evidence = self._evidence
-
-        def read() -> Instants:
-            return evidence.times_ns, light_of(evidence, config)
-
-        times_ns, light = self._frames.of(config, read)
+        times_ns, light = self._light(config)
         chunks = events_from_light(
             zip(times_ns, light, strict=True),
             dataclasses.replace(as_recorded(config), seed=(_SEEDS * config.seed + seed) % 2**63),
@@ -85,6 +93,11 @@ class Simulator:
             self._progress(self.done, self.likely)
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
+
+    def _recorded(self, config: Config) -> Instants:
+        """Return the light of the recording's frames, and what is made of them once."""
+        evidence = self._evidence
+        return self._frames.of(config, lambda: (evidence.times_ns, light_of(evidence, config)))
 
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""
@@ -124,7 +137,10 @@ class Laboratory:
 
     def measure(self, config: Config, seed: int) -> Any:
         """Return the statistics of one simulation, (views, statistics)."""
-        stream = self.simulator.stream(config, seed)
+        return self._measured(self.simulator, config, seed)
+
+    def _measured(self, simulator: Simulator, config: Config, seed: int) -> Any:
+        stream = simulator.stream(config, seed)
         return self.markers.measure(Placed.of(stream, self.scene)) - self._bias
 
     def ensemble(self, config: Config, seeds: Sequence[int]) -> Any:
@@ -144,3 +160,10 @@ class Laboratory:
         )
         rows = np.array([self._held[pair] for pair in pairs])
         return rows.reshape(len(configs), len(seeds), *rows.shape[1:])
+
+    def there_and_back(
+        self, config: Config, shift_px: tuple[float, float], seeds: Sequence[int]
+    ) -> Any:
+        """Return the statistics for frames moved there and back, (seeds, views, statistics)."""
+        with closing(self.simulator.there_and_back(config, shift_px)) as moved:
+            return np.array(moved.map(lambda seed: self._measured(moved, config, seed), seeds))
