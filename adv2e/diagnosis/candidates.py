@@ -67,6 +67,10 @@ class Knob:
         return value <= self.low + low or value >= self.high - high
 
 
+FITTED = 0.02
+"""Share of the residual that a fit may leave."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """An effect with the keys that are fitted for it.
@@ -91,7 +95,7 @@ class Candidate:
     probes: tuple[tuple[float, ...], ...]
     extra: tuple[tuple[str, Any], ...] = ()
     defaults: tuple[tuple[str, Any], ...] = ()
-    left: float = 0.02
+    left: float = FITTED
 
     def inner(self, values: Sequence[float]) -> list[float]:
         """Return where on the fitted scales values of the knobs are."""

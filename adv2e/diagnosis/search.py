@@ -3,8 +3,9 @@
 Forward: every effect of the library is fitted on one part of the data, the best are simulated many
 times, and the best of those is added if it holds on another part.  Where none holds alone, the best
 is taken on trial and a second is looked for on top of it: two strong effects hide one another.
-That goes on until chance can make what is left, or nothing holds.  Then backward: what is no longer
-needed is dropped.
+That goes on until chance can make what is left, or nothing holds.  What is small beside an effect
+may be due to its fit: another is added for it only if it explains it in full.  Then backward: what
+is no longer needed is dropped.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import MANY, Bench, State, parted
-from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.candidates import FITTED, Candidate, Knob
 from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations, scored
 from adv2e.diagnosis.interpolation import InterpolationError
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
@@ -84,6 +85,11 @@ class _Attempt:
     objections: list[str]
 
 
+def _put_down_to_the_fit(state: State) -> float:
+    """Return the share of the residual that is put down to the fit of a model's effects."""
+    return max((fit.candidate.left for fit in state.fits), default=0.0)
+
+
 class Search:
     """Looks for effects that a declared model lacks.
 
@@ -140,9 +146,9 @@ class Search:
         """Search forward and backward."""
         state = self.declared
         self.bench.log(f"declared model: probability of the residual {self.probability(state):.2g}")
-        while self._is_something_left(state) and len(state.fits) < MOST_EFFECTS:
+        while self._is_open(state) and len(state.fits) < MOST_EFFECTS:
             grown = self._grown(state)
-            if grown is None or self._is_patch(state, grown):
+            if grown is None or not self._is_worth_it(state, grown):
                 break
             state = grown
             self.bench.log(
@@ -163,8 +169,30 @@ class Search:
     def _is_something_left(self, state: State, view: int = BOTH) -> bool:
         if self.probability(state, view) >= PER_LOOK:
             return False
-        left = max((fit.candidate.left for fit in state.fits), default=0.0)
-        return self.explained(state, view) < 1.0 - left
+        return self.explained(state, view) < 1.0 - _put_down_to_the_fit(state)
+
+    def _is_open(self, state: State) -> bool:
+        """Tell whether another effect is looked for.
+
+        What is small beside an effect may be its fit's, or another effect.  Of an effect that
+        cannot be undone in full it is the former, but others would go by its name.
+        """
+        if self.probability(state) >= PER_LOOK:
+            return False
+        return self._is_something_left(state) or _put_down_to_the_fit(state) <= FITTED
+
+    def _is_worth_it(self, state: State, grown: State) -> bool:
+        """Tell whether an addition that holds is a name for what is left.
+
+        For what may be the fit's, it is one if nothing is left after it.
+        """
+        if self._is_something_left(state):
+            return not self._is_patch(state, grown)
+        if self.probability(grown) >= PER_LOOK:
+            return True
+        self.bench.log(f"  {grown.names[-1]} leaves some of what may be the fit's: not added")
+        self.bench.rejections.add(grown.fits[-1], "does not explain all that is left", final=True)
+        return False
 
     def _is_patch(self, state: State, grown: State) -> bool:
         """Tell whether an addition takes away so little that effects like it will not do.

@@ -148,6 +148,33 @@ def test_what_cannot_be_undone_in_full_leaves_more_that_is_put_down_to_the_fit()
     assert verdict_of(outcome, GONE) != "explained"
 
 
+def test_a_small_effect_beside_a_large_one_is_found():
+    """It is less than what a fit may leave, but no fit leaves it."""
+    truth = ["pixel.refractory.period_us=8000", "pixel.leak.rate_hz=0.3"]
+    told = []
+    _, outcome = searched(truth, MadeUpLaboratory(strength=60.0), log=told.append)
+    search, alone = searched(truth, MadeUpLaboratory(strength=60.0), candidates("refractory"))
+    assert alone.state.names == ("refractory",)
+    assert alone.probability < LEVEL / 100
+    assert not search._is_something_left(alone.state)
+    assert set(outcome.state.names) == {"refractory", "leak"}
+    assert verdict_of(outcome, GONE) == "explained"
+
+
+@pytest.mark.parametrize(("rate", "size"), [(0.1, 12.0), (0.2, 10.0)])
+def test_what_a_fit_may_leave_is_given_no_name_but_that_of_all_of_it(rate, size):
+    truth = ["pixel.refractory.period_us=8000", f"pixel.leak.rate_hz={rate}"]
+    told = []
+    laboratory = MadeUpLaboratory(strength=60.0)
+    _, outcome = searched(truth, laboratory, beyond=outside(size), log=told.append)
+    assert outcome.state.names == ("refractory",)
+    assert outcome.probability < LEVEL / 2
+    assert verdict_of(outcome, GONE) == "explained"
+    held = rate > 0.1
+    assert told[-1].endswith("not added") is held
+    assert ("all that is left" in outcome.rejected["leak"].reason) is held
+
+
 @pytest.mark.parametrize(("period", "rate"), [(5000.0, 1.0), (900.0, 1.0), (15_000.0, 0.7)])
 def test_two_effects_are_both_found(period, rate):
     truth = [f"pixel.refractory.period_us={period}", f"pixel.leak.rate_hz={rate}"]
