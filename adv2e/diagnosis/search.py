@@ -4,7 +4,7 @@ Forward: every effect of the library is fitted on one part of the data, the best
 times, and the best of those is added if it holds on another part.  Where none holds alone, the best
 is taken on trial and a second is looked for on top of it: two strong effects hide one another.
 That goes on until chance can make what is left, or nothing holds.  What is small beside an effect
-may be due to its fit: another is added for it only if it explains it in full.  Then backward: what
+may be due to its fit: another is added for it only if it explains most of it.  Then backward: what
 is no longer needed is dropped.
 """
 
@@ -39,6 +39,8 @@ PER_LOOK = LEVEL / 2.0
 MOST_EFFECTS = 4
 _LEAST_OF_THE_LEFT = 0.5 / MOST_EFFECTS
 """Least share of what is left that an effect must take away for the search to go on."""
+_MOST_OF_THE_FIT = 0.5
+"""The same where what is left may be due to the fit of others."""
 
 _TRIED = 4
 _CATCHES_UP = 60.0  # log likelihood that a fit may gain when it is brought to its end
@@ -182,34 +184,26 @@ class Search:
         return self._is_something_left(state) or _put_down_to_the_fit(state) <= FITTED
 
     def _is_worth_it(self, state: State, grown: State) -> bool:
-        """Tell whether an addition that holds is a name for what is left.
+        """Tell whether an addition that holds takes away enough of what is left.
 
-        For what may be the fit's, it is one if nothing is left after it.
-        """
-        if self._is_something_left(state):
-            return not self._is_patch(state, grown)
-        if self.probability(grown) >= PER_LOOK:
-            return True
-        self.bench.log(f"  {grown.names[-1]} leaves some of what may be the fit's: not added")
-        self.bench.rejections.add(grown.fits[-1], "does not explain all that is left", final=True)
-        return False
-
-    def _is_patch(self, state: State, grown: State) -> bool:
-        """Tell whether an addition takes away so little that effects like it will not do.
-
-        The largest of the few effects that may be added makes more of what is left.
+        Of what may be the fit's, it must be most.  Of more, the few effects that may be added must
+        be able to explain it with others as large: it is no patch then.  Single statistics that
+        stand out, and the last to be found, have no share to speak of.
         """
         model = state.models[BOTH]
         before, after = self.bench.misfit(state), self.bench.misfit(grown)
-        if before < model.limits(PER_LOOK)[0] or not self._is_something_left(grown):
-            return False  # single statistics stand out, or nothing
+        least = _LEAST_OF_THE_LEFT
+        if not self._is_something_left(state):
+            least = _MOST_OF_THE_FIT
+        elif before < model.limits(PER_LOOK)[0] or not self._is_something_left(grown):
+            return True
         share = (before - after) / (before - model.floor)
-        if share >= _LEAST_OF_THE_LEFT:
-            return False
+        if share >= least:
+            return True
         self.bench.log(f"  {grown.names[-1]} takes away {share:.0%} of what is left: too little")
         why = f"takes away no more than {max(share, 0.0):.0%} of what is left"
         self.bench.rejections.add(grown.fits[-1], why, final=True)
-        return True
+        return False
 
     def _grown(self, state: State) -> State | None:
         """Return the model with one effect more, or two that hold only together.
