@@ -39,8 +39,10 @@ PER_LOOK = LEVEL / 2.0
 MOST_EFFECTS = 4
 _LEAST_OF_THE_LEFT = 0.5 / MOST_EFFECTS
 """Least share of what is left that an effect must take away for the search to go on."""
+_OF_FITS = 1e-6
+"""Probability of what is left below which it is looked into, though it may be the fit's."""
 _MOST_OF_THE_FIT = 0.5
-"""The same where what is left may be due to the fit of others."""
+"""Least share of that which an effect must take away."""
 
 _TRIED = 4
 _CATCHES_UP = 60.0  # log likelihood that a fit may gain when it is brought to its end
@@ -176,12 +178,13 @@ class Search:
     def _is_open(self, state: State) -> bool:
         """Tell whether another effect is looked for.
 
-        What is small beside an effect may be its fit's, or another effect.  Of an effect that
-        cannot be undone in full it is the former, but others would go by its name.
+        What is small beside an effect may be its fit's, or another effect, which chance makes far
+        less often.  Of an effect that cannot be undone in full it is the former all the same.
         """
-        if self.probability(state) >= PER_LOOK:
-            return False
-        return self._is_something_left(state) or _put_down_to_the_fit(state) <= FITTED
+        if self._is_something_left(state):
+            return True
+        undone = _put_down_to_the_fit(state) <= FITTED
+        return undone and self.probability(state) < _OF_FITS
 
     def _is_worth_it(self, state: State, grown: State) -> bool:
         """Tell whether an addition that holds takes away enough of what is left.
