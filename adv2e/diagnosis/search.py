@@ -195,11 +195,12 @@ class Search:
         """
         model = state.models[BOTH]
         before, after = self.bench.misfit(state), self.bench.misfit(grown)
-        least = _LEAST_OF_THE_LEFT
-        if not self._is_something_left(state):
+        if self._is_something_left(state):
+            least = _LEAST_OF_THE_LEFT
+            if before < model.limits(PER_LOOK)[0] or not self._is_something_left(grown):
+                return True
+        else:
             least = _MOST_OF_THE_FIT
-        elif before < model.limits(PER_LOOK)[0] or not self._is_something_left(grown):
-            return True
         share = (before - after) / (before - model.floor)
         if share >= least:
             return True

@@ -71,9 +71,9 @@ def _continued(values: NDArray[Any], left: int, right: int) -> NDArray[Any]:
 
 def _between(values: NDArray[Any], part: float) -> NDArray[Any]:
     """Return `values` (rows, columns) taken `part` of a pixel to the right."""
-    row = np.ones(1)
-    found = cv2.sepFilter2D(values, -1, _weights(part), row, borderType=cv2.BORDER_REPLICATE)
-    around = cv2.copyMakeBorder(values, 0, 0, 1, 2, cv2.BORDER_REPLICATE)
+    border = cv2.BORDER_REPLICATE
+    found = cv2.sepFilter2D(values, -1, _weights(part), np.ones(1), borderType=border)
+    around = cv2.copyMakeBorder(values, 0, 0, 1, 2, border)
     left, a, b, right = (around[:, k : around.shape[1] - 3 + k] for k in range(4))
     bends = left - 2 * a + b, a - 2 * b + right
     # the lesser of the two where they have the same sign, otherwise none
