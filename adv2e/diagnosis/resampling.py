@@ -16,10 +16,9 @@ statistics from that by some 0.6 of it.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from adv2e.config import Config
 from adv2e.diagnosis.interpolation import InterpolationError, beyond_chance
+from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.simulations import Laboratory
 
 _SHARE = 0.75
@@ -39,8 +38,7 @@ class Resampling:
 
     def __init__(self, laboratory: Laboratory, declared: Config) -> None:
         self._laboratory = laboratory
-        frames = replace(declared.frames, shift_px=(0.0, 0.0))
-        self._unmoved = replace(declared, frames=frames)
+        self._unmoved = with_keys(declared, {"frames.shift_px": [0.0, 0.0]})
         self._held: dict[tuple[float, float], InterpolationError] = {}
 
     def error(self, config: Config) -> InterpolationError | None:

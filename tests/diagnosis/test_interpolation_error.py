@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-from camera import SCENES, Camera
 from made_up_streams import wandering_light
+from three_cameras import Apart, Recorded
 
 from adv2e import load_config
-from adv2e.diagnosis.evidence import Evidence, read_evidence
+from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.interpolation import InterpolationError, every, interpolation_error
-from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import BOTH, Markers
-from adv2e.diagnosis.scene import Placed, Scene
+from adv2e.diagnosis.scene import Scene
 from adv2e.diagnosis.simulations import Simulator
 from adv2e.diagnosis.stream import Stream
 from adv2e.events import empty_events
@@ -61,34 +60,23 @@ def evidence_of(light, times):
 
 def test_simulations_without_the_bias_are_nearer_to_a_camera(tmp_path):
     """The camera sees the scene itself, whose edges move a pixel between two of its frames."""
-    size = (32, 24)
-    paths = [tmp_path / f"{seed}.zip" for seed in range(3)]
-    for seed, path in enumerate(paths):
-        scene = SCENES["patchwork"](size, seed=3)
-        Camera(scene, size=size, duration_s=0.6, fps=200.0, seed=seed).record(path)
-    declared = load_config([tmp_path / "0.declared.yaml"])
-    recordings = [read_evidence(path) for path in paths]
-    evidence = recordings[0]
-    scene = Scene.of(light_of(evidence, declared), evidence.times_s, 0.0)
+    recorded = Recorded(tmp_path, 3, duration_s=0.6, fps=200.0)
+    declared, scene, evidence = recorded.declared, recorded.scene, recorded.evidence
     simulator = Simulator(evidence, 2)
     streams = {seed: simulator.stream(declared, seed) for seed in range(24)}
-    markers = Markers(scene, [Placed.of(stream, scene) for stream in streams.values()])
+    placed = [recorded.placed(stream) for stream in streams.values()]
+    markers = Markers(scene, placed)
     error = interpolation_error(
         evidence, declared, scene, markers, streams, lambda fewer: Simulator(fewer, 2)
     )
     simulator.close()
-    sample = np.array([markers.measure(Placed.of(one, scene)) for one in streams.values()])[:, BOTH]
-    measured = [markers.measure(Placed.of(one.stream, scene))[BOTH] for one in recordings]
-    sd = np.maximum(sample.std(axis=0), markers.least)
-    apart = np.clip((np.mean(measured, axis=0) - sample.mean(axis=0)) / sd, -20.0, 20.0)
-    bias = error.bias[BOTH] / sd
-    chance = np.sqrt(1.0 / 3.0 + 1.0 / 24.0)
-    before, after = (np.mean(one**2) - chance**2 for one in (apart, apart + bias))
+    sample = np.array([markers.measure(one)[BOTH] for one in placed])
+    apart = Apart.of(recorded.measured(markers), sample, error, markers.least)
+    before, after = apart.squares()
     assert before > 0.5
     assert after < 0.75 * before
     # the doubt covers what is left
-    doubt = np.hypot(chance, error.sd[BOTH] / sd)
-    assert np.mean(np.abs(apart + bias) < 2.0 * doubt) > 0.9
+    assert np.mean(np.abs(apart.corrected) < 2.0 * apart.doubt) > 0.9
 
 
 def test_too_few_frames_tell_nothing():

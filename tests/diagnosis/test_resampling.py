@@ -2,46 +2,27 @@
 
 import numpy as np
 import pytest
-from camera import SCENES, Camera
+from three_cameras import Apart, Recorded
 
-from adv2e import load_config
-from adv2e.diagnosis.evidence import read_evidence
 from adv2e.diagnosis.keys import with_keys
-from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.resampling import Resampling
-from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 
 SHIFT = [0.4, 0.25]
 
 
-class Recorded:
-    """Recordings of a scene by three cameras whose frames are shifted."""
-
-    def __init__(self, folder):
-        paths = [folder / f"{seed}.zip" for seed in range(3)]
-        for seed, path in enumerate(paths):
-            scene = SCENES["patchwork"]((32, 24), seed=4)
-            hidden = {"frames": {"shift_px": SHIFT}}
-            Camera(
-                scene, hidden=hidden, size=(32, 24), duration_s=0.5, fps=400.0, seed=seed
-            ).record(path)
-        self.declared = load_config([folder / "0.declared.yaml"])
-        evidence, *_ = recordings = [read_evidence(path) for path in paths]
-        scene = Scene.of(light_of(evidence, self.declared), evidence.times_s, 0.0)
-        self.simulator = Simulator(evidence, 2)
-        pilot = [self.simulator.stream(self.declared, seed) for seed in range(101, 117)]
-        markers = Markers(scene, [Placed.of(stream, scene) for stream in pilot])
-        self.laboratory = Laboratory(self.simulator, scene, markers)
-        self.measured = np.array([markers.measure(Placed.of(r.stream, scene)) for r in recordings])
-
-
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    made = Recorded(tmp_path_factory.mktemp("shifted"))
+    """Recordings with shifted frames, and a laboratory for them."""
+    hidden = {"frames": {"shift_px": SHIFT}}
+    folder = tmp_path_factory.mktemp("shifted")
+    made = Recorded(folder, 4, hidden=hidden, duration_s=0.5, fps=400.0)
+    simulator = Simulator(made.evidence, 2)
+    pilot = [made.placed(simulator.stream(made.declared, seed)) for seed in range(101, 117)]
+    made.laboratory = Laboratory(simulator, made.scene, Markers(made.scene, pilot))
     yield made
-    made.simulator.close()
+    simulator.close()
 
 
 def shifted(recorded, *shift):
@@ -53,16 +34,13 @@ def test_simulations_without_the_bias_are_nearer_to_a_camera(recorded):
     config = shifted(recorded, *SHIFT)
     sample = recorded.laboratory.ensemble(config, range(16))[:, BOTH]
     error = Resampling(recorded.laboratory, recorded.declared).error(config)
-    sd = np.maximum(sample.std(axis=0), recorded.laboratory.markers.least)
-    apart = (recorded.measured[:, BOTH].mean(axis=0) - sample.mean(axis=0)) / sd
-    apart, bias = np.clip(apart, -20.0, 20.0), error.bias[BOTH] / sd
-    chance = np.sqrt(1.0 / 3.0 + 1.0 / 16.0)
-    before, after = (np.mean(one**2) - chance**2 for one in (apart, apart + bias))
+    markers = recorded.laboratory.markers
+    apart = Apart.of(recorded.measured(markers), sample, error, markers.least)
+    before, after = apart.squares()
     assert before > 1.0
     assert after < 0.7 * before
-    doubt = np.hypot(chance, error.sd[BOTH] / sd)
-    assert np.mean(np.abs(apart) < 2.0 * chance) < 0.7
-    assert np.mean(np.abs(apart + bias) < 2.0 * doubt) > 0.8
+    assert np.mean(np.abs(apart.plain) < 2.0 * apart.chance) < 0.7
+    assert np.mean(np.abs(apart.corrected) < 2.0 * apart.doubt) > 0.8
 
 
 def test_whole_pixels_are_shifted_without_error(recorded):

@@ -151,8 +151,7 @@ def test_what_cannot_be_undone_in_full_leaves_more_that_is_put_down_to_the_fit()
 def test_a_small_effect_beside_a_large_one_is_found():
     """It is less than what a fit may leave, but no fit leaves it."""
     truth = ["pixel.refractory.period_us=8000", "pixel.leak.rate_hz=0.3"]
-    told = []
-    _, outcome = searched(truth, MadeUpLaboratory(strength=60.0), log=told.append)
+    _, outcome = searched(truth, MadeUpLaboratory(strength=60.0))
     search, alone = searched(truth, MadeUpLaboratory(strength=60.0), candidates("refractory"))
     assert alone.state.names == ("refractory",)
     assert alone.probability < LEVEL / 100

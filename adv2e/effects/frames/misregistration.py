@@ -86,9 +86,9 @@ def _between(values: NDArray[Any], part: float) -> NDArray[Any]:
 def _moved(values: NDArray[Any], by: float) -> NDArray[Any]:
     """Return `values` (rows, columns) taken `by` pixels further to the right."""
     count, whole = values.shape[1], math.floor(by)
-    left, right = max(-whole, 0), max(whole + 1, 0)
     if by == whole:
         return values.take(np.clip(np.arange(count) + whole, 0, count - 1), axis=1)
+    left, right = max(-whole, 0), max(whole + 1, 0)
     values = _between(_continued(values, left, right), by - whole)
     return values[:, left + whole : left + whole + count]
 
