@@ -7,6 +7,7 @@ well is taken.  An effect whose keys the configuration does not have is left out
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -265,11 +266,11 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
     ]  # fmt: skip
     for lamp in hints.lamps:
         depth = Knob("frames.flicker.depth", 0.005, 0.99)
-        read_off = (
-            ("frames.flicker.frequency_hz", lamp.hz),
-            ("frames.flicker.phase_rad", lamp.phase_rad),
-        )
-        made.append(Candidate("flicker", (depth,), ((0.06,), (0.15,), (0.35,)), read_off))
+        read_off = ("frames.flicker.frequency_hz", lamp.hz)
+        near = lamp.phase_rad
+        phase = Knob("frames.flicker.phase_rad", near - math.pi, near + math.pi, False, 0.1)
+        probes = ((0.06, near), (0.15, near), (0.35, near))
+        made.append(Candidate("flicker", (depth, phase), probes, (read_off,)))
     made += _encodings(values, hints)
     return made
 
