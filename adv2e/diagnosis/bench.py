@@ -58,6 +58,10 @@ class State:
         """Names of the effects that were added."""
         return tuple(fit.candidate.name for fit in self.fits)
 
+    def beyond(self, ground: State) -> tuple[Fit, ...]:
+        """Return the effects that were added to those of another model."""
+        return self.fits[len(ground.fits) :]
+
 
 @dataclass
 class Rejections:

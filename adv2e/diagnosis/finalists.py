@@ -64,7 +64,7 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     configs = [fit.config for fit in fits]
     sample = bench.laboratory.many(configs, range(1, SOME + 1))
     trials = [
-        Trial(fit, models, scored(bench, models, fit.candidate))
+        Trial(fit, models, scored(bench, models, len(fit.candidate.knobs)))
         for fit, models in zip(fits, map(bench.models, configs, sample), strict=True)
     ]
     trials.sort(key=lambda trial: -trial.score)
@@ -84,17 +84,17 @@ def _behind(fit: Fit, nothing: float) -> str:
     return f"{what} where others do more"
 
 
-def scored(bench: Bench, models: Sequence[Model], added: Candidate) -> float:
-    """Return a model's log likelihood of fitting and judging data, less the knobs of what it adds.
+def scored(bench: Bench, models: Sequence[Model], knobs: int) -> float:
+    """Return a model's log likelihood of fitting and judging data, less the knobs that it adds.
 
     Parameters
     ----------
     bench : Bench
     models : sequence of Model
         One a view.
-    added : Candidate
+    knobs : int
     """
-    return models[BOTH].log_likelihood(bench.observed[BOTH]) - len(added.knobs)
+    return models[BOTH].log_likelihood(bench.observed[BOTH]) - knobs
 
 
 def likely_simulations(candidates: Sequence[Candidate]) -> int:

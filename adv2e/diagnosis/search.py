@@ -1,8 +1,9 @@
 """Attribution: which effects, added to the declared model, make it agree with the recording.
 
 Forward: every effect of the library is fitted on one part of the data, the best are simulated many
-times, and the best of those is added if it holds on another part.  Where none holds alone, the best
-is taken on trial and a second is looked for on top of it: two strong effects hide one another.
+times, and the best of those is added if it holds on another part.  Where none holds alone, two
+strong effects may hide one another: a second is looked for on top of the best, on trial, and the
+likeliest pairs are fitted together.
 That goes on until chance can make what is left, or nothing holds.  What is small beside an effect
 may be due to its fit: another is added for it only if it explains most of it.  Then backward: what
 is no longer needed is dropped.
@@ -25,6 +26,7 @@ from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations, scor
 from adv2e.diagnosis.interpolation import InterpolationError
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.pairs import likely_pairs
 from adv2e.diagnosis.simulations import Laboratory
 from adv2e.reports.result import Rejected
 
@@ -204,9 +206,11 @@ class Search:
         share = (before - after) / (before - model.floor)
         if share >= least:
             return True
-        self.bench.log(f"  {grown.names[-1]} takes away {share:.0%} of what is left: too little")
+        added = " and ".join(fit.candidate.name for fit in grown.beyond(state))
+        self.bench.log(f"  {added} takes away {share:.0%} of what is left: too little")
         why = f"takes away no more than {max(share, 0.0):.0%} of what is left"
-        self.bench.rejections.add(grown.fits[-1], why, final=True)
+        for fit in grown.beyond(state):
+            self.bench.rejections.add(fit, why, final=True)
         return False
 
     def _grown(self, state: State) -> State | None:
@@ -215,55 +219,77 @@ class Search:
         Where one holds but another that does not explains far more, the one is no name for what is
         missing: it stands in for a part of the other.
         """
-        attempts = self._attempts(state, [state])
+        trials = self._trials(state)
+        attempts = self._attempts(state, trials, [state])
         # with one of two effects, something still stands out; but the one gains, and is physical
         physical = [one for one in attempts if not {BORDER, BY_CHANCE} & set(one.objections)]
-        if not physical:
-            return None
-        first = max(physical, key=self._judged)
+        most = max(map(self._judged, physical), default=-np.inf)
         holding = [self._judged(one) for one in physical if not one.objections]
-        if holding and max(holding) > self._judged(first) - _CATCHES_UP:
+        if holding and max(holding) > most - _CATCHES_UP:
             return self._best(attempts, state)
         grown = None
         if len(state.fits) + 2 <= MOST_EFFECTS:
-            self.bench.log(f"on trial: {', '.join(first.state.names)}")
-            grown = self._best(self._attempts(first.state, [first.state, state]), state)
-        if grown is None:
+            grown = self._best(self._attempts_of_two(state, trials, physical), state)
+        if grown is None and holding:
+            first = max(physical, key=self._judged)
             why = f"holds, but {first.state.names[-1]}, which does not, explains far more"
             for one in physical:
                 if not one.objections:
                     self.bench.rejections.add(one.state.fits[-1], why, final=True)
         return grown
 
+    def _attempts_of_two(
+        self, state: State, trials: Sequence[Trial], physical: Sequence[_Attempt]
+    ) -> list[_Attempt]:
+        """Return models with two effects more, of which none need hold alone.
+
+        Others on top of the best that is physical, and the likeliest pairs.
+        """
+        made: list[_Attempt] = []
+        if physical:
+            first = max(physical, key=self._judged).state
+            self.bench.log(f"on trial: {', '.join(first.names)}")
+            made += self._attempts(first, self._trials(first), [first, state])
+        had = {frozenset(one.state.names) for one in made}
+        for pair in likely_pairs(self.bench, state, trials):
+            if frozenset((*state.names, *(one.name for one in pair))) not in had:
+                made.append(self._attempt(state, pair, [state]))
+        return made
+
     def _judged(self, attempt: _Attempt) -> float:
         """Return the log likelihood of the data that the attempt was not fitted to."""
         return self.bench.likelihood(attempt.state, parts.JUDGE)
 
-    def _attempts(self, state: State, grounds: Sequence[State]) -> list[_Attempt]:
+    def _trials(self, state: State) -> list[Trial]:
+        """Return the best form of each of the best effects on top of a model, the best first."""
+        self._simulator.likely = self._simulator.done + likely_simulations(self.candidates)
+        best: dict[str, Trial] = {}
+        for trial in finalists(self.bench, state, self.candidates):
+            best.setdefault(trial.name, trial)
+        return list(best.values())
+
+    def _attempts(
+        self, state: State, trials: Sequence[Trial], grounds: Sequence[State]
+    ) -> list[_Attempt]:
         """Return models with one effect more, judged against all `grounds`.
 
         Fits are brought to their end on the data for fitting and judged on other data.  Before its
         fit has ended, an effect may be behind another for that alone: all that are close are tried.
         Others are, one after another, where none of these holds.
         """
-        self._simulator.likely = self._simulator.done + likely_simulations(self.candidates)
-        trials = finalists(self.bench, state, self.candidates)
-        best: dict[str, Trial] = {}
-        for trial in trials:
-            best.setdefault(trial.name, trial)
         made: list[_Attempt] = []
-        for trial in list(best.values())[:_TRIED]:
+        for trial in trials[:_TRIED]:
             close = trial.score > trials[0].score - _CATCHES_UP
             if not close and any(not one.objections for one in made):
                 break
-            made.append(self._attempt(state, trial, grounds))
+            made.append(self._attempt(state, [trial], grounds))
         return made
 
-    def _attempt(self, state: State, trial: Trial, grounds: Sequence[State]) -> _Attempt:
-        """Return the model with a trial's effect more, fitted to its end and judged."""
+    def _attempt(self, state: State, added: Sequence[Trial], grounds: Sequence[State]) -> _Attempt:
+        """Return the model with effects more, fitted to its end and judged."""
         bench = self.bench
-        together = (*state.fits, trial.fit)
-        joint = bench.fitted(together, trial.models[parts.FIT].sd, parts.FIT)
+        together = (*state.fits, *(trial.fit for trial in added))
+        joint = bench.fitted(together, added[0].models[parts.FIT].sd, parts.FIT)
         fits = parted(joint, together)
         grown = State(joint.config, fits, bench.tried(joint.config))
         against: list[str] = []
@@ -271,10 +297,11 @@ class Search:
             against = objections(joint, grown, ground, bench)
             if against:
                 break
-        parameters = fits[-1].candidate.parameters(fits[-1].place)
-        bench.log(f"  {trial.name} {parameters}: {'; '.join(against) or 'holds'}")
-        if against:
-            bench.rejections.add(fits[-1], "; ".join(against), final=True)
+        new = grown.beyond(state)
+        told = [f"{fit.candidate.name} {fit.candidate.parameters(fit.place)}" for fit in new]
+        bench.log(f"  {' and '.join(told)}: {'; '.join(against) or 'holds'}")
+        if against and len(new) == 1:  # of two, nobody knows which it is
+            bench.rejections.add(new[0], "; ".join(against), final=True)
         return _Attempt(grown, against)
 
     def _best(self, attempts: Sequence[_Attempt], state: State) -> State | None:
@@ -289,19 +316,22 @@ class Search:
         ]
         if not holding:
             return None
-        scores = [scored(self.bench, one.models, one.fits[-1].candidate) for one in holding]
+        knobs = [sum(len(fit.candidate.knobs) for fit in one.beyond(state)) for one in holding]
+        scores = [
+            scored(self.bench, one.models, free) for one, free in zip(holding, knobs, strict=True)
+        ]
         best = max(scores)
         chosen = holding[scores.index(best)]
-        alike = set()
+        alike: set[str] = set()
         for one, score in zip(holding, scores, strict=True):
             self.bench.log(f"  {' and '.join(one.names)}, on more data: score {score:.0f}")
-            if one is chosen:
-                continue
             why = "others explain more"
+            others = [fit for fit in one.fits if fit.candidate.name not in chosen.names]
             if score > best - _CLOSE:
-                alike.add(one.names[-1])
+                alike.update(fit.candidate.name for fit in others)
                 why = f"does as well as {chosen.names[-1]}, and cannot be told from it"
-            self.bench.rejections.add(one.fits[-1], why, final=True)
+            for fit in others:
+                self.bench.rejections.add(fit, why, final=True)
         if not alike:
             return dataclasses.replace(chosen, alternatives=state.alternatives)
         alternatives = {**state.alternatives, chosen.names[-1]: frozenset(alike)}

@@ -309,7 +309,7 @@ def test_two_effects_that_hide_one_another_are_found_together():
     laboratory.patterns["pixel.refractory.period_us"] = 0.6 * shared + 0.6 * other
     truth = ["pixel.refractory.period_us=4000", "pixel.leak.rate_hz=4"]
     search, outcome = searched(truth, laboratory)
-    single = search._attempts(search.declared, [search.declared])
+    single = search._attempts(search.declared, search._trials(search.declared), [search.declared])
     assert all(one.objections for one in single)
     assert set(outcome.state.names) == {"refractory", "leak"}
     assert verdict_of(outcome, GONE) == "explained"
