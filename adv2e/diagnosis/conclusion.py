@@ -152,10 +152,10 @@ def about_interpolation(ready: Ready, search: Search) -> str:
             "too few frames to leave any out: what the interpolation between them does to the"
             " residual is not known, and may be all of it"
         )
-    size = error.size(search.bench.scales[BOTH].sd, BOTH)
+    doubt = error.doubt(search.bench.scales[BOTH].sd, BOTH)
     text = (
-        f"interpolation between the frames moves a statistic by {size:.2g} deviations (root mean"
-        " square), as simulations with every second frame left out tell; taken off, and counted as"
-        " uncertain by as much"
+        f"what interpolation makes up between the frames leaves statistics uncertain by {doubt:.2g}"
+        " times what chance does (root mean square), as simulations with every second frame left"
+        " out tell"
     )
-    return text + (": the frames hardly resolve the motion" if size > 1.0 else "")
+    return text + (": the frames hardly resolve the motion" if doubt > 1.0 else "")

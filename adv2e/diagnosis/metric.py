@@ -61,7 +61,7 @@ class Scale:
             Least deviation: what hardly varies is not known that well either.
         """
         mean, sd = sample.mean(axis=0), np.maximum(sample.std(axis=0, ddof=1), least)
-        scaled = _compressed((sample - mean) / sd)
+        scaled = compressed((sample - mean) / sd)
         scaled /= np.maximum(scaled.std(axis=0, ddof=1), 1e-9)
         scaled -= scaled.mean(axis=0)
         correlation = (1.0 - _SHRINK) * (scaled.T @ scaled) / (len(sample) - 1)
@@ -70,7 +70,7 @@ class Scale:
 
     def of_values(self, values: Array) -> Array:
         """Return statistics (..., statistics) in compressed deviations."""
-        return _compressed((values - self.mean) / self.sd)
+        return compressed((values - self.mean) / self.sd)
 
     def values_of(self, compressed: Array) -> Array:
         """Return the statistics (..., statistics) of compressed deviations."""
@@ -82,7 +82,8 @@ class Scale:
         return np.asarray(np.linalg.inv(np.linalg.cholesky(self.correlation)))
 
 
-def _compressed(z: Array) -> Array:
+def compressed(z: Array) -> Array:
+    """Return deviations so that one that is large counts for little more."""
     return np.asarray(_KNEE * np.arcsinh(z / _KNEE))
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from adv2e.diagnosis.metric import Model, Scale, _compressed, _gumbel, _log_normal, _tail
+from adv2e.diagnosis.metric import Model, Scale, _gumbel, _log_normal, _tail, compressed
 
 STATISTICS, SEEDS = 200, 160
 
@@ -131,15 +131,15 @@ def test_fewer_seeds_than_statistics_will_do():
 @given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
 def test_compression_keeps_the_order_and_small_values(a, b):
     low, high = sorted((a, b))
-    assert _compressed(np.array(low)) <= _compressed(np.array(high))
-    assert _compressed(np.array(-a)) == pytest.approx(-_compressed(np.array(a)))
-    assert abs(_compressed(np.array(a))) <= abs(a) + 1e-12
+    assert compressed(np.array(low)) <= compressed(np.array(high))
+    assert compressed(np.array(-a)) == pytest.approx(-compressed(np.array(a)))
+    assert abs(compressed(np.array(a))) <= abs(a) + 1e-12
 
 
 def test_compression_is_none_for_small_values():
     z = np.linspace(-0.3, 0.3, 7)
-    np.testing.assert_allclose(_compressed(z), z, rtol=2e-3)
-    assert _compressed(np.array(1000.0)) == pytest.approx(3 * np.arcsinh(1000 / 3))
+    np.testing.assert_allclose(compressed(z), z, rtol=2e-3)
+    assert compressed(np.array(1000.0)) == pytest.approx(3 * np.arcsinh(1000 / 3))
 
 
 # --- likelihood ----------------------------------------------------------------------------------
