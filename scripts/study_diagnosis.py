@@ -14,6 +14,7 @@ pairs           two effects at once
 
     python scripts/study_diagnosis.py run results
     python scripts/study_diagnosis.py run results --kinds library --sizes middle --shard 3/16
+    python scripts/study_diagnosis.py run ordinary --fps 60 --bits 8 --interpolation flow
     python scripts/study_diagnosis.py report results -o tables
 
 ``run`` adds a line of JSON for each case to a file in its folder and skips what is there already
@@ -91,6 +92,12 @@ def main() -> None:
 @click.option("--size", metavar="WxH", default="48x36", show_default=True, help="Sensor.")
 @click.option("--seconds", type=click.FloatRange(min=0.1), default=0.8, show_default=True)
 @click.option("--fps", type=click.FloatRange(min=10.0), default=500.0, show_default=True)
+@click.option(
+    "--bits", type=click.Choice(["8", "16"]), default="16", help="Of the frames.", show_default=True
+)
+@click.option(
+    "--interpolation", type=click.Choice(["linear", "flow"]), default="linear", show_default=True
+)
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True)
 @click.option("--most", type=click.IntRange(min=1), help="Stop after so many cases.")
 @click.option("-v", "verbose", is_flag=True, help="Show what competes.")
@@ -106,6 +113,8 @@ def run(
     size: str,
     seconds: float,
     fps: float,
+    bits: str,
+    interpolation: str,
     threads: int,
     most: int | None,
     verbose: bool,
@@ -118,7 +127,7 @@ def run(
 
     say = partial(click.echo, err=True)
     width, height = _size(size)
-    setup = running.Setup(width, height, seconds, fps)
+    setup = running.Setup(width, height, seconds, fps, int(bits), interpolation)
     known = library_names()
     lacking = [name for name in catalogue.LIBRARY if name not in known]
     if lacking:

@@ -24,26 +24,44 @@ STUDIED = ("adv2e", "tests/camera")
 """What results depend on: their commit is the last that changed any of it."""
 
 
+_STEPS = 8
+"""Pictures that are made up between two frames, where they move."""
+
+
 @dataclass(frozen=True)
 class Setup:
-    """How recordings are made: columns and rows [px], length [s], frames a second."""
+    """How recordings are made: columns and rows [px], length [s], frames a second.
+
+    And how many bits a pixel of a frame has, and what is simulated between two frames.
+    """
 
     width: int = 48
     height: int = 36
     seconds: float = 0.8
     fps: float = 500.0
+    bits: int = 16
+    interpolation: str = "linear"
 
     def camera_for(self, case: Case, study_seed: int) -> Any:
         """Return the camera of a case, with a scene before it."""
         size, seed = (self.width, self.height), case.seed(study_seed)
         return camera.Camera(
             camera.SCENES[case.scene(study_seed)](size, seed=seed),
+            settings.merged(settings.BENCH, self._declared()),
             hidden=case.hidden,
             size=size,
             duration_s=self.seconds,
             fps=self.fps,
             seed=seed,
         )
+
+    def _declared(self) -> dict[str, Any]:
+        """Return what is declared of the frames."""
+        steps = 1 if self.interpolation == "linear" else _STEPS
+        return {
+            "frames": {"full_scale": 2**self.bits - 1},
+            "sampling": {"interpolation": self.interpolation, "L": steps},
+        }
 
 
 def commit() -> str:

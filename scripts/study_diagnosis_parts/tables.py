@@ -74,7 +74,8 @@ def _by_size(
 
 def _how(lines: Sequence[Line]) -> str:
     setups = Counter(
-        "{width}x{height} px, {seconds:g} s, {fps:g} frames a second".format(**one["setup"])
+        "{width}x{height} px, {seconds:g} s, {fps:g} frames a second of {bits} bits,"
+        " {interpolation} interpolation".format(**one["setup"])
         for one in lines
     )
     lacking = sorted({name for one in lines for name in one["lacking"]})

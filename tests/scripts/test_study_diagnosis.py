@@ -10,7 +10,9 @@ from click.testing import CliRunner
 from study_diagnosis_parts import cases, figure, results, scoring, tables
 from study_diagnosis_parts import run as study_run
 
-SETUP = {"width": 48, "height": 36, "seconds": 0.8, "fps": 500.0}
+SETUP = {
+    "width": 48, "height": 36, "seconds": 0.8, "fps": 500.0, "bits": 16, "interpolation": "linear",
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -180,6 +182,18 @@ def test_shards_of_a_run_never_do_the_same(quick_run):
 )
 def test_wrong_options_are_named(quick_run, arguments, said):
     assert said in quick_run(*arguments)
+
+
+def test_frames_and_interpolation_are_declared_as_the_setup_says():
+    case = cases.Case("library", ("leak",), "middle", 0)
+    plain = study_run.Setup(8, 8, 0.1, 50.0).camera_for(case, 0)
+    ordinary = study_run.Setup(8, 8, 0.1, 50.0, 8, "flow").camera_for(case, 0)
+    assert plain.declared == study_run.settings.BENCH
+    assert ordinary.declared["frames"] == {**plain.declared["frames"], "full_scale": 255}
+    assert ordinary.declared["sampling"] == {"interpolation": "flow", "L": 8, "K": 10}
+    assert ordinary.truth["pixel"]["leak"]["rate_hz"] == 2.0
+    kinds = [next(iter(camera.frames())).image.dtype for camera in (plain, ordinary)]
+    assert [str(kind) for kind in kinds] == ["uint16", "uint8"]
 
 
 def test_what_goes_wrong_is_part_of_the_line(monkeypatch):
