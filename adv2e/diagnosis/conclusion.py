@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,13 +13,15 @@ from numpy.typing import NDArray
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.error import error_rows, of_part
+from adv2e.diagnosis.error import error_rows, of_interpolation, of_part
 from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.interpolation import every
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.picture import Gallery
 from adv2e.diagnosis.ready import Ready
 from adv2e.diagnosis.scene import Placed
 from adv2e.diagnosis.search import Outcome, Search
+from adv2e.diagnosis.simulations import Simulator
 from adv2e.diagnosis.stream import Stream
 from adv2e.diagnosis.verdict import verdict_of
 from adv2e.reports.result import ErrorRow, Finding, Rejected, Signature, Verdict
@@ -56,22 +59,29 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
     """Look at the last part of the data, and decide."""
     scene, simulator = ready.laboratory.scene, ready.laboratory.simulator
 
-    def drawn(state: State) -> list[Placed]:
-        seeds = range(_FIRST_DRAW, _FIRST_DRAW + DRAWS)
-        return [Placed.of(simulator.stream(state.config, seed), scene) for seed in seeds]
+    def last(placed: Placed) -> Stream:
+        return of_part(placed.stream, scene.parts, parts.LAST)
+
+    measured = last(ready.measured)
+
+    def drawn(state: State, of: Simulator = simulator, first: int = _FIRST_DRAW) -> list[Placed]:
+        seeds = range(first, first + DRAWS)
+        return [Placed.of(of.stream(state.config, seed), scene) for seed in seeds]
 
     def errors(before: Sequence[Placed], after: Sequence[Placed]) -> list[ErrorRow]:
-        def last(placed: Placed) -> Stream:
-            return of_part(placed.stream, scene.parts, parts.LAST)
-
-        return error_rows(last(ready.measured), list(map(last, before)), list(map(last, after)))
+        return error_rows(measured, list(map(last, before)), list(map(last, after)))
 
     kept, declared = outcome.state, search.declared
     before = after = drawn(declared)
+    interpolated = 0.0
     if kept is not declared:
         after = drawn(kept)
+        if ready.error is not None:
+            with closing(simulator.of(every(ready.evidence, 2))) as fewer:
+                half = drawn(kept, fewer, _FIRST_DRAW + DRAWS)
+            interpolated = of_interpolation(measured, list(map(last, after)), list(map(last, half)))
     rows = errors(before, after)
-    verdict = verdict_of(outcome, rows[0])
+    verdict = verdict_of(outcome, rows[0], interpolated)
     if verdict in ("consistent", "unexplained") and kept is not declared:
         kept, after = declared, before
         rows = errors(before, after)

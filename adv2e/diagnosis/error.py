@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -50,6 +51,27 @@ def error_rows(
         ErrorRow(name, *(_estimate(table[:, k]) for table in tables))
         for k, name in enumerate(names)
     ]
+
+
+def of_interpolation(measured: Stream, full: Sequence[Stream], half: Sequence[Stream]) -> float:
+    """Return what the interpolation between frames adds to the error over all scales, in squares.
+
+    About half of what it is with every second frame left out, as for the statistics
+    (:mod:`adv2e.diagnosis.interpolation`).
+
+    Parameters
+    ----------
+    measured : Stream
+    full, half : sequence of Stream
+        Simulations of a model with all frames, and with every second, each with its own chance.
+    """
+    unit = smoothed_norms([(measured.events(), 1.0)], measured.width, SIGMAS_US)
+
+    def mean(pairs: Sequence[tuple[Stream, Stream]]) -> float:
+        return float(np.mean([_apart(a, b, unit).mean() for a, b in pairs]))
+
+    square = mean(list(zip(full, half, strict=True))) ** 2 - mean(_pairs(full)) ** 2
+    return 0.5 * math.sqrt(square) if square > 0.0 else 0.0  # not a number: nothing measured
 
 
 def _apart(a: Stream, b: Stream, unit: Array) -> Array:

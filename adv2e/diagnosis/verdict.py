@@ -20,7 +20,7 @@ _ERROR_PARTLY, _ERROR_EXPLAINED = 0.9, 0.75
 left, and when all statistics are explained."""
 
 
-def verdict_of(outcome: Outcome, error: ErrorRow) -> Verdict:
+def verdict_of(outcome: Outcome, error: ErrorRow, interpolated: float = 0.0) -> Verdict:
     """Return the verdict.
 
     Parameters
@@ -29,10 +29,12 @@ def verdict_of(outcome: Outcome, error: ErrorRow) -> Verdict:
         Where the search ended.
     error : ErrorRow
         Of the declared model and of that where the search ended.
+    interpolated : float
+        What interpolation between the frames adds to it, in squares.
     """
     if not outcome.state.fits:
         return "consistent" if outcome.complete else "unexplained"
-    gone, at_most = _gone(error)
+    gone, at_most = _gone(error, interpolated)
     if not outcome.complete:
         partly = outcome.explained >= _PARTLY and gone >= _ERROR_PARTLY and not _too_near(error)
         return "partly_explained" if partly else "unexplained"
@@ -41,7 +43,7 @@ def verdict_of(outcome: Outcome, error: ErrorRow) -> Verdict:
     return "not_identifiable" if outcome.alternatives else "explained"
 
 
-def _gone(error: ErrorRow) -> tuple[float, float]:
+def _gone(error: ErrorRow, interpolated: float) -> tuple[float, float]:
     """Return by how much of what it can the error fell, and by how much at most (97.5 %).
 
     One where the error tells nothing of the effect.  Statistics fall for any effect that does some
@@ -51,10 +53,12 @@ def _gone(error: ErrorRow) -> tuple[float, float]:
     before, after, floor = error.before, error.after, error.floor
     if before.interval is None or floor.interval is None or after.interval is None:
         return 1.0, 1.0
-    if not before.interval[0] > floor.interval[1]:  # or there is none
-        return 1.0, 1.0
-    room = before.value - floor.value
-    return (before.value - after.value) / room, (before.value - after.interval[0]) / room
+    if not before.interval[0] > math.hypot(floor.interval[1], 2.0 * interpolated):
+        return 1.0, 1.0  # nor where there is none
+    # no model with these frames comes nearer; how far they leave it is known to a factor of two
+    nearest, at_least = (math.hypot(floor.value, k * interpolated) for k in (1.0, 2.0))
+    gone = (before.value - after.value) / (before.value - nearest)
+    return gone, (before.value - after.interval[0]) / (before.value - at_least)
 
 
 def _too_near(error: ErrorRow) -> bool:

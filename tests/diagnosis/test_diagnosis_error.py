@@ -6,7 +6,7 @@ from made_up_streams import HEIGHT, WIDTH, random_stream, stream_of
 
 from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_errors
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.error import NAME, PAIRS, _pairs, error_rows, of_part
+from adv2e.diagnosis.error import NAME, PAIRS, _pairs, error_rows, of_interpolation, of_part
 from adv2e.diagnosis.parts import Parts
 
 MEASURED = random_stream(600, 1)
@@ -36,6 +36,22 @@ def test_the_floor_is_between_draws_in_units_of_the_measured():
     table = np.array([distance(a, b, MEASURED) for a, b in _pairs(AFTER)])
     assert rows[0].floor.value == pytest.approx(table.mean())
     assert rows[3].floor.value == pytest.approx(table[:, 2].mean())
+
+
+def test_what_interpolation_adds_is_half_of_what_leaving_frames_out_does():
+    draws = [random_stream(600, seed) for seed in range(30, 42)]
+    others = [random_stream(600, seed) for seed in range(50, 62)]
+    assert of_interpolation(MEASURED, draws, others) < 0.3  # chance alone
+    fewer = [random_stream(100, seed) for seed in range(70, 82)]
+    between = np.mean([distance(a, b, MEASURED) for a, b in _pairs(draws)])
+    apart = np.mean([distance(a, b, MEASURED) for a, b in zip(draws, fewer, strict=True)])
+    assert apart < between
+    assert of_interpolation(MEASURED, draws, fewer) == 0.0
+    more = [random_stream(3000, seed) for seed in range(70, 82)]
+    apart = np.mean([distance(a, b, MEASURED) for a, b in zip(draws, more, strict=True)])
+    found = of_interpolation(MEASURED, draws, more)
+    assert found == pytest.approx(0.5 * np.sqrt(apart**2 - between**2))
+    assert found > 0.5
 
 
 def test_rows_are_the_mean_and_every_scale():

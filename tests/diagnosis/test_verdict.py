@@ -54,6 +54,18 @@ def test_the_sentence_tells_what_is_lacking_from_what_is_otherwise(sets, wrong):
     assert "lacks" not in told
 
 
+def test_what_frames_leave_of_the_error_is_not_asked_of_an_effect():
+    _, outcome = searched(["pixel.leak.rate_hz=4"])
+    stays = error(0.304, 0.304, 0.262, spread=0.01)
+    assert verdict_of(outcome, stays) == "unexplained"
+    # with so much made up between the frames, the error tells nothing of an effect
+    assert verdict_of(outcome, stays, interpolated=0.135) == "explained"
+    # but where there is more than that, it does
+    larger = error(0.8, 0.7, 0.262, spread=0.01)
+    assert verdict_of(outcome, larger, interpolated=0.135) == "unexplained"
+    assert verdict_of(outcome, error(0.8, 0.35, 0.262), interpolated=0.135) == "explained"
+
+
 @pytest.mark.parametrize("shift", ["[0, 2]", "[2, 0]"])
 def test_any_key_of_an_effect_makes_it_one_that_is_there(shift):
     knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
