@@ -23,7 +23,10 @@ from typing import Any
 import click
 import numpy as np
 from numpy.typing import NDArray
+from study_diagnosis_parts import tables
 from study_diagnosis_parts.camera import camera
+from study_diagnosis_parts.cases import SCENES
+from study_diagnosis_parts.options import Names
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.evidence import Evidence, read_evidence
@@ -133,22 +136,21 @@ def table(rows: Sequence[Row]) -> str:
     groups: dict[tuple[str, float], list[Row]] = defaultdict(list)
     for row in rows:
         groups[row.kind, row.fps].append(row)
-    lines = [
-        "| between frames | frames a second | error | left | doubt | left / doubt |",
-        "|---|---:|---:|---:|---:|---:|",
-    ]
+    cells = []
     for (kind, fps), group in sorted(groups.items(), key=lambda one: (one[0][0], -one[0][1])):
-        error, left, doubt = (
-            np.median([getattr(row, name) for row in group]) for name in ("error", "left", "doubt")
-        )
+        medians = [
+            f"{np.median([getattr(row, name) for row in group]):.2f}"
+            for name in ("error", "left", "doubt")
+        ]
         ratios = [row.left / row.doubt for row in group]
         told = f"{np.median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})"
-        lines.append(f"| {kind} | {fps:.4g} | {error:.2f} | {left:.2f} | {doubt:.2f} | {told} |")
-    return "\n".join(lines)
+        cells.append([kind, f"{fps:.4g}", *medians, told])
+    header = ("between frames", "frames a second", "error", "left", "expected", "left / expected")
+    return tables.table(header, cells)
 
 
 @click.command()
-@click.option("--scenes", default=",".join(camera.SCENES), show_default=True)
+@click.option("--scenes", type=Names(SCENES), default=",".join(SCENES), show_default=True)
 @click.option("--seeds", type=click.IntRange(min=1), default=4, show_default=True)
 @click.option("--seconds", type=click.FloatRange(min=0.1), default=0.8, show_default=True)
 @click.option(
@@ -156,19 +158,16 @@ def table(rows: Sequence[Row]) -> str:
     show_default=True, help="Frames of which one is taken. Repeatable.",
 )  # fmt: skip
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True)
-def main(scenes: str, seeds: int, seconds: float, steps: tuple[int, ...], threads: int) -> None:
+def main(
+    scenes: tuple[str, ...], seeds: int, seconds: float, steps: tuple[int, ...], threads: int
+) -> None:
     """Print errors and what is expected of them, by rate of the frames."""
-    names = scenes.split(",")
-    for name in names:
-        if name not in camera.SCENES:
-            known = ", ".join(camera.SCENES)
-            raise click.BadParameter(f"{name!r}: none of {known}", param_hint="--scenes")
     rows: list[Row] = []
     for seed in range(1, seeds + 1):
-        for number, name in enumerate(names):
+        for number, name in enumerate(scenes):
             click.echo(f"scene {name}, seed {seed}", err=True)
             rows += rows_of(name, 100 * seed + number, seconds, steps, threads)
-    click.echo(f"{seeds * len(names)} scenes, {SIZE[0]}x{SIZE[1]} px, {seconds:g} s\n")
+    click.echo(f"{seeds * len(scenes)} scenes, {SIZE[0]}x{SIZE[1]} px, {seconds:g} s\n")
     click.echo(table(rows))
 
 

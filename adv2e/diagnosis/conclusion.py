@@ -72,15 +72,16 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
         return error_rows(measured, list(map(last, before)), list(map(last, after)))
 
     kept, declared = outcome.state, search.declared
-    before = after = drawn(declared)
-    interpolated = 0.0
-    if kept is not declared:
-        after = drawn(kept)
-        if ready.error is not None:
-            with closing(simulator.of(every(ready.evidence, 2))) as fewer:
-                half = drawn(kept, fewer, _FIRST_DRAW + DRAWS)
-            interpolated = of_interpolation(measured, list(map(last, after)), list(map(last, half)))
-    rows = errors(before, after)
+    before = drawn(declared)
+    after = before if kept is declared else drawn(kept)
+    rows, interpolated = errors(before, after), 0.0
+    if kept is not declared and ready.error is not None:
+        with closing(simulator.of(every(ready.evidence, 2))) as fewer:
+            half = drawn(kept, fewer, _FIRST_DRAW + DRAWS)
+        floor = rows[0].floor.value
+        interpolated = of_interpolation(
+            measured, list(map(last, after)), list(map(last, half)), floor
+        )
     verdict = verdict_of(outcome, rows[0], interpolated)
     if verdict in ("consistent", "unexplained") and kept is not declared:
         kept, after = declared, before

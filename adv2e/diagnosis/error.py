@@ -53,7 +53,9 @@ def error_rows(
     ]
 
 
-def of_interpolation(measured: Stream, full: Sequence[Stream], half: Sequence[Stream]) -> float:
+def of_interpolation(
+    measured: Stream, full: Sequence[Stream], half: Sequence[Stream], floor: float
+) -> float:
     """Return what the interpolation between frames adds to the error over all scales, in squares.
 
     About half of what it is with every second frame left out, as for the statistics
@@ -64,13 +66,12 @@ def of_interpolation(measured: Stream, full: Sequence[Stream], half: Sequence[St
     measured : Stream
     full, half : sequence of Stream
         Simulations of a model with all frames, and with every second, each with its own chance.
+    floor : float
+        Of the error of that model with all frames.
     """
     unit = smoothed_norms([(measured.events(), 1.0)], measured.width, SIGMAS_US)
-
-    def mean(pairs: Sequence[tuple[Stream, Stream]]) -> float:
-        return float(np.mean([_apart(a, b, unit).mean() for a, b in pairs]))
-
-    square = mean(list(zip(full, half, strict=True))) ** 2 - mean(_pairs(full)) ** 2
+    apart = np.mean([_apart(a, b, unit).mean() for a, b in zip(full, half, strict=True)])
+    square = float(apart) ** 2 - floor**2
     return 0.5 * math.sqrt(square) if square > 0.0 else 0.0  # not a number: nothing measured
 
 
