@@ -122,7 +122,7 @@ def compared(
     chance = apart.var(axis=0, ddof=1) / len(apart)
     error = compressed(apart.mean(axis=0))
     left = compressed(apart.mean(axis=0) - expected.bias[BOTH] / deviation)
-    doubt = expected.sd[BOTH] / deviation
+    doubt = compressed(expected.sd[BOTH] / deviation)
     return Row(kind, fps, rms(error, chance), rms(left, chance), rms(doubt))
 
 

@@ -1,16 +1,21 @@
 r"""What statistics owe to the interpolation between frames, and how well that is known.
 
 Between frames a simulation knows nothing of the light.  What it makes up changes each statistic by
-an error e, of which the change d tells that leaving out every second frame makes.  Where motion is
-resolved, interpolation is wrong by what the light bends, to leading order by the square of the time
-between frames, so that e = d/3 (Richardson extrapolation [1]_); where it is not, or moves along
-optical flow, e is about as large but hardly goes with d.  So, in deviations of chance, compressed
-(:mod:`adv2e.diagnosis.metric`),
+an error e, of which the change d tells that leaving out every second frame makes.  In deviations of
+chance, compressed (:mod:`adv2e.diagnosis.metric`),
 
-.. math:: e = \tfrac{1}{4} d \pm \tfrac{1}{2} \sqrt{d^2 + \overline{d^2}},
+.. math:: e = \tfrac{1}{4} d \pm f \sqrt{\tfrac{1}{2} (d^2 + \overline{d^2})},
 
 with the mean over the statistics of a group: where one happens not to change, others of its kind
 tell what to expect.  The first part is taken off all simulations.
+
+How much is uncertain, f, depends on whether the frames resolve the motion.  Where they do, frames
+that are blended are wrong by what the light bends, to leading order by the square of the time
+between them: e = d/3 (Richardson extrapolation [1]_), and leaving out three of four frames changes
+five times as much as every second; where they do not, the two changes are about as large, as is e.
+So the ratio r of the two tells what to expect, :math:`f = (1.2 / r)^{1.8}`.  Frames that are moved
+along their optical flow are wrong where that is, whatever the time between them: e hardly goes with
+d, nor f with r.
 
 ``scripts/study_interpolation_error.py`` measures e, and what is left of it beside its doubt, on
 scenes seen at 2000 frames a second of which a 4th to 64th is taken; numbers here were chosen on
@@ -44,8 +49,9 @@ from adv2e.diagnosis.stream import Stream
 Array = NDArray[np.float64]
 
 _TAKEN_OFF = 0.25
-_DOUBT = 0.5
-_SPREAD = 0.5  # of the logarithm
+_MOVED = 0.7
+_BLENDED = (0.2, 1.0)
+_SPREAD = 0.45  # of the logarithm
 _TAIL = 4.0
 _FEWEST = 5
 """Frames that must be left for a simulation to say anything."""
@@ -74,29 +80,32 @@ class InterpolationError:
         return cls(np.zeros(shape), np.zeros(shape))
 
     @classmethod
-    def of(cls, full: Any, half: Any, groups: Sequence[str], least: Array) -> InterpolationError:
+    def of(
+        cls, full: Any, half: Any, quarter: Any, groups: Sequence[str], least: Array
+    ) -> InterpolationError:
         """Return the error that follows from simulations with frames left out.
 
         Parameters
         ----------
         full, half : (seeds, views, statistics)
             With all frames, and with every second, of the same seeds.
+        quarter : (seeds, views, statistics), optional
+            With every fourth frame, where frames are blended.
         groups : sequence of str
             Of each statistic, which go together.
         least : (statistics,)
             Deviation below which each statistic is not trusted to be known.
         """
         deviation = np.maximum(full.std(axis=0, ddof=1), least)
-        apart = (half - full) / deviation
-        change = compressed(beyond_chance(apart))
-        chance = np.minimum(apart.var(axis=0, ddof=1) / len(apart), 1.0)
-        square = compressed(apart.mean(axis=0)) ** 2 - chance
-        usual = np.empty_like(change)
-        for group in dict.fromkeys(groups):
-            own = np.array([one == group for one in groups])
-            usual[:, own] = square[:, own].mean(axis=1, keepdims=True)
-        doubt = _DOUBT * np.sqrt(change**2 + np.maximum(usual, 0.0))
-        return cls(deviation * expanded(_TAKEN_OFF * change), deviation * doubt)
+
+        def changed(sample: Any) -> Array:
+            return compressed(beyond_chance((sample - full) / deviation))
+
+        change = changed(half)
+        share = _MOVED if quarter is None else _blended(changed(quarter), change)
+        usual = _usual_squares((half - full) / deviation, groups)
+        uncertain = expanded(share * np.sqrt((change**2 + usual) / 2.0))
+        return cls(deviation * expanded(_TAKEN_OFF * change), deviation * uncertain)
 
     def blurred(self, sample: Array, view: int, stream: int) -> Array:
         """Return simulations, (seeds, statistics), spread by what is uncertain.
@@ -161,13 +170,43 @@ def interpolation_error(
     def measured(streams: list[Stream]) -> Any:
         return np.array([markers.measure(Placed.of(stream, scene)) for stream in streams])
 
-    half = every(evidence, 2)
-    if len(half.frames) < _FEWEST:
+    def left(step: int) -> Any:
+        fewer = every(evidence, step)
+        if len(fewer.frames) < _FEWEST:
+            return None
+        with closing(simulator(fewer)) as made:
+            return measured(made.map(lambda seed: made.stream(declared, seed), pilot))
+
+    half = left(2)
+    if half is None:
         return None
-    with closing(simulator(half)) as made:
-        left_out = made.map(lambda seed: made.stream(declared, seed), pilot)
-    full = list(pilot.values())
-    return InterpolationError.of(measured(full), measured(left_out), markers.titles, markers.least)
+    quarter = left(4) if declared.sampling.interpolation == "linear" else None
+    full = measured(list(pilot.values()))
+    return InterpolationError.of(full, half, quarter, markers.titles, markers.least)
+
+
+def _usual_squares(differences: Any, groups: Sequence[str]) -> Array:
+    """Return the mean squared change of each statistic's group, less what chance puts into it."""
+    chance = np.minimum(differences.var(axis=0, ddof=1) / len(differences), 1.0)
+    squares = compressed(differences.mean(axis=0)) ** 2 - chance
+    usual = np.empty_like(squares)
+    for group in dict.fromkeys(groups):
+        own = np.array([one == group for one in groups])
+        usual[:, own] = squares[:, own].mean(axis=1, keepdims=True)
+    return np.maximum(usual, 0.0)
+
+
+def _blended(of_quarter: Array, of_half: Array) -> float:
+    """Return the share of the change that is uncertain where frames are blended.
+
+    Parameters
+    ----------
+    of_quarter, of_half : (views, statistics)
+        Changes that leaving out three of four frames makes, and every second.
+    """
+    square = float(np.mean(of_half**2))
+    ratio = np.sqrt(np.mean(of_quarter**2) / square) if square > 0.0 else np.inf
+    return float(np.clip((1.2 / ratio) ** 1.8, *_BLENDED))
 
 
 def every(evidence: Evidence, step: int) -> Evidence:

@@ -26,23 +26,54 @@ GROUPS = ["a", "a", "a", "b", "b", "b"]
 LEAST = np.full(6, 1.0)
 
 
+def changed(by):
+    """Return simulations of which the first statistic has changed by so many deviations."""
+    sample = repeated(10.0)
+    sample[:, :, 0] += by
+    return sample
+
+
 def test_a_quarter_of_the_change_is_taken_off():
-    full, half = repeated(10.0), repeated(10.0)
-    half[:, :, 0] += 0.4  # of deviations of 1
-    error = InterpolationError.of(full, half, GROUPS, LEAST)
+    error = InterpolationError.of(repeated(10.0), changed(0.4), None, GROUPS, LEAST)
     np.testing.assert_allclose(error.bias[:, 0], 0.1, rtol=0.01)
     np.testing.assert_array_equal(error.bias[:, 1:], 0.0)
-    # half of the change and of what is usual in its group, of three of which one changes
+    # of the change and of what is usual in its group, of three of which one changes
     usual = 0.4 / np.sqrt(3.0)
-    np.testing.assert_allclose(error.sd[:, 0], 0.5 * np.hypot(0.4, usual), rtol=0.01)
-    np.testing.assert_allclose(error.sd[:, 1:3], 0.5 * usual, rtol=0.01)
+    share = 0.7 / np.sqrt(2.0)
+    np.testing.assert_allclose(error.sd[:, 0], share * np.hypot(0.4, usual), rtol=0.01)
+    np.testing.assert_allclose(error.sd[:, 1:3], share * usual, rtol=0.01)
     np.testing.assert_array_equal(error.sd[:, 3:], 0.0)
 
 
+def test_less_is_uncertain_where_blended_frames_resolve_the_motion():
+    """Fewer frames change more then: the error goes with the square of the time between them."""
+    doubts = [
+        InterpolationError.of(repeated(10.0), changed(0.4), changed(0.4 * more), GROUPS, LEAST)
+        for more in (1.0, 2.0, 5.0, 50.0)
+    ]
+    along_flow = InterpolationError.of(repeated(10.0), changed(0.4), None, GROUPS, LEAST)
+    shares = [one.sd[0, 0] / along_flow.sd[0, 0] * 0.7 for one in doubts]
+    assert shares == pytest.approx([1.0, 0.41, 0.2, 0.2], rel=0.1)
+    for one in doubts:
+        np.testing.assert_array_equal(one.bias, along_flow.bias)
+
+
+def test_what_nothing_changes_is_certain():
+    same = repeated(10.0)
+    error = InterpolationError.of(same, same, same, GROUPS, LEAST)
+    np.testing.assert_array_equal(error.sd, 0.0)
+
+
 def test_the_error_grows_with_the_unit_of_a_statistic():
-    one = InterpolationError.of(repeated(5.0, 1.0), 2.0 + repeated(5.0, 1.0), GROUPS, 0.01 * LEAST)
-    ten = InterpolationError.of(
-        10.0 * repeated(5.0, 1.0), 10.0 * (2.0 + repeated(5.0, 1.0)), GROUPS, 0.01 * LEAST
+    one, ten = (
+        InterpolationError.of(
+            unit * repeated(5.0, 1.0),
+            unit * (2.0 + repeated(5.0, 1.0)),
+            unit * (6.0 + repeated(5.0, 1.0)),
+            GROUPS,
+            0.01 * LEAST,
+        )
+        for unit in (1.0, 10.0)
     )
     np.testing.assert_allclose(ten.bias, 10.0 * one.bias)
     np.testing.assert_allclose(ten.sd, 10.0 * one.sd)
@@ -50,13 +81,14 @@ def test_the_error_grows_with_the_unit_of_a_statistic():
 
 def test_of_far_more_than_chance_less_is_taken_off():
     """What is that large says that the motion is not resolved, and little of the error."""
-    error = InterpolationError.of(repeated(0.0), repeated(100.0), GROUPS, LEAST)
+    error = InterpolationError.of(repeated(0.0), repeated(100.0), None, GROUPS, LEAST)
     assert np.all((error.bias > 2.0) & (error.bias < 10.0))
-    assert np.all((error.sd > 5.0) & (error.sd < 10.0))
+    # as large as the change but for what is taken off, less so than in proportion
+    assert np.all((error.sd > 10.0) & (error.sd < 90.0))
 
 
 def test_chance_is_no_change():
-    found = InterpolationError.of(repeated(5.0, 1.0, 1), repeated(5.0, 1.0, 2), GROUPS, LEAST)
+    found = InterpolationError.of(repeated(5.0, 1.0, 1), repeated(5.0, 1.0, 2), None, GROUPS, LEAST)
     assert np.median(np.abs(found.bias)) == 0.0
     assert np.median(found.sd) < 0.2
 

@@ -21,7 +21,10 @@ _QUANTILES = (0.1, 0.25, 0.5, 0.75)
 _BIN_BORDERS_US = np.r_[
     np.arange(-0.5, 100.0), np.unique(np.rint(np.geomspace(100.0, 1e5, 100)))[1:] + 0.5
 ]
-"""Of the gaps counted: each one of whole microseconds by itself, longer ones within 7 %."""
+"""Of the gaps counted: each of whole microseconds by itself, longer ones within 7 %, up to 0.1 s.
+
+No readout takes as long; what is longer counts as that.
+"""
 _BIN_OF = np.searchsorted(_BIN_BORDERS_US[1:-1], np.arange(int(_BIN_BORDERS_US[-1]) + 1))
 
 
