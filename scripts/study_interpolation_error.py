@@ -26,14 +26,17 @@ from numpy.typing import NDArray
 from study_diagnosis_parts import tables
 from study_diagnosis_parts.camera import camera
 from study_diagnosis_parts.cases import SCENES
-from study_diagnosis_parts.options import Names
+from study_diagnosis_parts.options import Names, sampling
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.evidence import Evidence, read_evidence
-from adv2e.diagnosis.interpolation import InterpolationError, every, interpolation_error
+from adv2e.diagnosis.frame_error import FrameError
+from adv2e.diagnosis.interpolation import between_frames, every
+from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.metric import compressed
+from adv2e.diagnosis.pilot import Pilot
 from adv2e.diagnosis.ready import PILOT, quantum_dn
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Simulator
@@ -46,7 +49,7 @@ SIZE = (48, 36)
 DRAWS = 48
 """Simulations that an error is the mean of."""
 
-KINDS = {"linear": ["sampling.L=1"], "flow": ["sampling.interpolation=flow", "sampling.L=8"]}
+KINDS = ("linear", "flow")
 
 
 @dataclass(frozen=True)
@@ -72,8 +75,13 @@ def rows_of(
         made = camera.SCENES[scene](SIZE, seed=seed)
         camera.Camera(made, size=SIZE, duration_s=seconds, fps=FPS, seed=seed).record(path)
         evidence = read_evidence(path)
-        declared = path.with_name("recording.declared.yaml")
-        configs = {kind: load_config([declared], sets) for kind, sets in KINDS.items()}
+        declared = load_config([path.with_name("recording.declared.yaml")])
+        configs = {
+            kind: with_keys(
+                declared, {f"sampling.{key}": value for key, value in sampling(kind).items()}
+            )
+            for kind in KINDS
+        }
     all_frames = streams(evidence, configs["linear"], threads)
     for step in steps:
         for kind, config in configs.items():
@@ -102,10 +110,11 @@ def row_of(
     drawn = streams(evidence, config, threads)
     pilot = {seed: drawn[seed] for seed in list(drawn)[:PILOT]}
     markers = Markers(scene, [Placed.of(stream, scene) for stream in pilot.values()])
-    expected = interpolation_error(
-        evidence, config, scene, markers, pilot, lambda fewer: Simulator(fewer, threads)
+    expected = between_frames(
+        Pilot(evidence, config, scene, markers, pilot, lambda fewer: Simulator(fewer, threads))
     )
-    assert expected is not None
+    if expected is None:
+        raise click.UsageError(f"too few frames in so short a scene at {fps:.4g} a second")
 
     def measured(made: dict[int, Stream]) -> Any:
         return np.array([markers.measure(Placed.of(one, scene))[BOTH] for one in made.values()])
@@ -114,7 +123,7 @@ def row_of(
 
 
 def compared(
-    kind: str, fps: float, few: Array, many: Array, expected: InterpolationError, least: Array
+    kind: str, fps: float, few: Array, many: Array, expected: FrameError, least: Array
 ) -> Row:
     """Return the row of simulations with few frames and with many, (seeds, statistics)."""
     deviation = np.maximum(few.std(axis=0, ddof=1), least)

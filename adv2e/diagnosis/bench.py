@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis.candidates import Candidate, Knob, neutral_value
 from adv2e.diagnosis.fit import Fit, Fitter
-from adv2e.diagnosis.interpolation import InterpolationError
+from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.markers import BOTH, VIEWS
 from adv2e.diagnosis.metric import Model, Scale
 from adv2e.diagnosis.resampling import Resampling
@@ -94,7 +94,7 @@ class Bench:
     declared : Config
     scales : tuple of Scale
         One a view.
-    error : InterpolationError
+    error : FrameError
         Of the statistics.
     resampling : Resampling
         Of models that shift the frames.
@@ -109,7 +109,7 @@ class Bench:
     observed: Array
     declared: Config
     scales: tuple[Scale, ...]
-    error: InterpolationError
+    error: FrameError
     resampling: Resampling
     log: Callable[[str], None]
     free: tuple[Knob, ...] = ()
@@ -121,12 +121,12 @@ class Bench:
         laboratory: Laboratory,
         observed: Array,
         declared: Config,
-        error: InterpolationError | None,
+        error: FrameError | None,
         log: Callable[[str], None],
         free: tuple[Knob, ...] = (),
     ) -> Bench:
         """Return the bench of a declared model, which is simulated for the scales."""
-        error = error or InterpolationError.none(observed.shape)
+        error = error or FrameError.none(observed.shape)
         # not the simulations that misfits are compared with: those would fit too well
         sample = laboratory.ensemble(declared, range(MANY + 1, 2 * MANY + 1))
         least = laboratory.markers.least

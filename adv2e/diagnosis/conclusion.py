@@ -75,7 +75,7 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
     before = drawn(declared)
     after = before if kept is declared else drawn(kept)
     rows, interpolated = errors(before, after), 0.0
-    if kept is not declared and ready.error is not None:
+    if kept is not declared and ready.between_frames is not None:
         with closing(simulator.of(every(ready.evidence, 2))) as fewer:
             half = drawn(kept, fewer, _FIRST_DRAW + DRAWS)
         floor = rows[0].floor.value
@@ -155,18 +155,29 @@ def signatures_of(ready: Ready, search: Search, kept: State) -> list[Signature]:
     ]
 
 
-def about_interpolation(ready: Ready, search: Search) -> str:
-    """Say what the statistics owe to the interpolation between frames."""
-    error = ready.error
-    if error is None:
-        return (
+def about_frames(ready: Ready, search: Search) -> list[str]:
+    """Say how uncertain statistics are for what the frames do not tell."""
+    chance = ready.error.chance(search.bench.scales[BOTH].sd, BOTH)
+    notes = []
+    if ready.between_frames is None:
+        notes.append(
             "too few frames to leave any out: what the interpolation between them does to the"
             " residual is not known, and may be all of it"
         )
-    doubt = error.doubt(search.bench.scales[BOTH].sd, BOTH)
-    text = (
-        f"what interpolation makes up between the frames leaves statistics uncertain by {doubt:.2g}"
-        " times what chance does (root mean square), as simulations with every second frame left"
-        " out tell"
-    )
-    return text + (": the frames hardly resolve the motion" if doubt > 1.0 else "")
+    else:
+        doubt = ready.between_frames.doubt(chance, BOTH)
+        text = (
+            "what interpolation makes up between the frames leaves statistics uncertain by"
+            f" {doubt:.2g} times what chance does (root mean square), as simulations with frames"
+            " left out tell"
+        )
+        unresolved = ": the frames hardly resolve the motion" if doubt > 1.0 else ""
+        notes.append(text + unresolved)
+    if ready.between_levels is not None:
+        doubt = ready.between_levels.doubt(chance, BOTH)
+        notes.append(
+            "what frames do not tell between the levels of their numbers leaves statistics"
+            f" uncertain by {doubt:.2g} times what chance does (root mean square), as simulations"
+            " with frames of coarser levels tell"
+        )
+    return notes

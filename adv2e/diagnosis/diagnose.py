@@ -12,7 +12,7 @@ from adv2e.cores import default_threads
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.affordable import affordable
 from adv2e.diagnosis.conclusion import (
-    about_interpolation,
+    about_frames,
     conclude,
     finding_of,
     rejected_of,
@@ -107,7 +107,7 @@ def diagnose(
             else [],
             masked=evidence.masked,
             split=ready.laboratory.scene.parts.text(),
-            notes=[*evidence.notes, about_interpolation(ready, search)],
+            notes=[*evidence.notes, *about_frames(ready, search)],
             model=as_found(kept.config),
             facts={
                 "sensor": f"{evidence.width}x{evidence.height}",

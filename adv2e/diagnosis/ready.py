@@ -13,13 +13,16 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.error import of_part
 from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.interpolation import InterpolationError, interpolation_error
+from adv2e.diagnosis.frame_error import FrameError
+from adv2e.diagnosis.interpolation import between_frames
 from adv2e.diagnosis.lamps import Lamp, lamps_of
+from adv2e.diagnosis.levels import between_levels
 from adv2e.diagnosis.library import hints_of, library
 from adv2e.diagnosis.light import light_of, quantum_dn
 from adv2e.diagnosis.lines import strongest_lines
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of
+from adv2e.diagnosis.pilot import Pilot
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 from adv2e.diagnosis.stream import Stream
@@ -42,8 +45,8 @@ class Ready:
     declared : Config
         With thresholds that match the totals, where they were not known.
     laboratory : Laboratory
-    error : InterpolationError, optional
-        Of the statistics; None: too few frames to tell.
+    between_frames, between_levels : FrameError, optional
+        Of the statistics; None: too few frames to tell, and levels too fine to matter.
     measured : Placed
         The recording's events.
     observed : (views, statistics)
@@ -55,11 +58,18 @@ class Ready:
     evidence: Evidence
     declared: Config
     laboratory: Laboratory
-    error: InterpolationError | None
+    between_frames: FrameError | None
+    between_levels: FrameError | None
     measured: Placed
     observed: NDArray[np.float64]
     candidates: list[Candidate]
     free: tuple[Knob, ...]
+
+    @property
+    def error(self) -> FrameError:
+        """What the frames do not tell in all."""
+        none = FrameError.none(self.observed.shape)
+        return (self.between_frames or none) + (self.between_levels or none)
 
 
 def make_ready(
@@ -97,16 +107,18 @@ def make_ready(
     streams = simulator.map(lambda seed: simulator.stream(declared, seed), seeds)
     markers = Markers(scene, [Placed.of(stream, scene) for stream in streams])
     known = dict(zip(seeds, streams, strict=True))
-    error = interpolation_error(evidence, declared, scene, markers, known, simulator.of)
+    pilot = Pilot(evidence, declared, scene, markers, known, simulator.of)
+    frames, levels = between_frames(pilot), between_levels(pilot)
     measured = Placed.of(evidence.stream, scene)
-    laboratory = Laboratory(simulator, scene, markers, error.bias if error else None)
+    laboratory = Laboratory(simulator, scene, markers, frames.bias if frames else None)
     lamps = _lamps(evidence, declared, simulator, scene, streams)
     hints = hints_of(evidence, lamps)
     return Ready(
         evidence,
         declared,
         laboratory,
-        error,
+        frames,
+        levels,
         measured,
         markers.measure(measured),
         [one for one in library(declared, hints) if one.name not in without],

@@ -17,7 +17,7 @@ statistics from that by some 0.6 of it.
 from __future__ import annotations
 
 from adv2e.config import Config
-from adv2e.diagnosis.interpolation import InterpolationError, beyond_chance
+from adv2e.diagnosis.frame_error import FrameError, beyond_chance
 from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.simulations import Laboratory
 
@@ -39,9 +39,9 @@ class Resampling:
     def __init__(self, laboratory: Laboratory, declared: Config) -> None:
         self._laboratory = laboratory
         self._unmoved = with_keys(declared, {"frames.shift_px": [0.0, 0.0]})
-        self._held: dict[tuple[float, float], InterpolationError] = {}
+        self._held: dict[tuple[float, float], FrameError] = {}
 
-    def error(self, config: Config) -> InterpolationError | None:
+    def error(self, config: Config) -> FrameError | None:
         """Return the error of a model's statistics; None where no part of a pixel is shifted."""
         x, y = (_STEP_PX * round(part / _STEP_PX) for part in config.frames.shift_px)
         if x == round(x) and y == round(y):
@@ -50,8 +50,8 @@ class Resampling:
             self._held[x, y] = self._there_and_back((x, y))
         return self._held[x, y]
 
-    def _there_and_back(self, shift_px: tuple[float, float]) -> InterpolationError:
+    def _there_and_back(self, shift_px: tuple[float, float]) -> FrameError:
         plain = self._laboratory.ensemble(self._unmoved, _SEEDS)
         back = self._laboratory.there_and_back(self._unmoved, shift_px, _SEEDS)
         bias = _SHARE * beyond_chance(back - plain)
-        return InterpolationError(bias, abs(bias))
+        return FrameError(bias, abs(bias))

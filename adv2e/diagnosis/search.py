@@ -23,7 +23,7 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import MANY, Bench, State, parted
 from adv2e.diagnosis.candidates import FITTED, Candidate, Knob
 from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations, scored
-from adv2e.diagnosis.interpolation import InterpolationError
+from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.pairs import likely_pairs
@@ -106,7 +106,7 @@ class Search:
         Of the recording.
     declared : Config
     candidates : sequence of Candidate
-    error : InterpolationError, optional
+    error : FrameError, optional
         Of the statistics.
     log : callable
         Told of each step.
@@ -125,7 +125,7 @@ class Search:
         observed: Array,
         declared: Config,
         candidates: Sequence[Candidate],
-        error: InterpolationError | None = None,
+        error: FrameError | None = None,
         log: Callable[[str], None] = lambda text: None,
         free: tuple[Knob, ...] = (),
     ) -> None:

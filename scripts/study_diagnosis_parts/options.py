@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
+
+_STEPS = 8
+"""Pictures that are made up between two frames, where they move."""
 
 
 class Names(click.ParamType):
@@ -24,3 +29,8 @@ class Names(click.ParamType):
             if name not in self.known:
                 self.fail(f"{name!r}: none of {', '.join(self.known)}", param, ctx)
         return tuple(name for name in self.known if name in names)
+
+
+def sampling(interpolation: str) -> dict[str, Any]:
+    """Return what is declared of the pictures between frames that are blended, or moved."""
+    return {"interpolation": interpolation, "L": 1 if interpolation == "linear" else _STEPS}

@@ -18,14 +18,11 @@ from adv2e.diagnosis.evidence import read_evidence
 from adv2e.reports.result import Diagnosis
 from study_diagnosis_parts.camera import REPOSITORY, camera, settings
 from study_diagnosis_parts.cases import Case
+from study_diagnosis_parts.options import sampling
 from study_diagnosis_parts.results import Line
 
 STUDIED = ("adv2e", "tests/camera")
 """What results depend on: their commit is the last that changed any of it."""
-
-
-_STEPS = 8
-"""Pictures that are made up between two frames, where they move."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +54,9 @@ class Setup:
 
     def _declared(self) -> dict[str, Any]:
         """Return what is declared of the frames."""
-        steps = 1 if self.interpolation == "linear" else _STEPS
         return {
             "frames": {"full_scale": 2**self.bits - 1},
-            "sampling": {"interpolation": self.interpolation, "L": steps},
+            "sampling": sampling(self.interpolation),
         }
 
 

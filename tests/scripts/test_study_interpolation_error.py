@@ -5,7 +5,7 @@ import pytest
 import study_interpolation_error as study
 from click.testing import CliRunner
 
-from adv2e.diagnosis.interpolation import InterpolationError
+from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.markers import BOTH
 
 
@@ -17,7 +17,7 @@ def simulations(mean, seed, count=400):
 def expected(bias, sd):
     """Return an error that is the same for all statistics of one view, and for no other view."""
     shape = (BOTH + 1, 200)
-    error = InterpolationError(np.full(shape, np.nan), np.full(shape, np.nan))
+    error = FrameError(np.full(shape, np.nan), np.full(shape, np.nan))
     error.bias[BOTH], error.sd[BOTH] = bias, sd
     return error
 
@@ -54,3 +54,11 @@ def test_an_unknown_scene_is_named():
     result = CliRunner().invoke(study.main, ["--scenes", "edges,nowhere"])
     assert result.exit_code == 2
     assert "'nowhere': none of" in result.output
+
+
+def test_too_few_frames_are_an_error_and_not_a_row():
+    result = CliRunner().invoke(
+        study.main, ["--scenes", "edges", "--seeds", "1", "--seconds", "0.1", "--every", "64"]
+    )
+    assert result.exit_code == 2
+    assert "too few frames in so short a scene at 31.25 a second" in result.output

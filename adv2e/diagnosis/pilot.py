@@ -1,0 +1,60 @@
+"""Simulations of the declared model that tell what to expect, also of other frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config import Config
+from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.markers import Markers
+from adv2e.diagnosis.scene import Placed, Scene
+from adv2e.diagnosis.simulations import Simulator
+from adv2e.diagnosis.stream import Stream
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """Simulations of the declared model.
+
+    Attributes
+    ----------
+    evidence : Evidence
+        The recording.
+    declared : Config
+    scene : Scene
+    markers : Markers
+    streams : dict of Stream
+        By their seeds.
+    simulator : callable
+        Makes a simulator of a recording.
+    """
+
+    evidence: Evidence
+    declared: Config
+    scene: Scene
+    markers: Markers
+    streams: dict[int, Stream]
+    simulator: Callable[[Evidence], Simulator]
+
+    @cached_property
+    def sample(self) -> Array:
+        """Their statistics, (seeds, views, statistics)."""
+        return self._measured(self.streams.values())
+
+    def of_frames(self, evidence: Evidence) -> Array:
+        """Return the statistics of the same simulations with the frames of `evidence`."""
+        with closing(self.simulator(evidence)) as made:
+            return self._measured(
+                made.map(lambda seed: made.stream(self.declared, seed), self.streams)
+            )
+
+    def _measured(self, streams: Iterable[Stream]) -> Array:
+        return np.array([self.markers.measure(Placed.of(one, self.scene)) for one in streams])
