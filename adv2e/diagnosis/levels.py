@@ -3,8 +3,8 @@
 A simulation takes the steps of 8-bit frames for light, and so do the statistics that ask how the
 light changed before an event: where it is dark, a step is as large as a threshold.  How much that
 is worth is told by simulations of frames that are rounded to every third level.  What those change
-has hardly the direction of the error, but is about three times as large (of ten scenes of 60 to
-250 frames a second in 8 bits and 16: .2 to .5 of it), so nothing is taken off, and 0.3 of it is
+has hardly the direction of the error, but is two to five times as large (of four scenes of 60 to
+250 frames a second in 8 bits and 16: .2 to .5 of it), so nothing is taken off, and 0.4 of it is
 counted as uncertain.
 """
 
@@ -21,7 +21,7 @@ from adv2e.diagnosis.frame_error import Change, FrameError
 from adv2e.diagnosis.light import quantum_dn
 from adv2e.diagnosis.pilot import Pilot
 
-_DOUBT = 0.3
+_DOUBT = 0.4
 _FINE_DN = 0.05
 """Steps, of 255, that leave nothing to be seen: those of 12 bits are a little larger."""
 
