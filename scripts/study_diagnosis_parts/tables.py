@@ -256,12 +256,21 @@ def _given(line: Line) -> set[str]:
 
 
 def _strangers(lines: Sequence[Line]) -> str:
+    """Return which effects had which outcome, with the names that they were given."""
+    held: dict[str, list[Line]] = {kind: [] for kind in scoring.OF_STRANGERS}
+    for one in lines:
+        held[scoring.outcome(one)].append(one)
     rows = [
-        [name, *_counts(group, scoring.OF_STRANGERS), _names(group)]
-        for name, group in _grouped(lines)
+        [kind, str(len(found)), "; ".join(_taken_as(*group) for group in _grouped(found))]
+        for kind, found in held.items()
+        if found
     ]
-    total = ["all", *_counts(lines, scoring.OF_STRANGERS), ""]
-    return table(("effect", *scoring.OF_STRANGERS, "named"), [*rows, total])
+    return table(("outcome", "cases", "effects"), rows)
+
+
+def _taken_as(name: str, lines: Sequence[Line]) -> str:
+    given = _names(lines)
+    return f"{name} as {given}" if given else name
 
 
 def _grouped(lines: Sequence[Line]) -> list[tuple[str, list[Line]]]:

@@ -346,9 +346,13 @@ def test_the_report_counts_what_happened():
     assert "1 of 49: 2.0%" in row(text, "any verdict but consistent")
     assert "1 of 49: 2.0%" in row(text, "global test on the last part below 1%")
     assert "0 of 49" in row(text, "an effect named")
-    assert "shot_noise" in row(text, "echo")
-    assert "1 of 2: 50.0%" in text.partition("left out of the library")[2]
-    assert "the same thing under another key: 1" in text
+    left_out, outside = text.partition("left out of the library")[2].split("\n## ")[:2]
+    assert "1 of 2: 50.0%" in left_out
+    assert "the same thing under another key: 1" in left_out
+    assert row(left_out, "wrong name") == "| wrong name | 1 | leak as photo_leak |"
+    assert row(left_out, "unexplained") == "| unexplained | 1 | flicker |"
+    assert row(outside, "wrong name") == "| wrong name | 1 | echo as shot_noise |"
+    assert "| missed |" not in outside
     assert "| 49 of 100 |" in row(text, "nothing")
     assert f"20 of {len(LIBRARY)}" in row(text, "library")
 
