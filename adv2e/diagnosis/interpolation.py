@@ -13,7 +13,7 @@ How much is uncertain, f, depends on whether the frames resolve the motion.  Whe
 that are blended are wrong by what the light bends, to leading order by the square of the time
 between them: e = d/3 (Richardson extrapolation [1]_), and leaving out three of four frames changes
 five times as much as every second; where they do not, the two changes are about as large, as is e.
-So the ratio r of the two tells what to expect, :math:`f = (1.2 / r)^{1.8}` between 0.2 and 1.  Frames
+So the ratio r of the two tells what to expect, :math:`f = (1.2 / r)^{1.8}`, from 0.2 to 1.  Frames
 that are moved along their optical flow are wrong where that is, whatever the time between them: e
 hardly goes with d, nor f with r, and f = 0.7, as where frames are too few to tell r.
 
