@@ -58,8 +58,8 @@ def of_interpolation(
 ) -> float:
     """Return what the interpolation between frames adds to the error over all scales, in squares.
 
-    About half of what it is with every second frame left out, as for the statistics
-    (:mod:`adv2e.diagnosis.interpolation`).
+    About half of what leaving out every second frame adds, give or take a factor of two: between a
+    third, where frames resolve the motion, and all of it (:mod:`adv2e.diagnosis.interpolation`).
 
     Parameters
     ----------
