@@ -33,11 +33,10 @@ from adv2e.diagnosis.evidence import Evidence, read_evidence
 from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.interpolation import between_frames, every
 from adv2e.diagnosis.keys import with_keys
-from adv2e.diagnosis.light import light_of
+from adv2e.diagnosis.light import light_of, quantum_dn
 from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.metric import compressed
-from adv2e.diagnosis.pilot import Pilot
-from adv2e.diagnosis.ready import PILOT, quantum_dn
+from adv2e.diagnosis.pilot import COUNT, Pilot
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Simulator
 from adv2e.diagnosis.stream import Stream
@@ -108,7 +107,7 @@ def row_of(
     """Return what frames at one rate make of the statistics."""
     scene = Scene.of(light_of(evidence, config), evidence.times_s, quantum_dn(evidence, config))
     drawn = streams(evidence, config, threads)
-    pilot = {seed: drawn[seed] for seed in list(drawn)[:PILOT]}
+    pilot = {seed: drawn[seed] for seed in list(drawn)[:COUNT]}
     markers = Markers(scene, [Placed.of(stream, scene) for stream in pilot.values()])
     expected = between_frames(
         Pilot(evidence, config, scene, markers, pilot, lambda fewer: Simulator(fewer, threads))

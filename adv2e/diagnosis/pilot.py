@@ -19,6 +19,9 @@ from adv2e.diagnosis.stream import Stream
 
 Array = NDArray[np.float64]
 
+COUNT = 16
+_FIRST = 10_000
+
 
 @dataclass(frozen=True)
 class Pilot:
@@ -43,6 +46,15 @@ class Pilot:
     markers: Markers
     streams: dict[int, Stream]
     simulator: Callable[[Evidence], Simulator]
+
+    @classmethod
+    def of(cls, evidence: Evidence, declared: Config, scene: Scene, simulator: Simulator) -> Pilot:
+        """Return simulations of a recording, and the statistics that they ask for."""
+        seeds = range(_FIRST, _FIRST + COUNT)
+        streams = simulator.map(lambda seed: simulator.stream(declared, seed), seeds)
+        markers = Markers(scene, [Placed.of(stream, scene) for stream in streams])
+        by_seed = dict(zip(seeds, streams, strict=True))
+        return cls(evidence, declared, scene, markers, by_seed, simulator.of)
 
     @cached_property
     def sample(self) -> Array:

@@ -20,17 +20,12 @@ from adv2e.diagnosis.levels import between_levels
 from adv2e.diagnosis.library import hints_of, library
 from adv2e.diagnosis.light import light_of, quantum_dn
 from adv2e.diagnosis.lines import strongest_lines
-from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of
 from adv2e.diagnosis.pilot import Pilot
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 from adv2e.diagnosis.stream import Stream
 
-PILOT = 16
-"""Simulations of the declared model that tell what to expect."""
-
-_FIRST_PILOT = 10_000
 _MATCHING_SEED = 9_999
 _LAMP_SEED = 9_998
 
@@ -103,15 +98,11 @@ def make_ready(
         if miss > TOLERANCE:
             missed = f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}"
             evidence = replace(evidence, notes=[*evidence.notes, missed])
-    seeds = range(_FIRST_PILOT, _FIRST_PILOT + PILOT)
-    streams = simulator.map(lambda seed: simulator.stream(declared, seed), seeds)
-    markers = Markers(scene, [Placed.of(stream, scene) for stream in streams])
-    known = dict(zip(seeds, streams, strict=True))
-    pilot = Pilot(evidence, declared, scene, markers, known, simulator.of)
+    pilot = Pilot.of(evidence, declared, scene, simulator)
     frames, levels = between_frames(pilot), between_levels(pilot)
     measured = Placed.of(evidence.stream, scene)
-    laboratory = Laboratory(simulator, scene, markers, frames.bias if frames else None)
-    lamps = _lamps(evidence, declared, simulator, scene, streams)
+    laboratory = Laboratory(simulator, scene, pilot.markers, frames.bias if frames else None)
+    lamps = _lamps(pilot, simulator)
     hints = hints_of(evidence, lamps)
     return Ready(
         evidence,
@@ -120,26 +111,21 @@ def make_ready(
         frames,
         levels,
         measured,
-        markers.measure(measured),
+        pilot.markers.measure(measured),
         [one for one in library(declared, hints) if one.name not in without],
         THRESHOLDS if free_thresholds else (),
     )
 
 
-def _lamps(
-    evidence: Evidence,
-    declared: Config,
-    simulator: Simulator,
-    scene: Scene,
-    pilot: Sequence[Stream],
-) -> list[Lamp]:
+def _lamps(pilot: Pilot, simulator: Simulator) -> list[Lamp]:
     """Return the lamps that may have lit the scene, by the data that effects are fitted to."""
+    scene, declared = pilot.scene, pilot.declared
 
     def to_fit(stream: Stream) -> Stream:
         return of_part(stream, scene.parts, parts.FIT)
 
-    measured = to_fit(evidence.stream)
-    lines = strongest_lines(measured, list(map(to_fit, pilot)), scene)
+    measured = to_fit(pilot.evidence.stream)
+    lines = strongest_lines(measured, list(map(to_fit, pilot.streams.values())), scene)
     return lamps_of(
         lines, measured, declared, lambda lit: to_fit(simulator.stream(lit, _LAMP_SEED))
     )

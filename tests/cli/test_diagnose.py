@@ -11,7 +11,7 @@ from camera import Camera, patchwork
 from camera.settings import BENCH
 
 from adv2e import load_config, simulate
-from adv2e.diagnosis import bench, conclusion, evidence, finalists, ready, report
+from adv2e.diagnosis import bench, conclusion, evidence, finalists, pilot, report
 from adv2e.diagnosis import diagnose as whole
 from adv2e.diagnosis.library import names
 from adv2e.reports import summary
@@ -51,7 +51,7 @@ def short(monkeypatch):
     monkeypatch.setattr(bench, "MANY", 40)
     for module in (bench, finalists):
         monkeypatch.setattr(module, "SOME", 16)
-    monkeypatch.setattr(ready, "PILOT", 4)
+    monkeypatch.setattr(pilot, "COUNT", 4)
     monkeypatch.setattr(conclusion, "DRAWS", 4)
 
 
