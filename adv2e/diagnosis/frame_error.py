@@ -83,7 +83,7 @@ class Change:
     own : (views, statistics)
         Of each statistic, less what chance makes of it.
     usual : (views, statistics)
-        Root mean square of the group of each.
+        Root mean square of those of its group that feel the frames, times how much it does itself.
     deviation : (views, statistics)
         Of chance, in the units of the statistics.
     """
@@ -117,7 +117,7 @@ class Change:
     def error(self, known: float, uncertain: float) -> FrameError:
         """Return the error of which shares of the change are known, and uncertain.
 
-        Where a statistic happens not to change, others of its kind tell what to expect.
+        Where a statistic happens not to change in the mean, others of its kind tell what to expect.
         """
         doubt = uncertain * np.sqrt((self.own**2 + self.usual**2) / 2.0)
         return FrameError(
@@ -133,11 +133,17 @@ def beyond_chance(differences: Array) -> Array:
 
 
 def _usual_squares(differences: Array, groups: Sequence[str]) -> Array:
-    """Return the mean squared change of each statistic's group, less what chance puts into it."""
+    """Return the squared change to expect of each statistic, less what chance puts into it.
+
+    Simulations of the same seed that differ as two of different seeds do feel the frames in full;
+    noise of pixels that rest is the same in both.
+    """
+    felt = np.minimum(np.mean(differences**2, axis=0) / 2.0, 1.0)
     chance = np.minimum(differences.var(axis=0, ddof=1) / len(differences), 1.0)
     squares = compressed(differences.mean(axis=0)) ** 2 - chance
     usual = np.empty_like(squares)
     for group in dict.fromkeys(groups):
         own = np.array([one == group for one in groups])
-        usual[:, own] = squares[:, own].mean(axis=1, keepdims=True)
-    return np.asarray(np.maximum(usual, 0.0))
+        all_felt = np.maximum(felt[:, own].sum(axis=1, keepdims=True), 1e-9)
+        usual[:, own] = squares[:, own].sum(axis=1, keepdims=True) / all_felt
+    return np.asarray(felt * np.maximum(usual, 0.0))

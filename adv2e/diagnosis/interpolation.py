@@ -6,8 +6,8 @@ chance, compressed (:mod:`adv2e.diagnosis.metric`),
 
 .. math:: e = \tfrac{1}{4} d \pm f \sqrt{\tfrac{1}{2} (d^2 + \overline{d^2})},
 
-with the mean over the statistics of a group (:mod:`adv2e.diagnosis.frame_error`).  The first part
-is taken off all simulations.
+with the mean over those statistics of a group that feel the frames, and for these
+(:mod:`adv2e.diagnosis.frame_error`).  The first part is taken off all simulations.
 
 How much is uncertain, f, depends on whether the frames resolve the motion.  Where they do, frames
 that are blended are wrong by what the light bends, to leading order by the square of the time

@@ -29,12 +29,22 @@ def test_shares_of_the_change_are_known_and_uncertain():
     error = error_of(repeated(10.0), changed(0.4))
     np.testing.assert_allclose(error.bias[:, 0], 0.1, rtol=0.01)
     np.testing.assert_array_equal(error.bias[:, 1:], 0.0)
-    # of the change and of what is usual in its group, of three of which one changes
-    usual = 0.4 / np.sqrt(3.0)
-    share = 0.7 / np.sqrt(2.0)
-    np.testing.assert_allclose(error.sd[:, 0], share * np.hypot(0.4, usual), rtol=0.01)
-    np.testing.assert_allclose(error.sd[:, 1:3], share * usual, rtol=0.01)
-    np.testing.assert_array_equal(error.sd[:, 3:], 0.0)
+    np.testing.assert_allclose(error.sd[:, 0], 0.7 * 0.4, rtol=0.01)
+    np.testing.assert_array_equal(error.sd[:, 1:], 0.0)
+
+
+def test_others_of_its_kind_tell_what_to_expect_of_one_that_changes_by_chance_alone():
+    """It feels the frames, as each simulation is another with them; the mean happens to be none."""
+    other, quiet = repeated(10.0), repeated(10.0)
+    other[:, :, 0] += 3.0
+    other[:, :, 1] += np.tile([[-1.5], [1.5]], (4, 1))
+    felt = error_of(repeated(10.0), other).sd[0]
+    assert felt[1] == pytest.approx(0.5 * felt[0], rel=0.3)
+    np.testing.assert_array_equal(felt[2:], 0.0)  # each simulation is what it was
+    # the less it is another, the less is expected of it
+    quiet[:, :, 0] += 3.0
+    quiet[:, :, 1] += np.tile([[-0.75], [0.75]], (4, 1))
+    assert 0.3 * felt[1] < error_of(repeated(10.0), quiet).sd[0, 1] < 0.75 * felt[1]
 
 
 def test_the_error_grows_with_the_unit_of_a_statistic():
