@@ -33,11 +33,11 @@ from adv2e.diagnosis.evidence import Evidence, read_evidence
 from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.interpolation import between_frames, every
 from adv2e.diagnosis.keys import with_keys
-from adv2e.diagnosis.light import light_of, quantum_dn
+from adv2e.diagnosis.light import scene_of
 from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.metric import compressed
 from adv2e.diagnosis.pilot import COUNT, Pilot
-from adv2e.diagnosis.scene import Placed, Scene
+from adv2e.diagnosis.scene import Placed
 from adv2e.diagnosis.simulations import Simulator
 from adv2e.diagnosis.stream import Stream
 
@@ -105,7 +105,7 @@ def row_of(
     threads: int,
 ) -> Row:
     """Return what frames at one rate make of the statistics."""
-    scene = Scene.of(light_of(evidence, config), evidence.times_s, quantum_dn(evidence, config))
+    scene = scene_of(evidence, config)
     drawn = streams(evidence, config, threads)
     pilot = {seed: drawn[seed] for seed in list(drawn)[:COUNT]}
     markers = Markers(scene, [Placed.of(stream, scene) for stream in pilot.values()])

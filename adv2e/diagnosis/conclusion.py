@@ -166,18 +166,19 @@ def about_frames(ready: Ready, search: Search) -> list[str]:
         )
     else:
         doubt = ready.between_frames.doubt(chance, BOTH)
-        text = (
-            "what interpolation makes up between the frames leaves statistics uncertain by"
-            f" {doubt:.2g} times what chance does (root mean square), as simulations with frames"
-            " left out tell"
-        )
+        made_up = "what interpolation makes up between the frames"
+        text = _uncertain(made_up, doubt, "frames left out")
         unresolved = ": the frames hardly resolve the motion" if doubt > 1.0 else ""
         notes.append(text + unresolved)
     if ready.between_levels is not None:
         doubt = ready.between_levels.doubt(chance, BOTH)
-        notes.append(
-            "what frames do not tell between the levels of their numbers leaves statistics"
-            f" uncertain by {doubt:.2g} times what chance does (root mean square), as simulations"
-            " with frames of coarser levels tell"
-        )
+        untold = "what frames do not tell between the levels of their numbers"
+        notes.append(_uncertain(untold, doubt, "frames of coarser levels"))
     return notes
+
+
+def _uncertain(what: str, doubt: float, told_by: str) -> str:
+    return (
+        f"{what} leaves statistics uncertain by {doubt:.2g} times what chance does (root mean"
+        f" square), as simulations with {told_by} tell"
+    )

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.scene import Scene
 from adv2e.effects.frames.encoding import LightDecoder, decoder_for
 
 
@@ -14,6 +15,12 @@ def light_of(evidence: Evidence, declared: Config) -> NDArray[np.float32]:
     """Return the light of all frames [DN], (frames, rows, columns)."""
     decoder = _decoder(evidence, declared)
     return np.array([decoder.decode(image) for image in evidence.frames], np.float32)
+
+
+def scene_of(evidence: Evidence, declared: Config) -> Scene:
+    """Return what the frames say of each pixel, as the declared model reads them."""
+    light = light_of(evidence, declared)
+    return Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
 
 
 def quantum_dn(evidence: Evidence, declared: Config) -> float:

@@ -18,7 +18,7 @@ from adv2e.diagnosis.interpolation import between_frames
 from adv2e.diagnosis.lamps import Lamp, lamps_of
 from adv2e.diagnosis.levels import between_levels
 from adv2e.diagnosis.library import hints_of, library
-from adv2e.diagnosis.light import light_of, quantum_dn
+from adv2e.diagnosis.light import scene_of
 from adv2e.diagnosis.lines import strongest_lines
 from adv2e.diagnosis.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of
 from adv2e.diagnosis.pilot import Pilot
@@ -90,8 +90,7 @@ def make_ready(
     log : callable
         Takes lines for people.
     """
-    light = light_of(evidence, declared)
-    scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
+    scene = scene_of(evidence, declared)
     if free_thresholds:
         declared, miss = _with_fitted_thresholds(evidence, declared, simulator, scene)
         log(f"thresholds that match the totals: {thresholds_of(declared)}")

@@ -10,10 +10,10 @@ from three_cameras import Recorded
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.levels import between_levels, coarser
-from adv2e.diagnosis.light import light_of, quantum_dn
+from adv2e.diagnosis.light import scene_of
 from adv2e.diagnosis.markers import BOTH, Markers
 from adv2e.diagnosis.pilot import Pilot
-from adv2e.diagnosis.scene import Placed, Scene
+from adv2e.diagnosis.scene import Placed
 from adv2e.diagnosis.simulations import Simulator
 
 SEEDS = range(16)
@@ -37,8 +37,7 @@ def streams_of(evidence, declared):
 
 
 def pilot_of(evidence, declared):
-    light = light_of(evidence, declared)
-    scene = Scene.of(light, evidence.times_s, quantum_dn(evidence, declared))
+    scene = scene_of(evidence, declared)
     streams = streams_of(evidence, declared)
     markers = Markers(scene, [Placed.of(one, scene) for one in streams.values()])
     return Pilot(evidence, declared, scene, markers, streams, lambda made: Simulator(made, 2))
