@@ -14,7 +14,7 @@ from __future__ import annotations
 from adv2e.jit import kernel
 from adv2e.kernel.doubt import found_stop, go_on
 from adv2e.kernel.exchange import sort_out
-from adv2e.kernel.land import emit_found, land, release
+from adv2e.kernel.land import fire_found, land, release
 from adv2e.kernel.lanes import (
     DONE,
     DOUBTFUL,
@@ -75,7 +75,7 @@ def decide(
 
 
 @kernel
-def search(lo, m, ta, length, t_base, circuit, rule, pixels, lanes, keys, times, n):
+def search(lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys, times, n):
     """Every lane finds one place; returns the number of events, and of lanes to look through.
 
     At most one event a lane is written.  See `decide` for the latter.
@@ -85,11 +85,11 @@ def search(lo, m, ta, length, t_base, circuit, rule, pixels, lanes, keys, times,
     evaluate(lanes, count, length, circuit, rule)
     refine(lanes, count, length, circuit)
     land(count, ta, length, circuit, lanes)
-    n = emit_found(lo, m, t_base, pixels, lanes, keys, times, n)
+    n = fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n)
     for j in range(m):
         seeks = lanes[SEEKS + j]
         if seeks == INJECTED or (seeks == TURN and lanes[ERROR + j] <= TOLERANCE):
-            found_stop(j, lanes)
+            found_stop(lo + pixels[j], j, circuit, state, lanes)
         elif seeks == OPEN:
             open_piece(j, ta, length, lanes)
     return n, _waiting(m, lanes)

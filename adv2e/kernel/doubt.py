@@ -9,12 +9,12 @@ from __future__ import annotations
 from adv2e.jit import inlined, kernel
 from adv2e.kernel.comparator import (
     SIGNAL_EVENT,
-    emit,
     injected_polarity,
     next_injected,
     use_up,
 )
-from adv2e.kernel.exchange import next_noise
+from adv2e.kernel.exchange import kind_of_next_noise, next_noise
+from adv2e.kernel.land import fire
 from adv2e.kernel.lanes import (
     ALONE,
     AWAY_P,
@@ -157,7 +157,7 @@ def _choose(j, length, circuit, lanes):
 
 
 @inlined
-def found_stop(j, lanes):
+def found_stop(i, j, circuit, state, lanes):
     """Make the turn, or the time of a noise event, that was looked at the next known place."""
     seeks = lanes[SEEKS + j]
     place = lanes[PLACE + j]
@@ -165,6 +165,8 @@ def found_stop(j, lanes):
     if seeks == TURN:
         lag = 0.0
         lanes[KIND + j] = SIGNAL_EVENT
+    else:
+        lanes[KIND + j] = kind_of_next_noise(i, circuit, state)
     set_stop(j, place, lag, lanes[LIGHT_E + j], fallen_at_place(j, lanes), lanes)
     lanes[KNOWN + j] = 1.0
     lanes[SEEKS + j] = DOUBTFUL
@@ -180,7 +182,6 @@ def _find_stop(i, j, ta, length, circuit, state, lanes):
         kind, t = next_injected(i, now, t_end, circuit, state)
         lanes[NOISE + j] = next_noise(i, circuit, state)
         if kind != SIGNAL_EVENT:
-            lanes[KIND + j] = kind
             place = min(max((t - ta) / length, lanes[S + j]), end * BEFORE_END)
             _seek_given(j, INJECTED, place, lanes)
             return True
@@ -209,7 +210,7 @@ def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
     if polarity == 0:
         return n, False
     when = ta + lanes[S + j] * length
-    n = emit(keys, times, n, when, t_base, i, 1 if polarity > 0 else 0)
+    n = fire(i, j, when, polarity, t_base, circuit, state, lanes, keys, times, n)
     lanes[REFERENCE + j] += lanes[AWAY_S + j]
     lanes[AWAY_S + j] = 0.0
     return n, True

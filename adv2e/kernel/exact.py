@@ -150,7 +150,7 @@ def _solve_flagged(
             break
         rounds += 1
         n, waiting = batch.search(
-            lo, m, ta, length, t_base, circuit, rule, pixels, lanes, keys, times, n
+            lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys, times, n
         )
     for c in range(left):
         k, s, x = int(alone[0, c]), alone[1, c], alone[2, c]
@@ -195,29 +195,8 @@ def _rule(rules, f):
 
 
 @kernel
-def _solve_irregular(
-    lo, b, count, m, f, starts, circuit, rules, t_base, state, scratch, keys, times, n
-):  # fmt: skip
-    """Solve the m flagged pixels of a block at rest whose leak draws a new speed at every event."""
-    rows, falls, pixels = scratch.rows, scratch.falls, scratch.pixels
-    size = min(rest.BLOCK, count - b)
-    for j in range(m):
-        rows[screen.LAG_1 + pixels[j]] = _f(0.0)
-    n, keys, times = _solve_flagged(
-        lo, m, starts[0], starts[f], starts[f + 1] - starts[f], t_base, circuit, _rule(rules, f),
-        state, scratch, keys, times, n,
-    )  # fmt: skip
-    rest.fall_of_block(lo + b, b, size, 1.0, circuit, state, falls, scratch.means)
-    for k in range(b, b + size):
-        rows[screen.FALL + k] = falls[k]
-    # their numbers are gone
-    rest.flag_block(b, size, _f(starts[f + 1] - starts[0]), rows, pixels)
-    return n, keys, times
-
-
-@kernel
 def _rest_strip(
-    lo, count, first, last, starts, circuit, rules, t_base, state, scratch, keys, times, n
+    lo, count, first, last, starts, circuit, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
     """Advance one strip over the intervals first..last: no light changes, no lag is left."""
     b, f, j, m, s = 0, first, 0, 0, 0.0
@@ -226,12 +205,7 @@ def _rest_strip(
             lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, scratch.rows,
             scratch.falls, scratch.means, scratch.pixels, keys, times, n,
         )  # fmt: skip
-        if b < count and circuit.leak_jitter > 0.0:
-            n, keys, times = _solve_irregular(
-                lo, b, count, m, f, starts, circuit, rules, t_base, state, scratch, keys, times, n
-            )
-            j = m
-        elif b < count:
+        if b < count:
             keys, times = with_room(keys, times, n, n + 1)
     return n, keys, times
 
@@ -266,7 +240,7 @@ def _strip(
             while last < intervals and _rests(frames, last, before, share, lo, count):
                 last += 1
             n, keys, times = _rest_strip(
-                lo, count, f, last, starts, circuit, rules, t_base, state, scratch, keys, times, n
+                lo, count, f, last, starts, circuit, t_base, state, scratch, keys, times, n
             )
             f = last
             continue

@@ -24,7 +24,6 @@ from adv2e.kernel.lanes import (
     I0,
     I1,
     KAPPA,
-    KIND,
     KNOWN,
     LAG_P,
     LAG_S,
@@ -67,6 +66,7 @@ from adv2e.kernel.workspace import (
     S_HOLD,
     S_HOT_TIME,
     S_LAG,
+    S_LEAK_FACTOR,
     S_OFF,
     S_ON,
     S_REFERENCE,
@@ -100,6 +100,14 @@ def next_noise(i, circuit, state):
 
 
 @kernel
+def kind_of_next_noise(i, circuit, state):
+    """Tell whether the next noise event of pixel i is SHOT or HOT."""
+    shot = state[S_SHOT_TIME, i] if circuit.shot_rate > 0.0 else _NO_TIME
+    hot = state[S_HOT_TIME, i] if circuit.hot_rate > 0.0 else _NO_TIME
+    return HOT if hot < shot else SHOT
+
+
+@kernel
 def watch(k, i, x1, start, circuit, state, rows):
     """Rows of the screen for pixel k of a strip, i of the state: distance, thresholds, due time."""
     rows[AWAY_1 + k] = x1 - state[S_REFERENCE, i]
@@ -130,11 +138,7 @@ def _gather(lo, m, circuit, state, rows, falls, pixels, lanes):
         lanes[HOLD + j] = state[S_HOLD, lo + k]
     if circuit.shot_rate > 0.0 or circuit.hot_rate > 0.0:
         for j in range(m):
-            i = lo + pixels[j]
-            shot = state[S_SHOT_TIME, i] if circuit.shot_rate > 0.0 else _NO_TIME
-            hot = state[S_HOT_TIME, i] if circuit.hot_rate > 0.0 else _NO_TIME
-            lanes[NOISE + j] = min(shot, hot)
-            lanes[KIND + j] = HOT if hot < shot else SHOT
+            lanes[NOISE + j] = next_noise(lo + pixels[j], circuit, state)
     else:
         for j in range(m):
             lanes[NOISE + j] = _NO_TIME
@@ -193,11 +197,16 @@ def load(lo, m, ta, length, circuit, state, rows, falls, pixels, lanes):
         seeks = OPEN if in_pieces else seeks
         place = end if in_pieces else place
         bright = (i1 > LARGEST_LIGHT) | (in_pieces & (i0 > LARGEST_LIGHT))
-        seeks = ALONE if bright | (circuit.leak_jitter > 0.0) else seeks
+        seeks = ALONE if bright else seeks
         lanes[SEEKS + j] = seeks
         lanes[PLACE + j] = place
         lanes[FRESH + j] = 0.0
         lanes[MOVES + j] = 0.0
+    if circuit.leak_jitter > 0.0:
+        for j in range(m):
+            factor = state[S_LEAK_FACTOR, lo + pixels[j]]
+            lanes[FALL + j] *= factor
+            lanes[FALL_DN + j] *= factor
 
 
 @kernel

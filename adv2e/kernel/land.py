@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from adv2e.jit import kernel
+from adv2e.effects.pixel.leak import next_leak_factor
+from adv2e.jit import inlined, kernel
 from adv2e.kernel.comparator import emit
 from adv2e.kernel.lanes import (
     ALONE,
@@ -15,6 +16,7 @@ from adv2e.kernel.lanes import (
     EVENT,
     FALL,
     FALL_DN,
+    FALLEN_B,
     FALLEN_P,
     FALLEN_S,
     FRESH,
@@ -51,6 +53,7 @@ from adv2e.kernel.lanes import (
 from adv2e.kernel.pieces import fallen_at_place
 from adv2e.kernel.places import evaluate_release
 from adv2e.kernel.polynomial import TIE
+from adv2e.kernel.workspace import S_LEAK_FACTOR
 
 _TRIES = 4
 
@@ -129,12 +132,36 @@ def release(count, length, circuit, rule, lanes):
         lanes[SEEKS + j] = READY if waits else seeks
 
 
+@inlined
+def _begin_leak_cycle(i, j, circuit, state, lanes):
+    """Draw the leak speed from S on, up to where the reference has fallen as it has."""
+    share = 1.0 / state[S_LEAK_FACTOR, i]
+    share *= next_leak_factor(i, circuit, state)
+    lanes[FALL + j] *= share
+    lanes[FALL_DN + j] *= share
+    fallen = lanes[FALLEN_S + j]
+    # as if it had gone on like this from the start of the piece
+    lanes[FALLEN_B + j] = fallen + share * (lanes[FALLEN_B + j] - fallen)
+    lanes[TAIL + j] = fallen + share * (lanes[TAIL + j] - fallen)
+    until_stop = fallen + share * (lanes[FALLEN_P + j] - fallen)
+    lanes[AWAY_P + j] += until_stop - lanes[FALLEN_P + j]
+    lanes[FALLEN_P + j] = until_stop
+
+
+@inlined
+def fire(i, j, when, polarity, t_base, circuit, state, lanes, keys, times, n):
+    """Write an event of pixel i, in lane j, where the lane is; returns the number of events."""
+    if circuit.leak_jitter > 0.0:
+        _begin_leak_cycle(i, j, circuit, state, lanes)
+    return emit(keys, times, n, when, t_base, i, 1 if polarity > 0 else 0)
+
+
 @kernel
-def emit_found(lo, m, t_base, pixels, lanes, keys, times, n):
+def fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n):
     """Write the events of the thresholds that were found."""
     for j in range(m):
         event = lanes[EVENT + j]
         if event != 0.0:
-            on = 1 if event > 0.0 else 0
-            n = emit(keys, times, n, lanes[WHEN + j], t_base, lo + pixels[j], on)
+            i, when = lo + pixels[j], lanes[WHEN + j]
+            n = fire(i, j, when, event, t_base, circuit, state, lanes, keys, times, n)
     return n

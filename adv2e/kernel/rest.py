@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adv2e.effects.pixel.leak import fill_falls
+from adv2e.effects.pixel.leak import fill_falls, next_leak_factor
 from adv2e.jit import kernel
 from adv2e.kernel import screen
 from adv2e.kernel.comparator import (
@@ -140,8 +140,17 @@ def _go_on(b, m, end, rows, index):
 
 
 @kernel
+def _begin_leak_cycle(k, i, length, circuit, state, rows, falls, means):
+    """Draw the leak speed of pixel k of the strip, i of all, from its event on."""
+    next_leak_factor(i, circuit, state)
+    fall_of_block(i, k, 1, 1.0, circuit, state, falls, means)
+    rows[screen.FALL + k] = falls[k]
+    fall_of_block(i, k, 1, length, circuit, state, falls, means)
+
+
+@kernel
 def _solve(
-    k, i, s, start, ta, length, t_base, circuit, state, rows, falls, keys, times, n
+    k, i, s, start, ta, length, t_base, circuit, state, rows, falls, means, keys, times, n
 ):  # fmt: skip
     """Events of one pixel, number k of its strip and i of all, over an interval at rest.
 
@@ -189,6 +198,10 @@ def _solve(
             level = away + fall * s
         when = ta + s * length
         n = emit(keys, times, n, when, t_base, i, 1 if polarity > 0 else 0)
+        if circuit.leak_jitter > 0.0:
+            _begin_leak_cycle(k, i, length, circuit, state, rows, falls, means)
+            reference += (falls[k] - fall) * s
+            fall = falls[k]
         if circuit.dead_time > 0.0:
             state[S_HOLD, i] = when + circuit.dead_time
         else:
@@ -201,7 +214,8 @@ def _solve(
 
 @kernel
 def _solve_block(
-    lo, j, m, s, start, ta, length, t_base, circuit, state, rows, falls, index, keys, times, n
+    lo, j, m, s, start, ta, length, t_base, circuit, state, rows, falls, means, index, keys,
+    times, n,
 ):  # fmt: skip
     """Events of the flagged pixels, from the j-th of m on, which is solved from place s on.
 
@@ -210,7 +224,21 @@ def _solve_block(
     while j < m:
         k = index[j]
         n, s = _solve(
-            k, lo + k, s, start, ta, length, t_base, circuit, state, rows, falls, keys, times, n
+            k,
+            lo + k,
+            s,
+            start,
+            ta,
+            length,
+            t_base,
+            circuit,
+            state,
+            rows,
+            falls,
+            means,
+            keys,
+            times,
+            n,
         )
         if s != DONE:
             return n, j, s
@@ -225,9 +253,8 @@ def go_through(
 ):  # fmt: skip
     """Advance a strip at rest over the intervals first..last, from where the last call stopped.
 
-    It stops where there is no room left for events or, where leak is irregular, at pixels that are
-    to be solved by the caller, their numbers being in `index`.  A function that makes arrays counts
-    references to all that it is given, which costs more than most blocks do.
+    It stops where there is no room left for events.  A function that makes arrays counts references
+    to all that it is given, which costs more than most blocks do.
 
     Parameters
     ----------
@@ -260,11 +287,10 @@ def go_through(
             if leaks:
                 fall_of_block(i, b, size, length, circuit, state, falls, means)
                 _lower_unflagged(i, b, size, state, rows, falls)
-        if circuit.leak_jitter == 0.0:
-            n, j, s = _solve_block(
-                lo, j, m, s, start, ta, length, t_base, circuit, state, rows, falls, index, keys,
-                times, n,
-            )  # fmt: skip
+        n, j, s = _solve_block(
+            lo, j, m, s, start, ta, length, t_base, circuit, state, rows, falls, means, index,
+            keys, times, n,
+        )  # fmt: skip
         if j < m:
             break
         _go_on(b, m, end, rows, index)

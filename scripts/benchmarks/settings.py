@@ -28,6 +28,7 @@ IDEAL = (
 
 MISMATCH = ("pixel.thresholds.mismatch=0.03",)
 LEAK = ("pixel.leak.rate_hz=0.1",)
+JITTER = ("pixel.leak.jitter=0.1",)
 DEAD_TIME = ("pixel.refractory.period_us=500",)
 SHOT = ("pixel.shot_noise.rate_hz=5",)
 SHOT_WEAK = ("pixel.shot_noise.rate_hz=0.1",)
@@ -105,6 +106,7 @@ def settings() -> Iterator[Setting]:
         "leak 0.1 Hz": LEAK,
         "dead time 0.5 ms": DEAD_TIME,
         "shot 5 Hz": SHOT,
+        "all effects, shot 0.1 Hz, jitter of the leak": (*ALL_WEAK, *JITTER),
         "exact, K = 1": stepped("exact", 1),
         "exact, K = 100": stepped("exact", 100),
     }

@@ -36,10 +36,11 @@ def events(light, times_ns, moving, **sections):
     ids=["quiet", "shot", "hot"],
 )
 @pytest.mark.parametrize("interval_ms", [1.0, 40.0])
-def test_at_rest_as_in_lanes(dead_time_us, noise, interval_ms):
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_at_rest_as_in_lanes(dead_time_us, noise, interval_ms, jitter):
     light = np.exp(np.random.default_rng(1).uniform(0.0, 5.5, PIXELS))
     times_ns = [round(k * interval_ms * 1e6) for k in range(round(400 / interval_ms) + 1)]
-    sections = {"leak": Leak(rate_hz=7.0, photo_rate_hz=20.0), **noise}
+    sections = {"leak": Leak(rate_hz=7.0, photo_rate_hz=20.0, jitter=jitter), **noise}
     if dead_time_us is not None:
         sections["refractory"] = Refractory(period_us=dead_time_us)
     still = events(light, times_ns, False, **sections)

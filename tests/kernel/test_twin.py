@@ -134,15 +134,16 @@ def hot_times(pixel, fraction, rate_hz, seed, end_s):
     return times[times < end_s]
 
 
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
 @pytest.mark.parametrize("dead_time", [None, 800.0])
-def test_noise_events_and_leak_jitter(dead_time):
+def test_noise_events_and_leak_jitter(dead_time, jitter):
     """The same draws handed to both: thinning, order, dead time and references must agree."""
     knots, pixels, seed = 25, 24, 9
     light = moving_light(knots, pixels, seed=6, step=0.15)
     times = clock(knots, 1 / 240)
     pixel = quiet(
         refractory=Refractory(period_us=dead_time) if dead_time else None,
-        leak=Leak(rate_hz=20, photo_rate_hz=10, jitter=0.2),
+        leak=Leak(rate_hz=20, photo_rate_hz=10, jitter=jitter),
         shot_noise=ShotNoise(rate_hz=150),
         hot_pixels=HotPixels(fraction=0.3, rate_hz=200),
     )
@@ -152,7 +153,7 @@ def test_noise_events_and_leak_jitter(dead_time):
     factors = [
         np.array(
             [
-                1 / (1 + 0.2 * np.clip(rng.normal(seed, rng.LEAK_PERIOD, i, k), -3, 3))
+                1 / (1 + jitter * np.clip(rng.normal(seed, rng.LEAK_PERIOD, i, k), -3, 3))
                 for k in range(200)
             ]
         )
