@@ -207,6 +207,13 @@ def run_rounds(
     return found
 
 
+_WORKER = (
+    "import sys, runpy; sys.path[:] = filter(None, sys.path);"
+    " runpy.run_module('benchmarks.worker', run_name='__main__')"
+)
+"""``python -m`` would look for packages in the working folder first, which may hold adv2e itself."""
+
+
 def run_job(job: Job) -> Round:
     """Run `job` once, in a fresh process.
 
@@ -215,7 +222,7 @@ def run_job(job: Job) -> Round:
     JobError
         It failed; the message is the last line that it wrote.
     """
-    command = [job.python, "-m", "benchmarks.worker", json.dumps(asdict(job))]
+    command = [job.python, "-c", _WORKER, json.dumps(asdict(job))]
     busy, own, began = _busy_s(), children_cpu_s(), time.perf_counter()
     done = subprocess.run(
         command, env=_environment(job), capture_output=True, text=True, check=False

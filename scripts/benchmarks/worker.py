@@ -1,6 +1,6 @@
-"""Runs one measurement in a process of its own: ``python -m benchmarks.worker SPEC``.
+"""Runs one measurement in a process of its own, as its only argument says.
 
-SPEC is JSON: see :class:`benchmarks.processes.Job`.  Prints one line of JSON.  Imports nothing of
+That is JSON: see :class:`benchmarks.processes.Job`.  Prints one line of JSON.  Imports nothing of
 adv2e unless the tool is adv2e, so that it runs in the Python of another tool.
 """
 

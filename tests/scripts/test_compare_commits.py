@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import compare_commits as script
@@ -43,6 +44,18 @@ def test_each_commit_is_taken_out_and_git_keeps_no_trace(repository, tmp_path):
     )
     assert len(listed.stdout.splitlines()) == 1
     assert script.checked_out(".", tmp_path / "unused", repository) == repository
+
+
+def test_jobs_run_their_own_package_wherever_one_stands(tmp_path, monkeypatch):
+    for name in ("here", "before", "after"):
+        (tmp_path / name / "adv2e").mkdir(parents=True)
+        code = f"def tell(spec):\n    return {{'package': {name!r}}}\n"
+        (tmp_path / name / "adv2e" / "__init__.py").write_text(code)
+    monkeypatch.chdir(tmp_path / "here")
+    job = script.Job(name="any", action="adv2e:tell")
+    for name in ("before", "after"):
+        own = replace(job, package=str(tmp_path / name))
+        assert processes.run_job(own).report["package"] == name
 
 
 def test_unknown_commit_is_told_in_one_line(repository, tmp_path):
