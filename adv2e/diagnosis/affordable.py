@@ -11,12 +11,13 @@ from adv2e.diagnosis.evidence import Evidence, check_events
 from adv2e.diagnosis.stream import Stream
 from adv2e.reports.result import Masked
 
-AFFORDABLE_S = 0.2
-"""What one simulation may take, in one thread; a diagnosis takes some thousands of them [s]."""
+AFFORDABLE_S = 0.25
+"""What a simulation may take in the mean, in one thread; a diagnosis takes some thousands [s]."""
 
 # about what a simulation and the statistics of its events take, in one thread [s]
 _INSTANT_S = 20e-9  # of one pixel
-_EVENT_S = 300e-9
+_EVENT_S = 400e-9
+_SECOND_S = 13e-6  # of one pixel: what effects that are solved in steps of time add, over all
 _STEPPED = 10
 _BLOCK = 8
 _SMALLEST = 48
@@ -48,7 +49,8 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
     def cost_s(part: Evidence) -> float:
         instants = (len(part.frames) - 1) * declared.sampling.L
         pixels = part.width * part.height
-        return _INSTANT_S * each * instants * pixels + _EVENT_S * len(part.stream)
+        of_pixel = _INSTANT_S * each * instants + _SECOND_S * part.seconds
+        return of_pixel * pixels + _EVENT_S * len(part.stream)
 
     kept, share = evidence, 1.0
     while cost_s(kept) > AFFORDABLE_S:

@@ -211,7 +211,7 @@ _WORKER = (
     "import sys, runpy; sys.path[:] = filter(None, sys.path);"
     " runpy.run_module('benchmarks.worker', run_name='__main__')"
 )
-"""``python -m`` would look for packages in the working folder first, which may hold adv2e itself."""
+"""``python -m`` would look for packages in the working folder first, which may hold adv2e."""
 
 
 def run_job(job: Job) -> Round:

@@ -33,6 +33,7 @@ def limit(monkeypatch, pixels, steps=1, event_s=0.0):
     instants = (len(TIMES) - 1) * CONFIG.sampling.L
     monkeypatch.setattr(affordable_module, "_INSTANT_S", 1.0)
     monkeypatch.setattr(affordable_module, "_EVENT_S", event_s)
+    monkeypatch.setattr(affordable_module, "_SECOND_S", 0.0)
     monkeypatch.setattr(affordable_module, "AFFORDABLE_S", 1.001 * pixels * instants * steps)
 
 
@@ -84,6 +85,16 @@ def test_events_cost_too_and_a_crop_where_they_crowd_is_smaller(monkeypatch):
     assert 0.5 < crop.width * crop.height / (WIDTH * HEIGHT) <= 0.75
 
 
+def test_time_costs_too(monkeypatch):
+    """Effects that are solved in steps of time are simulated, too, however few frames there are."""
+    whole = recording()
+    instants = (len(TIMES) - 1) * CONFIG.sampling.L
+    limit(monkeypatch, WIDTH * HEIGHT)
+    monkeypatch.setattr(affordable_module, "_SECOND_S", instants / whole.seconds)
+    crop = affordable(whole, CONFIG)
+    assert crop.width * crop.height == pytest.approx(0.5 * WIDTH * HEIGHT, rel=0.15)
+
+
 @pytest.mark.parametrize("pixels", [1, 48 * 48])
 def test_a_crop_is_not_smaller_than_statistics_allow(monkeypatch, pixels):
     limit(monkeypatch, pixels)
@@ -102,6 +113,7 @@ def test_of_long_recordings_the_busiest_stretch_is_kept(monkeypatch):
     stream = Stream(t.astype(np.int64), pixel, pixel % 2 > 0, 48, 48)
     monkeypatch.setattr(affordable_module, "_INSTANT_S", 1.0)
     monkeypatch.setattr(affordable_module, "_EVENT_S", 0.0)
+    monkeypatch.setattr(affordable_module, "_SECOND_S", 0.0)
     monkeypatch.setattr(affordable_module, "AFFORDABLE_S", 31.0 * 48 * 48 * CONFIG.sampling.L)
     kept = affordable(Evidence("long", frames, times, stream, 48, 48), CONFIG)
     assert (kept.width, kept.height, len(kept.frames)) == (48, 48, 31)
