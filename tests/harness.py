@@ -36,6 +36,13 @@ EVERYTHING = {
     "hot_pixels": HotPixels(fraction=0.05, rate_hz=80.0),
 }
 
+IN_LANES = {
+    name: section
+    for name, section in EVERYTHING.items()
+    if name not in ("source_follower", "photoreceptor_noise")
+}
+"""Of these what does not have every pixel solved by itself."""
+
 
 def quiet(**sections):
     """Return a pixel without noise, dead time and mismatch, but for the sections given."""

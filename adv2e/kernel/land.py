@@ -134,13 +134,13 @@ def release(count, length, circuit, rule, lanes):
 
 @inlined
 def _begin_leak_cycle(i, j, circuit, state, lanes):
-    """Draw the leak speed from S on, up to where the reference has fallen as it has."""
+    """Draw the leak speed of the cycle that begins at S; what has fallen until there stays."""
     share = 1.0 / state[S_LEAK_FACTOR, i]
     share *= next_leak_factor(i, circuit, state)
     lanes[FALL + j] *= share
     lanes[FALL_DN + j] *= share
     fallen = lanes[FALLEN_S + j]
-    # as if it had gone on like this from the start of the piece
+    # as if the speed had been the new one from the start of the piece
     lanes[FALLEN_B + j] = fallen + share * (lanes[FALLEN_B + j] - fallen)
     lanes[TAIL + j] = fallen + share * (lanes[TAIL + j] - fallen)
     until_stop = fallen + share * (lanes[FALLEN_P + j] - fallen)

@@ -26,7 +26,7 @@ _STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
     # what holds over the whole interval
     X0,  # log intensity at its start
     DX,  # change of log intensity
-    FALL,  # fall of the reference over the interval, constant part
+    FALL,  # fall of the reference over the interval at the present leak speed, constant part
     FALL_DN,  # the same for each DN
     ON,  # thresholds
     OFF,
@@ -41,7 +41,7 @@ _STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
     I0,  # light at its start, and at its end
     I1,
     LOG,  # 1: on the logarithmic branch
-    FALLEN_B,  # fall of the reference until its start, and until its end
+    FALLEN_B,  # fall of the reference until its start and end, as if always at that speed
     TAIL,
     # where the lane is, and the next place that is known
     S,
