@@ -66,7 +66,7 @@ def sure_of_leak(away_s, away_p, lag_s, lag_p, drift, dx, rate_s, rate_p, leak, 
     least = min(abs(lag_s), abs(lag_p))
     follows = -dx / (max(rate_s, rate_p) + 1e-300) if dx < 0.0 else least
     outruns = slowest * min(least, follows) > leak
-    driven = -dx > leak * (1.0 - dx / (slowest + 1e-300))
+    driven = (dx < 0.0) & (-dx > leak * (1.0 - dx / (slowest + 1e-300)))
     settling = (dx >= 0.0) & (slowest > dx)
     may_rise = away_s + drift >= on
     may_dip = away_p - drift <= -off

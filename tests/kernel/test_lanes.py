@@ -168,6 +168,22 @@ def test_returns_to_earlier_grey_values(dead_time_us):
 # --- many events in one interval -----------------------------------------------------------------
 
 
+@pytest.mark.parametrize("leak_hz", [60.0, 100.0])
+def test_leak_overtakes_a_slow_signal_while_the_light_rises(leak_hz):
+    """The distance falls with the signal first, and then rises with the leak: OFF lies between."""
+    pixels, draw = 200, np.random.default_rng(8)
+    before, low = draw.uniform(1.0, 2.0, pixels), np.log(draw.uniform(0.2, 0.5, pixels))
+    light = np.exp([before, low, low, low + draw.uniform(0.1, 0.9, pixels)])
+    circuit = Circuit(
+        linear_below=0.0,
+        dark_cutoff_hz=5.0,
+        leak_hz=leak_hz,
+        on=0.4,
+        off=draw.uniform(0.02, 0.1, pixels),
+    )
+    check(light, clock((2.0, 10.0, 4.0)), circuit, at_least=pixels)
+
+
 @pytest.mark.parametrize("leak_hz", [0.0, 50.0])
 def test_more_crossings_in_one_interval_than_rounds(leak_hz):
     x = np.log([[6.0, 30.0, 250.0, 21.0]])
