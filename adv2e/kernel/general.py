@@ -29,7 +29,7 @@ def _bound(lo, count, ta, length, circuit, state, columns, falls, flags):
     lag = state[S_LAG, lo:hi]
     if circuit.filtered and (circuit.follower > 0.0 or circuit.update == EXACT):
         lag2 = state[S_LAG2, lo:hi] if circuit.follower > 0.0 else lag
-        stepped.rest_hull(x0, x1, lag, lag2, count, lag_end, low, high)
+        stepped.rest_hull(x0, x1, lag, lag2, circuit.update, count, lag_end, low, high)
     elif not circuit.filtered:
         stepped.line_hull(x0, x1, lag_end, count, low, high)
     else:

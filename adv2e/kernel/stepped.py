@@ -129,10 +129,15 @@ def line_hull(x0, x1, lag_end, count, low, high):
 
 
 @kernel
-def rest_hull(x0, x1, lag, lag2, count, lag_end, low, high):
-    """Bound behind a second pole: only a pixel at rest stays where it is."""
+def rest_hull(x0, x1, lag, lag2, update, count, lag_end, low, high):
+    """Bound behind a second pole: only a pixel at rest stays where it is.
+
+    The paper's form has no rest without lag: its weights do not sum to one.
+    """
+    rests = update != PAPER
     for k in range(count):
-        at_rest = (x1[k] == x0[k]) & (abs(lag[k]) < AT_REST) & (abs(lag2[k]) < AT_REST)
+        still = (x1[k] == x0[k]) & (abs(lag[k]) < AT_REST) & (abs(lag2[k]) < AT_REST)
+        at_rest = rests & still
         lag_end[k] = lag[k]
         low[k] = x0[k] - AT_REST if at_rest else -1e300
         high[k] = x0[k] + AT_REST if at_rest else 1e300

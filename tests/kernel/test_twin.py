@@ -108,6 +108,15 @@ def test_stepped_forms(update, printed):
     check(light, clock(31, 1 / 240), pixel, circuit, K=5, L=10, printed=printed, within_us=0.01)
 
 
+@pytest.mark.parametrize("update", ["first_order_hold", "zero_order_hold", "euler", "paper"])
+def test_stepped_forms_behind_a_second_pole_from_rest(update):
+    """The paper's form moves at rest, too: its weights do not sum to one."""
+    light = np.repeat(moving_light(8, 12, seed=3), 4, axis=0)
+    pixel = quiet(low_pass=LowPass(update=update), source_follower=SourceFollower(cutoff_hz=100))
+    circuit = Circuit(update=update, K=3, follower_hz=100.0)
+    check(light, clock(32, 1 / 240), pixel, circuit, K=3, within_us=0.01)
+
+
 @pytest.mark.parametrize("L", [1, 10])
 def test_exact_with_the_printed_last_interval(L):
     light = moving_light(21, 8, seed=4, step=0.1)
