@@ -165,9 +165,6 @@ def test_returns_to_earlier_grey_values(dead_time_us):
         assert all(abs(events[:, 1].sum()) <= 1 for events in truth)
 
 
-# --- many events in one interval -----------------------------------------------------------------
-
-
 @pytest.mark.parametrize("leak_hz", [60.0, 100.0])
 def test_leak_overtakes_a_slow_signal_while_the_light_rises(leak_hz):
     """The distance falls with the signal first, and then rises with the leak: OFF lies between."""
@@ -182,6 +179,9 @@ def test_leak_overtakes_a_slow_signal_while_the_light_rises(leak_hz):
         off=draw.uniform(0.02, 0.1, pixels),
     )
     check(light, clock((2.0, 10.0, 4.0)), circuit, at_least=pixels)
+
+
+# --- many events in one interval -----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("leak_hz", [0.0, 50.0])
