@@ -9,7 +9,7 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import Bench, State
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.markers import BOTH
-from adv2e.diagnosis.metric import Model
+from adv2e.diagnosis.metric import Model, shrunk_correlation, whitening
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def objections(fit: Fit, grown: State, ground: State, bench: Bench) -> list[str]
         found.append(BY_CHANCE)
     if fit.at_border:
         found.append(BORDER)
-    loud = _loudness(after, before, observed)
+    loud = loudness(after, before, observed)
     if loud > _QUIET:
         found.append(f"what it changes most still stands out by {loud:.1f} deviations")
     for view in (parts.JUDGE, BOTH):
@@ -80,11 +80,23 @@ def chance_gain(after: Model, before: Model, observed: Array) -> float:
     return float(max(gains.mean() + 3.0 * deviation, 3.0))
 
 
-def _loudness(after: Model, before: Model, observed: Array) -> float:
-    """Return how far the statistics that a model changes most are still off [deviations]."""
+def loudness(after: Model, before: Model, observed: Array) -> float:
+    """Return how far the statistics that a model changes most are still off [deviations].
+
+    By the correlations that they have under the model itself: one fact that many of them tell, as
+    that few of its hot pixels lie where they were looked for, counts as one.  Under the declared
+    model, from which those of all others are taken, there may have been nothing to tell.
+
+    Parameters
+    ----------
+    after, before : Model
+    observed : (statistics,)
+    """
     change = np.abs(before.scale.whitening @ (after.mean - before.mean))
     own = np.argsort(-change)[:_SIGNATURE]
-    z = after.z(observed)[own]
+    apart = (after.sample[:, own] - after.mean[own]) / after.sd[own]
+    white = whitening(shrunk_correlation(apart))
+    z = white @ after.z(observed)[own]
     return float(np.sqrt(np.mean(z * z)))
 
 

@@ -64,9 +64,7 @@ class Scale:
         scaled = compressed((sample - mean) / sd)
         scaled /= np.maximum(scaled.std(axis=0, ddof=1), 1e-9)
         scaled -= scaled.mean(axis=0)
-        correlation = (1.0 - _SHRINK) * (scaled.T @ scaled) / (len(sample) - 1)
-        np.fill_diagonal(correlation, 1.0)
-        return cls(mean, sd, correlation)
+        return cls(mean, sd, shrunk_correlation(scaled))
 
     def of_values(self, values: Array) -> Array:
         """Return statistics (..., statistics) in compressed deviations."""
@@ -79,7 +77,25 @@ class Scale:
     @cached_property
     def whitening(self) -> Array:
         """Matrix that takes compressed deviations to uncorrelated ones."""
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.correlation)))
+        return whitening(self.correlation)
+
+
+def shrunk_correlation(apart: Array) -> Array:
+    """Return the correlations of statistics, shrunk towards none.
+
+    Parameters
+    ----------
+    apart : (seeds, statistics)
+        Distances of simulations from their mean, in deviations.
+    """
+    correlation = (1.0 - _SHRINK) * (apart.T @ apart) / (len(apart) - 1)
+    np.fill_diagonal(correlation, 1.0)
+    return np.asarray(correlation)
+
+
+def whitening(correlation: Array) -> Array:
+    """Return the matrix that takes deviations with these correlations to uncorrelated ones."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(correlation)))
 
 
 def compressed(z: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What a model gains by chance over the one before it."""
+"""What a model gains by chance over the one before it, and whether its own marker is quiet."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from made_up_laboratory import MadeUpLaboratory, searched
 
 from adv2e.config import Config
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.judging import chance_gain, gain
+from adv2e.diagnosis.judging import chance_gain, gain, loudness
 from adv2e.diagnosis.metric import Model, Scale
 
 
@@ -44,3 +44,25 @@ def test_a_model_that_does_nothing_gains_what_chance_may(misfit, shared):
         observed = sample(1)[0] + draw.normal(size=200) * np.sqrt(misfit)
         passed += gain(after, before, observed) >= chance_gain(after, before, observed)
     assert passed <= 3
+
+
+def test_one_fact_that_many_statistics_tell_counts_as_one():
+    """As how many hot pixels lie in the data for judging: nothing to tell in the declared model."""
+    draw = np.random.default_rng(3)
+    declared = draw.normal(size=(100, 60))
+    changed = np.where(np.arange(60) < 12, 10.0, 0.0)
+    hidden = draw.normal(size=(32, 1)) * np.where(np.arange(60) < 4, 1.0, 0.0)
+    scale = Scale.of(declared, np.full(60, 0.01))
+    before = Model.of(scale, declared[:32])
+    after = Model.of(scale, declared[:32] + changed + hidden)
+    together, against = np.zeros(60), np.zeros(60)
+    together[:4] = 1.0
+    against[:4] = [1.0, -1.0, 1.0, -1.0]
+
+    def loud(direction):
+        at = after.mean + 4.0 * after.sd * direction
+        return loudness(after, before, scale.values_of(at))
+
+    alone = 4.0 * np.sqrt(4.0 / 12.0)
+    assert loud(together) < 0.85 * alone
+    assert loud(against) > alone
