@@ -61,10 +61,10 @@ def driver_of(pixel: Pixel, circuit: Circuit, additions: Additions | None, metho
     """Return the name of the compiled function that advances these pixels."""
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
-    new = circuit.slew > 0 or circuit.overshoot != 0 or pixel.thresholds.drift_per_s != 0
-    # series for each pixel take ten times as long as steps do, and need a first pole, too
-    exact = circuit.update == EXACT and circuit.noise_rms == 0
-    second = circuit.follower > 0 and (exact or not circuit.filtered)
+    drifts = pixel.thresholds.drift_per_s != 0
+    # what the other two know nothing of
+    new = circuit.slew > 0 or circuit.overshoot != 0 or drifts or circuit.noise_rms > 0
+    second = circuit.follower > 0 and (circuit.update == EXACT or not circuit.filtered)
     if method == "dense" or additions is not None or new or second:
         return "run_dense"
     return "run_exact" if covers(circuit) else "run_general"

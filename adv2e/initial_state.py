@@ -100,10 +100,7 @@ def initial_state(
         factors = state[S_LEAK_FACTOR]
         fill_first_factors(seed, circuit.leak_jitter, factors)
     if circuit.noise_rms > 0:
-        noise = state[S_NOISE]
-        fill_first_noise(seed, circuit.noise_rms, noise)
-        if circuit.follower == 0:  # behind a second pole at rest it does not show yet
-            state[S_REFERENCE] += noise
+        fill_first_noise(seed, circuit.noise_rms, state[S_NOISE])
     return state
 
 
@@ -113,7 +110,7 @@ def rest_poles(state: NDArray[np.float64], circuit: Circuit, stepping: Stepping)
     state[S_FIRST] = driven
     state[S_SECOND] = driven
     state[S_REFERENCE] += driven - state[S_X] + stepping.first_signal()
-    if circuit.noise_rms > 0 and circuit.follower > 0:
+    if circuit.noise_rms > 0:
         # the noise was there before the first frame: a second pole without it, and references
         # in the middle of its course, would take seconds to forget that
         state[S_SECOND] += state[S_NOISE]

@@ -15,7 +15,7 @@ event of 50 was 5 us off; 0.8 us at 1/4).  Against dense solutions of the circui
 within 1 us, most within 0.05 us.
 
 Photoreceptor noise is drawn at each step, so in every pixel at most ``photoreceptor_noise.step`` of
-the correlation time at white apart; the solved path draws at that share of each pixel's own.
+the correlation time at white apart.
 """
 
 from __future__ import annotations

@@ -41,7 +41,14 @@ IN_LANES = {
     for name, section in EVERYTHING.items()
     if name not in ("source_follower", "photoreceptor_noise")
 }
-"""Of these what does not have every pixel solved by itself."""
+"""Of these what is not solved in steps of time."""
+
+ONE_BY_ONE = {
+    **IN_LANES,
+    "low_pass": LowPass(update="first_order_hold"),
+    "source_follower": SourceFollower(cutoff_hz=900.0),
+}
+"""What has every pixel that may fire solved by itself."""
 
 
 def quiet(**sections):

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from adv2e.characterisation.threshold_noise import SAMPLING_SHIFT, event_rates
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
+from adv2e.stepping import LONGEST_US
 
 Array = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ class NoisySources:
     rms : float
         Photoreceptor noise [ln].
     noise_step : float
-        Step at which that noise is sampled, in correlation times; 0: not sampled.
+        Step at which that noise is sampled, in correlation times at white; 0: not sampled.
     cutoff_hz, dark_cutoff_hz : float
         Corner of the low-pass at 255 DN and at none.
     on, off : float
@@ -113,19 +114,25 @@ def _crossings(sources: NoisySources, light: Array) -> tuple[Array, Array]:
     if sources.rms <= 0.0:
         return on, off
     corner = sources.dark_cutoff_hz + (sources.cutoff_hz - sources.dark_cutoff_hz) * light
+    white = 2.0 * np.pi * max(sources.cutoff_hz, sources.dark_cutoff_hz)
+    step_s = min(sources.noise_step / white, LONGEST_US * 1e-6)
     for k, w in enumerate(2.0 * np.pi * corner):
         dead = float(w * sources.dead_time_s)
-        a, b = _tabulated(sources, dead)
+        a, b = _tabulated(sources, dead, w * step_s)
         free = 1.0 - (a + b) * dead  # the caller takes the dead time out again
         on[k], off[k] = w * a / free, w * b / free
     return on, off
 
 
-def _tabulated(sources: NoisySources, dead: float) -> tuple[float, float]:
-    """Return ON and OFF events a correlation time, between rms values at which they are kept."""
+def _tabulated(sources: NoisySources, dead: float, step: float) -> tuple[float, float]:
+    """Return ON and OFF events a correlation time, between rms values at which they are kept.
+
+    dead : float
+        Dead time; and step : float, between samples, in correlation times.
+    """
     place = np.log(sources.rms) / _RMS_STEP
     below = int(np.floor(place))
-    shift = SAMPLING_SHIFT * np.sqrt(2.0 * sources.noise_step)
+    shift = SAMPLING_SHIFT * np.sqrt(2.0 * step)
     ends = []
     for number in (below, below + 1):
         rms = float(np.exp(number * _RMS_STEP))

@@ -84,7 +84,6 @@ class Simulator:
             zip(times_ns, light, strict=True),
             dataclasses.replace(as_recorded(config), seed=(_SEEDS * config.seed + seed) % 2**63),
             threads=1,
-            method=_method(config),
             coarseness=_COARSENESS,
         )
         events = np.concatenate([empty_events(), *chunks])
@@ -102,14 +101,6 @@ class Simulator:
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""
         return list(self._pool.map(work, *columns))
-
-
-def _method(config: Config) -> str:
-    """Return how to solve the pixel: in steps where solving it exactly takes far longer."""
-    pixel = config.pixel
-    slow = pixel.photoreceptor_noise is not None
-    exact = pixel.low_pass is None or pixel.low_pass.update == "exact"
-    return "dense" if slow and exact else "auto"
 
 
 class Laboratory:

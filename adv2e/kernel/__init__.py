@@ -17,8 +17,8 @@
 ``batch``       the pixels of a strip that may fire, from event to event, by these
 ``rest``        pixels at rest, in closed form: a block at a time, from what is due to what is next
 ``exact``       the exact circuit over a tile: screen, batch or rest, and what is left one by one
-``stepped``     screens for all other circuits
-``general``     all other circuits over a tile
+``stepped``     screens for the circuits of ``general``
+``general``     the K-step forms over a tile, and ``exact`` without low-pass or as printed
 ``dense``       any circuit over a tile, in steps of time: what acts on the pixels from outside, and
                 effects that the others do not have; ``dense_rows``, ``dense_signal`` and
                 ``dense_events`` are its parts

@@ -25,7 +25,7 @@ _ROUNDS = 100
 
 def covers(circuit: Circuit) -> bool:
     """Tell whether this module advances the circuit; if not, :mod:`adv2e.kernel.general` does."""
-    one_pole = circuit.filtered and circuit.follower == 0.0 and circuit.noise_rms == 0.0
+    one_pole = circuit.filtered and circuit.follower == 0.0
     return circuit.update == EXACT and one_pole and not circuit.printed
 
 

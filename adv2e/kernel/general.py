@@ -1,4 +1,8 @@
-"""Any circuit over a tile: bounds in double precision, and every pixel that may fire by itself."""
+"""Circuits that neither lanes nor steps of time take: what may fire is solved by itself.
+
+The K-step forms of the low-pass, with a second pole or not; ``exact`` without a low-pass, or with
+the last interval as printed.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +87,7 @@ def _strip(
     lo, count, frames, before, share, starts, begins, last, circuit, t_base, state,
     scratch, keys, times, n,
 ):  # fmt: skip
-    """Advance one strip of any circuit over all intervals."""
+    """Advance one strip over all intervals."""
     columns, flags, falls = scratch.columns, scratch.flags, scratch.falls
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     rows = scratch.rows
@@ -99,7 +103,7 @@ def _strip(
         )  # fmt: skip
         for k in range(count):
             flags[k] = True
-        if circuit.noise_rms == 0.0 and not (last[f] or last[f + 1]):
+        if not (last[f] or last[f + 1]):
             if leaks:
                 _fill_falls(lo, count, length, circuit, state, columns, falls, scratch.means)
             _bound(lo, count, ta, length, circuit, state, columns, falls, flags)

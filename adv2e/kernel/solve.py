@@ -6,11 +6,12 @@
 
 has an analytic solution whose Taylor coefficients follow from a recurrence: I is an exponential
 (log branch) or linear (foot), so is the product's Cauchy sum.  Sub-steps are so short that the
-series converges to 1e-11 (radius (w + |dx/dt|) h <= 1.6, order up to 16); every further part of
-the pixel (second pole, leak, noise) is one more polynomial, and event times are roots of
-polynomials.  No step depends on K, tiles, chunks or threads.
+series converges to 1e-11 (radius (w + |dx/dt|) h <= 1.6, order up to 16); the leak is
+one more polynomial, and event times are roots of polynomials.  No step depends on K, tiles, chunks
+or threads.
 
-The K-step forms make one straight line a step and go through the same comparator.
+The K-step forms make one straight line a step, of the second pole, too, and go through the same
+comparator.
 
 References
 ----------
@@ -25,8 +26,6 @@ import math
 
 from adv2e.effects.pixel.leak import leak_series
 from adv2e.effects.pixel.low_pass import lag_series, ramp_response, stepped
-from adv2e.effects.pixel.photoreceptor_noise import advance_noise
-from adv2e.effects.pixel.source_follower import follower_series
 from adv2e.jit import inlined, kernel
 from adv2e.kernel.comparator import events_of_series
 from adv2e.kernel.polynomial import at_end
@@ -44,7 +43,6 @@ from adv2e.kernel.workspace import (
 
 RADIUS = 1.6
 _TOLERANCE = 1e-11
-_UNBOUNDED = 1e300
 
 
 @kernel
@@ -80,16 +78,11 @@ def _light_series(ws, order, light, dx, log_branch, slope):
 
 
 @kernel
-def _substep_length(rest, rate, rate_end, speed, circuit):
+def _substep_length(rest, rate, rate_end, speed):
     """Length of the next sub-step: the rest, or an equal part of it short enough to converge."""
     fastest = rate if rate > rate_end else rate_end
-    if circuit.filtered:
-        # the small number: nothing moves in full darkness without a dark corner
-        limit = RADIUS / (fastest + circuit.follower + speed + 1e-300)
-        if circuit.noise_rms > 0.0:
-            limit = min(limit, circuit.noise_step / (fastest + 1e-300))
-    else:
-        limit = RADIUS / (speed + 1e-300)
+    # the small number: nothing moves in full darkness without a dark corner
+    limit = RADIUS / (fastest + speed + 1e-300)
     if rest <= limit:
         return rest, fastest
     return rest / math.ceil(rest / limit), fastest
@@ -177,14 +170,13 @@ def solve_interval(
         h = rest
         dx = piece_end - x
         order = 1
-        low, high = -_UNBOUNDED, _UNBOUNDED
         monotone = False
         if exact:
-            h, fastest = _substep_length(rest, rate, rate_end, speed, circuit)
+            h, fastest = _substep_length(rest, rate, rate_end, speed)
             dx *= h / rest
             radius = abs(dx)
             if circuit.filtered:
-                radius += (fastest + circuit.follower) * h
+                radius += fastest * h
             order = _order_for(radius)
             _light_series(ws, order, light, dx, log_branch, circuit.slope)
             if circuit.filtered:
@@ -197,17 +189,10 @@ def solve_interval(
         else:
             light_end = light_of(piece_end, circuit)
             _line_series(i, ws, x, dx, light, light_end, rate, rate_end, h, circuit, state)
-        if circuit.noise_rms > 0.0:
-            mean = 0.5 * (rate + circuit.dark + circuit.per_dn * at_end(ws, LIGHT, order))
-            advance_noise(i, ws, h, mean, circuit, state)
         row = LAG
         if circuit.follower > 0.0:
             row = LAG2
-            if exact:
-                follower_series(ws, order, state[S_LAG2, i], dx, h, circuit)
-                state[S_LAG2, i] = at_end(ws, LAG2, order)
-            else:
-                _follower_line(i, ws, x, dx, h, circuit, state)
+            _follower_line(i, ws, x, dx, h, circuit, state)
         for j in range(order + 1):
             ws[SIGNAL, j] = ws[row, j]
         ws[SIGNAL, 0] += x
@@ -215,17 +200,13 @@ def solve_interval(
         if order == 1:
             end = ws[SIGNAL, 0] + ws[SIGNAL, 1]
             low, high = min(ws[SIGNAL, 0], end), max(ws[SIGNAL, 0], end)
-        elif circuit.noise_rms == 0.0:
+        else:
             # y turns only where it meets x, see screen.py
             end = x + dx + state[S_LAG, i]
             low, high = min(x + lag, end), max(x + lag, end)
             monotone = not leaks
             if lag * state[S_LAG, i] < 0.0:
                 low, high, monotone = min(low, x), max(high, x), False
-            if circuit.follower > 0.0:
-                # z moves towards y, so it stays between where it was and where y goes
-                low, high = min(low, ws[SIGNAL, 0]), max(high, ws[SIGNAL, 0])
-                monotone = False
         if leaks:
             leak_series(ws, order, h, state[S_ON, i], circuit)
         n = events_of_series(

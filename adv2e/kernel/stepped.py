@@ -2,7 +2,7 @@
 
 The K-step forms are bounded by the signal at their steps' ends, as it is a straight line between
 them; without a low-pass the signal is x itself; with a second pole only a pixel at rest is known to
-stay where it is, and with photoreceptor noise not even that.
+stay where it is.
 """
 
 from __future__ import annotations

@@ -142,9 +142,7 @@ def test_photoreceptor_noise_moves_the_signal(follower_hz):
         for k in range(len(z) - 1):
             z[k + 1] = z[k] + b / (1 + b / 2) * (0.5 * (signal[k] + signal[k + 1]) - z[k])
         signal = z
-    found = count_and_time_errors(
-        solve(light, times, pixel, seed=seed, method="dense"), Truth(signal).events()
-    )
+    found = count_and_time_errors(solve(light, times, pixel, seed=seed), Truth(signal).events())
     assert found.count_b > 30
     assert not found.differing
     assert found.max_dt_us < 0.5
@@ -168,7 +166,7 @@ def test_photoreceptor_noise_makes_as_many_events_as_the_camera_has(follower_hz)
         refractory=Refractory(**dead),
     )
     light, times = np.full((4, 500), 60.0), np.arange(4) * 0.1
-    events = sum(map(len, solve(light, times, pixel, seed=1, method="dense")))
+    events = sum(map(len, solve(light, times, pixel, seed=1)))
     assert events > 3000
     assert events == pytest.approx(len(stream.time), rel=0.06)
 

@@ -6,7 +6,7 @@ from harness import advance, quiet, start
 from scipy import stats
 
 from adv2e.config.model import HotPixels, Leak, PhotoreceptorNoise, Refractory, ShotNoise
-from adv2e.kernel.workspace import S_REFERENCE, S_X
+from adv2e.kernel.workspace import S_NOISE, S_REFERENCE, S_X
 
 PIXELS = 3000
 SECONDS = 4.0
@@ -90,7 +90,7 @@ def test_photoreceptor_noise_has_its_rms_and_correlation():
         samples = []
         for k in range(30):
             advance(array, light, [k * interval_ns, (k + 1) * interval_ns])
-            samples.append(array.state[-2].copy())
+            samples.append(array.state[S_NOISE].copy())
         noise = np.array(samples)
         assert noise.std() == pytest.approx(0.05, rel=0.03)
         corner = 2e-9 * np.pi * (21.8 + 278.2 * dn / 255)

@@ -13,7 +13,6 @@ from adv2e.config.model import (
     Leak,
     LogResponse,
     LowPass,
-    PhotoreceptorNoise,
     Refractory,
     ShotNoise,
     SourceFollower,
@@ -171,37 +170,3 @@ def test_noise_events_and_leak_jitter(dead_time, jitter):
     draws = Draws(injected=merge_injected(shot, hot), leak_factors=factors)
     circuit = Circuit(dead_time_us=dead_time, leak_hz=20.0, photo_leak_hz=10.0)
     check(light, times, pixel, circuit, draws, seed=seed)
-
-
-@pytest.mark.parametrize("follower_hz", [None, 500.0])
-def test_photoreceptor_noise_moves_the_signal(follower_hz):
-    """At rest the noise path is known from its draws; the twin gets it as knots."""
-    pixels, seed, rms, share = 12, 4, 0.12, 0.2
-    light = np.full((9, pixels), 80.0)
-    times = clock(9, 1 / 240)
-    interval_us = 1e6 / 240
-    corner = 2e-6 * np.pi * (21.8 + 278.2 * 80 / 255)
-    pixel = quiet(
-        photoreceptor_noise=PhotoreceptorNoise(rms=rms, step=share),
-        source_follower=SourceFollower(cutoff_hz=follower_hz) if follower_hz else None,
-    )
-    radius = 1.6 / (corner + 2e-6 * np.pi * (follower_hz or 0.0))
-    steps = int(np.ceil(interval_us / min(share / corner, radius)))
-    h = interval_us / steps
-    decay = np.exp(-corner * h)
-    knots = np.arange(8 * steps + 1) * h * 1e-6
-    paths = []
-    for i in range(pixels):
-        n = [rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)]
-        for k in range(1, knots.size):
-            g = rng.normal(seed, rng.PHOTORECEPTOR, i, k)
-            n.append(decay * n[-1] + rms * np.sqrt(1 - decay**2) * g)
-        paths.append((knots, np.array(n)))
-    kernel = solve(light, times, pixel, seed=seed)
-    twin = simulate_twin(
-        light, times, Circuit(follower_hz=follower_hz), Draws(signal_noise=paths), step_us=2.0
-    )
-    found = count_and_time_errors(kernel, twin)
-    assert found.count_b > 50
-    assert not found.differing
-    assert found.max_dt_us < 0.3

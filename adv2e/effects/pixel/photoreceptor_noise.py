@@ -5,7 +5,7 @@ r"""Photoreceptor noise: white noise on the drive, band-limited by the low-pass 
 n adds to the filtered signal; sigma = ``rms`` is its standard deviation at every brightness, and
 its correlation time is that of the low-pass.  Noise events of one pixel therefore mostly alternate
 in polarity, which Poisson events do not.  The process is sampled exactly at steps of at most
-``step`` of the correlation time and is linear between them.
+``step`` of the shortest correlation time, that at white, and is linear between them.
 
 References
 ----------
@@ -17,12 +17,11 @@ References
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from adv2e import rng
 from adv2e.jit import entry, kernel
-from adv2e.kernel.workspace import LAG, S_NOISE, S_NOISE_DRAW, Array, Circuit
+from adv2e.kernel.workspace import Array
 from adv2e.parameters import Fit, Section, parameter
 
 
@@ -39,23 +38,10 @@ class PhotoreceptorNoise(Section):
     step: float = parameter(
         0.1,
         unit="-",
-        meaning="longest step of the sampled noise, as a share of its correlation time",
+        meaning="longest step of the sampled noise, as a share of its correlation time at white",
         above=0,
         at_most=1,
     )
-
-
-@kernel
-def advance_noise(i: int, ws: Array, h: float, rate: float, circuit: Circuit, state: Array) -> None:
-    """Draw the noise at the end of a step of h us at corner `rate` [1/us]; add its line to LAG."""
-    before = state[S_NOISE, i]
-    decay = math.exp(-rate * h)
-    state[S_NOISE_DRAW, i] += 1
-    g = rng.normal(circuit.seed, rng.PHOTORECEPTOR, i, state[S_NOISE_DRAW, i])
-    after = decay * before + circuit.noise_rms * math.sqrt(1.0 - decay * decay) * g
-    state[S_NOISE, i] = after
-    ws[LAG, 0] += before
-    ws[LAG, 1] += after - before
 
 
 @entry
