@@ -30,6 +30,8 @@ LOOK_ALIKE = 9.0
 """Difference in the sum of squares, in units of its spread: three standard errors."""
 SKILL = 0.5
 """Least share of the error of a constant that a model must be free of on held-out levels."""
+NEAR = 3.0
+"""Held-out error, in floors, up to which a model that fits needs no such share."""
 
 
 @dataclass(frozen=True)
@@ -198,9 +200,9 @@ class Selector:
             return self._selection(before, before, "unexplained", [], refused)
         assert after.p is not None
         explained = after.p >= SIGNIFICANT
-        if not explained and (
-            after.error**2 > (1.0 - SKILL) * min(before.error, self._constant) ** 2
-        ):
+        predicts = after.error**2 <= (1.0 - SKILL) * min(before.error, self._constant) ** 2
+        # what fits the rows that it was fitted to need not predict others
+        if not predicts and not (explained and self._is_near(after)):
             refused = self._refused(before, sets, [], before)
             return self._selection(before, before, "unexplained", [], refused)
         alternatives = [
@@ -216,6 +218,10 @@ class Selector:
             verdict = "explained" if explained else "partly_explained"
         refused = self._refused(before, sets, alternatives, after)
         return self._selection(before, after, verdict, alternatives, refused)
+
+    def _is_near(self, model: Model) -> bool:
+        """Whether the held-out error is near what the true model's would be."""
+        return model.error**2 <= NEAR**2 * float(self.floors.mean())
 
     def _selection(
         self,

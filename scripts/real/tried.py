@@ -50,8 +50,6 @@ CLIPPED_BLACK = Candidate(
 
 UNSEEN = {
     "thresholds": "matched to the totals each time",
-    "photoreceptor_noise": "solved pixel by pixel: too slow to search over",
-    "source_follower": "solved pixel by pixel: too slow to search over",
     "timestamp_tick": "does not move this score",
     "readout": "does not move this score at these rates",
     "threshold_drift": "not within half a second",

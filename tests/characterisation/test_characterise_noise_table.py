@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adv2e.characterisation.characterise import Settings, characterise
+from adv2e.characterisation.characterise import Settings, characterise, problem_of
 from adv2e.characterisation.declared import read_declared
 from adv2e.characterisation.noise import NoisySources, noise_rates
+from adv2e.characterisation.selection import Selector
 from adv2e.characterisation.table import parse_table
 from adv2e.characterisation.threshold_noise import event_rates
 from adv2e.errors import DataError
@@ -122,6 +123,20 @@ def test_noise_that_falls_as_one_over_light_is_unexplained():
     found = verdict_of(table(5.0 / LUX, 5.0 / LUX, on_median=5.0 / LUX))
     assert found.verdict == "unexplained"
     assert found.effects == []
+
+
+def test_what_fits_the_light_it_was_fitted_to_must_predict_what_was_held_out():
+    """A leak fits three levels within their errors; the two held out have a hundred times more."""
+    on = np.where(LUX < 100, 40.0, 0.4)
+    part = np.where(LUX < 100, "dim", "bright")
+    measured = table(on, np.zeros(5), on_median=on, part=part)
+    problem = problem_of(measured, read_declared([], []), Settings(judge=["part=dim"]))
+    problem.candidates = tuple(one for one in problem.candidates if one.name == "leak")
+    found = Selector(problem, seed=0, draws=40).select()
+    ((leak, reason),) = found.tried
+    assert leak.error < found.before.error
+    assert found.verdict == "unexplained"
+    assert "leaves too much" in reason
 
 
 def test_effects_that_are_not_found_are_off_in_the_model():
