@@ -60,3 +60,9 @@ def streams(draw, width=WIDTH, height=HEIGHT, most=60):
 
 def placed(stream, scene):
     return Placed.of(stream, scene)
+
+
+def statistics(group, where):
+    """Return the statistics of all data by name."""
+    values = group.values(group.count(where).sum(axis=0))
+    return dict(zip((entry.name for entry in group.entries), values, strict=True))
