@@ -5,101 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from harness import advance, by_pixel, quiet, start
+from lane_checks import check, clock, fire, tangent_level, turns
 from lane_light import single, walks
-from reference.agreement import count_and_time_errors
-from reference.circuit import PURE, Circuit, Draws
-from reference.dense_ode import as_lists, find_events
-from reference.dense_signal import solve_signal, turning_points
+from reference.circuit import PURE, Circuit
+from reference.dense_ode import find_events
+from reference.dense_signal import solve_signal
 
-from adv2e import rng
-from adv2e.config.model import Leak, LogResponse, LowPass, Refractory, ShotNoise
 from adv2e.kernel import exact
-from adv2e.kernel.workspace import S_OFF, S_ON
 
 FAR = 50.0
 """A threshold that nothing reaches [ln units]."""
-
-
-def clock(intervals_ms):
-    """Times of the knots [s], in whole nanoseconds, from the lengths of the intervals."""
-    at = np.concatenate([[0.0], np.cumsum(intervals_ms)]) * 1e-3
-    return np.round(at * 1e9) * 1e-9
-
-
-def sections_of(circuit):
-    """Return the configuration's sections for a circuit of the reference."""
-    sections = {
-        "log_response": LogResponse(linear_below=circuit.linear_below, floor=circuit.floor),
-        "low_pass": LowPass(cutoff_hz=circuit.cutoff_hz, dark_cutoff_hz=circuit.dark_cutoff_hz),
-    }
-    if circuit.dead_time_us is not None:
-        sections["refractory"] = Refractory(period_us=circuit.dead_time_us)
-    if circuit.leak_hz or circuit.photo_leak_hz:
-        sections["leak"] = Leak(rate_hz=circuit.leak_hz, photo_rate_hz=circuit.photo_leak_hz)
-    return sections
-
-
-def fire(light, times, circuit, seed=0, **sections):
-    """Return the kernel's events, one (events, 2) array a pixel, with the circuit's thresholds."""
-    pixel = quiet(**sections_of(circuit), **sections)
-    times_ns = [round(float(t) * 1e9) for t in times]
-    array = start(light, times_ns, pixel, seed=seed, exact_times=True)
-    array.state[S_ON], array.state[S_OFF] = circuit.levels(array.pixels)
-    return by_pixel(array, *advance(array, light, times_ns))
-
-
-def check(light, times, circuit, *, paths=None, at_least=1, within_us=1.0):
-    """Compare kernel and truth; returns the truth's events."""
-    truths = find_events(paths or solve_signal(light, times, circuit), circuit)
-    truth, until = as_lists(truths)
-    found = count_and_time_errors(fire(light, times, circuit), truth, until)
-    assert sum(map(len, truth)) >= at_least
-    assert found.left_out <= found.count_b, "hardly anything to compare: ties"
-    assert not found.differing
-    assert found.max_dt_us < within_us
-    return truth
-
-
-def turns(path):
-    """Return when one pixel's signal turns [s]."""
-    pieces = zip(path.start, path.length, path.signal, strict=True)
-    return np.array(
-        [
-            t + 0.5 * (s + 1.0) * length
-            for t, length, signal in pieces
-            for s in turning_points(signal, -1.0, 1.0)
-        ]
-    )
-
-
-def dense(path, points=400):
-    """Return times [s], signal and leak of one pixel's path at many places."""
-    s = np.cos(np.linspace(math.pi, 0.0, points))
-    rows = [
-        np.column_stack(
-            [
-                t + 0.5 * (s + 1.0) * h,
-                np.polynomial.chebyshev.chebval(s, signal),
-                np.polynomial.chebyshev.chebval(s, leak),
-            ]
-        )
-        for t, h, signal, leak in zip(path.start, path.length, path.signal, path.leak, strict=True)
-    ]
-    return np.concatenate(rows)
-
-
-def tangent_level(path, polarity, on=None):
-    """Return the threshold that the distance from the reference just reaches.
-
-    The reference falls in proportion to the ON threshold, so it takes part in its own tangent:
-    y + on l = on at the most, which is on = max y / (1 - l).
-    """
-    _, y, leaked = dense(path).T
-    away = y - y[0]
-    if polarity > 0:
-        return float(np.max(away / (1.0 - leaked)))
-    return float(np.max(-(away + on * leaked)))
 
 
 # --- tangents and ties ---------------------------------------------------------------------------
@@ -282,56 +197,6 @@ def test_leak_that_outruns_the_signal(dead_time_us, leaks):
         leak_hz=leaks[0], photo_leak_hz=leaks[1], dead_time_us=dead_time_us, on=0.1, off=0.08
     )
     check(light, clock([33.0, 4.0, 1.0, 33.0, 8.0, 100.0]), circuit, at_least=150)
-
-
-# --- noise events --------------------------------------------------------------------------------
-
-
-def shot_candidates(pixels, rate_hz, seed, end_s):
-    """Return the candidates of every pixel, drawn here one by one."""
-    drawn = []
-    for pixel in range(pixels):
-        rows, t = [], 0.0
-        for draw in range(10_000):
-            t += rng.exponential(seed, rng.SHOT_TIME, pixel, draw) / rate_hz
-            if t >= end_s:
-                break
-            u, v = rng.uniforms(seed, rng.SHOT_KIND, pixel, draw)
-            rows.append((t, u, 1 if v < 0.5 else -1))
-        drawn.append(np.array(rows).reshape(-1, 3))
-    return drawn
-
-
-@pytest.mark.parametrize("dead_time_us", [None, 700.0, 9_000.0])
-@pytest.mark.parametrize("leak_hz", [0.0, 30.0])
-def test_shot_noise_at_500_hz_among_signal_events(dead_time_us, leak_hz):
-    seed, rate_hz = 4, 500.0
-    light, times = walks(31, 8, 20, lo=1.0), clock([4.0, 12.0, 1.0, 33.0, 4.0, 4.0, 33.0])
-    circuit = Circuit(linear_below=2.72, dead_time_us=dead_time_us, leak_hz=leak_hz)
-    draws = Draws(injected=shot_candidates(light.shape[1], rate_hz, seed, times[-1]))
-    truth, until = as_lists(find_events(solve_signal(light, times, circuit), circuit, draws))
-    found = fire(light, times, circuit, seed=seed, shot_noise=ShotNoise(rate_hz=rate_hz))
-    agreement = count_and_time_errors(found, truth, until)
-    assert agreement.count_b > 150
-    assert not agreement.differing
-    assert agreement.max_dt_us < 1.0
-
-
-@pytest.mark.parametrize("dead_time_us", [None, 700.0])
-@pytest.mark.parametrize("dn", [0.0, 128.0])
-def test_rate_and_gaps_of_shot_noise_at_500_hz(dead_time_us, dn):
-    pixels, seconds, kept = 64, 1.0, 500.0 * (1 - 0.75 * dn / 255)
-    light, times = np.full((31, pixels), dn), np.linspace(0.0, seconds, 31)
-    circuit = Circuit(dead_time_us=dead_time_us)
-    found = fire(light, times, circuit, shot_noise=ShotNoise(rate_hz=500.0))
-    gaps = np.concatenate([np.diff(events[:, 0]) for events in found]) * 1e6
-    dead_s = (dead_time_us or 0.0) * 1e-6
-    assert gaps.min() >= dead_s * 1e6 - 1e-4  # times count from the start of the recording [s]
-    # a renewal process: a gap is the dead time and an exponential wait
-    expected = pixels * seconds * kept / (1 + kept * dead_s)
-    count = sum(map(len, found))
-    assert abs(count - expected) < 4 * math.sqrt(expected) / (1 + kept * dead_s) + pixels
-    assert np.mean(gaps) == pytest.approx(1e6 / kept + dead_s * 1e6, rel=4 / math.sqrt(count))
 
 
 # --- what the lanes leave alone ------------------------------------------------------------------
