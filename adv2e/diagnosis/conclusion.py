@@ -69,7 +69,9 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
         return [Placed.of(of.stream(state.config, seed), scene) for seed in seeds]
 
     def errors(before: Sequence[Placed], after: Sequence[Placed]) -> list[ErrorRow]:
-        return error_rows(measured, list(map(last, before)), list(map(last, after)))
+        first = list(map(last, before))
+        second = first if after is before else list(map(last, after))
+        return error_rows(measured, first, second)
 
     kept, declared = outcome.state, search.declared
     before = drawn(declared)

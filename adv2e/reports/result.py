@@ -65,12 +65,15 @@ class ErrorRow:
         What it measures, in a few words.
     before, after, floor : Estimate
         Declared model; model found; independent draws of the model found against each other.
+    without_chance : bool
+        Of the mean of simulations: what chance makes in each of them does not count.
     """
 
     name: str
     before: Estimate
     after: Estimate
     floor: Estimate
+    without_chance: bool = False
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from adv2e.reports.quantities import (
     unit_of,
     value_text,
 )
-from adv2e.reports.result import Diagnosis
+from adv2e.reports.result import Diagnosis, ErrorRow
 from adv2e.reports.standing_out import standing_out
 
 WIDTH = 100
@@ -33,14 +33,21 @@ def summary_text(diagnosis: Diagnosis) -> str:
     if diagnosis.alternatives:
         lines += _wrapped(f"as well: {', '.join(diagnosis.alternatives)}", 2)
     for row in diagnosis.errors[:1]:
-        before, after, floor = (
-            number_text(estimate.value) for estimate in (row.before, row.after, row.floor)
-        )
-        lines += _wrapped(f"error {before} -> {after} (floor {floor}): {row.name}", 2)
+        lines += _error(row)
+        if row.after.value > row.before.value:  # by random events, if it is right
+            for other in diagnosis.errors:
+                lines += _error(other) if other.without_chance else []
     before = probability_text(diagnosis.global_p_before).removeprefix("= ")
     after = probability_text(diagnosis.global_p_after).removeprefix("= ")
     lines.append(f"p {before} -> {after}")
     return "\n".join(lines)
+
+
+def _error(row: ErrorRow) -> list[str]:
+    before, after, floor = (
+        number_text(estimate.value) for estimate in (row.before, row.after, row.floor)
+    )
+    return _wrapped(f"error {before} -> {after} (floor {floor}): {row.name}", 2)
 
 
 def _wrapped(text: str, most: int) -> list[str]:

@@ -1,12 +1,22 @@
 """The distance between recording and simulations, and its floor."""
 
+import itertools
+
 import numpy as np
 import pytest
 from made_up_streams import HEIGHT, WIDTH, random_stream, stream_of
 
-from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_errors
+from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_errors, smoothed_norms
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.error import NAME, PAIRS, _pairs, error_rows, of_interpolation, of_part
+from adv2e.diagnosis.error import (
+    NAME,
+    OF_MEAN,
+    PAIRS,
+    _pairs,
+    error_rows,
+    of_interpolation,
+    of_part,
+)
 from adv2e.diagnosis.parts import Parts
 
 MEASURED = random_stream(600, 1)
@@ -56,9 +66,32 @@ def test_what_interpolation_adds_is_half_of_what_leaving_frames_out_does():
 
 def test_rows_are_the_mean_and_every_scale():
     names = [row.name for row in error_rows(MEASURED, BEFORE, AFTER)]
-    assert names[0] == NAME
-    scales = [name.rpartition(" over ")[2] for name in names[1:]]
+    assert (names[0], names[-1]) == (NAME, OF_MEAN)
+    scales = [name.rpartition(" over ")[2] for name in names[1:-1]]
     assert scales == ["2 ms", "10 ms", "50 ms", "100 ms"]
+
+
+def test_the_last_row_is_of_the_mean_of_simulations():
+    """Beside the mean of so many as there are, whose own chance is left in it."""
+    rows = error_rows(MEASURED, BEFORE, AFTER)
+    (row,) = (row for row in rows if row.without_chance)
+    n, unit = len(BEFORE), smoothed_norms([(MEASURED.events(), 1.0)], WIDTH, SIGMAS_US)
+    mean = [(one.events(), -1.0 / n) for one in BEFORE]
+    apart = smoothed_norms([(MEASURED.events(), 1.0), *mean], WIDTH, SIGMAS_US) / unit
+    pairs = itertools.combinations(BEFORE, 2)
+    chance = 0.5 * np.mean([np.square(distance(a, b, MEASURED)) for a, b in pairs], axis=0)
+    assert row.before.value == pytest.approx(np.sqrt(apart**2 - chance / n).mean())
+    between = np.array([distance(a, b, MEASURED) for a, b in _pairs(AFTER)])
+    assert row.floor.value == pytest.approx(np.sqrt(0.5 * np.mean(between**2, axis=0)).mean())
+
+
+def test_random_events_as_the_camera_has_them_cost_nothing_from_the_mean():
+    """Though each simulation with them is farther off than one without."""
+    with_noise = [random_stream(900, seed) for seed in range(30, 42)]
+    silent = [random_stream(0) for _ in range(12)]
+    rows = error_rows(MEASURED, silent, with_noise)
+    assert rows[0].after.value > 1.3 * rows[0].before.value
+    assert rows[-1].after.value == pytest.approx(rows[-1].before.value, rel=0.05)
 
 
 def test_a_model_like_the_recording_is_at_the_floor():

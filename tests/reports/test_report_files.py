@@ -16,6 +16,7 @@ from adv2e.reports import files
 from adv2e.reports.files import check_folder
 from adv2e.reports.model_file import model_text
 from adv2e.reports.quantities import native
+from adv2e.reports.result import ErrorRow, Estimate
 from adv2e.reports.summary import summary_text
 
 NAMES = ["model.yaml", "report.html", "report.json"]
@@ -155,6 +156,15 @@ def test_the_summary_says_the_result():
         "  100 ms)",
         "p < 0.001 -> 0.34",
     ]
+
+
+def test_the_summary_of_random_events_says_how_far_their_mean_is():
+    """An error that rises, where the model has got what makes events at random."""
+    own = ErrorRow("from the mean", Estimate(0.7), Estimate(0.6), Estimate(0.6), True)
+    for after, shown in ((0.7, True), (0.3, False)):
+        row = ErrorRow("distance", Estimate(0.5), Estimate(after), Estimate(0.3))
+        text = summary_text(replace(everything(), errors=[row, own]))
+        assert ("error 0.700 -> 0.600 (floor 0.600): from the mean" in text) == shown
 
 
 def test_the_summary_counts_what_it_leaves_out():
