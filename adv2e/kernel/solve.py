@@ -6,9 +6,9 @@
 
 has an analytic solution whose Taylor coefficients follow from a recurrence: I is an exponential
 (log branch) or linear (foot), so is the product's Cauchy sum.  Sub-steps are so short that the
-series converges to 1e-11 (radius (w + |dx/dt|) h <= 1.6, order up to 16); the leak is
-one more polynomial, and event times are roots of polynomials.  No step depends on K, tiles, chunks
-or threads.
+series converges to 1e-11 (radius (w + |dx/dt|) h <= 1.6, order up to 16); the leak is one more
+polynomial, and event times are roots of polynomials.  No step depends on K, tiles, chunks or
+threads.
 
 The K-step forms make one straight line a step, of the second pole, too, and go through the same
 comparator.

@@ -2,8 +2,8 @@
 
 A tile is some strips of pixels over several intervals, those that one call of a driver claims
 (:mod:`adv2e.kernel.claims`).  :mod:`adv2e.kernel.exact` advances the circuit
-that :mod:`adv2e.kernel.screen` covers, :mod:`adv2e.kernel.general` all others; both go strip by
-strip, and each strip through all of its intervals.
+that :mod:`adv2e.kernel.screen` covers, :mod:`adv2e.kernel.general` what is left of those that are
+not solved in steps of time; both go strip by strip, and each strip through all of its intervals.
 """
 
 from __future__ import annotations
