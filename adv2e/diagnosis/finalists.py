@@ -13,6 +13,8 @@ from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Model
 
 _FINALISTS = 6
+_FORMS = 2
+"""Of them, forms of one effect: a third kept others out that are missing together with it."""
 _FAR = 2.0
 
 
@@ -58,8 +60,9 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
         fits = fits[: 2 * _FINALISTS]
     # whoever is far behind the first is not worth the simulations
     far = _FAR * fits[0].misfit + _FAR * len(bench.observed[BOTH])
-    dropped = [fit for k, fit in enumerate(fits) if k >= _FINALISTS or fit.misfit > far] + dropped
-    fits = [fit for fit in fits[:_FINALISTS] if fit.misfit <= far]
+    chosen = [fit for fit in _of_different_effects(fits)[:_FINALISTS] if fit.misfit <= far]
+    dropped = [fit for fit in fits if not any(fit is one for one in chosen)] + dropped
+    fits = chosen
     fitter.improve(fits, (3, 4, 5))
     configs = [fit.config for fit in fits]
     sample = bench.laboratory.many(configs, range(1, SOME + 1))
@@ -76,6 +79,12 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     for fit in dropped:
         bench.rejections.add(fit, _behind(fit, nothing))
     return trials
+
+
+def _of_different_effects(fits: Sequence[Fit]) -> list[Fit]:
+    """Return the fits but for third forms of an effect, of which the best is tried in the end."""
+    names = [fit.candidate.name for fit in fits]
+    return [fit for k, fit in enumerate(fits) if names[:k].count(names[k]) < _FORMS]
 
 
 def _behind(fit: Fit, nothing: float) -> str:

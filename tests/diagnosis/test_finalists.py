@@ -1,0 +1,19 @@
+"""Which effects are simulated often enough to compare them."""
+
+from made_up_laboratory import RECORDING, MadeUpLaboratory, candidates
+
+from adv2e.config import Config, load_config
+from adv2e.diagnosis.finalists import finalists
+from adv2e.diagnosis.search import Search
+
+
+def test_a_third_form_of_an_effect_keeps_no_other_effect_out():
+    """All three forms of other thresholds do as well; shot noise is the best of the others."""
+    alike = {"pixel.thresholds.off": "pixel.thresholds.on"}
+    laboratory = MadeUpLaboratory(strength=4.0, alike=alike)
+    observed = laboratory.measure(load_config([], ["pixel.thresholds.on=0.3"]), RECORDING)
+    search = Search(laboratory, observed, Config(), candidates())
+    assert sum(one.name == "thresholds" for one in search.candidates) == 3
+    names = [trial.name for trial in finalists(search.bench, search.declared, search.candidates)]
+    assert names[:3] == ["thresholds", "thresholds", "shot_noise"]
+    assert len(names) == 6
