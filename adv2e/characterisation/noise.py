@@ -127,8 +127,11 @@ def _crossings(sources: NoisySources, light: Array) -> tuple[Array, Array]:
 def _tabulated(sources: NoisySources, dead: float, step: float) -> tuple[float, float]:
     """Return ON and OFF events a correlation time, between rms values at which they are kept.
 
-    dead : float
-        Dead time; and step : float, between samples, in correlation times.
+    Parameters
+    ----------
+    sources : NoisySources
+    dead, step : float
+        Dead time, and time between samples, in correlation times.
     """
     place = np.log(sources.rms) / _RMS_STEP
     below = int(np.floor(place))

@@ -60,7 +60,7 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
         fits = fits[: 2 * _FINALISTS]
     # whoever is far behind the first is not worth the simulations
     far = _FAR * fits[0].misfit + _FAR * len(bench.observed[BOTH])
-    chosen = [fit for fit in _of_different_effects(fits)[:_FINALISTS] if fit.misfit <= far]
+    chosen = [fit for fit in _without_third_forms(fits)[:_FINALISTS] if fit.misfit <= far]
     dropped = [fit for fit in fits if not any(fit is one for one in chosen)] + dropped
     fits = chosen
     fitter.improve(fits, (3, 4, 5))
@@ -81,8 +81,8 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     return trials
 
 
-def _of_different_effects(fits: Sequence[Fit]) -> list[Fit]:
-    """Return the fits but for third forms of an effect, of which the best is tried in the end."""
+def _without_third_forms(fits: Sequence[Fit]) -> list[Fit]:
+    """Return the best forms of each effect; only one of them is tried in the end."""
     names = [fit.candidate.name for fit in fits]
     return [fit for k, fit in enumerate(fits) if names[:k].count(names[k]) < _FORMS]
 

@@ -10,6 +10,7 @@ import diagnose_real
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from narrow_candidates import BLACK_LEVEL
 from real.model import BEYOND_US, SCORE, Bench, Judged
 from real.recording import halves, read
 from real.search import Search
@@ -19,15 +20,11 @@ from real.tried import Added
 from adv2e import simulate
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import load_config
-from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.events import empty_events, make_events
 
 REAL = os.environ.get("ADV2E_REAL_DATA")
 WIDTH, HEIGHT, FRAMES = 24, 16, 9
 TIMES = np.arange(FRAMES) * 0.02
-BLACK_LEVEL = Candidate(
-    "black_level", (Knob("frames.black_level_dn", 0.02, 100.0),), ((2.0,), (14.0,))
-)
 
 
 def moving_waves():

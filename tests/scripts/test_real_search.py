@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from narrow_candidates import BLACK_LEVEL
 from real.fit import Fit, Model, enough_seeds
 from real.search import Search
 from real.tried import CLIPPED_BLACK, Added
@@ -11,10 +12,6 @@ from real.tried import CLIPPED_BLACK, Added
 from adv2e.comparison.windows import Windows
 from adv2e.config import load_config
 from adv2e.diagnosis.candidates import Candidate, Knob
-
-BLACK_LEVEL = Candidate(
-    "black_level", (Knob("frames.black_level_dn", 0.02, 100.0),), ((2.0,), (14.0,))
-)
 
 OFFSET = Candidate("clock_offset", (Knob("frames.clock_offset_us", -1e6, 1e6, False, 1e3),), ())
 
