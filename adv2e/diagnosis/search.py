@@ -6,7 +6,8 @@ strong effects may hide one another: a second is looked for on top of the best, 
 likeliest pairs are fitted together.
 That goes on until chance can make what is left, or nothing holds.  What is small beside an effect
 may be due to its fit: another is added for it only if it explains most of it.  Then backward: what
-is no longer needed is dropped.
+is no longer needed is dropped.  Where something is left all the same, others are tried in the place
+of each effect that was added while more was missing, and it goes on from there.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.bench import MANY, Bench, State, parted
+from adv2e.diagnosis.attempts import CATCHES_UP, CLOSE, Attempt, Attempts
+from adv2e.diagnosis.bench import MANY, Bench, State
 from adv2e.diagnosis.candidates import FITTED, Candidate, Knob
-from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations, scored
+from adv2e.diagnosis.finalists import Trial, scored
+from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.frame_error import FrameError
-from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.pairs import likely_pairs
 from adv2e.diagnosis.simulations import Laboratory
@@ -45,10 +47,6 @@ _OF_FITS = 1e-6
 """Probability of what is left below which it is looked into, though it may be the fit's."""
 _MOST_OF_THE_FIT = 0.5
 """Least share of that which an effect must take away."""
-
-_TRIED = 4
-_CATCHES_UP = 60.0  # log likelihood that a fit may gain when it is brought to its end
-_CLOSE = 5.0  # log likelihood; simulations are too few for less to be known
 
 
 @dataclass(frozen=True)
@@ -83,17 +81,14 @@ class Outcome:
         return sorted(alike - set(self.state.names))
 
 
-@dataclass(frozen=True)
-class _Attempt:
-    """A model with one effect more, fitted to its end, and what speaks against it."""
-
-    state: State
-    objections: list[str]
-
-
 def _put_down_to_the_fit(state: State) -> float:
     """Return the share of the residual that is put down to the fit of a model's effects."""
     return max((fit.candidate.left for fit in state.fits), default=0.0)
+
+
+def _is_undone(state: State) -> bool:
+    """Tell whether a model's effects can all be undone in full: more is not put down to them."""
+    return _put_down_to_the_fit(state) <= FITTED
 
 
 class Search:
@@ -117,6 +112,9 @@ class Search:
     ----------
     candidates : list of Candidate
         Those that compete.
+    bench : Bench
+    attempts : Attempts
+    declared : State
     """
 
     def __init__(
@@ -133,9 +131,9 @@ class Search:
         self.candidates = [
             one for one in candidates if not unknown & {knob.key for knob in one.knobs}
         ]
-        self._simulator = laboratory.simulator
-        self._simulator.likely = self._simulator.done + 2 * MANY
+        laboratory.simulator.likely = laboratory.simulator.done + 2 * MANY
         self.bench = Bench.of(laboratory, observed, declared, error, log, free)
+        self.attempts = Attempts(self.bench, self.candidates)
         self.declared = self.bench.state(declared, ())
 
     def probability(self, state: State, view: int = BOTH) -> float:
@@ -152,15 +150,12 @@ class Search:
         """Search forward and backward."""
         state = self.declared
         self.bench.log(f"declared model: probability of the residual {self.probability(state):.2g}")
-        while self._is_open(state) and len(state.fits) < MOST_EFFECTS:
-            grown = self._grown(state)
-            if grown is None or not self._is_worth_it(state, grown):
+        state = self._backward(self._forward(state))
+        while self._may_be_wrong(state):
+            other = self._with_another(state)
+            if other is None:
                 break
-            state = grown
-            self.bench.log(
-                f"added {', '.join(state.names)}: probability {self.probability(state):.2g}"
-            )
-        state = self._backward(state)
+            state = self._backward(self._forward(other))
         held = self.bench.rejections.held
         rejected = {name: why for name, why in held.items() if name not in state.names}
         return Outcome(
@@ -171,6 +166,18 @@ class Search:
             not any(self._is_something_left(state, view) for view in (BOTH, parts.LAST)),
             rejected,
         )
+
+    def _forward(self, state: State) -> State:
+        """Return the model with effects more, until nothing is left or nothing holds."""
+        while self._is_open(state) and len(state.fits) < MOST_EFFECTS:
+            grown = self._grown(state)
+            if grown is None or not self._is_worth_it(state, grown):
+                break
+            state = grown
+            self.bench.log(
+                f"added {', '.join(state.names)}: probability {self.probability(state):.2g}"
+            )
+        return state
 
     def _is_something_left(self, state: State, view: int = BOTH) -> bool:
         if self.probability(state, view) >= PER_LOOK:
@@ -185,8 +192,13 @@ class Search:
         """
         if self._is_something_left(state):
             return True
-        undone = _put_down_to_the_fit(state) <= FITTED
-        return undone and self.probability(state) < _OF_FITS
+        return _is_undone(state) and self.probability(state) < _OF_FITS
+
+    def _may_be_wrong(self, state: State) -> bool:
+        """Tell whether others are tried in the place of the effects that were added."""
+        if len(state.fits) < 2 or self.probability(state) >= PER_LOOK:
+            return False
+        return self._is_something_left(state) or _is_undone(state)
 
     def _is_worth_it(self, state: State, grown: State) -> bool:
         """Tell whether an addition that holds takes away enough of what is left.
@@ -195,15 +207,14 @@ class Search:
         be able to explain it with others as large: it is no patch then.  Single statistics that
         stand out, and the last to be found, have no share to speak of.
         """
-        model = state.models[BOTH]
-        before, after = self.bench.misfit(state), self.bench.misfit(grown)
         if self._is_something_left(state):
             least = _LEAST_OF_THE_LEFT
-            if before < model.limits(PER_LOOK)[0] or not self._is_something_left(grown):
+            stands_out = self.bench.misfit(state) < state.models[BOTH].limits(PER_LOOK)[0]
+            if stands_out or not self._is_something_left(grown):
                 return True
         else:
             least = _MOST_OF_THE_FIT
-        share = (before - after) / (before - model.floor)
+        share = self._taken_away(state, grown)
         if share >= least:
             return True
         added = " and ".join(fit.candidate.name for fit in grown.beyond(state))
@@ -213,139 +224,105 @@ class Search:
             self.bench.rejections.add(fit, why, final=True)
         return False
 
+    def _taken_away(self, state: State, other: State) -> float:
+        """Return the share of what a model leaves that another does not."""
+        before, after = self.bench.misfit(state), self.bench.misfit(other)
+        return (before - after) / (before - state.models[BOTH].floor)
+
     def _grown(self, state: State) -> State | None:
         """Return the model with one effect more, or two that hold only together.
 
         Where one holds but another that does not explains far more, the one is no name for what is
         missing: it stands in for a part of the other.
         """
-        trials = self._trials(state)
-        attempts = self._attempts(state, trials, [state])
+        trials = self.attempts.trials(state)
         # with one of two effects, something still stands out; but the one gains, and is physical
-        physical = [one for one in attempts if not {BORDER, BY_CHANCE} & set(one.objections)]
-        most = max(map(self._judged, physical), default=-np.inf)
-        holding = [self._judged(one) for one in physical if not one.objections]
-        if holding and max(holding) > most - _CATCHES_UP:
-            return self._best(attempts, state)
+        made = self.attempts.of_one(state, trials, [state])
+        physical = [one for one in made if one.physical]
+        most = max((one.judged for one in physical), default=-np.inf)
+        holding = [one for one in physical if not one.objections]
+        if any(one.judged > most - CATCHES_UP for one in holding):
+            return self.attempts.best(made, state)
         grown = None
         if len(state.fits) + 2 <= MOST_EFFECTS:
-            grown = self._best(self._attempts_of_two(state, trials, physical), state)
+            grown = self.attempts.best(self._of_two(state, trials, physical), state)
         if grown is None and holding:
-            first = max(physical, key=self._judged)
+            first = max(physical, key=lambda one: one.judged)
             why = f"holds, but {first.state.names[-1]}, which does not, explains far more"
-            for one in physical:
-                if not one.objections:
-                    self.bench.rejections.add(one.state.fits[-1], why, final=True)
+            for one in holding:
+                self.bench.rejections.add(one.state.fits[-1], why, final=True)
         return grown
 
-    def _attempts_of_two(
-        self, state: State, trials: Sequence[Trial], physical: Sequence[_Attempt]
-    ) -> list[_Attempt]:
+    def _of_two(
+        self, state: State, trials: Sequence[Trial], physical: Sequence[Attempt]
+    ) -> list[Attempt]:
         """Return models with two effects more, of which none need hold alone.
 
         Others on top of the best that is physical, and the likeliest pairs.
         """
-        made: list[_Attempt] = []
+        made: list[Attempt] = []
         if physical:
-            first = max(physical, key=self._judged).state
+            first = max(physical, key=lambda one: one.judged).state
             self.bench.log(f"on trial: {', '.join(first.names)}")
-            made += self._attempts(first, self._trials(first), [first, state])
+            made += self.attempts.of_one(first, self.attempts.trials(first), [first, state])
         had = {frozenset(one.state.names) for one in made}
         for pair in likely_pairs(self.bench, state, trials):
             if frozenset((*state.names, *(one.name for one in pair))) not in had:
-                made.append(self._attempt(state, pair, [state]))
+                made.append(self.attempts.of(state, pair, [state]))
         return made
-
-    def _judged(self, attempt: _Attempt) -> float:
-        """Return the log likelihood of the data that the attempt was not fitted to."""
-        return self.bench.likelihood(attempt.state, parts.JUDGE)
-
-    def _trials(self, state: State) -> list[Trial]:
-        """Return the best form of each of the best effects on top of a model, the best first."""
-        self._simulator.likely = self._simulator.done + likely_simulations(self.candidates)
-        best: dict[str, Trial] = {}
-        for trial in finalists(self.bench, state, self.candidates):
-            best.setdefault(trial.name, trial)
-        return list(best.values())
-
-    def _attempts(
-        self, state: State, trials: Sequence[Trial], grounds: Sequence[State]
-    ) -> list[_Attempt]:
-        """Return models with one effect more, judged against all `grounds`.
-
-        Fits are brought to their end on the data for fitting and judged on other data.  Before its
-        fit has ended, an effect may be behind another for that alone: all that are close are tried.
-        Others are, one after another, where none of these holds.
-        """
-        made: list[_Attempt] = []
-        for trial in trials[:_TRIED]:
-            close = trial.score > trials[0].score - _CATCHES_UP
-            if not close and any(not one.objections for one in made):
-                break
-            made.append(self._attempt(state, [trial], grounds))
-        return made
-
-    def _attempt(self, state: State, added: Sequence[Trial], grounds: Sequence[State]) -> _Attempt:
-        """Return the model with effects more, fitted to its end and judged."""
-        bench = self.bench
-        together = (*state.fits, *(trial.fit for trial in added))
-        joint = bench.fitted(together, added[0].models[parts.FIT].sd, parts.FIT)
-        fits = parted(joint, together)
-        grown = State(joint.config, fits, bench.tried(joint.config))
-        against: list[str] = []
-        for ground in grounds:
-            against = objections(joint, grown, ground, bench)
-            if against:
-                break
-        new = grown.beyond(state)
-        told = [f"{fit.candidate.name} {fit.candidate.parameters(fit.place)}" for fit in new]
-        bench.log(f"  {' and '.join(told)}: {'; '.join(against) or 'holds'}")
-        if against and len(new) == 1:  # of two, nobody knows which it is
-            bench.rejections.add(new[0], "; ".join(against), final=True)
-        return _Attempt(grown, against)
-
-    def _best(self, attempts: Sequence[_Attempt], state: State) -> State | None:
-        """Return the best of the models that hold, fitted to all data but those looked at last.
-
-        Effects of others that do as well are noted as alternatives.
-        """
-        holding = [
-            self.bench.settled(one.state.fits, one.state.models[BOTH].sd)
-            for one in attempts
-            if not one.objections
-        ]
-        if not holding:
-            return None
-        knobs = [sum(len(fit.candidate.knobs) for fit in one.beyond(state)) for one in holding]
-        scores = [
-            scored(self.bench, one.models, free) for one, free in zip(holding, knobs, strict=True)
-        ]
-        best = max(scores)
-        chosen = holding[scores.index(best)]
-        alike: set[str] = set()
-        for one, score in zip(holding, scores, strict=True):
-            self.bench.log(f"  {' and '.join(one.names)}, on more data: score {score:.0f}")
-            why = "others explain more"
-            others = [fit for fit in one.fits if fit.candidate.name not in chosen.names]
-            if score > best - _CLOSE:
-                alike.update(fit.candidate.name for fit in others)
-                why = f"does as well as {chosen.names[-1]}, and cannot be told from it"
-            for fit in others:
-                self.bench.rejections.add(fit, why, final=True)
-        if not alike:
-            return dataclasses.replace(chosen, alternatives=state.alternatives)
-        alternatives = {**state.alternatives, chosen.names[-1]: frozenset(alike)}
-        return dataclasses.replace(chosen, alternatives=alternatives)
 
     def _backward(self, state: State) -> State:
         """Drop effects without which the others, fitted again, do as well, one after another."""
         for fit in state.fits[:-1]:
-            rest = tuple(other for other in state.fits if other is not fit)
-            without = self.bench.settled(rest, state.models[BOTH].sd)
+            without = self._without(state, fit)
             loss = self.bench.likelihood(state) - self.bench.likelihood(without)
-            if loss < _CLOSE:
+            if loss < CLOSE:
                 self.bench.log(f"dropped {fit.candidate.name}: the others do without it")
                 self.bench.rejections.add(fit, "not needed beside the others", final=True)
-                alike = {n: a for n, a in state.alternatives.items() if n in without.names}
-                return self._backward(dataclasses.replace(without, alternatives=alike))
+                return self._backward(without)
         return state
+
+    def _with_another(self, state: State) -> State | None:
+        """Return the model with another effect in the place of one of those that were added.
+
+        Each but the last was chosen while others were missing, whose part it may have taken.
+        Another has to hold on top of the rest, and instead of the one.
+        """
+        reasons = self.bench.rejections
+        held = dict(reasons.held)
+        for fit in state.fits[:-1]:
+            name = fit.candidate.name
+            rest = self._without(state, fit)
+            self.bench.log(f"in the place of {name}:")
+            trials = self.attempts.trials(rest, besides=[name])
+            other = self.attempts.best(self.attempts.of_one(rest, trials, [rest, state]), rest)
+            if other is None:
+                continue
+            if self._is_better(other, state):
+                why = f"does less than {other.names[-1]} in its place"
+                reasons.add(fit, why, final=True)
+                self.bench.log(f"replaced {name} by {other.names[-1]}")
+                return other
+        reasons.held = held  # of what does not go on top of the model that is kept
+        return None
+
+    def _is_better(self, other: State, state: State) -> bool:
+        """Tell whether a model is taken for another with as many effects.
+
+        Of what may be the fit's, it must take away most.
+        """
+        scores = []
+        for one in (other, state):
+            knobs = sum(len(fit.candidate.knobs) for fit in one.fits)
+            scores.append(scored(self.bench, one.models, knobs))
+        if scores[0] <= scores[1] + CLOSE:
+            return False
+        share = self._taken_away(state, other)
+        return self._is_something_left(state) or share >= _MOST_OF_THE_FIT
+
+    def _without(self, state: State, fit: Fit) -> State:
+        """Return the model without one of its effects, the others fitted again."""
+        rest = tuple(other for other in state.fits if other is not fit)
+        without = self.bench.settled(rest, state.models[BOTH].sd)
+        alike = {name: of for name, of in state.alternatives.items() if name in without.names}
+        return dataclasses.replace(without, alternatives=alike)

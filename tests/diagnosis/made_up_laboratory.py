@@ -10,6 +10,8 @@ import numpy as np
 from adv2e.config import Config, load_config, to_dict
 from adv2e.config.paths import get_key
 from adv2e.diagnosis import parts
+from adv2e.diagnosis.bench import parted
+from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.library import Hints, library
 from adv2e.diagnosis.markers import BOTH, VIEWS, Entry
@@ -139,3 +141,23 @@ def searched(
     library = candidates() if library is None else library
     search = Search(laboratory, observed, declared or Config(), library, log=log)
     return search, search.run()
+
+
+def outside(size):
+    """Return a change of statistics that no effect makes, nor all of them together."""
+    patterns = np.array(list(MadeUpLaboratory().patterns.values()))
+    draw = np.random.default_rng(11).normal(size=STATISTICS)
+    draw -= np.linalg.pinv(patterns) @ (patterns @ draw)
+    return size * draw / np.linalg.norm(draw)
+
+
+def fits_of(*effects):
+    """Return unfinished fits of effects with one key each: (name, value)."""
+    found = [(candidates(name)[0], value) for name, value in effects]
+    return tuple(Fit(one, Config(), np.array(one.inner((value,)))) for one, value in found)
+
+
+def refitted(search, fits):
+    """Return the model with all `fits`, fitted together."""
+    joint = search.bench.fitted(fits, search.declared.models[BOTH].sd, BOTH)
+    return search.bench.state(joint.config, parted(joint, fits))

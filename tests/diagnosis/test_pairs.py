@@ -5,7 +5,7 @@ import pytest
 from made_up_laboratory import GONE, RECORDING, MadeUpLaboratory, candidates, searched
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis import search as search_module
+from adv2e.diagnosis import attempts as attempts_module
 from adv2e.diagnosis.bench import Bench
 from adv2e.diagnosis.finalists import finalists
 from adv2e.diagnosis.judging import BY_CHANCE
@@ -38,7 +38,7 @@ def nothing_holds_alone(monkeypatch):
             return [BY_CHANCE]
         return real_objections(fit, grown, ground, bench)
 
-    monkeypatch.setattr(search_module, "objections", objections)
+    monkeypatch.setattr(attempts_module, "objections", objections)
 
 
 def test_the_two_that_are_missing_are_the_likeliest_pair():

@@ -9,33 +9,25 @@ from made_up_laboratory import (
     EFFECTS,
     GONE,
     RECORDING,
-    STATISTICS,
     MadeUpLaboratory,
     candidates,
     error,
+    fits_of,
+    outside,
+    refitted,
     searched,
 )
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis import search as search_module
-from adv2e.diagnosis.bench import Rejections, parted
+from adv2e.diagnosis import attempts as attempts_module
+from adv2e.diagnosis.bench import Rejections
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.conclusion import finding_of
 from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.fit import Fit
-from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.nuisances import THRESHOLDS, thresholds_of
 from adv2e.diagnosis.search import LEVEL, Search
 from adv2e.diagnosis.verdict import verdict_of
-
-
-def outside(size):
-    """Return a change of statistics that no effect makes, nor all of them together."""
-    laboratory = MadeUpLaboratory()
-    patterns = np.array(list(laboratory.patterns.values()))
-    draw = np.random.default_rng(11).normal(size=STATISTICS)
-    draw -= np.linalg.pinv(patterns) @ (patterns @ draw)
-    return size * draw / np.linalg.norm(draw)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -100,7 +92,7 @@ def test_what_no_effect_makes_is_not_explained():
 
 
 def test_patches_on_something_unknown_are_not_laid_one_on_another(monkeypatch):
-    monkeypatch.setattr(search_module, "objections", lambda *of_what: [])
+    monkeypatch.setattr(attempts_module, "objections", lambda *of_what: [])
     told = []
     _, outcome = searched(
         ["pixel.refractory.period_us=3000"], beyond=outside(60.0), log=told.append
@@ -192,7 +184,7 @@ def test_what_holds_is_no_name_where_what_does_not_explains_far_more(monkeypatch
     def objecting(fit, grown, ground, bench):
         return [] if grown.names == ("leak",) else ["something else stands out"]
 
-    monkeypatch.setattr(search_module, "objections", objecting)
+    monkeypatch.setattr(attempts_module, "objections", objecting)
     truth = ["pixel.refractory.period_us=1900", "pixel.leak.rate_hz=1.2"]
     library = [*candidates("refractory"), *candidates("leak")]
     _, outcome = searched(truth, library=library)
@@ -202,18 +194,6 @@ def test_what_holds_is_no_name_where_what_does_not_explains_far_more(monkeypatch
     assert outcome.rejected["refractory"].reason == "something else stands out"
     _, outcome = searched(["pixel.leak.rate_hz=4"], library=library)
     assert outcome.state.names == ("leak",)
-
-
-def fits_of(*effects):
-    """Return unfinished fits of effects with one key each: (name, value)."""
-    found = [(candidates(name)[0], value) for name, value in effects]
-    return tuple(Fit(one, Config(), np.array(one.inner((value,)))) for one, value in found)
-
-
-def refitted(search, fits):
-    """Return the model with all `fits`, fitted together."""
-    joint = search.bench.fitted(fits, search.declared.models[BOTH].sd, BOTH)
-    return search.bench.state(joint.config, parted(joint, fits))
 
 
 def test_backward_drops_what_the_others_do_without():
@@ -309,7 +289,9 @@ def test_two_effects_that_hide_one_another_are_found_together():
     laboratory.patterns["pixel.refractory.period_us"] = 0.6 * shared + 0.6 * other
     truth = ["pixel.refractory.period_us=4000", "pixel.leak.rate_hz=4"]
     search, outcome = searched(truth, laboratory)
-    single = search._attempts(search.declared, search._trials(search.declared), [search.declared])
+    single = search.attempts.of_one(
+        search.declared, search.attempts.trials(search.declared), [search.declared]
+    )
     assert all(one.objections for one in single)
     assert set(outcome.state.names) == {"refractory", "leak"}
     assert verdict_of(outcome, GONE) == "explained"
