@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.error import error_rows, of_interpolation, of_part
+from adv2e.diagnosis.error import Distances, error_rows, of_interpolation, of_part
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.interpolation import every
 from adv2e.diagnosis.markers import BOTH
@@ -68,15 +68,13 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
         seeds = range(first, first + DRAWS)
         return [Placed.of(of.stream(state.config, seed), scene) for seed in seeds]
 
-    def errors(before: Sequence[Placed], after: Sequence[Placed]) -> list[ErrorRow]:
-        first = list(map(last, before))
-        second = first if after is before else list(map(last, after))
-        return error_rows(measured, first, second)
-
     kept, declared = outcome.state, search.declared
-    before = drawn(declared)
-    after = before if kept is declared else drawn(kept)
-    rows, interpolated = errors(before, after), 0.0
+    before = after = drawn(declared)
+    of_before = of_after = Distances.of(measured, list(map(last, before)))
+    if kept is not declared:
+        after = drawn(kept)
+        of_after = Distances.of(measured, list(map(last, after)))
+    rows, interpolated = error_rows(of_before, of_after), 0.0
     if kept is not declared and ready.between_frames is not None:
         with closing(simulator.of(every(ready.evidence, 2))) as fewer:
             half = drawn(kept, fewer, _FIRST_DRAW + DRAWS)
@@ -87,7 +85,7 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
     verdict = verdict_of(outcome, rows[0], interpolated)
     if verdict in ("consistent", "unexplained") and kept is not declared:
         kept, after = declared, before
-        rows = errors(before, after)
+        rows = error_rows(of_before, of_before)
     return Conclusion(verdict, kept, rows, Gallery(scene, ready.measured, before, after))
 
 

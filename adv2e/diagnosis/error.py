@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,41 +28,56 @@ def of_part(stream: Stream, parts: Parts, part: int) -> Stream:
     return stream.chosen(label == part)
 
 
-def error_rows(
-    measured: Stream, before: Sequence[Stream], after: Sequence[Stream]
-) -> list[ErrorRow]:
+@dataclass(frozen=True)
+class Distances:
+    """Of the simulations of one model, as parts of the norm of what was measured.
+
+    Attributes
+    ----------
+    to_measured : (simulations, scales)
+    between : (pairs, scales)
+        Independent simulations from each other.
+    """
+
+    to_measured: Array
+    between: Array
+
+    @classmethod
+    def of(cls, measured: Stream, simulations: Sequence[Stream]) -> Distances:
+        """Return those of simulations; not a number if nothing was measured."""
+        unit = _norm(measured)
+        return cls(
+            np.array([_apart(measured, stream, unit) for stream in simulations]),
+            np.array([_apart(a, b, unit) for a, b in _pairs(simulations)]),
+        )
+
+    @property
+    def own(self) -> Array:
+        """Square of what is each simulation's own chance, (scales,)."""
+        return 0.5 * _mean_square(self.between)
+
+
+def error_rows(before: Distances, after: Distances) -> list[ErrorRow]:
     """Return the error over all scales, at each scale, and of the mean of simulations.
 
     Random events cost, wherever they come: a model that makes them as the camera does is farther
     off by the first of these than one without.  The last is not moved by that: the distance d from
     one simulation and c from one to another are those from their mean by d^2 = m^2 + c^2/2.
 
-    NaN if nothing was measured.
-
     Parameters
     ----------
-    measured : Stream
-    before : sequence of Stream
-        Simulations of the declared model.
-    after : sequence of Stream
-        Simulations of the model found, of which the floor is made, too.
+    before : Distances
+        Of the declared model.
+    after : Distances
+        Of the model found, which the floor is of, too.
     """
-    unit = smoothed_norms([(measured.events(), 1.0)], measured.width, SIGMAS_US)
-    to_before = np.array([_apart(measured, stream, unit) for stream in before])
-    between_before = np.array([_apart(a, b, unit) for a, b in _pairs(before)])
-    if before is after:
-        to_after, between = to_before, between_before
-    else:
-        to_after = np.array([_apart(measured, stream, unit) for stream in after])
-        between = np.array([_apart(a, b, unit) for a, b in _pairs(after)])
     names = [NAME, *(f"{NAME} over {sigma / 1e3:g} ms" for sigma in SIGMAS_US)]
     first, second, floor = (
         [_estimate(column) for column in (apart.mean(axis=1), *apart.T)]
-        for apart in (to_before, to_after, between)
+        for apart in (before.to_measured, after.to_measured, after.between)
     )
     rows = [ErrorRow(*row) for row in zip(names, first, second, floor, strict=True)]
-    own_before, own = (0.5 * _mean_square(apart) for apart in (between_before, between))
-    squares = _mean_square(to_before) - own_before, _mean_square(to_after) - own, own
+    squares = (*(_mean_square(one.to_measured) - one.own for one in (before, after)), after.own)
     roots = [Estimate(float(np.sqrt(np.maximum(one, 0.0)).mean())) for one in squares]
     rows.append(ErrorRow(OF_MEAN, roots[0], roots[1], roots[2], without_chance=True))
     return rows
@@ -83,10 +99,14 @@ def of_interpolation(
     floor : float
         Of the error of that model with all frames.
     """
-    unit = smoothed_norms([(measured.events(), 1.0)], measured.width, SIGMAS_US)
+    unit = _norm(measured)
     apart = np.mean([_apart(a, b, unit).mean() for a, b in zip(full, half, strict=True)])
     square = float(apart) ** 2 - floor**2
     return 0.5 * math.sqrt(square) if square > 0.0 else 0.0  # not a number: nothing measured
+
+
+def _norm(measured: Stream) -> Array:
+    return smoothed_norms([(measured.events(), 1.0)], measured.width, SIGMAS_US)
 
 
 def _apart(a: Stream, b: Stream, unit: Array) -> Array:

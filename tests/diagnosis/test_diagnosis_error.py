@@ -12,6 +12,7 @@ from adv2e.diagnosis.error import (
     NAME,
     OF_MEAN,
     PAIRS,
+    Distances,
     _pairs,
     error_rows,
     of_interpolation,
@@ -24,13 +25,17 @@ BEFORE = [random_stream(600, seed) for seed in range(10, 16)]
 AFTER = [random_stream(500, seed) for seed in range(20, 28)]
 
 
+def rows_of(measured, before, after):
+    return error_rows(Distances.of(measured, before), Distances.of(measured, after))
+
+
 def distance(measured, simulated, whole=None):
     whole = None if whole is None else whole.events()
     return smoothed_errors(measured.events(), simulated.events(), WIDTH, whole=whole)
 
 
 def test_errors_are_those_of_the_comparison():
-    rows = error_rows(MEASURED, BEFORE, AFTER)
+    rows = rows_of(MEASURED, BEFORE, AFTER)
     for column, streams in (("before", BEFORE), ("after", AFTER)):
         table = np.array([distance(MEASURED, stream) for stream in streams])
         assert getattr(rows[0], column).value == pytest.approx(table.mean())
@@ -42,7 +47,7 @@ def test_errors_are_those_of_the_comparison():
 
 
 def test_the_floor_is_between_draws_in_units_of_the_measured():
-    rows = error_rows(MEASURED, BEFORE, AFTER)
+    rows = rows_of(MEASURED, BEFORE, AFTER)
     table = np.array([distance(a, b, MEASURED) for a, b in _pairs(AFTER)])
     assert rows[0].floor.value == pytest.approx(table.mean())
     assert rows[3].floor.value == pytest.approx(table[:, 2].mean())
@@ -65,7 +70,7 @@ def test_what_interpolation_adds_is_half_of_what_leaving_frames_out_does():
 
 
 def test_rows_are_the_mean_and_every_scale():
-    names = [row.name for row in error_rows(MEASURED, BEFORE, AFTER)]
+    names = [row.name for row in rows_of(MEASURED, BEFORE, AFTER)]
     assert (names[0], names[-1]) == (NAME, OF_MEAN)
     scales = [name.rpartition(" over ")[2] for name in names[1:-1]]
     assert scales == ["2 ms", "10 ms", "50 ms", "100 ms"]
@@ -73,7 +78,7 @@ def test_rows_are_the_mean_and_every_scale():
 
 def test_the_last_row_is_of_the_mean_of_simulations():
     """Beside the mean of so many as there are, whose own chance is left in it."""
-    rows = error_rows(MEASURED, BEFORE, AFTER)
+    rows = rows_of(MEASURED, BEFORE, AFTER)
     (row,) = (row for row in rows if row.without_chance)
     n, unit = len(BEFORE), smoothed_norms([(MEASURED.events(), 1.0)], WIDTH, SIGMAS_US)
     mean = [(one.events(), -1.0 / n) for one in BEFORE]
@@ -89,31 +94,31 @@ def test_random_events_as_the_camera_has_them_cost_nothing_from_the_mean():
     """Though each simulation with them is farther off than one without."""
     with_noise = [random_stream(900, seed) for seed in range(30, 42)]
     silent = [random_stream(0) for _ in range(12)]
-    rows = error_rows(MEASURED, silent, with_noise)
+    rows = rows_of(MEASURED, silent, with_noise)
     assert rows[0].after.value > 1.3 * rows[0].before.value
     assert rows[-1].after.value == pytest.approx(rows[-1].before.value, rel=0.05)
 
 
 def test_a_model_like_the_recording_is_at_the_floor():
     draws = [random_stream(600, seed) for seed in range(30, 42)]
-    row = error_rows(MEASURED, BEFORE, draws)[0]
+    row = rows_of(MEASURED, BEFORE, draws)[0]
     assert row.after.value == pytest.approx(row.floor.value, rel=0.1)
 
 
 def test_no_distance_to_itself():
-    row = error_rows(MEASURED, [MEASURED], [MEASURED, MEASURED])[0]
+    row = rows_of(MEASURED, [MEASURED], [MEASURED, MEASURED])[0]
     assert (row.before.value, row.after.value, row.floor.value) == (0.0, 0.0, 0.0)
 
 
 def test_no_events_at_all_are_at_the_distance_one():
     nothing = random_stream(0)
-    row = error_rows(MEASURED, [nothing], [nothing, nothing])[0]
+    row = rows_of(MEASURED, [nothing], [nothing, nothing])[0]
     assert row.before.value == pytest.approx(1.0)
     assert row.floor.value == 0.0
 
 
 def test_without_a_measured_event_there_is_no_distance():
-    for row in error_rows(random_stream(0), BEFORE, AFTER):
+    for row in rows_of(random_stream(0), BEFORE, AFTER):
         for estimate in (row.before, row.after, row.floor):
             assert np.isnan(estimate.value)
 
