@@ -28,6 +28,7 @@ MANY, SOME = 100, 32
 _OF_SCALES, _OF_MODELS, OF_RECORDINGS, _OF_SHIFTED = 1, 2, 3, 4
 """What simulations stand for, each with draws of its own of what is uncertain in them."""
 _SEEDS = 6
+_LAST_ROUNDS = [range(first, first + _SEEDS) for first in range(21, 57, _SEEDS)]
 _ROUNDS = 4
 _SETTLED = 0.25  # deviations
 _REACH = 0.4
@@ -176,7 +177,7 @@ class Bench:
         state = self.state(joint.config)
         if joint.derivative.size:
             fitter = self.fitter(BOTH, joint.config, sd)
-            fitter.set_covariance(joint, state.models[BOTH].sample, _SEEDS)
+            fitter.set_covariance(joint, state.models[BOTH].sample)
         return dataclasses.replace(state, fits=parted(joint, fits))
 
     def fitted(self, fits: tuple[Fit, ...], sd: Array, view: int) -> Fit:
@@ -187,6 +188,8 @@ class Bench:
             fitter.improve([joint], range(11, 11 + _SEEDS))
             if joint.moved < _SETTLED:
                 break
+        if joint.derivative.size:
+            self.fitter(view, joint.config, sd).refine(joint, _LAST_ROUNDS)
         return joint
 
     def misfit(self, state: State, view: int = BOTH) -> float:

@@ -6,6 +6,10 @@ statistics add up their squares: a fit by that would hardly move, and be called 
 products are formed between different seeds only, which is unbiased, and derivatives are taken over
 wide differences that become narrower from step to step, down to what the data can tell apart.
 
+Near the end, no misfit tells where it is: the events of few simulations leap as keys move, and the
+least of what they make is a matter of chance.  So the last steps are whole ones, not checked, each
+by other simulations, and their mean is taken (stochastic approximation [2]_).
+
 How precise a fit is, is told by simulations of the fitted model: what each would have moved the fit
 by.  That needs no assumption on how statistics go together (sandwich estimator [1]_).
 
@@ -13,6 +17,8 @@ References
 ----------
 .. [1] P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions",
    Proc. 5th Berkeley Symposium, 1967.
+.. [2] B. T. Polyak, A. B. Juditsky, "Acceleration of stochastic approximation by averaging", SIAM
+   J. Control Optim. 30, 1992, doi:10.1137/0330046.
 """
 
 from __future__ import annotations
@@ -34,9 +40,21 @@ Array = NDArray[np.float64]
 WIDE, _NARROW = 0.8, 0.1
 """Reach of the first derivative, and least of any, on the knobs' scales."""
 
+_LAST_REACH = 10.0
+"""Reach of the last derivatives, in deviations of the place: less, and chance is most of them."""
+_OF_LAST_REACHES = (0.02, 0.3)
+"""Least and most, on the knobs' scales."""
+_NEAR = 2.0
+"""Deviations; what is known from before a longer step is not taken into the mean."""
+_IN_THE_MEAN = 3
+"""Last steps that are."""
+_LEAP = 80.0
+"""Of the sum of squares by so few simulations: by more, a step has made it worse."""
+
 _LARGEST_MOVE = 1.2
 _SHARES = (1.0, 0.4)
-_LEAST_SHARE = 0.1  # of the biased normal matrix, of an unbiased one that is used
+_LEAST_SHARE = 0.1
+"""Of the biased normal matrix, of an unbiased one that is used, in every direction."""
 
 
 @dataclass
@@ -64,6 +82,8 @@ class Fit:
     damping : float
     moved : float
         By the last step, at most, in deviations of the place.
+    simulations : int
+        That the place is told by.
     """
 
     candidate: Candidate
@@ -76,6 +96,7 @@ class Fit:
     reach: float = WIDE
     damping: float = 0.05
     moved: float = np.inf
+    simulations: int = 1
 
     @property
     def config(self) -> Config:
@@ -185,9 +206,11 @@ class Fitter:
             columns = []
             for k, place in enumerate(_nudged(fit)):
                 columns.append((next(whites) - here) / (place[k] - fit.place[k]))
-            residual = self._observed - here
-            fit.misfit = float(np.sum(residual.mean(axis=0) ** 2))
-            move = _move(fit, np.array(columns), residual)
+            slope = _Slope.of(np.array(columns), self._observed - here)
+            fit.misfit = float(np.sum((self._observed - here.mean(axis=0)) ** 2))
+            move = _damped(fit, slope)
+            fit.normal, fit.derivative, fit.simulations = slope.normal, slope.derivative, len(seeds)
+            fit.covariance = np.linalg.pinv(slope.normal) * _of_mean(len(seeds))
             trials += [(fit, fit.inside(fit.place + share * move)) for share in _SHARES]
         for fit in fits:
             fit.moved = 0.0
@@ -201,7 +224,61 @@ class Fitter:
                 fit.misfit, fit.place = misfit, place
                 fit.damping = max(fit.damping / 16.0, 1e-3)
 
-    def set_covariance(self, fit: Fit, sample: Array, seeds: int) -> None:
+    def refine(self, fit: Fit, rounds: Sequence[Sequence[int]]) -> None:
+        """Bring a fit that is near its end there.
+
+        Parameters
+        ----------
+        fit : Fit
+            Moved at least once.
+        rounds : sequence of sequence of int
+            Seeds of each step, two at least; not all are taken where it is near at once.
+        """
+        slopes: list[_Slope] = []
+        deviation, trust = fit.deviation, 1.0
+        safe, least = fit.place, np.inf
+        for seeds in rounds:
+            reach = np.clip(_LAST_REACH * deviation, *_OF_LAST_REACHES)
+            slope = self._slope(fit, reach, seeds)
+            if slope.left > least + _LEAP:
+                fit.place, trust = safe, 0.3 * trust
+                slopes.clear()
+                continue
+            safe, least = fit.place, min(least, slope.left)
+            slopes.append(slope)
+            fit.normal = np.asarray(np.mean([slope.normal for slope in slopes], axis=0))
+            fit.derivative = np.asarray(np.mean([slope.derivative for slope in slopes], axis=0))
+            fit.covariance = np.linalg.pinv(fit.normal)
+            fit.simulations = len(seeds) * len(slopes)
+            deviation = fit.deviation
+            move = fit.covariance @ slope.downhill / len(slopes)
+            move *= min(1.0, trust / max(float(np.max(np.abs(move) / reach)), 1e-12))
+            fit.place = fit.inside(fit.place + move)
+            fit.moved = float(np.max(np.abs(fit.place - safe) / deviation))
+            if fit.moved > _NEAR:
+                slopes.clear()
+            elif len(slopes) == _IN_THE_MEAN:
+                break
+        if fit.moved > _NEAR:
+            fit.place = safe  # as far as it is known to be better
+
+    def _slope(self, fit: Fit, reach: Array, seeds: Sequence[int]) -> _Slope:
+        """Return the derivatives of a fit from both sides, and what is left at its place."""
+        ends = []
+        for k, far in enumerate(reach):
+            for side in (far, -far):
+                place = fit.place.copy()
+                place[k] += side
+                ends.append(fit.inside(place))
+        configs = [fit.config, *(fit.moved_to(place) for place in ends)]
+        here, *sides = self._white_of_seeds(configs, seeds)
+        columns = []
+        for k in range(len(reach)):
+            above, below = ends[2 * k : 2 * k + 2]
+            columns.append((sides[2 * k] - sides[2 * k + 1]) / (above[k] - below[k]))
+        return _Slope.of(np.array(columns), self._observed - here)
+
+    def set_covariance(self, fit: Fit, sample: Array) -> None:
         """Note the covariance of a fit's place, as simulations of the fitted model tell it.
 
         Parameters
@@ -210,14 +287,55 @@ class Fitter:
             Moved at least once.
         sample : (simulations, statistics)
             Of the fitted model, in compressed deviations.
-        seeds : int
-            With which the fit was made.
         """
         apart = (sample - sample.mean(axis=0)) @ self._whitening.T
         downhill = apart @ fit.derivative.T
         spread = downhill.T @ downhill / (len(sample) - 1)
         inverse = np.linalg.pinv(fit.normal)
-        fit.covariance = inverse @ spread @ inverse * _of_mean(seeds)
+        fit.covariance = inverse @ spread @ inverse * _of_mean(fit.simulations)
+
+
+@dataclass(frozen=True)
+class _Slope:
+    """How the misfit falls at a place.
+
+    Attributes
+    ----------
+    derivative : (knobs, statistics)
+    normal : (knobs, knobs)
+        Products of derivatives.
+    downhill : (knobs,)
+        Products of derivatives and what is left.
+    left : float
+        Square of what is left.
+    """
+
+    derivative: NDArray[Any]
+    normal: NDArray[Any]
+    downhill: Array
+    left: float
+
+    @classmethod
+    def of(cls, derivative: NDArray[Any], residual: Array) -> _Slope:
+        """Return the slope by the products of different seeds.
+
+        Parameters
+        ----------
+        derivative : (knobs, seeds, statistics)
+        residual : (seeds, statistics)
+        """
+        seeds = len(residual)
+        total, left = derivative.sum(axis=1), residual.sum(axis=0)
+        biased = total @ total.T / seeds**2
+        own = np.einsum("ask,bsk->ab", derivative, derivative)
+        pairs = seeds * (seeds - 1)
+        normal = (total @ total.T - own) / pairs
+        downhill = (total @ left - np.einsum("ask,sk->a", derivative, residual)) / pairs
+        # with few seeds the unbiased matrix may be no matrix of squares at all
+        if np.linalg.eigvalsh(normal - _LEAST_SHARE * biased).min() < 0.0:
+            normal, downhill = biased, total @ left / seeds**2
+        square = float(left @ left - np.sum(residual * residual)) / pairs
+        return cls(total / seeds, normal, downhill, square)
 
 
 def _of_mean(seeds: int) -> float:
@@ -237,28 +355,9 @@ def _nudged(fit: Fit) -> list[Array]:
     return places
 
 
-def _move(fit: Fit, derivative: Array, residual: Array) -> Array:
-    """Return the damped step, and note the covariance of the place.
-
-    Parameters
-    ----------
-    fit : Fit
-    derivative : (knobs, seeds, statistics)
-    residual : (seeds, statistics)
-    """
-    seeds = len(residual)
-    total, left = derivative.sum(axis=1), residual.sum(axis=0)
-    biased = total @ total.T / seeds**2
-    own = np.einsum("ask,bsk->ab", derivative, derivative)
-    pairs = seeds * (seeds - 1)
-    normal = (total @ total.T - own) / pairs
-    downhill = (total @ left - np.einsum("ask,sk->a", derivative, residual)) / pairs
-    # with few seeds the unbiased matrix may be no matrix of squares at all
-    if np.linalg.eigvalsh(normal - _LEAST_SHARE * np.diag(np.diag(biased))).min() < 0.0:
-        normal, downhill = biased, total @ left / seeds**2
-    fit.derivative, fit.normal = total / seeds, normal
-    fit.covariance = np.linalg.pinv(normal) * _of_mean(seeds)
-    damped = normal + np.diag(fit.damping * np.diag(normal) + 1e-6)
-    move = np.linalg.solve(damped, downhill)
+def _damped(fit: Fit, slope: _Slope) -> Array:
+    """Return a step that is shorter where the last ones failed."""
+    damped = slope.normal + np.diag(fit.damping * np.diag(slope.normal) + 1e-6)
+    move = np.linalg.solve(damped, slope.downhill)
     largest = float(np.abs(move).max())
     return np.asarray(move * min(1.0, _LARGEST_MOVE / max(largest, 1e-12)))

@@ -1,6 +1,7 @@
 """Fits on statistics that are smooth functions of the keys: truth, borders, covariance."""
 
 import dataclasses
+import zlib
 
 import numpy as np
 import pytest
@@ -124,7 +125,7 @@ def test_the_covariance_of_simulations_does_not_depend_on_weights():
         places.append(fit.place)
         plain.append(np.diag(fit.covariance))
         sample = laboratory.ensemble(fit.config, range(3000, 3100))[:, VIEW]
-        fitter.set_covariance(fit, fitter.scale.of_values(sample), len(seeds))
+        fitter.set_covariance(fit, fitter.scale.of_values(sample))
         known.append(np.diag(fit.covariance))
     seen = np.std(places, axis=0, ddof=1)
     np.testing.assert_allclose(seen / np.sqrt(np.mean(known, axis=0)), 1.0, atol=0.3)
@@ -223,3 +224,70 @@ def test_the_same_seeds_give_the_same_fit():
     one, two = (fitted(MadeUpLaboratory(), truth, only("leak")) for _ in range(2))
     np.testing.assert_array_equal(one.place, two.place)
     np.testing.assert_array_equal(one.covariance, two.covariance)
+
+
+class LeapingLaboratory(MadeUpLaboratory):
+    """One whose simulations leap as keys move: by other chance at every place."""
+
+    def measure(self, config, seed, beyond=0.0):
+        views = super().measure(config, seed, beyond)
+        leaps = np.random.default_rng([seed, zlib.crc32(repr(config).encode())])
+        return views + leaps.normal(size=views.shape)
+
+
+def rounds(count, seeds=6):
+    return [range(21 + k * seeds, 21 + (k + 1) * seeds) for k in range(count)]
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.9])
+def test_where_simulations_leap_the_end_of_a_fit_and_its_covariance_are_right(alike):
+    """Two knobs, the one of which can be taken for the other in nine parts of ten."""
+    laboratory = LeapingLaboratory()
+    on, off = (laboratory.patterns[f"pixel.thresholds.{side}"] for side in ("on", "off"))
+    laboratory.patterns["pixel.thresholds.off"] = alike * on + np.sqrt(1.0 - alike**2) * off
+    truth = load_config([], ["pixel.thresholds.on=0.25", "pixel.thresholds.off=0.22"])
+    slow = only("thresholds", 2)
+    candidate = QuickThresholds(slow.name, slow.knobs, slow.probes)
+    start, goal = (np.array(candidate.inner(at)) for at in ((0.27, 0.24), (0.25, 0.22)))
+    apart, stated = [], []
+    for k in range(30):
+        fitter = fitter_of(laboratory, laboratory.measure(truth, 6000 + k)[VIEW])
+        fit = Fit(candidate, Config(), start.copy())
+        for _ in range(2):
+            fitter.improve([fit], range(11, 17))
+        fitter.refine(fit, rounds(6))
+        sample = laboratory.ensemble(fit.config, range(3000, 3100))[:, VIEW]
+        fitter.set_covariance(fit, fitter.scale.of_values(sample))
+        apart.append(fit.place - goal)
+        stated.append(fit.deviation)
+    seen = np.std(apart, axis=0, ddof=1)
+    np.testing.assert_allclose(seen / np.mean(stated, axis=0), 1.0, atol=0.3)
+    assert np.all(np.abs(np.mean(apart, axis=0)) < 4.0 * seen / np.sqrt(30))
+
+
+def test_the_last_steps_reach_the_end_from_far_off():
+    laboratory = MadeUpLaboratory(strength=60.0)
+    truth = load_config([], ["pixel.refractory.period_us=4000"])
+    fitter = fitter_of(laboratory, laboratory.measure(truth, 5000)[VIEW])
+    candidate = only("refractory")
+    fit = Fit(candidate, Config(), np.array(candidate.inner((2600.0,))))
+    fitter.improve([fit], (1, 2))
+    fit.place = np.array(candidate.inner((2600.0,)))
+    fitter.refine(fit, rounds(8))
+    assert fit.config.pixel.refractory.period_us == pytest.approx(4000.0, rel=0.05)
+    assert fit.simulations == 18  # those of the way there do not count
+    assert fit.moved < 1.0
+
+
+def test_the_last_steps_end_where_the_mean_is_known_and_stay_in_the_range():
+    knob = Knob("pixel.refractory.period_us", 200.0, 1500.0)
+    candidate = Candidate("refractory", (knob,), ((1000.0,),))
+    laboratory = MadeUpLaboratory()
+    for truth, last in ((1000.0, 18), (4000.0, 12)):
+        config = load_config([], [f"pixel.refractory.period_us={truth}"])
+        fitter = fitter_of(laboratory, laboratory.measure(config, 5000)[VIEW])
+        (fit,) = fitter.probe([candidate], Config(), (1, 2))
+        fitter.improve([fit], (1, 2))
+        fitter.refine(fit, rounds(2 if truth > 1500.0 else 5))
+        assert fit.at_border == (truth > 1500.0)
+        assert fit.simulations == last
