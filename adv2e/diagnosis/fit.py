@@ -69,7 +69,7 @@ class Fit:
     place : (knobs,)
         Best place found, on the knobs' scales.
     misfit : float
-        Sum of squares there.
+        Sum of squares there, as of the last step that was checked by it.
     derivative : (knobs, statistics)
         The last one, of uncorrelated statistics.
     normal : (knobs, knobs)
@@ -252,14 +252,14 @@ class Fitter:
             fit.simulations = len(seeds) * len(slopes)
             deviation = fit.deviation
             move = fit.covariance @ slope.downhill / len(slopes)
-            move *= min(1.0, trust / max(float(np.max(np.abs(move) / reach)), 1e-12))
-            fit.place = fit.inside(fit.place + move)
+            far = float(np.max(np.abs(move) / reach))
+            fit.place = fit.inside(fit.place + move * min(1.0, trust / max(far, 1e-12)))
             fit.moved = float(np.max(np.abs(fit.place - safe) / deviation))
-            if fit.moved > _NEAR:
+            if far > trust or fit.moved > _NEAR:
                 slopes.clear()
             elif len(slopes) == _IN_THE_MEAN:
                 break
-        if fit.moved > _NEAR:
+        if not slopes:
             fit.place = safe  # as far as it is known to be better
 
     def _slope(self, fit: Fit, reach: Array, seeds: Sequence[int]) -> _Slope:

@@ -10,7 +10,7 @@ from made_up_laboratory import STATISTICS, MadeUpLaboratory, candidates
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.fit import Fit, Fitter
+from adv2e.diagnosis.fit import Fit, Fitter, _Slope
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Scale
 
@@ -283,11 +283,44 @@ def test_the_last_steps_end_where_the_mean_is_known_and_stay_in_the_range():
     knob = Knob("pixel.refractory.period_us", 200.0, 1500.0)
     candidate = Candidate("refractory", (knob,), ((1000.0,),))
     laboratory = MadeUpLaboratory()
-    for truth, last in ((1000.0, 18), (4000.0, 12)):
+    for truth, told_by in ((1000.0, 18), (4000.0, 6)):
         config = load_config([], [f"pixel.refractory.period_us={truth}"])
         fitter = fitter_of(laboratory, laboratory.measure(config, 5000)[VIEW])
         (fit,) = fitter.probe([candidate], Config(), (1, 2))
         fitter.improve([fit], (1, 2))
-        fitter.refine(fit, rounds(2 if truth > 1500.0 else 5))
+        fitter.refine(fit, rounds(5))
         assert fit.at_border == (truth > 1500.0)
-        assert fit.simulations == last
+        assert fit.simulations == told_by
+
+
+class ToldFitter(Fitter):
+    """One that is told what is left, and where it falls, instead of simulating."""
+
+    def __init__(self, told):
+        self._told, self.seen = iter(told), []
+
+    def _slope(self, fit, reach, seeds):
+        downhill, left = next(self._told)
+        self.seen.append(float(fit.place[0]))
+        return _Slope(np.ones((1, 3)), np.array([[400.0]]), np.array([downhill]), left)
+
+
+@pytest.mark.parametrize(
+    ("told", "seen", "last"),
+    [
+        # far worse: taken back, and a shorter step from there
+        ([(400.0, 900.0), (0.0, 1500.0), (200.0, 880.0)], [0.0, 0.3, 0.0], 0.0),
+        # not far enough to be sure
+        ([(400.0, 900.0), (-20.0, 950.0), (0.0, 900.0)], [0.0, 0.3, 0.25], 0.25),
+        # still on its way at the end: not as far as the last step, which nobody has seen
+        ([(400.0, 900.0), (400.0, 700.0), (400.0, 500.0)], [0.0, 0.3, 0.6], 0.6),
+        # one that is near: steps of whole, half and third weight
+        ([(20.0, 30.0), (20.0, 20.0), (20.0, 25.0)], [0.0, 0.05, 0.075], 0.05 * 11 / 6),
+    ],
+)
+def test_last_steps(told, seen, last):
+    fitter = ToldFitter(told)
+    fit = Fit(only("leak"), Config(), np.zeros(1), covariance=np.array([[0.0025]]))
+    fitter.refine(fit, rounds(len(told)))
+    assert fitter.seen == pytest.approx(seen)
+    assert fit.place == pytest.approx([last])
