@@ -6,8 +6,8 @@ strong effects may hide one another: a second is looked for on top of the best, 
 likeliest pairs are fitted together.
 That goes on until chance can make what is left, or nothing holds.  What is small beside an effect
 may be due to its fit: another is added for it only if it explains most of it.  Then backward: what
-is no longer needed is dropped.  Where something is left all the same, others are tried in the place
-of each effect that was added while more was missing, and it goes on from there.
+is no longer needed is dropped.  Where something is left beside several effects, others are tried in
+the place of each that was added while more was missing, before one more is.
 """
 
 from __future__ import annotations
@@ -151,11 +151,6 @@ class Search:
         state = self.declared
         self.bench.log(f"declared model: probability of the residual {self.probability(state):.2g}")
         state = self._backward(self._forward(state))
-        while self._may_be_wrong(state):
-            other = self._with_another(state)
-            if other is None:
-                break
-            state = self._backward(self._forward(other))
         held = self.bench.rejections.held
         rejected = {name: why for name, why in held.items() if name not in state.names}
         return Outcome(
@@ -168,8 +163,17 @@ class Search:
         )
 
     def _forward(self, state: State) -> State:
-        """Return the model with effects more, until nothing is left or nothing holds."""
-        while self._is_open(state) and len(state.fits) < MOST_EFFECTS:
+        """Return the model with effects more, until nothing is left or nothing holds.
+
+        What explains more with as many effects goes before what does with one more.
+        """
+        while True:
+            other = self._with_another(state) if self._may_be_wrong(state) else None
+            if other is not None:
+                state = other
+                continue
+            if not self._is_open(state) or len(state.fits) >= MOST_EFFECTS:
+                break
             grown = self._grown(state)
             if grown is None or not self._is_worth_it(state, grown):
                 break
