@@ -10,6 +10,7 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import Bench, State, parted
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations, scored
+from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
 
@@ -41,6 +42,11 @@ class Attempt:
     def physical(self) -> bool:
         """It gains, within the range of what is physical, though something may stand out."""
         return not {BORDER, BY_CHANCE} & set(self.objections)
+
+
+def knobs_of(fits: Sequence[Fit]) -> int:
+    """Return the number of knobs that fits have together."""
+    return sum(len(fit.candidate.knobs) for fit in fits)
 
 
 @dataclass(frozen=True)
@@ -122,10 +128,7 @@ class Attempts:
         ]
         if not holding:
             return None
-        knobs = [sum(len(fit.candidate.knobs) for fit in one.beyond(state)) for one in holding]
-        scores = [
-            scored(self.bench, one.models, free) for one, free in zip(holding, knobs, strict=True)
-        ]
+        scores = [scored(self.bench, one.models, knobs_of(one.beyond(state))) for one in holding]
         best = max(scores)
         chosen = holding[scores.index(best)]
         alike: set[str] = set()

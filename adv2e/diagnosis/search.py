@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.attempts import CATCHES_UP, CLOSE, Attempt, Attempts
+from adv2e.diagnosis.attempts import CATCHES_UP, CLOSE, Attempt, Attempts, knobs_of
 from adv2e.diagnosis.bench import MANY, Bench, State
 from adv2e.diagnosis.candidates import FITTED, Candidate, Knob
 from adv2e.diagnosis.finalists import Trial, scored
@@ -300,9 +300,7 @@ class Search:
             self.bench.log(f"in the place of {name}:")
             trials = self.attempts.trials(rest, besides=[name])
             other = self.attempts.best(self.attempts.of_one(rest, trials, [rest, state]), rest)
-            if other is None:
-                continue
-            if self._is_better(other, state):
+            if other is not None and self._is_better(other, state):
                 why = f"does less than {other.names[-1]} in its place"
                 reasons.add(fit, why, final=True)
                 self.bench.log(f"replaced {name} by {other.names[-1]}")
@@ -315,11 +313,10 @@ class Search:
 
         Of what may be the fit's, it must take away most.
         """
-        scores = []
-        for one in (other, state):
-            knobs = sum(len(fit.candidate.knobs) for fit in one.fits)
-            scores.append(scored(self.bench, one.models, knobs))
-        if scores[0] <= scores[1] + CLOSE:
+        better, worse = (
+            scored(self.bench, one.models, knobs_of(one.fits)) for one in (other, state)
+        )
+        if better <= worse + CLOSE:
             return False
         share = self._taken_away(state, other)
         return self._is_something_left(state) or share >= _MOST_OF_THE_FIT
