@@ -44,6 +44,8 @@ _LAST_REACH = 10.0
 """Reach of the last derivatives, in deviations of the place: less, and chance is most of them."""
 _OF_LAST_REACHES = (0.02, 0.3)
 """Least and most, on the knobs' scales."""
+_CLIFF = 10.0
+"""Square of the changes on one side over that on the other, from which one is no slope."""
 _NEAR = 2.0
 """Deviations; what is known from before a longer step is not taken into the mean."""
 _IN_THE_MEAN = 3
@@ -235,48 +237,53 @@ class Fitter:
             Seeds of each step, two at least; not all are taken where it is near at once.
         """
         slopes: list[_Slope] = []
-        deviation, trust = fit.deviation, 1.0
+        gentler: list[_Slope] = []
+        axes, trust = _Axes.of(fit.normal), 1.0
         safe, least = fit.place, np.inf
         for seeds in rounds:
-            reach = np.clip(_LAST_REACH * deviation, *_OF_LAST_REACHES)
-            slope = self._slope(fit, reach, seeds)
+            slope, gentle = self._slopes(fit, axes, seeds)
             if slope.left > least + _LEAP:
                 fit.place, trust = safe, 0.3 * trust
                 slopes.clear()
                 continue
             safe, least = fit.place, min(least, slope.left)
             slopes.append(slope)
-            fit.normal = np.asarray(np.mean([slope.normal for slope in slopes], axis=0))
-            fit.derivative = np.asarray(np.mean([slope.derivative for slope in slopes], axis=0))
-            fit.covariance = np.linalg.pinv(fit.normal)
-            fit.simulations = len(seeds) * len(slopes)
-            deviation = fit.deviation
-            move = fit.covariance @ slope.downhill / len(slopes)
-            far = float(np.max(np.abs(move) / reach))
+            gentler = [*gentler, gentle][-len(slopes) :]
+            normal = np.asarray(np.mean([slope.normal for slope in slopes], axis=0))
+            move = np.linalg.pinv(normal) @ slope.downhill / len(slopes)
+            far = float(np.max(np.abs(axes.along(move)) / axes.reach))
+            axes = _Axes.of(normal)
             fit.place = fit.inside(fit.place + move * min(1.0, trust / max(far, 1e-12)))
-            fit.moved = float(np.max(np.abs(fit.place - safe) / deviation))
+            fit.moved = float(np.max(np.abs(axes.along(fit.place - safe)) / axes.deviation))
+            fit.simulations = len(seeds) * len(slopes)
             if far > trust or fit.moved > _NEAR:
                 slopes.clear()
             elif len(slopes) == _IN_THE_MEAN:
                 break
         if not slopes:
             fit.place = safe  # as far as it is known to be better
+        fit.normal = np.asarray(np.mean([slope.normal for slope in gentler], axis=0))
+        fit.derivative = np.asarray(np.mean([slope.derivative for slope in gentler], axis=0))
+        fit.covariance = np.linalg.pinv(fit.normal)
 
-    def _slope(self, fit: Fit, reach: Array, seeds: Sequence[int]) -> _Slope:
-        """Return the derivatives of a fit from both sides, and what is left at its place."""
-        ends = []
-        for k, far in enumerate(reach):
-            for side in (far, -far):
-                place = fit.place.copy()
-                place[k] += side
-                ends.append(fit.inside(place))
-        configs = [fit.config, *(fit.moved_to(place) for place in ends)]
-        here, *sides = self._white_of_seeds(configs, seeds)
-        columns = []
-        for k in range(len(reach)):
-            above, below = ends[2 * k : 2 * k + 2]
-            columns.append((sides[2 * k] - sides[2 * k + 1]) / (above[k] - below[k]))
-        return _Slope.of(np.array(columns), self._observed - here)
+    def _slopes(self, fit: Fit, axes: _Axes, seeds: Sequence[int]) -> tuple[_Slope, _Slope]:
+        """Return the slope at a fit's place by both sides of it, and by the gentler ones."""
+        steps = axes.reach[:, None] * axes.directions
+        ends = [[fit.inside(fit.place + side * step) for step in steps] for side in (1, -1)]
+        configs = [fit.moved_to(place) for place in (fit.place, *ends[0], *ends[1])]
+        here, *others = self._white_of_seeds(configs, seeds)
+        sides = list(zip(others[: len(steps)], others[len(steps) :], strict=True))
+        # one end may lie at the border of what is physical, beside the axis
+        inverse = np.linalg.pinv(np.array(ends[0]) - np.array(ends[1]))
+
+        def of(differences: list[Array]) -> _Slope:
+            derivative = np.tensordot(inverse, np.array(differences), axes=1)
+            return _Slope.of(derivative, self._observed - here)
+
+        return (
+            of([above - below for above, below in sides]),
+            of([_gentler(above - here, here - below) for above, below in sides]),
+        )
 
     def set_covariance(self, fit: Fit, sample: Array) -> None:
         """Note the covariance of a fit's place, as simulations of the fitted model tell it.
@@ -293,6 +300,37 @@ class Fitter:
         spread = downhill.T @ downhill / (len(sample) - 1)
         inverse = np.linalg.pinv(fit.normal)
         fit.covariance = inverse @ spread @ inverse * _of_mean(fit.simulations)
+
+
+@dataclass(frozen=True)
+class _Axes:
+    """Directions in which a place is known, each independently of the others.
+
+    Keys that go together, such as two times of which the sum shows, are known far better in some
+    directions than each by itself.
+
+    Attributes
+    ----------
+    directions : (knobs, knobs)
+        One a row.
+    deviation, reach : (knobs,)
+        Of the place, and of the last derivatives, along each.
+    """
+
+    directions: NDArray[Any]
+    deviation: Array
+    reach: Array
+
+    @classmethod
+    def of(cls, normal: NDArray[Any]) -> _Axes:
+        """Return the axes of a normal matrix."""
+        squares, columns = np.linalg.eigh(normal)
+        deviation = 1.0 / np.sqrt(np.maximum(squares, 1e-12))
+        return cls(columns.T, deviation, np.clip(_LAST_REACH * deviation, *_OF_LAST_REACHES))
+
+    def along(self, move: Array) -> Array:
+        """Return the parts of a move along each direction."""
+        return np.asarray(self.directions @ move)
 
 
 @dataclass(frozen=True)
@@ -336,6 +374,22 @@ class _Slope:
             normal, downhill = biased, total @ left / seeds**2
         square = float(left @ left - np.sum(residual * residual)) / pairs
         return cls(total / seeds, normal, downhill, square)
+
+
+def _gentler(above: Array, below: Array) -> Array:
+    """Return the change from one end to the other, by one side where the other is a cliff.
+
+    A place is as uncertain as it is towards the side where little changes.
+
+    Parameters
+    ----------
+    above, below : (seeds, statistics)
+        Changes from the place to one end, and from the other to the place.
+    """
+    squares = [float(np.sum(side.mean(axis=0) ** 2)) for side in (above, below)]
+    if max(squares) < _CLIFF * min(squares):
+        return above + below
+    return 2.0 * (above if squares[0] < squares[1] else below)
 
 
 def _of_mean(seeds: int) -> float:

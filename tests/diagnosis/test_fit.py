@@ -299,10 +299,11 @@ class ToldFitter(Fitter):
     def __init__(self, told):
         self._told, self.seen = iter(told), []
 
-    def _slope(self, fit, reach, seeds):
+    def _slopes(self, fit, axes, seeds):
         downhill, left = next(self._told)
         self.seen.append(float(fit.place[0]))
-        return _Slope(np.ones((1, 3)), np.array([[400.0]]), np.array([downhill]), left)
+        slope = _Slope(np.ones((1, 3)), np.array([[400.0]]), np.array([downhill]), left)
+        return slope, slope
 
 
 @pytest.mark.parametrize(
@@ -320,7 +321,55 @@ class ToldFitter(Fitter):
 )
 def test_last_steps(told, seen, last):
     fitter = ToldFitter(told)
-    fit = Fit(only("leak"), Config(), np.zeros(1), covariance=np.array([[0.0025]]))
+    fit = Fit(only("leak"), Config(), np.zeros(1), normal=np.array([[400.0]]))
     fitter.refine(fit, rounds(len(told)))
     assert fitter.seen == pytest.approx(seen)
     assert fit.place == pytest.approx([last])
+
+
+class FormulaFitter(Fitter):
+    """One whose statistics are a formula of the arbiter's two times, with chance."""
+
+    def __init__(self, formula, truth):
+        self.formula, self.asked = formula, []
+        self._observed = np.array(formula(*np.log(truth)))
+
+    def _white_of_seeds(self, configs, seeds):
+        times = [np.log([c.readout.arbiter.event_ns, c.readout.arbiter.row_ns]) for c in configs]
+        self.asked.append(np.array(times))
+        chance = [np.random.default_rng(seed).normal(size=len(self._observed)) for seed in seeds]
+        return np.array([[self.formula(*of) + one for one in chance] for of in times])
+
+
+def arbiter_at(event_ns, row_ns, normal):
+    candidate = only("readout")
+    return Fit(candidate, Config(), np.array(candidate.inner((event_ns, row_ns))), normal=normal)
+
+
+def test_keys_that_go_together_are_refined_along_what_is_known():
+    def formula(event, row):  # a statistic is as far off as it can be where the sum is by 10 %
+        return [30.0 * np.tanh(20.0 * (event + row - 17.0)), 4.0 * (event - row)]
+
+    both, one = np.array([1.0, 1.0]), np.array([1.0, -1.0])
+    known = 400.0**2 * np.outer(both, both) + 4.0**2 * np.outer(one, one)
+    truth = np.exp([8.6, 8.4])
+    fitter, fit = FormulaFitter(formula, truth), arbiter_at(1.02 * truth[0], 0.99 * truth[1], known)
+    fitter.refine(fit, rounds(6))
+    assert fit.place.sum() == pytest.approx(17.0, abs=0.005)
+    assert fit.place == pytest.approx([8.6, 8.4], abs=0.1)
+    asked = np.concatenate(fitter.asked)
+    # far along the difference, and no farther along the sum than it is known
+    assert np.abs(np.diff(asked)).max() > 0.5
+    assert np.abs(asked.sum(axis=1) - 17.0).max() < 0.1
+
+
+def test_beside_a_cliff_the_gentler_side_tells_how_precise_a_fit_is():
+    def formula(event, row):
+        beyond = event - 8.5
+        return [5.0 * beyond + (300.0 * beyond if beyond > 0 else 0.0), 50.0 * (row - 9.0)]
+
+    truth = np.exp([8.5, 9.0])
+    fitter, fit = FormulaFitter(formula, truth), arbiter_at(*truth, np.diag([25.0, 2500.0]))
+    fitter.refine(fit, rounds(3))
+    assert 0.1 < fit.deviation[0] < 0.3  # one by five on this side, by 155 for both
+    assert fit.deviation[1] == pytest.approx(1 / 50.0, rel=0.1)
