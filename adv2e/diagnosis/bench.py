@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -206,10 +207,13 @@ def _joined(fits: tuple[Fit, ...], declared: Config, free: tuple[Knob, ...]) -> 
     knobs = (*(knob for fit in fits for knob in fit.candidate.knobs), *free)
     extra = tuple(pair for fit in fits for pair in fit.candidate.extra)
     defaults = tuple(pair for fit in fits for pair in fit.candidate.defaults)
+    known = tuple(pair for fit in fits for pair in fit.candidate.known_or_not)
+    known += ((0.0, math.inf),) * len(free)
     name = " and ".join(fit.candidate.name for fit in fits)
     unknown = [knob.inner(neutral_value(declared, knob)) for knob in free]
     place = np.concatenate([*(fit.place for fit in fits), unknown])
-    return Fit(Candidate(name, knobs, (), extra, defaults), declared, place, reach=_REACH)
+    joint = Candidate(name, knobs, (), extra, defaults, known=known)
+    return Fit(joint, declared, place, reach=_REACH)
 
 
 def parted(joint: Fit, fits: tuple[Fit, ...]) -> tuple[Fit, ...]:

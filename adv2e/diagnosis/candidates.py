@@ -88,6 +88,9 @@ class Candidate:
     left : float
         Share of the residual that is put down to the fit where the model has this effect: more of
         those that undo what cannot be undone in full.
+    known : tuple of (float, float)
+        Of each knob, where on its scale something else than the statistics says that it is, and its
+        standard deviation; none: nothing else tells.
     """
 
     name: str
@@ -96,6 +99,12 @@ class Candidate:
     extra: tuple[tuple[str, Any], ...] = ()
     defaults: tuple[tuple[str, Any], ...] = ()
     left: float = FITTED
+    known: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def known_or_not(self) -> tuple[tuple[float, float], ...]:
+        """What is known of every knob: nothing is an infinite deviation."""
+        return self.known or ((0.0, math.inf),) * len(self.knobs)
 
     def inner(self, values: Sequence[float]) -> list[float]:
         """Return where on the fitted scales values of the knobs are."""

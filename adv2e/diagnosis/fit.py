@@ -75,7 +75,7 @@ class Fit:
     derivative : (knobs, statistics)
         The last one, of uncorrelated statistics.
     normal : (knobs, knobs)
-        Of the last step.
+        Of the last step, with what is known of the place besides.
     covariance : (knobs, knobs)
         Of the place; from the last step, as if statistics were as uncorrelated as they are taken
         to be, until :meth:`Fitter.set_covariance` is called.
@@ -113,6 +113,15 @@ class Fit:
         """Return `place` within the physical ranges."""
         knobs = self.candidate.knobs
         return np.array([k.inner(k.outer(p)) for k, p in zip(knobs, place, strict=True)])
+
+    @property
+    def certainty(self) -> Array:
+        """Precision of what is known of each number of the place besides, (knobs,)."""
+        return np.array([sd**-2.0 for _, sd in self.candidate.known_or_not])
+
+    def amiss(self, place: Array) -> Array:
+        """Return how far a place is from what is known of it besides, (knobs,)."""
+        return place - [known for known, _ in self.candidate.known_or_not]
 
     @property
     def deviation(self) -> Array:
@@ -175,16 +184,21 @@ class Fitter:
         means = self.whites(configs, seeds)
         best: dict[int, Fit] = {}
         for (candidate, place), mean in zip(places, means, strict=True):
-            misfit = float(np.sum((self._observed - mean) ** 2))
+            fit = Fit(candidate, base, place)
+            fit.misfit = self._misfit(fit, place, mean)
             held = best.get(id(candidate))
-            if held is None or misfit < held.misfit:
-                best[id(candidate)] = Fit(candidate, base, place, misfit)
+            if held is None or fit.misfit < held.misfit:
+                best[id(candidate)] = fit
         return [best[id(candidate)] for candidate in candidates]
 
     def misfit(self, config: Config, seeds: Sequence[int]) -> float:
         """Return the sum of squares of a model as it is."""
         mean = self.whites([config], seeds)[0]
         return float(np.sum((self._observed - mean) ** 2))
+
+    def _misfit(self, fit: Fit, place: Array, mean: Array) -> float:
+        """Return the sum of squares of a fit elsewhere, from its mean statistics there."""
+        return float(np.sum((self._observed - mean) ** 2)) + _penalty(fit, place)
 
     def improve(self, fits: Sequence[Fit], seeds: Sequence[int]) -> None:
         """Move every fit by one step, all of them with one batch of simulations for each half.
@@ -208,8 +222,8 @@ class Fitter:
             columns = []
             for k, place in enumerate(_nudged(fit)):
                 columns.append((next(whites) - here) / (place[k] - fit.place[k]))
-            slope = _Slope.of(np.array(columns), self._observed - here)
-            fit.misfit = float(np.sum((self._observed - here.mean(axis=0)) ** 2))
+            slope = _Slope.of(fit, np.array(columns), self._observed - here)
+            fit.misfit = self._misfit(fit, fit.place, here.mean(axis=0))
             move = _damped(fit, slope)
             fit.normal, fit.derivative, fit.simulations = slope.normal, slope.derivative, len(seeds)
             fit.covariance = np.linalg.pinv(slope.normal) * _of_mean(len(seeds))
@@ -220,7 +234,7 @@ class Fitter:
             fit.reach = max(0.5 * fit.reach, _NARROW)
         means = self.whites([fit.moved_to(place) for fit, place in trials], seeds)
         for (fit, place), mean in zip(trials, means, strict=True):
-            misfit = float(np.sum((self._observed - mean) ** 2))
+            misfit = self._misfit(fit, place, mean)
             if misfit < fit.misfit:
                 fit.moved = float(np.max(np.abs(place - fit.place) / fit.deviation))
                 fit.misfit, fit.place = misfit, place
@@ -278,7 +292,7 @@ class Fitter:
 
         def of(differences: list[Array]) -> _Slope:
             derivative = np.tensordot(inverse, np.array(differences), axes=1)
-            return _Slope.of(derivative, self._observed - here)
+            return _Slope.of(fit, derivative, self._observed - here)
 
         return (
             of([above - below for above, below in sides]),
@@ -297,7 +311,7 @@ class Fitter:
         """
         apart = (sample - sample.mean(axis=0)) @ self._whitening.T
         downhill = apart @ fit.derivative.T
-        spread = downhill.T @ downhill / (len(sample) - 1)
+        spread = downhill.T @ downhill / (len(sample) - 1) + np.diag(fit.certainty)
         inverse = np.linalg.pinv(fit.normal)
         fit.covariance = inverse @ spread @ inverse * _of_mean(fit.simulations)
 
@@ -341,11 +355,11 @@ class _Slope:
     ----------
     derivative : (knobs, statistics)
     normal : (knobs, knobs)
-        Products of derivatives.
+        Products of derivatives, with what is known of the place besides.
     downhill : (knobs,)
-        Products of derivatives and what is left.
+        Products of derivatives and what is left, likewise.
     left : float
-        Square of what is left.
+        Square of what is left, likewise.
     """
 
     derivative: NDArray[Any]
@@ -354,11 +368,13 @@ class _Slope:
     left: float
 
     @classmethod
-    def of(cls, derivative: NDArray[Any], residual: Array) -> _Slope:
+    def of(cls, fit: Fit, derivative: NDArray[Any], residual: Array) -> _Slope:
         """Return the slope by the products of different seeds.
 
         Parameters
         ----------
+        fit : Fit
+            At the place.
         derivative : (knobs, seeds, statistics)
         residual : (seeds, statistics)
         """
@@ -373,7 +389,10 @@ class _Slope:
         if np.linalg.eigvalsh(normal - _LEAST_SHARE * biased).min() < 0.0:
             normal, downhill = biased, total @ left / seeds**2
         square = float(left @ left - np.sum(residual * residual)) / pairs
-        return cls(total / seeds, normal, downhill, square)
+        amiss = fit.amiss(fit.place)
+        normal = normal + np.diag(fit.certainty)
+        downhill = downhill - fit.certainty * amiss
+        return cls(total / seeds, normal, downhill, square + _penalty(fit, fit.place))
 
 
 def _gentler(above: Array, below: Array) -> Array:
@@ -390,6 +409,11 @@ def _gentler(above: Array, below: Array) -> Array:
     if max(squares) < _CLIFF * min(squares):
         return above + below
     return 2.0 * (above if squares[0] < squares[1] else below)
+
+
+def _penalty(fit: Fit, place: Array) -> float:
+    """Return the square of how far a place is from what is known of it besides."""
+    return float(np.sum(fit.certainty * fit.amiss(place) ** 2))
 
 
 def _of_mean(seeds: int) -> float:

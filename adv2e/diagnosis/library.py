@@ -18,7 +18,7 @@ from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.keys import known_keys, user_effects
 from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.stamps import service_times, tick_of
+from adv2e.diagnosis.stamps import SERVICE_SD_NS, service_times, tick_of
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,8 @@ class Hints:
     encoding : str
         What ``frames.encoding: auto`` means for the frames.
     service_ns : (float, float), optional
-        Times that an event and a row take, where stamps look as if they had waited for a channel.
+        Times that an event and a row take, where stamps look as if they had waited for a channel;
+        known to :data:`adv2e.diagnosis.stamps.SERVICE_SD_NS`.
     """
 
     seconds: float
@@ -215,14 +216,7 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
             (amplitude, tau),
             ((0.05, 300.0), (-0.05, 300.0), (0.05, 1200.0), (0.15, 300.0)),
         ),
-        Candidate(
-            "readout",
-            (Knob("readout.arbiter.event_ns", 1.0, 1e6), Knob("readout.arbiter.row_ns", 1.0, 1e7)),
-            (
-                *((300.0, 3000.0), (2000.0, 10000.0), (3000.0, 30000.0)),
-                *([hints.service_ns] if hints.service_ns else []),
-            ),
-        ),
+        _arbiter(hints.service_ns),
         Candidate(
             "event_loss",
             (Knob("readout.loss.fraction", 1e-3, 0.95, False, 0.1),),
@@ -233,6 +227,18 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
         tick = ("readout.tick_us", float(hints.tick_us))
         made.append(Candidate("timestamp_tick", (), ((),), (tick,)))
     return made
+
+
+def _arbiter(service_ns: tuple[float, float] | None) -> Candidate:
+    """Return the readout with its two times, which stamps may tell far better than statistics."""
+    times = Knob("readout.arbiter.event_ns", 1.0, 1e6), Knob("readout.arbiter.row_ns", 1.0, 1e7)
+    probes = ((300.0, 3000.0), (2000.0, 10000.0), (3000.0, 30000.0))
+    if service_ns is None:
+        return Candidate("readout", times, probes)
+    known = tuple(
+        (knob.inner(ns), SERVICE_SD_NS / ns) for knob, ns in zip(times, service_ns, strict=True)
+    )
+    return Candidate("readout", times, (*probes, service_ns), known=known)
 
 
 def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:

@@ -328,10 +328,11 @@ def test_last_steps(told, seen, last):
 
 
 class FormulaFitter(Fitter):
-    """One whose statistics are a formula of the arbiter's two times, with chance."""
+    """One whose two statistics are a formula of the arbiter's times, with chance."""
 
     def __init__(self, formula, truth):
         self.formula, self.asked = formula, []
+        self._whitening = np.eye(2)
         self._observed = np.array(formula(*np.log(truth)))
 
     def _white_of_seeds(self, configs, seeds):
@@ -373,3 +374,34 @@ def test_beside_a_cliff_the_gentler_side_tells_how_precise_a_fit_is():
     fitter.refine(fit, rounds(3))
     assert 0.1 < fit.deviation[0] < 0.3  # one by five on this side, by 155 for both
     assert fit.deviation[1] == pytest.approx(1 / 50.0, rel=0.1)
+
+
+def test_what_is_known_besides_counts_as_a_measurement_of_its_own():
+    def formula(event, row):  # says where the first is, to 0.1, and little of the second
+        return [10.0 * event, 0.01 * row]
+
+    place = np.array([8.5, 9.0])
+    known = ((8.7, 0.1), (9.3, 0.05))
+    candidate = dataclasses.replace(only("readout"), known=known)
+    fit = Fit(candidate, Config(), place, normal=np.diag([200.0, 400.0]))
+    fitter = FormulaFitter(formula, np.exp(place))
+    fitter.refine(fit, rounds(6))
+    assert fit.place == pytest.approx([8.6, 9.3], abs=0.03)
+    assert fit.deviation == pytest.approx([0.1 / np.sqrt(2.0), 0.05], rel=0.15)
+    chance = np.random.default_rng(1).normal(size=(4000, 2))
+    fitter.set_covariance(fit, chance)
+    told = 0.1 * np.sqrt((1.0 + 1.0 / fit.simulations) / 2.0)
+    assert fit.deviation == pytest.approx([told, 0.05], rel=0.05)
+
+
+def test_no_step_goes_far_from_what_is_known_for_nothing():
+    def formula(event, row):
+        return [event, row]
+
+    candidate = dataclasses.replace(only("readout"), known=((8.5, 0.01), (9.0, 0.01)))
+    fitter = FormulaFitter(formula, np.exp([9.5, 8.0]))
+    (fit,) = fitter.probe([candidate], Config(), (1, 2))
+    assert fit.misfit > 1e3  # far from what is known, where every probe is
+    for _ in range(6):
+        fitter.improve([fit], (1, 2))
+    assert fit.place == pytest.approx([8.5, 9.0], abs=0.02)

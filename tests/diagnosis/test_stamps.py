@@ -8,7 +8,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.library import Hints, hints_of, library
-from adv2e.diagnosis.stamps import service_times, tick_of
+from adv2e.diagnosis.stamps import SERVICE_SD_NS, service_times, tick_of
 
 SIDE = 48
 
@@ -78,8 +78,7 @@ def test_times_of_an_arbiter(event_us, row_us, busy):
     stream = read_out(*requests((event_us + row_us) / busy), event_us, row_us)
     found = service_times(stream)
     assert found is not None
-    assert sum(found) == pytest.approx(1e3 * (event_us + row_us), abs=300.0)
-    assert found[0] == pytest.approx(1e3 * event_us, abs=300.0)
+    assert found == pytest.approx((1e3 * event_us, 1e3 * row_us), abs=1.5 * SERVICE_SD_NS)
 
 
 @pytest.mark.parametrize("tick", [1, 10, 500])
@@ -94,9 +93,15 @@ def test_all_events_of_one_row():
     assert service_times(stream_of(t, x, 0, 1, SIDE, SIDE)) is None
 
 
-def test_a_fit_starts_there():
-    def probes(hint):
-        made = library(Config(), Hints(1.0, (), 1, service_ns=hint))
-        return next(one for one in made if one.name == "readout").probes
+def readout(hint):
+    made = library(Config(), Hints(1.0, (), 1, service_ns=hint))
+    return next(one for one in made if one.name == "readout")
 
-    assert probes((700.0, 8000.0)) == (*probes(None), (700.0, 8000.0))
+
+def test_a_fit_starts_there_and_stays_near():
+    hinted, plain = readout((700.0, 8000.0)), readout(None)
+    assert hinted.probes == (*plain.probes, (700.0, 8000.0))
+    for (place, sd), knob, ns in zip(hinted.known, hinted.knobs, (700.0, 8000.0), strict=True):
+        assert knob.outer(place) == pytest.approx(ns)
+        assert knob.outer(place + sd) - ns == pytest.approx(SERVICE_SD_NS, rel=0.05)
+    assert not plain.known
