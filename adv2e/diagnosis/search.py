@@ -6,8 +6,8 @@ strong effects may hide one another: a second is looked for on top of the best, 
 likeliest pairs are fitted together.
 That goes on until chance can make what is left, or nothing holds.  What is small beside an effect
 may be due to its fit: another is added for it only if it explains most of it.  Then backward: what
-is no longer needed is dropped.  Where something is left beside several effects, others are tried in
-the place of each that was added while more was missing, before one more is.
+is no longer needed is dropped.  Where something is left beside two effects, others are tried in the
+place of the first, which was added while more was missing, before a third is.
 """
 
 from __future__ import annotations
@@ -199,8 +199,11 @@ class Search:
         return _is_undone(state) and self.probability(state) < _OF_FITS
 
     def _may_be_wrong(self, state: State) -> bool:
-        """Tell whether others are tried in the place of the effects that were added."""
-        if len(state.fits) < 2 or self.probability(state) >= PER_LOOK:
+        """Tell whether another is tried in the place of the first of two effects.
+
+        Of more, each takes as long as the whole search for another effect.
+        """
+        if len(state.fits) != 2 or self.probability(state) >= PER_LOOK:
             return False
         return self._is_something_left(state) or _is_undone(state)
 
@@ -287,24 +290,21 @@ class Search:
         return state
 
     def _with_another(self, state: State) -> State | None:
-        """Return the model with another effect in the place of one of those that were added.
+        """Return the model with another effect in the place of the one that was added first.
 
-        Each but the last was chosen while others were missing, whose part it may have taken.
-        Another has to hold on top of the rest, and instead of the one.
+        That was chosen while others were missing, whose part it may have taken.  Another has to
+        hold on top of the rest, and instead of the one.
         """
-        reasons = self.bench.rejections
-        held = dict(reasons.held)
-        for fit in state.fits[:-1]:
-            name = fit.candidate.name
-            rest = self._without(state, fit)
-            self.bench.log(f"in the place of {name}:")
-            trials = self.attempts.trials(rest, besides=[name])
-            other = self.attempts.best(self.attempts.of_one(rest, trials, [rest, state]), rest)
-            if other is not None and self._is_better(other, state):
-                why = f"does less than {other.names[-1]} in its place"
-                reasons.add(fit, why, final=True)
-                self.bench.log(f"replaced {name} by {other.names[-1]}")
-                return other
+        reasons, first = self.bench.rejections, state.fits[0]
+        held, name = dict(reasons.held), first.candidate.name
+        rest = self._without(state, first)
+        self.bench.log(f"in the place of {name}:")
+        trials = self.attempts.trials(rest, besides=[name])
+        other = self.attempts.best(self.attempts.of_one(rest, trials, [rest, state]), rest)
+        if other is not None and self._is_better(other, state):
+            reasons.add(first, f"does less than {other.names[-1]} in its place", final=True)
+            self.bench.log(f"replaced {name} by {other.names[-1]}")
+            return other
         reasons.held = held  # of what does not go on top of the model that is kept
         return None
 
