@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.bench import Bench, State, parted
+from adv2e.diagnosis.bench import MANY, SOME, Bench, State, likely_of_a_fit, parted
 from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.finalists import Trial, finalists, likely_simulations, scored
+from adv2e.diagnosis.finalists import Trial, finalists, likely_of_finalists, scored
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
 
-_TRIED = 4
+_TRIED, _LIKELY_TRIED = 4, 2
 CATCHES_UP = 60.0
 """Log likelihood that a fit may gain when it is brought to its end."""
 CLOSE = 5.0
@@ -49,6 +49,20 @@ def knobs_of(fits: Sequence[Fit]) -> int:
     return sum(len(fit.candidate.knobs) for fit in fits)
 
 
+def likely_of_a_round(candidates: Sequence[Candidate], fits: Sequence[Fit]) -> int:
+    """Return about how many simulations it takes to add an effect to others.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        Those that compete.
+    fits : sequence of Fit
+        Those of the model.
+    """
+    fit = likely_of_a_fit(knobs_of(fits) + 1)
+    return likely_of_finalists(candidates) + _LIKELY_TRIED * (fit + SOME) + fit + MANY
+
+
 @dataclass(frozen=True)
 class Attempts:
     """Tries effects on top of models.
@@ -72,8 +86,7 @@ class Attempts:
         besides : sequence of str
             Effects that are not tried, beside those that it has.
         """
-        simulator = self.bench.laboratory.simulator
-        simulator.likely = simulator.done + likely_simulations(self.candidates)
+        self.bench.laboratory.simulator.expect(likely_of_a_round(self.candidates, state.fits))
         best: dict[str, Trial] = {}
         competing = [one for one in self.candidates if one.name not in besides]
         for trial in finalists(self.bench, state, competing):

@@ -202,6 +202,11 @@ class Bench:
         return state.models[view].log_likelihood(self.observed[view])
 
 
+def likely_of_a_fit(knobs: int) -> int:
+    """Return about how many simulations it takes to fit so many keys together."""
+    return _SEEDS * (2 * (knobs + 3) + 4 * (2 * knobs + 1))
+
+
 def _joined(fits: tuple[Fit, ...], declared: Config, free: tuple[Knob, ...]) -> Fit:
     """Return one fit of all effects together, and of the keys that are not known, the last."""
     knobs = (*(knob for fit in fits for knob in fit.candidate.knobs), *free)

@@ -22,6 +22,8 @@ _SEEN = 0.8
 _ROUNDS = (range(1, 3), range(301, 305), range(305, 315))
 """Seeds of the recordings that are simulated at each size; first those of the probes."""
 _FARTHEST = 10.0
+LIKELY = sum(map(len, _ROUNDS))
+"""Simulations of each effect."""
 _SETTLED = 2.0
 """Factor by which the last round may still change a size that is told."""
 
@@ -41,8 +43,7 @@ def detectable(bench: Bench, declared: State, candidates: Sequence[Candidate]) -
     sizes = [_Size.of(candidate, declared.config) for candidate in mildest.values()]
     model = declared.models[BOTH]
     limits = _Limits.of(model)
-    simulator = bench.laboratory.simulator
-    simulator.likely = simulator.done + sum(map(len, _ROUNDS)) * len(sizes)
+    bench.laboratory.simulator.expect(LIKELY * len(sizes), after_the_search=0)
     for seeds in _ROUNDS:
         if not sizes:
             break

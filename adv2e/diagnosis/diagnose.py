@@ -12,15 +12,17 @@ from adv2e.cores import default_threads
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.affordable import affordable
 from adv2e.diagnosis.conclusion import (
+    DRAWS,
     about_frames,
     conclude,
     finding_of,
     rejected_of,
     signatures_of,
 )
-from adv2e.diagnosis.detectable import detectable
+from adv2e.diagnosis.detectable import LIKELY, detectable
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.keys import as_found, own_of
+from adv2e.diagnosis.library import names
 from adv2e.diagnosis.nuisances import thresholds_of
 from adv2e.diagnosis.ready import make_ready
 from adv2e.diagnosis.search import Search
@@ -73,6 +75,8 @@ def diagnose(
     began = time.perf_counter()
     evidence = affordable(evidence, declared)
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
+        of_sizes = LIKELY * len(names(declared)) if sizes else 0
+        simulator.expect(0, after_the_search=2 * DRAWS + of_sizes)
         ready = make_ready(evidence, declared, simulator, without, free_thresholds, log)
         declared, evidence = ready.declared, ready.evidence
         search = Search(

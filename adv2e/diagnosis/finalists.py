@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.bench import MANY, SOME, Bench, State
+from adv2e.diagnosis.bench import SOME, Bench, State
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.markers import BOTH
@@ -106,8 +106,8 @@ def scored(bench: Bench, models: Sequence[Model], knobs: int) -> float:
     return models[BOTH].log_likelihood(bench.observed[BOTH]) - knobs
 
 
-def likely_simulations(candidates: Sequence[Candidate]) -> int:
-    """Return about how many simulations one round takes, with what is tried after it."""
+def likely_of_finalists(candidates: Sequence[Candidate]) -> int:
+    """Return about how many simulations it takes to find the finalists."""
     probes = 2 * sum(len(one.probes) for one in candidates)
     steps = 2 * sum(2 + len(one.knobs) for one in candidates)
-    return probes + steps + steps // 2 + _FINALISTS * (3 * 4 + SOME) + 3 * 10 * 4 + MANY
+    return probes + steps + steps // 2 + _FINALISTS * (3 * 4 + SOME)

@@ -21,7 +21,14 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis import parts
-from adv2e.diagnosis.attempts import CATCHES_UP, CLOSE, Attempt, Attempts, knobs_of
+from adv2e.diagnosis.attempts import (
+    CATCHES_UP,
+    CLOSE,
+    Attempt,
+    Attempts,
+    knobs_of,
+    likely_of_a_round,
+)
 from adv2e.diagnosis.bench import MANY, Bench, State
 from adv2e.diagnosis.candidates import FITTED, Candidate, Knob
 from adv2e.diagnosis.finalists import Trial, scored
@@ -131,7 +138,7 @@ class Search:
         self.candidates = [
             one for one in candidates if not unknown & {knob.key for knob in one.knobs}
         ]
-        laboratory.simulator.likely = laboratory.simulator.done + 2 * MANY
+        laboratory.simulator.expect(2 * MANY + likely_of_a_round(self.candidates, ()))
         self.bench = Bench.of(laboratory, observed, declared, error, log, free)
         self.attempts = Attempts(self.bench, self.candidates)
         self.declared = self.bench.state(declared, ())

@@ -54,7 +54,21 @@ class Simulator:
         self._frames, self._counting = Kept(), threading.Lock()
         self._light: Callable[[Config], Instants] = self._recorded
         self.done = 0
-        self.likely = 0
+        self._likely = self._after_the_search = 0
+
+    def expect(self, more: int, after_the_search: int | None = None) -> None:
+        """Note how many simulations are likely to be needed, for those who are told of progress.
+
+        Parameters
+        ----------
+        more : int
+            From now to the end of the search.
+        after_the_search : int, optional
+            After it; default: as noted before.
+        """
+        if after_the_search is not None:
+            self._after_the_search = after_the_search
+        self._likely = self.done + more + self._after_the_search
 
     def of(self, evidence: Evidence) -> Simulator:
         """Return the same for another recording; nobody is told of its progress."""
@@ -89,7 +103,7 @@ class Simulator:
         events = np.concatenate([empty_events(), *chunks])
         with self._counting:
             self.done += 1
-            self._progress(self.done, self.likely)
+            self._progress(self.done, self._likely)
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
 

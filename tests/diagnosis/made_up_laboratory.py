@@ -85,12 +85,15 @@ class MadeUpLaboratory:
             self.patterns[key] = self.patterns[other]
         self.curvature = curvature
         self.common = np.zeros(STATISTICS) if common is None else common
-        self._means = {}
-        self.simulator = SimpleNamespace(done=0, likely=0)
+        self._means, self.expected = {}, []
+        self.simulator = SimpleNamespace(done=0, expect=self._expect)
         self.markers = SimpleNamespace(
             least=np.full(STATISTICS, 0.01),
             entries=[Entry(f"statistic {k}", "") for k in range(STATISTICS)],
         )
+
+    def _expect(self, more, after_the_search=0):
+        self.expected.append(more)
 
     def mean(self, config):
         """Return what is expected of a configuration, (statistics,)."""

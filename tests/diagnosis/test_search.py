@@ -20,7 +20,8 @@ from made_up_laboratory import (
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import attempts as attempts_module
-from adv2e.diagnosis.bench import Rejections
+from adv2e.diagnosis.attempts import likely_of_a_round
+from adv2e.diagnosis.bench import MANY, Rejections
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.conclusion import finding_of
 from adv2e.diagnosis.detectable import detectable
@@ -340,3 +341,14 @@ def test_the_reason_of_the_best_form_is_kept():
     reasons.add(fit(4.0), "next round")
     assert reasons.held["leak"].reason == "next round"
     assert reasons.held["leak"].parameters == {"pixel.leak.rate_hz": pytest.approx(4.0)}
+
+
+def test_what_a_round_takes_is_expected():
+    laboratory = MadeUpLaboratory(strength=60.0)
+    search, _ = searched(["pixel.refractory.period_us=3000"], laboratory)
+    at_first, round_ = laboratory.expected
+    assert at_first == 2 * MANY + round_
+    assert 0.5 < (laboratory.simulator.done - 2 * MANY) / round_ < 2.0
+    assert likely_of_a_round(search.candidates, search.declared.fits) == round_
+    more = fits_of(("refractory", 3000.0), ("leak", 4.0))
+    assert likely_of_a_round(search.candidates, more) > round_

@@ -205,3 +205,17 @@ def test_phase_and_frequency_of_a_lamp_are_read_off_the_events(line_hz, phase):
     assert lamp.hz == pytest.approx(85.0, abs=0.15)  # the recording lasts 0.2 s
     middle = 2.0 * np.pi * (lamp.hz - 85.0) * 0.1 + lamp.phase_rad - phase
     assert np.angle(np.exp(1j * middle)) == pytest.approx(0.0, abs=0.1)
+
+
+def test_what_is_still_expected_is_told():
+    told = []
+    simulator = Simulator(EVIDENCE, 1, lambda done, likely: told.append((done, likely)))
+    config = load_config([], LINEAR)
+    simulator.expect(3, after_the_search=10)
+    simulator.stream(config, 1)
+    simulator.expect(5)  # what comes after it is still to come
+    simulator.stream(config, 2)
+    simulator.expect(1, after_the_search=0)
+    simulator.stream(config, 3)
+    simulator.close()
+    assert told == [(1, 13), (2, 16), (3, 3)]
