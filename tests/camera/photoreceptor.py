@@ -142,6 +142,9 @@ def frame_coupling(amplitude: float, tau_s: float, readouts: Array, times: Array
 
     .. math:: d(t) = A \sum_{t_f < t} e^{-(t - t_f)/\tau}
 
+    The first of `times` after a readout has its full height: the leap lies in the step that ends
+    there, and the comparator sees it, however little is left of it at the end.
+
     Source: Brandli et al., "A 240 x 180 130 dB 3 us latency global shutter spatiotemporal vision
     sensor", 2014 (coupling of the frame readout into the event pixels).
     """
@@ -149,5 +152,8 @@ def frame_coupling(amplitude: float, tau_s: float, readouts: Array, times: Array
     for readout in readouts:
         start = int(np.searchsorted(times, readout, "right"))
         end = int(np.searchsorted(times, readout + 30.0 * tau_s))
-        disturbance[start:end] += amplitude * np.exp(-(times[start:end] - readout) / tau_s)
+        waited = times[start:end] - readout
+        if start > 0:
+            waited[:1] = 0.0
+        disturbance[start:end] += amplitude * np.exp(-waited / tau_s)
     return disturbance

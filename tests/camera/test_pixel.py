@@ -233,7 +233,7 @@ def test_flicker_is_a_line_in_the_events_and_not_in_averaged_frames():
 
 def test_frame_coupling_fires_after_frames_only():
     given = merged(
-        {"readout": {"frame_coupling": {"amplitude": 0.3, "tau_us": 500.0}}},
+        {"readout": {"frame_coupling": {"amplitude": 0.29, "tau_us": 500.0}}},
         pixel(thresholds={"on": 0.1, "off": 0.08}),
     )
     stream = seen(still(120.0), QUIET, hidden=given, size=(3, 2), fps=100.0)
@@ -242,15 +242,17 @@ def test_frame_coupling_fires_after_frames_only():
     assert np.all(since[stream.polarity == 1] < 60e-6)
     assert since.max() < 5 * 500e-6
     first = of_pixel(stream)[0][of_pixel(stream)[1] == -1][0]
-    assert first == pytest.approx(500e-6 * np.log(0.3 / 0.12), abs=1e-6)
+    assert first == pytest.approx(500e-6 * np.log(0.29 / 0.12), abs=1e-6)
 
 
 def test_disturbance_by_frames_decays_and_adds_up():
-    times = np.array([0.0, 0.001, 0.002, 0.003])
-    found = frame_coupling(0.2, 0.001, np.array([0.0, 0.002]), times)
-    np.testing.assert_allclose(
-        found, 0.2 * np.array([0, np.exp(-1), np.exp(-2), np.exp(-3) + np.exp(-1)])
-    )
+    times = np.array([0.0, 0.001, 0.002, 0.003, 0.004])
+    found = frame_coupling(0.2, 0.001, np.array([0.0, 0.0021]), times)
+    # the leap of the second is in the step before 3 ms
+    expected = [0, 1, np.exp(-2), np.exp(-3) + 1, np.exp(-4) + np.exp(-1.9)]
+    np.testing.assert_allclose(found, 0.2 * np.array(expected))
+    before = frame_coupling(0.2, 0.001, np.array([-0.003]), times)
+    np.testing.assert_allclose(before[:2], 0.2 * np.exp([-3.0, -4.0]))
 
 
 def test_log_response_with_and_without_knee():
