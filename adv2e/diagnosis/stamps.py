@@ -20,9 +20,10 @@ _LONGEST_US = 20_000
 _RARELY = 0.01
 _STANDS_OUT = 2.0
 _NOTHING_NS = 20.0
+_ROUNDS = 10
 
 SERVICE_SD_NS = 50.0
-"""Standard deviation that :func:`service_times` are given: off by as much at most in 48 streams."""
+"""Standard deviation that :func:`service_times` are given: off by 53 ns at most in 60 streams."""
 
 
 def tick_of(times_us: NDArray[np.int64]) -> int:
@@ -57,8 +58,23 @@ def service_times(stream: Stream) -> tuple[float, float] | None:
         return None
     if often[: both_us - 1].sum() > _RARELY * len(between_rows):
         return None
-    waited = np.maximum(often[both_us - 1 : both_us + 2] - by_chance, 0)
-    both_ns = 1e3 * (both_us + float(np.average([-1, 0, 1], weights=waited)))
+    both_ns = 1e3 * _waited_for(often, both_us, float(by_chance.mean()))
     latched = gap[(down == 0) & (right > 0) & (gap < both_us - 1)]
     event_ns = max(1e3 * float(latched.mean()), _NOTHING_NS) if len(latched) else _NOTHING_NS
     return event_ns, max(both_ns - event_ns, _NOTHING_NS)
+
+
+def _waited_for(often: NDArray[np.int64], about_us: int, by_chance: float) -> float:
+    """Return the time that what had waited follows in [us], from how often each gap is.
+
+    Nothing follows sooner, and what comes by chance does so evenly from there on; both times have
+    lost their parts of a microsecond, which spreads a gap over two of them.
+    """
+    near = about_us + np.arange(-1, 2)
+    both = float(about_us)
+    for _ in range(_ROUNDS):
+        after = np.clip(near - both, -1.0, 1.0)
+        later = np.where(after < 0.0, 0.5 * (1.0 + after) ** 2, 1.0 - 0.5 * (1.0 - after) ** 2)
+        waited = np.maximum(often[near] - by_chance * later, 0.0)
+        both = float(np.average(near, weights=waited))
+    return both

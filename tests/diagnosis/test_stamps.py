@@ -81,6 +81,17 @@ def test_times_of_an_arbiter(event_us, row_us, busy):
     assert found == pytest.approx((1e3 * event_us, 1e3 * row_us), abs=1.5 * SERVICE_SD_NS)
 
 
+@pytest.mark.parametrize("both_us", [3.6, 4.5, 6.7, 11.0])
+def test_what_comes_by_chance_after_it_does_not_count(both_us):
+    draw = np.random.default_rng(8)
+    gaps = np.concatenate([np.full(4000, both_us), both_us + 40.0 * draw.random(60_000)])
+    draw.shuffle(gaps)
+    t = np.cumsum(gaps)
+    alternating = np.arange(len(t)) % SIDE
+    found = service_times(stream_of(np.floor(t), 0, alternating, 1, SIDE, SIDE))
+    assert sum(found) == pytest.approx(1e3 * both_us, abs=SERVICE_SD_NS)
+
+
 @pytest.mark.parametrize("tick", [1, 10, 500])
 @pytest.mark.parametrize("mean_gap_us", [2.0, 20.0, 200.0, 5000.0])
 def test_no_arbiter(tick, mean_gap_us):
