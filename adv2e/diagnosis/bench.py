@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.candidates import Candidate, Knob, neutral_value
+from adv2e.diagnosis.candidates import NOTHING_KNOWN, Candidate, Knob, neutral_value
 from adv2e.diagnosis.fit import Fit, Fitter
 from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.markers import BOTH, VIEWS
@@ -213,7 +212,7 @@ def _joined(fits: tuple[Fit, ...], declared: Config, free: tuple[Knob, ...]) -> 
     extra = tuple(pair for fit in fits for pair in fit.candidate.extra)
     defaults = tuple(pair for fit in fits for pair in fit.candidate.defaults)
     known = tuple(pair for fit in fits for pair in fit.candidate.known_or_not)
-    known += ((0.0, math.inf),) * len(free)
+    known += (NOTHING_KNOWN,) * len(free)
     name = " and ".join(fit.candidate.name for fit in fits)
     unknown = [knob.inner(neutral_value(declared, knob)) for knob in free]
     place = np.concatenate([*(fit.place for fit in fits), unknown])

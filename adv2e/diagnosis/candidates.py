@@ -67,6 +67,9 @@ class Knob:
         return value <= self.low + low or value >= self.high - high
 
 
+NOTHING_KNOWN = (0.0, math.inf)
+"""Of a knob, besides what statistics tell: place and deviation."""
+
 FITTED = 0.02
 """Share of the residual that a fit may leave."""
 
@@ -103,8 +106,8 @@ class Candidate:
 
     @property
     def known_or_not(self) -> tuple[tuple[float, float], ...]:
-        """What is known of every knob: nothing is an infinite deviation."""
-        return self.known or ((0.0, math.inf),) * len(self.knobs)
+        """What is known of every knob besides, if only nothing."""
+        return self.known or (NOTHING_KNOWN,) * len(self.knobs)
 
     def inner(self, values: Sequence[float]) -> list[float]:
         """Return where on the fitted scales values of the knobs are."""

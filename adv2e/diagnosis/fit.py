@@ -34,18 +34,13 @@ from adv2e.config import Config
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.metric import Scale
 from adv2e.diagnosis.simulations import Laboratory
+from adv2e.diagnosis.slope import Axes, Slope, gentler
 
 Array = NDArray[np.float64]
 
 WIDE, _NARROW = 0.8, 0.1
 """Reach of the first derivative, and least of any, on the knobs' scales."""
 
-_LAST_REACH = 10.0
-"""Reach of the last derivatives, in deviations of the place: less, and chance is most of them."""
-_OF_LAST_REACHES = (0.02, 0.3)
-"""Least and most, on the knobs' scales."""
-_CLIFF = 10.0
-"""Square of the changes on one side over that on the other, from which one is no slope."""
 _NEAR = 2.0
 """Deviations; what is known from before a longer step is not taken into the mean."""
 _IN_THE_MEAN = 3
@@ -55,8 +50,6 @@ _LEAP = 80.0
 
 _LARGEST_MOVE = 1.2
 _SHARES = (1.0, 0.4)
-_LEAST_SHARE = 0.1
-"""Of the biased normal matrix, of an unbiased one that is used, in every direction."""
 
 
 @dataclass
@@ -122,6 +115,10 @@ class Fit:
     def amiss(self, place: Array) -> Array:
         """Return how far a place is from what is known of it besides, (knobs,)."""
         return place - [known for known, _ in self.candidate.known_or_not]
+
+    def slope(self, derivative: NDArray[Any], residual: Array) -> Slope:
+        """Return the slope at the place, with what is known of it besides; see :class:`Slope`."""
+        return Slope.of(derivative, residual).with_known(self.certainty, self.amiss(self.place))
 
     @property
     def deviation(self) -> Array:
@@ -193,12 +190,15 @@ class Fitter:
 
     def misfit(self, config: Config, seeds: Sequence[int]) -> float:
         """Return the sum of squares of a model as it is."""
-        mean = self.whites([config], seeds)[0]
+        return self._square(self.whites([config], seeds)[0])
+
+    def _square(self, mean: Array) -> float:
+        """Return the sum of squares of what mean statistics leave."""
         return float(np.sum((self._observed - mean) ** 2))
 
     def _misfit(self, fit: Fit, place: Array, mean: Array) -> float:
         """Return the sum of squares of a fit elsewhere, from its mean statistics there."""
-        return float(np.sum((self._observed - mean) ** 2)) + _penalty(fit, place)
+        return self._square(mean) + float(np.sum(fit.certainty * fit.amiss(place) ** 2))
 
     def improve(self, fits: Sequence[Fit], seeds: Sequence[int]) -> None:
         """Move every fit by one step, all of them with one batch of simulations for each half.
@@ -222,7 +222,7 @@ class Fitter:
             columns = []
             for k, place in enumerate(_nudged(fit)):
                 columns.append((next(whites) - here) / (place[k] - fit.place[k]))
-            slope = _Slope.of(fit, np.array(columns), self._observed - here)
+            slope = fit.slope(np.array(columns), self._observed - here)
             fit.misfit = self._misfit(fit, fit.place, here.mean(axis=0))
             move = _damped(fit, slope)
             fit.normal, fit.derivative, fit.simulations = slope.normal, slope.derivative, len(seeds)
@@ -250,9 +250,9 @@ class Fitter:
         rounds : sequence of sequence of int
             Seeds of each step, two at least; not all are taken where it is near at once.
         """
-        slopes: list[_Slope] = []
-        gentler: list[_Slope] = []
-        axes, trust = _Axes.of(fit.normal), 1.0
+        slopes: list[Slope] = []
+        gentler: list[Slope] = []
+        axes, trust = Axes.of(fit.normal), 1.0
         safe, least = fit.place, np.inf
         for seeds in rounds:
             slope, gentle = self._slopes(fit, axes, seeds)
@@ -266,7 +266,7 @@ class Fitter:
             normal = np.asarray(np.mean([slope.normal for slope in slopes], axis=0))
             move = np.linalg.pinv(normal) @ slope.downhill / len(slopes)
             far = float(np.max(np.abs(axes.along(move)) / axes.reach))
-            axes = _Axes.of(normal)
+            axes = Axes.of(normal)
             fit.place = fit.inside(fit.place + move * min(1.0, trust / max(far, 1e-12)))
             fit.moved = float(np.max(np.abs(axes.along(fit.place - safe)) / axes.deviation))
             fit.simulations = len(seeds) * len(slopes)
@@ -280,7 +280,7 @@ class Fitter:
         fit.derivative = np.asarray(np.mean([slope.derivative for slope in gentler], axis=0))
         fit.covariance = np.linalg.pinv(fit.normal)
 
-    def _slopes(self, fit: Fit, axes: _Axes, seeds: Sequence[int]) -> tuple[_Slope, _Slope]:
+    def _slopes(self, fit: Fit, axes: Axes, seeds: Sequence[int]) -> tuple[Slope, Slope]:
         """Return the slope at a fit's place by both sides of it, and by the gentler ones."""
         steps = axes.reach[:, None] * axes.directions
         ends = [[fit.inside(fit.place + side * step) for step in steps] for side in (1, -1)]
@@ -290,13 +290,13 @@ class Fitter:
         # one end may lie at the border of what is physical, beside the axis
         inverse = np.linalg.pinv(np.array(ends[0]) - np.array(ends[1]))
 
-        def of(differences: list[Array]) -> _Slope:
+        def of(differences: list[Array]) -> Slope:
             derivative = np.tensordot(inverse, np.array(differences), axes=1)
-            return _Slope.of(fit, derivative, self._observed - here)
+            return fit.slope(derivative, self._observed - here)
 
         return (
             of([above - below for above, below in sides]),
-            of([_gentler(above - here, here - below) for above, below in sides]),
+            of([gentler(above - here, here - below) for above, below in sides]),
         )
 
     def set_covariance(self, fit: Fit, sample: Array) -> None:
@@ -316,106 +316,6 @@ class Fitter:
         fit.covariance = inverse @ spread @ inverse * _of_mean(fit.simulations)
 
 
-@dataclass(frozen=True)
-class _Axes:
-    """Directions in which a place is known, each independently of the others.
-
-    Keys that go together, such as two times of which the sum shows, are known far better in some
-    directions than each by itself.
-
-    Attributes
-    ----------
-    directions : (knobs, knobs)
-        One a row.
-    deviation, reach : (knobs,)
-        Of the place, and of the last derivatives, along each.
-    """
-
-    directions: NDArray[Any]
-    deviation: Array
-    reach: Array
-
-    @classmethod
-    def of(cls, normal: NDArray[Any]) -> _Axes:
-        """Return the axes of a normal matrix."""
-        squares, columns = np.linalg.eigh(normal)
-        deviation = 1.0 / np.sqrt(np.maximum(squares, 1e-12))
-        return cls(columns.T, deviation, np.clip(_LAST_REACH * deviation, *_OF_LAST_REACHES))
-
-    def along(self, move: Array) -> Array:
-        """Return the parts of a move along each direction."""
-        return np.asarray(self.directions @ move)
-
-
-@dataclass(frozen=True)
-class _Slope:
-    """How the misfit falls at a place.
-
-    Attributes
-    ----------
-    derivative : (knobs, statistics)
-    normal : (knobs, knobs)
-        Products of derivatives, with what is known of the place besides.
-    downhill : (knobs,)
-        Products of derivatives and what is left, likewise.
-    left : float
-        Square of what is left, likewise.
-    """
-
-    derivative: NDArray[Any]
-    normal: NDArray[Any]
-    downhill: Array
-    left: float
-
-    @classmethod
-    def of(cls, fit: Fit, derivative: NDArray[Any], residual: Array) -> _Slope:
-        """Return the slope by the products of different seeds.
-
-        Parameters
-        ----------
-        fit : Fit
-            At the place.
-        derivative : (knobs, seeds, statistics)
-        residual : (seeds, statistics)
-        """
-        seeds = len(residual)
-        total, left = derivative.sum(axis=1), residual.sum(axis=0)
-        biased = total @ total.T / seeds**2
-        own = np.einsum("ask,bsk->ab", derivative, derivative)
-        pairs = seeds * (seeds - 1)
-        normal = (total @ total.T - own) / pairs
-        downhill = (total @ left - np.einsum("ask,sk->a", derivative, residual)) / pairs
-        # with few seeds the unbiased matrix may be no matrix of squares at all
-        if np.linalg.eigvalsh(normal - _LEAST_SHARE * biased).min() < 0.0:
-            normal, downhill = biased, total @ left / seeds**2
-        square = float(left @ left - np.sum(residual * residual)) / pairs
-        amiss = fit.amiss(fit.place)
-        normal = normal + np.diag(fit.certainty)
-        downhill = downhill - fit.certainty * amiss
-        return cls(total / seeds, normal, downhill, square + _penalty(fit, fit.place))
-
-
-def _gentler(above: Array, below: Array) -> Array:
-    """Return the change from one end to the other, by one side where the other is a cliff.
-
-    A place is as uncertain as it is towards the side where little changes.
-
-    Parameters
-    ----------
-    above, below : (seeds, statistics)
-        Changes from the place to one end, and from the other to the place.
-    """
-    squares = [float(np.sum(side.mean(axis=0) ** 2)) for side in (above, below)]
-    if max(squares) < _CLIFF * min(squares):
-        return above + below
-    return 2.0 * (above if squares[0] < squares[1] else below)
-
-
-def _penalty(fit: Fit, place: Array) -> float:
-    """Return the square of how far a place is from what is known of it besides."""
-    return float(np.sum(fit.certainty * fit.amiss(place) ** 2))
-
-
 def _of_mean(seeds: int) -> float:
     """Return by how much variances grow as the mean of so many simulations varies, too."""
     return 1.0 + 1.0 / seeds
@@ -433,7 +333,7 @@ def _nudged(fit: Fit) -> list[Array]:
     return places
 
 
-def _damped(fit: Fit, slope: _Slope) -> Array:
+def _damped(fit: Fit, slope: Slope) -> Array:
     """Return a step that is shorter where the last ones failed."""
     damped = slope.normal + np.diag(fit.damping * np.diag(slope.normal) + 1e-6)
     move = np.linalg.solve(damped, slope.downhill)

@@ -10,9 +10,10 @@ from made_up_laboratory import STATISTICS, MadeUpLaboratory, candidates
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.fit import Fit, Fitter, _Slope
+from adv2e.diagnosis.fit import Fit, Fitter
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Scale
+from adv2e.diagnosis.slope import Slope
 
 VIEW = parts.FIT
 
@@ -302,7 +303,7 @@ class ToldFitter(Fitter):
     def _slopes(self, fit, axes, seeds):
         downhill, left = next(self._told)
         self.seen.append(float(fit.place[0]))
-        slope = _Slope(np.ones((1, 3)), np.array([[400.0]]), np.array([downhill]), left)
+        slope = Slope(np.ones((1, 3)), np.array([[400.0]]), np.array([downhill]), left)
         return slope, slope
 
 
