@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import lru_cache
 from types import SimpleNamespace
 
@@ -11,10 +12,12 @@ from adv2e.config import Config, load_config, to_dict
 from adv2e.config.paths import get_key
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import parted
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.candidates import Candidate
+from adv2e.diagnosis.fit import Fit, Fitter
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.library import Hints, library
 from adv2e.diagnosis.markers import BOTH, VIEWS, Entry
+from adv2e.diagnosis.metric import Scale
 from adv2e.diagnosis.search import Search
 from adv2e.reports.result import ErrorRow, Estimate
 
@@ -164,3 +167,24 @@ def refitted(search, fits):
     """Return the model with all `fits`, fitted together."""
     joint = search.bench.fitted(fits, search.declared.models[BOTH].sd, BOTH)
     return search.bench.state(joint.config, parted(joint, fits))
+
+
+def fitter_of(laboratory, observed, view=parts.FIT, sd=None):
+    sample = laboratory.ensemble(Config(), range(2001, 2121))[:, view]
+    return Fitter(laboratory, Scale.of(sample, laboratory.markers.least), observed, view, sd)
+
+
+def only(name, forms=None):
+    found = [one for one in candidates(name) if forms is None or len(one.knobs) == forms]
+    return found[0]
+
+
+class QuickThresholds(Candidate):
+    """The thresholds, set without checks of the whole configuration."""
+
+    def applied(self, config, inner):
+        on, off = (knob.outer(place) for knob, place in zip(self.knobs, inner, strict=True))
+        thresholds = dataclasses.replace(config.pixel.thresholds, on=on, off=off)
+        return dataclasses.replace(
+            config, pixel=dataclasses.replace(config.pixel, thresholds=thresholds)
+        )
