@@ -2,7 +2,8 @@
 
 Sharp frames, and those along the motion, depend on the frames and their exposure alone, so they can
 be given to the pixels as if they had been recorded.  What else acts on the light of each frame is
-laid over them: it moves the motion that is found by next to nothing.
+laid over them: it moves the motion that is found by next to nothing.  A picture that is moved is
+made once, too, from those.
 """
 
 from __future__ import annotations
@@ -29,11 +30,25 @@ _KEPT = 4
 """Ways to make frames of which they are kept: those tried one beside another."""
 
 
+class _Last:
+    """What was made last, by what it was made of."""
+
+    def __init__(self) -> None:
+        self._held: dict[Any, Instants] = {}
+
+    def of(self, key: Any, make: Callable[[], Instants]) -> Instants:
+        if key not in self._held:
+            while len(self._held) >= _KEPT:
+                del self._held[next(iter(self._held))]
+            self._held[key] = make()
+        return self._held[key]
+
+
 class Kept:
     """Frames of a recording, read and made once for each way to do that; for many threads."""
 
     def __init__(self) -> None:
-        self._held: dict[Any, Instants] = {}
+        self._made, self._moved = _Last(), _Last()
         self._lock = threading.Lock()
 
     def of(self, config: Config, read: Callable[[], Instants]) -> Instants:
@@ -46,11 +61,10 @@ class Kept:
         how = (sampling.interpolation, sampling.L, frames.exposure_us) if once else None
         key = (frames.encoding, frames.full_scale, how)
         with self._lock:
-            if key not in self._held:
-                while len(self._held) >= _KEPT:
-                    del self._held[next(iter(self._held))]
-                self._held[key] = made(config, *read()) if once else read()
-            return self._held[key]
+            instants = self._made.of(key, lambda: made(config, *read()) if once else read())
+            if not _is_moved(config):
+                return instants
+            return self._moved.of((key, _until_moved(config)), lambda: _moved(config, *instants))
 
 
 def is_made_once(config: Config) -> bool:
@@ -72,6 +86,38 @@ def _is_along_motion(config: Config) -> bool:
     return config.sampling.interpolation != "linear" and config.sampling.L > 1
 
 
+def _is_moved(config: Config) -> bool:
+    """Tell whether moved frames may be given as frames: those that are sharp by then."""
+    return any(config.frames.shift_px) and (
+        is_made_once(config) or config.frames.exposure_us == 0.0
+    )
+
+
+def _until_moved(config: Config) -> Frames:
+    """Return what acts on the light of sharp frames, to their being moved."""
+    frames = config.frames
+    return Frames(
+        black_level_dn=frames.black_level_dn,
+        black_depth_dn=frames.black_depth_dn,
+        shift_px=frames.shift_px,
+    )
+
+
+def _moved(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Instants:
+    """Return the light where the event pixels see it."""
+    return times_ns, _after(_until_moved(config), config, times_ns, light)
+
+
+def _after(
+    acting: Frames, config: Config, times_ns: list[int], light: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return the light of frames after some of the effects on it."""
+    frames: Iterator[Timed] = zip(times_ns, light, strict=True)
+    for hook in frame_hooks(acting, config.sampling):
+        frames = hook.light(frames)
+    return np.array([one for _, one in frames], np.float32)
+
+
 def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Instants:
     """Return the frames, sharp where they are exposed, and what is between them.
 
@@ -85,16 +131,14 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     light : (frames, rows, columns)
         [DN]
     """
-    frames: Iterator[Timed] = zip(times_ns, light, strict=True)
-    for hook in frame_hooks(Frames(exposure_us=config.frames.exposure_us), config.sampling):
-        frames = hook.light(frames)
+    sharp = _after(Frames(exposure_us=config.frames.exposure_us), config, times_ns, light)
     if not _is_along_motion(config):
-        return times_ns, np.array([sharp for _, sharp in frames], np.float32)
+        return times_ns, sharp
     count = config.sampling.L
     upsampler = make_upsampler(config.sampling.interpolation, count)
     times: list[int] = []
     found: list[NDArray[np.float32]] = []
-    for (t0, first), (t1, second), beside in neighbours(frames):
+    for (t0, first), (t1, second), beside in neighbours(zip(times_ns, sharp, strict=True)):
         if not times:
             times.append(t0)
             found.append(first)
@@ -104,11 +148,12 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
 
 
 def as_recorded(config: Config) -> Config:
-    """Return `config` for what is made once: sharp frames, and all that is between them."""
-    if not is_made_once(config):
-        return config
-    frames = replace(config.frames, exposure_us=0.0)
-    if not _is_along_motion(config):
-        return replace(config, frames=frames)
-    sampling = replace(config.sampling, L=1, interpolation="linear")
+    """Return `config` for what is made once: frames sharp and in place, and all between them."""
+    frames, sampling = config.frames, config.sampling
+    if is_made_once(config):
+        frames = replace(frames, exposure_us=0.0)
+        if _is_along_motion(config):
+            sampling = replace(sampling, L=1, interpolation="linear")
+    if _is_moved(config):
+        frames = replace(frames, black_level_dn=0.0, black_depth_dn=0.0, shift_px=(0.0, 0.0))
     return replace(config, frames=frames, sampling=sampling)

@@ -15,6 +15,7 @@ from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 from adv2e.effects.active import frame_hooks
+from adv2e.effects.frames.misregistration import shifted
 from adv2e.simulation import events_from_light
 from adv2e.stepping import steps_of
 from adv2e.upsampling import make_upsampler
@@ -154,7 +155,7 @@ def test_frames_are_made_sharp_once_and_the_same(monkeypatch):
     made = []
     monkeypatch.setattr(
         "adv2e.diagnosis.instants.frame_hooks",
-        lambda *arguments: made.append(1) or frame_hooks(*arguments),
+        lambda frames, sampling: made.append(frames.exposure_us) or frame_hooks(frames, sampling),
     )
     simulator = Simulator(EVIDENCE, 2)
     laid_over = [
@@ -169,10 +170,44 @@ def test_frames_are_made_sharp_once_and_the_same(monkeypatch):
     assert len(whole) > 500
     np.testing.assert_array_equal(simulator.stream(config, 5).t, whole["t"])
     simulator.stream(load_config([], [*LINEAR, "frames.exposure_us=15000"]), 6)
-    assert len(made) == 1
+    assert made.count(15000.0) == 1
     blurred = load_config([], [*LINEAR, *laid_over])
     assert not np.array_equal(simulator.stream(blurred, 5).t, whole["t"])
-    assert len(made) == 1
+    assert made.count(15000.0) == 1
+    simulator.close()
+
+
+COUPLED = ["readout.frame_coupling.amplitude=0.05", "readout.frame_coupling.tau_us=2000"]
+
+
+@pytest.mark.parametrize(
+    ("beside", "times"),
+    [
+        (["frames.black_level_dn=3", "frames.black_depth_dn=2"], 1),
+        (["frames.exposure_us=15000"], 1),
+        (COUPLED, 1),
+        # sharp frames are made anew each time, and moved thereafter
+        ([*COUPLED, "frames.exposure_us=15000"], 2),
+    ],
+)
+def test_frames_are_moved_once_and_the_same(monkeypatch, beside, times):
+    moved = []
+    monkeypatch.setattr(
+        "adv2e.effects.frames.misregistration.shifted",
+        lambda light, by: moved.append(by) or shifted(light, by),
+    )
+    simulator = Simulator(EVIDENCE, 2)
+    config = load_config([], [*LINEAR, *beside, "frames.shift_px=[0.3, -0.2]"])
+    light = zip(EVIDENCE.times_ns, light_of(EVIDENCE, config), strict=True)
+    whole = np.concatenate(list(events_from_light(light, replace(config, seed=5))))
+    whole = whole[whole["t"].clip(0, 199_999) == whole["t"]]
+    assert len(whole) > 500
+    moved.clear()
+    np.testing.assert_array_equal(simulator.stream(config, 5).t, whole["t"])
+    simulator.stream(config, 6)
+    assert len(moved) == times * len(EVIDENCE.frames)
+    other = load_config([], [*LINEAR, *beside, "frames.shift_px=[0.3, 0.2]"])
+    assert not np.array_equal(simulator.stream(other, 5).t, whole["t"])
     simulator.close()
 
 
