@@ -62,22 +62,23 @@ def rules_for(lengths: NDArray[np.float64], fastest: float, dead_time: float) ->
         np.zeros(shape), np.zeros(shape), np.zeros(lengths.size, np.int64),
         np.zeros(shape), np.zeros(shape), np.zeros(lengths.size, np.int64),
     )  # fmt: skip
-    for k, length in enumerate(lengths):
-        # rounded up so that jitter of the frame times does not miss the cache
-        rounded = float(f"{length * 1.005:.2e}")
+    # rounded up so that jitter of the frame times does not miss the cache
+    roughly = np.array([float(f"{length:.2e}") for length in (1.005 * lengths).tolist()])
+    for rounded in dict.fromkeys(roughly.tolist()):
+        own = roughly == rounded
         node, weight = _remembered(rounded, fastest, WITHIN_US, 1.0)
-        _put(node, weight, k, rules.nodes, rules.weights, rules.counts)
+        _put(node, weight, own, rules.nodes, rules.weights, rules.counts)
         if dead_time > 0.0:
             dead = min(dead_time, rounded)
             node, weight = _remembered(dead, fastest, WITHIN_DEAD_US, dead / rounded)
-            _put(node, weight, k, rules.nodes_dead, rules.weights_dead, rules.counts_dead)
+            _put(node, weight, own, rules.nodes_dead, rules.weights_dead, rules.counts_dead)
     return rules
 
 
-def _put(node: Any, weight: Any, k: int, nodes: Any, weights: Any, counts: Any) -> None:
-    counts[k] = node.size
-    nodes[k, : node.size] = node
-    weights[k, : node.size] = weight
+def _put(node: Any, weight: Any, own: Any, nodes: Any, weights: Any, counts: Any) -> None:
+    counts[own] = node.size
+    nodes[own, : node.size] = node
+    weights[own, : node.size] = weight
 
 
 def quadrature(

@@ -12,7 +12,7 @@ from adv2e.diagnosis.markers.neighbours import Neighbours
 from adv2e.diagnosis.markers.pixels import Pixels
 from adv2e.diagnosis.markers.rates import Course, Load, Rates
 from adv2e.diagnosis.markers.stamps import TICKS_US, Gaps, RowGaps, Ticks
-from adv2e.diagnosis.markers.timing import LAGS_MS, Drift, Lag, Phase, Shift, Spectrum
+from adv2e.diagnosis.markers.timing import LAGS_MS, Drift, Lag, Phase, Shift, Slopes, Spectrum
 
 SCENE = some_scene(seed=5)
 PARTS = 3
@@ -143,7 +143,7 @@ def test_lag(stream):
         for n, lag in enumerate(LAGS_MS):
             slope = bounded_slope(interval_at(t - 1000 * lag), pixel)
             sums[part, n, light] += slope if on else -slope
-    same(Lag(SCENE).count(where), np.hstack([number, sums.reshape(PARTS, -1)]))
+    same(Lag(Slopes(SCENE)).count(where), np.hstack([number, sums.reshape(PARTS, -1)]))
 
 
 @several
@@ -157,7 +157,7 @@ def test_drift(stream):
         for n, (a, b) in enumerate(((-2, 4), (-8, 16))):
             later, earlier = (bounded_slope(interval_at(t - 1000 * lag), pixel) for lag in (a, b))
             sums[n, segment] += (earlier - later) * (1 if on else -1)
-    group = Drift(SCENE)
+    group = Drift(Slopes(SCENE))
     expected = sums / np.maximum(number, 1)
     same(group.values(group.count(where).sum(axis=0)), expected.ravel())
 
@@ -177,7 +177,7 @@ def test_shift(stream):
             for side, step in enumerate((1, WIDTH)):
                 beside = bounded_slope(k, pixel + step) - bounded_slope(k, pixel - step)
                 sums[part, n, side] += beside if on else -beside
-    same(Shift(SCENE).count(where), np.hstack([number, sums.reshape(PARTS, -1)]))
+    same(Shift(Slopes(SCENE)).count(where), np.hstack([number, sums.reshape(PARTS, -1)]))
 
 
 @several

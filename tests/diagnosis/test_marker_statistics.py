@@ -27,7 +27,7 @@ from adv2e.diagnosis.markers.intervals import Runs
 from adv2e.diagnosis.markers.neighbours import Neighbours
 from adv2e.diagnosis.markers.pixels import Pixels
 from adv2e.diagnosis.markers.stamps import Gaps, RowGaps, Ticks
-from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Spectrum
+from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Slopes, Spectrum
 from adv2e.diagnosis.parts import Parts
 
 SCENE = some_scene(seed=5)
@@ -158,13 +158,13 @@ def pan(shift, frames=FRAMES):
 def test_lag_is_greatest_where_the_change_is():
     names = [f"change {lag} ms before, medium" for lag in ("-8", "0", "8")]
     for late_us, best in ((-8000, 0), (0, 1), (8000, 2)):
-        found = statistics(Lag(SCENE), placed(following_events(SCENE, late_us), SCENE))
+        found = statistics(Lag(Slopes(SCENE)), placed(following_events(SCENE, late_us), SCENE))
         assert int(np.argmax([found[name] for name in names])) == best
         assert max(found[name] for name in names) > 0.3
 
 
 def test_lag_is_nothing_for_events_of_no_cause():
-    found = statistics(Lag(SCENE), placed(random_stream(6000, 1), SCENE))
+    found = statistics(Lag(Slopes(SCENE)), placed(random_stream(6000, 1), SCENE))
     assert np.abs(list(found.values())).max() < 0.15
 
 
@@ -176,7 +176,7 @@ def test_drift_sees_a_clock_that_goes_away():
         kept = (t >= 0) & (t < STOP_US)
         x, y = stream.pixel[kept] % WIDTH, stream.pixel[kept] // WIDTH
         moved = placed(stream_of(t[kept], x, y, stream.on[kept]), SCENE)
-        found.append(statistics(Drift(SCENE), moved))
+        found.append(statistics(Drift(Slopes(SCENE)), moved))
     # early, then late: the change comes after the event first, and before it later
     slow, none, fast = (
         one["lag 16 less -8 ms, time 3/4"] - one["lag 16 less -8 ms, time 2/4"] for one in found
@@ -190,7 +190,7 @@ def test_shift_sees_which_way_the_frames_lie():
     found = []
     for shift in (-1.0, 0.0, 1.0):
         scene = scene_of(pan(shift))
-        found.append(statistics(Shift(scene), placed(events, scene)))
+        found.append(statistics(Shift(Slopes(scene)), placed(events, scene)))
     right = [one["change right of the event, 2 ms before"] for one in found]
     # frames that lie left of the events have what makes an event left of it
     assert right[0] < right[1] - 0.05
@@ -205,7 +205,7 @@ def test_shift_has_the_axes_apart():
     events = following_events(scene_of(smooth))
     for axis, name in ((2, "right"), (1, "below")):
         scene = scene_of(np.roll(smooth, 1, axis))
-        found = statistics(Shift(scene), placed(events, scene))
+        found = statistics(Shift(Slopes(scene)), placed(events, scene))
         other = {"right": "below", "below": "right"}[name]
         moved = found[f"change {name} of the event, 2 ms before"]
         assert moved > 0.1

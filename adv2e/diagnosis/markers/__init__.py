@@ -19,7 +19,7 @@ from adv2e.diagnosis.markers.neighbours import Neighbours
 from adv2e.diagnosis.markers.pixels import Pixels
 from adv2e.diagnosis.markers.rates import Course, Load, Rates
 from adv2e.diagnosis.markers.stamps import Gaps, RowGaps, Ticks
-from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Spectrum
+from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Slopes, Spectrum
 from adv2e.diagnosis.scene import Placed, Scene
 
 __all__ = ["BOTH", "VIEWS", "Entry", "Markers"]
@@ -48,6 +48,7 @@ class Markers:
         events = np.mean(
             [np.bincount(placed.interval, minlength=scene.intervals) for placed in pilot], axis=0
         )
+        slopes = Slopes(scene)
         self.groups: list[Group] = [
             Rates(),
             Course(scene.times_us[0], scene.times_us[-1]),
@@ -55,9 +56,9 @@ class Markers:
             Intervals(),
             Intervals(at_rest=True),
             Runs(),
-            Lag(scene),
-            Drift(scene),
-            Shift(scene),
+            Lag(slopes),
+            Drift(slopes),
+            Shift(slopes),
             Phase(scene),
             Spectrum(scene),
             Ticks(),

@@ -11,7 +11,7 @@ from adv2e.jit import entry
 
 @entry
 def sum_slopes(
-    t: Any, pixel: Any, on: Any, cell: Any, times: Any, lags: Any, slope: Any, sums: Any
+    t: Any, pixel: Any, on: Any, cell: Any, times: Any, lags: Any, slope: Any, at: Any, sums: Any
 ) -> None:
     """Add up the change of light some time before each event, in the event's direction.
 
@@ -23,18 +23,22 @@ def sum_slopes(
         [us]
     lags : (lags,)
         [us]
-    slope : (frames - 1, pixels)
+    slope : (pixels, frames - 1)
+        All of a pixel side by side, as the lags of an event lie close to one another.
+    at : (lags,)
+        Zeros: room for where in `times` each lag is.
     sums : (lags, cells)
     """
-    last = slope.shape[0] - 1
-    for j in range(lags.shape[0]):
-        k = np.int64(0)
-        lag = lags[j]
-        for i in range(t.shape[0]):
-            while k < last and t[i] >= times[k + 1] + lag:
+    last = slope.shape[1] - 1
+    for i in range(t.shape[0]):
+        n, c = pixel[i], cell[i]
+        sign = 1.0 if on[i] else -1.0
+        for j in range(lags.shape[0]):
+            k = at[j]
+            while k < last and t[i] >= times[k + 1] + lags[j]:
                 k += 1
-            s = slope[k, pixel[i]]
-            sums[j, cell[i]] += s if on[i] else -s
+            at[j] = k
+            sums[j, c] += sign * slope[n, k]
 
 
 @entry
@@ -48,6 +52,7 @@ def sum_slopes_beside(
     times: Any,
     lags: Any,
     slope: Any,
+    at: Any,
     sums: Any,
 ) -> None:
     """Add up the change of light right of each event less that left of it, and below less above.
@@ -55,22 +60,20 @@ def sum_slopes_beside(
     Parameters are those of :func:`sum_slopes`; `sums`: (2 lags, parts), right and below in turn.
     Events of the border do not count.
     """
-    last = slope.shape[0] - 1
-    for j in range(lags.shape[0]):
-        k = np.int64(0)
-        lag = lags[j]
-        for i in range(t.shape[0]):
-            while k < last and t[i] >= times[k + 1] + lag:
+    last = slope.shape[1] - 1
+    for i in range(t.shape[0]):
+        n = pixel[i]
+        x, y = n % width, n // width
+        inside = x > 0 and y > 0 and x < width - 1 and y < height - 1
+        sign = 1.0 if on[i] else -1.0
+        for j in range(lags.shape[0]):
+            k = at[j]
+            while k < last and t[i] >= times[k + 1] + lags[j]:
                 k += 1
-            n = pixel[i]
-            x, y = n % width, n // width
-            if x == 0 or y == 0 or x == width - 1 or y == height - 1:
-                continue
-            right = slope[k, n + 1] - slope[k, n - 1]
-            below = slope[k, n + width] - slope[k, n - width]
-            sign = 1.0 if on[i] else -1.0
-            sums[2 * j, part[i]] += sign * right
-            sums[2 * j + 1, part[i]] += sign * below
+            at[j] = k
+            if inside:
+                sums[2 * j, part[i]] += sign * (slope[n + 1, k] - slope[n - 1, k])
+                sums[2 * j + 1, part[i]] += sign * (slope[n + width, k] - slope[n - width, k])
 
 
 @entry

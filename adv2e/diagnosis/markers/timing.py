@@ -18,14 +18,21 @@ LAGS_MS = (-20.0, -8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 _PAIRS_MS = ((-2.0, 4.0), (-8.0, 16.0))
 
 
-class _Slopes:
-    """Change of log light about events, bounded so that single large steps do not decide."""
+class Slopes:
+    """Change of log light about events, bounded so that single large steps do not decide.
+
+    Attributes
+    ----------
+    scene : Scene
+    bounded : (pixels, frames - 1)
+    """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         moving = np.abs(scene.slope[scene.speed > 0])
         typical = float(np.median(moving)) if moving.size else 1.0
-        self.bounded = scene.slope / (np.abs(scene.slope) + np.float32(max(typical, 1e-6)))
+        bounded = scene.slope / (np.abs(scene.slope) + np.float32(max(typical, 1e-6)))
+        self.bounded = np.ascontiguousarray(bounded.T)
 
     def sums(
         self, placed: Placed, cell: NDArray[np.int64], cells: int, lags_ms: Sequence[float]
@@ -36,7 +43,7 @@ class _Slopes:
         sums = np.zeros((len(lags), parts.COUNT * cells))
         sum_slopes(
             stream.t, stream.pixel, stream.on, placed.part * cells + cell,
-            self.scene.times_us, lags, self.bounded, sums,
+            self.scene.times_us, lags, self.bounded, np.zeros(len(lags), np.int64), sums,
         )  # fmt: skip
         by_part = sums.reshape(len(lags), parts.COUNT, cells).swapaxes(0, 1)
         return np.ascontiguousarray(by_part).reshape(parts.COUNT, -1)
@@ -48,8 +55,8 @@ class Lag:
     title = "lag behind the light"
     least = 0.002
 
-    def __init__(self, scene: Scene) -> None:
-        self._slopes = _Slopes(scene)
+    def __init__(self, slopes: Slopes) -> None:
+        self._slopes = slopes
 
     @cached_property
     def entries(self) -> Sequence[Entry]:
@@ -82,9 +89,9 @@ class Drift:
     title = "course of the lag"
     least = 0.002
 
-    def __init__(self, scene: Scene) -> None:
-        self._slopes = _Slopes(scene)
-        self._segments = scene.parts.segments
+    def __init__(self, slopes: Slopes) -> None:
+        self._slopes = slopes
+        self._segments = slopes.scene.parts.segments
 
     @cached_property
     def entries(self) -> Sequence[Entry]:
@@ -121,8 +128,8 @@ class Shift:
 
     _LAGS_MS = (2.0, 10.0)
 
-    def __init__(self, scene: Scene) -> None:
-        self._slopes = _Slopes(scene)
+    def __init__(self, slopes: Slopes) -> None:
+        self._slopes = slopes
 
     @cached_property
     def entries(self) -> Sequence[Entry]:
@@ -143,10 +150,11 @@ class Shift:
         x, y = stream.pixel % scene.width, stream.pixel // scene.width
         used = (x > 0) & (y > 0) & (x < scene.width - 1) & (y < scene.height - 1)
         number = np.bincount(placed.part[used], minlength=parts.COUNT)
-        sums = np.zeros((2 * len(self._LAGS_MS), parts.COUNT))
+        lags = 1e3 * np.array(self._LAGS_MS)
+        sums = np.zeros((2 * len(lags), parts.COUNT))
         sum_slopes_beside(
             stream.t, stream.pixel, stream.on, placed.part, scene.width, scene.height,
-            scene.times_us, 1e3 * np.array(self._LAGS_MS), self._slopes.bounded, sums,
+            scene.times_us, lags, self._slopes.bounded, np.zeros(len(lags), np.int64), sums,
         )  # fmt: skip
         return np.concatenate([number[:, None], sums.T], axis=1)
 
