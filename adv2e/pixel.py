@@ -34,7 +34,7 @@ from adv2e.kernel.workspace import (
     pack_limit_us,
 )
 from adv2e.sorting import Parted, in_order
-from adv2e.stepping import Stepping
+from adv2e.stepping import PRECISE, Coarseness, Stepping
 
 _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP
@@ -81,8 +81,8 @@ class PixelArray:
         What effects outside the kernel add to the pixels.
     method : {"auto", "dense"}
         How the circuit is solved: the fastest way that covers it, or in steps of time.
-    coarseness : float
-        Factor on the longest of those steps, where some us of precision may go for speed.
+    coarseness : Coarseness
+        Of those steps, where some us of precision may go for speed.
 
     Raises
     ------
@@ -103,7 +103,7 @@ class PixelArray:
         exact_times: bool = False,
         additions: Additions | None = None,
         method: str = "auto",
-        coarseness: float = 1.0,
+        coarseness: Coarseness = PRECISE,
     ) -> None:
         self.rows, self.columns = first.shape
         self.pixels = self.rows * self.columns

@@ -34,6 +34,7 @@ from adv2e.ordering import InOrder
 from adv2e.overlap import worker_pool
 from adv2e.pixel import PixelArray, thread_count
 from adv2e.sources.base import check_values
+from adv2e.stepping import PRECISE, Coarseness
 
 
 def simulate(
@@ -152,7 +153,7 @@ def events_from_light(
     table: NDArray[np.float32] | None = None,
     effects: Sequence[Hooks] = (),
     method: str = "auto",
-    coarseness: float = 1.0,
+    coarseness: Coarseness = PRECISE,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 

@@ -23,7 +23,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,12 +66,32 @@ _NOTHING = Injected(np.zeros(0), np.zeros(0, np.bool_), _NO_INDEX, _NO_INDEX)
 _WHITE = 255.0
 
 
+class Coarseness(NamedTuple):
+    """Factors on the longest steps that are precise enough, as far as steps stay stable.
+
+    Attributes
+    ----------
+    solved : float
+        For the circuit.
+    added : float
+        For what is added at the steps, and the noise drawn there: leaps are spread, and the fastest
+        part of the noise is lost.
+    """
+
+    solved: float = 1.0
+    added: float = 1.0
+
+
+PRECISE = Coarseness()
+"""Steps as short as all need."""
+
+
 def steps_of(
     length_us: float,
     circuit: Circuit,
     step_us: float = math.inf,
     brightest: float = _WHITE,
-    coarseness: float = 1.0,
+    coarseness: Coarseness = PRECISE,
 ) -> int:
     """Return how many steps ``exact`` makes of a straight piece of x.
 
@@ -84,18 +104,19 @@ def steps_of(
         Longest step that resolves what is added.
     brightest : float
         Light in the piece, if it is above white [DN].
-    coarseness : float
-        Factor on the longest step that is precise enough, as far as steps stay stable.
+    coarseness : Coarseness
     """
-    limit = min(coarseness * LONGEST_US, step_us)
+    solved, added = coarseness
+    limit = min(solved * LONGEST_US, added * step_us)
     fastest = max(circuit.dark + max(brightest, _WHITE) * circuit.per_dn, circuit.dark)
-    share = min(_SHARE, coarseness * _SHARE_OF_TWO) if circuit.follower > 0.0 else _SHARE
+    share = min(_SHARE, solved * _SHARE_OF_TWO) if circuit.follower > 0.0 else _SHARE
     if circuit.filtered:
         limit = min(limit, share / fastest if fastest > 0 else limit)
         if circuit.noise_rms > 0.0:
-            limit = min(limit, circuit.noise_step / fastest if fastest > 0 else limit)
+            drawn = added * circuit.noise_step
+            limit = min(limit, drawn / fastest if fastest > 0 else limit)
     if circuit.slew > 0.0 and fastest > 0.0:
-        limit = min(limit, coarseness * math.sqrt(_BEND_US / fastest))
+        limit = min(limit, solved * math.sqrt(_BEND_US / fastest))
     if circuit.follower > 0.0:
         limit = min(limit, share / circuit.follower)
     few = min(_FEWEST, math.ceil(length_us / _SHORT_US))
@@ -116,14 +137,12 @@ class Stepping:
         Time that the pixel array counts from, on the recording's clock.
     start_us : float
         Time of the first frame, from there.
-    coarseness : float
-        Factor on the longest step that is precise enough, but not on that which resolves what is
-        added: leaps would be spread.
+    coarseness : Coarseness
     """
 
     def __init__(
         self, circuit: Circuit, pixels: int, columns: int, additions: Additions | None,
-        drift_per_s: float, origin_us: int, start_us: float, coarseness: float = 1.0,
+        drift_per_s: float, origin_us: int, start_us: float, coarseness: Coarseness = PRECISE,
     ) -> None:  # fmt: skip
         self._circuit, self._pixels, self._columns = circuit, pixels, columns
         self._additions = additions

@@ -138,14 +138,18 @@ class Bench:
         resampling = Resampling(laboratory, declared)
         return cls(laboratory, observed, declared, scales, error, resampling, log, free)
 
-    def fitter(self, view: int, near: Config, sd: Array | None = None) -> Fitter:
+    def fitter(
+        self, view: int, near: Config, sd: Array | None = None, *, first_look: bool = False
+    ) -> Fitter:
         """Return what fits candidates in one view of the data, to models near one.
 
-        Simulations with shifted frames are as far off as those of that model.
+        Simulations with shifted frames are as far off as those of that model.  A `first_look` takes
+        rougher ones.
         """
+        laboratory = self.laboratory.for_a_first_look if first_look else self.laboratory
         shifted = self.resampling.error(near)
         goal = self.observed[view] + (0.0 if shifted is None else shifted.bias[view])
-        return Fitter(self.laboratory, self.scales[view], goal, view, sd)
+        return Fitter(laboratory, self.scales[view], goal, view, sd)
 
     def models(self, config: Config, sample: Any) -> tuple[Model, ...]:
         """Return the models of a configuration's simulations, (seeds, views, statistics)."""

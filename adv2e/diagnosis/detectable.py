@@ -48,7 +48,9 @@ def detectable(bench: Bench, declared: State, candidates: Sequence[Candidate]) -
         if not sizes:
             break
         configs = [size.config(declared.config) for size in sizes]
-        sample = bench.laboratory.many(configs, seeds)[:, :, BOTH]
+        last = seeds == _ROUNDS[-1]
+        laboratory = bench.laboratory if last else bench.laboratory.for_a_first_look
+        sample = laboratory.many(configs, seeds)[:, :, BOTH]
         for size, rows in zip(sizes, sample, strict=True):
             recordings = bench.error.blurred(rows, BOTH, OF_RECORDINGS)
             factors = [limits.missing(model, row) for row in recordings]

@@ -49,7 +49,7 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     left = [one for one in candidates if one.name not in state.names]
     if not left:
         return []
-    fitter = bench.fitter(parts.FIT, state.config)
+    fitter = bench.fitter(parts.FIT, state.config, first_look=True)
     fits = fitter.probe(left, state.config, (1, 2))
     nothing = fitter.misfit(state.config, (1, 2))
     dropped: list[Fit] = []
@@ -63,7 +63,7 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     chosen = [fit for fit in _without_third_forms(fits)[:_FINALISTS] if fit.misfit <= far]
     dropped = [fit for fit in fits if not any(fit is one for one in chosen)] + dropped
     fits = chosen
-    fitter.improve(fits, (3, 4, 5))
+    bench.fitter(parts.FIT, state.config).improve(fits, (3, 4, 5))
     configs = [fit.config for fit in fits]
     sample = bench.laboratory.many(configs, range(1, SOME + 1))
     trials = [

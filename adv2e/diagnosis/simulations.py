@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,13 +23,16 @@ from adv2e.diagnosis.stream import Stream
 from adv2e.effects.frames.misregistration import shifted
 from adv2e.events import empty_events
 from adv2e.simulation import events_from_light
+from adv2e.stepping import Coarseness
 
 Result = TypeVar("Result")
 
 _SEEDS = 1_000_000
 """Of a diagnosis, fewer than these; each seed of the configuration has its own."""
-_COARSENESS = 2.5
-"""Of the steps of time, where the pixel takes any: some us, which no statistic shows."""
+_FINE = Coarseness(5.0)
+"""Steps of time, where the pixel takes any: some us off, which no statistic shows."""
+_ROUGH = Coarseness(5.0, 2.5)
+"""Twice as fast with what takes longest, and off by what the first steps of a fit do not show."""
 
 
 class Simulator:
@@ -87,7 +91,7 @@ class Simulator:
         """Drop what has not begun."""
         self._pool.shutdown(cancel_futures=True)
 
-    def stream(self, config: Config, seed: int) -> Stream:
+    def stream(self, config: Config, seed: int, *, rough: bool = False) -> Stream:
         """Return the events of one simulation, cut to the time of the frames.
 
         `seed` tells simulations of one diagnosis apart, the configuration's tells diagnoses apart.
@@ -98,7 +102,7 @@ class Simulator:
             zip(times_ns, light, strict=True),
             dataclasses.replace(as_recorded(config), seed=(_SEEDS * config.seed + seed) % 2**63),
             threads=1,
-            coarseness=_COARSENESS,
+            coarseness=_ROUGH if rough else _FINE,
         )
         events = np.concatenate([empty_events(), *chunks])
         with self._counting:
@@ -127,6 +131,8 @@ class Laboratory:
     markers : Markers
     bias : (views, statistics), optional
         Taken off all statistics: what they owe to the interpolation between frames.
+    rough : bool
+        Simulations are as good as a first look needs.
     """
 
     def __init__(
@@ -134,18 +140,26 @@ class Laboratory:
         simulator: Simulator,
         scene: Scene,
         markers: Markers,
-        bias: NDArray[np.float64] | None = None,
+        bias: NDArray[np.float64] | float | None = None,
+        *,
+        rough: bool = False,
     ) -> None:
         self.simulator, self.scene, self.markers = simulator, scene, markers
+        self._rough = rough
         self._bias = 0.0 if bias is None else bias
         self._held: dict[tuple[Config, int], Any] = {}
+
+    @cached_property
+    def for_a_first_look(self) -> Laboratory:
+        """The same, as good as the first steps of a fit need."""
+        return Laboratory(self.simulator, self.scene, self.markers, self._bias, rough=True)
 
     def measure(self, config: Config, seed: int) -> Any:
         """Return the statistics of one simulation, (views, statistics)."""
         return self._measured(self.simulator, config, seed)
 
     def _measured(self, simulator: Simulator, config: Config, seed: int) -> Any:
-        stream = simulator.stream(config, seed)
+        stream = simulator.stream(config, seed, rough=self._rough)
         return self.markers.measure(Placed.of(stream, self.scene)) - self._bias
 
     def ensemble(self, config: Config, seeds: Sequence[int]) -> Any:

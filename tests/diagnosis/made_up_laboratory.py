@@ -127,6 +127,10 @@ class MadeUpLaboratory:
     def many(self, configs, seeds):
         return np.array([self.ensemble(config, seeds) for config in configs])
 
+    @property
+    def for_a_first_look(self):
+        return self
+
 
 def searched(
     truth=(),

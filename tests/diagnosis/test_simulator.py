@@ -71,6 +71,37 @@ def test_frames_are_decoded_as_every_configuration_says(simulator):
     assert len({len(t) for t in found}) > 3
 
 
+ADDED = {
+    "coupling": ["readout.frame_coupling.amplitude=0.08", "readout.frame_coupling.tau_us=300"],
+    "flicker": ["frames.flicker.frequency_hz=400", "frames.flicker.depth=0.2"],
+    "noise": ["pixel.photoreceptor_noise.rms=0.05"],
+}
+
+
+@pytest.mark.parametrize("sets", ADDED.values(), ids=ADDED)
+def test_what_is_added_is_rougher_at_a_first_look_alone(simulator, monkeypatch, sets):
+    planned = []
+
+    def noted(*arguments):
+        planned.append(steps_of(*arguments))
+        return planned[-1]
+
+    monkeypatch.setattr("adv2e.stepping.steps_of", noted)
+    config = load_config([], [*LINEAR, *sets, "pixel.low_pass.cutoff_hz=900"])
+    light = zip(EVIDENCE.times_ns, light_of(EVIDENCE, config), strict=True)
+    alone = np.concatenate(list(events_from_light(light, replace(config, seed=3))))
+    steps = {"alone": sum(planned)}
+    events = {"alone": np.count_nonzero(alone["t"] < 200_000)}
+    for rough in (False, True):
+        planned.clear()
+        events[rough] = len(simulator.stream(config, 3, rough=rough))
+        steps[rough] = sum(planned)
+    assert steps[False] == steps["alone"]
+    assert events[False] == events["alone"]
+    assert 0.35 * steps[False] < steps[True] < 0.5 * steps[False]
+    assert events[True] == pytest.approx(events[False], rel=0.15)
+
+
 @pytest.mark.parametrize("name", ["ideal", "vid2e", "adv2e"])
 def test_a_second_pole_only_takes_events_away(simulator, name):
     declared = load_config([name], [*LINEAR, "pixel.refractory.period_us=500"])
