@@ -10,6 +10,7 @@ from camera.readout import arbiter as camera_arbiter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adv2e import rng
 from adv2e.effects.hooks import View
 from adv2e.effects.pixel.dead_pixels import DeadPixels, DeadPixelsHooks
 from adv2e.effects.readout.arbiter import Arbiter, ArbiterHooks
@@ -30,10 +31,10 @@ def out_of(hook, events, cuts=(), start_s=0.0, seed=0):
 
 def bursts(seed, count=4000, span_us=20_000):
     """Return sorted events, many at the same time and in the same row."""
-    rng = np.random.default_rng(seed)
-    t = np.sort(rng.choice(rng.integers(0, span_us, count // 4), count))
-    columns = rng.integers(0, COLUMNS, count), rng.integers(0, ROWS, count)
-    return sort_events(make_events(t, *columns, rng.integers(0, 2, count)))
+    draws = np.random.default_rng(seed)
+    t = np.sort(draws.choice(draws.integers(0, span_us, count // 4), count))
+    columns = draws.integers(0, COLUMNS, count), draws.integers(0, ROWS, count)
+    return sort_events(make_events(t, *columns, draws.integers(0, 2, count)))
 
 
 @pytest.mark.parametrize(("event_ns", "row_ns"), [(500, 3000), (3000, 0), (0, 20000), (2000, 9000)])
@@ -45,12 +46,12 @@ def test_arbiter_is_that_of_the_camera(event_ns, row_ns, start_s):
     found = out_of(
         ArbiterHooks(Arbiter(event_ns=event_ns, row_ns=row_ns)), shifted, (7, 900, 2500), start_s
     )
+    pixels = events["y"].astype(np.int64) * COLUMNS + events["x"]
+    within = rng.next_uniforms(0, rng.REQUEST, pixels, np.zeros(ROWS * COLUMNS, np.int64))
     # in microseconds: what comes at the same time as a latch must not hang on rounding
     stream = Stream(
-        events["t"].astype(float),
-        events["y"].astype(np.int64) * COLUMNS + events["x"],
-        np.where(events["p"], 1, -1).astype(np.int64),
-    )
+        events["t"] + (within - 0.5), pixels, np.where(events["p"], 1, -1).astype(np.int64)
+    ).in_order()
     wanted = camera_arbiter(stream, COLUMNS, event_ns * 1e-3, row_ns * 1e-3)
     y, x = np.divmod(wanted.pixel, COLUMNS)
     stamps = np.rint(wanted.time) + round(start_s * 1e6)
@@ -71,10 +72,28 @@ def test_arbiter_serves_the_row_that_waited_longest_from_left_to_right():
 
 
 def test_a_pixel_that_waits_cannot_ask_again():
-    events = make_events([0, 1, 11, 12], [4] * 4, [4] * 4, [1, 0, 0, 1])
+    events = make_events([0, 1, 10, 12], [4] * 4, [4] * 4, [1, 0, 0, 1])
     found = out_of(ArbiterHooks(Arbiter(event_ns=1000.0, row_ns=10_000.0)), events)
     assert found["t"].tolist() == [11, 23]
     assert found["p"].tolist() == [1, 1]
+
+
+def test_what_leaves_the_arbiter_is_not_rounded_twice():
+    # one event a millisecond, so that none waits for another
+    t = 1000 * np.arange(1, 4001)
+    events = make_events(t, t // 1000 % COLUMNS, t // 1000 % ROWS, np.ones(t.size))
+    found = out_of(ArbiterHooks(Arbiter(event_ns=500.0, row_ns=4000.0)), events)
+    waited = found["t"] - t
+    assert set(waited.tolist()) == {4, 5}
+    assert np.mean(waited == 4) == pytest.approx(0.5, abs=0.04)
+
+
+def test_rows_that_ask_the_arbiter_together_are_served_in_any_order():
+    t = np.repeat(1000 * np.arange(1, 2001), 2)
+    events = make_events(t, np.full(t.size, 3), np.tile([2, 7], 2000), np.ones(t.size))
+    found = out_of(ArbiterHooks(Arbiter(event_ns=1000.0, row_ns=10_000.0)), events)
+    first = found["y"][::2]
+    assert np.mean(first == 2) == pytest.approx(0.5, abs=0.06)
 
 
 @settings(max_examples=25, deadline=None)

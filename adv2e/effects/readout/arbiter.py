@@ -7,6 +7,10 @@ event still waits cannot ask again: its further events are lost, which is how th
 at columns / (row_ns + columns event_ns) events a nanosecond and below.  The pixel does not know
 that it waits: its dead time runs from the event.
 
+Events come in whole microseconds, services do not: when within its own an event asks is drawn, for
+the n-th of a pixel.  Asking on the microsecond, all would be rounded alike as they leave (with 4.5
+us in all, to even numbers), and of those that ask together the uppermost row would always be first.
+
 References
 ----------
 .. [1] K. A. Boahen, "Point-to-point connectivity between neuromorphic chips using address events",
@@ -25,8 +29,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e import rng
 from adv2e.effects.hooks import Hooks, View
-from adv2e.events import Events, empty_events, make_events, sort_events
+from adv2e.events import Events, make_events, sort_events
 from adv2e.jit import entry
 from adv2e.ordering import InOrder
 from adv2e.parameters import Fit, Section, parameter
@@ -158,29 +163,34 @@ class ArbiterHooks(Hooks):
         self._asked = np.full(view.rows, -np.inf)
         self._waiting = np.full(view.rows * view.columns, _NOBODY, np.int8)
         self._left = np.full(view.rows * view.columns, -np.inf)
+        self._numbers = np.zeros(view.rows * view.columns, np.int64)
         # counted from the first frame: an epoch time would lose nanoseconds in rounding
         self._origin_us = round(view.start_s * 1e6)
 
     def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
         """Yield the events as they leave the channel."""
-        order = InOrder()
+        asking, order = InOrder(), InOrder()
         for events in chunks:
             if not events.size:
                 continue
-            served = self._served(events, float(events["t"][-1] - self._origin_us))
-            if served.size:
-                yield from order.add(sort_events(served), int(served["t"][-1]))
-        yield from order.add(sort_events(self._served(empty_events(), np.inf)), _FAR_US)
+            # those of the last microsecond wait for others of it, which may ask before them
+            for whole in asking.add(events, int(events["t"][-1])):
+                known_us = float(whole["t"][-1] - self._origin_us) + 0.5
+                served = self._served(whole, known_us)
+                if served.size:
+                    yield from order.add(sort_events(served), int(served["t"][-1]))
+        yield from order.add(sort_events(self._served(asking.rest(), np.inf)), _FAR_US)
 
     def _served(self, events: Events, known_us: float) -> Events:
         """Return what leaves the channel before `known_us`, in that order."""
+        asking_us, pixel, polarity = self._requests(events)
         most = events.size + int(self._channel[_EVENTS])
         times, pixels = np.empty(most), np.empty(most, np.int64)
         polarities = np.empty(most, np.int8)
         count = _serve(
-            (events["t"] - self._origin_us).astype(np.float64),
-            events["y"].astype(np.int64) * self.view.columns + events["x"],
-            events["p"].astype(np.int8),
+            asking_us,
+            pixel,
+            polarity,
             known_us,
             self.parameters.row_ns * 1e-3,
             self.parameters.event_ns * 1e-3,
@@ -197,6 +207,16 @@ class ArbiterHooks(Hooks):
         stamps = np.rint(times[:count]).astype(np.int64) + self._origin_us
         y, x = np.divmod(pixels[:count], self.view.columns)
         return make_events(stamps, x, y, polarities[:count])
+
+    def _requests(
+        self, events: Events
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int8]]:
+        """Return when the events ask [us], in order, and their pixels and polarities."""
+        pixels = events["y"].astype(np.int64) * self.view.columns + events["x"]
+        drawn = rng.next_uniforms(self.view.seed, rng.REQUEST, pixels, self._numbers)
+        asking_us = (events["t"] - self._origin_us) + (drawn - 0.5)
+        order = np.argsort(asking_us, kind="stable")
+        return asking_us[order], pixels[order], events["p"].astype(np.int8)[order]
 
 
 _FAR_US = np.iinfo(np.int64).max
