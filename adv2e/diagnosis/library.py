@@ -18,7 +18,7 @@ from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.keys import known_keys, user_effects
 from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.stamps import SERVICE_SD_NS, service_times, tick_of
+from adv2e.diagnosis.stamps import Service, service_times, tick_of
 
 
 @dataclass(frozen=True)
@@ -35,16 +35,15 @@ class Hints:
         Largest time of which nearly all stamps are multiples.
     encoding : str
         What ``frames.encoding: auto`` means for the frames.
-    service_ns : (float, float), optional
-        Times that an event and a row take, where stamps look as if they had waited for a channel;
-        known to :data:`adv2e.diagnosis.stamps.SERVICE_SD_NS`.
+    service : Service, optional
+        Times that an event and a row take, where stamps look as if they had waited for a channel.
     """
 
     seconds: float
     lamps: tuple[Lamp, ...]
     tick_us: int
     encoding: str = "linear"
-    service_ns: tuple[float, float] | None = None
+    service: Service | None = None
 
 
 def library(declared: Config, hints: Hints) -> list[Candidate]:
@@ -216,7 +215,7 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
             (amplitude, tau),
             ((0.05, 300.0), (-0.05, 300.0), (0.05, 1200.0), (0.15, 300.0)),
         ),
-        _arbiter(hints.service_ns),
+        _arbiter(hints.service),
         Candidate(
             "event_loss",
             (Knob("readout.loss.fraction", 1e-3, 0.95, False, 0.1),),
@@ -229,16 +228,18 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
     return made
 
 
-def _arbiter(service_ns: tuple[float, float] | None) -> Candidate:
+def _arbiter(service: Service | None) -> Candidate:
     """Return the readout with its two times, which stamps may tell far better than statistics."""
     times = Knob("readout.arbiter.event_ns", 1.0, 1e6), Knob("readout.arbiter.row_ns", 1.0, 1e7)
     probes = ((300.0, 3000.0), (2000.0, 10000.0), (3000.0, 30000.0))
-    if service_ns is None:
+    if service is None:
         return Candidate("readout", times, probes)
-    known = tuple(
-        (knob.inner(ns), SERVICE_SD_NS / ns) for knob, ns in zip(times, service_ns, strict=True)
+    event, row = times
+    known = (
+        (event.inner(service.event_ns), service.event_sd_ns / service.event_ns),
+        (row.inner(service.row_ns), service.row_sd_ns / service.row_ns),
     )
-    return Candidate("readout", times, (*probes, service_ns), known=known)
+    return Candidate("readout", times, (*probes, service[:2]), known=known)
 
 
 def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
