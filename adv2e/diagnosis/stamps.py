@@ -26,8 +26,8 @@ _ROUNDS = 10
 
 _SD_NS = 50.0
 """Standard deviation of an event's time where gaps are spread as no single time makes them."""
-_SD_OF_BOTH_NS = 5.0
-"""Of both times together, beside chance: off by 13 ns at most in 99 streams of known times."""
+_SD_OF_BOTH_NS, _SD_OF_CHANCE_NS = 5.0, 120.0
+"""Of both times together beside their chance, and more by the share of what comes by chance."""
 
 
 class Service(NamedTuple):
@@ -63,16 +63,13 @@ def service_times(stream: Stream) -> Service | None:
     row, column = np.divmod(stream.pixel.astype(np.int64), stream.width)
     gap, down, right = np.diff(stream.t), np.diff(row), np.diff(column)
     between_rows = gap[(down != 0) & (gap < _LONGEST_US)]
-    often = np.bincount(between_rows, minlength=_LONGEST_US + 5)
+    often = np.bincount(between_rows, minlength=_LONGEST_US + 10)
     both_us = int(np.argmax(often))
-    # what came by chance is nearly as frequent a little later
-    by_chance = often[both_us + 2 : both_us + 5]
-    if both_us < _LEAST_US or often[both_us] < _STANDS_OUT * by_chance.max():
+    if both_us < _LEAST_US or often[both_us] < _STANDS_OUT * often[both_us + 2 : both_us + 6].max():
         return None
     if often[: both_us - 1].sum() > _RARELY * len(between_rows):
         return None
-    both_ns = 1e3 * _waited_for(often, both_us, float(by_chance.mean()))
-    both_sd_ns = np.hypot(500.0 / np.sqrt(often[both_us - 1 : both_us + 2].sum()), _SD_OF_BOTH_NS)
+    both_ns, both_sd_ns = _of_both(often, both_us)
     latched = gap[(down == 0) & (right > 0) & (gap < both_us - 1)]
     event_ns, event_sd_ns = _of_an_event(latched, both_ns)
     row_sd_ns = float(np.hypot(event_sd_ns, both_sd_ns))
@@ -99,17 +96,29 @@ def _of_an_event(latched: NDArray[np.int64], both_ns: float) -> tuple[float, flo
     return max(1e3 * mean, _NOTHING_NS), 1e3 * float(np.sqrt(longer * (1.0 - longer) / count))
 
 
-def _waited_for(often: NDArray[np.int64], about_us: int, by_chance: float) -> float:
-    """Return the time that what had waited follows in [us], from how often each gap is.
+def _of_both(often: NDArray[np.int64], about_us: int) -> tuple[float, float]:
+    """Return the time that what had waited follows in, and its standard deviation [ns].
 
-    Nothing follows sooner, and what comes by chance does so evenly from there on; both times have
-    lost their parts of a microsecond, which spreads a gap over two of them.
+    Nothing follows sooner, and what comes by chance does so from there on, ever less often; both
+    stamps have lost their parts of a microsecond, which spreads a gap over two of them.
+
+    Parameters
+    ----------
+    often : (gaps,)
+        How often each gap is [us].
+    about_us : int
+        The most frequent one.
     """
     near = about_us + np.arange(-1, 2)
+    soon, later = (float(often[about_us + k : about_us + k + 4].mean()) for k in (2, 6))
+    fading = min(max(soon / max(later, 1.0), 1.0), _STANDS_OUT) ** 0.25
+    chance = soon * fading ** (about_us + 3.5 - near)
     both = float(about_us)
     for _ in range(_ROUNDS):
         after = np.clip(near - both, -1.0, 1.0)
-        later = np.where(after < 0.0, 0.5 * (1.0 + after) ** 2, 1.0 - 0.5 * (1.0 - after) ** 2)
-        waited = np.maximum(often[near] - by_chance * later, 0.0)
+        whole = np.where(after < 0.0, 0.5 * (1.0 + after) ** 2, 1.0 - 0.5 * (1.0 - after) ** 2)
+        waited = np.maximum(often[near] - chance * whole, 0.0)
         both = float(np.average(near, weights=waited))
-    return both
+    counted = float(often[near].sum())
+    sd = np.hypot(500.0 / np.sqrt(counted), _SD_OF_BOTH_NS + _SD_OF_CHANCE_NS * soon / counted)
+    return 1e3 * both, float(sd)
