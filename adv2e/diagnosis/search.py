@@ -48,6 +48,9 @@ PER_LOOK = LEVEL / 2.0
 """The same of each look: at the data for fitting and judging, and at those looked at last."""
 
 MOST_EFFECTS = 4
+_MOST_WITH_TWO = 3
+"""Effects of a model to which two were added that hold only together: beside two others, they would
+take as long to look for as all before."""
 _LEAST_OF_THE_LEFT = 0.5 / MOST_EFFECTS
 """Least share of what is left that an effect must take away for the search to go on."""
 _OF_FITS = 1e-6
@@ -258,7 +261,7 @@ class Search:
         if any(one.judged > most - CATCHES_UP for one in holding):
             return self.attempts.best(made, state)
         grown = None
-        if len(state.fits) + 2 <= MOST_EFFECTS:
+        if len(state.fits) + 2 <= _MOST_WITH_TWO:
             grown = self.attempts.best(self._of_two(state, trials, physical), state)
         if grown is None and holding:
             first = max(physical, key=lambda one: one.judged)
