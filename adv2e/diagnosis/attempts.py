@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import MANY, SOME, Bench, State, likely_of_a_fit, parted
 from adv2e.diagnosis.candidates import Candidate
@@ -13,6 +15,7 @@ from adv2e.diagnosis.finalists import Trial, finalists, likely_of_finalists, sco
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.readouts import EXPOSURE
 
 _TRIED, _LIKELY_TRIED = 4, 2
 CATCHES_UP = 60.0
@@ -61,6 +64,26 @@ def likely_of_a_round(candidates: Sequence[Candidate], fits: Sequence[Fit]) -> i
     """
     fit = likely_of_a_fit(knobs_of(fits) + 1)
     return likely_of_finalists(candidates) + _LIKELY_TRIED * (fit + SOME) + fit + MANY
+
+
+def _exposed_as(added: Sequence[Trial], fits: Sequence[Fit]) -> list[Fit]:
+    """Return the fits of a model with the exposure, if it has one, that a trial was tried with.
+
+    It is held near that: where it ends elsewhere, there is nothing that would tell it so.
+    """
+    found = list(fits)
+    for trial in added:
+        readouts, exposure_us = trial.fit.candidate.readouts, trial.fit.base.frames.exposure_us
+        for k, fit in enumerate(fits):
+            keys = [knob.key for knob in fit.candidate.knobs]
+            if readouts is None or keys != [EXPOSURE]:
+                continue
+            place = fit.candidate.inner([exposure_us])
+            if not np.allclose(place, fit.place, rtol=1e-9):
+                known = ((place[0], readouts.exposure_sd_us / exposure_us),)
+                held = dataclasses.replace(fit.candidate, known=known)
+                found[k] = dataclasses.replace(fit, candidate=held, place=np.array(place))
+    return found
 
 
 @dataclass(frozen=True)
@@ -113,7 +136,7 @@ class Attempts:
     def of(self, state: State, added: Sequence[Trial], grounds: Sequence[State]) -> Attempt:
         """Return the model with effects more, fitted to its end and judged."""
         bench = self.bench
-        together = (*state.fits, *(trial.fit for trial in added))
+        together = (*_exposed_as(added, state.fits), *(trial.fit for trial in added))
         joint = bench.fitted(together, added[0].models[parts.FIT].sd, parts.FIT)
         fits = parted(joint, together)
         grown = State(joint.config, fits, bench.tried(joint.config))

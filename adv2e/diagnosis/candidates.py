@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config, to_dict
 from adv2e.config.paths import flat, get_key, set_key
 from adv2e.diagnosis.keys import from_values
+from adv2e.diagnosis.readouts import Readouts
 
 Places = Sequence[float] | NDArray[np.float64]
 """A place on each knob's scale."""
@@ -94,6 +95,9 @@ class Candidate:
     known : tuple of (float, float)
         Of each knob, where on its scale something else than the statistics says that it is, and its
         standard deviation; none: nothing else tells.
+    readouts : Readouts, optional
+        When frames were read out if this effect is there: of exposures that are fitted, only those
+        which end then go with it, and no fit finds these from others.
     """
 
     name: str
@@ -103,6 +107,7 @@ class Candidate:
     defaults: tuple[tuple[str, Any], ...] = ()
     left: float = FITTED
     known: tuple[tuple[float, float], ...] = ()
+    readouts: Readouts | None = None
 
     @property
     def known_or_not(self) -> tuple[tuple[float, float], ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from adv2e.config import Config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import SOME, Bench, State
 from adv2e.diagnosis.candidates import Candidate
@@ -51,6 +52,10 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
         return []
     fitter = bench.fitter(parts.FIT, state.config, first_look=True)
     fits = fitter.probe(left, state.config, (1, 2))
+    for one in left:
+        exposed = _exposed(state.config, one)
+        if exposed != state.config:
+            fits += fitter.probe([one], exposed, (1, 2))
     nothing = fitter.misfit(state.config, (1, 2))
     dropped: list[Fit] = []
     for _ in range(2):
@@ -79,6 +84,13 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     for fit in dropped:
         bench.rejections.add(fit, _behind(fit, nothing))
     return trials
+
+
+def _exposed(config: Config, candidate: Candidate) -> Config:
+    """Return a model with its exposure, if it has one, as a candidate needs it."""
+    if candidate.readouts is None or not config.frames.exposure_us:
+        return config
+    return candidate.readouts.exposed(config)
 
 
 def _without_third_forms(fits: Sequence[Fit]) -> list[Fit]:

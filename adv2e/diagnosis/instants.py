@@ -20,6 +20,8 @@ from adv2e.config import Config
 from adv2e.config.model import Frames
 from adv2e.diagnosis.keys import user_effects
 from adv2e.effects.active import frame_hooks
+from adv2e.effects.hooks import Hooks
+from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
 from adv2e.upsampling import make_upsampler
 from adv2e.upsampling.sequence import Timed, instant_ns, neighbours
 
@@ -77,13 +79,17 @@ def is_made_once(config: Config) -> bool:
     return (
         (_is_along_motion(config) or config.frames.exposure_us > 0.0)
         and sampling.last_interval != "printed"
-        and (config.readout is None or config.readout.frame_coupling is None)
+        and not (_is_along_motion(config) and _is_coupled(config))
         and not any(getattr(user, name) is not None for name in user_effects(config))
     )
 
 
 def _is_along_motion(config: Config) -> bool:
     return config.sampling.interpolation != "linear" and config.sampling.L > 1
+
+
+def _is_coupled(config: Config) -> bool:
+    return config.readout is not None and config.readout.frame_coupling is not None
 
 
 def _is_moved(config: Config) -> bool:
@@ -147,13 +153,20 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     return times, np.array(found, np.float32)
 
 
-def as_recorded(config: Config) -> Config:
-    """Return `config` for what is made once: frames sharp and in place, and all between them."""
-    frames, sampling = config.frames, config.sampling
+def as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
+    """Return `config` for what is made once: frames sharp and in place, and all between them.
+
+    And the effects on other than frames that need to know how these were recorded.
+    """
+    frames, sampling, readout = config.frames, config.sampling, config.readout
+    effects: list[Hooks] = []
     if is_made_once(config):
+        if readout is not None and readout.frame_coupling is not None:
+            effects.append(FrameCouplingHooks(readout.frame_coupling, 0.5 * frames.exposure_us))
+            readout = replace(readout, frame_coupling=None)
         frames = replace(frames, exposure_us=0.0)
         if _is_along_motion(config):
             sampling = replace(sampling, L=1, interpolation="linear")
     if _is_moved(config):
         frames = replace(frames, black_level_dn=0.0, black_depth_dn=0.0, shift_px=(0.0, 0.0))
-    return replace(config, frames=frames, sampling=sampling)
+    return replace(config, frames=frames, sampling=sampling, readout=readout), effects

@@ -18,6 +18,7 @@ from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.keys import known_keys, user_effects
 from adv2e.diagnosis.lamps import Lamp
+from adv2e.diagnosis.readouts import Readouts, readouts_of
 from adv2e.diagnosis.stamps import Service, service_times, tick_of
 
 
@@ -37,6 +38,8 @@ class Hints:
         What ``frames.encoding: auto`` means for the frames.
     service : Service, optional
         Times that an event and a row take, where stamps look as if they had waited for a channel.
+    readouts : Readouts, optional
+        Of frames, where all pixels fire at once after each.
     """
 
     seconds: float
@@ -44,6 +47,7 @@ class Hints:
     tick_us: int
     encoding: str = "linear"
     service: Service | None = None
+    readouts: Readouts | None = None
 
 
 def library(declared: Config, hints: Hints) -> list[Candidate]:
@@ -214,6 +218,7 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
             "frame_coupling",
             (amplitude, tau),
             ((0.05, 300.0), (-0.05, 300.0), (0.05, 1200.0), (0.15, 300.0)),
+            readouts=hints.readouts,
         ),
         _arbiter(hints.service),
         Candidate(
@@ -319,5 +324,10 @@ def hints_of(evidence: Evidence, lamps: Sequence[Lamp]) -> Hints:
     """Return hints from a recording, and the lamps that may have lit it."""
     stream = evidence.stream
     return Hints(
-        evidence.seconds, tuple(lamps), tick_of(stream.t), evidence.encoding, service_times(stream)
+        evidence.seconds,
+        tuple(lamps),
+        tick_of(stream.t),
+        evidence.encoding,
+        service_times(stream),
+        readouts_of(stream, evidence.times_s),
     )

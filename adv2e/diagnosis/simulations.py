@@ -98,10 +98,12 @@ class Simulator:
         """
         evidence = self._evidence
         times_ns, light = self._light(config)
+        lean, effects = as_recorded(config)
         chunks = events_from_light(
             zip(times_ns, light, strict=True),
-            dataclasses.replace(as_recorded(config), seed=(_SEEDS * config.seed + seed) % 2**63),
+            dataclasses.replace(lean, seed=(_SEEDS * config.seed + seed) % 2**63),
             threads=1,
+            effects=effects,
             coarseness=_ROUGH if rough else _FINE,
         )
         events = np.concatenate([empty_events(), *chunks])

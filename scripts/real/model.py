@@ -71,8 +71,10 @@ class Bench:
         until = (windows.stop + BEYOND_US) * 1000
         made = zip(*self._frames.of(config, lambda: self._read(config)), strict=True)
         used = ((t_ns, light) for t_ns, light in made if t_ns <= until)
-        lean = replace(as_recorded(config), seed=seed)
-        chunks = events_from_light(used, lean, threads=self.threads)
+        lean, effects = as_recorded(config)
+        chunks = events_from_light(
+            used, replace(lean, seed=seed), threads=self.threads, effects=effects
+        )
         return cut(np.concatenate(list(chunks)), windows.start, windows.stop)
 
     def _read(self, config: Config) -> Instants:
