@@ -12,6 +12,7 @@ from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Model
+from adv2e.diagnosis.readouts import EXPOSURE
 
 _FINALISTS = 6
 _FORMS = 2
@@ -53,7 +54,7 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     fitter = bench.fitter(parts.FIT, state.config, first_look=True)
     fits = fitter.probe(left, state.config, (1, 2))
     for one in left:
-        exposed = _exposed(state.config, one)
+        exposed = _exposed(state, one)
         if exposed != state.config:
             fits += fitter.probe([one], exposed, (1, 2))
     nothing = fitter.misfit(state.config, (1, 2))
@@ -86,11 +87,12 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     return trials
 
 
-def _exposed(config: Config, candidate: Candidate) -> Config:
-    """Return a model with its exposure, if it has one, as a candidate needs it."""
-    if candidate.readouts is None or not config.frames.exposure_us:
-        return config
-    return candidate.readouts.exposed(config)
+def _exposed(state: State, candidate: Candidate) -> Config:
+    """Return a model with its exposure as a candidate needs it, if that is fitted and not held."""
+    fitted = any(knob.key == EXPOSURE for fit in state.fits for knob in fit.candidate.knobs)
+    if candidate.readouts is None or not fitted:
+        return state.config
+    return candidate.readouts.exposed(state.config)
 
 
 def _without_third_forms(fits: Sequence[Fit]) -> list[Fit]:

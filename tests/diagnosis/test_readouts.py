@@ -125,3 +125,13 @@ def test_leaps_are_looked_for_with_the_exposure_that_ends_there():
     assert found.state.fits[0].config.frames.exposure_us == pytest.approx(15_000.0, rel=0.002)
     alone = best_with_leaps(None)
     assert alone.objections or alone.judged < found.judged - 20.0
+
+
+def test_an_exposure_that_is_declared_is_held():
+    declared = load_config([], ["frames.exposure_us=15500"])
+    laboratory = Leaps()
+    observed = laboratory.measure(load_config([], ["frames.exposure_us=15000"]), RECORDING)
+    leaps = coupling(Readouts(1500.0, INTERVAL_US))
+    search = Search(laboratory, observed, declared, [leaps])
+    trials = finalists(search.bench, search.declared, search.candidates)
+    assert [trial.fit.base for trial in trials] == [declared]
