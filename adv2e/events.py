@@ -39,6 +39,12 @@ def make_events(t: Any, x: Any, y: Any, p: Any) -> Events:
     return events
 
 
+def pixels_of(events: Events, columns: int) -> NDArray[np.int64]:
+    """Return the pixel of each event, counted along rows of so many columns, (events,)."""
+    pixels: NDArray[np.int64] = events["y"].astype(np.int64) * columns + events["x"]
+    return pixels
+
+
 def sort_events(events: Events) -> Events:
     """Return the events sorted by time, ties by (y, x, p)."""
     order = np.lexsort((events["p"], events["x"], events["y"], events["t"]))

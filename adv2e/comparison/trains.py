@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.events import Events
+from adv2e.events import Events, pixels_of
 
 Keys = NDArray[np.int64]
 
@@ -26,6 +26,6 @@ def stride_of(*streams: Events, reach: int = 0) -> tuple[int, int]:
 
 def keys(events: Events, width: int, start: int, stride: int) -> Keys:
     """Return the key of each event, in the order of `events`."""
-    pixel = events["y"].astype(np.int64) * width + events["x"]
+    pixel = pixels_of(events, width)
     key: Keys = pixel * stride + (events["t"] - start)
     return key

@@ -66,24 +66,22 @@ def likely_of_a_round(candidates: Sequence[Candidate], fits: Sequence[Fit]) -> i
     return likely_of_finalists(candidates) + _LIKELY_TRIED * (fit + SOME) + fit + MANY
 
 
-def _exposed_as(added: Sequence[Trial], fits: Sequence[Fit]) -> list[Fit]:
-    """Return the fits of a model with the exposure, if it has one, that a trial was tried with.
+def _exposed_as(trial: Trial, fit: Fit) -> Fit:
+    """Return the fit of an exposure as a trial was tried with it, and any other as it is.
 
     It is held near that: where it ends elsewhere, there is nothing that would tell it so.
     """
-    found = list(fits)
-    for trial in added:
-        readouts, exposure_us = trial.fit.candidate.readouts, trial.fit.base.frames.exposure_us
-        for k, fit in enumerate(fits):
-            keys = [knob.key for knob in fit.candidate.knobs]
-            if readouts is None or keys != [EXPOSURE]:
-                continue
-            place = fit.candidate.inner([exposure_us])
-            if not np.allclose(place, fit.place, rtol=1e-9):
-                known = ((place[0], readouts.exposure_sd_us / exposure_us),)
-                held = dataclasses.replace(fit.candidate, known=known)
-                found[k] = dataclasses.replace(fit, candidate=held, place=np.array(place))
-    return found
+    readouts, candidate = trial.fit.candidate.readouts, fit.candidate
+    if readouts is None or [knob.key for knob in candidate.knobs] != [EXPOSURE]:
+        return fit
+    exposure_us = trial.fit.base.frames.exposure_us
+    place = np.array(candidate.inner([exposure_us]))
+    if np.allclose(place, fit.place, rtol=1e-9):
+        return fit
+    known = ((float(place[0]), readouts.exposure_sd_us / exposure_us),)
+    return dataclasses.replace(
+        fit, candidate=dataclasses.replace(candidate, known=known), place=place
+    )
 
 
 @dataclass(frozen=True)
@@ -136,7 +134,10 @@ class Attempts:
     def of(self, state: State, added: Sequence[Trial], grounds: Sequence[State]) -> Attempt:
         """Return the model with effects more, fitted to its end and judged."""
         bench = self.bench
-        together = (*_exposed_as(added, state.fits), *(trial.fit for trial in added))
+        before = state.fits
+        for trial in added:
+            before = tuple(_exposed_as(trial, fit) for fit in before)
+        together = (*before, *(trial.fit for trial in added))
         joint = bench.fitted(together, added[0].models[parts.FIT].sd, parts.FIT)
         fits = parted(joint, together)
         grown = State(joint.config, fits, bench.tried(joint.config))

@@ -21,7 +21,7 @@ from adv2e.config.model import Frames
 from adv2e.diagnosis.keys import user_effects
 from adv2e.effects.active import frame_hooks
 from adv2e.effects.hooks import Hooks
-from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
+from adv2e.effects.readout.frame_coupling import FrameCoupling, FrameCouplingHooks
 from adv2e.upsampling import make_upsampler
 from adv2e.upsampling.sequence import Timed, instant_ns, neighbours
 
@@ -66,7 +66,10 @@ class Kept:
             instants = self._made.of(key, lambda: made(config, *read()) if once else read())
             if not _is_moved(config):
                 return instants
-            return self._moved.of((key, _until_moved(config)), lambda: _moved(config, *instants))
+            acting = _until_moved(config)
+            return self._moved.of(
+                (key, acting), lambda: (instants[0], _after(acting, config, *instants))
+            )
 
 
 def is_made_once(config: Config) -> bool:
@@ -79,7 +82,7 @@ def is_made_once(config: Config) -> bool:
     return (
         (_is_along_motion(config) or config.frames.exposure_us > 0.0)
         and sampling.last_interval != "printed"
-        and not (_is_along_motion(config) and _is_coupled(config))
+        and not (_is_along_motion(config) and _coupling(config) is not None)
         and not any(getattr(user, name) is not None for name in user_effects(config))
     )
 
@@ -88,8 +91,8 @@ def _is_along_motion(config: Config) -> bool:
     return config.sampling.interpolation != "linear" and config.sampling.L > 1
 
 
-def _is_coupled(config: Config) -> bool:
-    return config.readout is not None and config.readout.frame_coupling is not None
+def _coupling(config: Config) -> FrameCoupling | None:
+    return None if config.readout is None else config.readout.frame_coupling
 
 
 def _is_moved(config: Config) -> bool:
@@ -107,11 +110,6 @@ def _until_moved(config: Config) -> Frames:
         black_depth_dn=frames.black_depth_dn,
         shift_px=frames.shift_px,
     )
-
-
-def _moved(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Instants:
-    """Return the light where the event pixels see it."""
-    return times_ns, _after(_until_moved(config), config, times_ns, light)
 
 
 def _after(
@@ -161,8 +159,9 @@ def as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
     frames, sampling, readout = config.frames, config.sampling, config.readout
     effects: list[Hooks] = []
     if is_made_once(config):
-        if readout is not None and readout.frame_coupling is not None:
-            effects.append(FrameCouplingHooks(readout.frame_coupling, 0.5 * frames.exposure_us))
+        coupling = _coupling(config)
+        if readout is not None and coupling is not None:
+            effects.append(FrameCouplingHooks(coupling, 0.5 * frames.exposure_us))
             readout = replace(readout, frame_coupling=None)
         frames = replace(frames, exposure_us=0.0)
         if _is_along_motion(config):

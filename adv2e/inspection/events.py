@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from adv2e.events import Events
+from adv2e.events import Events, pixels_of
 from adv2e.sources.times import seconds
 
 GAP_STEPS = 100
@@ -87,7 +87,7 @@ def _gaps(events: Events) -> str:
 
 
 def _hot(events: Events, width: int, height: int) -> str:
-    counts = np.bincount(events["y"].astype(np.int64) * width + events["x"])
+    counts = np.bincount(pixels_of(events, width))
     usual = np.quantile(np.pad(counts, (0, width * height - len(counts))), 0.999)
     hot = np.flatnonzero(counts > HOT_FACTOR * max(usual, 1.0))
     if not len(hot):

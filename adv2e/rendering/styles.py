@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import UsageError
-from adv2e.events import Events
+from adv2e.events import Events, pixels_of
 
 Picture = NDArray[np.uint8]
 """A picture (rows, columns, 3), RGB."""
@@ -131,7 +131,7 @@ def _last_polarity(events: Events, width: int, height: int, t_us: int, style: St
 
 
 def _net_count(events: Events, width: int, height: int, t_us: int, style: Style) -> Picture:
-    pixel = events["y"].astype(np.int64) * width + events["x"]
+    pixel = pixels_of(events, width)
     sign = events["p"].astype(np.float64) * 2 - 1
     net = np.bincount(pixel, weights=sign, minlength=width * height)
     clipped = np.clip(net, -GREY_CLIP, GREY_CLIP).reshape(height, width)

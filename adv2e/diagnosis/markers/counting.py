@@ -6,7 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from adv2e.jit import entry
+from adv2e.jit import entry, kernel
+
+
+@kernel
+def _interval(t: int, lag: float, times: Any, k: int) -> int:
+    """Return the frame interval that lies `lag` before a time [us], the k-th or a later one."""
+    while k < times.shape[0] - 2 and t >= times[k + 1] + lag:
+        k += 1
+    return k
 
 
 @entry
@@ -29,14 +37,11 @@ def sum_slopes(
         Zeros: room for where in `times` each lag is.
     sums : (lags, cells)
     """
-    last = slope.shape[1] - 1
     for i in range(t.shape[0]):
         n, c = pixel[i], cell[i]
         sign = 1.0 if on[i] else -1.0
         for j in range(lags.shape[0]):
-            k = at[j]
-            while k < last and t[i] >= times[k + 1] + lags[j]:
-                k += 1
+            k = _interval(t[i], lags[j], times, at[j])
             at[j] = k
             sums[j, c] += sign * slope[n, k]
 
@@ -60,16 +65,13 @@ def sum_slopes_beside(
     Parameters are those of :func:`sum_slopes`; `sums`: (2 lags, parts), right and below in turn.
     Events of the border do not count.
     """
-    last = slope.shape[1] - 1
     for i in range(t.shape[0]):
         n = pixel[i]
         x, y = n % width, n // width
         inside = x > 0 and y > 0 and x < width - 1 and y < height - 1
         sign = 1.0 if on[i] else -1.0
         for j in range(lags.shape[0]):
-            k = at[j]
-            while k < last and t[i] >= times[k + 1] + lags[j]:
-                k += 1
+            k = _interval(t[i], lags[j], times, at[j])
             at[j] = k
             if inside:
                 sums[2 * j, part[i]] += sign * (slope[n + 1, k] - slope[n - 1, k])

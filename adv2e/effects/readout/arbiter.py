@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from adv2e import rng
 from adv2e.effects.hooks import Hooks, View
-from adv2e.events import Events, make_events, sort_events
+from adv2e.events import Events, make_events, pixels_of, sort_events
 from adv2e.jit import entry
 from adv2e.ordering import InOrder
 from adv2e.parameters import Fit, Section, parameter
@@ -212,7 +212,7 @@ class ArbiterHooks(Hooks):
         self, events: Events
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int8]]:
         """Return when the events ask [us], in order, and their pixels and polarities."""
-        pixels = events["y"].astype(np.int64) * self.view.columns + events["x"]
+        pixels = pixels_of(events, self.view.columns)
         drawn = rng.next_uniforms(self.view.seed, rng.REQUEST, pixels, self._numbers)
         asking_us = (events["t"] - self._origin_us) + (drawn - 0.5)
         order = np.argsort(asking_us, kind="stable")

@@ -18,7 +18,7 @@ import numpy as np
 
 from adv2e import rng
 from adv2e.effects.hooks import Hooks, View
-from adv2e.events import Events
+from adv2e.events import Events, pixels_of
 from adv2e.parameters import Fit, Section, parameter
 
 
@@ -49,6 +49,6 @@ class EventLossHooks(Hooks):
     def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
         """Yield the events that are kept."""
         for events in chunks:
-            pixels = events["y"].astype(np.int64) * self.view.columns + events["x"]
+            pixels = pixels_of(events, self.view.columns)
             drawn = rng.next_uniforms(self.view.seed, rng.LOSS, pixels, self._numbers)
             yield events[drawn >= self.parameters.fraction]
