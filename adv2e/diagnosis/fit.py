@@ -93,6 +93,13 @@ class Fit:
     moved: float = np.inf
     simulations: int = 1
 
+    @classmethod
+    def at(cls, values: Sequence[float], candidate: Candidate, base: Config) -> Fit:
+        """Return a fit that starts at values of the knobs, or the nearest that are physical."""
+        fit = cls(candidate, base, np.array(candidate.inner(values)))
+        fit.place = fit.inside(fit.place)
+        return fit
+
     @property
     def config(self) -> Config:
         """The model with the effect as fitted."""
@@ -172,20 +179,16 @@ class Fitter:
         self, candidates: Sequence[Candidate], base: Config, seeds: Sequence[int]
     ) -> list[Fit]:
         """Return each candidate at the best of its probes."""
-        places = [
-            (candidate, np.array(candidate.inner(probe)))
-            for candidate in candidates
-            for probe in candidate.probes
+        fits = [
+            Fit.at(probe, candidate, base) for candidate in candidates for probe in candidate.probes
         ]
-        configs = [candidate.applied(base, place) for candidate, place in places]
-        means = self.whites(configs, seeds)
+        means = self.whites([fit.config for fit in fits], seeds)
         best: dict[int, Fit] = {}
-        for (candidate, place), mean in zip(places, means, strict=True):
-            fit = Fit(candidate, base, place)
-            fit.misfit = self._misfit(fit, place, mean)
-            held = best.get(id(candidate))
+        for fit, mean in zip(fits, means, strict=True):
+            fit.misfit = self._misfit(fit, fit.place, mean)
+            held = best.get(id(fit.candidate))
             if held is None or fit.misfit < held.misfit:
-                best[id(candidate)] = fit
+                best[id(fit.candidate)] = fit
         return [best[id(candidate)] for candidate in candidates]
 
     def misfit(self, config: Config, seeds: Sequence[int]) -> float:
@@ -216,7 +219,7 @@ class Fitter:
         for fit in fits:
             configs += [fit.config, *(fit.moved_to(place) for place in _nudged(fit))]
         whites = iter(self._white_of_seeds(configs, seeds))
-        trials: list[tuple[Fit, Array]] = []
+        trials: list[list[Array]] = []
         for fit in fits:
             here = next(whites)
             columns = []
@@ -227,18 +230,23 @@ class Fitter:
             move = _damped(fit, slope)
             fit.normal, fit.derivative, fit.simulations = slope.normal, slope.derivative, len(seeds)
             fit.covariance = np.linalg.pinv(slope.normal) * _of_mean(len(seeds))
-            trials += [(fit, fit.inside(fit.place + share * move)) for share in _SHARES]
-        for fit in fits:
-            fit.moved = 0.0
-            fit.damping *= 4.0
+            trials.append([fit.inside(fit.place + share * move) for share in _SHARES])
+        tried = [
+            fit.moved_to(place)
+            for fit, places in zip(fits, trials, strict=True)
+            for place in places
+        ]
+        means = iter(self.whites(tried, seeds))
+        for fit, places in zip(fits, trials, strict=True):
+            misfits = [self._misfit(fit, place, next(means)) for place in places]
+            nearest = int(np.argmin(misfits))
             fit.reach = max(0.5 * fit.reach, _NARROW)
-        means = self.whites([fit.moved_to(place) for fit, place in trials], seeds)
-        for (fit, place), mean in zip(trials, means, strict=True):
-            misfit = self._misfit(fit, place, mean)
-            if misfit < fit.misfit:
-                fit.moved = float(np.max(np.abs(place - fit.place) / fit.deviation))
-                fit.misfit, fit.place = misfit, place
-                fit.damping = max(fit.damping / 16.0, 1e-3)
+            if misfits[nearest] >= fit.misfit:
+                fit.moved, fit.damping = 0.0, 4.0 * fit.damping
+                continue
+            fit.moved = float(np.max(np.abs(places[nearest] - fit.place) / fit.deviation))
+            fit.misfit, fit.place = misfits[nearest], places[nearest]
+            fit.damping = max(0.25 * fit.damping, 1e-3)
 
     def refine(self, fit: Fit, rounds: Sequence[Sequence[int]]) -> None:
         """Bring a fit that is near its end there.

@@ -152,9 +152,7 @@ class Search:
 
     def explained(self, state: State, view: int = BOTH) -> float:
         """Return the share of the declared model's residual that is gone."""
-        before = self.bench.misfit(self.declared, view)
-        after, floor = self.bench.misfit(state, view), state.models[view].floor
-        return float((before - after) / max(before - floor, 1e-9))
+        return self._taken_away(self.declared, state, state.models[view].floor, view)
 
     def run(self) -> Outcome:
         """Search forward and backward."""
@@ -241,10 +239,16 @@ class Search:
             self.bench.rejections.add(fit, why, final=True)
         return False
 
-    def _taken_away(self, state: State, other: State) -> float:
-        """Return the share of what a model leaves that another does not."""
-        before, after = self.bench.misfit(state), self.bench.misfit(other)
-        return (before - after) / (before - state.models[BOTH].floor)
+    def _taken_away(
+        self, state: State, other: State, floor: float | None = None, view: int = BOTH
+    ) -> float:
+        """Return the share of what a model leaves above a floor that another does not.
+
+        The floor is the model's own unless it is given.  Below it, nothing is left to take away.
+        """
+        before, after = self.bench.misfit(state, view), self.bench.misfit(other, view)
+        above = before - (state.models[view].floor if floor is None else floor)
+        return float((before - after) / above) if above > 0.0 else 0.0
 
     def _grown(self, state: State) -> State | None:
         """Return the model with one effect more, or two that hold only together.

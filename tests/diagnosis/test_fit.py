@@ -143,6 +143,17 @@ def test_a_negative_end_is_a_border():
         assert Fit(candidate, Config(), np.array([place])).at_border == there
 
 
+def test_a_probe_beyond_the_range_starts_at_its_end():
+    knob = Knob("pixel.thresholds.mismatch", 1e-3, 0.5)
+    candidate = Candidate("threshold_mismatch", (knob,), ((1.2,),))
+    laboratory = MadeUpLaboratory()
+    truth = load_config([], ["pixel.thresholds.mismatch=0.3"])
+    fitter = fitter_of(laboratory, laboratory.measure(truth, 5000)[VIEW])
+    (fit,) = fitter.probe([candidate], Config(), (1, 2))
+    assert knob.outer(fit.place[0]) == pytest.approx(0.5)
+    assert fit.place[0] == knob.inner(0.5)
+
+
 def test_the_best_probe_is_where_a_fit_begins():
     laboratory = MadeUpLaboratory()
     truth = load_config([], ["pixel.refractory.period_us=14000"])
@@ -161,11 +172,15 @@ def test_a_step_never_makes_it_worse():
     fitter = fitter_of(laboratory, laboratory.measure(truth, 5000)[VIEW])
     fits = fitter.probe(candidates(), Config(), (1, 2))
     for _ in range(4):
-        before = [fit.misfit for fit in fits]
+        before = [(fit.misfit, fit.place, fit.damping) for fit in fits]
         fitter.improve(fits, (1, 2))
-        for fit, misfit in zip(fits, before, strict=True):
+        for fit, (misfit, place, damping) in zip(fits, before, strict=True):
             assert fit.misfit <= misfit + 1e-6
             assert fit.misfit == pytest.approx(fitter.misfit(fit.config, (1, 2)))
+            # whichever share of the step was taken, it is one step
+            assert fit.moved == pytest.approx(np.max(np.abs(fit.place - place) / fit.deviation))
+            factor = 0.25 if fit.moved else 4.0
+            assert fit.damping == pytest.approx(max(factor * damping, 1e-3))
 
 
 def test_many_fits_move_as_one_alone():

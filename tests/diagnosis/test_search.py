@@ -26,6 +26,7 @@ from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.conclusion import finding_of
 from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.nuisances import THRESHOLDS, thresholds_of
 from adv2e.diagnosis.search import LEVEL, Search
 from adv2e.diagnosis.verdict import verdict_of
@@ -65,6 +66,22 @@ def test_one_effect_is_named(name, sets, value):
     assert name not in outcome.rejected
     assert set(outcome.rejected) <= set(EFFECTS)
     assert all(one.reason for one in outcome.rejected.values())
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "share"),
+    [(9.0, 3.0, 1.0), (9.0, 6.0, 0.5), (3.0, 2.0, 0.0), (2.0, 2.5, 0.0), (2.0, 1.0, 0.0)],
+)
+def test_below_the_floor_there_is_nothing_to_explain(monkeypatch, before, after, share):
+    search, outcome = searched(["pixel.leak.rate_hz=2.5"])
+    floor = outcome.state.models[BOTH].floor
+    misfits = {id(search.declared): before, id(outcome.state): after}
+
+    def misfit(bench, state, view=BOTH):
+        return floor - 3.0 + misfits[id(state)]
+
+    monkeypatch.setattr(type(search.bench), "misfit", misfit)
+    assert search.explained(outcome.state) == pytest.approx(share)
 
 
 def test_of_the_forms_of_an_effect_the_plainest_that_does_is_taken():
