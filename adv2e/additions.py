@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 
+LONGEST_US = 100.0
+"""Longest step in which the circuit is solved, and courses are followed unless they say more."""
+
 Course = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """From times [s], (n,), to values, (n,) or (n, pixels)."""
 

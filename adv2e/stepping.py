@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.additions import INJECTED_DTYPE, Additions, Course, values_of
+from adv2e.additions import INJECTED_DTYPE, LONGEST_US, Additions, Course, values_of
 from adv2e.effects.pixel.threshold_drift import drift_factors
 from adv2e.errors import DataError
 from adv2e.intervals import Part
@@ -38,9 +38,6 @@ from adv2e.kernel.tile import Frames
 from adv2e.kernel.workspace import EXACT, Circuit
 
 _Planned = tuple[Run, Injected]
-
-LONGEST_US = 100.0
-"""Longest step."""
 
 _SHARE, _SHARE_OF_TWO = 0.5, 0.25
 """Longest step as a share of the shortest time constant, of one pole and of two."""

@@ -29,9 +29,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.additions import LONGEST_US
 from adv2e.characterisation.threshold_noise import SAMPLING_SHIFT, event_rates
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
-from adv2e.stepping import LONGEST_US
 
 Array = NDArray[np.float64]
 

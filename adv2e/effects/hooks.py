@@ -24,7 +24,6 @@ are functions of what they are for (:meth:`View.uniforms`), and `gain`, `drive`,
 
 from __future__ import annotations
 
-import math
 import re
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
@@ -35,7 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from adv2e import rng
-from adv2e.additions import INJECTED_DTYPE
+from adv2e.additions import INJECTED_DTYPE, LONGEST_US
 from adv2e.events import Events
 from adv2e.parameters import Section
 
@@ -108,8 +107,9 @@ class Hooks:
     source : mapping
         Name, file and SHA-256 of the code, where it was loaded from a file.
     step_us : float
-        Longest time step that resolves `gain`, `drive`, `signal` and `thresholds` [us]; steps are
-        not above 100 us anyway.
+        Longest time step that resolves `gain`, `drive`, `signal` and `thresholds` [us].  Events are
+        simulated with none above 100 us; a diagnosis, which can do with longer ones elsewhere,
+        keeps to this one, and takes two and a half of it for a first look.
     parameters : Section
     view : View
         Set before anything else is called.
@@ -125,7 +125,7 @@ class Hooks:
     Parameters: ClassVar[type[Section]] = NoParameters
     source: ClassVar[Mapping[str, str]] = {}
 
-    step_us: float = math.inf
+    step_us: float = LONGEST_US
     view: View
 
     def __init_subclass__(cls, **options: Any) -> None:

@@ -7,6 +7,8 @@ import pytest
 
 from adv2e import load_config, simulate
 from adv2e.additions import INJECTED_DTYPE
+from adv2e.circuit import make_circuit
+from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.active import active_hooks
 from adv2e.effects.composition import additions_of, begin, map_events
 from adv2e.effects.hooks import Hooks, View
@@ -14,6 +16,7 @@ from adv2e.errors import ConfigError, DataError
 from adv2e.events import make_events
 from adv2e.ordering import InOrder
 from adv2e.parameters import Fit, Section, parameter
+from adv2e.stepping import Coarseness, steps_of
 
 ROWS, COLUMNS = 3, 4
 TIMES = np.array([0.1, 0.2, 0.3])
@@ -66,6 +69,26 @@ def begun(*hooks):
     for hook in hooks:
         hook.begin(View(ROWS, COLUMNS, 0, 0.0))
     return hooks
+
+
+def test_a_course_is_followed_every_100_us_in_a_diagnosis_too_unless_it_says_more():
+    class Slow(Hooks):
+        def gain(self, times_s):
+            return 1.0 + times_s
+
+    class Slower(Slow):
+        step_us = 1000.0
+
+    circuit = make_circuit(Pixel(), Sampling(), 0)
+
+    def steps(hook, coarseness):
+        (begun_hook,) = begun(hook())
+        step_us = additions_of([begun_hook]).step_us
+        return steps_of(10_000.0, circuit, step_us, coarseness=coarseness)
+
+    assert steps(Slow, Coarseness()) == steps(Slower, Coarseness()) == 100
+    assert steps(Slow, Coarseness(5.0)) == 100
+    assert steps(Slower, Coarseness(5.0)) < 50
 
 
 def test_drives_add_up_and_factors_multiply():
