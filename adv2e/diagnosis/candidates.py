@@ -32,8 +32,8 @@ class Knob:
         Fitted as its logarithm.
     scale : float
         Change that counts as one, for knobs that are fitted as they are.
-    part : int, optional
-        Place in a key that is a list.
+    part : (int, int), optional
+        Place in a key that is a list, and how many numbers that has.
     text : str
         How a key that is text holds the number, such as ``gamma:{}``.
     neutral : float, optional
@@ -47,7 +47,7 @@ class Knob:
     high: float
     log: bool = True
     scale: float = 1.0
-    part: int | None = None
+    part: tuple[int, int] | None = None
     text: str = ""
     neutral: float | None = None
     of_pixels: bool = False
@@ -143,9 +143,10 @@ def _turn(values: dict[str, Any], knob: Knob, value: float) -> None:
     if knob.text:
         set_key(values, knob.key, knob.text.format(f"{value:.6g}"))
     elif knob.part is not None:
+        place, count = knob.part
         held = get_key(values, knob.key)
-        items = list(held) if isinstance(held, (list, tuple)) else [0.0, 0.0]
-        items[knob.part] = value
+        items = list(held) if isinstance(held, (list, tuple)) else [0.0] * count
+        items[place] = value
         set_key(values, knob.key, items)
     else:
         set_key(values, knob.key, value)
@@ -165,7 +166,7 @@ def neutral_value(config: Config, knob: Knob) -> float:
         return knob.neutral
     held = get_key(to_dict(config), knob.key)
     if knob.part is not None and isinstance(held, (list, tuple)):
-        held = held[knob.part]
+        held = held[knob.part[0]]
     if isinstance(held, (int, float)):
         return float(held)
     return math.inf if knob.key in _OFF_AT_INFINITY else 0.0

@@ -6,13 +6,13 @@ well is taken.  An effect whose keys the configuration does not have is left out
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from adv2e.config import Config, to_dict
+from adv2e.config.build import keys_of
 from adv2e.config.paths import get_key
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.evidence import Evidence
@@ -86,13 +86,15 @@ def _of_the_user(config: Config) -> list[Candidate]:
     values = to_dict(config)
     for name, effect in user_effects(config).items():
         knobs, starts = [], []
-        for item in dataclasses.fields(effect.Parameters):
-            fit = item.metadata["parameter"].fit
-            if fit is None or item.type in ("bool", bool):
+        for key in keys_of(effect.Parameters, f"user.{name}"):
+            fit, count = key.about.fit, len(key.parts)
+            if fit is None:
                 continue
             scale = (fit.high - fit.low) / 10.0
-            knobs.append(Knob(f"user.{name}.{item.name}", fit.low, fit.high, fit.log, scale))
-            starts.append(fit.start)
+            parts = [(n, count) for n in range(count)] if count else [None]
+            for part in parts:
+                knobs.append(Knob(key.path, fit.low, fit.high, fit.log, scale, part))
+                starts.append(fit.start)
         milder = [knob.outer(knob.inner(v) - 1.0) for knob, v in zip(knobs, starts, strict=True)]
         more = [knob.outer(knob.inner(v) + 1.0) for knob, v in zip(knobs, starts, strict=True)]
         probes = [tuple(starts)]
@@ -250,7 +252,7 @@ def _arbiter(service: Service | None) -> Candidate:
 def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
     offset = Knob("frames.clock_offset_us", -1e6, 1e6, False, 1000.0)
     drift = Knob("frames.clock_drift_ppm", -1e5, 1e5, False, 1000.0)
-    shift = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
+    shift = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, (part, 2)) for part in (0, 1))
     made = [
         Candidate(
             "black_level",

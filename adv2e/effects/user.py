@@ -19,6 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from adv2e.config.build import Key, keys_of
 from adv2e.config.model import Config
 from adv2e.effects import STAGES
 from adv2e.effects.hooks import Hooks
@@ -102,7 +103,29 @@ def _complaint(effect: type[Hooks]) -> str | None:
     for item in dataclasses.fields(section):
         if "parameter" not in item.metadata:
             return f"Parameters: {item.name} must be declared with parameter(unit=, meaning=)"
-    return None
+    try:
+        keys = keys_of(section)
+    except (NameError, TypeError, ValueError) as error:
+        return f"Parameters: {error}"
+    return next(filter(None, map(_key_complaint, keys)), None)
+
+
+_KINDS = (float, int, bool, str)
+
+
+def _key_complaint(key: Key) -> str | None:
+    """Return what is wrong with a parameter, or with where it may be fitted, or None."""
+    kinds = key.parts or (key.kind,)
+    if not set(kinds) <= set(_KINDS):
+        wanted = ", ".join(kind.__name__ for kind in _KINDS)
+        return f"Parameters: {key.name}: its type must be one of {wanted} or a tuple of them"
+    fit = key.about.fit
+    if fit is None:
+        return None
+    if set(kinds) != {float}:
+        return f"Parameters: {key.name}: fit: only float, and tuples of it, can be fitted"
+    wrong = key.about.complaint(fit.low) or key.about.complaint(fit.high)
+    return f"Parameters: {key.name}: fit: {wrong}" if wrong else None
 
 
 def config_class(effects: Sequence[type[Hooks]]) -> type[Config]:

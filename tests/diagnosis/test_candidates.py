@@ -169,7 +169,7 @@ def test_scale_is_the_change_that_counts_as_one():
 
 
 def test_parts_of_a_list_are_set_one_by_one():
-    right, below = KNOBS["frames.shift_px", 0], KNOBS["frames.shift_px", 1]
+    right, below = KNOBS["frames.shift_px", (0, 2)], KNOBS["frames.shift_px", (1, 2)]
     declared = load_config([], ["frames.shift_px=[0.5, -1]"])
     one = Candidate("misregistration", (below,), ((0.0,),))
     assert one.applied(declared, one.inner((2.0,))).frames.shift_px == (0.5, 2.0)
@@ -198,8 +198,8 @@ def test_a_knob_may_be_part_of_a_text():
         ("pixel.low_pass.cutoff_hz", None, [], 300.0),
         ("pixel.low_pass.cutoff_hz", None, ["pixel.low_pass=null"], math.inf),
         ("pixel.low_pass.dark_cutoff_hz", None, ["pixel.low_pass=null"], math.inf),
-        ("frames.shift_px", 0, [], 0.0),
-        ("frames.shift_px", 1, ["frames.shift_px=[1, -2.5]"], -2.5),
+        ("frames.shift_px", (0, 2), [], 0.0),
+        ("frames.shift_px", (1, 2), ["frames.shift_px=[1, -2.5]"], -2.5),
         ("frames.encoding", None, ["frames.encoding=linear"], 1.0),
         ("frames.encoding", None, ["frames.encoding=gamma:1.8"], 1.8),
         ("frames.encoding", None, ["frames.encoding=srgb"], 2.2),

@@ -62,6 +62,16 @@ def load(tmp_path):
     return write
 
 
+def fitted(kind, limits="at_least=0"):
+    """Return the text of an effect with a parameter of some type that may be fitted."""
+    return (
+        "from adv2e.parameters import Fit\n"
+        f"@dataclass(frozen=True, kw_only=True)\nclass K(Section):\n    depth: {kind} = parameter("
+        f"unit='-', meaning='m', {limits}, fit=Fit(1.0, 9.0, 3.0))\n"
+        "class A(Hooks):\n    Parameters = K\n    def drive(self, t): return t"
+    )
+
+
 def test_classes_of_a_file_in_their_order(load):
     effects = load(DIM + DRIFT)
     assert [effect.name for effect in effects] == ["dim", "drive_drift"]
@@ -98,6 +108,12 @@ def test_classes_of_a_file_in_their_order(load):
             "class A(Hooks):\n    Parameters = K\n    def drive(self, t): return t",
             r"class A: Parameters: depth must be declared with parameter\(unit=, meaning=\)",
         ),
+        (fitted("int"), r"class A: Parameters: depth: fit: only float, and tuples of it"),
+        (fitted("bool"), r"class A: Parameters: depth: fit: only float, and tuples of it"),
+        (fitted("tuple[float, int]"), r"Parameters: depth: fit: only float, and tuples of it"),
+        (fitted("float", "at_least=2"), r"Parameters: depth: fit: must be at least 2, got 1"),
+        (fitted("list"), r"depth: its type must be one of float, int, bool, str or a tuple"),
+        (fitted("'Depth'"), r"class A: Parameters: name 'Depth' is not defined"),
     ],
 )
 def test_a_file_that_is_wrong_is_told_where_and_what(load, text, message):
@@ -150,6 +166,16 @@ def test_its_configuration_survives_text_and_is_one_of_ours(load, tmp_path):
     assert load_config([path], effects=effects) == config
     assert "Takes light away." in to_annotated_yaml(config)
     assert dataclasses.replace(config, seed=5).user == config.user
+
+
+def test_each_number_of_a_list_is_fitted_by_itself(load):
+    effects = load(fitted("tuple[float, float, float]"))
+    declared = load_config((), ["user.a=null"], effects=effects)
+    (one,) = (one for one in library(declared, HINTS) if one.name == "a")
+    assert [knob.part for knob in one.knobs] == [(0, 3), (1, 3), (2, 3)]
+    assert one.probes[0] == (3.0, 3.0, 3.0)
+    assert len(one.probes) == 7
+    assert one.applied(declared, one.inner((1.5, 2.5, 9.0))).user.a.depth == (1.5, 2.5, 9.0)
 
 
 def test_two_of_one_name_are_an_error(load):
