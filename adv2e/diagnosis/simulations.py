@@ -21,7 +21,6 @@ from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.stream import Stream
 from adv2e.effects.frames.misregistration import shifted
-from adv2e.events import empty_events
 from adv2e.simulation import events_from_light
 from adv2e.stepping import Coarseness
 
@@ -106,7 +105,7 @@ class Simulator:
             effects=effects,
             coarseness=_ROUGH if rough else _FINE,
         )
-        events = np.concatenate([empty_events(), *chunks])
+        events = np.concatenate(list(chunks))
         with self._counting:
             self.done += 1
             self._progress(self.done, self._likely)

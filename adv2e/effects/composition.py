@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from adv2e.additions import INJECTED_DTYPE, Additions
 from adv2e.effects.hooks import Frames, Hooks, Times, View
 from adv2e.errors import Adv2eError, DataError
-from adv2e.events import EVENT_DTYPE, Events
+from adv2e.events import EVENT_DTYPE, Events, empty_events
 
 Array = NDArray[Any]
 
@@ -171,7 +171,7 @@ def _injected(hook: Hooks, start_s: float, stop_s: float) -> Array:
 
 
 def map_events(hooks: Iterable[Hooks], chunks: Iterable[Events]) -> Iterator[Events]:
-    """Yield the events that leave the last of the effects."""
+    """Yield the events that leave the last of the effects: one array at least."""
     chunks = iter(chunks)
     for hook in hooks:
         if overrides(hook, "events"):
@@ -180,7 +180,7 @@ def map_events(hooks: Iterable[Hooks], chunks: Iterable[Events]) -> Iterator[Eve
 
 
 def _events(hook: Hooks, chunks: Iterator[Events]) -> Iterator[Events]:
-    last = -np.inf
+    last, nothing = -np.inf, True
     source = _Watched(chunks)
     with blamed(hook, source):
         for events in hook.events(source):
@@ -191,8 +191,11 @@ def _events(hook: Hooks, chunks: Iterator[Events]) -> Iterator[Events]:
                 if times[0] < last or np.any(times[1:] < times[:-1]):
                     raise DataError(f"effect {hook.name}: events: times must not decrease")
                 last = times[-1]
+            nothing = False
             yield events
             del events  # or they would stay while the next ones are made
+    if nothing:
+        yield empty_events()
 
 
 class _Watched:

@@ -91,6 +91,27 @@ def test_a_course_is_followed_every_100_us_in_a_diagnosis_too_unless_it_says_mor
     assert steps(Slower, Coarseness(5.0)) < 50
 
 
+class Swallow(Hooks):
+    stage = "readout"
+
+    def events(self, chunks):
+        for _ in chunks:
+            yield from ()
+
+
+@pytest.mark.parametrize(
+    ("sets", "effects"),
+    [((), []), (["readout.arbiter={event_ns: 100, row_ns: 1000}"], []), ((), [Swallow()])],
+)
+def test_where_nothing_fires_there_is_an_array_without_events(sets, effects):
+    quiet = [f"pixel.{name}=null" for name in ("leak", "shot_noise")]
+    config = load_config((), [*quiet, *sets])
+    still = [np.full((3, 4), 0.2)] * 3
+    chunks = list(simulate(still, [0.0, 0.01, 0.02], config, effects=effects))
+    assert chunks
+    assert not np.concatenate(chunks).size
+
+
 def test_drives_add_up_and_factors_multiply():
     found = additions_of(begun(Lamp(), Spots()))
     assert found.step_us == 40.0
