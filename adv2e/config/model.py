@@ -55,41 +55,41 @@ class Frames(Section):
         0.0,
         unit="DN",
         meaning="light that the decoded frames lack at every brightness",
-        fit=Fit(-20.0, 20.0, 0.0),
+        fit=Fit(-100.0, 100.0, 1.5),
     )
     black_depth_dn: float = parameter(
         0.0,
         unit="DN",
         meaning="how far light falls on inside areas that the frames clip at 0",
         at_least=0,
-        fit=Fit(0.0, 20.0, 0.0),
+        fit=Fit(0.01, 100.0, 3.0, log=True),
     )
     exposure_us: float = parameter(
         0.0,
         unit="us",
         meaning="time over which a frame averages the light, about its own time; 0: none",
         at_least=0,
-        fit=Fit(0.0, 50000.0, 0.0),
+        fit=Fit(100.0, 2e5, 4000.0, log=True),
     )
     clock_offset_us: float = parameter(
         0.0,
         unit="us",
         meaning="time on the camera's clock minus stamp of the frame",
-        fit=Fit(-20000.0, 20000.0, 0.0),
+        fit=Fit(-1e6, 1e6, 600.0),
     )
     clock_drift_ppm: float = parameter(
         0.0,
         unit="ppm",
         meaning="by how much the clock of the frames is slow, from the first frame on",
         above=-1e6,
-        fit=Fit(-20000.0, 20000.0, 0.0),
+        fit=Fit(-1e5, 1e5, 1500.0),
     )
     shift_px: tuple[float, float] = parameter(
         (0.0, 0.0),
         unit="px",
         meaning="[x, y]: how far the picture in the frames lies right of and below that of the"
         " events",
-        fit=Fit(-5.0, 5.0, 0.0),
+        fit=Fit(-20.0, 20.0, 0.3),
     )
     flicker: Flicker | None = subsection(
         _off, meaning="light of lamps, of which the frames know nothing", optional=True

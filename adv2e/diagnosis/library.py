@@ -1,4 +1,6 @@
-"""The effects that may be missing, where their fits start, and in which ranges they are physical.
+"""The effects that may be missing, and where their fits start.
+
+In which ranges they are physical is declared with their parameters (:class:`adv2e.parameters.Fit`).
 
 Some effects are there several times: with one key alone, or more of them; the plainest that does as
 well is taken.  An effect whose keys the configuration does not have is left out.
@@ -6,7 +8,7 @@ well is taken.  An effect whose keys the configuration does not have is left out
 
 from __future__ import annotations
 
-import math
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +22,9 @@ from adv2e.diagnosis.keys import known_keys, user_effects
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.readouts import Readouts, readouts_of
 from adv2e.diagnosis.stamps import Service, service_times, tick_of
+from adv2e.parameters import Fit
+
+_DECLARED = known_keys(Config)
 
 
 @dataclass(frozen=True)
@@ -60,17 +65,32 @@ def library(declared: Config, hints: Hints) -> list[Candidate]:
 def _all(declared: Config, hints: Hints) -> list[Candidate]:
     values = to_dict(declared)
 
-    def now(key: str, otherwise: float) -> float:
+    def now(key: str) -> float:
         held = get_key(values, key)
-        return float(held) if isinstance(held, (int, float)) and held > 0 else otherwise
+        return float(held) if isinstance(held, (int, float)) and held > 0 else _fit_of(key).start
 
-    def times(key: str, otherwise: float, *factors: float) -> tuple[tuple[float, ...], ...]:
-        return tuple((now(key, otherwise) * factor,) for factor in factors)
+    def times(key: str, *factors: float) -> tuple[tuple[float, ...], ...]:
+        return tuple((now(key) * factor,) for factor in factors)
 
     made: list[Candidate] = []
     for build in _BUILDERS:
         made += build(now, times, values, hints)
     return made
+
+
+def _fit_of(key: str) -> Fit:
+    """Return where the parameter of a key is declared to be fitted."""
+    fit = _DECLARED[key].fit
+    assert fit is not None, key
+    return fit
+
+
+def _knob(
+    key: str, scale: float = 1.0, *, part: tuple[int, int] | None = None, of_pixels: bool = False
+) -> Knob:
+    """Return the knob on a key, in the range and on the scale that it is declared with."""
+    fit = _fit_of(key)
+    return Knob(key, fit.low, fit.high, fit.log, scale, part, of_pixels=of_pixels)
 
 
 def _keys_of(candidate: Candidate) -> list[str]:
@@ -107,65 +127,55 @@ def _of_the_user(config: Config) -> list[Candidate]:
     return made
 
 
-_Now = Callable[[str, float], float]
+_LEAST_DN = 0.02
+"""Of a black level, either way."""
+
+_Now = Callable[[str], float]
 _Times = Callable[..., tuple[tuple[float, ...], ...]]
 
 
 def _of_the_thresholds(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    on = Knob("pixel.thresholds.on", 0.01, 5.0)
-    off = Knob("pixel.thresholds.off", 0.01, 5.0)
-    a, b = now(on.key, 0.2), now(off.key, 0.2)
+    on, off = _knob("pixel.thresholds.on"), _knob("pixel.thresholds.off")
+    a, b = now(on.key), now(off.key)
+    spread = _knob("pixel.thresholds.mismatch")
     drift = 0.2 / hints.seconds
-    spread = "pixel.thresholds.mismatch"
+    drifts = _knob("pixel.thresholds.drift_per_s", drift)
+    # they must not reach zero before the end
+    drifts = dataclasses.replace(drifts, low=-0.9 / hints.seconds)
     return [
-        Candidate("thresholds", (on,), times(on.key, 0.2, 0.8, 1.25)),
-        Candidate("thresholds", (off,), times(off.key, 0.2, 0.8, 1.25)),
+        Candidate("thresholds", (on,), times(on.key, 0.8, 1.25)),
+        Candidate("thresholds", (off,), times(off.key, 0.8, 1.25)),
         Candidate(
             "thresholds", (on, off), ((0.8 * a, 0.8 * b), (1.25 * a, 1.25 * b), (1.25 * a, 0.8 * b))
         ),
-        Candidate(
-            "threshold_mismatch", (Knob(spread, 1e-3, 0.5),), times(spread, 0.02, 0.5, 2.0, 4.0)
-        ),
-        Candidate(
-            "threshold_drift",
-            (Knob("pixel.thresholds.drift_per_s", -0.9 / hints.seconds, 20.0, False, drift),),
-            ((-drift,), (drift,), (3 * drift,)),
-        ),
+        Candidate("threshold_mismatch", (spread,), times(spread.key, 0.5, 2.0, 4.0)),
+        Candidate("threshold_drift", (drifts,), ((-drift,), (drift,), (3 * drift,))),
     ]
 
 
 def _of_the_photoreceptor(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    white = Knob("pixel.low_pass.cutoff_hz", 1.0, 1e5)
-    dark = Knob("pixel.low_pass.dark_cutoff_hz", 0.05, 1e4)
-    a, b = now(white.key, 300.0), now(dark.key, 20.0)
+    white, dark = _knob("pixel.low_pass.cutoff_hz"), _knob("pixel.low_pass.dark_cutoff_hz")
+    a, b = now(white.key), now(dark.key)
     made = [
-        Candidate("low_pass", (white,), times(white.key, 300.0, 0.25, 0.6, 2.0)),
-        Candidate("low_pass", (dark,), times(dark.key, 20.0, 0.3, 3.0)),
+        Candidate("low_pass", (white,), times(white.key, 0.25, 0.6, 2.0)),
+        Candidate("low_pass", (dark,), times(dark.key, 0.3, 3.0)),
         Candidate("low_pass", (white, dark), ((0.4 * a, 0.5 * b), (2.0 * a, 2.0 * b))),
-        Candidate(
-            "dark_current",
-            (Knob("pixel.dark_current.dn", 0.02, 200.0),),
-            ((0.5,), (3.0,), (15.0,)),
-        ),
+        Candidate("dark_current", (_knob("pixel.dark_current.dn"),), ((0.5,), (3.0,), (15.0,))),
         Candidate(
             "source_follower",
-            (Knob("pixel.source_follower.cutoff_hz", 2.0, 1e5),),
+            (_knob("pixel.source_follower.cutoff_hz"),),
             ((20.0,), (60.0,), (200.0,), (600.0,)),
         ),
     ]
     if get_key(values, "pixel.low_pass") is None:  # the others act on it
         return made
-    least = min(now("pixel.thresholds.on", 0.2), now("pixel.thresholds.off", 0.2))
+    least = min(now("pixel.thresholds.on"), now("pixel.thresholds.off"))
     return [
         *made,
-        Candidate(
-            "slew_limit",
-            (Knob("pixel.slew_limit.per_s", 0.5, 1e4),),
-            ((10.0,), (30.0,), (90.0,)),
-        ),
+        Candidate("slew_limit", (_knob("pixel.slew_limit.per_s"),), ((10.0,), (30.0,), (90.0,))),
         Candidate(
             "photoreceptor_noise",
-            (Knob("pixel.photoreceptor_noise.rms", 1e-3, 0.5),),
+            (_knob("pixel.photoreceptor_noise.rms"),),
             tuple((f * least,) for f in (0.12, 0.2, 0.3)),
         ),
     ]
@@ -175,46 +185,46 @@ def _of_the_comparator(now: _Now, times: _Times, values: Any, hints: Hints) -> l
     return [
         Candidate(
             "refractory",
-            (Knob("pixel.refractory.period_us", 1.0, 2e6),),
+            (_knob("pixel.refractory.period_us"),),
             ((1500.0,), (5000.0,), (15000.0,)),
         ),
         Candidate(
             "reset_overshoot",
-            (Knob("pixel.reset_overshoot.fraction", -0.9, 0.9, False, 0.1),),
+            (_knob("pixel.reset_overshoot.fraction", 0.1),),
             ((-0.1,), (0.1,), (0.25,)),
         ),
         Candidate(
-            "leak", (Knob("pixel.leak.rate_hz", 1e-3, 500.0),), ((0.6,), (2.0,), (6.0,))
+            "leak", (_knob("pixel.leak.rate_hz"),), ((0.6,), (2.0,), (6.0,))
         ),
         Candidate(
             "photo_leak",
-            (Knob("pixel.leak.photo_rate_hz", 1e-2, 1000.0),),
+            (_knob("pixel.leak.photo_rate_hz"),),
             ((1.5,), (5.0,), (15.0,)),
             defaults=(("pixel.leak.rate_hz", 0.0),),
         ),
         Candidate(
-            "shot_noise", (Knob("pixel.shot_noise.rate_hz", 1e-3, 500.0),),
+            "shot_noise", (_knob("pixel.shot_noise.rate_hz"),),
             ((0.3,), (3.0,), (10.0,)),
         ),
         Candidate(
             "hot_pixels",
             (
-                Knob("pixel.hot_pixels.fraction", 2e-4, 0.2, of_pixels=True),
-                Knob("pixel.hot_pixels.rate_hz", 1.0, 2e4),
+                _knob("pixel.hot_pixels.fraction", of_pixels=True),
+                _knob("pixel.hot_pixels.rate_hz"),
             ),
             ((0.003, 40.0), (0.01, 150.0)),
         ),
         Candidate(
             "dead_pixels",
-            (Knob("pixel.dead_pixels.fraction", 2e-4, 0.9, of_pixels=True),),
+            (_knob("pixel.dead_pixels.fraction", of_pixels=True),),
             ((0.005,), (0.03,)),
         ),
     ]  # fmt: skip
 
 
 def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    amplitude = Knob("readout.frame_coupling.amplitude", -2.0, 2.0, False, 0.05)
-    tau = Knob("readout.frame_coupling.tau_us", 20.0, 1e5)
+    amplitude = _knob("readout.frame_coupling.amplitude", 0.05)
+    tau = _knob("readout.frame_coupling.tau_us")
     made = [
         Candidate(
             "frame_coupling",
@@ -225,7 +235,7 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
         _arbiter(hints.service),
         Candidate(
             "event_loss",
-            (Knob("readout.loss.fraction", 1e-3, 0.95, False, 0.1),),
+            (_knob("readout.loss.fraction", 0.1),),
             ((0.05,), (0.2,), (0.45,)),
         ),
     ]
@@ -237,7 +247,7 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
 
 def _arbiter(service: Service | None) -> Candidate:
     """Return the readout with its two times, which stamps may tell far better than statistics."""
-    times = Knob("readout.arbiter.event_ns", 1.0, 1e6), Knob("readout.arbiter.row_ns", 1.0, 1e7)
+    times = _knob("readout.arbiter.event_ns"), _knob("readout.arbiter.row_ns")
     probes = ((300.0, 3000.0), (2000.0, 10000.0), (3000.0, 30000.0))
     if service is None:
         return Candidate("readout", times, probes)
@@ -250,18 +260,14 @@ def _arbiter(service: Service | None) -> Candidate:
 
 
 def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    offset = Knob("frames.clock_offset_us", -1e6, 1e6, False, 1000.0)
-    drift = Knob("frames.clock_drift_ppm", -1e5, 1e5, False, 1000.0)
-    shift = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, (part, 2)) for part in (0, 1))
+    offset = _knob("frames.clock_offset_us", 1000.0)
+    drift = _knob("frames.clock_drift_ppm", 1000.0)
+    shift = tuple(_knob("frames.shift_px", 0.3, part=(part, 2)) for part in (0, 1))
     made = [
-        Candidate(
-            "black_level",
-            (Knob("frames.black_level_dn", 0.02, 100.0),),
-            ((0.3,), (1.5,), (6.0,)),
-        ),
+        *_black_levels(),
         Candidate(
             "exposure_blur",
-            (Knob("frames.exposure_us", 100.0, 2e5),),
+            (_knob("frames.exposure_us"),),
             ((4000.0,), (15000.0,)),
             # what changed faster than the exposure is not in the frames; at the true one, up to
             # 0.14 was left in eight recordings with 15 ms
@@ -281,14 +287,29 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
         ),
     ]  # fmt: skip
     for lamp in hints.lamps:
-        depth = Knob("frames.flicker.depth", 0.005, 0.99)
+        depth = _knob("frames.flicker.depth")
         read_off = ("frames.flicker.frequency_hz", lamp.hz)
         near = lamp.phase_rad
-        phase = Knob("frames.flicker.phase_rad", near - math.pi, near + math.pi, False, 0.1)
+        turn = _knob("frames.flicker.phase_rad", 0.1)
+        phase = dataclasses.replace(turn, low=near + turn.low, high=near + turn.high)
         probes = ((0.06, near), (0.15, near), (0.35, near))
         made.append(Candidate("flicker", (depth, phase), probes, (read_off,)))
     made += _encodings(values, hints)
     return made
+
+
+def _black_levels() -> list[Candidate]:
+    """Return what the frames lack, and what is too much in them.
+
+    The one is small beside the light or large; how large the other may be, the darkest light says.
+    """
+    knob = _knob("frames.black_level_dn")
+    lack = dataclasses.replace(knob, low=_LEAST_DN, log=True)
+    excess = dataclasses.replace(knob, high=-_LEAST_DN)
+    return [
+        Candidate("black_level", (lack,), ((0.3,), (1.5,), (6.0,))),
+        Candidate("black_level", (excess,), ((-0.5,), (-2.0,), (-6.0,))),
+    ]
 
 
 def _encodings(values: Mapping[str, Any], hints: Hints) -> list[Candidate]:

@@ -68,6 +68,29 @@ def test_probes_lie_within_the_ranges(name):
                 assert not knob.at_border(knob.inner(value))
 
 
+NOT_AS_DECLARED = {
+    "frames.encoding": "a text, which holds the number",
+    "frames.flicker.phase_rad": "about that of the line",
+    "pixel.thresholds.drift_per_s": "thresholds stay above zero to the end",
+}
+
+
+def test_ranges_are_those_that_are_declared_with_the_parameters():
+    for one in library(Config(), HINTS):
+        for knob in one.knobs:
+            if knob.key not in NOT_AS_DECLARED:
+                fit = about_key(Config(), knob.key).fit
+                assert fit.low <= knob.low < knob.high <= fit.high, knob.key
+                assert knob.log or not fit.log
+
+
+def test_a_black_level_may_be_missing_in_the_frames_or_too_much():
+    lack, excess = (one for one in library(Config(), HINTS) if one.name == "black_level")
+    assert all(value > 0 for (value,) in lack.probes)
+    assert all(value < 0 for (value,) in excess.probes)
+    assert lack.knobs[0].low == -excess.knobs[0].high > 0
+
+
 def test_without_a_low_pass_there_is_nothing_that_acts_on_it():
     found = {one.name for one in library(configuration("ideal"), HINTS)}
     assert {"photoreceptor_noise", "slew_limit"}.isdisjoint(found)

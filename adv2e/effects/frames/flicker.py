@@ -46,7 +46,7 @@ class Flicker(Section):
         meaning="amplitude of the swing, relative to the mean light",
         at_least=0,
         at_most=0.99,
-        fit=Fit(0.005, 0.9, 0.1, log=True),
+        fit=Fit(0.005, 0.99, 0.15, log=True),
     )
     phase_rad: float = parameter(
         0.0,

@@ -30,7 +30,7 @@ class DarkCurrent(Section):
         unit="DN",
         meaning="light that the dark current equals",
         at_least=0,
-        fit=Fit(0.01, 50.0, 2.0, log=True),
+        fit=Fit(0.02, 200.0, 3.0, log=True),
     )
 
 

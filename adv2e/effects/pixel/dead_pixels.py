@@ -31,7 +31,7 @@ class DeadPixels(Section):
         meaning="share of the pixels that is dead",
         at_least=0,
         at_most=1,
-        fit=Fit(0.0, 0.2, 0.01),
+        fit=Fit(2e-4, 0.9, 0.03, log=True),
     )
 
 

@@ -31,13 +31,13 @@ class HotPixels(Section):
         meaning="share of the pixels that is hot",
         at_least=0,
         at_most=1,
-        fit=Fit(1e-4, 0.1, 5e-3, log=True),
+        fit=Fit(2e-4, 0.2, 0.01, log=True),
     )
     rate_hz: float = parameter(
         unit="Hz",
         meaning="ON events a hot pixel a second",
         at_least=0,
-        fit=Fit(1.0, 1000.0, 50.0, log=True),
+        fit=Fit(1.0, 2e4, 150.0, log=True),
     )
 
 

@@ -45,14 +45,14 @@ class Leak(Section):
         meaning="ON events a pixel a second from junction leakage",
         at_least=0,
         source="v2e: 0.01-0.1 Hz",
-        fit=Fit(0.0, 20.0, 0.1),
+        fit=Fit(1e-3, 500.0, 2.0, log=True),
     )
     photo_rate_hz: float = parameter(
         0.0,
         unit="Hz",
         meaning="ON events a pixel a second from parasitic photocurrent, at white",
         at_least=0,
-        fit=Fit(0.0, 50.0, 0.0),
+        fit=Fit(1e-2, 1000.0, 5.0, log=True),
     )
     jitter: float = parameter(
         0.0,

@@ -61,7 +61,7 @@ class LowPass(Section):
         meaning="corner (-3 dB) at white",
         above=0,
         source="v2e default",
-        fit=Fit(5.0, 5000.0, 300.0, log=True),
+        fit=Fit(1.0, 1e5, 300.0, log=True),
     )
     dark_cutoff_hz: float = parameter(
         21.8,
@@ -69,7 +69,7 @@ class LowPass(Section):
         meaning="corner at zero light; linear in light between the two",
         at_least=0,
         source="v2e: 300 Hz (0 + 20)/275",
-        fit=Fit(0.5, 500.0, 20.0, log=True),
+        fit=Fit(0.05, 1e4, 20.0, log=True),
     )
     update: str = parameter(
         "exact", unit="-", meaning="how the filter's equation is solved", choices=UPDATES

@@ -33,7 +33,7 @@ class PhotoreceptorNoise(Section):
         unit="ln",
         meaning="standard deviation of the filtered noise",
         at_least=0,
-        fit=Fit(0.002, 0.2, 0.03, log=True),
+        fit=Fit(1e-3, 0.5, 0.04, log=True),
     )
     step: float = parameter(
         0.1,

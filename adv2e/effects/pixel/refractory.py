@@ -32,7 +32,7 @@ class Refractory(Section):
         meaning="dead time after an event",
         above=0,
         source="v2e default 0.5 ms",
-        fit=Fit(10.0, 50000.0, 500.0, log=True),
+        fit=Fit(1.0, 2e6, 5000.0, log=True),
     )
 
 

@@ -33,5 +33,5 @@ class ResetOvershoot(Section):
         meaning="share of the threshold by which the new reference is carried on",
         above=-1,
         at_most=0.9,
-        fit=Fit(-0.5, 0.9, 0.0),
+        fit=Fit(-0.9, 0.9, 0.1),
     )

@@ -38,7 +38,7 @@ class ShotNoise(Section):
         unit="Hz",
         meaning="ON and OFF events a pixel a second in the dark",
         at_least=0,
-        fit=Fit(0.01, 50.0, 1.0, log=True),
+        fit=Fit(1e-3, 500.0, 3.0, log=True),
     )
 
 

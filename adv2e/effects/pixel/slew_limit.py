@@ -51,7 +51,7 @@ class SlewLimit(Section):
         unit="ln/s",
         meaning="fastest change of the filtered signal",
         above=0,
-        fit=Fit(2.0, 2000.0, 50.0, log=True),
+        fit=Fit(0.5, 1e4, 30.0, log=True),
     )
 
 

@@ -27,5 +27,5 @@ class SourceFollower(Section):
         unit="Hz",
         meaning="corner (-3 dB)",
         above=0,
-        fit=Fit(5.0, 5000.0, 200.0, log=True),
+        fit=Fit(2.0, 1e5, 200.0, log=True),
     )

@@ -38,7 +38,7 @@ class Thresholds(Section):
         meaning="rise that fires an ON event",
         at_least=FLOOR,
         source="v2e default",
-        fit=Fit(0.05, 1.0, 0.2, log=True),
+        fit=Fit(0.01, 5.0, 0.2, log=True),
     )
     off: float = parameter(
         0.2,
@@ -46,7 +46,7 @@ class Thresholds(Section):
         meaning="fall that fires an OFF event",
         at_least=FLOOR,
         source="v2e default",
-        fit=Fit(0.05, 1.0, 0.2, log=True),
+        fit=Fit(0.01, 5.0, 0.2, log=True),
     )
     mismatch: float = parameter(
         0.03,
@@ -54,13 +54,13 @@ class Thresholds(Section):
         meaning="standard deviation over pixels, ON and OFF independent",
         at_least=0,
         source="v2e default",
-        fit=Fit(0.0, 0.2, 0.03),
+        fit=Fit(1e-3, 0.5, 0.02, log=True),
     )
     drift_per_s: float = parameter(
         0.0,
         unit="1/s",
         meaning="growth of both thresholds a second, as a share of them at the first frame",
-        fit=Fit(-0.9, 2.0, 0.0),
+        fit=Fit(-0.9, 20.0, 0.2),
     )
 
 

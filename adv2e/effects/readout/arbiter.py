@@ -51,13 +51,13 @@ class Arbiter(Section):
         meaning="time that an event takes",
         at_least=0,
         source="Brandli et al.: 83 ns (12 million events a second)",
-        fit=Fit(20.0, 20000.0, 200.0, log=True),
+        fit=Fit(1.0, 1e6, 300.0, log=True),
     )
     row_ns: float = parameter(
         unit="ns",
         meaning="time that the selection of a row takes",
         at_least=0,
-        fit=Fit(20.0, 100000.0, 1000.0, log=True),
+        fit=Fit(1.0, 1e7, 3000.0, log=True),
     )
 
 

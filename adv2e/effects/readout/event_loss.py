@@ -31,7 +31,7 @@ class EventLoss(Section):
         meaning="probability with which an event is lost",
         at_least=0,
         at_most=1,
-        fit=Fit(0.0, 0.9, 0.1),
+        fit=Fit(1e-3, 0.95, 0.2),
     )
 
 

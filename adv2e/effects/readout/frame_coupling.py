@@ -36,13 +36,13 @@ class FrameCoupling(Section):
     amplitude: float = parameter(
         unit="ln",
         meaning="leap of the signal at a readout; below 0: downwards",
-        fit=Fit(-0.5, 0.5, 0.02),
+        fit=Fit(-2.0, 2.0, 0.05),
     )
     tau_us: float = parameter(
         unit="us",
         meaning="time constant with which it decays",
         above=0,
-        fit=Fit(20.0, 10000.0, 300.0, log=True),
+        fit=Fit(20.0, 1e5, 300.0, log=True),
     )
 
 
