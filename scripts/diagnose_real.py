@@ -31,7 +31,7 @@ from real.stability import MOST as UNSTABLE
 from real.stability import Stability, compare_halved, stable_score
 from real.table import COLUMNS as TITLES
 from real.table import line, number
-from real.tried import UNSEEN, Added
+from real.tried import UNSEEN, Added, tried_names
 
 from adv2e.comparison.distances import distances
 from adv2e.comparison.floor import Floor, half_split
@@ -72,7 +72,7 @@ def main(
 ) -> None:
     """Add effects to a declared model of real recordings, one by one."""
     try:
-        only = [name for name in effects.split(",") if name]
+        only = _names(effects)
         parts = [_preamble(declared, only)]
         for folder in folders:
             real = read(folder)
@@ -86,6 +86,24 @@ def main(
             _write(text, out)
     except Adv2eError as error:
         raise click.ClickException(str(error)) from None
+
+
+def _names(text: str) -> list[str]:
+    """Return the names of effects to try.
+
+    Raises
+    ------
+    BadParameter
+        One of them cannot be tried.
+    """
+    only = [name.strip() for name in text.split(",") if name.strip()]
+    for name in only:
+        if name in UNSEEN:
+            raise click.BadParameter(f"{name} is not tried: {UNSEEN[name]}", param_hint="--effects")
+        if name not in tried_names():
+            known = ", ".join(tried_names())
+            raise click.BadParameter(f"{name}: must be one of {known}", param_hint="--effects")
+    return only
 
 
 def _write(text: str, out: Path) -> None:
@@ -146,7 +164,7 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
         [
             f"## {real.name}",
             _table(real, steps, second),
-            _found(last, config, ended),
+            _found(last, config, bench.missed(last.added.config, first), ended),
             _bound(stability, alone),
             _beside_peers(real, last),
         ]
@@ -200,7 +218,7 @@ def _cells(values: Floor) -> list[str]:
     return [number(values[name]) for name in COLUMNS]
 
 
-def _found(last: Step, declared: Config, ended: bool) -> str:
+def _found(last: Step, declared: Config, missed: float, ended: bool) -> str:
     ratio, config = last.judged.events_ratio, last.added.config
     before = dict(flat(to_dict(declared)))
     keys = [
@@ -210,7 +228,8 @@ def _found(last: Step, declared: Config, ended: bool) -> str:
     ]
     return (
         f"After the last step the second half has {ratio:.2f} times the measured events, with"
-        " thresholds that match the totals of the first. Keys that differ from those declared: "
+        f" thresholds that match the totals of the first to {missed:.1%}. Keys that differ from"
+        " those declared: "
         + ", ".join(f"`{key}`" for key in keys)
         + "."
         + " The search was interrupted: there may be more to find." * (not ended)

@@ -18,7 +18,7 @@ PRECISION = 0.001
 MOST_SEEDS = 4
 """Simulated with seeds enough for the score to be known to this, at most so many."""
 LEAST_GAIN = 0.003
-"""A lower score counts from here on: three times what it is known to."""
+"""A lower score counts from here on: three times what it is known to with seeds enough."""
 PASSES = 2
 """Rounds in which all that was added is refined together after each addition, at most."""
 LEADING = 6
@@ -64,15 +64,23 @@ class Fit:
     ----------
     bench : Bench
     windows : Windows
+
+    Attributes
+    ----------
+    seeds : tuple of int
+        With which configurations are tried.
+    known_to : float
+        Standard deviation of the mean score with them.
     """
 
     def __init__(self, bench: Bench, windows: Windows) -> None:
         self._bench, self._windows = bench, windows
         self.seeds: tuple[int, ...] = ()
+        self.known_to = np.inf
 
     def measured(self, config: Config) -> Added:
         """Return how far a model is, with seeds enough for that from here on."""
-        self.seeds = enough_seeds(self._bench, config, self._windows, config.seed)
+        self.seeds, self.known_to = enough_seeds(self._bench, config, self._windows, config.seed)
         return Added.plain("as it is", config, *self._score(config))
 
     def _score(self, config: Config) -> tuple[float, float | None]:
@@ -170,11 +178,17 @@ class Fit:
         return Model(model.base, found, best.named("all keys together"))
 
 
-def enough_seeds(bench: Bench, config: Config, windows: Windows, first: int) -> tuple[int, ...]:
-    """Return with which seeds the mean score is known to `PRECISION`, from `first` on."""
+def enough_seeds(
+    bench: Bench, config: Config, windows: Windows, first: int
+) -> tuple[tuple[int, ...], float]:
+    """Return with which seeds the mean score is known to `PRECISION`, from `first` on.
+
+    And to what it is known with them, as there are at most `MOST_SEEDS`.
+    """
     seeds = tuple(range(first, first + MOST_SEEDS))
     spread = np.std([bench.score(config, windows, (seed,))[0] for seed in seeds], ddof=1)
-    return seeds[: max(1, int(np.ceil((spread / PRECISION) ** 2)))]
+    taken = seeds[: max(1, int(np.ceil((spread / PRECISION) ** 2)))]
+    return taken, float(spread / np.sqrt(len(taken)))
 
 
 def keys(candidate: Candidate) -> frozenset[str]:

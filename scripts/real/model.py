@@ -95,6 +95,12 @@ class Bench:
         on, off, _ = match_totals(count, (here.on, here.off), goal, tolerance=tolerance, rounds=5)
         return with_thresholds(config, on, off)
 
+    def missed(self, config: Config, windows: Windows) -> float:
+        """Return by how much the worse of the two totals misses in the windows, relative."""
+        goal = np.array(totals(cut(self.real.events, windows.start, windows.stop)))
+        made = np.array(totals(self.quick(config, windows, config.seed)))
+        return float(np.max(np.abs(made - goal) / np.maximum(goal, 1)))
+
     def score(
         self, config: Config, windows: Windows, seeds: Sequence[int]
     ) -> tuple[float, float | None]:

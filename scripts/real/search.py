@@ -77,7 +77,8 @@ class Search:
 
     def _measured(self, config: Config) -> Added:
         here = self._fit.measured(config)
-        self._say(f"  seeds for each score: {len(self._fit.seeds)}")
+        count, known_to = len(self._fit.seeds), self._fit.known_to
+        self._say(f"  seeds for each score: {count}, which is known to {known_to:.4f}")
         return here
 
     def _grown(self, group: Sequence[Candidate], model: Model) -> Steps:

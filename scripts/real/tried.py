@@ -52,6 +52,7 @@ UNSEEN = {
     "thresholds": "matched to the totals each time",
     "timestamp_tick": "does not move this score",
     "readout": "does not move this score at these rates",
+    "flicker": "its frequency is that of a line in the rate, which is not looked for",
     "threshold_drift": "not within half a second",
     "clock_drift": "not within half a second",
     "hot_pixels": "a few pixels do not move this score",
@@ -65,6 +66,11 @@ def of_the_camera(declared: Config, seconds: float, only: Collection[str] = ()) 
     """Return the effects of the camera to try; `only`: with these names, empty: all."""
     found = [CLIPPED_BLACK, *library(declared, Hints(seconds, (), 1))]
     return [one for one in found if one.name not in UNSEEN and (not only or one.name in only)]
+
+
+def tried_names() -> list[str]:
+    """Return the names of the effects of the camera that can be tried."""
+    return list(dict.fromkeys(one.name for one in of_the_camera(Config(), 1.0)))
 
 
 def label(name: str) -> Candidate:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import cv2
@@ -15,11 +16,12 @@ from real.model import BEYOND_US, SCORE, Bench, Judged
 from real.recording import halves, read
 from real.search import Search
 from real.stability import compare_halved, stable_score
-from real.tried import Added
+from real.tried import UNSEEN, Added, tried_names
 
 from adv2e import simulate
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import load_config
+from adv2e.diagnosis.library import names as library_names
 from adv2e.events import empty_events, make_events
 
 REAL = os.environ.get("ADV2E_REAL_DATA")
@@ -211,8 +213,28 @@ def test_tables_before_and_after_each_effect(recording, declared, tmp_path, monk
     assert smoothed[2] < smoothed[1]
     assert smoothed[4] == 1.0
     assert "Dropping every second frame" in text
+    (missed,) = re.findall(r"match the totals of the first to (\d+\.\d)%", text)
+    assert float(missed) <= 3.0
     assert "Camera effects tried: all of the library but" in text
     assert "No other tools were run on this recording." in text
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ("black_level,flikker", "flikker: must be one of clipped_black, "),
+        ("hot_pixels", "hot_pixels is not tried: a few pixels do not move this score"),
+    ],
+)
+def test_effects_that_cannot_be_tried_are_told(recording, names, told):
+    result = CliRunner().invoke(diagnose_real.main, [str(recording), "--effects", names])
+    assert result.exit_code == 2
+    assert told in result.output
+
+
+def test_every_effect_of_the_library_is_tried_or_said_not_to_be():
+    assert {*tried_names(), *UNSEEN} == {"clipped_black", *library_names()}
+    assert not set(tried_names()) & set(UNSEEN)
 
 
 @pytest.mark.skipif(not REAL, reason="ADV2E_REAL_DATA does not name a folder of recordings")

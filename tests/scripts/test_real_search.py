@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from narrow_candidates import BLACK_LEVEL
-from real.fit import Fit, Model, enough_seeds
+from real.fit import MOST_SEEDS, PRECISION, Fit, Model, enough_seeds
 from real.search import Search
 from real.tried import CLIPPED_BLACK, Added
 
@@ -178,4 +178,6 @@ def test_what_made_noise_of_its_own_is_not_tried_again():
 @pytest.mark.parametrize(("chance", "count"), [(0.0, 1), (1e-4, 1), (1e-3, 2), (0.1, 4)])
 def test_seeds_are_as_many_as_chance_asks_for(chance, count):
     config = load_config([], ["frames.black_level_dn=14", "frames.black_depth_dn=5"])
-    assert enough_seeds(Valley(chance), config, None, 7) == tuple(range(7, 7 + count))
+    seeds, known_to = enough_seeds(Valley(chance), config, None, 7)
+    assert seeds == tuple(range(7, 7 + count))
+    assert (known_to <= PRECISION) == (count < MOST_SEEDS)
