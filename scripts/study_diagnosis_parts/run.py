@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import subprocess
 import tempfile
@@ -21,7 +22,10 @@ from study_diagnosis_parts.cases import Case
 from study_diagnosis_parts.options import sampling
 from study_diagnosis_parts.results import Line
 
-STUDIED = ("adv2e", "tests/camera")
+_PARTS = "scripts/study_diagnosis_parts"
+STUDIED = (
+    "adv2e", "tests/camera", *(f"{_PARTS}/{name}.py" for name in ("cases", "options", "run")),
+)  # fmt: skip
 """What results depend on: their commit is the last that changed any of it."""
 
 
@@ -61,10 +65,20 @@ class Setup:
 
 
 def commit() -> str:
-    """Return the last commit that changed what is studied, with ``-dirty`` if it has changed."""
+    """Return the last commit that changed what is studied.
+
+    What was changed since then is told by ``-dirty-`` and a digest of it, so that no other results
+    are taken for those of it.
+    """
     number = _git("log", "-1", "--format=%h", "--", *STUDIED)
-    changed = _git("status", "--porcelain", "--", *STUDIED)
-    return f"{number}-dirty" if changed else number
+    changed = _git("diff", "--no-ext-diff", "HEAD", "--", *STUDIED)
+    added = _git("ls-files", "--others", "--exclude-standard", "--", *STUDIED).splitlines()
+    if not changed and not added:
+        return number
+    digest = hashlib.sha1(changed.encode(), usedforsecurity=False)
+    for name in added:
+        digest.update(name.encode() + (REPOSITORY / name).read_bytes())
+    return f"{number}-dirty-{digest.hexdigest()[:8]}"
 
 
 def _git(*arguments: str) -> str:

@@ -50,6 +50,11 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in [header, ruler, *rows])
 
 
+def _done(lines: Sequence[Line]) -> list[Line]:
+    """Return those that did not fail."""
+    return [one for one in lines if "failed" not in one]
+
+
 def share(hits: int, count: int) -> str:
     """Return a count, its share and the 95 % interval of that."""
     if not count:
@@ -80,7 +85,7 @@ def _how(lines: Sequence[Line]) -> str:
     )
     lacking = sorted({name for one in lines for name in one["lacking"]})
     text = f"Recordings: {'; '.join(f'{what} ({n})' for what, n in setups.items())}."
-    done = [one for one in lines if "failed" not in one]
+    done = _done(lines)
     if done:
         each = scoring.median([one["seconds"]["diagnosis"] for one in done])
         made = scoring.median([one["seconds"]["recording"] for one in done])
@@ -99,8 +104,10 @@ def _how(lines: Sequence[Line]) -> str:
 def progress_table(lines: Sequence[Line]) -> str:
     """Return how many cases of each kind and size there are, of those of a full study."""
     known = [name for name in catalogue.LIBRARY if not any(name in one["lacking"] for one in lines)]
-    planned = Counter((case.kind, case.size) for case in Plan(KINDS, SIZES, known).cases())
-    run = Counter((one["kind"], one["size"]) for one in lines if "failed" not in one)
+    repeats = 1 + max((one["repeat"] for one in lines if one["kind"] != NOTHING), default=0)
+    plan = Plan(KINDS, SIZES, known, repeats=repeats)
+    planned = Counter((case.kind, case.size) for case in plan.cases())
+    run = Counter((one["kind"], one["size"]) for one in _done(lines))
     rows = []
     for kind in KINDS:
         cells = [
@@ -113,7 +120,7 @@ def progress_table(lines: Sequence[Line]) -> str:
 
 def pooled_table(lines: Sequence[Line]) -> str:
     """Return the targets over all effects of the library at the middle size."""
-    pool = [one for one in _of(lines, LIBRARY, MIDDLE) if "failed" not in one]
+    pool = _done(_of(lines, LIBRARY, MIDDLE))
     kinds = [scoring.outcome(one) for one in pool]
     named = [one for one, kind in zip(pool, kinds, strict=True) if kind in scoring.NAMED]
     near = [flag for one in named if (flag := scoring.is_near(one)) is not None]
@@ -138,7 +145,7 @@ def pooled_table(lines: Sequence[Line]) -> str:
 
 def alarm_table(lines: Sequence[Line]) -> str:
     """Return how often something was found where nothing was missing."""
-    quiet = [one for one in _of(lines, NOTHING) if "failed" not in one]
+    quiet = _done(_of(lines, NOTHING))
     alarms = sum(scoring.outcome(one) == scoring.ALARM for one in quiet)
     low = sum(one["global_p"]["before"] < LEVEL for one in quiet)
     named = sum(bool(one["found"]) for one in quiet)
@@ -201,6 +208,7 @@ def _worst(lines: Sequence[Line]) -> str:
 
 def left_out_table(lines: Sequence[Line]) -> str:
     """Return what was said where the true name was not to be had."""
+    lines = _done(lines)
     wrong = [one for one in lines if scoring.outcome(one) == scoring.WRONG]
     alike = [one for one in wrong if _neighbours(one) & _given(one)]
     which = f" ({', '.join(name for one in alike for name in one['effects'])})" if alike else ""
@@ -213,6 +221,7 @@ def left_out_table(lines: Sequence[Line]) -> str:
 
 def outside_table(lines: Sequence[Line]) -> str:
     """Return what was said of effects that the library does not have."""
+    lines = _done(lines)
     accepted = sum(scoring.outcome(one) == scoring.WRONG for one in lines)
     text = f"A name was accepted with nothing left to explain: {share(accepted, len(lines))}."
     return f"{text}\n\n{_strangers(lines)}"

@@ -11,8 +11,9 @@ def found(name, parameters=None, interval=None):
 
 def line_of(kind="library", effects=("refractory",), size="middle", verdict="explained", **rest):
     """Return a made-up line; by default the effects are found as they are."""
+    repeat = rest.pop("repeat", 0)
     return {
-        "key": f"{kind}/{'+'.join(effects)}/{size}/{rest.pop('repeat', 0)}",
+        "key": f"{kind}/{'+'.join(effects)}/{size}/{repeat}", "repeat": repeat,
         "kind": kind, "effects": list(effects), "size": size, "study_seed": 0, "scene": "edges",
         "setup": SETUP, "hidden": {}, "commit": "abc", "lacking": [], "verdict": verdict,
         "found": [] if verdict in ("consistent", "unexplained") else [found(x) for x in effects],

@@ -1,6 +1,7 @@
 """The study of the diagnosis: what is done, resumed and written."""
 
 import json
+import subprocess
 
 import pytest
 import study_diagnosis as study
@@ -35,6 +36,32 @@ def test_success_counts_over_failure_and_failures_are_done_again():
 )
 def test_another_commit_seed_or_setup_is_other_work(change):
     assert results.identity({**line_of(), **change}) != results.identity(line_of())
+
+
+def test_changes_that_are_not_committed_are_other_work_each(tmp_path, monkeypatch):
+    def git(*arguments):
+        identity = ["-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false"]
+        subprocess.run(["git", "-C", str(tmp_path), *identity, *arguments], check=True)
+
+    monkeypatch.setattr(study_run, "REPOSITORY", tmp_path)
+    inside, beside = tmp_path / "adv2e" / "fit.py", tmp_path / "README.md"
+    inside.parent.mkdir()
+    inside.write_text("a = 1\n")
+    git("init", "--quiet")
+    git("add", "-A")
+    git("commit", "--quiet", "-m", "first")
+    found = [study_run.commit()]
+    beside.write_text("not studied")
+    assert study_run.commit() == found[0]
+    for text in ("a = 2\n", "a = 3\n"):
+        inside.write_text(text)
+        found.append(study_run.commit())
+    inside.with_name("new.py").write_text("b = 1\n")
+    found.append(study_run.commit())
+    inside.with_name("new.py").write_text("b = 2\n")
+    found.append(study_run.commit())
+    assert len(set(found)) == 5
+    assert all(one.startswith(f"{found[0]}-dirty-") for one in found[1:])
 
 
 @pytest.fixture

@@ -56,6 +56,19 @@ def test_the_report_counts_what_happened():
     assert f"20 of {len(LIBRARY)}" in row(text, "library")
 
 
+def test_what_failed_is_no_part_of_a_rate_and_repeats_are_planned():
+    failed = [
+        {**line_of(kind, ("leak",), repeat=1), "failed": "DataError: no"}
+        for kind in ("leave-one-out", "outside", "library")
+    ]
+    text = tables.report([*made_up(), *failed], "abc")
+    left_out, outside = text.partition("left out of the library")[2].split("\n## ")[:2]
+    assert "1 of 2: 50.0%" in left_out
+    assert "1 of 1: 100.0%" in outside
+    assert f"20 of {2 * len(LIBRARY)}" in row(text, "library")
+    assert "| 49 of 100 |" in row(text, "nothing")
+
+
 def test_failures_come_with_what_competed():
     _, _, failures = tables.report(made_up(), "abc").partition("## What went wrong")
     assert "library/flicker/middle/0" in failures
