@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from adv2e.config import Config, load_config, written_keys
+from adv2e.config import Config, load_config, names_of, written_keys
 
 
 @dataclass(frozen=True)
@@ -53,5 +53,4 @@ def read_declared(
         As :func:`adv2e.config.load_config`.
     """
     config = load_config(files, sets, seed)
-    names = ", ".join([*(Path(name).name for name in files), *sets])
-    return Declared(names or "nothing", config, written_keys(files, sets))
+    return Declared(names_of(files, sets) or "nothing", config, written_keys(files, sets))

@@ -20,6 +20,9 @@ from adv2e.errors import DataError, UsageError
 
 DELIMITERS = ",;\t"
 
+_SHOWN = 12
+"""Values of a column that an error lists."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -118,7 +121,8 @@ class Table:
             raise DataError(f"{self.name}: has no column {column!r} for {option} (there: {there})")
         found = [self._same(text, value) for text in self.texts(column)]
         if not any(found):
-            there = ", ".join(sorted(set(self.texts(column)))[:12])
+            values = sorted(set(self.texts(column)))
+            there = ", ".join([*values[:_SHOWN], *["..."] * (len(values) > _SHOWN)])
             raise DataError(
                 f"{self.name}: {option}: no row has {column} = {value} (there: {there})"
             )

@@ -59,7 +59,7 @@ def command(
     """
     from pathlib import Path
 
-    from adv2e.config import written_keys
+    from adv2e.config import names_of, written_keys
     from adv2e.diagnosis.diagnose import diagnose
     from adv2e.diagnosis.evidence import read_evidence
     from adv2e.diagnosis.keys import user_effects, without_user_effects
@@ -72,7 +72,8 @@ def command(
     check_names(without, names(config))
     _check_own_names(user_effects(config), names())
     options_given = click.get_current_context().params
-    written = written_keys(options_given["config_files"], options_given["sets"])
+    given = options_given["config_files"], options_given["sets"]
+    written = written_keys(*given)
     config = without_user_effects(config, written)
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     check_folder(folder, overwrite=overwrite)
@@ -83,7 +84,7 @@ def command(
         found = diagnose(
             evidence,
             config,
-            declared_name=", ".join((*options_given["config_files"], *options_given["sets"])),
+            declared_name=names_of(*given) or "the defaults",
             without=without,
             free_thresholds=fit_thresholds,
             threads=threads,

@@ -23,6 +23,7 @@ __all__ = [
     "from_dict",
     "keys_of",
     "load_config",
+    "names_of",
     "shipped",
     "to_annotated_yaml",
     "to_dict",
@@ -65,6 +66,11 @@ def load_config(
     from adv2e.effects.user import config_class  # noqa: PLC0415 - it needs the model itself
 
     return build(config_class(effects), merge_all([*(read(name) for name in files), *over]))
+
+
+def names_of(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> str:
+    """Return what a configuration was made from, for people: names without folders, and keys."""
+    return ", ".join([*(Path(name).name for name in files), *sets])
 
 
 def written_keys(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> dict[str, Any]:

@@ -194,6 +194,9 @@ class Bench:
                 break
         if joint.derivative.size:
             self.fitter(view, joint.config, sd).refine(joint, _LAST_ROUNDS)
+            if joint.moved > 1.0:
+                names = " and ".join(fit.candidate.name for fit in fits)
+                self.log(f"  {names}: the last step of the fit moved it by {joint.moved:.1f} sd")
         return joint
 
     def misfit(self, state: State, view: int = BOTH) -> float:

@@ -33,14 +33,15 @@ def detectable(bench: Bench, declared: State, candidates: Sequence[Candidate]) -
 
     Recordings with the effect are simulated, from a mild probe on, and judged as the real one is;
     how much more or less of it would just have been seen, as if what it changes grew in proportion,
-    is tried in the next round.  Effects of which no size within the physical range would have been
-    seen are left out.
+    is tried in the next round.  Where no size within the physical range would have been seen, or
+    none was settled on, there is none.
     """
     mildest: dict[str, Candidate] = {}
     for candidate in candidates:
         if candidate.knobs:
             mildest.setdefault(candidate.name, candidate)
-    sizes = [_Size.of(candidate, declared.config) for candidate in mildest.values()]
+    every = [_Size.of(candidate, declared.config) for candidate in mildest.values()]
+    sizes = every
     model = declared.models[BOTH]
     limits = _Limits.of(model)
     bench.laboratory.simulator.expect(LIKELY * len(sizes), after_the_search=0)
@@ -56,7 +57,7 @@ def detectable(bench: Bench, declared: State, candidates: Sequence[Candidate]) -
             factors = [limits.missing(model, row) for row in recordings]
             size.change_by(float(np.quantile(factors, _SEEN)))
         sizes = [size for size in sizes if math.isfinite(size.factor)]
-    return [size.found(declared.config) for size in sizes if size.is_settled]
+    return [size.found(declared.config) for size in every]
 
 
 @dataclass
@@ -110,7 +111,8 @@ class _Size:
 
     def found(self, declared: Config) -> Detectable:
         key = self.candidate.knobs[0].key
-        return Detectable(self.candidate.name, key, self.value, about_key(declared, key).unit)
+        value = self.value if self.is_settled else None
+        return Detectable(self.candidate.name, key, value, about_key(declared, key).unit)
 
 
 @dataclass(frozen=True)

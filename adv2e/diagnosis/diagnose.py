@@ -35,7 +35,7 @@ def diagnose(
     evidence: Evidence,
     declared: Config,
     *,
-    declared_name: str = "",
+    declared_name: str = "the configuration given",
     without: Sequence[str] = (),
     free_thresholds: bool = False,
     sizes: bool = True,
@@ -71,6 +71,11 @@ def diagnose(
     Returns
     -------
     Diagnosis
+
+    Raises
+    ------
+    DataError
+        Too few events are left of a recording that would take too long.
     """
     began = time.perf_counter()
     evidence = affordable(evidence, declared)

@@ -63,7 +63,7 @@ def readouts_of(stream: Stream, times_s: NDArray[np.float64]) -> Readouts | None
     ----------
     stream : Stream
     times_s : (frames,)
-        Stamps of the frames.
+        Stamps of the frames [s].
     """
     times_us = 1e6 * times_s
     intervals = np.diff(times_us)

@@ -180,7 +180,12 @@ class Search:
             if other is not None:
                 state = other
                 continue
-            if not self._is_open(state) or len(state.fits) >= MOST_EFFECTS:
+            if not self._is_open(state):
+                break
+            if len(state.fits) >= MOST_EFFECTS:
+                self.bench.log(
+                    f"something is left beside {MOST_EFFECTS} effects: no more are tried"
+                )
                 break
             grown = self._grown(state)
             if grown is None or not self._is_worth_it(state, grown):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from adv2e.config import Config
+from adv2e.config import Config, to_dict
+from adv2e.config.paths import get_key
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate, neutral_value
 from adv2e.diagnosis.fit import Fit
@@ -129,5 +130,9 @@ def _wrong(fits: Sequence[Fit], declared: Config) -> str:
 
 def _has(declared: Config, candidate: Candidate) -> bool:
     """Tell whether a configuration has an effect already, of whatever size."""
-    values = (neutral_value(declared, knob) for knob in candidate.knobs)
+    values = [neutral_value(declared, knob) for knob in candidate.knobs]
+    held = to_dict(declared)
+    values += [
+        value for key, _ in candidate.extra if isinstance(value := get_key(held, key), (int, float))
+    ]
     return any(value != 0.0 and math.isfinite(value) for value in values)

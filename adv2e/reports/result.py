@@ -151,11 +151,11 @@ class ResidualMap:
 
 @dataclass(frozen=True)
 class Detectable:
-    """Smallest size of an effect that would have been seen 8 times in 10."""
+    """Smallest size of an effect that would have been seen 8 times in 10, if there is one."""
 
     name: str
     key: str
-    size: float
+    size: float | None
     unit: str
 
 

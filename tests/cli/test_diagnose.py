@@ -291,6 +291,16 @@ def test_effects_of_the_users_own_are_candidates_unless_they_are_declared(
     assert call["without"] == (("twice",) if "--without" in options else ())
 
 
+@pytest.mark.parametrize(
+    ("options", "name"), [((), "the defaults"), (("-c", "sub/mine.yaml"), "mine.yaml")]
+)
+def test_the_declared_model_has_a_name(adv2e, made_up, options, name):
+    Path("sub").mkdir()
+    Path("sub/mine.yaml").write_text("pixel: {leak: null}\n")
+    assert adv2e("diagnose", "a.zip", *options).status == 0
+    assert made_up[0]["declared_name"] == name
+
+
 def test_own_effects_need_names_of_their_own(adv2e, made_up):
     Path("mine.py").write_text(TWICE.replace("Twice", "EventLoss"))
     status, _, err = adv2e("diagnose", "a.zip", "--effect", "mine.py")

@@ -68,13 +68,24 @@ def test_what_frames_leave_of_the_error_is_not_asked_of_an_effect():
 
 @pytest.mark.parametrize("shift", ["[0, 2]", "[2, 0]"])
 def test_any_key_of_an_effect_makes_it_one_that_is_there(shift):
-    knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
+    knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, (part, 2)) for part in (0, 1))
     fit = Fit(Candidate("misregistration", knobs, ()), DECLARED, np.zeros(2))
     _, outcome = searched(["pixel.leak.rate_hz=4"])
     state = dataclasses.replace(outcome.state, fits=(fit,))
     for sets, wrong in (([f"frames.shift_px={shift}"], "is wrong in"), ([], "lacks")):
         told = sentence_of("explained", state, outcome, load_config([], sets))
         assert f"The declared model {wrong} misregistration" in told
+
+
+@pytest.mark.parametrize(("declared", "wrong"), [(0.0, "lacks"), (10.0, "is wrong in")])
+def test_a_key_that_is_read_off_makes_an_effect_one_that_is_there(declared, wrong):
+    one = Candidate("timestamp_tick", (), ((),), (("readout.tick_us", 100.0),))
+    fit = Fit(one, DECLARED, np.zeros(0))
+    _, outcome = searched(["pixel.leak.rate_hz=4"])
+    state = dataclasses.replace(outcome.state, fits=(fit,))
+    config = load_config([], [f"readout.tick_us={declared}"])
+    told = sentence_of("explained", state, outcome, config)
+    assert f"The declared model {wrong} timestamp_tick" in told
 
 
 def test_statistics_alone_are_no_explanation():
@@ -93,7 +104,7 @@ def test_statistics_alone_are_no_explanation():
 
 
 def test_intervals_of_a_list_are_lists():
-    knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, part) for part in (0, 1))
+    knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, (part, 2)) for part in (0, 1))
     fit = Fit(Candidate("misregistration", knobs, ()), Config(), np.array([1.0, -2.0]))
     fit.covariance = np.diag([0.01, 0.04])
     finding = finding_of(fit, 100)

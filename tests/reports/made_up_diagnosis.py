@@ -187,6 +187,7 @@ def everything() -> Diagnosis:
             Detectable("refractory", "pixel.refractory.period_us", 740.0, "us"),
             Detectable("leak", "pixel.leak.rate_hz", 0.31, "Hz"),
             Detectable("event_loss", "readout.loss.fraction", 0.052, "-"),
+            Detectable("dead_pixels", "pixel.dead_pixels.fraction", None, "-"),
         ],
         masked=[
             Masked("clipped parts of the frames (above 250 DN)", 0.034),

@@ -89,7 +89,7 @@ def test_the_record_says_what_was_found():
     }
     assert [row["name"] for row in report["errors"]] == [row.name for row in everything().errors]
     assert report["errors"][1]["after"] == {"value": 121.0, "interval": [115.0, 127.0]}
-    assert report["detectable"][0]["size"] == 740.0
+    assert [one["size"] for one in report["detectable"]] == [740.0, 0.31, 0.052, None]
     assert report["masked"][1] == {"what": "hot pixels", "share": 0.0006}
     assert report["trials"][0]["held_out"] == 0.998
     assert report["recording"] == "office_zigzag.zip"

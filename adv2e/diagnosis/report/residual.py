@@ -134,11 +134,18 @@ def detectable(diagnosis: Diagnosis) -> Markup:
         return tag("p", "This was not determined.")
     columns = [Column("effect"), Column("key"), Column("size", number=True), Column("unit")]
     rows = [
-        (one.name, tag("code", one.key), short_text(one.size, 3), unit_text(one.unit))
+        (one.name, tag("code", one.key), _size(one.size), unit_text(one.unit))
         for one in diagnosis.detectable
     ]
-    caption = "Values of a key from which on an effect would have been seen about 8 times in 10"
+    caption = (
+        "Values of a key from which on an effect would have been seen about 8 times in 10;"
+        f" {NOTHING}: none within the physical range, or not told by as many simulations"
+    )
     return table(caption, columns, rows, folded_from=2 * SHOWN)
+
+
+def _size(size: float | None) -> str:
+    return NOTHING if size is None else short_text(size, 3)
 
 
 def data(diagnosis: Diagnosis) -> Markup:
