@@ -16,9 +16,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from adv2e.parameters import Fit, Section, parameter
 
 
@@ -34,25 +31,3 @@ class Refractory(Section):
         source="v2e default 0.5 ms",
         fit=Fit(1.0, 2e6, 5000.0, log=True),
     )
-
-
-def estimate(times_us: NDArray[np.int64], pixels: NDArray[np.int64], share: float = 1e-3) -> float:
-    """Return the dead time that intervals between events of the same pixel suggest [us].
-
-    Parameters
-    ----------
-    times_us, pixels : (n,) int64
-        Time and pixel of each event, in any order.
-    share : float
-        Of the intervals that are taken for mistakes of the readout: those shorter than the result.
-
-    Returns
-    -------
-    float
-        0 where no pixel has two events.  Never below the true dead time but for that share, and
-        far above it where pixels are seldom driven so fast.
-    """
-    order = np.lexsort((times_us, pixels))
-    same = np.diff(pixels[order]) == 0
-    apart = np.diff(times_us[order])[same]
-    return float(np.quantile(apart, share, method="lower")) if apart.size else 0.0

@@ -34,17 +34,6 @@ def ticked(times_us: NDArray[np.int64], tick_us: float) -> NDArray[np.int64]:
     return np.rint(ticks * tick_us).astype(np.int64)
 
 
-def estimate(times_us: NDArray[np.int64]) -> int:
-    """Return the tick that all differences between times are multiples of [us]; 0: no two differ.
-
-    Parameters
-    ----------
-    times_us : (n,) int64
-        Time stamps, in any order.
-    """
-    return int(np.gcd.reduce(np.unique(np.diff(np.unique(times_us))))) if times_us.size > 1 else 0
-
-
 class TimestampTickHooks(Hooks):
     """Stamps events with ticks of `tick_us`."""
 
