@@ -22,6 +22,9 @@ from adv2e.diagnosis.keys import user_effects
 from adv2e.effects.active import frame_hooks
 from adv2e.effects.hooks import Hooks
 from adv2e.effects.readout.frame_coupling import FrameCoupling, FrameCouplingHooks
+from adv2e.events import Events
+from adv2e.simulation import events_from_light
+from adv2e.stepping import PRECISE, Coarseness
 from adv2e.upsampling import make_upsampler
 from adv2e.upsampling.sequence import Timed, instant_ns, neighbours
 
@@ -39,11 +42,11 @@ class _Last:
         self._held: dict[Any, Instants] = {}
 
     def of(self, key: Any, make: Callable[[], Instants]) -> Instants:
-        if key not in self._held:
-            while len(self._held) >= _KEPT:
-                del self._held[next(iter(self._held))]
-            self._held[key] = make()
-        return self._held[key]
+        made = self._held.pop(key, None) or make()
+        while len(self._held) >= _KEPT:
+            del self._held[next(iter(self._held))]
+        self._held[key] = made
+        return made
 
 
 class Kept:
@@ -56,20 +59,56 @@ class Kept:
     def of(self, config: Config, read: Callable[[], Instants]) -> Instants:
         """Return what `read` does, the frames, and what is :func:`made` of them where that is done.
 
-        It goes with :func:`as_recorded`.
+        They are for :func:`events_of`.
         """
         frames, sampling = config.frames, config.sampling
         once = is_made_once(config)
         how = (sampling.interpolation, sampling.L, frames.exposure_us) if once else None
-        key = (frames.encoding, frames.full_scale, how)
+        key, acting = (frames.encoding, frames.full_scale, how), _until_moved(config)
+
+        def in_place() -> Instants:
+            return self._made.of(key, lambda: made(config, *read()) if once else read())
+
+        def moved() -> Instants:
+            times_ns, light = in_place()
+            return times_ns, _after(acting, config, times_ns, light)
+
         with self._lock:
-            instants = self._made.of(key, lambda: made(config, *read()) if once else read())
             if not _is_moved(config):
-                return instants
-            acting = _until_moved(config)
-            return self._moved.of(
-                (key, acting), lambda: (instants[0], _after(acting, config, *instants))
-            )
+                return in_place()
+            return self._moved.of((key, acting), moved)
+
+
+def events_of(
+    instants: Instants,
+    config: Config,
+    *,
+    threads: int | None = None,
+    coarseness: Coarseness = PRECISE,
+) -> Events:
+    """Return the events of frames that were made once for a configuration, (n,), sorted.
+
+    Parameters
+    ----------
+    instants : (list of int, (instants, rows, columns))
+        As :meth:`Kept.of` returns them, or the first of them.
+    config : Config
+    threads : int, optional
+        Default: all cores.  The events do not depend on it.
+    coarseness : Coarseness
+        Of steps of time.
+
+    Raises
+    ------
+    DataError
+        Fewer than two frames, or times that do not increase.
+    """
+    lean, effects = _as_recorded(config)
+    frames = zip(*instants, strict=True)
+    chunks = events_from_light(
+        frames, lean, threads=threads, effects=effects, coarseness=coarseness
+    )
+    return np.concatenate(list(chunks))
 
 
 def is_made_once(config: Config) -> bool:
@@ -151,7 +190,7 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     return times, np.array(found, np.float32)
 
 
-def as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
+def _as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
     """Return `config` for what is made once: frames sharp and in place, and all between them.
 
     And the effects on other than frames that need to know how these were recorded.

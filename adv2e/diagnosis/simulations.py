@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.instants import Instants, Kept, as_recorded
+from adv2e.diagnosis.instants import Instants, Kept, events_of
 from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.stream import Stream
 from adv2e.effects.frames.misregistration import shifted
-from adv2e.simulation import events_from_light
 from adv2e.stepping import Coarseness
 
 Result = TypeVar("Result")
@@ -96,16 +95,12 @@ class Simulator:
         `seed` tells simulations of one diagnosis apart, the configuration's tells diagnoses apart.
         """
         evidence = self._evidence
-        times_ns, light = self._light(config)
-        lean, effects = as_recorded(config)
-        chunks = events_from_light(
-            zip(times_ns, light, strict=True),
-            dataclasses.replace(lean, seed=(_SEEDS * config.seed + seed) % 2**63),
+        events = events_of(
+            self._light(config),
+            dataclasses.replace(config, seed=(_SEEDS * config.seed + seed) % 2**63),
             threads=1,
-            effects=effects,
             coarseness=_ROUGH if rough else _FINE,
         )
-        events = np.concatenate(list(chunks))
         with self._counting:
             self.done += 1
             self._progress(self.done, self._likely)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -12,11 +13,10 @@ from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
-from adv2e.diagnosis.instants import Instants, Kept, as_recorded, is_made_once
+from adv2e.diagnosis.instants import Instants, Kept, events_of, is_made_once
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
 from adv2e.effects.frames.encoding import decoder_for
 from adv2e.events import Events
-from adv2e.simulation import events_from_light
 from real.recording import Real, still_rate
 
 SCORE = "relative_5_bins_smoothed"
@@ -68,14 +68,12 @@ class Bench:
         if not is_made_once(config):
             whole = self.real.simulator(config, windows.stop + BEYOND_US, self.threads)(seed)
             return cut(whole, windows.start, windows.stop)
-        until = (windows.stop + BEYOND_US) * 1000
-        made = zip(*self._frames.of(config, lambda: self._read(config)), strict=True)
-        used = ((t_ns, light) for t_ns, light in made if t_ns <= until)
-        lean, effects = as_recorded(config)
-        chunks = events_from_light(
-            used, replace(lean, seed=seed), threads=self.threads, effects=effects
+        times_ns, light = self._frames.of(config, lambda: self._read(config))
+        used = bisect_right(times_ns, (windows.stop + BEYOND_US) * 1000)
+        events = events_of(
+            (times_ns[:used], light[:used]), replace(config, seed=seed), threads=self.threads
         )
-        return cut(np.concatenate(list(chunks)), windows.start, windows.stop)
+        return cut(events, windows.start, windows.stop)
 
     def _read(self, config: Config) -> Instants:
         """Return the light of the frames, without what is laid over it."""
