@@ -93,4 +93,4 @@ def without_user_effects(config: Config, written: Collection[str] = ()) -> Confi
         return config
     values = to_dict(config)
     values["user"] |= dict.fromkeys(off)
-    return from_dict(values, "user", list(effects.values()))
+    return from_values(values, "user", config)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.markers.timing import Spectrum, above_beside, keeps_time
+from adv2e.diagnosis.markers.spectrum import Spectrum, keeps_time, prominence
 from adv2e.diagnosis.scene import Scene
 from adv2e.diagnosis.stream import Stream
 
@@ -72,12 +72,10 @@ class _Heights:
             return cls(np.empty(0), np.empty((2, 0)), scene)
         hz = np.fft.rfftfreq(_PADDING * bins, bin_us * 1e-6)
         step = np.minimum((stream.t - start) // bin_us, bins - 1).astype(np.int64)
-        heights = []
-        for sign in (np.ones(len(stream)), 2.0 * stream.on - 1.0):
-            rate = np.bincount(step, sign, minlength=bins)
-            rate = (rate - rate.mean()) * np.hanning(bins)
-            power = np.log(np.abs(np.fft.rfft(rate, _PADDING * bins)) ** 2 + 1.0)
-            heights.append(above_beside(power, _BESIDE))
+        heights = [
+            prominence(np.bincount(step, sign, minlength=bins), _BESIDE, _PADDING)
+            for sign in (np.ones(len(stream)), 2.0 * stream.on - 1.0)
+        ]
         above = hz > _LOWEST_HZ
         return cls(hz[above], np.array(heights)[:, above], scene)
 

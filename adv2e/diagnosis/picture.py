@@ -151,14 +151,10 @@ class Gallery:
         return np.array(values)
 
     def _phases(self, borders: Array) -> _Measure:
-        times = self._scene.times_us
-
         def measure(placed: Placed) -> Array:
             still = placed.speed == STILL
-            begin = times[placed.interval[still]]
-            length = times[placed.interval[still] + 1] - begin
-            share = 100.0 * (placed.stream.t[still] - begin) / length
-            return np.histogram(share, borders)[0].astype(np.float64)
+            phase = self._scene.phase_of(placed.stream.t[still], placed.interval[still])
+            return np.histogram(100.0 * phase, borders)[0].astype(np.float64)
 
         return measure
 

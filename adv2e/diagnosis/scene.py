@@ -85,6 +85,11 @@ class Scene:
         inner = np.searchsorted(t_us, self.times_us[1:-1] + late_us)
         return np.repeat(np.arange(self.intervals), np.diff(np.r_[0, inner, len(t_us)]))
 
+    def phase_of(self, t_us: NDArray[np.int64], interval: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return where times [us] are in their frame intervals: 0 at one frame, 1 at the next."""
+        begin = self.times_us[interval]
+        return np.asarray((t_us - begin) / (self.times_us[interval + 1] - begin))
+
 
 def _speeds(
     slope: NDArray[np.float32], seconds: NDArray[np.float32], still: NDArray[np.float32]

@@ -26,8 +26,10 @@ from adv2e.diagnosis.markers import BOTH, VIEWS, Markers
 from adv2e.diagnosis.markers.intervals import Runs
 from adv2e.diagnosis.markers.neighbours import Neighbours
 from adv2e.diagnosis.markers.pixels import Pixels
+from adv2e.diagnosis.markers.rates import Phase
+from adv2e.diagnosis.markers.spectrum import Spectrum
 from adv2e.diagnosis.markers.stamps import Gaps, RowGaps, Ticks
-from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Slopes, Spectrum
+from adv2e.diagnosis.markers.timing import Drift, Lag, Shift, Slopes
 from adv2e.diagnosis.parts import Parts
 
 SCENE = some_scene(seed=5)

@@ -17,9 +17,10 @@ from adv2e.diagnosis.markers.base import Entry, Group, Raw
 from adv2e.diagnosis.markers.intervals import Intervals, Runs
 from adv2e.diagnosis.markers.neighbours import Neighbours
 from adv2e.diagnosis.markers.pixels import Pixels
-from adv2e.diagnosis.markers.rates import Course, Load, Rates
+from adv2e.diagnosis.markers.rates import Course, Load, Phase, Rates
+from adv2e.diagnosis.markers.spectrum import Spectrum
 from adv2e.diagnosis.markers.stamps import Gaps, RowGaps, Ticks
-from adv2e.diagnosis.markers.timing import Drift, Lag, Phase, Shift, Slopes, Spectrum
+from adv2e.diagnosis.markers.timing import Drift, Lag, Shift, Slopes
 from adv2e.diagnosis.scene import Placed, Scene
 
 __all__ = ["BOTH", "VIEWS", "Entry", "Markers"]

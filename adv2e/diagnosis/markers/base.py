@@ -58,6 +58,14 @@ class Group(Protocol):
         """Return the statistics of sums that were added over parts, (entries,)."""
 
 
+class Numbers:
+    """A group of numbers of events, compared as :func:`stabilised` puts them."""
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics of sums that were added over parts, (entries,)."""
+        return stabilised(raw)
+
+
 def counts(
     part: NDArray[np.int64], cell: NDArray[Any], cells: int, weight: NDArray[Any] | None = None
 ) -> Raw:

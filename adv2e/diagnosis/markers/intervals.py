@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.markers.base import POLARITIES, Entry, Raw, counts, stabilised
+from adv2e.diagnosis.markers.base import POLARITIES, Entry, Numbers, Raw, counts
 from adv2e.diagnosis.scene import STILL, Placed
 from adv2e.diagnosis.stream import Stream
 
@@ -27,7 +27,7 @@ def _bins_text(borders: Sequence[float]) -> list[str]:
     ]
 
 
-class Intervals:
+class Intervals(Numbers):
     """Histogram of the time since the pixel's event before, by the pair of polarities."""
 
     title = "time between events of a pixel"
@@ -66,12 +66,8 @@ class Intervals:
         cell = gap * 4 + stream.on[used] * 2 + stream.on_before[used]
         return counts(placed.part[used], cell, len(self._texts) * 4)
 
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        return stabilised(raw)
 
-
-class Runs:
+class Runs(Numbers):
     """How far into a run of one polarity events are: what a reset changes from event to event."""
 
     title = "runs of one polarity"
@@ -100,10 +96,6 @@ class Runs:
         stream = placed.stream
         place = self._PLACE_OF[np.minimum(_place_in_run(stream, self._LONGEST_GAP_US), 9)]
         return counts(placed.part, place * 2 + stream.on, len(self._PLACES) * 2)
-
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        return stabilised(raw)
 
 
 def _place_in_run(stream: Stream, longest_gap_us: int) -> NDArray[np.int64]:

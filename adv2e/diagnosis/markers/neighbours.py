@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from adv2e.diagnosis.markers.base import Entry, Raw, counts, stabilised
+from adv2e.diagnosis.markers.base import Entry, Numbers, Raw, counts
 from adv2e.diagnosis.markers.counting import since_neighbours
 from adv2e.diagnosis.scene import Placed
 
 _BORDERS_US = (100, 300, 1_000, 3_000, 10_000, 30_000, 100_000)
 
 
-class Neighbours:
+class Neighbours(Numbers):
     """Histogram of the time since an event of a neighbouring pixel."""
 
     title = "neighbouring pixels"
@@ -52,7 +51,3 @@ class Neighbours:
             ],
             axis=1,
         )
-
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        return stabilised(raw)

@@ -1,4 +1,4 @@
-"""How many events there are, by polarity, speed, brightness, time and total rate."""
+"""How many events there are: by polarity, speed, brightness, time, rate, place between frames."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from adv2e.diagnosis.markers.base import (
     POLARITIES,
     SPEED_NAMES,
     Entry,
+    Numbers,
     Raw,
     counts,
-    stabilised,
+    excess,
 )
-from adv2e.diagnosis.scene import BRIGHTNESSES, SPEEDS, STILL, Placed
+from adv2e.diagnosis.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
 
 
-class Rates:
+class Rates(Numbers):
     """Numbers of events by speed, brightness and polarity."""
 
     title = "number of events"
@@ -45,12 +46,8 @@ class Rates:
         cell = (placed.speed * BRIGHTNESSES + placed.brightness) * 2 + placed.stream.on
         return counts(placed.part, cell, SPEEDS * BRIGHTNESSES * 2)
 
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        return stabilised(raw)
 
-
-class Course:
+class Course(Numbers):
     """Numbers of events over the time of the recording."""
 
     title = "course in time"
@@ -80,12 +77,8 @@ class Course:
         cell = (step * 2 + (placed.speed != STILL)) * 2 + placed.stream.on
         return counts(placed.part, cell, self._steps * 4)
 
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        return stabilised(raw)
 
-
-class Load:
+class Load(Numbers):
     """Numbers of events when few and when many come from the whole sensor."""
 
     title = "load of the readout"
@@ -119,6 +112,41 @@ class Load:
         cell = self._step_of[placed.interval] * 2 + placed.stream.on
         return counts(placed.part, cell, self._steps * 2)
 
+
+class Phase:
+    """Numbers of events by their place between two frames."""
+
+    title = "place between frames"
+    least = 0.6
+
+    _STEPS = 10
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        return [
+            Entry(
+                f"{p} events, {where}, {k * 10}-{k * 10 + 10} % after a frame",
+                f"number of {p} events {where} in that part of the time between frames, less a"
+                " tenth of all of them, in deviations of chance",
+            )
+            for k in range(self._STEPS)
+            for where in ("at rest", "in motion")
+            for p in ("OFF", "ON")
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        phase = self._scene.phase_of(placed.stream.t, placed.interval)
+        step = np.clip((phase * self._STEPS).astype(np.int64), 0, self._STEPS - 1)
+        cell = (step * 2 + (placed.speed > 0)) * 2 + placed.stream.on
+        return counts(placed.part, cell, self._STEPS * 4)
+
     def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        return stabilised(raw)
+        """Return the statistics: shares of the events of their kind, relative to chance."""
+        number = raw.reshape(self._STEPS, 4)
+        whole = number.sum(axis=0)
+        return excess(number, whole / self._STEPS).ravel()
