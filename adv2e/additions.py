@@ -84,3 +84,28 @@ def values_of(
         limit = f" above {above:g}" if above > -np.inf else ""
         raise DataError(f"{name}: all values must be finite numbers{limit}")
     return np.ascontiguousarray(values.reshape(n, -1))
+
+
+def injection_complaint(
+    found: NDArray[Any], start_s: float, stop_s: float, rows: int, columns: int
+) -> str | None:
+    """Return what is wrong with events injected from `start_s` to before `stop_s`, or None.
+
+    Parameters
+    ----------
+    found : array
+        What an injection returned.
+    start_s, stop_s : float
+        [s]
+    rows, columns : int
+        Of the sensor.
+    """
+    if found.dtype != INJECTED_DTYPE or found.ndim != 1:
+        return f"must be (n,) of INJECTED_DTYPE, got {found.dtype} of shape {found.shape}"
+    times = found["t"]
+    inside = (times >= start_s) & (times < stop_s)
+    if not (np.all(inside) and np.all(times[1:] >= times[:-1])):
+        return f"times must be sorted and from {start_s:.6f} s to before {stop_s:.6f} s"
+    if np.any(found["x"] >= columns) or np.any(found["y"] >= rows):
+        return f"x must be below {columns} and y below {rows}"
+    return None

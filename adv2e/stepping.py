@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.additions import INJECTED_DTYPE, LONGEST_US, Additions, Course, values_of
+from adv2e.additions import LONGEST_US, Additions, Course, injection_complaint, values_of
 from adv2e.effects.pixel.threshold_drift import drift_factors
 from adv2e.errors import DataError
 from adv2e.intervals import Part
@@ -238,17 +238,13 @@ class Stepping:
             return _NOTHING
         t0, t1 = (float(t) for t in self._seconds(np.array([t0_us, t1_us])))
         found = np.asarray(self._additions.inject(t0, t1))
-        if found.dtype.names is None or not {"t", "x", "y", "p"} <= set(found.dtype.names):
-            raise DataError(f"inject: must return an array of {INJECTED_DTYPE}, got {found.dtype}")
-        times = np.asarray(found["t"], np.float64)
-        x, y = found["x"].astype(np.int64), found["y"].astype(np.int64)
-        if not np.all((x < self._columns) & (y < self._pixels // self._columns)):
-            raise DataError("inject: events outside of the picture")
-        if not (np.all(np.diff(times) >= 0) and np.all((times >= t0) & (times < t1))):
-            raise DataError(f"inject: times must be sorted, from {t0:.6f} s to below {t1:.6f} s")
+        wrong = injection_complaint(found, t0, t1, self._pixels // self._columns, self._columns)
+        if wrong:
+            raise DataError(f"inject: {wrong}")
+        pixels = found["y"].astype(np.int64) * self._columns + found["x"]
         # seconds and back: rounding must not take an event out of its run
-        at = np.clip(times * 1e6 - self._origin, t0_us, np.nextafter(t1_us, -math.inf))
-        return injected_of(at, y * self._columns + x, found["p"] > 0, self._pixels)
+        at = np.clip(found["t"] * 1e6 - self._origin, t0_us, np.nextafter(t1_us, -math.inf))
+        return injected_of(at, pixels, found["p"] > 0, self._pixels)
 
     def _seconds(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         return (times + self._origin) * 1e-6

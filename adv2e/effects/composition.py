@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.additions import INJECTED_DTYPE, Additions
+from adv2e.additions import Additions, injection_complaint
 from adv2e.effects.hooks import Frames, Hooks, Times, View
 from adv2e.errors import Adv2eError, DataError
 from adv2e.events import EVENT_DTYPE, Events, empty_events
@@ -150,23 +150,9 @@ def _merge(hooks: Sequence[Hooks]) -> Callable[[float, float], Array]:
 def _injected(hook: Hooks, start_s: float, stop_s: float) -> Array:
     with blamed(hook):
         found = np.asarray(hook.inject(start_s, stop_s))
-    if found.dtype != INJECTED_DTYPE or found.ndim != 1:
-        raise DataError(
-            f"effect {hook.name}: inject: an array of {found.dtype} and shape {found.shape}, must"
-            " be (n,) of INJECTED_DTYPE"
-        )
-    times = found["t"]
-    inside = (times >= start_s) & (times < stop_s)
-    if not (np.all(inside) and np.all(times[1:] >= times[:-1])):
-        raise DataError(
-            f"effect {hook.name}: inject: times must be sorted and from {start_s:.6f} s to before"
-            f" {stop_s:.6f} s"
-        )
-    if np.any(found["x"] >= hook.view.columns) or np.any(found["y"] >= hook.view.rows):
-        raise DataError(
-            f"effect {hook.name}: inject: x must be below {hook.view.columns} and y below"
-            f" {hook.view.rows}"
-        )
+    wrong = injection_complaint(found, start_s, stop_s, hook.view.rows, hook.view.columns)
+    if wrong:
+        raise DataError(f"effect {hook.name}: inject: {wrong}")
     return found
 
 

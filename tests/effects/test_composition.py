@@ -217,7 +217,7 @@ BROKEN = {
     "effect mine: light: a frame of shape": {
         "light": lambda self, frames: ((t, light[:2]) for t, light in frames)
     },
-    "effect mine: inject: an array of float64": {"inject": lambda self, a, b: np.zeros(2)},
+    "effect mine: inject: must be .* got float64": {"inject": lambda self, a, b: np.zeros(2)},
     "effect mine: inject: times must be sorted": {"inject": lambda self, a, b: injected([b], 0)},
     "effect mine: inject: x must be below 4": {"inject": lambda self, a, b: injected([a], 4)},
     "effect mine: events: must yield arrays": {"events": lambda self, chunks: iter([[1, 2]])},

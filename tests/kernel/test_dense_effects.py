@@ -170,7 +170,7 @@ WRONG = {
     "zero": (Additions(step_us=50.0, on=lambda t: 0.0 * t), "on: all values .* above 0"),
     "outside": (
         Additions(step_us=50.0, inject=lambda a, b: np.array([(a, 900, 0, 1)], INJECTED_DTYPE)),
-        "outside of the picture",
+        "inject: x must be below",
     ),
     "late": (
         Additions(step_us=50.0, inject=lambda a, b: np.array([(b, 0, 0, 1)], INJECTED_DTYPE)),
