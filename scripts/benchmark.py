@@ -33,7 +33,7 @@ from benchmarks.machine import busy_line, machine_line, versions_line
 from benchmarks.processes import Job, JobError, Log, Measured, run_rounds
 from benchmarks.report import frontier_table, speed_tables
 from benchmarks.settings import Peers, Plan
-from study_knee_report import load_pyplot
+from writing.pyplot import load_pyplot
 
 from adv2e.errors import Adv2eError
 

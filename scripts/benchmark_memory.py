@@ -31,7 +31,7 @@ from benchmarks.clips import Clip, default_folder, render, stored
 from benchmarks.machine import busy_line, machine_line
 from benchmarks.memory import Burst, Moment, count_in, stored_burst, watched
 from benchmarks.processes import Job, JobError, Log, Measured, number, run_rounds
-from benchmarks.report import table
+from writing.markdown import table
 
 ACTION = "benchmarks.memory:convert"
 FORMATS = ("h5", "txt", "zip")

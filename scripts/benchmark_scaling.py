@@ -25,7 +25,7 @@ from benchmarks.machine import busy_line, machine_line, versions_line
 from benchmarks.processes import Job, JobError, Log, Measured, number, run_rounds
 from benchmarks.report import peak_text, table
 from benchmarks.settings import ALL, IDEAL, Plan, stepped
-from study_knee_report import load_pyplot
+from writing.pyplot import load_pyplot
 
 from adv2e.cores import default_threads
 from adv2e.errors import Adv2eError

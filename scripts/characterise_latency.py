@@ -16,7 +16,7 @@ from pathlib import Path
 
 import click
 import numpy as np
-from characterisation.markdown import table
+from writing.markdown import table
 
 from adv2e import simulate
 from adv2e.characterisation.characterise import Settings, characterise
@@ -39,9 +39,9 @@ def main(folder: Path, seed: int) -> None:
     """Fit the latencies of one camera, judge on the other."""
     try:
         measured = read(folder / "latency_summary.csv")
-        print(departures(measured))
-        print(verdicts(measured, seed))
-        print(simulated(measured, seed))
+        print(departures(measured), end="\n\n")
+        print(verdicts(measured, seed), end="\n\n")
+        print(simulated(measured, seed), end="\n\n")
     except Adv2eError as error:
         raise click.ClickException(str(error)) from None
 

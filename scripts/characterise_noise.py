@@ -16,7 +16,7 @@ import click
 import numpy as np
 from characterisation.cradle import still_rates, top_share
 from characterisation.iebcs import Level, read_levels
-from characterisation.markdown import table
+from writing.markdown import table
 
 from adv2e import simulate
 from adv2e.characterisation.characterise import Settings, characterise, problem_of
@@ -47,15 +47,15 @@ def main(folder: Path, cradle_folder: Path | None, seed: int) -> None:
     """Fit noise at two light levels, judge at the third."""
     try:
         levels = read_levels(folder)
-        print(measured_rates(levels))
-        print(per_pixel(levels))
+        print(measured_rates(levels), end="\n\n")
+        print(per_pixel(levels), end="\n\n")
         measured = iebcs_table(levels)
         for text in rotations(measured, seed):
-            print(text)
-        print(closed_forms(measured))
+            print(text, end="\n\n")
+        print(closed_forms(measured), end="\n\n")
         if cradle_folder is not None:
             for text in cradle(cradle_folder, seed):
-                print(text)
+                print(text, end="\n\n")
     except Adv2eError as error:
         raise click.ClickException(str(error)) from None
 
@@ -142,7 +142,7 @@ def fitted_here(level: Level, white: float) -> list[str]:
 def rotations(measured: Table, seed: int) -> Iterator[str]:
     """Yield the verdict, and what every single effect does at each level held out."""
     found = characterise(measured, read_declared([DECLARED]), Settings(error=OPEN, seed=seed))
-    yield f"IEBCS: {found.sentence}\n"
+    yield f"IEBCS: {found.sentence}"
     yield tried(found)
     rows = []
     for lux in measured.texts("illuminance_lux"):
@@ -217,7 +217,7 @@ def cradle(folder: Path, seed: int) -> Iterator[str]:
     lines += [",".join(f"{row[name]:.6g}" for name in columns) for row in rates]
     measured = parse_table("\n".join(lines), folder.name)
     found = characterise(measured, read_declared([DECLARED]), Settings(white=255.0, seed=seed))
-    yield f"{folder.name}: {found.sentence}\n"
+    yield f"{folder.name}: {found.sentence}"
     yield tried(found)
 
 

@@ -27,8 +27,8 @@ import click
 from benchmarks.clips import default_folder
 from benchmarks.machine import busy_line, machine_line, versions_line
 from benchmarks.processes import REPOSITORY, Job, JobError, Log, Measured, run_rounds
-from benchmarks.report import table
 from benchmarks.settings import OFF_NAME, Plan
+from writing.markdown import table
 
 USUAL = (f"346x260: {OFF_NAME}", "346x260: all effects, shot 5 Hz")
 """Settings compared unless others are named."""

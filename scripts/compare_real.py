@@ -19,6 +19,7 @@ import click
 import numpy as np
 from real.recording import Real, halves, read, still_rate
 from real.table import Row, Stream, definitions, markdown, preamble
+from writing.files import write
 
 from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor, half_split
@@ -26,7 +27,7 @@ from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config, load_config
 from adv2e.config.model import INTERPOLATIONS
 from adv2e.diagnosis.nuisances import TOLERANCE, match_totals, totals, with_thresholds
-from adv2e.errors import Adv2eError, OutputError
+from adv2e.errors import Adv2eError
 from adv2e.events import Events, empty_events
 from adv2e.sources.times import seconds
 
@@ -96,23 +97,13 @@ def main(
             parts.append(_shipped(real, cases, run))
             if matching:
                 parts.append(_matched(real, cases, run))
-        _write("\n\n".join([*parts, definitions()]), out)
+        write("\n\n".join([*parts, definitions()]), out)
     except Adv2eError as error:
         raise click.ClickException(str(error)) from None
 
 
 def _say(text: str) -> None:
     click.echo(text, err=True)
-
-
-def _write(text: str, out: Path | None) -> None:
-    if out is None:
-        click.echo(text)
-        return
-    try:
-        out.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"{out}: cannot be written: {error.strerror}") from None
 
 
 def _cases(names: Sequence[str], interpolation: str | None) -> list[Case]:

@@ -30,8 +30,10 @@ from real.search import Search
 from real.stability import MOST as UNSTABLE
 from real.stability import Stability, compare_halved, stable_score
 from real.table import COLUMNS as TITLES
-from real.table import line, number
+from real.table import number
 from real.tried import UNSEEN, Added, tried_names
+from writing.files import write
+from writing.markdown import table
 
 from adv2e.comparison.distances import distances
 from adv2e.comparison.floor import Floor, half_split
@@ -39,7 +41,7 @@ from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config, load_config, to_dict
 from adv2e.config.paths import flat
 from adv2e.diagnosis.nuisances import totals
-from adv2e.errors import Adv2eError, DataError, OutputError
+from adv2e.errors import Adv2eError, DataError
 from adv2e.events import Events, empty_events
 
 COLUMNS = {
@@ -80,10 +82,7 @@ def main(
                 click.echo(f"{folder}: {problem}", err=True)
             parts.append(section(real, declared, seed, only, threads))
         text = "\n\n".join(parts)
-        if out is None:
-            click.echo(text)
-        else:
-            _write(text, out)
+        write(text, out)
     except Adv2eError as error:
         raise click.ClickException(str(error)) from None
 
@@ -104,13 +103,6 @@ def _names(text: str) -> list[str]:
             known = ", ".join(tried_names())
             raise click.BadParameter(f"{name}: must be one of {known}", param_hint="--effects")
     return only
-
-
-def _write(text: str, out: Path) -> None:
-    try:
-        out.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"{out}: cannot be written: {error.strerror}") from None
 
 
 def _preamble(declared: str, only: Sequence[str]) -> str:
@@ -191,27 +183,25 @@ def _table(real: Real, steps: list[Step], windows: Windows) -> str:
     measured = cut(real.events, windows.start, windows.stop)
     share = totals(measured)[0] / len(measured)
     names = ["added", "ON / OFF threshold [ln]", "events", "ON share", *COLUMNS.values(), "mean"]
-    lines = [line(names), line(["---"] * len(names))]
+    rows = []
     for step in steps:
         levels, judged = step.added.config.pixel.thresholds, step.judged
         cells = [f"{number(judged.values[n])} ({number(judged.floor[n])})" for n in COLUMNS]
         cells.append(number(judged.without_chance(SCORE)))
-        lines.append(
-            line(
-                [
-                    step.added.text(),
-                    f"{levels.on:.3f} / {levels.off:.3f}",
-                    f"{judged.events_ratio:.2f}",
-                    f"{number(judged.on_share)} / {share:.2f}",
-                    *cells,
-                ]
-            )
+        rows.append(
+            [
+                step.added.text(),
+                f"{levels.on:.3f} / {levels.off:.3f}",
+                f"{judged.events_ratio:.2f}",
+                f"{number(judged.on_share)} / {share:.2f}",
+                *cells,
+            ]
         )
     split = half_split(real.events, windows, *real.size)
     nothing = distances(real.events, empty_events(), windows, *real.size).values
     for label, values in (("half split (Poisson)", split), ("no events at all", nothing)):
-        lines.append(line([label, "", "", "", *_cells(values), ""]))
-    return "\n".join(lines)
+        rows.append([label, "", "", "", *_cells(values), ""])
+    return table(names, rows)
 
 
 def _cells(values: Floor) -> list[str]:
@@ -251,9 +241,7 @@ def _beside_peers(real: Real, last: Step) -> str:
         return "No other tools were run on this recording."
     names = ["simulator", *list(COLUMNS.values())[:3]]
     own = ["adv2e, model found", *_cells(last.judged.values)[:3]]
-    return "\n".join(
-        [line(names), line(["---"] * len(names)), line(own), *(line(row) for row in rows)]
-    )
+    return table(names, [own, *rows])
 
 
 if __name__ == "__main__":

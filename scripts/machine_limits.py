@@ -29,8 +29,8 @@ import numba
 import numpy as np
 from benchmarks.machine import machine_line
 from benchmarks.processes import number
-from benchmarks.report import table
 from numpy.typing import NDArray
+from writing.markdown import table
 
 from adv2e.cores import default_threads
 from adv2e.events import Events, make_events, sort_events

@@ -148,7 +148,7 @@ def report(folder: Path, output: Path, commit: str | None) -> None:
     """Write tables and a figure of the cases in FOLDER to -o DIR: diagnosis.md, diagnosis.png."""
     from study_diagnosis_parts.figure import draw  # noqa: PLC0415
     from study_diagnosis_parts.tables import report as tables  # noqa: PLC0415
-    from study_knee_report import load_pyplot  # noqa: PLC0415
+    from writing.pyplot import load_pyplot  # noqa: PLC0415
 
     lines = latest(read(folder))
     if not lines:

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from study_interpolation_report import METHODS, Cost, Row, Score, draw, report
 from study_interpolation_scenes import Case, Image, cases
-from study_knee_report import load_pyplot
+from writing.pyplot import load_pyplot
 
 from adv2e.comparison.grids import Grid, smoothed, voxel_grid
 from adv2e.comparison.windows import cut, frame_windows

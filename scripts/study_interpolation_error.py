@@ -23,10 +23,10 @@ from typing import Any
 import click
 import numpy as np
 from numpy.typing import NDArray
-from study_diagnosis_parts import tables
 from study_diagnosis_parts.camera import camera
 from study_diagnosis_parts.cases import SCENES
 from study_diagnosis_parts.options import Names, sampling
+from writing import markdown
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.evidence import Evidence, read_evidence
@@ -154,7 +154,7 @@ def table(rows: Sequence[Row]) -> str:
         told = f"{np.median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})"
         cells.append([kind, f"{fps:.4g}", *medians, told])
     header = ("between frames", "frames a second", "error", "left", "expected", "left / expected")
-    return tables.table(header, cells)
+    return markdown.table(header, cells)
 
 
 @click.command()

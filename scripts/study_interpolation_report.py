@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from writing.markdown import table
+
 METHODS = ("linear", "flow", "perfect")
 """What makes the in-between frames; perfect: the scene itself, rendered at their times."""
 
@@ -68,7 +70,7 @@ def report(rows: Sequence[Row], costs: Sequence[Cost]) -> str:
         ]
         for row in rows
     ]
-    parts = [_table([*head, "true to made [ms]"], cells), _DEFINITIONS, _cost_table(costs)]
+    parts = [table([*head, "true to made [ms]"], cells), _DEFINITIONS, _cost_table(costs)]
     return "\n\n".join(parts)
 
 
@@ -77,14 +79,9 @@ def _cell(values: Sequence[float], digits: int) -> str:
     return " / ".join(texts)
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---:" if k else "---" for k in range(len(head))], *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
 def _cost_table(costs: Sequence[Cost]) -> str:
     rows = [[f"{cost.width} x {cost.height}", cost.method, f"{cost.ms:.1f}"] for cost in costs]
-    return _table(("size", "interpolation", "ms an interval of ten frames, this machine"), rows)
+    return table(("size", "interpolation", "ms an interval of ten frames, this machine"), rows)
 
 
 def draw(pyplot: Any, rows: Sequence[Row], path: Path) -> None:

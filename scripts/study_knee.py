@@ -36,7 +36,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from study_knee_report import Score, Scores, draw, load_pyplot, report
+from study_knee_report import Score, Scores, draw, report
+from writing.pyplot import load_pyplot
 
 from adv2e.comparison.grids import Grid, voxel_grid
 from adv2e.comparison.smoothed_error import smoothed_errors

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from adv2e.errors import MissingExtraError
+from writing.markdown import table
 
 THIRDS = ("dark", "middle", "bright")
 
@@ -101,11 +99,6 @@ def report(scores: Scores, lights: Mapping[str, NDArray[Any]]) -> str:
     return "\n\n".join([*parts, _choice(scores)])
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---:" if k else "---" for k in range(len(head))], *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
 def _scene_table(lights: Mapping[str, NDArray[Any]]) -> str:
     head = ("scene", "light [DN]", "median", "below 2.72 DN", "below 20 DN")
     rows = []
@@ -113,7 +106,7 @@ def _scene_table(lights: Mapping[str, NDArray[Any]]) -> str:
         shares = [f"{100 * float((light < knee).mean()):.0f} %" for knee in (math.e, 20.0)]
         span = f"{light.min():.2g} to {light.max():.3g}"
         rows.append([name, span, f"{np.median(light):.3g}", *shares])
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _main_table(scores: Scores) -> str:
@@ -137,7 +130,7 @@ def _main_table(scores: Scores) -> str:
         ]
         for k, name in enumerate(scores.maps)
     ]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _case_table(scores: Scores) -> str:
@@ -155,7 +148,7 @@ def _case_table(scores: Scores) -> str:
             for value, low in zip(distance[..., k].ravel(), smallest.ravel(), strict=True)
         ]
         rows.append([name, *cells])
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _choice(scores: Scores) -> str:
@@ -169,21 +162,6 @@ def _choice(scores: Scores) -> str:
         f" {100 * (mean[chosen] / mean[best] - 1):.1f} % more distance: recommended."
         f" Least error at {name[int(error.argmin())]}."
     )
-
-
-def load_pyplot() -> Any:
-    """Return Matplotlib's pyplot, drawing to files only.
-
-    Raises
-    ------
-    MissingExtraError
-        Matplotlib is not installed.
-    """
-    try:
-        importlib.import_module("matplotlib").use("Agg")
-        return importlib.import_module("matplotlib.pyplot")
-    except ImportError as error:
-        raise MissingExtraError("the figure of this study", "studies") from error
 
 
 def draw(pyplot: Any, scores: Scores, path: Path) -> None:

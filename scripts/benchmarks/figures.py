@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from study_knee_report import load_pyplot
+from writing.pyplot import load_pyplot
 
 from benchmarks.frontier import Point
 

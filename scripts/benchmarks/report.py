@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from writing.markdown import table
+
 from benchmarks.frontier import Point
 from benchmarks.processes import Measured, Spread, number
 
@@ -23,12 +25,6 @@ FRONTIER_ABOUT = (
     " evlib: no filter). Events: relative to the truth. Times of adv2e and EventCV are whole"
     " microseconds, which alone is 0.25 us."
 )
-
-
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table; all columns but the first are numbers."""
-    ruler = ["---", *(["---:"] * (len(header) - 1))]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in [header, ruler, *rows])
 
 
 def megapixel_frames(measured: Measured) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from writing.markdown import table
+
 from adv2e.comparison.distances import MEASURES
 from adv2e.comparison.floor import Floor
 
@@ -71,8 +73,7 @@ def definitions() -> str:
 def markdown(rows: Sequence[Row], measured: Stream) -> str:
     """Return the table."""
     names = ["configuration", "events", "ON share", *COLUMNS.values(), "still"]
-    lines = [line(names), line(["---"] * len(names))]
-    return "\n".join([*lines, *(line(_cells(row, measured)) for row in rows)])
+    return table(names, (_cells(row, measured) for row in rows))
 
 
 def _cells(row: Row, measured: Stream) -> list[str]:
@@ -99,8 +100,3 @@ def number(value: float | None) -> str:
     if value is None:
         return "-"
     return f"{value:.2f}" if value < 100 else f"{value:.0f}"
-
-
-def line(cells: Sequence[str]) -> str:
-    """Return a line of a table."""
-    return f"| {' | '.join(cells)} |"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
+from writing.markdown import table
+
 from adv2e.diagnosis.search import LEVEL
 from study_diagnosis_parts import scoring
 from study_diagnosis_parts.camera import catalogue
@@ -42,12 +44,6 @@ def report(lines: Sequence[Line], commit: str) -> str:
     if failures:
         parts.append("## What went wrong, and what competed\n\n" + failures)
     return "\n\n".join(parts) + "\n"
-
-
-def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a Markdown table; all columns but the first are numbers."""
-    ruler = ["---", *(["---:"] * (len(header) - 1))]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in [header, ruler, *rows])
 
 
 def _done(lines: Sequence[Line]) -> list[Line]:

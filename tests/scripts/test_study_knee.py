@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import study_knee as study
 import study_knee_report as report
+from writing.pyplot import load_pyplot
 
 from adv2e.effects.pixel.log_response import LogResponse
 from adv2e.errors import MissingExtraError
@@ -51,4 +52,4 @@ def test_fewest_false_events_decide_between_nearly_equal_distances():
 def test_missing_matplotlib_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingExtraError, match=r"adv2e\[studies\]"):
-        report.load_pyplot()
+        load_pyplot()

@@ -1,0 +1,1 @@
+"""What scripts write: tables, figures, files."""
