@@ -6,9 +6,10 @@ from pathlib import Path
 
 from adv2e.reports import files, findings, trials
 from adv2e.reports.curve_chart import curves
+from adv2e.reports.keys import unit_of
 from adv2e.reports.markup import plain, tag
 from adv2e.reports.page import page_of
-from adv2e.reports.quantities import unit_of, value_text
+from adv2e.reports.quantities import value_text
 from adv2e.reports.result import Diagnosis
 from adv2e.reports.summary import summary_text
 from adv2e.reports.wording import Wording

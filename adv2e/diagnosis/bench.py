@@ -16,9 +16,9 @@ from adv2e.diagnosis.fit import Fit, Fitter
 from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.markers import BOTH, VIEWS
 from adv2e.diagnosis.metric import Model, Scale
+from adv2e.diagnosis.rejections import Rejections
 from adv2e.diagnosis.resampling import Resampling
 from adv2e.diagnosis.simulations import Laboratory
-from adv2e.reports.result import Rejected
 
 Array = NDArray[np.float64]
 
@@ -62,25 +62,6 @@ class State:
     def beyond(self, ground: State) -> tuple[Fit, ...]:
         """Return the effects that were added to those of another model."""
         return self.fits[len(ground.fits) :]
-
-
-@dataclass
-class Rejections:
-    """Why effects were not added: of each round, the reason of an effect's best form."""
-
-    held: dict[str, Rejected] = field(default_factory=dict)
-    _this_round: set[str] = field(default_factory=set)
-
-    def new_round(self) -> None:
-        """Let reasons take the place of earlier ones."""
-        self._this_round.clear()
-
-    def add(self, fit: Fit, reason: str, *, final: bool = False) -> None:
-        """Note why an effect was not taken; `final` reasons replace those of the same round."""
-        name = fit.candidate.name
-        if final or name not in self._this_round:
-            self._this_round.add(name)
-            self.held[name] = Rejected(name, reason, fit.candidate.parameters(fit.place))
 
 
 @dataclass(frozen=True)

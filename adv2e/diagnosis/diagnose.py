@@ -21,9 +21,9 @@ from adv2e.diagnosis.conclusion import (
 )
 from adv2e.diagnosis.detectable import LIKELY, detectable
 from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.keys import as_found, own_of
 from adv2e.diagnosis.library import names
 from adv2e.diagnosis.nuisances import thresholds_of
+from adv2e.diagnosis.own_effects import as_found, own_of
 from adv2e.diagnosis.ready import make_ready
 from adv2e.diagnosis.search import Search
 from adv2e.diagnosis.simulations import Simulator
@@ -51,7 +51,7 @@ def diagnose(
     declared : Config
         What is known of the camera.  Effects of the user's own, for which it has sections, are
         candidates as the built-in ones are; those that are no knowledge of the camera are off
-        (:func:`adv2e.diagnosis.keys.without_user_effects`).
+        (:func:`adv2e.diagnosis.own_effects.without_user_effects`).
     declared_name : str
         Its file, for the report.
     without : sequence of str

@@ -173,12 +173,16 @@ def _declared(effect: type[Hooks]) -> Any:
     return subsection(MISSING if needed else section, meaning=meaning, optional=True)
 
 
+def user_effects(config: Config) -> Mapping[str, type[Hooks]]:
+    """Return the effects of the user's own that a configuration has sections for, by name."""
+    user = getattr(config, "user", None)
+    return {} if user is None else type(user).effects
+
+
 def user_hooks(config: Config) -> list[Hooks]:
     """Return the effects of the user's own that are on in `config`."""
     user = getattr(config, "user", None)
-    if user is None:
-        return []
-    sections = ((effect, getattr(user, name)) for name, effect in type(user).effects.items())
+    sections = ((effect, getattr(user, name)) for name, effect in user_effects(config).items())
     return [effect(section) for effect, section in sections if section is not None]
 
 

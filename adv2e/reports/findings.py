@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from adv2e.reports.error_chart import error_chart
+from adv2e.reports.keys import meaning_of, summary_of, unit_of
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.quantities import (
     estimate_text,
     interval_text,
-    meaning_of,
     probability_text,
-    summary_of,
-    unit_of,
     unit_text,
     value_text,
 )

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from adv2e.config.yaml12 import scalar_text
+from adv2e.reports.keys import unit_of
 from adv2e.reports.markup import plain
-from adv2e.reports.quantities import interval_text, native, unit_of
+from adv2e.reports.quantities import interval_text, native
 from adv2e.reports.result import Diagnosis, Own
 from adv2e.reports.wording import Wording
 

@@ -4,14 +4,9 @@ from __future__ import annotations
 
 import textwrap
 
+from adv2e.reports.keys import unit_of
 from adv2e.reports.markup import plain
-from adv2e.reports.quantities import (
-    interval_text,
-    number_text,
-    probability_text,
-    unit_of,
-    value_text,
-)
+from adv2e.reports.quantities import interval_text, number_text, probability_text, value_text
 from adv2e.reports.result import Diagnosis, ErrorRow
 from adv2e.reports.standing_out import standing_out
 

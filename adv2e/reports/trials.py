@@ -4,15 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from adv2e.reports.keys import summary_of, unit_of
 from adv2e.reports.markup import Markup, join, tag
-from adv2e.reports.quantities import (
-    NOTHING,
-    number_text,
-    summary_of,
-    unit_of,
-    unit_text,
-    value_text,
-)
+from adv2e.reports.quantities import NOTHING, number_text, unit_text, value_text
 from adv2e.reports.result import NO_OWN, Diagnosis, Finding, Own, Rejected
 from adv2e.reports.separation import separation_of
 from adv2e.reports.tables import SHOWN, Column, table

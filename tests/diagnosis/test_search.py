@@ -21,13 +21,14 @@ from made_up_laboratory import (
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import attempts as attempts_module
 from adv2e.diagnosis.attempts import likely_of_a_round
-from adv2e.diagnosis.bench import MANY, Rejections
+from adv2e.diagnosis.bench import MANY
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.conclusion import finding_of
 from adv2e.diagnosis.detectable import detectable
 from adv2e.diagnosis.fit import Fit
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.nuisances import THRESHOLDS, thresholds_of
+from adv2e.diagnosis.rejections import Rejections
 from adv2e.diagnosis.search import LEVEL, Search
 from adv2e.diagnosis.verdict import verdict_of
 

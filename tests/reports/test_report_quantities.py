@@ -5,18 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adv2e.reports.keys import meaning_of, summary_of, unit_of
 from adv2e.reports.markup import join, markup, plain, tag
 from adv2e.reports.quantities import (
     estimate_text,
     interval_text,
-    meaning_of,
     native,
     number_text,
     percent_text,
     probability_text,
     short_text,
-    summary_of,
-    unit_of,
     value_text,
 )
 from adv2e.reports.result import Estimate

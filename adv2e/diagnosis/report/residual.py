@@ -9,13 +9,7 @@ import numpy as np
 
 from adv2e.diagnosis.report.sensor_map import CLIP_SD, Map, colour_bar, map_image, reduction
 from adv2e.reports.markup import Markup, join, tag
-from adv2e.reports.quantities import (
-    NOTHING,
-    number_text,
-    percent_text,
-    short_text,
-    unit_text,
-)
+from adv2e.reports.quantities import NOTHING, number_text, percent_text, short_text, unit_text
 from adv2e.reports.result import Diagnosis, ResidualMap, Signature
 from adv2e.reports.standing_out import LARGE_Z, standing_out
 from adv2e.reports.tables import SHOWN, Column, table
