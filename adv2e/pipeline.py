@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e import __version__
+from adv2e.active_effects import user_sources
 from adv2e.config import Config, to_dict
 from adv2e.effects.frames.encoding import LightDecoder, check_white
-from adv2e.effects.user import user_sources
 from adv2e.events import Events
 from adv2e.overlap import WriteBehind
 from adv2e.reading import Decoding, Reading, Still
@@ -162,7 +162,7 @@ def convert(
     began = time.perf_counter()
     recording, workers = reading.source, reading.threads
     if recording.largest is not None:
-        check_white(recording.largest, recording.path, config.frames)
+        check_white(recording.largest, recording.path, config.frames.full_scale)
     target = output or default_output(reading.path)
     for written in (target, preview):
         if written not in (None, "-"):

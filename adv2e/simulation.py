@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e import pixel
+from adv2e.active_effects import active_hooks
 from adv2e.config.model import Config
-from adv2e.effects.active import active_hooks
+from adv2e.decoding import decoder_for
 from adv2e.effects.composition import additions_of, begin, changes_light, map_events
-from adv2e.effects.frames.encoding import LightDecoder, check_white, decoder_for, encoding_of_images
+from adv2e.effects.frames.encoding import LightDecoder, check_white, encoding_of_images
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.errors import ConfigError, DataError
 from adv2e.events import Events
@@ -140,7 +141,7 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
             f"frame 0: shape {image.shape}, must be (rows, columns) or (rows, columns, 3)"
         )
     if image.dtype.kind == "f" and image.size:
-        check_white(float(image.max()), "frame 0", config.frames)
+        check_white(float(image.max()), "frame 0", config.frames.full_scale)
     auto = encoding_of_images(image.dtype, colour)
     return decoder_for(config.frames, image.dtype, colour, auto=auto)
 

@@ -60,12 +60,12 @@ def command(
     from pathlib import Path
 
     from adv2e.config import names_of, written_keys
+    from adv2e.config.own import user_effects
     from adv2e.diagnosis.diagnose import diagnose
     from adv2e.diagnosis.evidence import read_evidence
     from adv2e.diagnosis.library import names
     from adv2e.diagnosis.own_effects import without_user_effects
     from adv2e.diagnosis.report import write_reports
-    from adv2e.effects.user import user_effects
     from adv2e.pixel import is_compiled
     from adv2e.reports.files import check_folder
     from adv2e.reports.summary import summary_text

@@ -68,7 +68,7 @@ def own_effects(files: tuple[str, ...]) -> list[type[Hooks]]:
     """Return the effects that files hold."""
     if not files:
         return []
-    from adv2e.effects.user import load_effects
+    from adv2e.own_effects import load_effects
 
     return [effect for name in files for effect in load_effects(name)]
 

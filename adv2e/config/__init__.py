@@ -10,6 +10,7 @@ from adv2e.config.build import Key, all_keys, build, keys_of
 from adv2e.config.files import read, shipped
 from adv2e.config.merge import merge_all, parse_set
 from adv2e.config.model import Config
+from adv2e.config.own import config_class
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
 from adv2e.config.yaml12 import Origin, Value
 
@@ -63,8 +64,6 @@ def load_config(
     if seed is not None:
         origin = Origin("--seed", on_command_line=True)
         over.append(Value({"seed": Value(seed, origin)}, origin))
-    from adv2e.effects.user import config_class  # noqa: PLC0415 - it needs the model itself
-
     return build(config_class(effects), merge_all([*(read(name) for name in files), *over]))
 
 
@@ -107,8 +106,6 @@ def from_dict(
     ConfigError
         As for a file; the text begins with `name`.
     """
-    from adv2e.effects.user import config_class  # noqa: PLC0415 - it needs the model itself
-
     return build(config_class(effects), _tree(values, Origin(name)))
 
 

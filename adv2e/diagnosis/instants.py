@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.active_effects import frame_hooks
 from adv2e.config import Config
 from adv2e.config.model import Frames
-from adv2e.effects.active import frame_hooks
+from adv2e.config.own import user_effects
 from adv2e.effects.hooks import Hooks
 from adv2e.effects.readout.frame_coupling import FrameCoupling, FrameCouplingHooks
-from adv2e.effects.user import user_effects
 from adv2e.events import Events
 from adv2e.simulation import events_from_light
 from adv2e.stepping import PRECISE, Coarseness

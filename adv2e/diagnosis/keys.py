@@ -7,8 +7,8 @@ from typing import Any
 
 from adv2e.config import Config, from_dict, to_dict
 from adv2e.config.build import all_keys
+from adv2e.config.own import user_effects
 from adv2e.config.paths import set_key
-from adv2e.effects.user import user_effects
 from adv2e.parameters import Parameter
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from adv2e.config import Config, to_dict
 from adv2e.config.build import keys_of
+from adv2e.config.own import user_effects
 from adv2e.config.paths import get_key
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.evidence import Evidence
@@ -22,7 +23,6 @@ from adv2e.diagnosis.keys import known_keys
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.readouts import Readouts, readouts_of
 from adv2e.diagnosis.stamps import Service, service_times, tick_of
-from adv2e.effects.user import user_effects
 from adv2e.parameters import Fit
 
 _DECLARED = known_keys(Config)

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
+from adv2e.decoding import decoder_for
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.scene import Scene
-from adv2e.effects.frames.encoding import LightDecoder, decoder_for
+from adv2e.effects.frames.encoding import LightDecoder
 
 
 def light_of(evidence: Evidence, declared: Config) -> NDArray[np.float32]:

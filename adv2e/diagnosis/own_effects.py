@@ -7,8 +7,8 @@ from collections.abc import Collection
 from typing import Any
 
 from adv2e.config import Config, to_dict
+from adv2e.config.own import user_effects
 from adv2e.diagnosis.keys import from_values, known_keys
-from adv2e.effects.user import user_effects
 from adv2e.reports.result import Own
 
 

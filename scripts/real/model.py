@@ -13,9 +13,9 @@ from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
+from adv2e.decoding import decoder_for
 from adv2e.diagnosis.instants import Instants, Kept, events_of, is_made_once
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
-from adv2e.effects.frames.encoding import decoder_for
 from adv2e.events import Events
 from real.recording import Real, still_rate
 

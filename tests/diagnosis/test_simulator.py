@@ -7,6 +7,7 @@ import pytest
 from made_up_streams import random_stream, wandering_light
 
 from adv2e import load_config
+from adv2e.active_effects import frame_hooks
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.lamps import lamps_of
@@ -14,7 +15,6 @@ from adv2e.diagnosis.light import light_of
 from adv2e.diagnosis.markers import Markers
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Laboratory, Simulator
-from adv2e.effects.active import frame_hooks
 from adv2e.effects.frames.misregistration import shifted
 from adv2e.simulation import events_from_light
 from adv2e.stepping import steps_of

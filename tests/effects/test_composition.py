@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from adv2e import load_config, simulate
+from adv2e.active_effects import active_hooks
 from adv2e.additions import INJECTED_DTYPE
 from adv2e.circuit import make_circuit
 from adv2e.config.model import Pixel, Sampling
-from adv2e.effects.active import active_hooks
 from adv2e.effects.composition import additions_of, begin, map_events
 from adv2e.effects.hooks import Hooks, View
 from adv2e.errors import ConfigError, DataError

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from adv2e.active_effects import active_hooks
 from adv2e.config.model import Config, Frames, Sampling
-from adv2e.effects.active import active_hooks
 from adv2e.effects.frames.exposure_blur import ExposureBlurHooks
 from adv2e.effects.frames.motion_blur import MotionBlurHooks, sharpened, smear, spread, velocity
 from adv2e.effects.hooks import View

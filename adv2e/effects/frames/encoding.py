@@ -18,15 +18,12 @@ References
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from adv2e.errors import ConfigError, DataError
-
-if TYPE_CHECKING:
-    from adv2e.config.model import Frames
 
 LUMA_WEIGHTS = (0.2126, 0.7152, 0.0722)
 """Shares of red, green and blue light in luma."""
@@ -72,7 +69,7 @@ def encoding_of_images(dtype: DTypeLike, colour: bool) -> str:
     return "srgb" if colour and np.dtype(dtype) == np.uint8 else "linear"
 
 
-def check_white(largest: float, label: str, frames: Frames) -> None:
+def check_white(largest: float, label: str, full_scale: float | None) -> None:
     """Refuse floats that are far above white, unless somebody said what white is.
 
     A pixel that sees light a hundred times too bright is another one, and takes a thousand times as
@@ -84,14 +81,15 @@ def check_white(largest: float, label: str, frames: Frames) -> None:
         Of the numbers of a frame.
     label : str
         What it is called.
-    frames : Frames
+    full_scale : float, optional
+        Number that is said to mean white.
 
     Raises
     ------
     DataError
         Naming `label`, the largest number, and the key that says what is white.
     """
-    if frames.full_scale is None and largest > _NO_WHITE:
+    if full_scale is None and largest > _NO_WHITE:
         raise DataError(
             f"{label}: floats up to {largest:g}, where 1 is white; say what is, with"
             " frames.full_scale=255 or another number (1, if they are right)"
@@ -210,19 +208,3 @@ class LightDecoder:
         red, green, blue = self._tables
         fill_luma(pixels, red, green, blue, light.reshape(-1))
         return light
-
-
-def decoder_for(frames: Frames, dtype: DTypeLike, colour: bool, *, auto: str) -> LightDecoder:
-    """Return the decoder that a configuration asks for.
-
-    Parameters
-    ----------
-    frames : Frames
-        The configuration's section.
-    dtype, colour
-        Of the frames; see :class:`LightDecoder`.
-    auto : str
-        What ``encoding: auto`` means for them.
-    """
-    encoding = auto if frames.encoding == "auto" else frames.encoding
-    return LightDecoder(encoding, frames.full_scale or full_scale_of(dtype), dtype, colour)

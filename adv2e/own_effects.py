@@ -1,30 +1,21 @@
-"""Effects of the user's own: classes loaded from a file, and their sections of the configuration.
-
-A configuration that knows them is of a class made for them: that of all configurations with one
-more section, ``user``, and in it a section for each effect, named after it.
-"""
+"""Effects of the user's own: classes loaded from a file."""
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
-import inspect
 import re
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING
-from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from adv2e.config.build import Key, keys_of
-from adv2e.config.model import Config
 from adv2e.effects import STAGES
 from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError
-from adv2e.parameters import Section, subsection
+from adv2e.parameters import Section
 
 METHODS = ("light", "gain", "drive", "signal", "thresholds", "inject", "events")
 """The methods of which an effect overrides one at least."""
@@ -126,66 +117,3 @@ def _key_complaint(key: Key) -> str | None:
         return f"Parameters: {key.name}: fit: only float, and tuples of it, can be fitted"
     wrong = key.about.complaint(fit.low) or key.about.complaint(fit.high)
     return f"Parameters: {key.name}: fit: {wrong}" if wrong else None
-
-
-def config_class(effects: Sequence[type[Hooks]]) -> type[Config]:
-    """Return the class of configurations with a section ``user.<name>`` for each of `effects`.
-
-    An effect is on, with the defaults of its parameters, unless the configuration says otherwise.
-
-    Raises
-    ------
-    ConfigError
-        Two of them have the same name.
-    """
-    return _config_class(tuple(effects))
-
-
-@lru_cache(maxsize=64)
-def _config_class(effects: tuple[type[Hooks], ...]) -> type[Config]:
-    if not effects:
-        return Config
-    by_name: dict[str, type[Hooks]] = {}
-    for effect in effects:
-        if effect.name in by_name:
-            raise ConfigError(f"user.{effect.name}: two effects have this name: rename one")
-        by_name[effect.name] = effect
-    fields = [
-        (name, effect.Parameters | None, _declared(effect)) for name, effect in by_name.items()
-    ]
-    user = dataclasses.make_dataclass(
-        "User", fields, bases=(Section,), frozen=True, kw_only=True, namespace={"effects": by_name}
-    )
-    needed = any(field.default_factory is MISSING for _, _, field in fields)
-    declared = subsection(MISSING if needed else user, meaning="effects of your own")
-    return dataclasses.make_dataclass(
-        "Config", [("user", user, declared)], bases=(Config,), frozen=True, kw_only=True
-    )
-
-
-def _declared(effect: type[Hooks]) -> Any:
-    section = effect.Parameters
-    needed = any(
-        item.default is MISSING and item.default_factory is MISSING
-        for item in dataclasses.fields(section)
-    )
-    meaning = (inspect.getdoc(effect) or effect.name).partition("\n")[0]
-    return subsection(MISSING if needed else section, meaning=meaning, optional=True)
-
-
-def user_effects(config: Config) -> Mapping[str, type[Hooks]]:
-    """Return the effects of the user's own that a configuration has sections for, by name."""
-    user = getattr(config, "user", None)
-    return {} if user is None else type(user).effects
-
-
-def user_hooks(config: Config) -> list[Hooks]:
-    """Return the effects of the user's own that are on in `config`."""
-    user = getattr(config, "user", None)
-    sections = ((effect, getattr(user, name)) for name, effect in user_effects(config).items())
-    return [effect(section) for effect, section in sections if section is not None]
-
-
-def user_sources(config: Config) -> list[Mapping[str, str]]:
-    """Return name, file and SHA-256 of each effect of the user's own that is on in `config`."""
-    return [type(hook).source for hook in user_hooks(config) if type(hook).source]

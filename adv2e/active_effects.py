@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from adv2e.config.model import Config, Frames, Pixel, Readout, Sampling
+from adv2e.config.own import user_effects
 from adv2e.effects import STAGES
 from adv2e.effects.frames.black_level import BlackLevelHooks
 from adv2e.effects.frames.clock_drift import ClockDriftHooks
@@ -19,7 +20,6 @@ from adv2e.effects.readout.arbiter import ArbiterHooks
 from adv2e.effects.readout.event_loss import EventLossHooks
 from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
 from adv2e.effects.readout.timestamp_tick import TimestampTickHooks
-from adv2e.effects.user import user_hooks
 
 
 def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
@@ -90,3 +90,15 @@ def _of_readout(readout: Readout, frames: Frames) -> list[Hooks]:
     if readout.loss is not None and readout.loss.fraction:
         hooks.append(EventLossHooks(readout.loss))
     return hooks
+
+
+def user_hooks(config: Config) -> list[Hooks]:
+    """Return the effects of the user's own that are on in `config`."""
+    user = getattr(config, "user", None)
+    sections = ((effect, getattr(user, name)) for name, effect in user_effects(config).items())
+    return [effect(section) for effect, section in sections if section is not None]
+
+
+def user_sources(config: Config) -> list[Mapping[str, str]]:
+    """Return name, file and SHA-256 of each effect of the user's own that is on in `config`."""
+    return [type(hook).source for hook in user_hooks(config) if type(hook).source]
