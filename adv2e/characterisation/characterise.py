@@ -13,7 +13,7 @@ from adv2e import __version__
 from adv2e.characterisation.declared import Declared
 from adv2e.characterisation.latency_problem import LatencyProblem
 from adv2e.characterisation.measurements import Latencies, measurements_of
-from adv2e.characterisation.noise_problem import HOT_FRACTION, HOT_RATE, NoiseProblem
+from adv2e.characterisation.noise_problem import NoiseProblem
 from adv2e.characterisation.problem import Problem, held_rows, is_key
 from adv2e.characterisation.selection import Draws, Model, Selection, Selector
 from adv2e.characterisation.table import Table
@@ -161,17 +161,13 @@ def problem_of(
     return problem
 
 
-def found_model(
-    declared: Declared, model: Model, problem: LatencyProblem | NoiseProblem
-) -> dict[str, Any]:
+def found_model(declared: Declared, model: Model, problem: Problem) -> dict[str, Any]:
     """Return the declared configuration with what was fitted, as nested mappings.
 
     Keys that were not written stand as they were fitted: effects that are not found are off.
     """
     tree = to_dict(declared.config)
-    values = dict(model.values)
-    if isinstance(problem, NoiseProblem) and HOT_RATE in values:
-        values[HOT_FRACTION] = problem.hot_fraction
+    values = problem.completed(model.values)
     for key, value in problem.neutral.items():
         values.setdefault(key, value)
     for key, value in values.items():
@@ -184,9 +180,7 @@ def _findings(model: Model, draws: Draws, problem: Problem) -> list[Finding]:
     intervals = _intervals(model, draws, problem)
     found: list[Finding] = []
     for effect in model.effects:
-        parameters = {free.key: model.values[free.key] for free in effect.free}
-        if isinstance(problem, NoiseProblem) and HOT_RATE in parameters:
-            parameters[HOT_FRACTION] = problem.hot_fraction
+        parameters = problem.completed({free.key: model.values[free.key] for free in effect.free})
         inside: dict[str, Any] = {free.key: intervals[free.key] for free in effect.free}
         same = next((one for one in found if one.name == effect.name), None)
         if same is not None:  # two keys of one effect, added one after another

@@ -41,6 +41,10 @@ class Declared:
         value = self.written.get(path)
         return neutral if value is None else float(value)
 
+    def value(self, fitted: Mapping[str, float], path: str, neutral: float | None) -> float | None:
+        """Return what was fitted for a key, else what is :meth:`held`."""
+        return fitted[path] if path in fitted else self.held(path, neutral)
+
 
 def read_declared(
     files: Sequence[str | Path] = (), sets: Sequence[str] = (), seed: int | None = None

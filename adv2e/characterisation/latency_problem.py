@@ -98,13 +98,9 @@ class LatencyProblem:
 
     def predict(self, values: Mapping[str, float]) -> Array:
         """Return ln of the latency [us], (rows,)."""
-        held = self._declared.held
-
-        def value(key: str, neutral: float | None) -> float | None:
-            return values[key] if key in values else held(key, neutral)
 
         def number(key: str) -> float:
-            return value(key, 0.0) or 0.0
+            return self._declared.value(values, key, 0.0) or 0.0
 
         without = self._without_low_pass and CUTOFF not in values
         cutoff, dark, stray = number(CUTOFF), number(DARK_CUTOFF), number(DARK_CURRENT)
@@ -113,16 +109,20 @@ class LatencyProblem:
         step = np.log((bright + stray) / (dim + stray))
         after = np.where(self._polarity == 1, bright, dim) + stray
         corner = 2.0 * np.pi * (dark + (cutoff - dark) * after / 255.0)
-        follower = value(FOLLOWER, None)
+        follower = self._declared.value(values, FOLLOWER, None)
         time = first_crossing(
             step,
             self._thresholds(values),
             np.full(step.shape, _FAST) if without else np.maximum(corner, 1e-9),
             None if follower is None else 2.0 * np.pi * follower,
-            value(SLEW, None),
+            self._declared.value(values, SLEW, None),
         )
         latency = np.maximum(1e6 * time + number(OFFSET), _SOONEST_US)
         return np.asarray(np.minimum(np.log(latency), NEVER), dtype=np.float64)
+
+    def completed(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the keys as they are: a latency tells all of an effect."""
+        return dict(values)
 
     @property
     def neutral(self) -> dict[str, float]:

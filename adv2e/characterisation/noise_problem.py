@@ -145,10 +145,10 @@ class NoiseProblem:
         return logs
 
     def _sources(self, values: Mapping[str, float]) -> NoisySources:
-        held, pixel = self._declared.held, self._declared.config.pixel
+        pixel = self._declared.config.pixel
 
         def value(key: str) -> float:
-            return values[key] if key in values else held(key, 0.0) or 0.0
+            return self._declared.value(values, key, 0.0) or 0.0
 
         noise, corner = pixel.photoreceptor_noise, pixel.low_pass
         return NoisySources(
@@ -164,6 +164,11 @@ class NoiseProblem:
             dead_time_s=0.0 if pixel.refractory is None else 1e-6 * pixel.refractory.period_us,
             hot_hz=self.hot_fraction * value(HOT_RATE),
         )
+
+    def completed(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the keys with the share of hot pixels, of which mean rates tell the product."""
+        hot = {HOT_FRACTION: self.hot_fraction} if HOT_RATE in values else {}
+        return {**values, **hot}
 
     @property
     def neutral(self) -> dict[str, float]:

@@ -93,6 +93,13 @@ class Problem(Protocol):
     def predict(self, values: Mapping[str, float]) -> Array:
         """Return the logarithms that the model predicts, (n,), finite."""
 
+    @property
+    def neutral(self) -> Mapping[str, float]:
+        """Keys that this model has at a value other than the default, where not written."""
+
+    def completed(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return keys that were fitted with those which go with them and cannot be told."""
+
 
 def is_key(name: str) -> bool:
     """Tell whether what is fitted is a key of the configuration, not something else of the table.
