@@ -65,8 +65,10 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
     measured = last(ready.measured)
 
     def drawn(state: State, of: Simulator = simulator, first: int = _FIRST_DRAW) -> list[Placed]:
-        seeds = range(first, first + DRAWS)
-        return [Placed.of(of.stream(state.config, seed), scene) for seed in seeds]
+        def draw(seed: int) -> Placed:
+            return Placed.of(of.stream(state.config, seed), scene)
+
+        return of.map(draw, range(first, first + DRAWS))
 
     kept, declared = outcome.state, search.declared
     before = after = drawn(declared)
