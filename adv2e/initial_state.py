@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from adv2e.config.model import Pixel
 from adv2e.effects.pixel.hot_pixels import fill_first_hot_times
+from adv2e.effects.pixel.initial_reference import RANDOM, fill_random_reference
 from adv2e.effects.pixel.leak import fill_first_factors
 from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
 from adv2e.effects.pixel.shot_noise import fill_first_candidates
-from adv2e.effects.pixel.thresholds import fill_levels, fill_random_reference
+from adv2e.effects.pixel.thresholds import fill_levels
 from adv2e.kernel import stepped
 from adv2e.kernel.workspace import (
     S_BEYOND,
@@ -87,7 +88,7 @@ def initial_state(
     fill(fill_levels, seed, *means, levels.mismatch, on, off, spare)
     state[S_REFERENCE] = state[S_X]
     state[S_HOLD] = -1.0
-    if pixel.initial_reference == "random":
+    if pixel.initial_reference == RANDOM:
         fill_random_reference(seed, on, off, state[S_X], state[S_REFERENCE])
     if circuit.shot_rate > 0:
         times = state[S_SHOT_TIME]

@@ -12,6 +12,7 @@ from adv2e.effects.frames.flicker import Flicker
 from adv2e.effects.pixel.dark_current import DarkCurrent
 from adv2e.effects.pixel.dead_pixels import DeadPixels
 from adv2e.effects.pixel.hot_pixels import HotPixels
+from adv2e.effects.pixel.initial_reference import REFERENCES, SETTLED
 from adv2e.effects.pixel.leak import Leak
 from adv2e.effects.pixel.log_response import LogResponse
 from adv2e.effects.pixel.low_pass import LowPass
@@ -133,11 +134,11 @@ class Pixel(Section):
     """The pixel, in signal order."""
 
     initial_reference: str = parameter(
-        "settled",
+        SETTLED,
         unit="-",
         meaning="settled: reference = signal on the first frame; random: uniform between the"
         " thresholds",
-        choices=("settled", "random"),
+        choices=REFERENCES,
     )
     dark_current: DarkCurrent | None = subsection(
         _off, meaning="constant light that the frames lack", optional=True

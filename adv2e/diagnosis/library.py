@@ -23,6 +23,7 @@ from adv2e.diagnosis.keys import known_keys
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.readouts import Readouts, readouts_of
 from adv2e.diagnosis.stamps import Service, service_times, tick_of
+from adv2e.effects.pixel.initial_reference import REFERENCES
 from adv2e.parameters import Fit
 
 _DECLARED = known_keys(Config)
@@ -149,9 +150,17 @@ def _of_the_thresholds(now: _Now, times: _Times, values: Any, hints: Hints) -> l
         Candidate(
             "thresholds", (on, off), ((0.8 * a, 0.8 * b), (1.25 * a, 1.25 * b), (1.25 * a, 0.8 * b))
         ),
+        _start(values),
         Candidate("threshold_mismatch", (spread,), times(spread.key, 0.5, 2.0, 4.0)),
         Candidate("threshold_drift", (drifts,), ((-drift,), (drift,), (3 * drift,))),
     ]
+
+
+def _start(values: Any) -> Candidate:
+    """Return the other way in which pixels may be when the recording begins."""
+    key = "pixel.initial_reference"
+    (other,) = (one for one in REFERENCES if one != get_key(values, key))
+    return Candidate("initial_reference", (), ((),), ((key, other),))
 
 
 def _of_the_photoreceptor(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:

@@ -130,9 +130,9 @@ def _wrong(fits: Sequence[Fit], declared: Config) -> str:
 
 def _has(declared: Config, candidate: Candidate) -> bool:
     """Tell whether a configuration has an effect already, of whatever size."""
-    values = [neutral_value(declared, knob) for knob in candidate.knobs]
+    values = (neutral_value(declared, knob) for knob in candidate.knobs)
     held = to_dict(declared)
-    values += [
-        value for key, _ in candidate.extra if isinstance(value := get_key(held, key), (int, float))
-    ]
-    return any(value != 0.0 and math.isfinite(value) for value in values)
+    others = (get_key(held, key) for key, _ in candidate.extra)
+    return any(value != 0.0 and math.isfinite(value) for value in values) or any(
+        value is not None and value != 0.0 for value in others
+    )

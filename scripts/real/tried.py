@@ -49,6 +49,7 @@ CLIPPED_BLACK = Candidate(
 """Beside the black level of the library: how far light falls on where it is clipped at black."""
 
 UNSEEN = {
+    "initial_reference": "a choice of the simulation, tried before the camera's effects",
     "thresholds": "matched to the totals each time",
     "timestamp_tick": "does not move this score",
     "readout": "does not move this score at these rates",

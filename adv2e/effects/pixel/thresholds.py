@@ -88,11 +88,3 @@ def fill_levels(
         for i in range(lo, hi):
             on[i] = mean_on if mean_on > FLOOR else FLOOR
             off[i] = mean_off if mean_off > FLOOR else FLOOR
-
-
-@entry
-def fill_random_reference(seed: int, on: Array, off: Array, x: Array, reference: Array) -> None:
-    """Draw references so that x lies uniformly between the thresholds of each pixel."""
-    for i in range(x.shape[0]):
-        u = rng.uniforms(seed, rng.INITIAL_REFERENCE, i, 0)[0]
-        reference[i] = x[i] - (u * (on[i] + off[i]) - off[i])

@@ -1,0 +1,37 @@
+r"""What each pixel remembers when the first frame comes.
+
+``settled``: the scene has rested, and every pixel remembers its first frame, so that none fires
+before the light has changed by a whole threshold.  ``random``: the scene moved before, as in a
+piece of a longer recording, and each pixel may be anywhere on its way to its next event:
+
+.. math:: x - x_{ref} \sim U(-\theta_{OFF},\ \theta_{ON})
+
+with x the log intensity of the first frame, and the pixel's own thresholds.  It shows in the first
+events of each pixel, and nowhere else.
+
+References
+----------
+.. [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
+   contrast vision sensor", IEEE J. Solid-State Circuits 43(2), 2008,
+   doi:10.1109/JSSC.2007.914337 (the pixel remembers the light of its last event).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e import rng
+from adv2e.jit import entry
+
+Array = NDArray[np.float64]
+
+SETTLED, RANDOM = REFERENCES = ("settled", "random")
+
+
+@entry
+def fill_random_reference(seed: int, on: Array, off: Array, x: Array, reference: Array) -> None:
+    """Draw references so that x lies uniformly between the thresholds of each pixel."""
+    for i in range(x.shape[0]):
+        u = rng.uniforms(seed, rng.INITIAL_REFERENCE, i, 0)[0]
+        reference[i] = x[i] - (u * (on[i] + off[i]) - off[i])
