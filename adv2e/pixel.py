@@ -183,7 +183,9 @@ class PixelArray:
         span = starts[-1] - starts[0]
         t_base = math.floor(starts[0]) - 1
         if span >= pack_limit_us() // 2:
-            raise DataError(f"{span / 1e6:.0f} s between frames: too long")
+            raise DataError(
+                f"{span / 1e6:.0f} s between frames: too long; are their times in another unit?"
+            )
         frames = frames_of(part.frames, table)
         per_us = order.SLICES / (span + 2.0)
         advance = self._advance_dense if self._driver == "run_dense" else self._advance_whole

@@ -28,7 +28,7 @@ from adv2e.recordings.gather import Gatherer
 from adv2e.recordings.text import gather_lines
 from adv2e.sources.base import Image
 from adv2e.sources.opencv import decode_image
-from adv2e.sources.times import parse_times
+from adv2e.sources.times import parse_list
 
 EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
 
@@ -173,7 +173,7 @@ def _listed(files: _Files) -> tuple[NDArray[np.int64] | None, list[str]]:
     text, label = _text(files, LIST, "backslashreplace"), files.label(LIST)
     if not any(line.strip() and not line.strip().startswith("#") for line in text.splitlines()):
         return None, []
-    stamps = parse_times(text, label)
+    stamps, _ = parse_list(text, label)
     for stamp in stamps:
         if stamp.name is None:
             raise DataError(f"{label} line {stamp.line}: must be 'time name', the name is missing")

@@ -19,6 +19,7 @@ from adv2e.errors import DataError
 from adv2e.jit import entry, kernel
 from adv2e.recordings.base import Recording, described_geometry, parse_description
 from adv2e.recordings.gather import Gatherer
+from adv2e.sources.times import WHOLE
 
 _BLOCK = 1 << 22  # bytes read at once
 _SECONDS, _MICROSECONDS = 6, 0  # decimals that make a microsecond
@@ -221,7 +222,7 @@ def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer) -> tuple[int, 
         gatherer.add(*(column[:count] for column in columns))
         before += lines
     if before and decimals == _MICROSECONDS:
-        gatherer.problems.append("times have no decimal point: taken as microseconds")
+        gatherer.problems.append(WHOLE)
     return geometry
 
 

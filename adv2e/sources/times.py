@@ -78,7 +78,32 @@ def read_text(path: Path) -> str:
         raise DataError(f"{path}: {error.strerror}") from error
 
 
-def parse_times(text: str, label: str) -> list[Stamp]:
+WHOLE = "times have no decimal point: taken as microseconds"
+"""What is told of files whose times are whole numbers, of events or of their frames."""
+
+
+def parse_list(text: str, label: str) -> tuple[list[Stamp], bool]:
+    """Read the list of frames of a recording; times without any decimal point are microseconds.
+
+    So are those of its events: see :mod:`adv2e.recordings.text`.
+
+    Returns
+    -------
+    stamps : list of Stamp
+    whole : bool
+        Whether they were taken as microseconds.
+
+    Raises
+    ------
+    DataError
+        As :func:`parse_times`.
+    """
+    words = [words[0] for _, words in _lines(text, label, name_first=False)]
+    whole = len(words) > 1 and all(re.fullmatch(r"[+-]?\d+", word) for word in words)
+    return parse_times(text, label, 1000 if whole else NS_PER_S), whole
+
+
+def parse_times(text: str, label: str, unit_ns: int = NS_PER_S) -> list[Stamp]:
     """Read ``t`` or ``t name`` lines, t in seconds, ``#`` comments allowed.
 
     Lines with names may stand in any order and are sorted by time (a name tells which frame is
@@ -90,6 +115,8 @@ def parse_times(text: str, label: str) -> list[Stamp]:
         The list.
     label : str
         Name of the file, for messages.
+    unit_ns : int
+        Unit of the times [ns].
 
     Raises
     ------
@@ -99,7 +126,7 @@ def parse_times(text: str, label: str) -> list[Stamp]:
     """
     stamps = []
     for number, words in _lines(text, label, name_first=False):
-        stamps.append(_stamp(words[0], NS_PER_S, number, label, *words[1:]))
+        stamps.append(_stamp(words[0], unit_ns, number, label, *words[1:]))
     return _checked(stamps, label)
 
 

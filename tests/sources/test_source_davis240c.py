@@ -56,6 +56,16 @@ def test_folder_with_events_needs_no_folder_for_images(recording, picture):
     check(open_source(recording), picture)
 
 
+def test_whole_numbers_are_microseconds_as_those_of_its_events_are(recording, pack):
+    lines = [f"{t // 1000} images/frame_{n}.png\n" for t, n in zip(TIMES, (0, 1, 2), strict=True)]
+    (recording / "images.txt").write_text("".join(lines))
+    for source in (open_source(recording), open_source(pack())):
+        assert [frame.t_ns for frame in source.frames()] == [t // 1000 * 1000 for t in TIMES]
+        assert any("times have no decimal point" in note for note in source.notes)
+    given = open_source(recording, fps=10.0)
+    assert not any("decimal point" in note for note in given.notes)
+
+
 @pytest.mark.parametrize("top", ["", "rec/"])
 def test_zip_with_its_files_at_the_root_or_in_one_folder(pack, picture, top):
     check(open_source(pack(top)), picture)

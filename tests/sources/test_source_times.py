@@ -13,6 +13,7 @@ from adv2e.sources.times import (
     Stamp,
     constant_rate,
     parse_info,
+    parse_list,
     parse_ns,
     parse_times,
     read_text,
@@ -54,6 +55,19 @@ def test_list_with_comments_and_blank_lines():
         Stamp(500_000_000, 2, None),
         Stamp(1_500_000_000, 4, None),
     ]
+
+
+@pytest.mark.parametrize(
+    ("text", "t_ns", "whole"),
+    [
+        ("0 a\n2000 b\n", [0, 2_000_000], True),
+        ("0 a\n2 b\n2.5 c\n", [0, 2_000_000_000, 2_500_000_000], False),
+        ("3 a\n", [3_000_000_000], False),
+    ],
+)
+def test_a_list_of_a_recording_may_be_in_microseconds(text, t_ns, whole):
+    stamps, found = parse_list(text, "images.txt")
+    assert ([stamp.t_ns for stamp in stamps], found) == (t_ns, whole)
 
 
 def test_named_lines_are_sorted_by_time():
