@@ -98,6 +98,9 @@ class Candidate:
     readouts : Readouts, optional
         When frames were read out if this effect is there: of exposures that are fitted, only those
         which end then go with it, and no fit finds these from others.
+    of_chance : bool
+        It makes chance larger or smaller more than it moves any mean, which no misfit of a few
+        simulations shows: it is always simulated often.
     """
 
     name: str
@@ -108,6 +111,7 @@ class Candidate:
     left: float = FITTED
     known: tuple[tuple[float, float], ...] = ()
     readouts: Readouts | None = None
+    of_chance: bool = False
 
     @property
     def known_or_not(self) -> tuple[tuple[float, float], ...]:

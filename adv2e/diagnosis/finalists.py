@@ -58,6 +58,8 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
         if exposed != state.config:
             fits += fitter.probe([one], exposed, (1, 2))
     nothing = fitter.misfit(state.config, (1, 2))
+    of_chance = [fit for fit in fits if fit.candidate.of_chance]
+    fits = [fit for fit in fits if not fit.candidate.of_chance]
     dropped: list[Fit] = []
     for _ in range(2):
         fitter.improve(fits, (1, 2))
@@ -65,10 +67,11 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
         dropped = fits[2 * _FINALISTS :] + dropped
         fits = fits[: 2 * _FINALISTS]
     # whoever is far behind the first is not worth the simulations
-    far = _FAR * fits[0].misfit + _FAR * len(bench.observed[BOTH])
+    least = min((fit.misfit for fit in fits), default=nothing)
+    far = _FAR * least + _FAR * len(bench.observed[BOTH])
     chosen = [fit for fit in _without_third_forms(fits)[:_FINALISTS] if fit.misfit <= far]
     dropped = [fit for fit in fits if not any(fit is one for one in chosen)] + dropped
-    fits = chosen
+    fits = chosen + of_chance
     bench.fitter(parts.FIT, state.config).improve(fits, (3, 4, 5))
     configs = [fit.config for fit in fits]
     sample = bench.laboratory.many(configs, range(1, SOME + 1))

@@ -9,9 +9,13 @@ well is taken.  An effect whose keys the configuration does not have is left out
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any
+
+import numpy as np
 
 from adv2e.config import Config, to_dict
 from adv2e.config.build import keys_of
@@ -23,6 +27,7 @@ from adv2e.diagnosis.keys import known_keys
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.readouts import Readouts, readouts_of
 from adv2e.diagnosis.stamps import Service, service_times, tick_of
+from adv2e.diagnosis.stream import Stream
 from adv2e.effects.pixel.initial_reference import REFERENCES
 from adv2e.parameters import Fit
 
@@ -47,6 +52,8 @@ class Hints:
         Times that an event and a row take, where stamps look as if they had waited for a channel.
     readouts : Readouts, optional
         Of frames, where all pixels fire at once after each.
+    too_many : (float, float)
+        ON and OFF events that the declared model makes, over those measured.
     """
 
     seconds: float
@@ -55,6 +62,7 @@ class Hints:
     encoding: str = "linear"
     service: Service | None = None
     readouts: Readouts | None = None
+    too_many: tuple[float, float] = (1.0, 1.0)
 
 
 def library(declared: Config, hints: Hints) -> list[Candidate]:
@@ -139,16 +147,22 @@ _Times = Callable[..., tuple[tuple[float, ...], ...]]
 def _of_the_thresholds(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
     on, off = _knob("pixel.thresholds.on"), _knob("pixel.thresholds.off")
     a, b = now(on.key), now(off.key)
+    far_on, far_off = (_far_off(ratio) for ratio in hints.too_many)
     spread = _knob("pixel.thresholds.mismatch")
     drift = 0.2 / hints.seconds
     drifts = _knob("pixel.thresholds.drift_per_s", drift)
     # they must not reach zero before the end
     drifts = dataclasses.replace(drifts, low=-0.9 / hints.seconds)
     return [
-        Candidate("thresholds", (on,), times(on.key, 0.8, 1.25)),
-        Candidate("thresholds", (off,), times(off.key, 0.8, 1.25)),
+        Candidate("thresholds", (on,), times(on.key, 0.8, 1.25, *far_on)),
+        Candidate("thresholds", (off,), times(off.key, 0.8, 1.25, *far_off)),
         Candidate(
-            "thresholds", (on, off), ((0.8 * a, 0.8 * b), (1.25 * a, 1.25 * b), (1.25 * a, 0.8 * b))
+            "thresholds",
+            (on, off),
+            (
+                *((0.8 * a, 0.8 * b), (1.25 * a, 1.25 * b), (1.25 * a, 0.8 * b)),
+                *((f * a, g * b) for f, g in zip_longest(far_on, far_off, fillvalue=1.0)),
+            ),
         ),
         _start(values),
         Candidate("threshold_mismatch", (spread,), times(spread.key, 0.5, 2.0, 4.0)),
@@ -156,19 +170,35 @@ def _of_the_thresholds(now: _Now, times: _Times, values: Any, hints: Hints) -> l
     ]
 
 
+_USUAL, _FARTHEST = 2.0, 10.0
+"""Factors on the number of events: up to this, fits find the thresholds from near; most tried."""
+
+
+def _far_off(ratio: float) -> tuple[float, ...]:
+    """Return factors on a threshold that may bring far too many or too few events right."""
+    if 1.0 / _USUAL < ratio < _USUAL:
+        return ()
+    whole = min(max(ratio, 1.0 / _FARTHEST), _FARTHEST)
+    return whole, math.sqrt(whole)
+
+
 def _start(values: Any) -> Candidate:
     """Return the other way in which pixels may be when the recording begins."""
     key = "pixel.initial_reference"
     (other,) = (one for one in REFERENCES if one != get_key(values, key))
-    return Candidate("initial_reference", (), ((),), ((key, other),))
+    return Candidate("initial_reference", (), ((),), ((key, other),), of_chance=True)
 
 
 def _of_the_photoreceptor(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
     white, dark = _knob("pixel.low_pass.cutoff_hz"), _knob("pixel.low_pass.dark_cutoff_hz")
     a, b = now(white.key), now(dark.key)
+    off = get_key(values, "pixel.low_pass") is None
     made = [
-        Candidate("low_pass", (white,), times(white.key, 0.25, 0.6, 2.0)),
-        Candidate("low_pass", (dark,), times(dark.key, 0.3, 3.0)),
+        # of a low-pass that is off, the other corner is nothing that was declared
+        Candidate(
+            "low_pass", (white,), times(white.key, 0.25, 0.6, 2.0), ((dark.key, b),) if off else ()
+        ),
+        *([] if off else [Candidate("low_pass", (dark,), times(dark.key, 0.3, 3.0))]),
         Candidate("low_pass", (white, dark), ((0.4 * a, 0.5 * b), (2.0 * a, 2.0 * b))),
         Candidate("dark_current", (_knob("pixel.dark_current.dn"),), ((0.5,), (3.0,), (15.0,))),
         Candidate(
@@ -177,7 +207,7 @@ def _of_the_photoreceptor(now: _Now, times: _Times, values: Any, hints: Hints) -
             ((20.0,), (60.0,), (200.0,), (600.0,)),
         ),
     ]
-    if get_key(values, "pixel.low_pass") is None:  # the others act on it
+    if off:  # the others act on it
         return made
     least = min(now("pixel.thresholds.on"), now("pixel.thresholds.off"))
     return [
@@ -249,9 +279,9 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
             ((0.05,), (0.2,), (0.45,)),
         ),
     ]
-    if hints.tick_us > 1:
-        tick = ("readout.tick_us", float(hints.tick_us))
-        made.append(Candidate("timestamp_tick", (), ((),), (tick,)))
+    tick_us = float(hints.tick_us) if hints.tick_us > 1 else 0.0
+    if tick_us != (get_key(values, "readout.tick_us") or 0.0):
+        made.append(Candidate("timestamp_tick", (), ((),), (("readout.tick_us", tick_us),)))
     return made
 
 
@@ -304,6 +334,8 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
         phase = dataclasses.replace(turn, low=near + turn.low, high=near + turn.high)
         probes = ((0.06, near), (0.15, near), (0.35, near))
         made.append(Candidate("flicker", (depth, phase), probes, (read_off,)))
+    if get_key(values, "frames.flicker") is not None:
+        made.append(Candidate("flicker", (), ((),), (("frames.flicker", None),)))
     made += _encodings(values, hints)
     return made
 
@@ -353,8 +385,17 @@ def names(config: Config | None = None) -> list[str]:
     return list(dict.fromkeys([*built_in, *(user_effects(config) if config else ())]))
 
 
-def hints_of(evidence: Evidence, lamps: Sequence[Lamp]) -> Hints:
-    """Return hints from a recording, and the lamps that may have lit it."""
+def hints_of(evidence: Evidence, lamps: Sequence[Lamp], pilot: Sequence[Stream] = ()) -> Hints:
+    """Return hints from a recording.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    lamps : sequence of Lamp
+        That may have lit it.
+    pilot : sequence of Stream
+        Simulations of the declared model.
+    """
     stream = evidence.stream
     return Hints(
         evidence.seconds,
@@ -363,4 +404,13 @@ def hints_of(evidence: Evidence, lamps: Sequence[Lamp]) -> Hints:
         evidence.encoding,
         service_times(stream),
         readouts_of(stream, evidence.times_s),
+        (_too_many(stream, pilot, 1), _too_many(stream, pilot, 0)),
     )
+
+
+def _too_many(stream: Stream, pilot: Sequence[Stream], polarity: int) -> float:
+    """Return how many events of a polarity simulations have, over those of a stream."""
+    if not pilot:
+        return 1.0
+    made = float(np.mean([np.count_nonzero(one.on == polarity) for one in pilot]))
+    return (made + 1.0) / (float(np.count_nonzero(stream.on == polarity)) + 1.0)

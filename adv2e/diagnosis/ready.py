@@ -102,7 +102,7 @@ def make_ready(
     measured = Placed.of(evidence.stream, scene)
     laboratory = Laboratory(simulator, scene, pilot.markers, frames.bias if frames else None)
     lamps = _lamps(pilot, simulator)
-    hints = hints_of(evidence, lamps)
+    hints = hints_of(evidence, lamps, list(pilot.streams.values()))
     return Ready(
         evidence,
         declared,

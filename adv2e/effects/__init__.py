@@ -61,7 +61,7 @@ EFFECTS = (
     Effect("pixel", "low_pass"),
     Effect("pixel", "slew_limit"),
     Effect("pixel", "source_follower"),
-    Effect("pixel", "initial_reference"),
+    Effect("pixel", "initial_reference", ("pixel.initial_reference",)),
     Effect("pixel", "thresholds"),
     Effect("pixel", "threshold_drift", ("pixel.thresholds.drift_per_s",)),
     Effect("pixel", "refractory"),

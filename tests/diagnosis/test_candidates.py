@@ -29,7 +29,8 @@ def changed(config, other):
 
 
 def test_the_library_has_the_effects_of_the_catalogue():
-    assert set(names()) == set(LIBRARY)
+    # how the pixels begin is no effect of a camera
+    assert set(names()) == {*LIBRARY, "initial_reference"}
     assert len(names()) == len(set(names()))
 
 
@@ -143,6 +144,59 @@ def test_ticks_are_a_candidate_where_all_stamps_have_one(tick, there):
     for one in found:
         assert one.applied(Config(), []).readout.tick_us == tick
         assert one.parameters([]) == {"readout.tick_us": float(tick)}
+
+
+def forms(name, sets, hints=HINTS):
+    """Return a configuration, and the forms of an effect on top of it."""
+    declared = load_config([], sets)
+    return declared, [one for one in library(declared, hints) if one.name == name]
+
+
+@pytest.mark.parametrize("way", ["settled", "random"])
+def test_pixels_may_have_begun_the_other_way(way):
+    declared, (one,) = forms("initial_reference", [f"pixel.initial_reference={way}"])
+    (other,) = {"settled", "random"} - {way}
+    assert one.applied(declared, []).pixel.initial_reference == other
+    assert one.of_chance
+
+
+def test_what_is_declared_and_not_there_can_be_taken_away():
+    lamp = "frames.flicker={frequency_hz: 100, depth: 0.2}"
+    declared, lines = forms("flicker", [lamp], Hints(0.3, (), 1))
+    (one,) = lines
+    assert one.applied(declared, []).frames.flicker is None
+    declared, (one,) = forms("timestamp_tick", ["readout.tick_us=1000"], Hints(0.3, (), 1))
+    assert one.applied(declared, []).readout.tick_us == 0.0
+    assert forms("timestamp_tick", ["readout.tick_us=10"])[1] == []  # as the stamps have it
+
+
+def test_of_a_low_pass_that_is_off_both_corners_are_told():
+    _, found = forms("low_pass", ["pixel.low_pass=null"])
+    assert len(found) == 2
+    for one in found:
+        keys = one.parameters(one.inner(one.probes[0]))
+        assert set(keys) == {"pixel.low_pass.cutoff_hz", "pixel.low_pass.dark_cutoff_hz"}
+    assert len(forms("low_pass", [])[1]) == 3
+
+
+@pytest.mark.parametrize(
+    ("too_many", "more"),
+    [
+        ((1.0, 1.0), [0, 0, 0]),
+        ((1.9, 0.6), [0, 0, 0]),
+        ((0.04, 0.25), [2, 2, 2]),
+        ((3.0, 1.0), [2, 0, 2]),
+    ],
+)
+def test_thresholds_far_off_are_looked_for_where_the_totals_say(too_many, more):
+    usual = [len(one.probes) for one in forms("thresholds", [])[1]]
+    declared, found = forms("thresholds", [], Hints(0.3, (), 1, too_many=too_many))
+    assert [len(one.probes) - n for one, n in zip(found, usual, strict=True)] == more
+    if more[2]:
+        levels = declared.pixel.thresholds
+        first = found[2].probes[-2]
+        factors = [min(max(ratio, 0.1), 10.0) for ratio in too_many]
+        assert first == pytest.approx((factors[0] * levels.on, factors[1] * levels.off))
 
 
 # --- knobs ---------------------------------------------------------------------------------------
