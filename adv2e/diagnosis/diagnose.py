@@ -129,4 +129,5 @@ def diagnose(
                 "adv2e": __version__,
             },
             own=own_of(declared),
+            doubts=evidence.notes,
         )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.doubts import doubts_of
 from adv2e.diagnosis.error import of_part
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.frame_error import FrameError
@@ -18,7 +19,7 @@ from adv2e.diagnosis.interpolation import between_frames
 from adv2e.diagnosis.lamps import Lamp, lamps_of
 from adv2e.diagnosis.levels import between_levels
 from adv2e.diagnosis.library import hints_of, library
-from adv2e.diagnosis.light import scene_of
+from adv2e.diagnosis.light import light_of, scene_of
 from adv2e.diagnosis.lines import strongest_lines
 from adv2e.diagnosis.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of
 from adv2e.diagnosis.pilot import Pilot
@@ -91,6 +92,9 @@ def make_ready(
         Takes lines for people.
     """
     scene = scene_of(evidence, declared)
+    measured = Placed.of(evidence.stream, scene)
+    doubts = doubts_of(measured, scene, light_of(evidence, declared))
+    evidence = replace(evidence, notes=[*evidence.notes, *doubts])
     if free_thresholds:
         declared, miss = _with_fitted_thresholds(evidence, declared, simulator, scene)
         log(f"thresholds that match the totals: {thresholds_of(declared)}")
@@ -99,7 +103,6 @@ def make_ready(
             evidence = replace(evidence, notes=[*evidence.notes, missed])
     pilot = Pilot.of(evidence, declared, scene, simulator)
     frames, levels = between_frames(pilot), between_levels(pilot)
-    measured = Placed.of(evidence.stream, scene)
     laboratory = Laboratory(simulator, scene, pilot.markers, frames.bias if frames else None)
     lamps = _lamps(pilot, simulator)
     hints = hints_of(evidence, lamps, list(pilot.streams.values()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -223,6 +223,8 @@ class Diagnosis:
         Small things for the end of the report: sizes, seeds, simulations, seconds, versions.
     own : Own
         Effects of the user's own that competed.
+    doubts : list of str
+        Those of the notes that say what may be wrong with the recording.
     """
 
     verdict: Verdict
@@ -246,3 +248,4 @@ class Diagnosis:
     model: Mapping[str, Any]
     facts: Mapping[str, str]
     own: Own = NO_OWN
+    doubts: Sequence[str] = ()

@@ -13,13 +13,14 @@ from adv2e.reports.standing_out import standing_out
 WIDTH = 100
 _MOST_PARAMETERS = 5
 _MOST_STANDING = 3
+_MOST_DOUBTS = 2
 
 
 def summary_text(diagnosis: Diagnosis) -> str:
-    """Return verdict, effects, error and p before and after: under 15 lines of :data:`WIDTH`.
+    """Return verdict, effects, error and p before and after: some 15 lines of :data:`WIDTH`.
 
     Where there are more parameters than that, it says how many.  Where nothing is named, it says
-    what stands out most.
+    what stands out most.  What may be wrong with the recording comes last.
     """
     lines = _wrapped(f"{diagnosis.verdict}: {diagnosis.sentence}", 4)
     lines += _parameters(diagnosis)
@@ -35,6 +36,8 @@ def summary_text(diagnosis: Diagnosis) -> str:
     before = probability_text(diagnosis.global_p_before).removeprefix("= ")
     after = probability_text(diagnosis.global_p_after).removeprefix("= ")
     lines.append(f"p {before} -> {after}")
+    for doubt in diagnosis.doubts[:_MOST_DOUBTS]:
+        lines += _wrapped(f"note: {doubt}", 2)
     return "\n".join(lines)
 
 
@@ -61,7 +64,7 @@ def _parameters(diagnosis: Diagnosis) -> list[str]:
             text += unit_of(path, diagnosis.own)
             if interval is not None:
                 text = f"{text.rstrip()} ({interval_text(interval)})"
-            lines += [f"  {line}" for line in _wrapped(text, 1)]
+            lines += [f"  {line}" for line in _wrapped(text, 2)]
     if len(lines) <= _MOST_PARAMETERS:
         return lines
     more = len(lines) - _MOST_PARAMETERS + 1

@@ -16,7 +16,7 @@ from adv2e.reports import files
 from adv2e.reports.files import check_folder
 from adv2e.reports.model_file import model_text
 from adv2e.reports.quantities import native
-from adv2e.reports.result import ErrorRow, Estimate
+from adv2e.reports.result import ErrorRow, Estimate, Finding
 from adv2e.reports.summary import summary_text
 
 NAMES = ["model.yaml", "report.html", "report.json"]
@@ -165,6 +165,22 @@ def test_the_summary_of_random_events_says_how_far_their_mean_is():
         row = ErrorRow("distance", Estimate(0.5), Estimate(after), Estimate(0.3))
         text = summary_text(replace(everything(), errors=[row, own]))
         assert ("error 0.700 -> 0.600 (floor 0.600): from the mean" in text) == shown
+
+
+def test_the_summary_ends_with_what_may_be_wrong_with_the_recording():
+    doubts = ["no frames from 0.1 to 0.2 s", "ON events come where the light falls", "a third"]
+    lines = summary_text(replace(everything(), doubts=doubts)).splitlines()
+    assert lines[-2:] == [f"note: {doubt}" for doubt in doubts[:2]]
+
+
+def test_long_intervals_are_not_cut_off():
+    one = Finding(
+        "misregistration",
+        {"frames.shift_px": [-0.01907, 0.01512]},
+        {"frames.shift_px": ([-0.03441, -0.002736], [0.00327, 0.0323])},
+    )
+    text = " ".join(summary_text(replace(everything(), effects=[one])).split())
+    assert "([-0.03441, -0.002736] to [0.00327, 0.0323])" in text
 
 
 def test_the_summary_counts_what_it_leaves_out():
