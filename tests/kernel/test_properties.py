@@ -50,7 +50,8 @@ def test_mirrored_light_mirrors_polarities(values, level):
     a = solve(light.astype(np.float64), seconds, one)[0]
     b = solve(mirrored, seconds, other)[0]
     assert np.array_equal(a[:, 1], -b[:, 1])
-    assert np.allclose(a[:, 0], b[:, 0], rtol=0, atol=1e-8)
+    # where the lag creeps over the level, its single precision is some 10 ns
+    assert np.allclose(a[:, 0], b[:, 0], rtol=0, atol=1e-7)
 
 
 def test_more_light_everywhere_changes_nothing_but_the_corner():
