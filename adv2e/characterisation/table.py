@@ -166,6 +166,10 @@ def parse_table(text: str, name: str) -> Table:
     header_line, header_text = numbered[0]
     delimiter = max(DELIMITERS, key=header_text.count)
     header = _cells(header_text, delimiter)
+    if len(header) == 1 and len(header_text.split()) > 1 and '"' not in header_text:
+        raise DataError(
+            f"{name}:{header_line}: the header has no comma, semicolon or tab between its columns"
+        )
     for column in header:
         if not column:
             raise DataError(f"{name}:{header_line}: the header has a column without a name")

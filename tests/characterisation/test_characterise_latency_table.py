@@ -193,6 +193,7 @@ def test_the_command_writes_a_report_and_a_model_that_loads(tmp_path):
         ("irradiance_W_m2,latency_us\n1,2\n2,\n3,4\n", "t.csv:3: latency_us: is empty"),
         ("irradiance_W_m2,latency_us\n1,2\n2,nan\n3,4\n", "finite"),
         ("irradiance_W_m2,irradiance_W_m2\n1,2\n", "twice"),
+        ("irradiance_W_m2 latency_us polarity\n1 2 1\n", "no comma, semicolon or tab"),
         ("irradiance,latency_us\n1,2\n", "must have one of the columns irradiance_W_m2"),
         ("irradiance_W_m2,delay\n1,2\n", "latency_us"),
         ("irradiance_W_m2,latency_us,on_rate_hz\n1,2,3\n", "either"),
