@@ -10,59 +10,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from itertools import zip_longest
 from typing import Any
-
-import numpy as np
 
 from adv2e.config import Config, to_dict
 from adv2e.config.build import keys_of
 from adv2e.config.own import user_effects
 from adv2e.config.paths import get_key
 from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.hints import Hints
 from adv2e.diagnosis.keys import known_keys
 from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.readouts import Readouts, readouts_of
-from adv2e.diagnosis.stamps import Service, service_times, tick_of
-from adv2e.diagnosis.stream import Stream
+from adv2e.diagnosis.stamps import Service
 from adv2e.effects.pixel.initial_reference import REFERENCES
 from adv2e.parameters import Fit
 
 _DECLARED = known_keys(Config)
-
-
-@dataclass(frozen=True)
-class Hints:
-    """What a look at the recording says of where fits may start.
-
-    Attributes
-    ----------
-    seconds : float
-        Length of the recording.
-    lamps : tuple of Lamp
-        Of the strongest lines in the rate.
-    tick_us : int
-        Largest time of which nearly all stamps are multiples.
-    encoding : str
-        What ``frames.encoding: auto`` means for the frames.
-    service : Service, optional
-        Times that an event and a row take, where stamps look as if they had waited for a channel.
-    readouts : Readouts, optional
-        Of frames, where all pixels fire at once after each.
-    too_many : (float, float)
-        ON and OFF events that the declared model makes, over those measured.
-    """
-
-    seconds: float
-    lamps: tuple[Lamp, ...]
-    tick_us: int
-    encoding: str = "linear"
-    service: Service | None = None
-    readouts: Readouts | None = None
-    too_many: tuple[float, float] = (1.0, 1.0)
 
 
 def library(declared: Config, hints: Hints) -> list[Candidate]:
@@ -383,34 +347,3 @@ def names(config: Config | None = None) -> list[str]:
     """Return the names of all effects that can be found, with those of the user's own."""
     built_in = (one.name for one in _all(Config(), Hints(1.0, (Lamp(100.0),), 10)))
     return list(dict.fromkeys([*built_in, *(user_effects(config) if config else ())]))
-
-
-def hints_of(evidence: Evidence, lamps: Sequence[Lamp], pilot: Sequence[Stream] = ()) -> Hints:
-    """Return hints from a recording.
-
-    Parameters
-    ----------
-    evidence : Evidence
-    lamps : sequence of Lamp
-        That may have lit it.
-    pilot : sequence of Stream
-        Simulations of the declared model.
-    """
-    stream = evidence.stream
-    return Hints(
-        evidence.seconds,
-        tuple(lamps),
-        tick_of(stream.t),
-        evidence.encoding,
-        service_times(stream),
-        readouts_of(stream, evidence.times_s),
-        (_too_many(stream, pilot, 1), _too_many(stream, pilot, 0)),
-    )
-
-
-def _too_many(stream: Stream, pilot: Sequence[Stream], polarity: int) -> float:
-    """Return how many events of a polarity simulations have, over those of a stream."""
-    if not pilot:
-        return 1.0
-    made = float(np.mean([np.count_nonzero(one.on == polarity) for one in pilot]))
-    return (made + 1.0) / (float(np.count_nonzero(stream.on == polarity)) + 1.0)

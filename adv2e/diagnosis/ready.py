@@ -15,10 +15,11 @@ from adv2e.diagnosis.doubts import doubts_of
 from adv2e.diagnosis.error import of_part
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.frame_error import FrameError
+from adv2e.diagnosis.hints import hints_of
 from adv2e.diagnosis.interpolation import between_frames
 from adv2e.diagnosis.lamps import Lamp, lamps_of
 from adv2e.diagnosis.levels import between_levels
-from adv2e.diagnosis.library import hints_of, library
+from adv2e.diagnosis.library import library
 from adv2e.diagnosis.light import light_of, scene_of
 from adv2e.diagnosis.lines import strongest_lines
 from adv2e.diagnosis.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of

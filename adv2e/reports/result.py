@@ -224,7 +224,7 @@ class Diagnosis:
     own : Own
         Effects of the user's own that competed.
     doubts : list of str
-        Those of the notes that say what may be wrong with the recording.
+        Those of the notes that are on the recording itself, such as what may be wrong with it.
     """
 
     verdict: Verdict

@@ -9,7 +9,8 @@ import numpy as np
 
 from adv2e.config import Config
 from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.library import Hints, library
+from adv2e.diagnosis.hints import Hints
+from adv2e.diagnosis.library import library
 
 NOISE_HZ = 0.1
 NOISES = ("leak", "photo_leak", "shot_noise", "photoreceptor_noise", "hot_pixels")

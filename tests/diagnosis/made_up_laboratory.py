@@ -14,8 +14,9 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import parted
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.fit import Fit, Fitter
+from adv2e.diagnosis.hints import Hints
 from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.library import Hints, library
+from adv2e.diagnosis.library import library
 from adv2e.diagnosis.markers import BOTH, VIEWS, Entry
 from adv2e.diagnosis.metric import Scale
 from adv2e.diagnosis.search import Search

@@ -11,7 +11,8 @@ import pytest
 from adv2e import load_config, simulate
 from adv2e.active_effects import active_hooks
 from adv2e.config import Config, from_dict, to_annotated_yaml, to_dict, to_yaml
-from adv2e.diagnosis.library import Hints, library, names
+from adv2e.diagnosis.hints import Hints
+from adv2e.diagnosis.library import library, names
 from adv2e.diagnosis.own_effects import as_found, own_of, without_user_effects
 from adv2e.errors import ConfigError
 from adv2e.own_effects import load_effects
