@@ -28,7 +28,7 @@ from real.peers import peer_rows
 from real.recording import Real, halves, read
 from real.search import Search
 from real.stability import MOST as UNSTABLE
-from real.stability import Stability, compare_halved, stable_score
+from real.stability import Stability, compare_halved
 from real.table import COLUMNS as TITLES
 from real.table import number
 from real.tried import UNSEEN, Added, tried_names
@@ -149,38 +149,55 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
         steps[-1], judged=bench.judge(steps[-1].added.config, second, seeds, in_full=True)
     )
     steps[-1] = last
-    stability, alone = _stability(bench, last.added, second, seeds)
+    stable = _where_stable(bench, steps, second, seeds)
     seconds = time.perf_counter() - began
     say(f"{bench.simulations} simulations in {seconds:.0f} s")
     return "\n\n".join(
         [
             f"## {real.name}",
-            _table(real, steps, second),
+            _table(real.size, cut(real.events, second.start, second.stop), steps, second),
             _found(last, config, bench.missed(last.added.config, first), ended),
-            _bound(stability, alone),
+            stable,
             _beside_peers(real, last),
         ]
     )
 
 
-def _stability(
-    bench: Bench, found: Added, windows: Windows, seeds: tuple[int, int]
-) -> tuple[Stability, float | None]:
-    """Return what dropping every second frame changes, and the score where that is little."""
+def _where_stable(bench: Bench, steps: list[Step], windows: Windows, seeds: tuple[int, int]) -> str:
+    """Return what dropping every second frame changes, and the table of where that is little."""
+    real, found = bench.real, steps[-1].added
+    stability = _stability(bench, found, windows, seeds)
+    told = (
+        f"Dropping every second frame changes the simulation by {stability.change:.2f} of its norm"
+        f" (chance taken off). Tiles where that is below {UNSTABLE:.0%} hold {stability.kept:.0%}"
+        " of the measured events. The rest hangs on what was made up between frames and tells"
+        " little of the camera."
+    )
+    measured = stability.alone(real.events)
+    if not len(measured):
+        return told
+    steps = [
+        Step(one.added, bench.judge(one.added.config, windows, seeds, of=stability.alone))
+        for one in steps
+    ]
+    return f"{told} The same of those tiles alone:\n\n" + _table(
+        real.size, measured, steps, windows
+    )
+
+
+def _stability(bench: Bench, found: Added, windows: Windows, seeds: tuple[int, int]) -> Stability:
+    """Return what dropping every second frame changes."""
     half = Bench(bench.real.thinned(), bench.threads)
     first, second = seeds
 
     def pair(one: Bench) -> tuple[Events, Events]:
         return one.quick(found.config, windows, first), one.quick(found.config, windows, second)
 
-    whole, thinned = pair(bench), pair(half)
-    measured = bench.real.events
-    stability = compare_halved(whole, thinned, measured, windows, *bench.real.size)
-    return stability, stable_score(measured, whole[0], windows, stability)
+    return compare_halved(pair(bench), pair(half), bench.real.events, windows, *bench.real.size)
 
 
-def _table(real: Real, steps: list[Step], windows: Windows) -> str:
-    measured = cut(real.events, windows.start, windows.stop)
+def _table(size: tuple[int, int], measured: Events, steps: list[Step], windows: Windows) -> str:
+    """Return a row a step, and what chance and no events come to; `measured`: what it is of."""
     share = totals(measured)[0] / len(measured)
     names = ["added", "ON / OFF threshold [ln]", "events", "ON share", *COLUMNS.values(), "mean"]
     rows = []
@@ -197,8 +214,8 @@ def _table(real: Real, steps: list[Step], windows: Windows) -> str:
                 *cells,
             ]
         )
-    split = half_split(real.events, windows, *real.size)
-    nothing = distances(real.events, empty_events(), windows, *real.size).values
+    split = half_split(measured, windows, *size)
+    nothing = distances(measured, empty_events(), windows, *size).values
     for label, values in (("half split (Poisson)", split), ("no events at all", nothing)):
         rows.append([label, "", "", "", *_cells(values), ""])
     return table(names, rows)
@@ -223,15 +240,6 @@ def _found(last: Step, declared: Config, missed: float, ended: bool) -> str:
         + ", ".join(f"`{key}`" for key in keys)
         + "."
         + " The search was interrupted: there may be more to find." * (not ended)
-    )
-
-
-def _bound(stability: Stability, alone: float | None) -> str:
-    return (
-        f"Dropping every second frame changes the simulation by {stability.change:.2f} of its norm"
-        f" (chance taken off). Tiles where that is below {UNSTABLE:.0%} hold {stability.kept:.0%}"
-        f" of the measured events; on them alone the smoothed distance is {number(alone)}. The rest"
-        " hangs on what was made up between frames and tells little of the camera."
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -123,21 +123,31 @@ class Bench:
         return still_rate(measured, self.real.still, windows.duration_s)
 
     def judge(
-        self, config: Config, windows: Windows, seeds: Sequence[int], *, in_full: bool = False
+        self,
+        config: Config,
+        windows: Windows,
+        seeds: Sequence[int],
+        *,
+        in_full: bool = False,
+        of: Callable[[Events], Events] | None = None,
     ) -> Judged:
-        """Return how far a configuration is; `in_full`: as ``adv2e convert`` simulates it."""
-        real = self.real
+        """Return how far a configuration is on the windows, with means over the seeds.
+
+        `in_full`: as ``adv2e convert`` simulates it; `of`: picks the events to judge by.
+        """
+        real, of = self.real, of or (lambda events: events)
         if in_full:
             simulate = real.simulator(config, windows.stop + BEYOND_US, self.threads)
-            streams = [cut(simulate(seed), windows.start, windows.stop) for seed in seeds]
+            made = [cut(simulate(seed), windows.start, windows.stop) for seed in seeds]
         else:
-            streams = [self.quick(config, windows, seed) for seed in seeds]
-        found = [distances(real.events, one, windows, *real.size).values for one in streams]
+            made = [self.quick(config, windows, seed) for seed in seeds]
+        streams = [of(one) for one in made]
+        measured = of(cut(real.events, windows.start, windows.stop))
+        found = [distances(measured, one, windows, *real.size).values for one in streams]
         apart = [
-            distances(*pair, windows, *real.size, whole=real.events).values
+            distances(*pair, windows, *real.size, whole=measured).values
             for pair in itertools.combinations(streams, 2)
         ]
-        measured = cut(real.events, windows.start, windows.stop)
         shares = [totals(one)[0] / len(one) if len(one) else None for one in streams]
         ratio = float(np.mean([len(one) for one in streams])) / len(measured)
         return Judged(means(found), means(apart), ratio, pooled(shares, "mean"))

@@ -7,7 +7,7 @@ large say nothing of the camera.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,11 +36,22 @@ class Stability:
         Pixels in whose tile it is below MOST.
     kept : float
         Share of the measured events there.
+    windows : Windows
+        Those it was told for.
     """
 
     change: float
     stable: NDArray[np.bool_]
     kept: float
+    windows: Windows
+
+    def alone(self, events: Events) -> Events:
+        """Return the events in the windows that are in stable tiles of theirs, a copy."""
+        parts = []
+        for window, stable in zip(self.windows.used, self.stable, strict=True):
+            part = cut(events, *window)
+            parts.append(part[stable[part["y"], part["x"]]])
+        return np.concatenate(parts)
 
 
 def compare_halved(
@@ -58,7 +69,7 @@ def compare_halved(
     windows : Windows
     width, height : int
     """
-    changes, masks, kept = [], [], 0
+    changes, masks = [], []
 
     def grid(events: Events, window: tuple[int, int]) -> NDArray[Any]:
         return smoothed(voxel_grid(cut(events, *window), window, _BINS, width, height))
@@ -69,29 +80,10 @@ def compare_halved(
         moved, power = _tiled((a - c) * (b - d)), _tiled(a * b)
         whole_power = max(float((a * b).sum()), 1e-9)
         changes.append(np.sqrt(max(float(((a - c) * (b - d)).sum()), 0.0) / whole_power))
-        stable = _pixels(moved <= MOST**2 * np.maximum(power, 0.0), height, width)
-        masks.append(stable)
-        part = cut(measured, *window)
-        kept += int(np.count_nonzero(stable[part["y"], part["x"]]))
+        masks.append(_pixels(moved <= MOST**2 * np.maximum(power, 0.0), height, width))
+    found = Stability(float(np.median(changes)), np.array(masks), 0.0, windows)
     total = len(cut(measured, windows.start, windows.stop))
-    return Stability(float(np.median(changes)), np.array(masks), kept / max(total, 1))
-
-
-def stable_score(
-    measured: Events, simulated: Events, windows: Windows, stability: Stability
-) -> float | None:
-    """Return the score of stable pixels alone, median over windows that have any."""
-    rows, columns = stability.stable.shape[1:]
-    found = []
-    for window, stable in zip(windows.used, stability.stable, strict=True):
-        a, b = (
-            voxel_grid(cut(one, *window), window, _BINS, columns, rows) * stable
-            for one in (measured, simulated)
-        )
-        norm = float(np.linalg.norm(smoothed(a)))
-        if norm:
-            found.append(float(np.linalg.norm(smoothed(a - b))) / norm)
-    return float(np.median(found)) if found else None
+    return replace(found, kept=len(found.alone(measured)) / max(total, 1))
 
 
 def _tiled(grid: NDArray[Any]) -> NDArray[Any]:

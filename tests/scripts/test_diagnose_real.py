@@ -15,7 +15,7 @@ from narrow_candidates import BLACK_LEVEL
 from real.model import BEYOND_US, SCORE, Bench, Judged
 from real.recording import halves, read
 from real.search import Search
-from real.stability import compare_halved, stable_score
+from real.stability import compare_halved
 from real.tried import UNSEEN, Added, tried_names
 
 from adv2e import simulate
@@ -158,8 +158,10 @@ def test_tiles_that_change_are_unstable_and_chance_is_not():
     assert not found.stable[0, 3, 16:].any()
     assert found.kept == pytest.approx(0.5)
     assert found.change == pytest.approx(np.sqrt(2.0), rel=0.1)
-    assert stable_score(measured, whole[0], windows, found) < 0.3
-    assert stable_score(measured, empty_events(), windows, found) == pytest.approx(1.0)
+    alone = found.alone(measured)
+    assert len(alone) == 2000
+    assert np.all(alone["x"] < 8)
+    assert len(found.alone(empty_events())) == 0
 
 
 def run_script(recording, declared, out):
@@ -208,15 +210,30 @@ def test_tables_before_and_after_each_effect(recording, declared, tmp_path, monk
     labels = [row[0] for row in rows]
     assert labels[2:4] == ["as declared", "thresholds"]
     assert labels[4].startswith("black_level")
-    assert labels[5:] == ["half split (Poisson)", "no events at all"]
+    chance = ["half split (Poisson)", "no events at all"]
+    assert labels[5:] == chance
     smoothed = [float(row[5].split(" ")[0]) for row in rows[2:]]
     assert smoothed[2] < smoothed[1]
     assert smoothed[4] == 1.0
-    assert "Dropping every second frame" in text
+    assert "hold 0% of the measured events" in text  # the waves are too fast for that
     (missed,) = re.findall(r"match the totals of the first to (\d+\.\d)%", text)
     assert float(missed) <= 3.0
     assert "Camera effects tried: all of the library but" in text
     assert "No other tools were run on this recording." in text
+
+
+def test_where_all_is_stable_its_table_is_that_of_all(recording, declared, tmp_path, monkeypatch):
+    monkeypatch.setattr("real.stability.MOST", 10.0)
+    monkeypatch.setattr("real.search.OWN", ())
+    monkeypatch.setattr("real.search.of_the_camera", lambda *_: [])
+    out = tmp_path / "table.md"
+    result = run_script(recording, declared, out)
+    assert result.exit_code == 0, result.output
+    text = out.read_text(encoding="utf-8")
+    assert "hold 100% of the measured events" in text
+    rows = rows_of(text)
+    assert len(rows) == 12
+    assert rows[:6] == rows[6:]
 
 
 @pytest.mark.parametrize(
