@@ -140,7 +140,7 @@ def _read(files: _Files, path: Path, name: str, images: Any) -> Recording:
         description = parse_description(text, files.label(DESCRIPTION), gatherer.problems)
     with files.open(name) as file:
         header = gather_lines(file, files.label(name), gatherer)
-    times, names = _listed(files)
+    times, names = _listed(files, gatherer.problems)
     geometry, whence = described_geometry(description), DESCRIPTION
     if geometry is None and names:
         first = next(iter(images(names[:1])))
@@ -166,14 +166,19 @@ def _text(files: _Files, name: str, errors: str) -> str:
         return file.read().decode("utf-8-sig", errors)
 
 
-def _listed(files: _Files) -> tuple[NDArray[np.int64] | None, list[str]]:
-    """Return times [ns], or None without frames, and names of the frames."""
+def _listed(files: _Files, problems: list[str]) -> tuple[NDArray[np.int64] | None, list[str]]:
+    """Return times [ns], or None without frames, and names of the frames.
+
+    What is to be told of them is added to `problems`.
+    """
     if not files.has(LIST):
         return None, []
     text, label = _text(files, LIST, "backslashreplace"), files.label(LIST)
     if not any(line.strip() and not line.strip().startswith("#") for line in text.splitlines()):
         return None, []
-    stamps, _ = parse_list(text, label)
+    stamps, unit = parse_list(text, label)
+    if unit:
+        problems.append(f"{LIST}: {unit}")
     for stamp in stamps:
         if stamp.name is None:
             raise DataError(f"{label} line {stamp.line}: must be 'time name', the name is missing")

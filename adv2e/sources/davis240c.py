@@ -21,7 +21,7 @@ from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Image, Selection, Shot
 from adv2e.sources.listed import ListedSource, Picture, given_shots
 from adv2e.sources.opencv import decode_image, read_image
-from adv2e.sources.times import WHOLE, Stamp, parse_list, read_text
+from adv2e.sources.times import Stamp, parse_list, read_text
 
 LIST = "images.txt"
 
@@ -53,14 +53,14 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
 
 def _open_folder(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
     label = str(path / LIST)
-    stamps, whole = parse_list(read_text(path / LIST), label)
+    stamps, unit = parse_list(read_text(path / LIST), label)
     pictures = []
     for stamp in _named(stamps, label):
         file = path / str(stamp.name)
         if not file.is_file():
             raise DataError(f"{label} line {stamp.line}: no image {file}")
         pictures.append(Picture(str(file), file.name, partial(read_image, file)))
-    return _source(path, label, stamps, whole, pictures, given, selection)
+    return _source(path, label, stamps, unit, pictures, given, selection)
 
 
 def _open_zip(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
@@ -72,7 +72,7 @@ def _open_zip(path: Path, given: GivenTimes, selection: Selection) -> ListedSour
     except _UNREADABLE as error:
         raise DataError(f"{path}: not a zip that can be read, or damaged") from error
     label = f"{path}: {listed}"
-    stamps, whole = parse_list(text, label)
+    stamps, unit = parse_list(text, label)
     pictures = []
     for stamp in _named(stamps, label):
         member = str(PurePosixPath(listed).parent / str(stamp.name))
@@ -80,7 +80,7 @@ def _open_zip(path: Path, given: GivenTimes, selection: Selection) -> ListedSour
             raise DataError(f"{label} line {stamp.line}: no image {member} in the zip")
         load = partial(_read_member, archive, member, f"{path}: {member}")
         pictures.append(Picture(f"{path}: {member}", PurePosixPath(member).name, load))
-    return _source(path, label, stamps, whole, pictures, given, selection)
+    return _source(path, label, stamps, unit, pictures, given, selection)
 
 
 def _list_in(path: Path, names: set[str]) -> str:
@@ -116,7 +116,7 @@ def _source(
     path: Path,
     label: str,
     stamps: list[Stamp],
-    whole: bool,
+    unit: str,
     pictures: list[Picture],
     given: GivenTimes,
     selection: Selection,
@@ -131,6 +131,6 @@ def _source(
     )
     if given:
         source.notes.append(f"{given} replaces the times in {label}")
-    elif whole:
-        source.notes.append(f"{label}: {WHOLE}")
+    elif unit:
+        source.notes.append(f"{label}: {unit}")
     return source

@@ -80,18 +80,22 @@ def read_text(path: Path) -> str:
 
 WHOLE = "times have no decimal point: taken as microseconds"
 """What is told of files whose times are whole numbers, of events or of their frames."""
+WHOLE_SECONDS = "times have no decimal point, but are too near for microseconds: taken as seconds"
+_SHORTEST_US = 20
+"""Frames that would be nearer than this, typically, are not listed in microseconds."""
 
 
-def parse_list(text: str, label: str) -> tuple[list[Stamp], bool]:
+def parse_list(text: str, label: str) -> tuple[list[Stamp], str]:
     """Read the list of frames of a recording; times without any decimal point are microseconds.
 
-    So are those of its events: see :mod:`adv2e.recordings.text`.
+    So are those of its events: see :mod:`adv2e.recordings.text`.  Frames that would come faster
+    than 50,000 a second are listed in whole seconds.
 
     Returns
     -------
     stamps : list of Stamp
-    whole : bool
-        Whether they were taken as microseconds.
+    note : str
+        What is to be told of their unit; empty for decimal seconds.
 
     Raises
     ------
@@ -99,8 +103,12 @@ def parse_list(text: str, label: str) -> tuple[list[Stamp], bool]:
         As :func:`parse_times`.
     """
     words = [words[0] for _, words in _lines(text, label, name_first=False)]
-    whole = len(words) > 1 and all(re.fullmatch(r"[+-]?\d+", word) for word in words)
-    return parse_times(text, label, 1000 if whole else NS_PER_S), whole
+    if len(words) < 2 or not all(re.fullmatch(r"[+-]?\d+", word) for word in words):
+        return parse_times(text, label), ""
+    gaps = np.diff(np.sort([int(word) for word in words]))
+    if np.median(gaps) < _SHORTEST_US:
+        return parse_times(text, label), WHOLE_SECONDS
+    return parse_times(text, label, 1000), WHOLE
 
 
 def parse_times(text: str, label: str, unit_ns: int = NS_PER_S) -> list[Stamp]:

@@ -94,6 +94,17 @@ def test_listed_image_that_is_missing_is_named_with_its_line(davis):
     assert "images.txt line 2: no image images/a.png" in error_of(davis(files))
 
 
+@pytest.mark.parametrize(
+    ("late", "unit_ns", "told"), [(40_000, 1000, "microseconds"), (2, 10**9, "seconds")]
+)
+def test_whole_times_of_frames_are_told_with_their_unit(davis, late, unit_ns, told):
+    listed = f"{late} images/b.png\n0 images/a.png\n".encode()
+    recording = read_recording(davis({**recording_files(), "images.txt": listed}))
+    assert recording.frame_times_ns.tolist() == [0, late * unit_ns]
+    (problem,) = [one for one in recording.problems if one.startswith("images.txt")]
+    assert problem.endswith(f"taken as {told}")
+
+
 def test_image_that_is_none_is_named(davis):
     assert "images/b.png" in error_of(davis({**recording_files(), "images/b.png": b"no png"}))
 

@@ -66,6 +66,14 @@ def test_whole_numbers_are_microseconds_as_those_of_its_events_are(recording, pa
     assert not any("decimal point" in note for note in given.notes)
 
 
+def test_whole_numbers_too_near_for_microseconds_are_seconds(recording, pack):
+    lines = [f"{t} images/frame_{n}.png\n" for n, t in enumerate((0, 1, 3))]
+    (recording / "images.txt").write_text("".join(lines))
+    for source in (open_source(recording), open_source(pack())):
+        assert [frame.t_ns for frame in source.frames()] == [0, 10**9, 3 * 10**9]
+        assert any("taken as seconds" in note for note in source.notes)
+
+
 @pytest.mark.parametrize("top", ["", "rec/"])
 def test_zip_with_its_files_at_the_root_or_in_one_folder(pack, picture, top):
     check(open_source(pack(top)), picture)
