@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence, check_events
@@ -47,9 +49,10 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
     each = 1 if low_pass is None or low_pass.update == "exact" else _STEPPED
 
     def cost_s(part: Evidence) -> float:
-        instants = (len(part.frames) - 1) * declared.sampling.L
+        instants = (len(part.run_in.frames) + len(part.frames) - 1) * declared.sampling.L
         pixels = part.width * part.height
-        of_pixel = _INSTANT_S * each * instants + _SECOND_S * part.seconds
+        seconds = part.run_in.seconds + part.seconds
+        of_pixel = _INSTANT_S * each * instants + _SECOND_S * seconds
         return of_pixel * pixels + _EVENT_S * len(part.stream)
 
     kept, share = evidence, 1.0
@@ -95,10 +98,15 @@ def _cropped(evidence: Evidence, left: int, top: int, width: int, height: int) -
     inside = (x >= left) & (x < left + width) & (y >= top) & (y < top + height)
     pixel = ((y - top) * width + (x - left))[inside].astype(np.int32)
     kept = Stream(stream.t[inside], pixel, stream.on[inside], width, height)
+
+    def crop(frames: list[NDArray[Any]]) -> list[NDArray[Any]]:
+        return [frame[top : top + height, left : left + width] for frame in frames]
+
     what = f"pixels outside the {width}x{height} at column {left}, row {top}"
     return replace(
         evidence,
-        frames=[frame[top : top + height, left : left + width] for frame in evidence.frames],
+        frames=crop(evidence.frames),
+        run_in=replace(evidence.run_in, frames=crop(evidence.run_in.frames)),
         stream=kept,
         width=width,
         height=height,
@@ -117,14 +125,11 @@ def _shortened(evidence: Evidence, intervals: int) -> Evidence:
     before = np.searchsorted(stream.t, times_s * 1e6)
     first = int(np.argmax(before[intervals:] - before[:-intervals]))
     last = first + intervals
-    kept = stream.between(times_s[first] * 1e6, times_s[last] * 1e6)
+    part = evidence.during(first, last)
     what = f"time outside {times_s[first]:.3f} to {times_s[last]:.3f} s"
     return replace(
-        evidence,
-        frames=evidence.frames[first : last + 1],
-        times_s=times_s[first : last + 1],
-        stream=kept,
-        masked=[*evidence.masked, Masked(what, 1.0 - len(kept) / len(stream))],
+        part,
+        masked=[*evidence.masked, Masked(what, 1.0 - len(part.stream) / len(stream))],
         notes=[
             *evidence.notes,
             f"{times_s[last] - times_s[first]:.3g} of {evidence.seconds:.3g} s were looked at, as"

@@ -122,7 +122,7 @@ def diagnose(
                 "sensor": f"{evidence.width}x{evidence.height}",
                 "length": f"{evidence.seconds:.3f} s",
                 "events": f"{len(evidence.stream):,}",
-                "frames": f"{len(evidence.frames):,}",
+                "frames": _frames_text(evidence),
                 "simulations": f"{simulator.done:,}",
                 "seed": str(declared.seed),
                 "time taken": f"{time.perf_counter() - began:.0f} s",
@@ -131,3 +131,10 @@ def diagnose(
             own=own_of(declared),
             doubts=evidence.notes,
         )
+
+
+def _frames_text(evidence: Evidence) -> str:
+    before = len(evidence.run_in.frames)
+    return f"{len(evidence.frames):,}" + (
+        f", and {before:,} before for pixels to settle" * (before > 0)
+    )

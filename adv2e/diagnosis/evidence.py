@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,31 @@ LEAST_EVENTS = 1000
 
 _UNCOVERED = 10.0
 """A pause at an end that is longer than the longest within by this factor is no pause."""
+
+
+RUN_IN_S = 0.5
+"""Of what pixels saw before, this much is simulated [s]: by then most have fired, and forgotten."""
+_RUN_IN_SHARE = 0.5
+"""And no more than this share of what is looked at."""
+
+
+@dataclass(frozen=True)
+class RunIn:
+    """Frames before the first that is looked at: pixels saw them, and have left their first state.
+
+    Attributes
+    ----------
+    frames : list of (rows, columns[, 3]) arrays
+    times_s : (frames,)
+    """
+
+    frames: list[NDArray[Any]] = field(default_factory=list)
+    times_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def seconds(self) -> float:
+        """Time from its first frame to its last."""
+        return float(self.times_s[-1] - self.times_s[0]) if len(self.times_s) else 0.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +65,8 @@ class Evidence:
         What ``frames.encoding: auto`` means for the frames.
     masked : list of Masked
     notes : list of str
+    run_in : RunIn
+        What pixels saw before; events of that time are of no recording and no simulation.
     """
 
     name: str
@@ -51,6 +78,7 @@ class Evidence:
     encoding: str = "linear"
     masked: list[Masked] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    run_in: RunIn = field(default_factory=RunIn)
 
     @property
     def times_ns(self) -> list[int]:
@@ -61,6 +89,32 @@ class Evidence:
     def seconds(self) -> float:
         """Length of the recording [s]."""
         return float(self.times_s[-1] - self.times_s[0])
+
+    @property
+    def simulated(self) -> Evidence:
+        """The same with the frames that are simulated: after those of the run-in."""
+        before = self.run_in
+        return replace(
+            self,
+            frames=[*before.frames, *self.frames],
+            times_s=np.concatenate([before.times_s, self.times_s]),
+            run_in=RunIn(),
+        )
+
+    def during(self, first: int, last: int) -> Evidence:
+        """Return the recording from frame `first` to frame `last`; pixels saw those before."""
+        whole = self.simulated
+        begin = first + len(self.run_in.frames)
+        looked_at_s = self.times_s[last] - self.times_s[first]
+        since_s = self.times_s[first] - min(RUN_IN_S, _RUN_IN_SHARE * looked_at_s)
+        since = int(np.searchsorted(whole.times_s, since_s))
+        return replace(
+            self,
+            frames=self.frames[first : last + 1],
+            times_s=self.times_s[first : last + 1],
+            stream=self.stream.between(self.times_s[first] * 1e6, self.times_s[last] * 1e6),
+            run_in=RunIn(whole.frames[since:begin], whole.times_s[since:begin]),
+        )
 
 
 def read_evidence(path: str | Path) -> Evidence:
@@ -94,12 +148,8 @@ def read_evidence(path: str | Path) -> Evidence:
             f"{recording.height}"
         )
     kept, masked = _between_frames(recording.events, times_s)
-    covered = _covered(kept, times_s)
-    if covered != slice(0, len(frames)):
-        frames, times_s, without = frames[covered], times_s[covered], times_s
-        masked.append(_uncovered(without, times_s))
     check_events(len(kept), path, "between its first and its last frame")
-    return Evidence(
+    whole = Evidence(
         name=str(path),
         frames=frames,
         times_s=times_s,
@@ -110,6 +160,11 @@ def read_evidence(path: str | Path) -> Evidence:
         masked=masked,
         notes=list(recording.problems),
     )
+    first, last = _covered(kept, times_s)
+    if (first, last) == (0, len(frames) - 1):
+        return whole
+    covered = whole.during(first, last)
+    return replace(covered, masked=[*masked, _uncovered(times_s, covered.times_s)])
 
 
 def _check_alike(path: str | Path, frames: list[NDArray[Any]]) -> None:
@@ -148,22 +203,22 @@ def _between_frames(events: Events, times_s: NDArray[np.float64]) -> tuple[Event
     return events[inside], masked
 
 
-def _covered(events: Events, times_s: NDArray[np.float64]) -> slice:
-    """Return which frames lie within the time that the events cover.
+def _covered(events: Events, times_s: NDArray[np.float64]) -> tuple[int, int]:
+    """Return the first and the last frame of the time that the events cover.
 
     Streams are often cut, or begin late; what no event was kept of did not happen without any.
     """
-    everything = slice(0, len(times_s))
+    everything = 0, len(times_s) - 1
     if len(events) < 2:
         return everything
     t_s = events["t"] * 1e-6
     usual = max(_UNCOVERED * float(np.diff(t_s).max()), 2.0 * float(np.diff(times_s).max()))
-    first, last = 0, len(times_s) - 1
+    first, last = everything
     if t_s[0] - times_s[0] > usual:
         first = int(np.searchsorted(times_s, t_s[0], "right")) - 1
     if times_s[-1] - t_s[-1] > usual:
         last = int(np.searchsorted(times_s, t_s[-1]))
-    return slice(first, last + 1) if last - first >= 2 else everything
+    return (first, last) if last - first >= 2 else everything
 
 
 def _uncovered(whole_s: NDArray[np.float64], kept_s: NDArray[np.float64]) -> Masked:

@@ -90,7 +90,7 @@ class Simulator:
         self._pool.shutdown(cancel_futures=True)
 
     def stream(self, config: Config, seed: int, *, rough: bool = False) -> Stream:
-        """Return the events of one simulation, cut to the time of the frames.
+        """Return the events of one simulation, cut to the time that is looked at.
 
         `seed` tells simulations of one diagnosis apart, the configuration's tells diagnoses apart.
         """
@@ -109,8 +109,8 @@ class Simulator:
 
     def _recorded(self, config: Config) -> Instants:
         """Return the light of the recording's frames, and what is made of them once."""
-        evidence = self._evidence
-        return self._frames.of(config, lambda: (evidence.times_ns, light_of(evidence, config)))
+        shown = self._evidence.simulated
+        return self._frames.of(config, lambda: (shown.times_ns, light_of(shown, config)))
 
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""

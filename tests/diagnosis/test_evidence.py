@@ -90,6 +90,9 @@ def test_frames_that_the_events_do_not_cover_are_set_aside(record, span, kept, w
     first, last = kept
     assert evidence.times_s == pytest.approx(0.01 * np.arange(first, last + 1))
     assert [int(frame[0, 0]) // 10 for frame in evidence.frames] == list(range(first, last + 1))
+    before = [int(frame[0, 0]) // 10 for frame in evidence.run_in.frames]
+    assert before == list(range(max(first - (last - first) // 2, 0), first))
+    assert evidence.run_in.times_s == pytest.approx(0.01 * np.array(before))
     (masked,) = evidence.masked
     assert masked.what == f"{which}, which the events do not cover"
     assert len(evidence.stream) == 2000

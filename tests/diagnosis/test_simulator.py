@@ -8,7 +8,7 @@ from made_up_streams import random_stream, wandering_light
 
 from adv2e import load_config
 from adv2e.active_effects import frame_hooks
-from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.evidence import Evidence, RunIn
 from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.lamps import lamps_of
 from adv2e.diagnosis.light import light_of
@@ -39,6 +39,26 @@ def test_streams_lie_between_the_frames(simulator):
     assert stream.t.min() >= 0
     assert stream.t.max() < 200_000
     assert (stream.width, stream.height) == (16, 12)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "flow"])
+def test_pixels_have_seen_the_frames_of_the_run_in(simulator, interpolation):
+    """With all the frames before, a part's events are those of the whole at that time."""
+    config = load_config([], [*LINEAR, f"sampling.interpolation={interpolation}"])
+    whole = simulator.stream(config, 1).between(80_000, 200_000)
+    part = EVIDENCE.during(8, 20)
+    bare = replace(part, run_in=RunIn())
+    assert part.run_in.seconds == pytest.approx(0.05)  # half of 0.12 s, and no frame in part
+    for known, alike in ((replace(part, run_in=all_before(8)), True), (bare, False)):
+        made = Simulator(known, 1)
+        stream = made.stream(config, 1)
+        made.close()
+        assert np.array_equal(stream.t, whole.t) == alike
+        assert stream.t.min() >= 80_000
+
+
+def all_before(first):
+    return RunIn(EVIDENCE.frames[:first], EVIDENCE.times_s[:first])
 
 
 def test_both_seeds_decide(simulator):
