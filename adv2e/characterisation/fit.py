@@ -21,8 +21,8 @@ _MOST_STEPS = 60
 
 
 @dataclass(frozen=True)
-class Fit:
-    """Where a fit ended: parameters (their logarithms) and the sum of squares there."""
+class Solution:
+    """What a fit found: parameters (their logarithms) and the sum of squares there."""
 
     logs: Array
     sum_of_squares: float
@@ -39,7 +39,7 @@ def fit(
     lower: Array,
     upper: Array,
     tolerance: float = 1e-8,
-) -> Fit:
+) -> Solution:
     """Return the best of the fits from several starts.
 
     Parameters
@@ -60,7 +60,7 @@ def fit(
 
 def _descend(
     residuals: Callable[[Array], Array], start: Array, lower: Array, upper: Array, tolerance: float
-) -> Fit:
+) -> Solution:
     at = np.clip(start, lower, upper)
     r = residuals(at)
     best = float(r @ r)
@@ -85,7 +85,7 @@ def _descend(
             damping *= 8.0
             if damping > 1e8:
                 break
-    return Fit(at, best)
+    return Solution(at, best)
 
 
 def _slopes(residuals: Callable[[Array], Array], at: Array, r: Array, upper: Array) -> Array:

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.characterisation.fit import Fit, fit
+from adv2e.characterisation.fit import Solution, fit
 from adv2e.characterisation.problem import Candidate, Free, Problem, held_rows
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Model:
     effects : tuple of Candidate
     free : tuple of Free
         What was fitted: nuisances, then the effects' parameters.
-    fit : Fit
+    fit : Solution
         To all rows that are not kept for judging.
     errors : (levels,)
         Mean square of ln(measured/predicted) on each level when it was held out, each row weighted
@@ -70,7 +70,7 @@ class Model:
 
     effects: tuple[Candidate, ...]
     free: tuple[Free, ...]
-    fit: Fit
+    fit: Solution
     errors: Array
     p: float | None = None
 
@@ -310,7 +310,7 @@ class Selector:
         starts: list[Array],
         table: Array | None = None,
         tolerance: float = 1e-8,
-    ) -> Fit:
+    ) -> Solution:
         measured = self.problem.measured if table is None else table
 
         def residuals(logs: Array) -> Array:

@@ -12,7 +12,7 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import MANY, SOME, Bench, State, likely_of_a_fit, parted
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.finalists import Trial, finalists, likely_of_finalists, scored
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.readouts import EXPOSURE
@@ -47,26 +47,26 @@ class Attempt:
         return not {BORDER, BY_CHANCE} & set(self.objections)
 
 
-def knobs_of(fits: Sequence[Fit]) -> int:
+def knobs_of(fits: Sequence[Fitted]) -> int:
     """Return the number of knobs that fits have together."""
     return sum(len(fit.candidate.knobs) for fit in fits)
 
 
-def likely_of_a_round(candidates: Sequence[Candidate], fits: Sequence[Fit]) -> int:
+def likely_of_a_round(candidates: Sequence[Candidate], fits: Sequence[Fitted]) -> int:
     """Return about how many simulations it takes to add an effect to others.
 
     Parameters
     ----------
     candidates : sequence of Candidate
         Those that compete.
-    fits : sequence of Fit
+    fits : sequence of Fitted
         Those of the model.
     """
     fit = likely_of_a_fit(knobs_of(fits) + 1)
     return likely_of_finalists(candidates) + _LIKELY_TRIED * (fit + SOME) + fit + MANY
 
 
-def _exposed_as(trial: Trial, fit: Fit) -> Fit:
+def _exposed_as(trial: Trial, fit: Fitted) -> Fitted:
     """Return the fit of an exposure as a trial was tried with it, and any other as it is.
 
     It is held near that: where it ends elsewhere, there is nothing that would tell it so.

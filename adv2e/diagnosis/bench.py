@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.candidates import NOTHING_KNOWN, Candidate, Knob, neutral_value
-from adv2e.diagnosis.fit import Fit, Fitter
+from adv2e.diagnosis.fit import Fitted, Fitter
 from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.markers import BOTH, VIEWS
 from adv2e.diagnosis.metric import Model, Scale
@@ -42,7 +42,7 @@ class State:
     Attributes
     ----------
     config : Config
-    fits : tuple of Fit
+    fits : tuple of Fitted
     models : tuple of Model
         One a view.
     alternatives : mapping of str to frozenset of str
@@ -50,7 +50,7 @@ class State:
     """
 
     config: Config
-    fits: tuple[Fit, ...]
+    fits: tuple[Fitted, ...]
     models: tuple[Model, ...]
     alternatives: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
@@ -59,7 +59,7 @@ class State:
         """Names of the effects that were added."""
         return tuple(fit.candidate.name for fit in self.fits)
 
-    def beyond(self, ground: State) -> tuple[Fit, ...]:
+    def beyond(self, ground: State) -> tuple[Fitted, ...]:
         """Return the effects that were added to those of another model."""
         return self.fits[len(ground.fits) :]
 
@@ -148,12 +148,12 @@ class Bench:
         """Return the models of a configuration, simulated often enough to judge it."""
         return self.models(config, self.laboratory.ensemble(config, range(1, SOME + 1)))
 
-    def state(self, config: Config, fits: tuple[Fit, ...] = ()) -> State:
+    def state(self, config: Config, fits: tuple[Fitted, ...] = ()) -> State:
         """Return a model, simulated often enough to build on it."""
         sample = self.laboratory.ensemble(config, range(1, MANY + 1))
         return State(config, fits, self.models(config, sample))
 
-    def settled(self, fits: tuple[Fit, ...], sd: Array) -> State:
+    def settled(self, fits: tuple[Fitted, ...], sd: Array) -> State:
         """Return the model of effects fitted together to the data for fitting and judging.
 
         How precise the fits are is told by its simulations.
@@ -165,7 +165,7 @@ class Bench:
             fitter.set_covariance(joint, state.models[BOTH].sample)
         return dataclasses.replace(state, fits=parted(joint, fits))
 
-    def fitted(self, fits: tuple[Fit, ...], sd: Array, view: int) -> Fit:
+    def fitted(self, fits: tuple[Fitted, ...], sd: Array, view: int) -> Fitted:
         """Return the fit of all effects together in a view of the data."""
         joint = _joined(fits, self.declared, self.free)
         for _ in range(_ROUNDS):
@@ -194,7 +194,7 @@ def likely_of_a_fit(knobs: int) -> int:
     return _SEEDS * (2 * (knobs + 3) + 4 * (2 * knobs + 1))
 
 
-def _joined(fits: tuple[Fit, ...], declared: Config, free: tuple[Knob, ...]) -> Fit:
+def _joined(fits: tuple[Fitted, ...], declared: Config, free: tuple[Knob, ...]) -> Fitted:
     """Return one fit of all effects together, and of the keys that are not known, the last."""
     knobs = (*(knob for fit in fits for knob in fit.candidate.knobs), *free)
     extra = tuple(pair for fit in fits for pair in fit.candidate.extra)
@@ -205,16 +205,16 @@ def _joined(fits: tuple[Fit, ...], declared: Config, free: tuple[Knob, ...]) -> 
     unknown = [knob.inner(neutral_value(declared, knob)) for knob in free]
     place = np.concatenate([*(fit.place for fit in fits), unknown])
     joint = Candidate(name, knobs, (), extra, defaults, known=known)
-    return Fit(joint, declared, place, reach=_REACH)
+    return Fitted(joint, declared, place, reach=_REACH)
 
 
-def parted(joint: Fit, fits: tuple[Fit, ...]) -> tuple[Fit, ...]:
+def parted(joint: Fitted, fits: tuple[Fitted, ...]) -> tuple[Fitted, ...]:
     """Return the effects of a joined fit, each with its own place and covariance."""
     result, start = [], 0
     for fit in fits:
         stop = start + len(fit.candidate.knobs)
         own = slice(start, stop)
         place, covariance = joint.place[own], joint.covariance[own, own]
-        result.append(Fit(fit.candidate, fit.base, place, joint.misfit, covariance=covariance))
+        result.append(Fitted(fit.candidate, fit.base, place, joint.misfit, covariance=covariance))
         start = stop
     return tuple(result)

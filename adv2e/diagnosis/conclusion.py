@@ -14,7 +14,7 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.error import Distances, error_rows, of_interpolation, of_part
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.interpolation import every
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.picture import Gallery
@@ -91,12 +91,12 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
     return Conclusion(verdict, kept, rows, Gallery(scene, ready.measured, before, after))
 
 
-def finding_of(fit: Fit, pixels: int) -> Finding:
+def finding_of(fit: Fitted, pixels: int) -> Finding:
     """Return an effect that was added, with 95 % intervals of what was fitted.
 
     Parameters
     ----------
-    fit : Fit
+    fit : Fitted
     pixels : int
         Of the recording: of a share of them, no more can be known than so many draws tell.
     """

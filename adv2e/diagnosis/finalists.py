@@ -9,7 +9,7 @@ from adv2e.config import Config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import SOME, Bench, State
 from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Model
 from adv2e.diagnosis.readouts import EXPOSURE
@@ -26,14 +26,14 @@ class Trial:
 
     Attributes
     ----------
-    fit : Fit
+    fit : Fitted
     models : tuple of Model
         One a view.
     score : float
         Log likelihood of fitting and judging data together, less the number of its knobs.
     """
 
-    fit: Fit
+    fit: Fitted
     models: tuple[Model, ...]
     score: float
 
@@ -60,7 +60,7 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     nothing = fitter.misfit(state.config, (1, 2))
     of_chance = [fit for fit in fits if fit.candidate.of_chance]
     fits = [fit for fit in fits if not fit.candidate.of_chance]
-    dropped: list[Fit] = []
+    dropped: list[Fitted] = []
     for _ in range(2):
         fitter.improve(fits, (1, 2))
         fits.sort(key=lambda fit: fit.misfit)
@@ -98,13 +98,13 @@ def _exposed(state: State, candidate: Candidate) -> Config:
     return candidate.readouts.exposed(state.config)
 
 
-def _without_third_forms(fits: Sequence[Fit]) -> list[Fit]:
+def _without_third_forms(fits: Sequence[Fitted]) -> list[Fitted]:
     """Return the best forms of each effect; only one of them is tried in the end."""
     names = [fit.candidate.name for fit in fits]
     return [fit for k, fit in enumerate(fits) if names[:k].count(names[k]) < _FORMS]
 
 
-def _behind(fit: Fit, nothing: float) -> str:
+def _behind(fit: Fitted, nothing: float) -> str:
     share = 1.0 - fit.misfit / nothing
     what = f"takes away {share:.0%} of the misfit" if share > 0 else "makes nothing better"
     return f"{what} where others do more"

@@ -53,7 +53,7 @@ _SHARES = (1.0, 0.4)
 
 
 @dataclass
-class Fit:
+class Fitted:
     """The state of one candidate's fit.
 
     Attributes
@@ -94,7 +94,7 @@ class Fit:
     simulations: int = 1
 
     @classmethod
-    def at(cls, values: Sequence[float], candidate: Candidate, base: Config) -> Fit:
+    def at(cls, values: Sequence[float], candidate: Candidate, base: Config) -> Fitted:
         """Return a fit that starts at values of the knobs, or the nearest that are physical."""
         fit = cls(candidate, base, np.array(candidate.inner(values)))
         fit.place = fit.inside(fit.place)
@@ -177,13 +177,15 @@ class Fitter:
 
     def probe(
         self, candidates: Sequence[Candidate], base: Config, seeds: Sequence[int]
-    ) -> list[Fit]:
+    ) -> list[Fitted]:
         """Return each candidate at the best of its probes."""
         fits = [
-            Fit.at(probe, candidate, base) for candidate in candidates for probe in candidate.probes
+            Fitted.at(probe, candidate, base)
+            for candidate in candidates
+            for probe in candidate.probes
         ]
         means = self.whites([fit.config for fit in fits], seeds)
-        best: dict[int, Fit] = {}
+        best: dict[int, Fitted] = {}
         for fit, mean in zip(fits, means, strict=True):
             fit.misfit = self._misfit(fit, fit.place, mean)
             held = best.get(id(fit.candidate))
@@ -199,16 +201,16 @@ class Fitter:
         """Return the sum of squares of what mean statistics leave."""
         return float(np.sum((self._observed - mean) ** 2))
 
-    def _misfit(self, fit: Fit, place: Array, mean: Array) -> float:
+    def _misfit(self, fit: Fitted, place: Array, mean: Array) -> float:
         """Return the sum of squares of a fit elsewhere, from its mean statistics there."""
         return self._square(mean) + float(np.sum(fit.certainty * fit.amiss(place) ** 2))
 
-    def improve(self, fits: Sequence[Fit], seeds: Sequence[int]) -> None:
+    def improve(self, fits: Sequence[Fitted], seeds: Sequence[int]) -> None:
         """Move every fit by one step, all of them with one batch of simulations for each half.
 
         Parameters
         ----------
-        fits : sequence of Fit
+        fits : sequence of Fitted
         seeds : sequence of int
             Two at least.
         """
@@ -248,12 +250,12 @@ class Fitter:
             fit.misfit, fit.place = misfits[nearest], places[nearest]
             fit.damping = max(0.25 * fit.damping, 1e-3)
 
-    def refine(self, fit: Fit, rounds: Sequence[Sequence[int]]) -> None:
+    def refine(self, fit: Fitted, rounds: Sequence[Sequence[int]]) -> None:
         """Bring a fit that is near its end there.
 
         Parameters
         ----------
-        fit : Fit
+        fit : Fitted
             Moved at least once.
         rounds : sequence of sequence of int
             Seeds of each step, two at least; not all are taken where it is near at once.
@@ -288,7 +290,7 @@ class Fitter:
         fit.derivative = np.asarray(np.mean([slope.derivative for slope in gentler], axis=0))
         fit.covariance = np.linalg.pinv(fit.normal)
 
-    def _slopes(self, fit: Fit, axes: Axes, seeds: Sequence[int]) -> tuple[Slope, Slope]:
+    def _slopes(self, fit: Fitted, axes: Axes, seeds: Sequence[int]) -> tuple[Slope, Slope]:
         """Return the slope at a fit's place by both sides of it, and by the gentler ones."""
         steps = axes.reach[:, None] * axes.directions
         ends = [[fit.inside(fit.place + side * step) for step in steps] for side in (1, -1)]
@@ -307,12 +309,12 @@ class Fitter:
             of([gentler(above - here, here - below) for above, below in sides]),
         )
 
-    def set_covariance(self, fit: Fit, sample: Array) -> None:
+    def set_covariance(self, fit: Fitted, sample: Array) -> None:
         """Note the covariance of a fit's place, as simulations of the fitted model tell it.
 
         Parameters
         ----------
-        fit : Fit
+        fit : Fitted
             Moved at least once.
         sample : (simulations, statistics)
             Of the fitted model, in compressed deviations.
@@ -329,7 +331,7 @@ def _of_mean(seeds: int) -> float:
     return 1.0 + 1.0 / seeds
 
 
-def _nudged(fit: Fit) -> list[Array]:
+def _nudged(fit: Fitted) -> list[Array]:
     """Return the place with each knob in turn moved, inwards at the end of its range."""
     places = []
     for k in range(len(fit.place)):
@@ -341,7 +343,7 @@ def _nudged(fit: Fit) -> list[Array]:
     return places
 
 
-def _damped(fit: Fit, slope: Slope) -> Array:
+def _damped(fit: Fitted, slope: Slope) -> Array:
     """Return a step that is shorter where the last ones failed."""
     damped = slope.normal + np.diag(fit.damping * np.diag(slope.normal) + 1e-6)
     move = np.linalg.solve(damped, slope.downhill)

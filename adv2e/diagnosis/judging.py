@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import Bench, State
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Model, shrunk_correlation, whitening
 
@@ -22,12 +22,12 @@ BORDER = "its fit runs to the end of the physical range"
 BY_CHANCE = "what it gains on data it was not fitted to, chance could gain"
 
 
-def objections(fit: Fit, grown: State, ground: State, bench: Bench) -> list[str]:
+def objections(fit: Fitted, grown: State, ground: State, bench: Bench) -> list[str]:
     """Return why a model is not to be taken for the one before it; none: it holds.
 
     Parameters
     ----------
-    fit : Fit
+    fit : Fitted
         Of the model.
     grown, ground : State
         The two, the first as :meth:`~adv2e.diagnosis.bench.Bench.tried`.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.reports.result import Rejected
 
 
@@ -19,7 +19,7 @@ class Rejections:
         """Let reasons take the place of earlier ones."""
         self._this_round.clear()
 
-    def add(self, fit: Fit, reason: str, *, final: bool = False) -> None:
+    def add(self, fit: Fitted, reason: str, *, final: bool = False) -> None:
         """Note why an effect was not taken; `final` reasons replace those of the same round."""
         name = fit.candidate.name
         if final or name not in self._this_round:

@@ -32,7 +32,7 @@ from adv2e.diagnosis.attempts import (
 from adv2e.diagnosis.bench import MANY, Bench, State
 from adv2e.diagnosis.candidates import FITTED, Candidate, Knob
 from adv2e.diagnosis.finalists import Trial, scored
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.pairs import likely_pairs
@@ -340,7 +340,7 @@ class Search:
         share = self._taken_away(state, other)
         return self._is_something_left(state) or share >= _MOST_OF_THE_FIT
 
-    def _without(self, state: State, fit: Fit) -> State:
+    def _without(self, state: State, fit: Fitted) -> State:
         """Return the model without one of its effects, the others fitted again."""
         rest = tuple(other for other in state.fits if other is not fit)
         without = self.bench.settled(rest, state.models[BOTH].sd)

@@ -9,7 +9,7 @@ from adv2e.config import Config, to_dict
 from adv2e.config.paths import get_key
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate, neutral_value
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.search import PER_LOOK, Outcome
 from adv2e.reports.result import ErrorRow, Verdict
 
@@ -118,7 +118,7 @@ def sentence_of(verdict: Verdict, kept: State, outcome: Outcome, declared: Confi
     return f"{wrong}; with what was fitted, nothing is left that can be seen."
 
 
-def _wrong(fits: Sequence[Fit], declared: Config) -> str:
+def _wrong(fits: Sequence[Fitted], declared: Config) -> str:
     """Return what the declared model lacks, and what it has, but otherwise."""
     told = []
     for there, what in ((False, "lacks"), (True, "is wrong in")):

@@ -57,7 +57,7 @@ class Model:
         return not keys(candidate) <= {key for one in self.found for key in keys(one)}
 
 
-class Fit:
+class Fitter:
     """Tries configurations on one stretch of a recording.
 
     Parameters

@@ -8,7 +8,7 @@ from dataclasses import replace
 from adv2e.comparison.windows import Windows
 from adv2e.config import Config
 from adv2e.diagnosis.candidates import Candidate
-from real.fit import LEAST_GAIN, Fit, Model, Probe, keys
+from real.fit import LEAST_GAIN, Fitter, Model, Probe, keys
 from real.model import Bench
 from real.tried import EXACT, OWN, Added, of_the_camera
 
@@ -34,7 +34,7 @@ class Search:
     """
 
     def __init__(self, bench: Bench, windows: Windows, say: Callable[[str], None]) -> None:
-        self._fit, self._say = Fit(bench, windows), say
+        self._fit, self._say = Fitter(bench, windows), say
         self._seconds = windows.duration_s
         self._measured_hz = bench.still_hz(windows)
         self._noisy: set[Probe] = set()

@@ -13,7 +13,7 @@ from adv2e.config.paths import get_key
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import parted
 from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.fit import Fit, Fitter
+from adv2e.diagnosis.fit import Fitted, Fitter
 from adv2e.diagnosis.hints import Hints
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.library import library
@@ -165,7 +165,7 @@ def outside(size):
 def fits_of(*effects):
     """Return unfinished fits of effects with one key each: (name, value)."""
     found = [(candidates(name)[0], value) for name, value in effects]
-    return tuple(Fit(one, Config(), np.array(one.inner((value,)))) for one, value in found)
+    return tuple(Fitted(one, Config(), np.array(one.inner((value,)))) for one, value in found)
 
 
 def refitted(search, fits):

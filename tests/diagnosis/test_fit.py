@@ -16,7 +16,7 @@ from made_up_laboratory import (
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.markers import BOTH
 
 VIEW = parts.FIT
@@ -140,7 +140,7 @@ def test_a_negative_end_is_a_border():
     knob = Knob("frames.clock_offset_us", -2000.0, 2000.0, False, 500.0)
     candidate = Candidate("clock_offset", (knob,), ((0.0,),))
     for place, there in ((-4.0, True), (4.0, True), (-3.9, False), (0.0, False)):
-        assert Fit(candidate, Config(), np.array([place])).at_border == there
+        assert Fitted(candidate, Config(), np.array([place])).at_border == there
 
 
 def test_a_probe_beyond_the_range_starts_at_its_end():

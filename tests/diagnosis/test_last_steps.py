@@ -15,7 +15,7 @@ from made_up_laboratory import (
 from adv2e.config import Config, load_config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.fit import Fit, Fitter
+from adv2e.diagnosis.fit import Fitted, Fitter
 from adv2e.diagnosis.slope import Slope
 
 VIEW = parts.FIT
@@ -47,7 +47,7 @@ def test_where_simulations_leap_the_end_of_a_fit_and_its_covariance_are_right(al
     apart, stated = [], []
     for k in range(30):
         fitter = fitter_of(laboratory, laboratory.measure(truth, 6000 + k)[VIEW])
-        fit = Fit(candidate, Config(), start.copy())
+        fit = Fitted(candidate, Config(), start.copy())
         for _ in range(2):
             fitter.improve([fit], range(11, 17))
         fitter.refine(fit, rounds(6))
@@ -65,7 +65,7 @@ def test_the_last_steps_reach_the_end_from_far_off():
     truth = load_config([], ["pixel.refractory.period_us=4000"])
     fitter = fitter_of(laboratory, laboratory.measure(truth, 5000)[VIEW])
     candidate = only("refractory")
-    fit = Fit(candidate, Config(), np.array(candidate.inner((2600.0,))))
+    fit = Fitted(candidate, Config(), np.array(candidate.inner((2600.0,))))
     fitter.improve([fit], (1, 2))
     fit.place = np.array(candidate.inner((2600.0,)))
     fitter.refine(fit, rounds(8))
@@ -116,7 +116,7 @@ class ToldFitter(Fitter):
 )
 def test_last_steps(told, seen, last):
     fitter = ToldFitter(told)
-    fit = Fit(only("leak"), Config(), np.zeros(1), normal=np.array([[400.0]]))
+    fit = Fitted(only("leak"), Config(), np.zeros(1), normal=np.array([[400.0]]))
     fitter.refine(fit, rounds(len(told)))
     assert fitter.seen == pytest.approx(seen)
     assert fit.place == pytest.approx([last])
@@ -139,7 +139,7 @@ class FormulaFitter(Fitter):
 
 def arbiter_at(event_ns, row_ns, normal):
     candidate = only("readout")
-    return Fit(candidate, Config(), np.array(candidate.inner((event_ns, row_ns))), normal=normal)
+    return Fitted(candidate, Config(), np.array(candidate.inner((event_ns, row_ns))), normal=normal)
 
 
 def test_keys_that_go_together_are_refined_along_what_is_known():
@@ -178,7 +178,7 @@ def test_what_is_known_besides_counts_as_a_measurement_of_its_own():
     place = np.array([8.5, 9.0])
     known = ((8.7, 0.1), (9.3, 0.05))
     candidate = dataclasses.replace(only("readout"), known=known)
-    fit = Fit(candidate, Config(), place, normal=np.diag([200.0, 400.0]))
+    fit = Fitted(candidate, Config(), place, normal=np.diag([200.0, 400.0]))
     fitter = FormulaFitter(formula, np.exp(place))
     fitter.refine(fit, rounds(6))
     assert fit.place == pytest.approx([8.6, 9.3], abs=0.03)

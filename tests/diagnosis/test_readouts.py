@@ -8,7 +8,7 @@ from made_up_streams import stream_of
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.finalists import finalists
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.library import library
 from adv2e.diagnosis.readouts import Readouts, readouts_of
 from adv2e.diagnosis.search import Search
@@ -108,7 +108,7 @@ def best_with_leaps(readouts):
     laboratory = Leaps()
     observed = laboratory.measure(load_config([], truth), RECORDING)
     search = Search(laboratory, observed, Config(), [coupling(readouts), blur])
-    fit = Fit(blur, Config(), np.array(blur.inner((15_500.0,))))
+    fit = Fitted(blur, Config(), np.array(blur.inner((15_500.0,))))
     state = search.bench.state(fit.config, (fit,))
     trial = max(finalists(search.bench, state, search.candidates), key=lambda one: one.score)
     return search.attempts.of(state, [trial], [state])

@@ -25,7 +25,7 @@ from adv2e.diagnosis.bench import MANY
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.conclusion import finding_of
 from adv2e.diagnosis.detectable import detectable
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.nuisances import THRESHOLDS, thresholds_of
 from adv2e.diagnosis.rejections import Rejections
@@ -347,7 +347,7 @@ def test_backward_drops_one_after_another():
 def test_the_reason_of_the_best_form_is_kept():
     def fit(value):
         (one, *_) = candidates("leak")
-        return Fit(one, Config(), np.array(one.inner((value,))))
+        return Fitted(one, Config(), np.array(one.inner((value,))))
 
     reasons = Rejections()
     reasons.add(fit(2.0), "best form")

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.conclusion import finding_of, rejected_of
-from adv2e.diagnosis.fit import Fit
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.verdict import sentence_of, verdict_of
 from adv2e.reports.quantities import interval_text
 
@@ -69,7 +69,7 @@ def test_what_frames_leave_of_the_error_is_not_asked_of_an_effect():
 @pytest.mark.parametrize("shift", ["[0, 2]", "[2, 0]"])
 def test_any_key_of_an_effect_makes_it_one_that_is_there(shift):
     knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, (part, 2)) for part in (0, 1))
-    fit = Fit(Candidate("misregistration", knobs, ()), DECLARED, np.zeros(2))
+    fit = Fitted(Candidate("misregistration", knobs, ()), DECLARED, np.zeros(2))
     _, outcome = searched(["pixel.leak.rate_hz=4"])
     state = dataclasses.replace(outcome.state, fits=(fit,))
     for sets, wrong in (([f"frames.shift_px={shift}"], "is wrong in"), ([], "lacks")):
@@ -80,7 +80,7 @@ def test_any_key_of_an_effect_makes_it_one_that_is_there(shift):
 @pytest.mark.parametrize(("declared", "wrong"), [(0.0, "lacks"), (10.0, "is wrong in")])
 def test_a_key_that_is_read_off_makes_an_effect_one_that_is_there(declared, wrong):
     one = Candidate("timestamp_tick", (), ((),), (("readout.tick_us", 100.0),))
-    fit = Fit(one, DECLARED, np.zeros(0))
+    fit = Fitted(one, DECLARED, np.zeros(0))
     _, outcome = searched(["pixel.leak.rate_hz=4"])
     state = dataclasses.replace(outcome.state, fits=(fit,))
     config = load_config([], [f"readout.tick_us={declared}"])
@@ -105,7 +105,7 @@ def test_statistics_alone_are_no_explanation():
 
 def test_intervals_of_a_list_are_lists():
     knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, (part, 2)) for part in (0, 1))
-    fit = Fit(Candidate("misregistration", knobs, ()), Config(), np.array([1.0, -2.0]))
+    fit = Fitted(Candidate("misregistration", knobs, ()), Config(), np.array([1.0, -2.0]))
     fit.covariance = np.diag([0.01, 0.04])
     finding = finding_of(fit, 100)
     assert finding.parameters == {"frames.shift_px": [pytest.approx(0.3), pytest.approx(-0.6)]}
@@ -117,7 +117,7 @@ def test_intervals_of_a_list_are_lists():
 
 def test_of_a_share_of_pixels_no_more_is_known_than_its_number_tells():
     (dead,) = candidates("dead_pixels")
-    fit = Fit(dead, Config(), np.array(dead.inner([0.01])), covariance=np.array([[0.001**2]]))
+    fit = Fitted(dead, Config(), np.array(dead.inner([0.01])), covariance=np.array([[0.001**2]]))
     for pixels, near in ((400, 0.5), (40_000, 0.01)):
         found = finding_of(fit, pixels).interval["pixel.dead_pixels.fraction"]
         n = 0.01 * pixels

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from narrow_candidates import BLACK_LEVEL
-from real.fit import MOST_SEEDS, PRECISION, Fit, Model, enough_seeds
+from real.fit import MOST_SEEDS, PRECISION, Fitter, Model, enough_seeds
 from real.search import Search
 from real.tried import CLIPPED_BLACK, Added
 
@@ -45,7 +45,7 @@ class Valley:
 
 
 def fitted(bench, seeds=(0,)):
-    fit = Fit(bench, None)
+    fit = Fitter(bench, None)
     fit.seeds = seeds
     return fit
 
