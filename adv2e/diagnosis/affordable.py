@@ -99,14 +99,12 @@ def _cropped(evidence: Evidence, left: int, top: int, width: int, height: int) -
     pixel = ((y - top) * width + (x - left))[inside].astype(np.int32)
     kept = Stream(stream.t[inside], pixel, stream.on[inside], width, height)
 
-    def crop(frames: list[NDArray[Any]]) -> list[NDArray[Any]]:
-        return [frame[top : top + height, left : left + width] for frame in frames]
+    def cropped(frame: NDArray[Any]) -> NDArray[Any]:
+        return frame[top : top + height, left : left + width]
 
     what = f"pixels outside the {width}x{height} at column {left}, row {top}"
     return replace(
-        evidence,
-        frames=crop(evidence.frames),
-        run_in=replace(evidence.run_in, frames=crop(evidence.run_in.frames)),
+        evidence.with_frames(cropped),
         stream=kept,
         width=width,
         height=height,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -100,6 +101,11 @@ class Evidence:
             times_s=np.concatenate([before.times_s, self.times_s]),
             run_in=RunIn(),
         )
+
+    def with_frames(self, changed: Callable[[NDArray[Any]], NDArray[Any]]) -> Evidence:
+        """Return the recording with all frames changed, those of the run-in as well."""
+        before = replace(self.run_in, frames=[changed(one) for one in self.run_in.frames])
+        return replace(self, frames=[changed(one) for one in self.frames], run_in=before)
 
     def during(self, first: int, last: int) -> Evidence:
         """Return the recording from frame `first` to frame `last`; pixels saw those before."""

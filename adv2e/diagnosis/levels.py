@@ -10,7 +10,6 @@ counted as uncertain.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ def coarser(evidence: Evidence) -> Evidence:
 
     An odd number of levels has one in the middle, so that the light stays what it is on average.
     """
-    return replace(evidence, frames=[_rounded(image) for image in evidence.frames])
+    return evidence.with_frames(_rounded)
 
 
 def _rounded(image: NDArray[Any]) -> NDArray[Any]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from three_cameras import Recorded
 
-from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.evidence import Evidence, RunIn
 from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.levels import between_levels, coarser
 from adv2e.diagnosis.light import scene_of
@@ -75,7 +75,10 @@ def test_fine_levels_tell_everything(recorded):
 def test_every_third_level_is_left(dtype):
     largest = np.iinfo(dtype).max
     levels = np.arange(largest + 1).astype(dtype)
-    (image,) = coarser(Evidence("made up", [levels], np.zeros(1), None, 1, 1)).frames
+    before = RunIn([levels], -np.ones(1))
+    coarse = coarser(Evidence("made up", [levels], np.zeros(1), None, 1, 1, run_in=before))
+    (image,) = coarse.frames
+    np.testing.assert_array_equal(coarse.run_in.frames, [image])
     assert image.dtype == dtype
     assert set(np.unique(image)) == set(range(0, largest + 1, 3))
     off = image.astype(int) - levels

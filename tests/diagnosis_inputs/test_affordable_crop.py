@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from adv2e.config import load_config
 from adv2e.diagnosis import affordable as affordable_module
 from adv2e.diagnosis import evidence as evidence_module
 from adv2e.diagnosis.affordable import affordable
-from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.evidence import Evidence, RunIn
 from adv2e.diagnosis.stream import Stream
 from adv2e.errors import DataError
 
@@ -53,6 +55,18 @@ def test_a_crop_holds_the_busiest_pixels_and_says_so(monkeypatch):
     assert crop.masked[-1].what == "pixels outside the 56x48 at column 40, row 24"
     assert crop.masked[-1].share == 0.0
     assert "cropped from 96x80" in crop.notes[-1]
+
+
+def test_what_pixels_saw_before_is_cropped_and_costs_its_time(monkeypatch):
+    whole = recording()
+    before = RunIn(whole.frames[:5], whole.times_s[:5] - 0.05)
+    with_run_in = replace(whole, run_in=before)
+    limit(monkeypatch, WIDTH * HEIGHT // 3, steps=2)  # twice as many instants
+    crop, same = affordable(with_run_in, CONFIG), affordable(whole, CONFIG)
+    assert (crop.width, crop.height) == (56, 48)
+    assert same.width * same.height > 1.5 * crop.width * crop.height
+    np.testing.assert_array_equal(crop.run_in.frames, crop.frames[:5])
+    assert crop.run_in.times_s is before.times_s
 
 
 def test_a_crop_simulates_to_what_its_pixels_saw_in_the_whole(monkeypatch):
