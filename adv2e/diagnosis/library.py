@@ -263,6 +263,15 @@ def _arbiter(service: Service | None) -> Candidate:
     return Candidate("readout", times, (*probes, service[:2]), known=known)
 
 
+def _either_way(*sizes: float) -> tuple[tuple[float, ...], ...]:
+    """Return probes of a key on both sides of nothing.
+
+    Sizes should be about a factor of two apart: from half or twice the time, fits of periodic
+    scenes do not come to their end.
+    """
+    return tuple((sign * size,) for size in sizes for sign in (-1.0, 1.0))
+
+
 def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
     offset = _knob("frames.clock_offset_us", 1000.0)
     drift = _knob("frames.clock_drift_ppm", 1000.0)
@@ -280,9 +289,9 @@ def _of_the_frames(now: _Now, times: _Times, values: Any, hints: Hints) -> list[
         Candidate(
             "clock_offset",
             (offset,),
-            ((-600.0,), (600.0,), (-3000.0,), (3000.0,)),
+            _either_way(600.0, 1300.0, 2900.0, 6300.0),
         ),
-        Candidate("clock_drift", (drift,), ((-1500.0,), (1500.0,), (-6000.0,), (6000.0,))),
+        Candidate("clock_drift", (drift,), _either_way(700.0, 1500.0, 3300.0, 7200.0)),
         Candidate(
             "misregistration",
             shift,
