@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from adv2e.errors import DataError
 from adv2e.sources.times import (
+    WHOLE,
+    WHOLE_SECONDS,
     FrameRate,
     Stamp,
     constant_rate,
@@ -58,16 +60,18 @@ def test_list_with_comments_and_blank_lines():
 
 
 @pytest.mark.parametrize(
-    ("text", "t_ns", "whole"),
+    ("text", "t_ns", "note"),
     [
-        ("0 a\n2000 b\n", [0, 2_000_000], True),
-        ("0 a\n2 b\n2.5 c\n", [0, 2_000_000_000, 2_500_000_000], False),
-        ("3 a\n", [3_000_000_000], False),
+        ("0 a\n2000 b\n", [0, 2_000_000], WHOLE),
+        ("0 a\n2 b\n2.5 c\n", [0, 2_000_000_000, 2_500_000_000], ""),
+        ("3 a\n", [3_000_000_000], ""),
+        ("0 a\n20 b\n", [0, 20_000], WHOLE),
+        ("0 a\n19 b\n", [0, 19_000_000_000], WHOLE_SECONDS),
     ],
 )
-def test_a_list_of_a_recording_may_be_in_microseconds(text, t_ns, whole):
+def test_a_list_of_a_recording_may_be_in_microseconds(text, t_ns, note):
     stamps, found = parse_list(text, "images.txt")
-    assert ([stamp.t_ns for stamp in stamps], found) == (t_ns, whole)
+    assert ([stamp.t_ns for stamp in stamps], found) == (t_ns, note)
 
 
 def test_named_lines_are_sorted_by_time():
