@@ -13,6 +13,7 @@ from decimal import Decimal
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,10 +104,10 @@ def parse_list(text: str, label: str) -> tuple[list[Stamp], str]:
         As :func:`parse_times`.
     """
     words = [words[0] for _, words in _lines(text, label, name_first=False)]
-    if len(words) < 2 or not all(re.fullmatch(r"[+-]?\d+", word) for word in words):
+    if len(words) < 2 or not all(re.fullmatch(r"[+-]?\d{1,19}", word) for word in words):
         return parse_times(text, label), ""
-    gaps = np.diff(np.sort([int(word) for word in words]))
-    if np.median(gaps) < _SHORTEST_US:
+    listed = sorted(int(word) for word in words)
+    if median(after - before for before, after in pairwise(listed)) < _SHORTEST_US:
         return parse_times(text, label), WHOLE_SECONDS
     return parse_times(text, label, 1000), WHOLE
 

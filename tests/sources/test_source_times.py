@@ -74,6 +74,12 @@ def test_a_list_of_a_recording_may_be_in_microseconds(text, t_ns, note):
     assert ([stamp.t_ns for stamp in stamps], found) == (t_ns, note)
 
 
+@pytest.mark.parametrize("digits", [19, 20, 5000])
+def test_whole_numbers_beyond_all_clocks_are_told(digits):
+    with pytest.raises(DataError, match=r"images.txt line 2: '9+' is out of range"):
+        parse_list(f"0 a\n{'9' * digits} b\n", "images.txt")
+
+
 def test_named_lines_are_sorted_by_time():
     stamps = parse_times("0.2 b c.png\n0.1 a.png\n", "t.txt")
     assert stamps == [Stamp(100_000_000, 2, "a.png"), Stamp(200_000_000, 1, "b c.png")]
