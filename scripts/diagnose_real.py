@@ -167,13 +167,14 @@ def _where_stable(bench: Bench, steps: list[Step], windows: Windows, seeds: tupl
     """Return what dropping every second frame changes, and the table of where that is little."""
     real, found = bench.real, steps[-1].added
     stability = _stability(bench, found, windows, seeds)
+    measured = stability.alone(real.events)
+    kept = len(measured) / len(cut(real.events, windows.start, windows.stop))
     told = (
         f"Dropping every second frame changes the simulation by {stability.change:.2f} of its norm"
-        f" (chance taken off). Tiles where that is below {UNSTABLE:.0%} hold {stability.kept:.0%}"
+        f" (chance taken off). Tiles where that is below {UNSTABLE:.0%} hold {kept:.0%}"
         " of the measured events. The rest hangs on what was made up between frames and tells"
         " little of the camera."
     )
-    measured = stability.alone(real.events)
     if not len(measured):
         return told
     steps = [
@@ -193,7 +194,7 @@ def _stability(bench: Bench, found: Added, windows: Windows, seeds: tuple[int, i
     def pair(one: Bench) -> tuple[Events, Events]:
         return one.quick(found.config, windows, first), one.quick(found.config, windows, second)
 
-    return compare_halved(pair(bench), pair(half), bench.real.events, windows, *bench.real.size)
+    return compare_halved(pair(bench), pair(half), windows, *bench.real.size)
 
 
 def _table(size: tuple[int, int], measured: Events, steps: list[Step], windows: Windows) -> str:

@@ -109,8 +109,12 @@ class Simulator:
 
     def _recorded(self, config: Config) -> Instants:
         """Return the light of the recording's frames, and what is made of them once."""
-        shown = self._evidence.simulated
-        return self._frames.of(config, lambda: (shown.times_ns, light_of(shown, config)))
+
+        def read() -> Instants:
+            shown = self._evidence.simulated
+            return shown.times_ns, light_of(shown, config)
+
+        return self._frames.of(config, read)
 
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""

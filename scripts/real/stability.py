@@ -7,7 +7,7 @@ large say nothing of the camera.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -34,15 +34,12 @@ class Stability:
         Norm of the change over that of the simulation, chance taken off; median over windows.
     stable : (windows, rows, columns) bool
         Pixels in whose tile it is below MOST.
-    kept : float
-        Share of the measured events there.
     windows : Windows
         Those it was told for.
     """
 
     change: float
     stable: NDArray[np.bool_]
-    kept: float
     windows: Windows
 
     def alone(self, events: Events) -> Events:
@@ -55,7 +52,7 @@ class Stability:
 
 
 def compare_halved(
-    whole: tuple[Events, Events], halved: tuple[Events, Events], measured: Events,
+    whole: tuple[Events, Events], halved: tuple[Events, Events],
     windows: Windows, width: int, height: int,
 ) -> Stability:  # fmt: skip
     """Return what dropping frames changes.
@@ -65,7 +62,6 @@ def compare_halved(
     whole, halved : (Events, Events)
         Two seeds from all frames, and the same two from every second one: the change is read off
         the product of the two differences, in which chance cancels on average.
-    measured : Events
     windows : Windows
     width, height : int
     """
@@ -81,9 +77,7 @@ def compare_halved(
         whole_power = max(float((a * b).sum()), 1e-9)
         changes.append(np.sqrt(max(float(((a - c) * (b - d)).sum()), 0.0) / whole_power))
         masks.append(_pixels(moved <= MOST**2 * np.maximum(power, 0.0), height, width))
-    found = Stability(float(np.median(changes)), np.array(masks), 0.0, windows)
-    total = len(cut(measured, windows.start, windows.stop))
-    return replace(found, kept=len(found.alone(measured)) / max(total, 1))
+    return Stability(float(np.median(changes)), np.array(masks), windows)
 
 
 def _tiled(grid: NDArray[Any]) -> NDArray[Any]:
