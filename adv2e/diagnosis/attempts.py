@@ -11,17 +11,16 @@ import numpy as np
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import MANY, SOME, Bench, State, likely_of_a_fit, parted
 from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.finalists import Trial, finalists, likely_of_finalists, scored
+from adv2e.diagnosis.finalists import Trial, finalists, likely_of_finalists
 from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.judging import BORDER, BY_CHANCE, objections
 from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.ranking import ranked
 from adv2e.diagnosis.readouts import EXPOSURE
 
 _TRIED, _LIKELY_TRIED = 4, 2
 CATCHES_UP = 60.0
 """Log likelihood that a fit may gain when it is brought to its end."""
-CLOSE = 5.0
-"""Log likelihood; simulations are too few for less to be known."""
 
 
 @dataclass(frozen=True)
@@ -165,15 +164,16 @@ class Attempts:
         ]
         if not holding:
             return None
-        scores = [scored(self.bench, one.models, knobs_of(one.beyond(state))) for one in holding]
-        best = max(scores)
-        chosen = holding[scores.index(best)]
+        ranking = ranked(self.bench, holding, [knobs_of(one.beyond(state)) for one in holding])
+        chosen = holding[ranking.best]
         alike: set[str] = set()
-        for one, score in zip(holding, scores, strict=True):
-            self.bench.log(f"  {' and '.join(one.names)}, on more data: score {score:.0f}")
+        for k, one in enumerate(holding):
+            self.bench.log(
+                f"  {' and '.join(one.names)}, on more data: score {ranking.scores[k]:.0f}"
+            )
             why = "others explain more"
             others = [fit for fit in one.fits if fit.candidate.name not in chosen.names]
-            if score > best - CLOSE:
+            if k in ranking.alike:
                 alike.update(fit.candidate.name for fit in others)
                 why = f"does as well as {chosen.names[-1]}, and cannot be told from it"
             for fit in others:

@@ -23,7 +23,6 @@ from adv2e.config import Config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.attempts import (
     CATCHES_UP,
-    CLOSE,
     Attempt,
     Attempts,
     knobs_of,
@@ -36,6 +35,7 @@ from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.frame_error import FrameError
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.pairs import likely_pairs
+from adv2e.diagnosis.ranking import CLOSE
 from adv2e.diagnosis.simulations import Laboratory
 from adv2e.reports.result import Rejected
 
