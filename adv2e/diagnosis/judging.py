@@ -75,8 +75,7 @@ def chance_gain(after: Model, before: Model, observed: Array) -> float:
     """
     rows = before.sample
     gains = after.likelihood_of_others(rows) - before.likelihood_of_others(rows)
-    own = after.pull(observed) - before.pull(observed)
-    deviation = np.hypot(gains.std(), own.std(ddof=1) / np.sqrt(len(own)))
+    deviation = np.hypot(gains.std(), after.parted_by_chance(before, observed))
     return float(max(gains.mean() + 3.0 * deviation, 3.0))
 
 

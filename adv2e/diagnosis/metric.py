@@ -166,6 +166,14 @@ class Model:
         of_sd = 0.5 * (apart**2 - 1.0) @ np.where(free, downhill * z - 1.0, 0.0)
         return np.asarray(of_mean + of_sd)
 
+    def parted_by_chance(self, other: Model, values: Array) -> float:
+        """Return how far two models of the same seeds are apart in log likelihood by chance.
+
+        As a deviation: as far as that hangs on which simulations the two were made of.
+        """
+        own = self.pull(values) - other.pull(values)
+        return float(own.std(ddof=1) / math.sqrt(len(own)))
+
     def against_others(self, recordings: Array) -> tuple[Array, Array]:
         """Return recordings as seen by the model without the simulation of the same place.
 

@@ -1,13 +1,12 @@
 """Which of several models explains most, and which others cannot be told from it.
 
 A likelihood by simulations is itself uncertain: the more is left of the residual, the more it hangs
-on which simulations it was made of.  Models that chance may have parted, or brought together, are
-simulated more often; what that does not tell, nobody knows.
+on which simulations it was made of.  Models that chance may have parted are simulated more often;
+what that does not tell, nobody knows.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -46,6 +45,11 @@ class Ranking:
     best: int
     alike: frozenset[int]
 
+    @property
+    def behind(self) -> Array:
+        """How far each is behind the best, (models,)."""
+        return np.asarray(self.scores[self.best] - self.scores)
+
 
 def ranked(bench: Bench, states: Sequence[State], knobs: Sequence[int]) -> Ranking:
     """Rank models; where chance may have parted some of them, by more simulations.
@@ -58,26 +62,23 @@ def ranked(bench: Bench, states: Sequence[State], knobs: Sequence[int]) -> Ranki
     knobs : sequence of int
         That each adds.
     """
-    ranking, behind = _ranked(bench, [state.models for state in states], knobs)
+    ranking = _ranked(bench, [state.models for state in states], knobs)
     near = sorted({ranking.best} | ranking.alike)
-    if not np.any(behind[near] > CLOSE):
+    if not np.any(ranking.behind[near] > CLOSE):
         return ranking
     configs = [states[k].config for k in near]
     models = [bench.models(one, bench.laboratory.ensemble(one, _OFTEN)) for one in configs]
-    again, _ = _ranked(bench, models, [knobs[k] for k in near])
+    again = _ranked(bench, models, [knobs[k] for k in near])
     scores = ranking.scores.copy()
     scores[near] = again.scores
     return Ranking(scores, near[again.best], frozenset(near[k] for k in again.alike))
 
 
-def _ranked(
-    bench: Bench, models: Sequence[Sequence[Model]], knobs: Sequence[int]
-) -> tuple[Ranking, Array]:
-    """Rank models, of which each has one a view; and return how far each is behind the best."""
+def _ranked(bench: Bench, models: Sequence[Sequence[Model]], knobs: Sequence[int]) -> Ranking:
+    """Rank models, of which each has one a view."""
     scores = np.array([scored(bench, *each) for each in zip(models, knobs, strict=True)])
-    best = int(np.argmax(scores))
-    pulls = np.array([of_views[BOTH].pull(bench.observed[BOTH]) for of_views in models])
-    chance = (pulls - pulls[best]).std(axis=1, ddof=1) / math.sqrt(pulls.shape[1])
-    behind = scores[best] - scores
-    alike = np.flatnonzero(behind <= CLOSE + _DEVIATIONS * chance)
-    return Ranking(scores, best, frozenset(alike.tolist()) - {best}), behind
+    best, observed = int(np.argmax(scores)), bench.observed[BOTH]
+    first = models[best][BOTH]
+    chance = np.array([of_views[BOTH].parted_by_chance(first, observed) for of_views in models])
+    alike = np.flatnonzero(scores[best] - scores <= CLOSE + _DEVIATIONS * chance)
+    return Ranking(scores, best, frozenset(alike.tolist()) - {best})
