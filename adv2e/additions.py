@@ -23,6 +23,9 @@ LONGEST_US = 100.0
 Course = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """From times [s], (n,), to values, (n,) or (n, pixels)."""
 
+StepLimit = Callable[[float, float], float]
+"""From two times [s] to the longest step that resolves the courses between them [us]."""
+
 Injection = Callable[[float, float], NDArray[Any]]
 """From t0, t1 [s] to the events in [t0, t1), as INJECTED_DTYPE, sorted by time."""
 
@@ -36,7 +39,7 @@ class Additions:
 
     Attributes
     ----------
-    step_us : float
+    step_us : float or StepLimit
         Longest step that resolves the courses [us].
     gain : Course, optional
         Factors on the light between the frames, above 0; corner, leak and shot noise follow them.
@@ -51,7 +54,7 @@ class Additions:
         Events that fire whenever their pixel is not in its dead time, as those of hot pixels do.
     """
 
-    step_us: float
+    step_us: float | StepLimit
     gain: Course | None = None
     drive: Course | None = None
     signal: Course | None = None
@@ -60,8 +63,12 @@ class Additions:
     inject: Injection | None = None
 
     def __post_init__(self) -> None:
-        if not self.step_us > 0:
+        if not callable(self.step_us) and not self.step_us > 0:
             raise DataError(f"step_us: must be above 0 us, got {self.step_us!r}")
+
+    def longest_step_us(self, start_s: float, stop_s: float) -> float:
+        """Return the longest step that resolves the courses between two times [us]."""
+        return self.step_us(start_s, stop_s) if callable(self.step_us) else self.step_us
 
 
 def values_of(

@@ -144,7 +144,6 @@ class Stepping:
         self._circuit, self._pixels, self._columns = circuit, pixels, columns
         self._additions = additions
         self._drift, self._origin, self._start = drift_per_s, origin_us, start_us
-        self._step_us = additions.step_us if additions else math.inf
         self._coarseness = coarseness
         at = np.array([start_us])
         widths = (self._course(name, at).shape[1] for name in _COURSES)
@@ -189,9 +188,11 @@ class Stepping:
         exact = circuit.update == EXACT
         steps = np.ones(lengths.size, np.int64)
         if exact:
-            for f, brightest in enumerate(_brightest(part, frames, lengths.size)):
+            brightest, ends_s = _brightest(part, frames, lengths.size), self._seconds(starts)
+            for f, length in enumerate(lengths):
+                step_us = self._longest_step_us(ends_s[f], ends_s[f + 1])
                 steps[f] = steps_of(
-                    lengths[f] / pieces, circuit, self._step_us, brightest, self._coarseness
+                    length / pieces, circuit, step_us, brightest[f], self._coarseness
                 )
         for first, first_step, stop, stop_step in self._cuts(pieces, steps):
             times = _instants(starts, pieces * steps, first, first_step, stop, stop_step)
@@ -215,6 +216,11 @@ class Stepping:
                 taken += stop - start
                 border = (f + 1, stop)
         yield (*begin, *border)
+
+    def _longest_step_us(self, start_s: float, stop_s: float) -> float:
+        """Return the longest step that resolves what is added between two times [us]."""
+        added = self._additions
+        return math.inf if added is None else added.longest_step_us(float(start_s), float(stop_s))
 
     def _course(self, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a course at times since the origin [us], without rows if there is none."""

@@ -13,7 +13,7 @@ from adv2e.diagnosis.evidence import Evidence, check_events
 from adv2e.diagnosis.stream import Stream
 from adv2e.reports.result import Masked
 
-AFFORDABLE_S = 0.25
+AFFORDABLE_S = 0.18
 """What a simulation may take in the mean, in one thread; a diagnosis takes some thousands [s]."""
 
 # about what a simulation and the statistics of its events take, in one thread [s]

@@ -121,7 +121,6 @@ def is_made_once(config: Config) -> bool:
     return (
         (_is_along_motion(config) or config.frames.exposure_us > 0.0)
         and sampling.last_interval != "printed"
-        and not (_is_along_motion(config) and _coupling(config) is not None)
         and not any(getattr(user, name) is not None for name in user_effects(config))
     )
 
@@ -200,7 +199,8 @@ def _as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
     if is_made_once(config):
         coupling = _coupling(config)
         if readout is not None and coupling is not None:
-            effects.append(FrameCouplingHooks(coupling, 0.5 * frames.exposure_us))
+            every = sampling.L if _is_along_motion(config) else 1
+            effects.append(FrameCouplingHooks(coupling, 0.5 * frames.exposure_us, every))
             readout = replace(readout, frame_coupling=None)
         frames = replace(frames, exposure_us=0.0)
         if _is_along_motion(config):

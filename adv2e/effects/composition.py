@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.additions import Additions, injection_complaint
+from adv2e.additions import Additions, StepLimit, injection_complaint
 from adv2e.effects.hooks import Frames, Hooks, Times, View
 from adv2e.errors import Adv2eError, DataError
 from adv2e.events import EVENT_DTYPE, Events, empty_events
@@ -71,10 +71,10 @@ def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
     of = {name: [hook for hook in hooks if overrides(hook, name)] for name in (*_TIMED, "inject")}
     if not any(of.values()):
         return None
-    timed = [hook for name in _TIMED for hook in of[name]]
+    timed = list(dict.fromkeys(hook for name in _TIMED for hook in of[name]))
     gains, levels = of["gain"], of["thresholds"]
     return Additions(
-        step_us=min((hook.step_us for hook in timed), default=np.inf),
+        step_us=_shortest(timed),
         gain=_product(gains, "gain", lambda found: found) if gains else None,
         drive=_sum(of["drive"], "drive") if of["drive"] else None,
         signal=_sum(of["signal"], "signal") if of["signal"] else None,
@@ -82,6 +82,21 @@ def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
         off=_product(levels, "thresholds", lambda pair: pair[1]) if levels else None,
         inject=_merge(of["inject"]) if of["inject"] else None,
     )
+
+
+def _shortest(hooks: Sequence[Hooks]) -> StepLimit:
+    def shortest(start_s: float, stop_s: float) -> float:
+        return min((_longest_step_us(hook, start_s, stop_s) for hook in hooks), default=np.inf)
+
+    return shortest
+
+
+def _longest_step_us(hook: Hooks, start_s: float, stop_s: float) -> float:
+    with blamed(hook):
+        found = float(hook.longest_step_us(start_s, stop_s))
+    if not found > 0.0:
+        raise DataError(f"effect {hook.name}: longest_step_us: {found:g} us, must be above 0")
+    return found
 
 
 def _sum(hooks: Sequence[Hooks], method: str) -> Callable[[Times], Array]:

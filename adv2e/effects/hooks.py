@@ -183,5 +183,12 @@ class Hooks:
         """
         yield from chunks
 
+    def longest_step_us(self, start_s: float, stop_s: float) -> float:
+        """Return the longest time step that resolves what it adds between two times [us].
+
+        `step_us`, unless an effect that is quiet for a while says otherwise.
+        """
+        return self.step_us
+
     def passed(self, time_s: float) -> None:
         """Take notice that nothing before `time_s` will be asked for again."""

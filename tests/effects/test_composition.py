@@ -83,7 +83,7 @@ def test_a_course_is_followed_every_100_us_in_a_diagnosis_too_unless_it_says_mor
 
     def steps(hook, coarseness):
         (begun_hook,) = begun(hook())
-        step_us = additions_of([begun_hook]).step_us
+        step_us = additions_of([begun_hook]).longest_step_us(0.0, 0.01)
         return steps_of(10_000.0, circuit, step_us, coarseness=coarseness)
 
     assert steps(Slow, Coarseness()) == steps(Slower, Coarseness()) == 100
@@ -114,12 +114,24 @@ def test_where_nothing_fires_there_is_an_array_without_events(sets, effects):
 
 def test_drives_add_up_and_factors_multiply():
     found = additions_of(begun(Lamp(), Spots()))
-    assert found.step_us == 40.0
+    assert found.longest_step_us(0.0, 1.0) == 40.0
     np.testing.assert_array_equal(found.drive(TIMES), np.repeat(TIMES[:, None] + 1.0, 12, 1))
     np.testing.assert_array_equal(found.gain(TIMES), 1.0 + TIMES)
     np.testing.assert_array_equal(found.signal(TIMES), -TIMES)
     np.testing.assert_array_equal(found.on(TIMES), [6.0] * 3)
     np.testing.assert_array_equal(found.off(TIMES), [1.5] * 3)
+
+
+def test_steps_are_those_of_the_effect_that_needs_the_shortest_then():
+    class Pulse(Lamp):
+        def longest_step_us(self, start_s, stop_s):
+            return 7.0 if start_s < 0.3 < stop_s else np.inf
+
+    found = additions_of(begun(Pulse(), Spots()))
+    assert found.longest_step_us(0.1, 0.2) == 70.0
+    assert found.longest_step_us(0.2, 0.4) == 7.0
+    assert additions_of(begun(Pulse())).longest_step_us(0.4, 0.5) == np.inf
+    assert additions_of(begun(Later())).longest_step_us(0.0, 1.0) == np.inf
 
 
 def test_injected_events_are_merged_by_time():
@@ -217,6 +229,11 @@ BROKEN = {
     "effect mine: light: a frame of shape": {
         "light": lambda self, frames: ((t, light[:2]) for t, light in frames)
     },
+    "effect mine: longest_step_us: 0 us, must be above 0": {
+        "signal": lambda self, t: t,
+        "longest_step_us": lambda self, a, b: 0.0,
+    },
+    "effect mine: longest_step_us: nan us": {"signal": lambda self, t: t, "step_us": np.nan},
     "effect mine: inject: must be .* got float64": {"inject": lambda self, a, b: np.zeros(2)},
     "effect mine: inject: times must be sorted": {"inject": lambda self, a, b: injected([b], 0)},
     "effect mine: inject: x must be below 4": {"inject": lambda self, a, b: injected([a], 4)},

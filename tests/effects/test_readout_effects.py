@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from camera.photoreceptor import frame_coupling
@@ -9,15 +11,17 @@ from camera.readout import Stream
 from camera.readout import arbiter as camera_arbiter
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference.agreement import count_and_time_errors, split_events
 
-from adv2e import rng
-from adv2e.effects.hooks import View
+from adv2e import load_config, rng, simulate
+from adv2e.effects.hooks import Hooks, View
 from adv2e.effects.pixel.dead_pixels import DeadPixels, DeadPixelsHooks
 from adv2e.effects.readout.arbiter import Arbiter, ArbiterHooks
 from adv2e.effects.readout.event_loss import EventLoss, EventLossHooks
 from adv2e.effects.readout.frame_coupling import FrameCoupling, FrameCouplingHooks
 from adv2e.effects.readout.timestamp_tick import TimestampTickHooks, ticked
 from adv2e.events import make_events, sort_events
+from adv2e.stepping import steps_of
 
 ROWS, COLUMNS = 12, 10
 
@@ -168,7 +172,58 @@ def test_coupling_is_that_of_the_camera_after_its_rise_and_never_before_a_readou
     assert hook.signal(np.array([begins[0] + rise]))[0] == pytest.approx(0.1)
     assert hook.signal(np.array([begins[0]]))[0] == pytest.approx(0.0, abs=1e-12)
     assert hook.signal(np.array([begins[1]]))[0] < 0.1 * np.exp(-2.0)
+    steps = [hook.longest_step_us(t, t + 1e-4) for t in times]
     hook.passed(0.005)
     later = times >= 0.005
+    busy = (times > begins[0] - 1e-4) & (times < begins[-1] + math.log(1152) * tau_s)
+    assert steps == np.where(busy, 800 / 12, math.inf).tolist()
+    assert [hook.longest_step_us(t, t + 1e-4) for t in times[later]] == steps[-sum(later) :]
     np.testing.assert_allclose(hook.signal(times[later]), found[later], atol=1e-12)
     assert len(hook._readouts) == 2
+
+
+def test_frames_that_were_made_between_others_are_not_read_out():
+    times = np.linspace(0.0, 0.007, 500)
+
+    def signal(count, every):
+        hook = FrameCouplingHooks(FrameCoupling(amplitude=0.1, tau_us=800.0), 200.0, every)
+        hook.begin(View(2, 2, 0, 0.0))
+        assert len(list(hook.light((round(6e6 / count * k), None) for k in range(count)))) == count
+        return hook.signal(times)
+
+    np.testing.assert_array_equal(signal(9, 3), signal(3, 1))
+    assert not np.array_equal(signal(9, 3), signal(9, 1))
+
+
+@pytest.mark.parametrize("tau_us", [150.0, 600.0])
+def test_where_the_coupling_has_decayed_long_steps_make_the_same_events(monkeypatch, tau_us):
+    planned = []
+
+    def noted(*arguments):
+        planned.append(steps_of(*arguments))
+        return planned[-1]
+
+    monkeypatch.setattr("adv2e.stepping.steps_of", noted)
+    y, x = np.mgrid[:24, :32]
+    frames = [
+        (110 + 90 * np.sin(0.5 * (x - 0.9 * k)) * np.cos(0.4 * y)).astype(np.uint8)
+        for k in range(6)
+    ]
+    coupling = f"readout.frame_coupling={{amplitude: 0.25, tau_us: {tau_us}}}"
+    config = load_config(["ideal"], ["sampling.L=10", "pixel.low_pass.cutoff_hz=200", coupling])
+
+    def found():
+        planned.clear()
+        chunks = simulate(frames, [0.04 * k for k in range(6)], config, effects=[])
+        return np.concatenate(list(chunks)), sum(planned)
+
+    events, steps = found()
+    monkeypatch.setattr(FrameCouplingHooks, "longest_step_us", Hooks.longest_step_us)
+    precise, all_steps = found()
+    assert steps < 0.65 * all_steps
+    assert len(precise) > 5000
+    agreement = count_and_time_errors(
+        *(split_events(stream, 32, 24 * 32) for stream in (events, precise))
+    )
+    assert not agreement.differing
+    assert agreement.mean_dt_us < 0.1
