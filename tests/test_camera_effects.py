@@ -91,9 +91,20 @@ def test_what_is_drawn_leaves_as_many_events_as_in_the_camera(hidden, share, tmp
     assert np.mean(recorded) == pytest.approx(share, abs=0.04)
 
 
-def test_readout_of_frames_makes_as_many_events_as_long_after_it_as_in_the_camera(tmp_path):
+@pytest.mark.parametrize(
+    "coupling",
+    [
+        {"amplitude": 0.15, "tau_us": 700.0},
+        {"amplitude": 0.08, "tau_us": 4000.0, "delay_us": -500.0, "width_us": 750.0},
+        {"amplitude": -0.08, "tau_us": 2500.0, "delay_us": 250.0, "width_us": 1000.0},
+    ],
+    ids=["leap", "pulse before the frame", "pulse downwards"],
+)
+def test_readout_of_frames_makes_as_many_events_as_long_after_it_as_in_the_camera(
+    coupling, tmp_path
+):
     # which of them a pixel makes hangs on details: each one decides where the next ones fall
-    hidden = {"readout": {"frame_coupling": {"amplitude": 0.15, "tau_us": 700.0}}}
+    hidden = {"readout": {"frame_coupling": coupling}}
     camera = camera_with(hidden)
     edges = np.array([0, 250, 750, 1250, 1750, 2000])
 

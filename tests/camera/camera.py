@@ -158,7 +158,13 @@ class _Run:
             return None
         exposure = find(self._truth, "frames.exposure_us", 0.0) * 1e-6
         tau = self._truth["readout"]["frame_coupling"]["tau_us"] * 1e-6
-        return frame_coupling(amplitude, tau, camera.frame_times + 0.5 * exposure, ends)
+        delay = find(self._truth, "readout.frame_coupling.delay_us", 0.0) * 1e-6
+        width = find(self._truth, "readout.frame_coupling.width_us", 0.0) * 1e-6
+        leaps = camera.frame_times + 0.5 * exposure + delay
+        disturbance = frame_coupling(amplitude, tau, leaps[leaps >= 0.0], ends)
+        if width:
+            disturbance -= frame_coupling(amplitude, tau, leaps[leaps >= 0.0] + width, ends)
+        return disturbance
 
     def _first_reference(self, off: Array, rng: np.random.Generator) -> Array:
         """Return the signal; with ``random``, references about it, uniform between thresholds."""

@@ -151,7 +151,7 @@ def test_dead_pixels_are_silent_and_the_others_as_they_were():
 
 def test_coupling_is_that_of_the_camera_after_its_rise_and_never_before_a_readout():
     readouts, tau_s = np.array([0.0, 0.002, 0.004, 0.0061]), 800e-6
-    hook = FrameCouplingHooks(FrameCoupling(amplitude=0.1, tau_us=800.0), delay_us=200.0)
+    hook = FrameCouplingHooks(FrameCoupling(amplitude=0.1, tau_us=800.0), 200.0)
     hook.begin(View(2, 2, 0, 0.0))
     frames = [(round(t * 1e9), np.zeros((2, 2))) for t in readouts]
     assert [t for t, _ in hook.light(iter(frames))] == [t for t, _ in frames]
@@ -179,7 +179,50 @@ def test_coupling_is_that_of_the_camera_after_its_rise_and_never_before_a_readou
     assert steps == np.where(busy, 800 / 12, math.inf).tolist()
     assert [hook.longest_step_us(t, t + 1e-4) for t in times[later]] == steps[-sum(later) :]
     np.testing.assert_allclose(hook.signal(times[later]), found[later], atol=1e-12)
-    assert len(hook._readouts) == 2
+    assert len(hook._leaps) == 2
+
+
+def test_a_pulse_is_a_leap_and_one_back_that_the_frames_before_it_wait_for():
+    tau_s, width_s, rise = 3e-3, 0.9e-3, 75e-6
+    coupling = FrameCoupling(amplitude=-0.2, tau_us=3000.0, delay_us=-2500.0, width_us=900.0)
+    hook = FrameCouplingHooks(coupling, 500.0)
+    hook.begin(View(2, 2, 0, 0.0))
+    stamps = [0.0, 0.004, 0.0081, 0.012]
+    known, passed = [], []
+
+    def coming():
+        for stamp in stamps:
+            known.append(stamp)
+            yield round(stamp * 1e9), np.zeros((2, 2))
+
+    for t_ns, _ in hook.light(coming()):
+        # a frame may only go when the leaps up to its time are known, 2 ms ahead of theirs
+        assert known[-1] >= t_ns * 1e-9 + 0.002 or known == stamps
+        passed.append(t_ns)
+    assert passed == [round(stamp * 1e9) for stamp in stamps]
+    begins = np.array([0.002, 0.0061, 0.010])  # that of the first frame is before all began
+    times = np.linspace(0.0, 0.015, 1500)
+    wanted = frame_coupling(-0.2, tau_s, begins + rise, times)
+    wanted -= frame_coupling(-0.2, tau_s, begins + width_s + rise, times)
+    since = times[:, None] - np.concatenate([begins, begins + width_s])
+    # the camera sees the height of a leap with the step that it lies in
+    near = np.any((since >= 0.0) & (since < rise + 2e-5), axis=1)
+    assert np.count_nonzero(~near) > 1300
+    np.testing.assert_allclose(hook.signal(times)[~near], wanted[~near], atol=1e-9)
+    assert hook.signal(np.array([0.002 + rise]))[0] == pytest.approx(-0.2)
+    back = hook.signal(np.array([0.002 + width_s + rise]))[0]
+    assert back == pytest.approx(-0.2 * (np.exp(-width_s / tau_s) - 1.0))
+
+    def step(start_ms):
+        return hook.longest_step_us(1e-3 * start_ms, 1e-3 * start_ms + 1e-5)
+
+    # the leap, between both, the leap back, the decay of both, and when that is over
+    assert [step(2.02), step(2.5), step(2.92), step(4.0)] == [75.0, 250.0, 75.0, 250.0]
+    assert step(1.0) == step(33.0) == math.inf
+    before = hook.signal(times)
+    hook.passed(0.0065)  # between a leap and the one back, which is still to come
+    later = times >= 0.0065
+    np.testing.assert_allclose(hook.signal(times)[later], before[later], atol=1e-12)
 
 
 def test_frames_that_were_made_between_others_are_not_read_out():

@@ -1,14 +1,25 @@
 r"""Frame coupling: the readout of a frame disturbs the event pixels of the same sensor.
 
-.. math:: d(t) = A \sum_{t_f < t} e^{-(t - t_f)/\tau}
+.. math::
+
+    d(t) = A \sum_f \left( l(t - t_f) - l(t - t_f - w) \right), \qquad
+    l(s) = e^{-s/\tau} \text{ for } s > 0, \text{ else } 0
 
 is added to the signal of all pixels behind all poles, with A = ``amplitude`` [ln], tau = ``tau_us``
 and t_f the times at which frames were read out: the end of each exposure, that is the time of the
-frame on the camera's clock (after clock offset and drift) plus half of ``frames.exposure_us``.
-The pixels are at rest at the first frame.  The leap is a rise over a twelfth of tau, the longest
-step of time, after which it decays: nothing shows before the readout, and its height is met.  A
-line through such a step of the decay is off by A/1152; intervals that begin when no more than that
-is left, 7 tau after a readout, take the steps that they would without it.
+frame on the camera's clock (after clock offset and drift) plus half of ``frames.exposure_us``, and
+``delay_us`` more, or less if that is below 0.  With w = ``width_us`` the signal leaps back so long
+after it leapt; where that is 0, it only decays.
+
+All pixels that are within A of a threshold fire at the leap: of a DAVIS240C that watches a scene in
+motion a tenth of all events, within 0.3 ms of each frame; those of the other polarity follow when
+the signal leaps back.
+
+The pixels are at rest at the first frame: there is no leap before it.  A leap is a rise over a
+twelfth of tau, or of w where that is shorter, which is the longest step of time there, after which
+it decays: nothing shows before it, and its height is met.  A line through a step of a twelfth of
+tau of the decay is off by A/1152; intervals that begin when no more than that is left, 7 tau after
+a leap, take the steps that they would without it.
 
 References
 ----------
@@ -21,7 +32,9 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +43,7 @@ from adv2e.effects.hooks import Frames, Hooks, Times, View
 from adv2e.parameters import Fit, Section, parameter
 
 _STEPS_PER_TAU = 12
+_SAME_S = 1e-9
 _FADED = math.log(8.0 * _STEPS_PER_TAU**2)
 """Time constants after which what is left is what steps leave out of the decay at its start."""
 
@@ -49,6 +63,19 @@ class FrameCoupling(Section):
         above=0,
         fit=Fit(20.0, 1e5, 300.0, log=True),
     )
+    delay_us: float = parameter(
+        0.0,
+        unit="us",
+        meaning="from the end of an exposure to the leap; below 0: before it",
+        fit=Fit(-1e5, 1e5, 0.0),
+    )
+    width_us: float = parameter(
+        0.0,
+        unit="us",
+        meaning="after so long the signal leaps back; 0: it only decays",
+        at_least=0,
+        fit=Fit(20.0, 1e5, 1000.0, log=True),
+    )
 
 
 class FrameCouplingHooks(Hooks):
@@ -57,8 +84,8 @@ class FrameCouplingHooks(Hooks):
     Parameters
     ----------
     parameters : FrameCoupling
-    delay_us : float
-        From a frame's time to its readout.
+    exposed_us : float
+        From a frame's time to the end of its exposure.
     every : int
         Of so many frames one was recorded, from the first on; the others were made between them.
     """
@@ -66,52 +93,75 @@ class FrameCouplingHooks(Hooks):
     stage = "readout"
     Parameters = FrameCoupling
 
-    def __init__(self, parameters: FrameCoupling, delay_us: float = 0.0, every: int = 1) -> None:
+    def __init__(self, parameters: FrameCoupling, exposed_us: float = 0.0, every: int = 1) -> None:
         super().__init__(parameters)
-        self._delay_s, self._every = delay_us * 1e-6, every
+        self._delay_s, self._every = (exposed_us + parameters.delay_us) * 1e-6, every
+        self._width_s = parameters.width_us * 1e-6
+        self._tau_s = parameters.tau_us * 1e-6
+        self._rise_us = min(parameters.tau_us, parameters.width_us or math.inf) / _STEPS_PER_TAU
         self.step_us = parameters.tau_us / _STEPS_PER_TAU
-        self._rise_s = self.step_us * 1e-6
 
     def begin(self, view: View) -> None:
         """Forget the frames of before."""
         super().begin(view)
-        # of each readout: its time, and the sum of what all up to it have left at that time
-        self._readouts: list[float] = []
+        # of each leap: its time, and the sum of what all up to it have left at that time
+        self._leaps: list[float] = []
         self._sums: list[float] = []
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames as they are, and note when they were read out."""
-        tau_s = self.parameters.tau_us * 1e-6
-        for number, (t_ns, light) in enumerate(frames):
+        """Yield the frames as they are, each once all leaps before it are known."""
+        ahead_ns = max(0, math.ceil(-self._delay_s * 1e9))
+        held: deque[tuple[int, NDArray[Any]]] = deque()
+        for number, frame in enumerate(frames):
             if number % self._every == 0:
-                time = t_ns * 1e-9 + self._delay_s
-                left = 0.0
-                if self._readouts:
-                    left = self._sums[-1] * float(np.exp((self._readouts[-1] - time) / tau_s))
-                self._readouts.append(time)
-                self._sums.append(1.0 + left)
-            yield t_ns, light
+                self._leap(frame[0] * 1e-9 + self._delay_s)
+            held.append(frame)
+            while held and held[0][0] + ahead_ns <= frame[0]:
+                yield held.popleft()
+        yield from held
+
+    def _leap(self, time: float) -> None:
+        if time < self.view.start_s - _SAME_S:
+            return
+        left = 0.0
+        if self._leaps:
+            left = self._sums[-1] * float(np.exp((self._leaps[-1] - time) / self._tau_s))
+        self._leaps.append(time)
+        self._sums.append(1.0 + left)
 
     def signal(self, times_s: Times) -> NDArray[np.float64]:
         """Return the disturbance, (n,)."""
-        readouts, sums = np.array(self._readouts), np.array(self._sums)
-        last = np.searchsorted(readouts, times_s, "right") - 1
-        waited = np.maximum(times_s - readouts[last], 0.0)
-        tau_s = self.parameters.tau_us * 1e-6
-        fading = np.exp(-(waited - self._rise_s) / tau_s)
-        rising = waited / self._rise_s
+        left = self._left(times_s)
+        if self._width_s:
+            left = left - self._left(times_s - self._width_s)
+        return np.where(times_s > self.view.start_s, self.parameters.amplitude * left, 0.0)
+
+    def _left(self, times_s: Times) -> NDArray[np.float64]:
+        """Return what is left of all leaps up to each time, of a leap of one."""
+        if not self._leaps:
+            return np.zeros(len(times_s))
+        leaps, sums = np.array(self._leaps), np.array(self._sums)
+        last = np.searchsorted(leaps, times_s, "right") - 1
+        waited = np.maximum(times_s - leaps[last], 0.0)
+        rise_s = self._rise_us * 1e-6
+        fading = np.exp(-(waited - rise_s) / self._tau_s)
+        rising = waited / rise_s
         left = (sums[last] - 1.0) * fading + np.where(rising < 1.0, rising, fading)
-        begun = (last >= 0) & (times_s > self.view.start_s)
-        return np.where(begun, self.parameters.amplitude * left, 0.0)
+        return np.where(last >= 0, left, 0.0)
 
     def longest_step_us(self, start_s: float, stop_s: float) -> float:
-        """Return its step, and no limit where what was read out before has decayed."""
-        before = bisect_left(self._readouts, stop_s) - 1
-        faded_s = _FADED * self.parameters.tau_us * 1e-6
-        quiet = before < 0 or start_s >= self._readouts[before] + faded_s
-        return math.inf if quiet else self.step_us
+        """Return its step, and no limit where what leapt before has decayed."""
+        backs = (0.0, self._width_s) if self._width_s else (0.0,)
+        return min(self._step_us(start_s - back, stop_s - back) for back in backs)
+
+    def _step_us(self, start_s: float, stop_s: float) -> float:
+        before = bisect_left(self._leaps, stop_s) - 1
+        if before < 0 or start_s >= self._leaps[before] + _FADED * self._tau_s:
+            return math.inf
+        rises = start_s < self._leaps[before] + self._rise_us * 1e-6
+        return self._rise_us if rises else self.step_us
 
     def passed(self, time_s: float) -> None:
-        """Forget the readouts that no later time needs."""
-        done = max(bisect_left(self._readouts, time_s) - 1, 0)
-        del self._readouts[:done], self._sums[:done]
+        """Forget the leaps that no later time needs."""
+        done = max(bisect_left(self._leaps, time_s - self._width_s) - 1, 0)
+        del self._leaps[:done], self._sums[:done]
