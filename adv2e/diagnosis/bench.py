@@ -204,7 +204,8 @@ def _joined(fits: tuple[Fitted, ...], declared: Config, free: tuple[Knob, ...]) 
     name = " and ".join(fit.candidate.name for fit in fits)
     unknown = [knob.inner(neutral_value(declared, knob)) for knob in free]
     place = np.concatenate([*(fit.place for fit in fits), unknown])
-    joint = Candidate(name, knobs, (), extra, defaults, known=known)
+    pulse = next((fit.candidate.pulse for fit in fits), None)
+    joint = Candidate(name, knobs, (), extra, defaults, known=known, pulse=pulse)
     return Fitted(joint, declared, place, reach=_REACH)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config, to_dict
 from adv2e.config.paths import flat, get_key, set_key
 from adv2e.diagnosis.keys import from_values
+from adv2e.diagnosis.pulses import Pulse
 from adv2e.diagnosis.readouts import Readouts
 
 Places = Sequence[float] | NDArray[np.float64]
@@ -98,6 +99,9 @@ class Candidate:
     readouts : Readouts, optional
         When frames were read out if this effect is there: of exposures that are fitted, only those
         which end then go with it, and no fit finds these from others.
+    pulse : Pulse, optional
+        That bursts of events tell: where it is in a model stays with them, whatever this effect
+        does to the times of the frames.
     of_chance : bool
         It makes chance larger or smaller more than it moves any mean, which no misfit of a few
         simulations shows: it is always simulated often.
@@ -111,6 +115,7 @@ class Candidate:
     left: float = FITTED
     known: tuple[tuple[float, float], ...] = ()
     readouts: Readouts | None = None
+    pulse: Pulse | None = None
     of_chance: bool = False
 
     @property
@@ -128,7 +133,8 @@ class Candidate:
         for key, value in self.defaults:
             if get_key(values, key.rpartition(".")[0]) is None:
                 set_key(values, key, value)
-        return from_values(self._set(values, inner), self.name, config)
+        applied = from_values(self._set(values, inner), self.name, config)
+        return applied if self.pulse is None else self.pulse.placed(applied)
 
     def parameters(self, inner: Places) -> dict[str, Any]:
         """Return the keys that this effect sets, and their values."""

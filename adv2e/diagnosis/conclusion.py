@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.config import Config, to_dict
+from adv2e.config.paths import get_key
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate
@@ -91,7 +93,7 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
     return Conclusion(verdict, kept, rows, Gallery(scene, ready.measured, before, after))
 
 
-def finding_of(fit: Fitted, pixels: int) -> Finding:
+def finding_of(fit: Fitted, pixels: int, config: Config) -> Finding:
     """Return an effect that was added, with 95 % intervals of what was fitted.
 
     Parameters
@@ -99,8 +101,14 @@ def finding_of(fit: Fitted, pixels: int) -> Finding:
     fit : Fitted
     pixels : int
         Of the recording: of a share of them, no more can be known than so many draws tell.
+    config : Config
+        The model, which tells what was set besides.
     """
-    parameters = fit.candidate.parameters(fit.place)
+    besides, values = {key for key, _ in fit.candidate.extra}, to_dict(config)
+    parameters = {
+        key: get_key(values, key) if key in besides else value
+        for key, value in fit.candidate.parameters(fit.place).items()
+    }
     interval: dict[str, Any] = {}
     spread: Any = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if fit.covariance.size else []
     for knob, place, sd in zip(fit.candidate.knobs, fit.place, spread, strict=False):

@@ -101,7 +101,9 @@ def diagnose(
             sentence=sentence_of(found.verdict, kept, outcome, declared),
             recording=evidence.name,
             declared=declared_name,
-            effects=[finding_of(fit, evidence.width * evidence.height) for fit in kept.fits],
+            effects=[
+                finding_of(fit, evidence.width * evidence.height, kept.config) for fit in kept.fits
+            ],
             alternatives=outcome.alternatives if kept.fits else [],
             nuisances=thresholds_of(kept.config) if free_thresholds else {},
             rejected=rejected_of(outcome, kept, search.candidates),

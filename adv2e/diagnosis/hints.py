@@ -9,6 +9,7 @@ import numpy as np
 
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.lamps import Lamp
+from adv2e.diagnosis.pulses import Pulse, pulse_of
 from adv2e.diagnosis.readouts import Readouts, readouts_of
 from adv2e.diagnosis.stamps import Service, service_times, tick_of
 from adv2e.diagnosis.stream import Stream
@@ -32,6 +33,8 @@ class Hints:
         Times that an event and a row take, where stamps look as if they had waited for a channel.
     readouts : Readouts, optional
         Of frames, where all pixels fire at once after each.
+    pulse : Pulse, optional
+        Where they fire twice: as the signal leaps, and as it leaps back.
     too_many : (float, float)
         ON and OFF events that the declared model makes, over those measured.
     """
@@ -42,6 +45,7 @@ class Hints:
     encoding: str = "linear"
     service: Service | None = None
     readouts: Readouts | None = None
+    pulse: Pulse | None = None
     too_many: tuple[float, float] = (1.0, 1.0)
 
 
@@ -64,6 +68,7 @@ def hints_of(evidence: Evidence, lamps: Sequence[Lamp], pilot: Sequence[Stream] 
         evidence.encoding,
         service_times(stream),
         readouts_of(stream, evidence.times_s),
+        pulse_of(stream, evidence.times_s),
         (_too_many(stream, pilot, 1), _too_many(stream, pilot, 0)),
     )
 

@@ -22,6 +22,7 @@ from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.hints import Hints
 from adv2e.diagnosis.keys import known_keys
 from adv2e.diagnosis.lamps import Lamp
+from adv2e.diagnosis.pulses import WIDTH
 from adv2e.diagnosis.stamps import Service
 from adv2e.effects.pixel.initial_reference import REFERENCES
 from adv2e.parameters import Fit
@@ -32,8 +33,11 @@ _DECLARED = known_keys(Config)
 def library(declared: Config, hints: Hints) -> list[Candidate]:
     """Return all candidates for what `declared` may lack."""
     known = known_keys(type(declared))
+    if get_key(to_dict(declared), WIDTH):  # a pulse that is declared stays where it is
+        hints = dataclasses.replace(hints, pulse=None)
     built_in = [one for one in _all(declared, hints) if all(key in known for key in _keys_of(one))]
-    return [*built_in, *_of_the_user(declared)]
+    every = [*built_in, *_of_the_user(declared)]
+    return [dataclasses.replace(one, pulse=hints.pulse) for one in every]
 
 
 def _all(declared: Config, hints: Hints) -> list[Candidate]:
@@ -227,15 +231,8 @@ def _of_the_comparator(now: _Now, times: _Times, values: Any, hints: Hints) -> l
 
 
 def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list[Candidate]:
-    amplitude = _knob("readout.frame_coupling.amplitude", 0.05)
-    tau = _knob("readout.frame_coupling.tau_us")
     made = [
-        Candidate(
-            "frame_coupling",
-            (amplitude, tau),
-            ((0.05, 300.0), (-0.05, 300.0), (0.05, 1200.0), (0.15, 300.0)),
-            readouts=hints.readouts,
-        ),
+        *_frame_coupling(hints),
         _arbiter(hints.service),
         Candidate(
             "event_loss",
@@ -246,6 +243,32 @@ def _of_the_readout(now: _Now, times: _Times, values: Any, hints: Hints) -> list
     tick_us = float(hints.tick_us) if hints.tick_us > 1 else 0.0
     if tick_us != (get_key(values, "readout.tick_us") or 0.0):
         made.append(Candidate("timestamp_tick", (), ((),), (("readout.tick_us", tick_us),)))
+    return made
+
+
+def _frame_coupling(hints: Hints) -> list[Candidate]:
+    """Return leaps at the end of exposures; or the pulse that bursts of events tell."""
+    amplitude = _knob("readout.frame_coupling.amplitude", 0.05)
+    tau = _knob("readout.frame_coupling.tau_us")
+    if hints.pulse is None:
+        probes = ((0.05, 300.0), (-0.05, 300.0), (0.05, 1200.0), (0.15, 300.0))
+        return [
+            Candidate("frame_coupling", (amplitude, tau), probes, readouts=hints.readouts),
+        ]
+    made = []
+    for sign in (1.0, -1.0):
+        leap = (
+            dataclasses.replace(amplitude, low=0.0)
+            if sign > 0.0
+            else dataclasses.replace(amplitude, high=0.0)
+        )
+        keys = hints.pulse.keys(up=sign > 0.0)
+        starts = tuple(
+            (sign * size, min(max(widths * keys[WIDTH], tau.low), tau.high))
+            for size in (0.03, 0.1)
+            for widths in (2.0, 20.0)
+        )
+        made.append(Candidate("frame_coupling", (leap, tau), starts, tuple(keys.items())))
     return made
 
 

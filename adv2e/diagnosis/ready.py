@@ -107,6 +107,8 @@ def make_ready(
     laboratory = Laboratory(simulator, scene, pilot.markers, frames.bias if frames else None)
     lamps = _lamps(pilot, simulator)
     hints = hints_of(evidence, lamps, list(pilot.streams.values()))
+    if hints.pulse:
+        evidence = replace(evidence, notes=[*evidence.notes, hints.pulse.text()])
     return Ready(
         evidence,
         declared,

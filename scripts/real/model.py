@@ -16,7 +16,10 @@ from adv2e.config import Config
 from adv2e.decoding import decoder_for
 from adv2e.diagnosis.instants import Instants, Kept, events_of, is_made_once
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
+from adv2e.diagnosis.pulses import pulse_of
+from adv2e.diagnosis.stream import Stream
 from adv2e.events import Events
+from adv2e.stepping import Coarseness
 from real.recording import Real, still_rate
 
 SCORE = "relative_5_bins_smoothed"
@@ -25,6 +28,8 @@ SOUGHT = (SCORE, "relative_1_bin_smoothed")
 """What the search goes by, their mean: by one alone, on few windows, it would fit chance."""
 NEAR = 0.03
 """Totals match to this while candidates are compared, relative."""
+COARSE = Coarseness(solved=4.0)
+"""Steps of time where the pixels are solved in steps: the scores see hundreds of microseconds."""
 BEYOND_US = 100_000
 """Frames are simulated to this long after the windows, as a clock offset may need them [us]."""
 
@@ -55,11 +60,19 @@ class Bench:
 
     In-between frames along the motion take longer than all else, so they are made once for what
     they depend on (:mod:`adv2e.diagnosis.instants`).
+
+    Attributes
+    ----------
+    pulse : Pulse, optional
+        That follows each frame, as far as bursts of events tell.
+    simulations : int
+        Made so far.
     """
 
     def __init__(self, real: Real, threads: int | None) -> None:
         self.real, self.threads = real, threads
         self._frames = Kept()
+        self.pulse = pulse_of(Stream.of(real.events, *real.size), real.times_us * 1e-6)
         self.simulations = 0
 
     def quick(self, config: Config, windows: Windows, seed: int) -> Events:
@@ -71,8 +84,9 @@ class Bench:
         times_ns, light = self._frames.of(config, lambda: self._read(config))
         used = bisect_right(times_ns, (windows.stop + BEYOND_US) * 1000)
         events = events_of(
-            (times_ns[:used], light[:used]), replace(config, seed=seed), threads=self.threads
-        )
+            (times_ns[:used], light[:used]), replace(config, seed=seed),
+            threads=self.threads, coarseness=COARSE,
+        )  # fmt: skip
         return cut(events, windows.start, windows.stop)
 
     def _read(self, config: Config) -> Instants:
@@ -83,7 +97,11 @@ class Bench:
         return [one.t_ns for one in frames], np.array([decoder.decode(one.image) for one in frames])
 
     def matched(self, config: Config, windows: Windows, tolerance: float = NEAR) -> Config:
-        """Return `config` with thresholds that match the totals in the windows."""
+        """Return `config` with thresholds that match the totals in the windows.
+
+        And with a pulse, if it has one, where the bursts are.
+        """
+        config = self.pulse.placed(config) if self.pulse else config
         goal = totals(cut(self.real.events, windows.start, windows.stop))
 
         def count(on: float, off: float) -> tuple[int, int]:
@@ -156,3 +174,9 @@ class Bench:
 def means(found: Sequence[Floor]) -> Floor:
     """Return the mean of each measure."""
     return {name: pooled([one[name] for one in found], "mean") for name in found[0]}
+
+
+def without_coupling(config: Config) -> Config:
+    """Return `config` without what the readout of frames does to the pixels."""
+    readout = config.readout
+    return replace(config, readout=readout and replace(readout, frame_coupling=None))

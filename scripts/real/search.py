@@ -35,7 +35,7 @@ class Search:
 
     def __init__(self, bench: Bench, windows: Windows, say: Callable[[str], None]) -> None:
         self._fit, self._say = Fitter(bench, windows), say
-        self._seconds = windows.duration_s
+        self._seconds, self._pulse = windows.duration_s, bench.pulse
         self._measured_hz = bench.still_hz(windows)
         self._noisy: set[Probe] = set()
 
@@ -66,7 +66,7 @@ class Search:
         model = yield from self._additions(OWN, model)
         # with references at random chance is another
         model = replace(model, here=self._measured(model.here.config))
-        everything = [*OWN, *of_the_camera(declared, self._seconds, only)]
+        everything = [*OWN, *of_the_camera(declared, self._seconds, only, self._pulse)]
         while True:
             model = yield from self._grown(everything, model)
             model = yield from self._removals(model)

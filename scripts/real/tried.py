@@ -11,6 +11,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.hints import Hints
 from adv2e.diagnosis.library import library
+from adv2e.diagnosis.pulses import Pulse
 
 NOISE_HZ = 0.1
 NOISES = ("leak", "photo_leak", "shot_noise", "photoreceptor_noise", "hot_pixels")
@@ -59,20 +60,38 @@ UNSEEN = {
     "clock_drift": "not within half a second",
     "hot_pixels": "a few pixels do not move this score",
     "dead_pixels": "a few pixels do not move this score",
-    "frame_coupling": "bound to the frames, as is interpolation: not to be told here",
 }
 """Effects of the library that are left out, and why."""
 
 
-def of_the_camera(declared: Config, seconds: float, only: Collection[str] = ()) -> list[Candidate]:
-    """Return the effects of the camera to try; `only`: with these names, empty: all."""
-    found = [CLIPPED_BLACK, *library(declared, Hints(seconds, (), 1))]
-    return [one for one in found if one.name not in UNSEEN and (not only or one.name in only)]
+COUPLING = "frame_coupling"
+"""Tried where bursts of events after each frame tell when the signal leaps, not to be guessed from
+events that all hang on the frames."""
+
+
+def of_the_camera(
+    declared: Config, seconds: float, only: Collection[str] = (), pulse: Pulse | None = None
+) -> list[Candidate]:
+    """Return the effects of the camera to try.
+
+    Parameters
+    ----------
+    declared : Config
+    seconds : float
+        Length of what is fitted to.
+    only : collection of str
+        With these names; empty: all.
+    pulse : Pulse, optional
+        That follows each frame.
+    """
+    found = [CLIPPED_BLACK, *library(declared, Hints(seconds, (), 1, pulse=pulse))]
+    unseen = {*UNSEEN, *(() if pulse else (COUPLING,))}
+    return [one for one in found if one.name not in unseen and (not only or one.name in only)]
 
 
 def tried_names() -> list[str]:
     """Return the names of the effects of the camera that can be tried."""
-    return list(dict.fromkeys(one.name for one in of_the_camera(Config(), 1.0)))
+    return [*dict.fromkeys(one.name for one in of_the_camera(Config(), 1.0)), COUPLING]
 
 
 def label(name: str) -> Candidate:

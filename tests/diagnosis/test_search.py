@@ -57,7 +57,7 @@ def test_one_effect_is_named(name, sets, value):
     _, outcome = searched([sets])
     assert outcome.state.names == (name,)
     assert verdict_of(outcome, GONE) == "explained"
-    finding = finding_of(outcome.state.fits[0], 100)
+    finding = finding_of(outcome.state.fits[0], 100, outcome.state.config)
     (key,) = (key for key in finding.parameters if key == sets.partition("=")[0])
     low, high = finding.interval[key]
     assert low < finding.parameters[key] < high
@@ -196,7 +196,7 @@ def test_two_effects_are_both_found(period, rate):
     assert config.pixel.leak.rate_hz == pytest.approx(rate, rel=0.2)
     for fit in outcome.state.fits:
         assert fit.covariance.shape == (1, 1)
-        assert finding_of(fit, 100).interval
+        assert finding_of(fit, 100, fit.config).interval
 
 
 def test_what_holds_is_no_name_where_what_does_not_explains_far_more(monkeypatch):

@@ -107,7 +107,7 @@ def test_intervals_of_a_list_are_lists():
     knobs = tuple(Knob("frames.shift_px", -20.0, 20.0, False, 0.3, (part, 2)) for part in (0, 1))
     fit = Fitted(Candidate("misregistration", knobs, ()), Config(), np.array([1.0, -2.0]))
     fit.covariance = np.diag([0.01, 0.04])
-    finding = finding_of(fit, 100)
+    finding = finding_of(fit, 100, fit.config)
     assert finding.parameters == {"frames.shift_px": [pytest.approx(0.3), pytest.approx(-0.6)]}
     low, high = finding.interval["frames.shift_px"]
     assert low == pytest.approx((0.3 - 0.3 * 0.196, -0.6 - 0.3 * 0.392))
@@ -119,7 +119,7 @@ def test_of_a_share_of_pixels_no_more_is_known_than_its_number_tells():
     (dead,) = candidates("dead_pixels")
     fit = Fitted(dead, Config(), np.array(dead.inner([0.01])), covariance=np.array([[0.001**2]]))
     for pixels, near in ((400, 0.5), (40_000, 0.01)):
-        found = finding_of(fit, pixels).interval["pixel.dead_pixels.fraction"]
+        found = finding_of(fit, pixels, fit.config).interval["pixel.dead_pixels.fraction"]
         n = 0.01 * pixels
         counted = 0.5 * np.array([chi2.ppf(0.025, 2 * n), chi2.ppf(0.975, 2 * n + 2)])  # Garwood's
         assert list(found) == pytest.approx(counted / pixels, rel=near)

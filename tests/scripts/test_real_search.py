@@ -26,7 +26,7 @@ class Valley:
     """
 
     def __init__(self, chance=0.0):
-        self.tried, self.chance = 0, chance
+        self.tried, self.chance, self.pulse = 0, chance, None
 
     def still_hz(self, windows):
         return None

@@ -1,0 +1,180 @@
+"""Pulses that the readout of frames leaves in the events, as far as these tell.
+
+Where the signal of all pixels leaps at the same time after each frame and back a while later
+(:mod:`adv2e.effects.readout.frame_coupling`), many fire within a fraction of a millisecond: events
+of one polarity first, of the other when it leaps back.  Such bursts stand out of the rate of each
+polarity against the time since a frame.  They also tell how far apart the frames are by the clock
+of the events, to some ten parts in a million.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config import Config
+from adv2e.diagnosis.keys import with_keys
+from adv2e.diagnosis.stream import Stream
+
+DELAY, WIDTH = "readout.frame_coupling.delay_us", "readout.frame_coupling.width_us"
+DRIFT = "frames.clock_drift_ppm"
+
+_BINS, _SHORTEST_US, _LONGEST_US = 400, 20.0, 100.0
+"""Of an interval between frames, and how long each is."""
+_REGULAR = 0.01
+"""Most by which intervals between frames may differ, as a share of them."""
+_FARTHEST = 0.02
+"""Most by which the clock of the frames may be slow or fast."""
+_SHARPER = 1.1
+"""How much sharper bursts must be at another interval before that is believed."""
+_STANDS_OUT, _TIMES_AS_MANY = 10.0, 3.0
+"""Deviations of a burst that is no chance, and how often as many events come then as at a median
+time."""
+_FOOT = 0.25
+"""Share of its height at which a burst begins."""
+_LEAST_SHARE = 0.01
+"""Of the events of a polarity that come in the burst."""
+
+
+@dataclass(frozen=True)
+class Burst:
+    """Events of one polarity that come at once after each frame.
+
+    Attributes
+    ----------
+    begins_us : float
+        After the time of each frame, or whole intervals later or earlier.
+    share : float
+        Of the polarity's events that are in such bursts.
+    """
+
+    begins_us: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """Two leaps of the signal after each frame.
+
+    Attributes
+    ----------
+    on, off : Burst
+        Of ON and of OFF events.
+    interval_us : float
+        Between frames, by the clock of the events.
+    drift_ppm : float
+        By how much the clock of the frames is slow; 0 where it cannot be told from the declared.
+    """
+
+    on: Burst
+    off: Burst
+    interval_us: float
+    drift_ppm: float
+
+    def keys(self, up: bool) -> dict[str, float]:
+        """Return the keys of a pulse that begins with a leap upwards or downwards.
+
+        For frames at their stamps and without exposure; see :meth:`placed`.
+        """
+        first, second = (self.on, self.off) if up else (self.off, self.on)
+        width = (second.begins_us - first.begins_us) % self.interval_us
+        found = {DELAY: self._nearest(first.begins_us), WIDTH: width}
+        return {**found, DRIFT: self.drift_ppm} if self.drift_ppm else found
+
+    def placed(self, config: Config) -> Config:
+        """Return `config` with a pulse, if it has one, where the bursts are.
+
+        Wherever its clock offset and exposure put the frames.
+        """
+        coupling = None if config.readout is None else config.readout.frame_coupling
+        if coupling is None or not coupling.width_us:
+            return config
+        first = self.on if coupling.amplitude > 0.0 else self.off
+        ends = config.frames.clock_offset_us + 0.5 * config.frames.exposure_us
+        return with_keys(config, {DELAY: self._nearest(first.begins_us - ends)})
+
+    def text(self) -> str:
+        """Return what bursts there are, for people."""
+        on, off = (
+            f"{burst.share:.0%} of the {name} events come at once"
+            f" {self._nearest(burst.begins_us) / 1e3:+.2f} ms from each frame"
+            for burst, name in ((self.on, "ON"), (self.off, "OFF"))
+        )
+        apart = f", and these are {self.interval_us / 1e3:.2f} ms apart" if self.drift_ppm else ""
+        return f"{on}, {off}{apart}: their readout disturbs the pixels (frame_coupling)"
+
+    def _nearest(self, time_us: float) -> float:
+        half = 0.5 * self.interval_us
+        return (time_us + half) % self.interval_us - half
+
+
+def pulse_of(stream: Stream, times_s: NDArray[np.float64]) -> Pulse | None:
+    """Return the pulse that follows each frame; None: there are not two bursts.
+
+    Parameters
+    ----------
+    stream : Stream
+    times_s : (frames,)
+        Stamps of the frames [s].
+    """
+    times_us = 1e6 * times_s
+    intervals = np.diff(times_us)
+    declared = float(np.median(intervals)) if len(intervals) > 1 else 0.0
+    if declared <= 0.0 or np.abs(intervals - declared).max() > _REGULAR * declared:
+        return None
+    since = stream.t - times_us[0]
+    parts = [since[stream.on == on] for on in (1, 0)]
+    interval = _interval(parts, declared, float(times_us[-1] - times_us[0]))
+    bin_us = _bin_us(interval)
+    on, off = (_burst(_folded(part, interval, bin_us), bin_us) for part in parts)
+    if on is None or off is None:
+        return None
+    return Pulse(on, off, interval, 1e6 * (interval / declared - 1.0))
+
+
+def _bin_us(interval: float) -> float:
+    longest = min(max(interval / _BINS, _SHORTEST_US), _LONGEST_US)
+    return float(interval / np.ceil(interval / longest))
+
+
+def _folded(since: NDArray[np.float64], interval: float, bin_us: float) -> NDArray[np.int64]:
+    """Return how many events come how long after a frame."""
+    bins = round(interval / bin_us)
+    place = (since % interval / bin_us).astype(np.int64)
+    return np.bincount(np.minimum(place, bins - 1), minlength=bins)
+
+
+def _interval(parts: list[NDArray[np.float64]], declared: float, seconds_us: float) -> float:
+    """Return the interval at which bursts are sharpest: the declared one unless others are more."""
+    bin_us = _bin_us(declared)
+
+    def sharpness(interval: float) -> float:
+        counts = [_folded(part, interval, bin_us * interval / declared) for part in parts]
+        return float(sum(np.square(count, dtype=np.float64).sum() for count in counts))
+
+    reach = round(_FARTHEST * 2.0 * seconds_us / bin_us)
+    tried = declared + 0.5 * bin_us * declared / seconds_us * np.arange(-reach, reach + 1)
+    found = [sharpness(interval) for interval in tried]
+    best = int(np.argmax(found))
+    return float(tried[best]) if found[best] > _SHARPER * found[reach] else declared
+
+
+def _burst(count: NDArray[np.int64], bin_us: float) -> Burst | None:
+    """Return the burst that stands out of how many events come when; None: there is none."""
+    level = float(np.median(count))
+    top = int(np.argmax(count))
+    above = count[top] - level
+    if above < _STANDS_OUT * np.sqrt(level + 1.0) or count[top] < _TIMES_AS_MANY * level:
+        return None
+    around = np.roll(count, len(count) // 2 - top) - level
+    middle = first = last = len(count) // 2
+    while first > 0 and around[first - 1] > _FOOT * above:
+        first -= 1
+    while last + 1 < len(count) and around[last + 1] > _FOOT * above:
+        last += 1
+    share = float(around[first : last + 1].sum() / count.sum())
+    if share < _LEAST_SHARE:
+        return None
+    return Burst((top + first - middle) % len(count) * bin_us, share)

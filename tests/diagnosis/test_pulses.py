@@ -1,0 +1,129 @@
+"""Pulses at the readout of frames, told by bursts of events of both polarities."""
+
+import numpy as np
+import pytest
+from made_up_laboratory import HINTS
+from made_up_streams import stream_of
+
+from adv2e.config import load_config
+from adv2e.diagnosis.library import library
+from adv2e.diagnosis.pulses import Burst, Pulse, pulse_of
+
+INTERVAL_US = 40_000.0
+TIMES_S = 5.0 + 1e-6 * INTERVAL_US * np.arange(20)
+COUPLING = "readout.frame_coupling={amplitude: %s, tau_us: 5000, delay_us: 1, width_us: %s}"
+
+
+def events(on_us=None, off_us=None, interval_us=INTERVAL_US, burst=60, seed=1):
+    """Return events at any time, with bursts of one or both polarities after each frame."""
+    draw = np.random.default_rng(seed)
+    t, on = [5e6 + 20 * INTERVAL_US * draw.random(20_000)], [draw.integers(0, 2, 20_000)]
+    for polarity, delay_us in ((1, on_us), (0, off_us)):
+        if delay_us is not None:
+            frames = 5e6 + interval_us * np.arange(19)
+            t.append((frames[:, None] + delay_us + 250.0 * draw.random(burst)).ravel())
+            on.append(np.full(t[-1].size, polarity))
+    t, on = np.concatenate(t), np.concatenate(on)
+    return stream_of(t.astype(np.int64), 0, 0, on)
+
+
+@pytest.mark.parametrize(
+    ("on_us", "off_us"), [(700.0, 1900.0), (39_600.0, 550.0), (27_300.0, 14_100.0)]
+)
+def test_when_both_bursts_begin(on_us, off_us):
+    found = pulse_of(events(on_us, off_us), TIMES_S)
+    assert found.on.begins_us == pytest.approx(on_us, abs=110.0)
+    assert found.off.begins_us == pytest.approx(off_us, abs=110.0)
+    assert found.on.share == pytest.approx(19 * 60 / (10_000 + 19 * 60), rel=0.1)
+    assert (found.interval_us, found.drift_ppm) == (pytest.approx(INTERVAL_US), 0.0)
+
+
+@pytest.mark.parametrize("ppm", [-6400.0, 300.0, 15_000.0])
+def test_bursts_tell_how_fast_the_clock_of_the_frames_is(ppm):
+    found = pulse_of(events(3000.0, 9000.0, INTERVAL_US * (1.0 + 1e-6 * ppm)), TIMES_S)
+    assert found.drift_ppm == pytest.approx(ppm, abs=80.0)
+    assert found.on.begins_us == pytest.approx(3000.0, abs=150.0)
+    assert f"{found.interval_us / 1e3:.2f} ms apart" in found.text()
+
+
+@pytest.mark.parametrize(
+    ("stream", "times_s"),
+    [
+        (events(), TIMES_S),
+        (events(on_us=700.0), TIMES_S),
+        (events(off_us=700.0), TIMES_S),
+        (events(700.0, 1900.0, burst=2), TIMES_S),
+        (events(700.0, 1900.0), TIMES_S + 1e-3 * np.random.default_rng(2).random(20)),
+        (events(700.0, 1900.0), TIMES_S[:2]),
+    ],
+    ids=["none", "on alone", "off alone", "few", "irregular", "two frames"],
+)
+def test_no_pulse(stream, times_s):
+    assert pulse_of(stream, times_s) is None
+
+
+def test_swings_are_no_pulses():
+    draw = np.random.default_rng(5)
+    t = 5e6 + 20 * INTERVAL_US * draw.random(60_000)
+    on = draw.integers(0, 2, t.size)
+    phase = 2.0 * np.pi * t / INTERVAL_US + np.pi * on
+    kept = draw.random(t.size) < 0.5 + 0.5 * np.sin(phase)
+    assert pulse_of(stream_of(t[kept].astype(np.int64), 0, 0, on[kept]), TIMES_S) is None
+
+
+ON, OFF = Burst(39_600.0, 0.124), Burst(600.0, 0.09)
+PULSE = Pulse(ON, OFF, INTERVAL_US, drift_ppm=0.0)
+
+
+def test_the_bursts_in_words():
+    assert PULSE.text() == (
+        "12% of the ON events come at once -0.40 ms from each frame, 9% of the OFF events come at"
+        " once +0.60 ms from each frame: their readout disturbs the pixels (frame_coupling)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("sets", "amplitude", "delay_us"),
+    [
+        ([], 0.05, -400.0),
+        ([], -0.05, 600.0),
+        (["frames.clock_offset_us=1900"], 0.05, -2300.0),
+        (["frames.clock_offset_us=-300", "frames.exposure_us=5000"], 0.05, -2600.0),
+        (["frames.exposure_us=50000"], 0.05, 14_600.0),
+    ],
+)
+def test_a_pulse_stays_with_the_bursts_wherever_the_frames_are(sets, amplitude, delay_us):
+    config = load_config([], [*sets, COUPLING % (amplitude, 1000)])
+    found = PULSE.placed(config).readout.frame_coupling
+    assert found.delay_us == pytest.approx(delay_us)
+    assert (found.amplitude, found.width_us) == (amplitude, 1000.0)
+
+
+def test_what_is_no_pulse_is_not_moved():
+    for sets in ([], [COUPLING % (0.05, 0)]):
+        config = load_config([], sets)
+        assert PULSE.placed(config) == config
+
+
+def test_the_library_has_the_pulse_in_the_place_of_leaps_at_the_end_of_exposures():
+    def couplings(hints, sets=()):
+        made = library(load_config([], list(sets)), hints)
+        return [one for one in made if one.name == "frame_coupling"]
+
+    (leap,) = couplings(HINTS)
+    assert (leap.extra, leap.pulse) == ((), None)
+    drifting = Pulse(ON, OFF, INTERVAL_US, -6400.0)
+    up, down = couplings(HINTS.__class__(**{**vars(HINTS), "pulse": drifting}))
+    assert dict(up.extra)["readout.frame_coupling.width_us"] == pytest.approx(1000.0)
+    assert dict(down.extra)["readout.frame_coupling.width_us"] == pytest.approx(39_000.0)
+    assert dict(up.extra)["frames.clock_drift_ppm"] == -6400.0
+    assert all(probe[0] > 0.0 for probe in up.probes)
+    assert all(probe[0] < 0.0 for probe in down.probes)
+    config = up.applied(load_config([], ["frames.clock_offset_us=1000"]), up.inner((0.05, 4000.0)))
+    coupling = config.readout.frame_coupling
+    assert (coupling.amplitude, coupling.tau_us) == (pytest.approx(0.05), pytest.approx(4000.0))
+    assert coupling.delay_us == pytest.approx(-1400.0)
+    assert config.frames.clock_drift_ppm == -6400.0
+    # one that is declared stays where it is said to be
+    declared = couplings(HINTS, [COUPLING % (0.05, 1000)])
+    assert [one.pulse for one in declared] == [None]
