@@ -29,11 +29,18 @@ _FARTHEST = 0.02
 """Most by which the clock of the frames may be slow or fast."""
 _SHARPER = 1.1
 """How much sharper bursts must be at another interval before that is believed."""
+_ENOUGH = 100_000
+"""Events of a polarity that tell the interval."""
 _STANDS_OUT, _TIMES_AS_MANY = 10.0, 3.0
 """Deviations of a burst that is no chance, and how often as many events come then as at a median
 time."""
 _FOOT = 0.25
 """Share of its height at which a burst begins."""
+_LONGEST = 0.04
+"""Share of an interval that a burst takes at most: lamps at multiples of the frame rate make ON and
+OFF events in turn, too, but for milliseconds, and again and again."""
+_OTHERS = 0.5
+"""Of its height that any other may have."""
 _LEAST_SHARE = 0.01
 """Of the events of a polarity that come in the burst."""
 
@@ -149,9 +156,10 @@ def _folded(since: NDArray[np.float64], interval: float, bin_us: float) -> NDArr
 def _interval(parts: list[NDArray[np.float64]], declared: float, seconds_us: float) -> float:
     """Return the interval at which bursts are sharpest: the declared one unless others are more."""
     bin_us = _bin_us(declared)
+    some = [part[:: 1 + len(part) // _ENOUGH] for part in parts]
 
     def sharpness(interval: float) -> float:
-        counts = [_folded(part, interval, bin_us * interval / declared) for part in parts]
+        counts = [_folded(part, interval, bin_us * interval / declared) for part in some]
         return float(sum(np.square(count, dtype=np.float64).sum() for count in counts))
 
     reach = round(_FARTHEST * 2.0 * seconds_us / bin_us)
@@ -174,7 +182,11 @@ def _burst(count: NDArray[np.int64], bin_us: float) -> Burst | None:
         first -= 1
     while last + 1 < len(count) and around[last + 1] > _FOOT * above:
         last += 1
-    share = float(around[first : last + 1].sum() / count.sum())
+    burst = around[first : last + 1]
+    others = max(around[:first].max(initial=0.0), around[last + 1 :].max(initial=0.0))
+    if len(burst) > max(_LONGEST * len(count), 1.0) or others > _OTHERS * above:
+        return None
+    share = float(burst.sum() / count.sum())
     if share < _LEAST_SHARE:
         return None
     return Burst((top + first - middle) % len(count) * bin_us, share)

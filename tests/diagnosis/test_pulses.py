@@ -72,6 +72,26 @@ def test_swings_are_no_pulses():
 
 
 ON, OFF = Burst(39_600.0, 0.124), Burst(600.0, 0.09)
+
+
+@pytest.mark.parametrize("swing", [0.05, 0.5])
+def test_a_lamp_at_four_times_the_frame_rate_is_no_pulse(swing):
+    """Sharp or not, its bursts come every quarter of an interval."""
+    draw = np.random.default_rng(5)
+    on = draw.integers(0, 2, 20_000)
+    turns = draw.integers(0, 80, on.size) + 0.5 * on + swing * draw.random(on.size)
+    t = 5e6 + 0.25 * INTERVAL_US * turns
+    assert pulse_of(stream_of(t.astype(np.int64), 0, 0, on), TIMES_S) is None
+
+
+def test_a_lamp_at_the_frame_rate_is_no_pulse():
+    draw = np.random.default_rng(5)
+    on = draw.integers(0, 2, 20_000)
+    turns = draw.integers(0, 20, on.size) + 0.5 * on + 0.15 * draw.random(on.size)
+    t = 5e6 + INTERVAL_US * turns
+    assert pulse_of(stream_of(t.astype(np.int64), 0, 0, on), TIMES_S) is None
+
+
 PULSE = Pulse(ON, OFF, INTERVAL_US, drift_ppm=0.0)
 
 
