@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import click
+from real.bursts import bursts
 from real.model import SCORE, Bench, Judged, without_coupling
 from real.peers import peer_rows
 from real.recording import Real, halves, read
@@ -150,6 +151,7 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
     )
     steps[-1] = last
     stable = _where_stable(bench, steps, second, seeds)
+    at_readouts = bursts(bench, last.added.config, second, seeds[0])
     seconds = time.perf_counter() - began
     say(f"{bench.simulations} simulations in {seconds:.0f} s")
     return "\n\n".join(
@@ -158,6 +160,7 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
             _table(real.size, cut(real.events, second.start, second.stop), steps, second),
             _found(last, config, bench.missed(last.added.config, first), ended),
             stable,
+            *([at_readouts] if at_readouts else []),
             _beside_peers(real, last),
         ]
     )

@@ -1,0 +1,88 @@
+"""Bursts of events at the readout of frames, in what is told of a real recording."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from real.bursts import bursts
+from real.model import Bench, without_coupling
+from real.recording import halves, read
+from real.search import Search
+from real.tried import of_the_camera
+
+from adv2e import simulate
+from adv2e.config import load_config
+
+WIDTH, HEIGHT, FRAMES = 32, 24, 13
+TIMES = 0.04 * np.arange(FRAMES)
+PIXEL = [
+    "pixel.thresholds.on=0.2",
+    "pixel.thresholds.off=0.15",
+    "pixel.log_response.linear_below=0",
+    "pixel.log_response.floor=0.5",
+]
+COUPLING = (
+    "readout.frame_coupling={amplitude: 0.07, tau_us: 20000, delay_us: -2000, width_us: 1500}"
+)
+
+
+def write_recording(folder, sets):
+    """Write waves that an ideal pixel sees, which drift slowly."""
+    (folder / "images").mkdir(parents=True)
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    phases = 2 * np.pi * (x / 11 + y / 17 - 2.3 * TIMES[:, None, None])
+    frames = np.rint(80 + 60 * np.sin(phases)).astype(np.uint8)
+    config = load_config(["ideal"], [*PIXEL, *sets])
+    events = np.concatenate(list(simulate(frames, TIMES, config, threads=1)))
+    names = [f"images/frame_{number:08d}.png" for number in range(FRAMES)]
+    for name, frame in zip(names, frames, strict=True):
+        assert cv2.imwrite(str(folder / name), frame)
+    stamps = [f"{t:.9f} {name}\n" for t, name in zip(TIMES, names, strict=True)]
+    (folder / "images.txt").write_text("".join(stamps))
+    lines = [f"{e['t'] / 1e6:.9f} {e['x']} {e['y']} {e['p']}\n" for e in events]
+    (folder / "events.txt").write_text("".join(lines))
+    return Bench(read(str(folder)), 1)
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    return write_recording(tmp_path_factory.mktemp("real") / "pulsed", [COUPLING])
+
+
+def test_frame_coupling_is_tried_where_there_are_bursts(bench, tmp_path):
+    def names(pulse):
+        return {one.name for one in of_the_camera(load_config(), 0.24, (), pulse)}
+
+    assert bench.pulse is not None
+    assert names(bench.pulse) - names(None) == {"frame_coupling"}
+    quiet = write_recording(tmp_path / "quiet", [])
+    assert quiet.pulse is None
+    assert bursts(quiet, load_config(), quiet.real.windows, 1) == ""
+
+
+def test_the_search_finds_the_pulse_that_made_the_bursts(bench, monkeypatch):
+    monkeypatch.setattr("real.search.OWN", ())
+    first, second = halves(bench.real.windows)
+    declared = load_config(["ideal"], PIXEL)
+    steps = list(Search(bench, first, lambda text: None).run(declared, ["frame_coupling"]))
+    assert [step.candidate.name for step in steps[:2]] == ["thresholds", "frame_coupling"]
+    found = steps[-1].config
+    coupling = found.readout.frame_coupling
+    assert steps[-1].score < 0.6 * steps[0].score
+    # a pulse upwards, or nearly the same: one downwards for the rest of the interval
+    assert abs(coupling.amplitude) == pytest.approx(0.07, rel=0.3)
+    assert coupling.width_us % 37_000.0 == pytest.approx(1500.0, abs=200.0)
+
+    text = bursts(bench, found, second, 1)
+    assert "their readout disturbs the pixels" in text
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    assert [row[0] for row in rows[2:]] == [
+        "measured", "as found, without frame coupling", "as found",
+    ]  # fmt: skip
+    measured, without, with_it = (
+        np.array([float(cell.rstrip("%")) for cell in row[1:]]) for row in rows[2:]
+    )
+    assert np.all(measured > 2.0 * without)
+    assert with_it == pytest.approx(measured, rel=0.25)
+    assert without_coupling(found).readout.frame_coupling is None
