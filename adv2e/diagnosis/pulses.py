@@ -18,7 +18,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.stream import Stream
 
-DELAY, WIDTH = "readout.frame_coupling.delay_us", "readout.frame_coupling.width_us"
+DELAY, WIDTH, RISE = (f"readout.frame_coupling.{name}_us" for name in ("delay", "width", "rise"))
 DRIFT = "frames.clock_drift_ppm"
 
 _BINS, _SHORTEST_US, _LONGEST_US = 400, 20.0, 100.0
@@ -53,11 +53,13 @@ class Burst:
     ----------
     begins_us : float
         After the time of each frame, or whole intervals later or earlier.
+    lasts_us : float
     share : float
         Of the polarity's events that are in such bursts.
     """
 
     begins_us: float
+    lasts_us: float
     share: float
 
 
@@ -87,7 +89,9 @@ class Pulse:
         """
         first, second = (self.on, self.off) if up else (self.off, self.on)
         width = (second.begins_us - first.begins_us) % self.interval_us
-        found = {DELAY: self._nearest(first.begins_us), WIDTH: width}
+        # the shorter one: the other's events may have waited to be due
+        rise = min(first.lasts_us, second.lasts_us)
+        found = {DELAY: self._nearest(first.begins_us), WIDTH: width, RISE: rise}
         return {**found, DRIFT: self.drift_ppm} if self.drift_ppm else found
 
     def placed(self, config: Config) -> Config:
@@ -189,4 +193,4 @@ def _burst(count: NDArray[np.int64], bin_us: float) -> Burst | None:
     share = float(burst.sum() / count.sum())
     if share < _LEAST_SHARE:
         return None
-    return Burst((top + first - middle) % len(count) * bin_us, share)
+    return Burst((top + first - middle) % len(count) * bin_us, len(burst) * bin_us, share)

@@ -34,6 +34,7 @@ def test_when_both_bursts_begin(on_us, off_us):
     found = pulse_of(events(on_us, off_us), TIMES_S)
     assert found.on.begins_us == pytest.approx(on_us, abs=110.0)
     assert found.off.begins_us == pytest.approx(off_us, abs=110.0)
+    assert found.on.lasts_us == pytest.approx(300.0, abs=110.0)
     assert found.on.share == pytest.approx(19 * 60 / (10_000 + 19 * 60), rel=0.1)
     assert (found.interval_us, found.drift_ppm) == (pytest.approx(INTERVAL_US), 0.0)
 
@@ -71,7 +72,7 @@ def test_swings_are_no_pulses():
     assert pulse_of(stream_of(t[kept].astype(np.int64), 0, 0, on[kept]), TIMES_S) is None
 
 
-ON, OFF = Burst(39_600.0, 0.124), Burst(600.0, 0.09)
+ON, OFF = Burst(39_600.0, 300.0, 0.124), Burst(600.0, 900.0, 0.09)
 
 
 @pytest.mark.parametrize("swing", [0.05, 0.5])
@@ -136,6 +137,7 @@ def test_the_library_has_the_pulse_in_the_place_of_leaps_at_the_end_of_exposures
     up, down = couplings(HINTS.__class__(**{**vars(HINTS), "pulse": drifting}))
     assert dict(up.extra)["readout.frame_coupling.width_us"] == pytest.approx(1000.0)
     assert dict(down.extra)["readout.frame_coupling.width_us"] == pytest.approx(39_000.0)
+    assert dict(up.extra)["readout.frame_coupling.rise_us"] == 300.0
     assert dict(up.extra)["frames.clock_drift_ppm"] == -6400.0
     assert all(probe[0] > 0.0 for probe in up.probes)
     assert all(probe[0] < 0.0 for probe in down.probes)

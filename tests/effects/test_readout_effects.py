@@ -225,6 +225,18 @@ def test_a_pulse_is_a_leap_and_one_back_that_the_frames_before_it_wait_for():
     np.testing.assert_allclose(hook.signal(times)[later], before[later], atol=1e-12)
 
 
+@pytest.mark.parametrize(("rise_us", "step_us"), [(30.0, 30.0), (400.0, 250.0)])
+def test_how_long_a_leap_takes(rise_us, step_us):
+    hook = FrameCouplingHooks(FrameCoupling(amplitude=0.2, tau_us=3000.0, rise_us=rise_us))
+    hook.begin(View(2, 2, 0, 0.0))
+    list(hook.light(iter([(0, np.zeros((2, 2)))])))
+    rise = 1e-6 * rise_us
+    found = hook.signal(np.array([0.0, 0.5 * rise, rise, rise + 3e-3]))
+    np.testing.assert_allclose(found, 0.2 * np.array([0.0, 0.5, 1.0, np.exp(-1.0)]), atol=1e-12)
+    assert hook.longest_step_us(0.0, 1e-5) == step_us
+    assert hook.longest_step_us(2 * rise, 3 * rise) == 250.0
+
+
 def test_frames_that_were_made_between_others_are_not_read_out():
     times = np.linspace(0.0, 0.007, 500)
 

@@ -11,15 +11,15 @@ frame on the camera's clock (after clock offset and drift) plus half of ``frames
 ``delay_us`` more, or less if that is below 0.  With w = ``width_us`` the signal leaps back so long
 after it leapt; where that is 0, it only decays.
 
-All pixels that are within A of a threshold fire at the leap: of a DAVIS240C that watches a scene in
-motion a tenth of all events, within 0.3 ms of each frame; those of the other polarity follow when
-the signal leaps back.
+All pixels that are within A of a threshold fire at the leap, and others when the signal leaps back:
+of a DAVIS240C that watches a scene in motion these are a tenth of all events, ON in the 0.4 ms
+before each frame, OFF in about a millisecond after it.
 
-The pixels are at rest at the first frame: there is no leap before it.  A leap is a rise over a
-twelfth of tau, or of w where that is shorter, which is the longest step of time there, after which
-it decays: nothing shows before it, and its height is met.  A line through a step of a twelfth of
-tau of the decay is off by A/1152; intervals that begin when no more than that is left, 7 tau after
-a leap, take the steps that they would without it.
+The pixels are at rest at the first frame: there is no leap before it.  A leap is a rise over
+``rise_us``, or if that is 0 over a twelfth of tau, or of w where that is shorter; it is the longest
+step of time there.  Then it decays: nothing shows before it, and its height is met.  A line through
+a step of a twelfth of tau of the decay is off by A/1152; intervals that begin when no more than
+that is left, 7 tau after a leap, take the steps that they would without it.
 
 References
 ----------
@@ -76,6 +76,13 @@ class FrameCoupling(Section):
         at_least=0,
         fit=Fit(20.0, 1e5, 1000.0, log=True),
     )
+    rise_us: float = parameter(
+        0.0,
+        unit="us",
+        meaning="time that a leap takes; 0: a twelfth of tau_us or width_us",
+        at_least=0,
+        fit=Fit(1.0, 1e4, 30.0, log=True),
+    )
 
 
 class FrameCouplingHooks(Hooks):
@@ -98,7 +105,8 @@ class FrameCouplingHooks(Hooks):
         self._delay_s, self._every = (exposed_us + parameters.delay_us) * 1e-6, every
         self._width_s = parameters.width_us * 1e-6
         self._tau_s = parameters.tau_us * 1e-6
-        self._rise_us = min(parameters.tau_us, parameters.width_us or math.inf) / _STEPS_PER_TAU
+        shorter_us = min(parameters.tau_us, parameters.width_us or math.inf)
+        self._rise_us = parameters.rise_us or shorter_us / _STEPS_PER_TAU
         self.step_us = parameters.tau_us / _STEPS_PER_TAU
 
     def begin(self, view: View) -> None:
@@ -159,7 +167,7 @@ class FrameCouplingHooks(Hooks):
         if before < 0 or start_s >= self._leaps[before] + _FADED * self._tau_s:
             return math.inf
         rises = start_s < self._leaps[before] + self._rise_us * 1e-6
-        return self._rise_us if rises else self.step_us
+        return min(self._rise_us, self.step_us) if rises else self.step_us
 
     def passed(self, time_s: float) -> None:
         """Forget the leaps that no later time needs."""
