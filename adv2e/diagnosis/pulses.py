@@ -27,8 +27,9 @@ _REGULAR = 0.01
 """Most by which intervals between frames may differ, as a share of them."""
 _FARTHEST = 0.02
 """Most by which the clock of the frames may be slow or fast."""
-_SHARPER = 1.1
-"""How much sharper bursts must be at another interval before that is believed."""
+_SHARPER = 1.5
+"""How much sharper bursts must be at another interval before that is believed: by a third they are
+where no more than the border of a bin parted them."""
 _ENOUGH = 100_000
 """Events of a polarity that tell the interval."""
 _STANDS_OUT, _TIMES_AS_MANY = 10.0, 3.0
@@ -164,7 +165,8 @@ def _interval(parts: list[NDArray[np.float64]], declared: float, seconds_us: flo
 
     def sharpness(interval: float) -> float:
         counts = [_folded(part, interval, bin_us * interval / declared) for part in some]
-        return float(sum(np.square(count, dtype=np.float64).sum() for count in counts))
+        above = [count - np.median(count) for count in counts]
+        return float(sum(np.square(count + np.roll(count, 1)).sum() for count in above))
 
     reach = round(_FARTHEST * 2.0 * seconds_us / bin_us)
     tried = declared + 0.5 * bin_us * declared / seconds_us * np.arange(-reach, reach + 1)

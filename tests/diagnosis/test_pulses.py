@@ -39,7 +39,21 @@ def test_when_both_bursts_begin(on_us, off_us):
     assert (found.interval_us, found.drift_ppm) == (pytest.approx(INTERVAL_US), 0.0)
 
 
-@pytest.mark.parametrize("ppm", [-6400.0, 300.0, 15_000.0])
+@pytest.mark.parametrize("on_us", [39_990.0, 85.0, 160.0])
+def test_sharp_bursts_over_the_border_of_a_bin_are_no_drift(on_us):
+    draw = np.random.default_rng(1)
+    quiet, count = events(), 19 * 100
+    frames = np.repeat(5e6 + INTERVAL_US * np.arange(19), 100)
+    bursts = [frames + delay_us + 30.0 * draw.random(count) for delay_us in (on_us, 755.0)]
+    t = np.concatenate([quiet.t, *bursts]).astype(np.int64)
+    on = np.concatenate([quiet.on, np.ones(count, np.int8), np.zeros(count, np.int8)])
+    found = pulse_of(stream_of(t, 0, 0, on), TIMES_S)
+    assert (found.drift_ppm, found.interval_us) == (0.0, INTERVAL_US)
+    apart = (found.on.begins_us - on_us + 200.0) % INTERVAL_US - 200.0
+    assert apart == pytest.approx(0.0, abs=101.0)
+
+
+@pytest.mark.parametrize("ppm", [-6400.0, 900.0, 15_000.0])
 def test_bursts_tell_how_fast_the_clock_of_the_frames_is(ppm):
     found = pulse_of(events(3000.0, 9000.0, INTERVAL_US * (1.0 + 1e-6 * ppm)), TIMES_S)
     assert found.drift_ppm == pytest.approx(ppm, abs=80.0)
