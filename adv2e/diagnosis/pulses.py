@@ -27,6 +27,8 @@ _REGULAR = 0.01
 """Most by which intervals between frames may differ, as a share of them."""
 _FARTHEST = 0.02
 """Most by which the clock of the frames may be slow or fast."""
+_BEGINNING_US, _MORE = 2e6, 4
+"""What is looked at first, and how many intervals to both sides are tried with twice as much."""
 _SHARPER = 1.5
 """How much sharper bursts must be at another interval before that is believed: by a third they are
 where no more than the border of a bin parted them."""
@@ -158,21 +160,34 @@ def _folded(since: NDArray[np.float64], interval: float, bin_us: float) -> NDArr
     return np.bincount(np.minimum(place, bins - 1), minlength=bins)
 
 
-def _interval(parts: list[NDArray[np.float64]], declared: float, seconds_us: float) -> float:
-    """Return the interval at which bursts are sharpest: the declared one unless others are more."""
+def _interval(parts: list[NDArray[np.float64]], declared: float, span_us: float) -> float:
+    """Return the interval at which bursts are sharpest: the declared one unless others are more.
+
+    It is sought in the beginning of a long recording, and told ever better from more of it.
+    """
     bin_us = _bin_us(declared)
-    some = [part[:: 1 + len(part) // _ENOUGH] for part in parts]
 
-    def sharpness(interval: float) -> float:
-        counts = [_folded(part, interval, bin_us * interval / declared) for part in some]
-        above = [count - np.median(count) for count in counts]
-        return float(sum(np.square(count + np.roll(count, 1)).sum() for count in above))
+    def sharpness(interval: float, until_us: float) -> float:
+        total = 0.0
+        for part in parts:
+            some = part[: np.searchsorted(part, until_us)]
+            some = some[:: 1 + len(some) // _ENOUGH]
+            count = _folded(some, interval, bin_us * interval / declared)
+            above = count - np.median(count)
+            total += float(np.square(above + np.roll(above, 1)).sum())
+        return total
 
-    reach = round(_FARTHEST * 2.0 * seconds_us / bin_us)
-    tried = declared + 0.5 * bin_us * declared / seconds_us * np.arange(-reach, reach + 1)
-    found = [sharpness(interval) for interval in tried]
-    best = int(np.argmax(found))
-    return float(tried[best]) if found[best] > _SHARPER * found[reach] else declared
+    def best(middle: float, reach: int, until_us: float) -> float:
+        tried = middle + 0.5 * bin_us * declared / until_us * np.arange(-reach, reach + 1)
+        return float(max(tried, key=lambda one: sharpness(one, until_us)))
+
+    until_us = min(span_us, _BEGINNING_US)
+    interval = best(declared, round(_FARTHEST * 2.0 * until_us / bin_us), until_us)
+    while until_us < span_us:
+        until_us = min(2.0 * until_us, span_us)
+        interval = best(interval, _MORE, until_us)
+    is_sharper = sharpness(interval, span_us) > _SHARPER * sharpness(declared, span_us)
+    return interval if is_sharper else declared
 
 
 def _burst(count: NDArray[np.int64], bin_us: float) -> Burst | None:

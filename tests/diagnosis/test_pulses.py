@@ -61,6 +61,21 @@ def test_bursts_tell_how_fast_the_clock_of_the_frames_is(ppm):
     assert f"{found.interval_us / 1e3:.2f} ms apart" in found.text()
 
 
+@pytest.mark.parametrize("ppm", [0.0, 40.0, -5000.0])
+def test_long_recordings_tell_more_of_the_clock(ppm):
+    draw = np.random.default_rng(4)
+    interval, count = INTERVAL_US * (1.0 + 1e-6 * ppm), 500
+    frames = np.repeat(interval * np.arange(count), 40)
+    t = np.concatenate([frames + delay + 250.0 * draw.random(frames.size) for delay in (700, 1900)])
+    on = np.repeat([1, 0], frames.size)
+    quiet = interval * count * draw.random(20_000)
+    t, on = np.concatenate([t, quiet]), np.concatenate([on, draw.integers(0, 2, quiet.size)])
+    times_s = 1e-6 * INTERVAL_US * np.arange(count)
+    found = pulse_of(stream_of(t.astype(np.int64), 0, 0, on), times_s)
+    assert found.drift_ppm == pytest.approx(ppm, abs=5.0)
+    assert found.on.begins_us == pytest.approx(700.0, abs=120.0)
+
+
 @pytest.mark.parametrize(
     ("stream", "times_s"),
     [
