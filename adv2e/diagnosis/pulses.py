@@ -145,6 +145,9 @@ def pulse_of(stream: Stream, times_s: NDArray[np.float64]) -> Pulse | None:
     on, off = (_burst(_folded(part, interval, bin_us), bin_us) for part in parts)
     if on is None or off is None:
         return None
+    apart = (off.begins_us - on.begins_us) % interval
+    if apart < on.lasts_us or interval - apart < off.lasts_us:  # as of stamps in whole intervals
+        return None
     return Pulse(on, off, interval, 1e6 * (interval / declared - 1.0))
 
 

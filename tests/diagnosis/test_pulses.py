@@ -104,6 +104,13 @@ def test_swings_are_no_pulses():
 ON, OFF = Burst(39_600.0, 300.0, 0.124), Burst(600.0, 900.0, 0.09)
 
 
+@pytest.mark.parametrize("tick_us", [INTERVAL_US, 0.5 * INTERVAL_US, 0.1 * INTERVAL_US])
+def test_coarse_stamps_are_no_pulse(tick_us):
+    quiet = events()
+    t = (quiet.t // tick_us * tick_us).astype(np.int64)
+    assert pulse_of(stream_of(t, 0, 0, quiet.on), TIMES_S) is None
+
+
 @pytest.mark.parametrize("swing", [0.05, 0.5])
 def test_a_lamp_at_four_times_the_frame_rate_is_no_pulse(swing):
     """Sharp or not, its bursts come every quarter of an interval."""
