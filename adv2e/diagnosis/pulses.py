@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.keys import with_keys
+from adv2e.diagnosis.readouts import regular_interval
 from adv2e.diagnosis.stream import Stream
 
 DELAY, WIDTH, RISE = (f"readout.frame_coupling.{name}_us" for name in ("delay", "width", "rise"))
@@ -23,8 +24,8 @@ DRIFT = "frames.clock_drift_ppm"
 
 _BINS, _SHORTEST_US, _LONGEST_US = 400, 20.0, 100.0
 """Of an interval between frames, and how long each is."""
-_REGULAR = 0.01
-"""Most by which intervals between frames may differ, as a share of them."""
+_FEWEST = 3
+"""Frames: bursts come again."""
 _FARTHEST = 0.02
 """Most by which the clock of the frames may be slow or fast."""
 _BEGINNING_US, _MORE = 2e6, 4
@@ -134,9 +135,8 @@ def pulse_of(stream: Stream, times_s: NDArray[np.float64]) -> Pulse | None:
         Stamps of the frames [s].
     """
     times_us = 1e6 * times_s
-    intervals = np.diff(times_us)
-    declared = float(np.median(intervals)) if len(intervals) > 1 else 0.0
-    if declared <= 0.0 or np.abs(intervals - declared).max() > _REGULAR * declared:
+    declared = regular_interval(times_us)
+    if declared is None or len(times_us) < _FEWEST:
         return None
     since = stream.t - times_us[0]
     parts = [since[stream.on == on] for on in (1, 0)]

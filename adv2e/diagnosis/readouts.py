@@ -56,6 +56,20 @@ class Readouts:
         return with_keys(config, {EXPOSURE: least + count * whole})
 
 
+def regular_interval(times_us: NDArray[np.float64]) -> float | None:
+    """Return the interval between frames [us]; None: there is none, or they differ.
+
+    Parameters
+    ----------
+    times_us : (frames,)
+    """
+    intervals = np.diff(times_us)
+    interval = float(np.median(intervals)) if len(intervals) else 0.0
+    if interval <= 0.0 or np.abs(intervals - interval).max() > _REGULAR * interval:
+        return None
+    return interval
+
+
 def readouts_of(stream: Stream, times_s: NDArray[np.float64]) -> Readouts | None:
     """Return when frames are read out; None: nothing happens to all pixels at once.
 
@@ -66,11 +80,10 @@ def readouts_of(stream: Stream, times_s: NDArray[np.float64]) -> Readouts | None
         Stamps of the frames [s].
     """
     times_us = 1e6 * times_s
-    intervals = np.diff(times_us)
-    interval = float(np.median(intervals)) if len(intervals) else 0.0
-    if interval <= 0.0 or np.abs(intervals - interval).max() > _REGULAR * interval:
+    interval = regular_interval(times_us)
+    if interval is None:
         return None
-    frame = np.clip(np.searchsorted(times_us, stream.t, "right") - 1, 0, len(intervals) - 1)
+    frame = np.clip(np.searchsorted(times_us, stream.t, "right") - 1, 0, len(times_us) - 2)
     phase = (stream.t - times_us[frame]) / interval % 1.0
     bin_of = np.minimum((phase * _BINS).astype(np.int64), _BINS - 1)
     rises = []

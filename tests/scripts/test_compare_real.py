@@ -3,11 +3,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import compare_real
-import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from real.recording import read, still_pixels, still_rate
+from written_recordings import write_recording
 
 from adv2e import simulate
 from adv2e.comparison.distances import distances
@@ -31,22 +31,10 @@ def ideal_events(frames, on=ON, off=OFF):
     return np.concatenate(list(simulate(frames, TIMES, load_config(["ideal"], sets), threads=1)))
 
 
-def write_recording(folder, frames, events):
-    (folder / "images").mkdir(parents=True)
-    names = [f"images/frame_{number:08d}.png" for number in range(len(frames))]
-    for name, frame in zip(names, frames, strict=True):
-        assert cv2.imwrite(str(folder / name), frame)
-    stamps = [f"{t:.9f} {name}\n" for t, name in zip(TIMES, names, strict=True)]
-    (folder / "images.txt").write_text("".join(stamps))
-    lines = [f"{e['t'] / 1e6:.9f} {e['x']} {e['y']} {e['p']}\n" for e in events]
-    (folder / "events.txt").write_text("".join(lines))
-    return folder
-
-
 @pytest.fixture
 def recording(tmp_path):
     frames = moving_waves()
-    return write_recording(tmp_path / "waves", frames, ideal_events(frames))
+    return write_recording(tmp_path / "waves", TIMES, frames, ideal_events(frames))
 
 
 def tables(text):
@@ -141,7 +129,7 @@ def test_totals_that_no_threshold_gives_are_marked():
 
 def test_events_that_no_threshold_gives_are_marked_in_the_table(tmp_path):
     quiet = np.full((FRAMES, HEIGHT, WIDTH), 90, np.uint8)
-    folder = write_recording(tmp_path / "quiet", quiet, ideal_events(moving_waves()))
+    folder = write_recording(tmp_path / "quiet", TIMES, quiet, ideal_events(moving_waves()))
     result = run(compare_real, folder, "--configs", "ideal", "--match-totals")
     first, second = (rows[2] for rows in tables(result.stdout).values())
     assert first[1].startswith("0 / ")
@@ -184,7 +172,7 @@ def test_tables_go_to_a_file_and_progress_to_stderr(recording, tmp_path):
 
 
 def test_a_folder_without_events_fails_with_one_line_and_leaves_no_file(tmp_path):
-    folder = write_recording(tmp_path / "empty", moving_waves(), [])
+    folder = write_recording(tmp_path / "empty", TIMES, moving_waves(), [])
     out = tmp_path / "table.md"
     result = run(compare_real, folder, "--out", out)
     assert result.exit_code == 1

@@ -6,7 +6,6 @@ import os
 import re
 from pathlib import Path
 
-import cv2
 import diagnose_real
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from real.recording import halves, read
 from real.search import Search
 from real.stability import compare_halved
 from real.tried import UNSEEN, Added, tried_names
+from written_recordings import write_recording
 
 from adv2e import simulate
 from adv2e.comparison.windows import Windows, cut
@@ -38,8 +38,6 @@ def moving_waves():
 @pytest.fixture
 def recording(tmp_path):
     """Waves seen by an ideal pixel with a black level of 20 DN, ON 0.2, OFF 0.15."""
-    folder = tmp_path / "waves"
-    (folder / "images").mkdir(parents=True)
     frames = moving_waves()
     sets = [
         "frames.black_level_dn=20",
@@ -50,14 +48,7 @@ def recording(tmp_path):
     ]
     config = load_config(["ideal"], sets)
     events = np.concatenate(list(simulate(frames, TIMES, config, threads=1)))
-    names = [f"images/frame_{number:08d}.png" for number in range(FRAMES)]
-    for name, frame in zip(names, frames, strict=True):
-        assert cv2.imwrite(str(folder / name), frame)
-    stamps = [f"{t:.9f} {name}\n" for t, name in zip(TIMES, names, strict=True)]
-    (folder / "images.txt").write_text("".join(stamps))
-    lines = [f"{e['t'] / 1e6:.9f} {e['x']} {e['y']} {e['p']}\n" for e in events]
-    (folder / "events.txt").write_text("".join(lines))
-    return folder
+    return write_recording(tmp_path / "waves", TIMES, frames, events)
 
 
 @pytest.fixture

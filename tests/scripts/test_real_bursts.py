@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
 from real.bursts import bursts
@@ -10,6 +9,7 @@ from real.model import Bench, without_coupling
 from real.recording import halves, read
 from real.search import Search
 from real.tried import of_the_camera
+from written_recordings import write_recording
 
 from adv2e import simulate
 from adv2e.config import load_config
@@ -27,27 +27,19 @@ COUPLING = (
 )
 
 
-def write_recording(folder, sets):
-    """Write waves that an ideal pixel sees, which drift slowly."""
-    (folder / "images").mkdir(parents=True)
+def bench_of(folder, sets):
+    """Return the bench of waves that an ideal pixel sees, which drift slowly."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     phases = 2 * np.pi * (x / 11 + y / 17 - 2.3 * TIMES[:, None, None])
     frames = np.rint(80 + 60 * np.sin(phases)).astype(np.uint8)
     config = load_config(["ideal"], [*PIXEL, *sets])
     events = np.concatenate(list(simulate(frames, TIMES, config, threads=1)))
-    names = [f"images/frame_{number:08d}.png" for number in range(FRAMES)]
-    for name, frame in zip(names, frames, strict=True):
-        assert cv2.imwrite(str(folder / name), frame)
-    stamps = [f"{t:.9f} {name}\n" for t, name in zip(TIMES, names, strict=True)]
-    (folder / "images.txt").write_text("".join(stamps))
-    lines = [f"{e['t'] / 1e6:.9f} {e['x']} {e['y']} {e['p']}\n" for e in events]
-    (folder / "events.txt").write_text("".join(lines))
-    return Bench(read(str(folder)), 1)
+    return Bench(read(str(write_recording(folder, TIMES, frames, events))), 1)
 
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
-    return write_recording(tmp_path_factory.mktemp("real") / "pulsed", [COUPLING])
+    return bench_of(tmp_path_factory.mktemp("real") / "pulsed", [COUPLING])
 
 
 def test_frame_coupling_is_tried_where_there_are_bursts(bench, tmp_path):
@@ -56,7 +48,7 @@ def test_frame_coupling_is_tried_where_there_are_bursts(bench, tmp_path):
 
     assert bench.pulse is not None
     assert names(bench.pulse) - names(None) == {"frame_coupling"}
-    quiet = write_recording(tmp_path / "quiet", [])
+    quiet = bench_of(tmp_path / "quiet", [])
     assert quiet.pulse is None
     assert bursts(quiet, load_config(), quiet.real.windows, 1) == ""
 
