@@ -38,7 +38,7 @@ def bursts(bench: Bench, found: Config, windows: Windows, seed: int) -> str:
     start_us = float(bench.real.times_us[0])
     rows = [[name, *_shares(pulse, events, start_us)] for name, events in streams]
     names = ["events", *(f"{name} within 1 ms from there" for name in ("ON", "OFF"))]
-    return f"Of the whole recording, {pulse.text()}.\n\n" + table(names, rows)
+    return f"Up to the end of the first half, {pulse.text()}.\n\n" + table(names, rows)
 
 
 def _shares(pulse: Pulse, events: Events, start_us: float) -> list[str]:

@@ -6,6 +6,7 @@ import itertools
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,11 +17,11 @@ from adv2e.config import Config
 from adv2e.decoding import decoder_for
 from adv2e.diagnosis.instants import Instants, Kept, events_of, is_made_once
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
-from adv2e.diagnosis.pulses import pulse_of
+from adv2e.diagnosis.pulses import Pulse, pulse_of
 from adv2e.diagnosis.stream import Stream
 from adv2e.events import Events
 from adv2e.stepping import Coarseness
-from real.recording import Real, still_rate
+from real.recording import Real, halves, still_rate
 
 SCORE = "relative_5_bins_smoothed"
 """What the tables judge by."""
@@ -63,8 +64,6 @@ class Bench:
 
     Attributes
     ----------
-    pulse : Pulse, optional
-        That follows each frame, as far as bursts of events tell.
     simulations : int
         Made so far.
     """
@@ -72,8 +71,17 @@ class Bench:
     def __init__(self, real: Real, threads: int | None) -> None:
         self.real, self.threads = real, threads
         self._frames = Kept()
-        self.pulse = pulse_of(Stream.of(real.events, *real.size), real.times_us * 1e-6)
         self.simulations = 0
+
+    @cached_property
+    def pulse(self) -> Pulse | None:
+        """The pulse that follows each frame, as far as bursts up to the end of the first half tell.
+
+        The second half is for judging alone.
+        """
+        real, until = self.real, halves(self.real.windows)[0].stop
+        seen = Stream.of(real.events[real.events["t"] < until], *real.size)
+        return pulse_of(seen, real.times_us[real.times_us <= until] * 1e-6)
 
     def quick(self, config: Config, windows: Windows, seed: int) -> Events:
         """Return the events in the windows, from in-between frames made once."""

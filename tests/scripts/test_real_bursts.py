@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from real.bursts import bursts
@@ -51,6 +53,13 @@ def test_frame_coupling_is_tried_where_there_are_bursts(bench, tmp_path):
     quiet = bench_of(tmp_path / "quiet", [])
     assert quiet.pulse is None
     assert bursts(quiet, load_config(), quiet.real.windows, 1) == ""
+
+
+def test_the_half_to_judge_by_tells_nothing_of_the_pulse(bench):
+    first, _ = halves(bench.real.windows)
+    real = bench.real
+    beyond = Bench(replace(real, events=real.events[real.events["t"] < first.stop]), 1)
+    assert beyond.pulse == bench.pulse is not None
 
 
 def test_the_search_finds_the_pulse_that_made_the_bursts(bench, monkeypatch):
