@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
+from adv2e.diagnosis.costs import Costs
 from adv2e.diagnosis.evidence import Evidence, check_events
 from adv2e.diagnosis.stream import Stream
 from adv2e.reports.result import Masked
@@ -16,11 +17,6 @@ from adv2e.reports.result import Masked
 AFFORDABLE_S = 0.18
 """What a simulation may take in the mean, in one thread; a diagnosis takes some thousands [s]."""
 
-# about what a simulation and the statistics of its events take, in one thread [s]
-_INSTANT_S = 20e-9  # of one pixel
-_EVENT_S = 400e-9
-_SECOND_S = 13e-6  # of one pixel: what effects that are solved in steps of time add, over all
-_STEPPED = 10
 _BLOCK = 8
 _SMALLEST = 48
 _FEWEST = 12  # frame intervals
@@ -38,23 +34,14 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
     ----------
     evidence : Evidence
     declared : Config
-        Its `sampling` and the form of its filter decide what a simulation costs.
+        Decides what a simulation costs.
 
     Raises
     ------
     DataError
         Too few events are left.
     """
-    low_pass = declared.pixel.low_pass
-    each = 1 if low_pass is None or low_pass.update == "exact" else _STEPPED
-
-    def cost_s(part: Evidence) -> float:
-        instants = (len(part.run_in.frames) + len(part.frames) - 1) * declared.sampling.L
-        pixels = part.width * part.height
-        seconds = part.run_in.seconds + part.seconds
-        of_pixel = _INSTANT_S * each * instants + _SECOND_S * seconds
-        return of_pixel * pixels + _EVENT_S * len(part.stream)
-
+    cost_s = Costs(evidence, declared).of
     kept, share = evidence, 1.0
     while cost_s(kept) > AFFORDABLE_S:
         # where events crowd, a part of the pixels costs more than its share

@@ -27,7 +27,7 @@ Result = TypeVar("Result")
 
 _SEEDS = 1_000_000
 """Of a diagnosis, fewer than these; each seed of the configuration has its own."""
-_FINE = Coarseness(5.0)
+FINE = Coarseness(5.0)
 """Steps of time, where the pixel takes any: some us off, which no statistic shows."""
 _ROUGH = Coarseness(5.0, 2.5)
 """Twice as fast with what takes longest, and off by what the first steps of a fit do not show."""
@@ -99,7 +99,7 @@ class Simulator:
             self._light(config),
             dataclasses.replace(config, seed=(_SEEDS * config.seed + seed) % 2**63),
             threads=1,
-            coarseness=_ROUGH if rough else _FINE,
+            coarseness=_ROUGH if rough else FINE,
         )
         with self._counting:
             self.done += 1

@@ -8,6 +8,7 @@ import pytest
 from adv2e import simulate
 from adv2e.config import load_config
 from adv2e.diagnosis import affordable as affordable_module
+from adv2e.diagnosis import costs
 from adv2e.diagnosis import evidence as evidence_module
 from adv2e.diagnosis.affordable import affordable
 from adv2e.diagnosis.evidence import Evidence, RunIn
@@ -33,9 +34,9 @@ def recording():
 
 def limit(monkeypatch, pixels, steps=1, event_s=0.0):
     instants = (len(TIMES) - 1) * CONFIG.sampling.L
-    monkeypatch.setattr(affordable_module, "_INSTANT_S", 1.0)
-    monkeypatch.setattr(affordable_module, "_EVENT_S", event_s)
-    monkeypatch.setattr(affordable_module, "_SECOND_S", 0.0)
+    monkeypatch.setattr(costs, "INSTANT_S", 1.0)
+    monkeypatch.setattr(costs, "EVENT_S", event_s)
+    monkeypatch.setattr(costs, "SECOND_S", 0.0)
     monkeypatch.setattr(affordable_module, "AFFORDABLE_S", 1.001 * pixels * instants * steps)
 
 
@@ -104,9 +105,25 @@ def test_time_costs_too(monkeypatch):
     whole = recording()
     instants = (len(TIMES) - 1) * CONFIG.sampling.L
     limit(monkeypatch, WIDTH * HEIGHT)
-    monkeypatch.setattr(affordable_module, "_SECOND_S", instants / whole.seconds)
+    monkeypatch.setattr(costs, "SECOND_S", instants / whole.seconds)
     crop = affordable(whole, CONFIG)
     assert crop.width * crop.height == pytest.approx(0.5 * WIDTH * HEIGHT, rel=0.15)
+
+
+def test_steps_of_time_of_the_declared_model_cost_too(monkeypatch):
+    whole = recording()
+    noisy = load_config(["adv2e"], ["pixel.photoreceptor_noise.rms=0.02"])
+    limit(monkeypatch, WIDTH * HEIGHT)
+    monkeypatch.setattr(costs, "STEP_S", 0.0)
+    assert affordable(whole, noisy) is whole
+    instants = (len(TIMES) - 1) * CONFIG.sampling.L
+    steps = costs.steps_of_time(whole, noisy)
+    assert steps > instants
+    monkeypatch.setattr(costs, "STEP_S", instants / steps)
+    assert affordable(whole, CONFIG) is whole
+    crop = affordable(whole, noisy)
+    assert crop.width * crop.height == pytest.approx(0.5 * WIDTH * HEIGHT, rel=0.15)
+    assert "cropped from 96x80" in crop.notes[-1]
 
 
 @pytest.mark.parametrize("pixels", [1, 48 * 48])
@@ -125,9 +142,9 @@ def test_of_long_recordings_the_busiest_stretch_is_kept(monkeypatch):
     frames = [np.full((48, 48), k, np.uint8) for k in range(101)]
     pixel = draw.integers(0, 48 * 48, t.size).astype(np.int32)
     stream = Stream(t.astype(np.int64), pixel, pixel % 2 > 0, 48, 48)
-    monkeypatch.setattr(affordable_module, "_INSTANT_S", 1.0)
-    monkeypatch.setattr(affordable_module, "_EVENT_S", 0.0)
-    monkeypatch.setattr(affordable_module, "_SECOND_S", 0.0)
+    monkeypatch.setattr(costs, "INSTANT_S", 1.0)
+    monkeypatch.setattr(costs, "EVENT_S", 0.0)
+    monkeypatch.setattr(costs, "SECOND_S", 0.0)
     monkeypatch.setattr(affordable_module, "AFFORDABLE_S", 31.0 * 48 * 48 * CONFIG.sampling.L)
     kept = affordable(Evidence("long", frames, times, stream, 48, 48), CONFIG)
     assert (kept.width, kept.height, len(kept.frames)) == (48, 48, 21)

@@ -1,0 +1,100 @@
+"""About how long a simulation of a recording takes, told without simulating it.
+
+Counted, not measured, so that what of a recording is looked at is the same on every machine.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from adv2e.active_effects import active_hooks
+from adv2e.circuit import driver_of, make_circuit
+from adv2e.config import Config
+from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.instants import as_recorded
+from adv2e.diagnosis.simulations import FINE
+from adv2e.effects.composition import additions_of, begin
+from adv2e.kernel.workspace import EXACT
+from adv2e.stepping import steps_of
+from adv2e.upsampling.sequence import instant_ns
+
+# in one thread, with the statistics of the events [s]
+INSTANT_S = 20e-9
+"""Of one pixel and each frame that is made."""
+EVENT_S = 400e-9
+SECOND_S = 13e-6
+"""Of one pixel and a second: what effects that are solved in steps of time add, over all that a
+diagnosis tries."""
+STEP_S = 3e-9
+"""Of one pixel and each step of time that the declared model takes by itself."""
+STEPPED = 10
+"""Times as long as `INSTANT_S` where the low-pass is stepped, as the paper prints it."""
+_WHITE = 255.0
+
+
+class Costs:
+    """What simulations of parts of a recording cost.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The whole of it.
+    declared : Config
+        Its `sampling`, the form of its filter, and what of it is solved in steps of time decide.
+    """
+
+    def __init__(self, evidence: Evidence, declared: Config) -> None:
+        low_pass = declared.pixel.low_pass
+        is_stepped = low_pass is not None and low_pass.update != "exact"
+        self._of_frame = INSTANT_S * (STEPPED if is_stepped else 1) * declared.sampling.L
+        steps = steps_of_time(evidence, declared)
+        self._of_second = SECOND_S + STEP_S * steps / evidence.simulated.seconds
+
+    def of(self, part: Evidence) -> float:
+        """Return about how long a simulation takes, in the mean of those of a diagnosis [s]."""
+        shown = part.simulated
+        of_pixel = self._of_frame * (len(shown.frames) - 1) + self._of_second * shown.seconds
+        return of_pixel * part.width * part.height + EVENT_S * len(part.stream)
+
+
+def steps_of_time(evidence: Evidence, declared: Config) -> int:
+    """Return how many steps of time a pixel takes through a recording; 0: it takes none.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        With its run-in.
+    declared : Config
+    """
+    shown = evidence.simulated
+    config, effects = as_recorded(declared)
+    hooks = active_hooks(config, effects)
+    frames_ns = _parted(shown.times_ns, declared.sampling.L // config.sampling.L)
+    light = np.full((shown.height, shown.width), _WHITE, np.float32)
+    seen = begin(hooks, ((t_ns, light) for t_ns in frames_ns), config.seed)
+    times_ns = _parted([t_ns for t_ns, _ in seen], config.sampling.L)
+    additions, circuit = additions_of(hooks), make_circuit(config.pixel, config.sampling, 0)
+    if driver_of(config.pixel, circuit, additions, "auto") != "run_dense":
+        return 0
+    is_exact = circuit.update == EXACT
+    pieces = 1 if is_exact and not circuit.printed else circuit.steps
+    total = 0
+    for start_ns, stop_ns in pairwise(times_ns):
+        limit, length_us = np.inf, 1e-3 * (stop_ns - start_ns)
+        if additions is not None:
+            limit = additions.longest_step_us(start_ns * 1e-9, stop_ns * 1e-9)
+        steps = steps_of(length_us / pieces, circuit, limit, coarseness=FINE) if is_exact else 1
+        total += pieces * steps
+    return total
+
+
+def _parted(times_ns: list[int], count: int) -> list[int]:
+    """Return the times, and those that part each interval between them in so many."""
+    between = (
+        instant_ns(start, stop, k, count)
+        for start, stop in pairwise(times_ns)
+        for k in range(1, count + 1)
+    )
+    return [*times_ns[:1], *between]
