@@ -22,10 +22,10 @@ PAIRS = 20
 Array = NDArray[np.float64]
 
 
-def of_part(stream: Stream, parts: Parts, part: int) -> Stream:
-    """Return the events of one part of the data."""
+def of_part(stream: Stream, parts: Parts, *wanted: int) -> Stream:
+    """Return the events of one part of the data, or of several."""
     label = parts.label[parts.segment_of(stream.t), stream.pixel]
-    return stream.chosen(label == part)
+    return stream.chosen(np.isin(label, wanted))
 
 
 @dataclass(frozen=True)

@@ -49,12 +49,17 @@ class Hints:
     too_many: tuple[float, float] = (1.0, 1.0)
 
 
-def hints_of(evidence: Evidence, lamps: Sequence[Lamp], pilot: Sequence[Stream] = ()) -> Hints:
+def hints_of(
+    evidence: Evidence, looked_at: Stream, lamps: Sequence[Lamp], pilot: Sequence[Stream] = ()
+) -> Hints:
     """Return hints from a recording.
 
     Parameters
     ----------
     evidence : Evidence
+        The whole of it, as how stamps follow one another shows in no part.
+    looked_at : Stream
+        Its events without those that are looked at last.
     lamps : sequence of Lamp
         That may have lit it.
     pilot : sequence of Stream
@@ -67,8 +72,8 @@ def hints_of(evidence: Evidence, lamps: Sequence[Lamp], pilot: Sequence[Stream] 
         tick_of(stream.t),
         evidence.encoding,
         service_times(stream),
-        readouts_of(stream, evidence.times_s),
-        pulse_of(stream, evidence.times_s),
+        readouts_of(looked_at, evidence.times_s),
+        pulse_of(looked_at, evidence.times_s),
         (_too_many(stream, pilot, 1), _too_many(stream, pilot, 0)),
     )
 

@@ -106,7 +106,8 @@ def make_ready(
     frames, levels = between_frames(pilot), between_levels(pilot)
     laboratory = Laboratory(simulator, scene, pilot.markers, frames.bias if frames else None)
     lamps = _lamps(pilot, simulator)
-    hints = hints_of(evidence, lamps, list(pilot.streams.values()))
+    looked_at = of_part(evidence.stream, scene.parts, parts.FIT, parts.JUDGE)
+    hints = hints_of(evidence, looked_at, lamps, list(pilot.streams.values()))
     if hints.pulse:
         evidence = replace(evidence, notes=[*evidence.notes, hints.pulse.text()])
     return Ready(

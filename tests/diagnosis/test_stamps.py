@@ -16,7 +16,7 @@ SIDE = 48
 
 def hints(t):
     evidence = Evidence("made up", [], np.array([0.0, 1.0]), stream_of(t, 0, 0, 1), 1, 1, "srgb")
-    return hints_of(evidence, (Lamp(50.0),))
+    return hints_of(evidence, evidence.stream, (Lamp(50.0),))
 
 
 # --- ticks ---------------------------------------------------------------------------------------
