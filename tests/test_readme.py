@@ -73,3 +73,11 @@ def test_scripts_and_pictures_exist():
 
 def test_no_table_is_missing():
     assert not re.search(r"^@\w+@$", TEXT, flags=re.MULTILINE)
+
+
+def test_links_within_lead_to_headings():
+    headings = re.findall(r"^#+ (.*)$", TEXT, re.MULTILINE)
+    anchors = {re.sub(r"[^\w -]", "", one.lower()).replace(" ", "-") for one in headings}
+    links = re.findall(r"\]\(#([^)]*)\)", TEXT)
+    assert links
+    assert set(links) <= anchors
