@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference.agreement import count_and_time_errors, split_events
 
-from adv2e import load_config, rng, simulate
+from adv2e import intervals, load_config, rng, simulate
 from adv2e.effects.hooks import Hooks, View
 from adv2e.effects.pixel.dead_pixels import DeadPixels, DeadPixelsHooks
 from adv2e.effects.readout.arbiter import Arbiter, ArbiterHooks
@@ -21,6 +21,7 @@ from adv2e.effects.readout.event_loss import EventLoss, EventLossHooks
 from adv2e.effects.readout.frame_coupling import FrameCoupling, FrameCouplingHooks
 from adv2e.effects.readout.timestamp_tick import TimestampTickHooks, ticked
 from adv2e.events import make_events, sort_events
+from adv2e.simulation import events_from_light
 from adv2e.stepping import steps_of
 
 ROWS, COLUMNS = 12, 10
@@ -175,7 +176,7 @@ def test_coupling_is_that_of_the_camera_after_its_rise_and_never_before_a_readou
     steps = [hook.longest_step_us(t, t + 1e-4) for t in times]
     hook.passed(0.005)
     later = times >= 0.005
-    busy = (times > begins[0] - 1e-4) & (times < begins[-1] + math.log(1152) * tau_s)
+    busy = (times > begins[0] - 1e-4) & (times < begins[-1] + rise + math.log(1152) * tau_s)
     assert steps == np.where(busy, 800 / 12, math.inf).tolist()
     assert [hook.longest_step_us(t, t + 1e-4) for t in times[later]] == steps[-sum(later) :]
     np.testing.assert_allclose(hook.signal(times[later]), found[later], atol=1e-12)
@@ -235,6 +236,62 @@ def test_how_long_a_leap_takes(rise_us, step_us):
     np.testing.assert_allclose(found, 0.2 * np.array([0.0, 0.5, 1.0, np.exp(-1.0)]), atol=1e-12)
     assert hook.longest_step_us(0.0, 1e-5) == step_us
     assert hook.longest_step_us(2 * rise, 3 * rise) == 250.0
+
+
+@pytest.mark.parametrize(
+    ("tau_us", "rise_us", "width_us"),
+    [(60e3, 0.0, 0.0), (3e3, 3e3, 0.0), (300.0, 5e3, 0.0), (20e3, 2.5e3, 7e3), (900.0, 100.0, 0.0)],
+)
+def test_frames_that_follow_one_another_faster_than_a_leap_rises(tau_us, rise_us, width_us):
+    coupling = FrameCoupling(amplitude=0.05, tau_us=tau_us, rise_us=rise_us, width_us=width_us)
+    hook = FrameCouplingHooks(coupling)
+    hook.begin(View(2, 2, 0, 0.0))
+    stamps = np.array([0.0, 0.002, 0.004, 0.0047, 0.008, 0.010])
+    list(hook.light((round(t * 1e9), None) for t in stamps))
+    rise, tau = 1e-6 * (rise_us or tau_us / 12), 1e-6 * tau_us
+    times = np.linspace(1e-9, 0.02 + 3 * rise, 4001)
+
+    def left(since):
+        return np.where(since < rise, np.maximum(since, 0.0) / rise, np.exp((rise - since) / tau))
+
+    since = times[:, None] - stamps
+    wanted = left(since).sum(axis=1)
+    if width_us:
+        wanted -= left(since - 1e-6 * width_us).sum(axis=1)
+    np.testing.assert_allclose(hook.signal(times), 0.05 * wanted, atol=1e-12)
+    # as long as a leap rises, and decays, it is followed
+    for start in (0.010, 0.010 + 0.9 * rise, 0.010 + rise + tau):
+        assert hook.longest_step_us(start, start + 1e-5) <= tau_us / 12
+    before = hook.signal(times)
+    hook.passed(0.0085)
+    later = times >= 0.0085
+    np.testing.assert_allclose(hook.signal(times)[later], before[later], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("start_ns", "interval_ns", "when"),
+    [
+        (1_468_941_032_000_000_000, 10_000_000, "delay_us: 10000"),
+        (0, 33_333_333, "width_us: 66666.666"),
+        (0, 40_000_000, "width_us: 40000"),
+    ],
+)
+def test_leaps_at_the_borders_of_parts(monkeypatch, start_ns, interval_ns, when):
+    """What a part begins with is rounded otherwise than what the one before ended with."""
+    coupling = f"readout.frame_coupling={{amplitude: 0.1, tau_us: 30000, {when}}}"
+    config = load_config(["ideal"], ["sampling.L=1", coupling])
+    y, x = np.mgrid[:24, :32]
+    frames = [
+        (start_ns + interval_ns * k, 110 + 60 * np.sin(0.5 * (x - 0.2 * k)) * np.cos(0.4 * y))
+        for k in range(20)
+    ]
+
+    def made(most):
+        monkeypatch.setattr(intervals, "_MOST", most)
+        return np.concatenate(list(events_from_light(iter(frames), config, threads=1)))
+
+    assert len(made(64)) > 500
+    assert made(1).tobytes() == made(64).tobytes()
 
 
 def test_frames_that_were_made_between_others_are_not_read_out():

@@ -19,7 +19,7 @@ The pixels are at rest at the first frame: there is no leap before it.  A leap i
 ``rise_us``, or if that is 0 over a twelfth of tau, or of w where that is shorter; it is the longest
 step of time there.  Then it decays: nothing shows before it, and its height is met.  A line through
 a step of a twelfth of tau of the decay is off by A/1152; intervals that begin when no more than
-that is left, 7 tau after a leap, take the steps that they would without it.
+that is left, 7 tau after a leap has risen, take the steps that they would without it.
 
 References
 ----------
@@ -44,6 +44,7 @@ from adv2e.parameters import Fit, Section, parameter
 
 _STEPS_PER_TAU = 12
 _SAME_S = 1e-9
+_ROUNDED_S = 1e-6
 _FADED = math.log(8.0 * _STEPS_PER_TAU**2)
 """Time constants after which what is left is what steps leave out of the decay at its start."""
 
@@ -107,6 +108,7 @@ class FrameCouplingHooks(Hooks):
         self._tau_s = parameters.tau_us * 1e-6
         shorter_us = min(parameters.tau_us, parameters.width_us or math.inf)
         self._rise_us = parameters.rise_us or shorter_us / _STEPS_PER_TAU
+        self._rise_s = self._rise_us * 1e-6
         self.step_us = parameters.tau_us / _STEPS_PER_TAU
 
     def begin(self, view: View) -> None:
@@ -150,12 +152,14 @@ class FrameCouplingHooks(Hooks):
             return np.zeros(len(times_s))
         leaps, sums = np.array(self._leaps), np.array(self._sums)
         last = np.searchsorted(leaps, times_s, "right") - 1
-        waited = np.maximum(times_s - leaps[last], 0.0)
-        rise_s = self._rise_us * 1e-6
-        fading = np.exp(-(waited - rise_s) / self._tau_s)
-        rising = waited / rise_s
-        left = (sums[last] - 1.0) * fading + np.where(rising < 1.0, rising, fading)
-        return np.where(last >= 0, left, 0.0)
+        # those that have risen decay alike; frames may follow one another faster than a leap rises
+        risen = np.searchsorted(leaps, times_s - self._rise_s, "right") - 1
+        waited = np.maximum(times_s - self._rise_s - leaps[risen], 0.0)
+        left = np.where(risen >= 0, sums[risen] * np.exp(-waited / self._tau_s), 0.0)
+        for more in range(int((last - risen).max(initial=0))):
+            rising = (times_s - leaps[last - more]) / self._rise_s
+            left += np.where(last - more > risen, np.minimum(rising, 1.0), 0.0)
+        return left
 
     def longest_step_us(self, start_s: float, stop_s: float) -> float:
         """Return its step, and no limit where what leapt before has decayed."""
@@ -164,12 +168,14 @@ class FrameCouplingHooks(Hooks):
 
     def _step_us(self, start_s: float, stop_s: float) -> float:
         before = bisect_left(self._leaps, stop_s) - 1
-        if before < 0 or start_s >= self._leaps[before] + _FADED * self._tau_s:
+        if before < 0 or start_s >= self._leaps[before] + self._rise_s + _FADED * self._tau_s:
             return math.inf
-        rises = start_s < self._leaps[before] + self._rise_us * 1e-6
+        rises = start_s < self._leaps[before] + self._rise_s
         return min(self._rise_us, self.step_us) if rises else self.step_us
 
     def passed(self, time_s: float) -> None:
         """Forget the leaps that no later time needs."""
-        done = max(bisect_left(self._leaps, time_s - self._width_s) - 1, 0)
+        # a later time may be less by as much as it is rounded
+        needed_s = time_s - self._width_s - self._rise_s - _ROUNDED_S
+        done = max(bisect_left(self._leaps, needed_s) - 1, 0)
         del self._leaps[:done], self._sums[:done]
