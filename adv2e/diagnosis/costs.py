@@ -5,6 +5,8 @@ Counted, not measured, so that what of a recording is looked at is the same on e
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +15,7 @@ from adv2e.active_effects import active_hooks
 from adv2e.circuit import driver_of, make_circuit
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.instants import as_recorded
+from adv2e.diagnosis.light import lights
 from adv2e.diagnosis.simulations import FINE
 from adv2e.effects.composition import additions_of, begin
 from adv2e.kernel.workspace import EXACT
@@ -31,7 +33,6 @@ STEP_S = 3e-9
 """Of one pixel and each step of time that the declared model takes by itself."""
 STEPPED = 10
 """Times as long as `INSTANT_S` where the low-pass is stepped, as the paper prints it."""
-_WHITE = 255.0
 
 
 class Costs:
@@ -68,33 +69,45 @@ def steps_of_time(evidence: Evidence, declared: Config) -> int:
         With its run-in.
     declared : Config
     """
-    shown = evidence.simulated
-    config, effects = as_recorded(declared)
-    hooks = active_hooks(config, effects)
-    frames_ns = _parted(shown.times_ns, declared.sampling.L // config.sampling.L)
-    light = np.full((shown.height, shown.width), _WHITE, np.float32)
-    seen = begin(hooks, ((t_ns, light) for t_ns in frames_ns), config.seed)
-    times_ns = _parted([t_ns for t_ns, _ in seen], config.sampling.L)
+    shown, config = evidence.simulated, _without_pictures(declared)
+    hooks = active_hooks(config)
     additions, circuit = additions_of(hooks), make_circuit(config.pixel, config.sampling, 0)
     if driver_of(config.pixel, circuit, additions, "auto") != "run_dense":
         return 0
+    frames = zip(shown.times_ns, lights(shown, config), strict=True)
+    # one at a time: all of them may be many
+    seen = [(t_ns, float(light.max())) for t_ns, light in begin(hooks, frames, config.seed)]
     is_exact = circuit.update == EXACT
     pieces = 1 if is_exact and not circuit.printed else circuit.steps
     total = 0
-    for start_ns, stop_ns in pairwise(times_ns):
+    for start_ns, stop_ns, brightest in _parted(seen, config.sampling.L):
         limit, length_us = np.inf, 1e-3 * (stop_ns - start_ns)
         if additions is not None:
             limit = additions.longest_step_us(start_ns * 1e-9, stop_ns * 1e-9)
-        steps = steps_of(length_us / pieces, circuit, limit, coarseness=FINE) if is_exact else 1
+        steps = 1
+        if is_exact:
+            steps = steps_of(length_us / pieces, circuit, limit, brightest, FINE)
         total += pieces * steps
     return total
 
 
-def _parted(times_ns: list[int], count: int) -> list[int]:
-    """Return the times, and those that part each interval between them in so many."""
-    between = (
-        instant_ns(start, stop, k, count)
-        for start, stop in pairwise(times_ns)
-        for k in range(1, count + 1)
+def _without_pictures(declared: Config) -> Config:
+    """Return `declared` without what acts on the pictures alone: no step hangs on it, but time."""
+    frames, readout = declared.frames, declared.readout
+    if readout is not None and readout.frame_coupling is not None:
+        # readouts come at the ends of exposures
+        delay_us = readout.frame_coupling.delay_us + 0.5 * frames.exposure_us
+        coupling = replace(readout.frame_coupling, delay_us=delay_us)
+        readout = replace(readout, frame_coupling=coupling)
+    bare = replace(
+        frames, exposure_us=0.0, black_level_dn=0.0, black_depth_dn=0.0, shift_px=(0.0, 0.0)
     )
-    return [*times_ns[:1], *between]
+    return replace(declared, frames=bare, readout=readout)
+
+
+def _parted(frames: Iterable[tuple[int, float]], count: int) -> Iterator[tuple[int, int, float]]:
+    """Yield begin and end of the parts of each interval, so many, and the brightest light in it."""
+    for (start_ns, dim), (stop_ns, lit) in pairwise(frames):
+        instants = (instant_ns(start_ns, stop_ns, k, count) for k in range(count + 1))
+        for begins_ns, ends_ns in pairwise(instants):
+            yield begins_ns, ends_ns, max(dim, lit)

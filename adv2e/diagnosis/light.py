@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,8 +17,13 @@ from adv2e.effects.frames.encoding import LightDecoder
 
 def light_of(evidence: Evidence, declared: Config) -> NDArray[np.float32]:
     """Return the light of all frames [DN], (frames, rows, columns)."""
+    return np.array(list(lights(evidence, declared)), np.float32)
+
+
+def lights(evidence: Evidence, declared: Config) -> Iterator[NDArray[Any]]:
+    """Yield the light of each frame [DN], (rows, columns)."""
     decoder = _decoder(evidence, declared)
-    return np.array([decoder.decode(image) for image in evidence.frames], np.float32)
+    yield from map(decoder.decode, evidence.frames)
 
 
 def scene_of(evidence: Evidence, declared: Config) -> Scene:

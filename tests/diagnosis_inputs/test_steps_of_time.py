@@ -8,6 +8,7 @@ import pytest
 from adv2e.config import load_config
 from adv2e.diagnosis.costs import steps_of_time
 from adv2e.diagnosis.evidence import Evidence, RunIn
+from adv2e.diagnosis.light import lights
 from adv2e.diagnosis.simulations import FINE
 from adv2e.diagnosis.stream import Stream
 from adv2e.effects.hooks import Hooks
@@ -51,6 +52,8 @@ def recording(times_s=TIMES_S, run_in=None):
     "keys",
     [
         ["pixel.photoreceptor_noise.rms=0.02"],
+        ["pixel.photoreceptor_noise.rms=0.02", "frames.full_scale=16"],  # brighter than white
+        ["pixel.photoreceptor_noise.rms=0.02", "frames.full_scale=50", "sampling.L=1"],
         ["pixel.source_follower.cutoff_hz=900"],
         ["pixel.slew_limit.per_s=50"],
         ["pixel.thresholds.drift_per_s=0.1", "sampling.L=1"],
@@ -65,9 +68,7 @@ def recording(times_s=TIMES_S, run_in=None):
 def test_as_many_steps_are_counted_as_the_pixel_takes(keys):
     config = load_config(["adv2e"], keys)
     shown, asked = recording(), Asked()
-    light = (
-        (t, frame.astype(np.float32)) for t, frame in zip(shown.times_ns, shown.frames, strict=True)
-    )
+    light = zip(shown.times_ns, lights(shown, config), strict=True)
     for _ in events_from_light(light, config, threads=1, effects=[asked], coarseness=FINE):
         pass
     taken = len(asked.times) - 1  # the first is where it begins
@@ -85,3 +86,25 @@ def test_what_pixels_saw_before_is_counted():
     parted = recording(TIMES_S[3:], RunIn(before[0].frames, TIMES_S[:3]))
     assert steps_of_time(parted, config) == steps_of_time(recording(), config)
     assert sum(steps_of_time(part, config) for part in before) == steps_of_time(parted, config)
+
+
+def test_effects_of_ones_own_see_the_frames():
+    seen = []
+
+    class Looks(Hooks):
+        stage = "frames"
+
+        def light(self, frames):
+            for t_ns, light in frames:
+                seen.append(light.copy())
+                yield t_ns, light
+
+    sets = [
+        "pixel.photoreceptor_noise.rms=0.02",
+        "frames.exposure_us=3000",
+        "frames.shift_px=[1,0]",
+    ]
+    config = load_config(["adv2e"], sets, effects=[Looks])
+    shown = recording()
+    assert steps_of_time(shown, config) > 0
+    np.testing.assert_array_equal(seen, list(lights(shown, config)))
