@@ -24,7 +24,7 @@ from pathlib import Path
 
 import click
 from real.bursts import bursts
-from real.model import SCORE, Bench, Judged, without_coupling
+from real.model import SCORE, Bench, Judged
 from real.peers import peer_rows
 from real.recording import Real, halves, read
 from real.search import Search
@@ -42,6 +42,7 @@ from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config, load_config, to_dict
 from adv2e.config.paths import flat
 from adv2e.diagnosis.nuisances import totals
+from adv2e.diagnosis.readouts import without_coupling
 from adv2e.errors import Adv2eError, DataError
 from adv2e.events import Events, empty_events
 
@@ -126,13 +127,13 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
     for windows, which in ((first, "first"), (second, "second")):
         if not len(cut(real.events, windows.start, windows.stop)):
             raise DataError(f"{real.name}: no events in the {which} half of its frame intervals")
-    bench = Bench(real, threads)
+    config = load_config([declared], seed=seed)
+    bench = Bench(real, threads, config)
     seeds = (seed + 1, seed + 2)
 
     def say(text: str) -> None:
         click.echo(f"{real.name}: {text}", err=True)
 
-    config = load_config([declared], seed=seed)
     as_declared = Added.plain("as declared", config)
     steps = [Step(as_declared, bench.judge(config, second, seeds))]
     ended = True

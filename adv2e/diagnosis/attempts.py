@@ -146,7 +146,9 @@ class Attempts:
             if against:
                 break
         new = grown.beyond(state)
-        told = [f"{fit.candidate.name} {fit.candidate.parameters(fit.place)}" for fit in new]
+        told = [
+            f"{fit.candidate.name} {fit.candidate.told(joint.config, fit.place)}" for fit in new
+        ]
         bench.log(f"  {' and '.join(told)}: {'; '.join(against) or 'holds'}")
         if against and len(new) == 1:  # of two, nobody knows which it is
             bench.rejections.add(new[0], "; ".join(against), final=True)

@@ -140,6 +140,17 @@ class Candidate:
         """Return the keys that this effect sets, and their values."""
         return dict(flat(self._set({}, inner)))
 
+    def told(self, config: Config, inner: Places) -> dict[str, Any]:
+        """Return the same of a model that has it: what was set besides, as it is there.
+
+        Where a pulse is, others' keys tell, too.
+        """
+        besides, values = {key for key, _ in self.extra}, to_dict(config)
+        return {
+            key: get_key(values, key) if key in besides else value
+            for key, value in self.parameters(inner).items()
+        }
+
     def _set(self, values: dict[str, Any], inner: Places) -> dict[str, Any]:
         """Set this effect's keys in nested mappings, and return them."""
         for key, value in self.extra:

@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.config import Config, to_dict
-from adv2e.config.paths import get_key
+from adv2e.config import Config
 from adv2e.diagnosis import parts
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.error import Distances, error_rows, of_interpolation, of_part
+from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.interpolation import every
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.picture import Gallery
+from adv2e.diagnosis.readouts import without_coupling
 from adv2e.diagnosis.ready import Ready
 from adv2e.diagnosis.scene import Placed
 from adv2e.diagnosis.search import Outcome, Search
@@ -66,26 +67,25 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
 
     measured = last(ready.measured)
 
-    def drawn(state: State, of: Simulator = simulator, first: int = _FIRST_DRAW) -> list[Placed]:
+    def drawn(config: Config, of: Simulator = simulator, first: int = _FIRST_DRAW) -> list[Placed]:
         def draw(seed: int) -> Placed:
-            return Placed.of(of.stream(state.config, seed), scene)
+            return Placed.of(of.stream(config, seed), scene)
 
         return of.map(draw, range(first, first + DRAWS))
 
     kept, declared = outcome.state, search.declared
-    before = after = drawn(declared)
+    before = after = drawn(declared.config)
     of_before = of_after = Distances.of(measured, list(map(last, before)))
     if kept is not declared:
-        after = drawn(kept)
+        after = drawn(kept.config)
         of_after = Distances.of(measured, list(map(last, after)))
     rows, interpolated = error_rows(of_before, of_after), 0.0
     if kept is not declared and ready.between_frames is not None:
+        bare = without_coupling(kept.config)
+        whole = list(map(last, after if bare == kept.config else drawn(bare)))
         with closing(simulator.of(every(ready.evidence, 2))) as fewer:
-            half = drawn(kept, fewer, _FIRST_DRAW + DRAWS)
-        floor = rows[0].floor.value
-        interpolated = of_interpolation(
-            measured, list(map(last, after)), list(map(last, half)), floor
-        )
+            half = list(map(last, drawn(bare, fewer, _FIRST_DRAW + DRAWS)))
+        interpolated = of_interpolation(measured, whole, half)
     verdict = verdict_of(outcome, rows[0], interpolated)
     if verdict in ("consistent", "unexplained") and kept is not declared:
         kept, after = declared, before
@@ -104,11 +104,7 @@ def finding_of(fit: Fitted, pixels: int, config: Config) -> Finding:
     config : Config
         The model, which tells what was set besides.
     """
-    besides, values = {key for key, _ in fit.candidate.extra}, to_dict(config)
-    parameters = {
-        key: get_key(values, key) if key in besides else value
-        for key, value in fit.candidate.parameters(fit.place).items()
-    }
+    parameters = fit.candidate.told(config, fit.place)
     interval: dict[str, Any] = {}
     spread: Any = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if fit.covariance.size else []
     for knob, place, sd in zip(fit.candidate.knobs, fit.place, spread, strict=False):
@@ -136,7 +132,7 @@ def rejected_of(outcome: Outcome, kept: State, candidates: Sequence[Candidate]) 
             held[fit.candidate.name] = Rejected(
                 fit.candidate.name,
                 why,
-                fit.candidate.parameters(fit.place),
+                fit.candidate.told(outcome.state.config, fit.place),
             )
     return [held[name] for name in names if name in held and name not in kept.names]
 
@@ -185,6 +181,19 @@ def about_frames(ready: Ready, search: Search) -> list[str]:
         untold = "what frames do not tell between the levels of their numbers"
         notes.append(_uncertain(untold, doubt, "frames of coarser levels"))
     return notes
+
+
+def about_drifts(evidence: Evidence, model: Config) -> list[str]:
+    """Say from when on drifts of a model count, where that is not when the recording begins."""
+    drifting = {
+        "clock_drift_ppm": model.frames.clock_drift_ppm,
+        "drift_per_s": model.pixel.thresholds.drift_per_s,
+    }
+    names = " and ".join(name for name, value in drifting.items() if value)
+    if not names or not evidence.run_in.frames:
+        return []
+    start_s = evidence.simulated.times_s[0]
+    return [f"in model.yaml {names} counts from the first frame simulated, at {start_s:.3f} s"]
 
 
 def _uncertain(what: str, doubt: float, told_by: str) -> str:

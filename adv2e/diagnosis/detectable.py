@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from adv2e.diagnosis.candidates import Candidate, neutral_value
 from adv2e.diagnosis.keys import about_key
 from adv2e.diagnosis.markers import BOTH
 from adv2e.diagnosis.metric import Model, expanded
+from adv2e.diagnosis.pulses import DRIFT
 from adv2e.diagnosis.search import PER_LOOK
 from adv2e.reports.result import Detectable
 
@@ -39,7 +40,9 @@ def detectable(bench: Bench, declared: State, candidates: Sequence[Candidate]) -
     mildest: dict[str, Candidate] = {}
     for candidate in candidates:
         if candidate.knobs:
-            mildest.setdefault(candidate.name, candidate)
+            # how fast the clock of the frames is would be seen by itself
+            extra = tuple((key, value) for key, value in candidate.extra if key != DRIFT)
+            mildest.setdefault(candidate.name, replace(candidate, extra=extra))
     every = [_Size.of(candidate, declared.config) for candidate in mildest.values()]
     sizes = every
     model = declared.models[BOTH]

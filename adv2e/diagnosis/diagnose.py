@@ -13,6 +13,7 @@ from adv2e.diagnosis import parts
 from adv2e.diagnosis.affordable import affordable
 from adv2e.diagnosis.conclusion import (
     DRAWS,
+    about_drifts,
     about_frames,
     conclude,
     finding_of,
@@ -118,7 +119,11 @@ def diagnose(
             else [],
             masked=evidence.masked,
             split=ready.laboratory.scene.parts.text(),
-            notes=[*evidence.notes, *about_frames(ready, search)],
+            notes=[
+                *evidence.notes,
+                *about_frames(ready, search),
+                *about_drifts(evidence, kept.config),
+            ],
             model=as_found(kept.config),
             facts={
                 "sensor": f"{evidence.width}x{evidence.height}",

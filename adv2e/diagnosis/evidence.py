@@ -92,6 +92,12 @@ class Evidence:
         return float(self.times_s[-1] - self.times_s[0])
 
     @property
+    def before_s(self) -> float:
+        """Time from the first frame that is simulated to the first that is looked at [s]."""
+        before = self.run_in.times_s
+        return float(self.times_s[0] - before[0]) if len(before) else 0.0
+
+    @property
     def simulated(self) -> Evidence:
         """The same with the frames that are simulated: after those of the run-in."""
         before = self.run_in

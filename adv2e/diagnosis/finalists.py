@@ -82,8 +82,7 @@ def finalists(bench: Bench, state: State, candidates: Sequence[Candidate]) -> li
     trials.sort(key=lambda trial: -trial.score)
     bench.rejections.new_round()
     for trial in trials:
-        parameters = trial.fit.candidate.parameters(trial.fit.place)
-        bench.log(f"  {trial.name} {parameters}: score {trial.score:.0f}")
+        bench.log(f"  {trial.name} {trial.fit.parameters}: score {trial.score:.0f}")
         bench.rejections.add(trial.fit, "others explain more")
     for fit in dropped:
         bench.rejections.add(fit, _behind(fit, nothing))

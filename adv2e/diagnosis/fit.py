@@ -105,6 +105,11 @@ class Fitted:
         """The model with the effect as fitted."""
         return self.candidate.applied(self.base, self.place)
 
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The keys that the effect sets, and their values in that model."""
+        return self.candidate.told(self.config, self.place)
+
     def moved_to(self, place: Array) -> Config:
         """Return the model with the effect at another place."""
         return self.candidate.applied(self.base, place)

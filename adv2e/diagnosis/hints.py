@@ -73,7 +73,7 @@ def hints_of(
         evidence.encoding,
         service_times(stream),
         readouts_of(looked_at, evidence.times_s),
-        pulse_of(looked_at, evidence.times_s),
+        pulse_of(looked_at, evidence.times_s, evidence.before_s),
         (_too_many(stream, pilot, 1), _too_many(stream, pilot, 0)),
     )
 

@@ -103,7 +103,7 @@ def events_of(
     DataError
         Fewer than two frames, or times that do not increase.
     """
-    lean, effects = as_recorded(config)
+    lean, effects = _as_recorded(config)
     frames = zip(*instants, strict=True)
     chunks = events_from_light(
         frames, lean, threads=threads, effects=effects, coarseness=coarseness
@@ -189,20 +189,16 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     return times, np.array(found, np.float32)
 
 
-def as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
+def _as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
     """Return `config` for what is made once: frames sharp and in place, and all between them.
 
     And the effects on other than frames that need to know how these were recorded.
-
-    Parameters
-    ----------
-    config : Config
     """
     frames, sampling, readout = config.frames, config.sampling, config.readout
     effects: list[Hooks] = []
     if is_made_once(config):
         coupling = _coupling(config)
-        if readout is not None and coupling is not None:
+        if readout is not None and coupling is not None and coupling.amplitude:
             every = sampling.L if _is_along_motion(config) else 1
             effects.append(FrameCouplingHooks(coupling, 0.5 * frames.exposure_us, every))
             readout = replace(readout, frame_coupling=None)

@@ -59,12 +59,13 @@ def between_frames(pilot: Pilot) -> FrameError | None:
     half = _with_every(pilot, 2)
     if half is None:
         return None
-    change = Change.of_pilot(pilot, half)
+    change = Change.of_pilot(pilot.undisturbed, half)
     uncertain = _MOVED
     if pilot.declared.sampling.interpolation == "linear":
         quarter = _with_every(pilot, 4)
         if quarter is not None:
-            uncertain = of_blended(Change.of_pilot(pilot, quarter).own, change.own)
+            of_quarter = Change.of_pilot(pilot.undisturbed, quarter)
+            uncertain = of_blended(of_quarter.own, change.own)
     return change.error(_TAKEN_OFF, uncertain)
 
 
@@ -83,7 +84,7 @@ def of_blended(of_quarter: Array, of_half: Array) -> float:
 
 def _with_every(pilot: Pilot, step: int) -> Array | None:
     fewer = every(pilot.evidence, step)
-    return pilot.of_frames(fewer) if len(fewer.frames) >= _FEWEST else None
+    return pilot.undisturbed.of_frames(fewer) if len(fewer.frames) >= _FEWEST else None
 
 
 def every(evidence: Evidence, step: int) -> Evidence:

@@ -22,7 +22,7 @@ from adv2e.diagnosis.candidates import Candidate, Knob
 from adv2e.diagnosis.hints import Hints
 from adv2e.diagnosis.keys import known_keys
 from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.pulses import WIDTH
+from adv2e.diagnosis.pulses import WIDTH, has_pulse
 from adv2e.diagnosis.stamps import Service
 from adv2e.effects.pixel.initial_reference import REFERENCES
 from adv2e.parameters import Fit
@@ -33,7 +33,7 @@ _DECLARED = known_keys(Config)
 def library(declared: Config, hints: Hints) -> list[Candidate]:
     """Return all candidates for what `declared` may lack."""
     known = known_keys(type(declared))
-    if get_key(to_dict(declared), WIDTH):  # a pulse that is declared stays where it is
+    if has_pulse(declared):  # it stays where it is
         hints = dataclasses.replace(hints, pulse=None)
     built_in = [one for one in _all(declared, hints) if all(key in known for key in _keys_of(one))]
     every = [*built_in, *_of_the_user(declared)]

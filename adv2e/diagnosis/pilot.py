@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.markers import Markers
+from adv2e.diagnosis.readouts import without_coupling
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Simulator
 from adv2e.diagnosis.stream import Stream
@@ -60,6 +61,16 @@ class Pilot:
     def sample(self) -> Array:
         """Their statistics, (seeds, views, statistics)."""
         return self._measured(self.streams.values())
+
+    @cached_property
+    def undisturbed(self) -> Pilot:
+        """The same of a model without frame coupling, for frames that are to be left out."""
+        bare = without_coupling(self.declared)
+        if bare == self.declared:
+            return self
+        with closing(self.simulator(self.evidence)) as made:
+            streams = made.map(lambda seed: made.stream(bare, seed), self.streams)
+        return replace(self, declared=bare, streams=dict(zip(self.streams, streams, strict=True)))
 
     def of_frames(self, evidence: Evidence) -> Array:
         """Return the statistics of the same simulations with the frames of `evidence`."""

@@ -18,6 +18,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.readouts import regular_interval
 from adv2e.diagnosis.stream import Stream
+from adv2e.effects.readout.frame_coupling import FrameCoupling
 
 DELAY, WIDTH, RISE = (f"readout.frame_coupling.{name}_us" for name in ("delay", "width", "rise"))
 DRIFT = "frames.clock_drift_ppm"
@@ -79,17 +80,21 @@ class Pulse:
         Between frames, by the clock of the events.
     drift_ppm : float
         By how much the clock of the frames is slow; 0 where it cannot be told from the declared.
+    before_s : float
+        From the first frame that is simulated, which a drift of its clock leaves in place, to the
+        first that is looked at.
     """
 
     on: Burst
     off: Burst
     interval_us: float
     drift_ppm: float
+    before_s: float = 0.0
 
     def keys(self, up: bool) -> dict[str, float]:
         """Return the keys of a pulse that begins with a leap upwards or downwards.
 
-        For frames at their stamps and without exposure; see :meth:`placed`.
+        With the leap as long after the stamps; see :meth:`placed`.
         """
         first, second = (self.on, self.off) if up else (self.off, self.on)
         width = (second.begins_us - first.begins_us) % self.interval_us
@@ -101,13 +106,15 @@ class Pulse:
     def placed(self, config: Config) -> Config:
         """Return `config` with a pulse, if it has one, where the bursts are.
 
-        Wherever its clock offset and exposure put the frames.
+        Wherever its clocks and exposure put the frames.
         """
-        coupling = None if config.readout is None else config.readout.frame_coupling
-        if coupling is None or not coupling.width_us:
+        coupling = _coupling(config)
+        if coupling is None or not has_pulse(config):
             return config
         first = self.on if coupling.amplitude > 0.0 else self.off
-        ends = config.frames.clock_offset_us + 0.5 * config.frames.exposure_us
+        frames = config.frames
+        drifted_us = frames.clock_drift_ppm * self.before_s  # ppm of seconds are us
+        ends = frames.clock_offset_us + drifted_us + 0.5 * frames.exposure_us
         return with_keys(config, {DELAY: self._nearest(first.begins_us - ends)})
 
     def text(self) -> str:
@@ -118,14 +125,14 @@ class Pulse:
             for burst, name in ((self.on, "ON"), (self.off, "OFF"))
         )
         apart = f", and these are {self.interval_us / 1e3:.2f} ms apart" if self.drift_ppm else ""
-        return f"{on}, {off}{apart}: their readout disturbs the pixels (frame_coupling)"
+        return f"{on}, {off}{apart}, as if their readout disturbed the pixels (frame_coupling)"
 
     def _nearest(self, time_us: float) -> float:
         half = 0.5 * self.interval_us
         return (time_us + half) % self.interval_us - half
 
 
-def pulse_of(stream: Stream, times_s: NDArray[np.float64]) -> Pulse | None:
+def pulse_of(stream: Stream, times_s: NDArray[np.float64], before_s: float = 0.0) -> Pulse | None:
     """Return the pulse that follows each frame; None: there are not two bursts.
 
     Parameters
@@ -133,14 +140,17 @@ def pulse_of(stream: Stream, times_s: NDArray[np.float64]) -> Pulse | None:
     stream : Stream
     times_s : (frames,)
         Stamps of the frames [s].
+    before_s : float
+        See :class:`Pulse`.
     """
-    times_us = 1e6 * times_s
-    declared = regular_interval(times_us)
-    if declared is None or len(times_us) < _FEWEST:
+    times_us = 1e6 * (times_s - times_s[0])
+    if regular_interval(times_us) is None or len(times_us) < _FEWEST:
         return None
-    since = stream.t - times_us[0]
+    # of stamps that are rounded the usual interval need not be the mean one
+    declared, first_us = np.polyfit(np.arange(len(times_us)), times_us, 1).tolist()
+    since = stream.t - 1e6 * times_s[0] - first_us
     parts = [since[stream.on == on] for on in (1, 0)]
-    interval = _interval(parts, declared, float(times_us[-1] - times_us[0]))
+    interval = _interval(parts, declared, float(times_us[-1]))
     bin_us = _bin_us(interval)
     on, off = (_burst(_folded(part, interval, bin_us), bin_us) for part in parts)
     if on is None or off is None:
@@ -148,7 +158,17 @@ def pulse_of(stream: Stream, times_s: NDArray[np.float64]) -> Pulse | None:
     apart = (off.begins_us - on.begins_us) % interval
     if apart < on.lasts_us or interval - apart < off.lasts_us:  # as of stamps in whole intervals
         return None
-    return Pulse(on, off, interval, 1e6 * (interval / declared - 1.0))
+    return Pulse(on, off, interval, 1e6 * (interval / declared - 1.0), before_s)
+
+
+def has_pulse(config: Config) -> bool:
+    """Tell whether a configuration says when the signal leaps, and when it leaps back."""
+    coupling = _coupling(config)
+    return coupling is not None and coupling.width_us > 0.0
+
+
+def _coupling(config: Config) -> FrameCoupling | None:
+    return None if config.readout is None else config.readout.frame_coupling
 
 
 def _bin_us(interval: float) -> float:

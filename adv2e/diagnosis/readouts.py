@@ -8,7 +8,7 @@ intervals between frames.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,18 @@ class Readouts:
         least = 2.0 * (self.delay_us - config.frames.clock_offset_us) % whole
         count = max(round((config.frames.exposure_us - least) / whole), 0 if least > 0.0 else 1)
         return with_keys(config, {EXPOSURE: least + count * whole})
+
+
+def without_coupling(config: Config) -> Config:
+    """Return `config` without what the readout of frames does to the pixels.
+
+    Frames that are left out of a simulation, to see what is made up between others, were read out
+    all the same: with it both were to be compared without.
+    """
+    readout = config.readout
+    if readout is None or readout.frame_coupling is None:
+        return config
+    return replace(config, readout=replace(readout, frame_coupling=None))
 
 
 def regular_interval(times_us: NDArray[np.float64]) -> float | None:

@@ -24,6 +24,7 @@ from adv2e.diagnosis.light import light_of, scene_of
 from adv2e.diagnosis.lines import strongest_lines
 from adv2e.diagnosis.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of
 from adv2e.diagnosis.pilot import Pilot
+from adv2e.diagnosis.pulses import has_pulse
 from adv2e.diagnosis.scene import Placed, Scene
 from adv2e.diagnosis.simulations import Laboratory, Simulator
 from adv2e.diagnosis.stream import Stream
@@ -108,7 +109,7 @@ def make_ready(
     lamps = _lamps(pilot, simulator)
     looked_at = of_part(evidence.stream, scene.parts, parts.FIT, parts.JUDGE)
     hints = hints_of(evidence, looked_at, lamps, list(pilot.streams.values()))
-    if hints.pulse:
+    if hints.pulse and not has_pulse(declared):
         evidence = replace(evidence, notes=[*evidence.notes, hints.pulse.text()])
     return Ready(
         evidence,

@@ -24,4 +24,4 @@ class Rejections:
         name = fit.candidate.name
         if final or name not in self._this_round:
             self._this_round.add(name)
-            self.held[name] = Rejected(name, reason, fit.candidate.parameters(fit.place))
+            self.held[name] = Rejected(name, reason, fit.parameters)

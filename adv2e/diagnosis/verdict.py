@@ -10,6 +10,7 @@ from adv2e.config.paths import get_key
 from adv2e.diagnosis.bench import State
 from adv2e.diagnosis.candidates import Candidate, neutral_value
 from adv2e.diagnosis.fit import Fitted
+from adv2e.diagnosis.pulses import DRIFT
 from adv2e.diagnosis.search import PER_LOOK, Outcome
 from adv2e.reports.result import ErrorRow, Verdict
 
@@ -132,7 +133,9 @@ def _has(declared: Config, candidate: Candidate) -> bool:
     """Tell whether a configuration has an effect already, of whatever size."""
     values = (neutral_value(declared, knob) for knob in candidate.knobs)
     held = to_dict(declared)
-    others = (get_key(held, key) for key, _ in candidate.extra)
+    # how fast the clock of the frames is, a pulse tells besides
+    besides = (key for key, _ in candidate.extra if key != DRIFT)
+    others = (get_key(held, key) for key in besides)
     return any(value != 0.0 and math.isfinite(value) for value in values) or any(
         value is not None and value != 0.0 for value in others
     )

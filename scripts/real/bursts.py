@@ -8,8 +8,9 @@ from writing.markdown import table
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
 from adv2e.diagnosis.pulses import Pulse
+from adv2e.diagnosis.readouts import without_coupling
 from adv2e.events import Events
-from real.model import Bench, without_coupling
+from real.model import Bench
 
 _LASTS_US = 1000.0
 """From the beginning of a burst on, events are counted for so long."""

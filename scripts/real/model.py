@@ -17,7 +17,7 @@ from adv2e.config import Config
 from adv2e.decoding import decoder_for
 from adv2e.diagnosis.instants import Instants, Kept, events_of, is_made_once
 from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
-from adv2e.diagnosis.pulses import Pulse, pulse_of
+from adv2e.diagnosis.pulses import Pulse, has_pulse, pulse_of
 from adv2e.diagnosis.stream import Stream
 from adv2e.events import Events
 from adv2e.stepping import Coarseness
@@ -62,14 +62,23 @@ class Bench:
     In-between frames along the motion take longer than all else, so they are made once for what
     they depend on (:mod:`adv2e.diagnosis.instants`).
 
+    Parameters
+    ----------
+    real : Real
+    threads : int, optional
+        Default: all cores.
+    declared : Config, optional
+        A pulse that is declared stays where it is.
+
     Attributes
     ----------
     simulations : int
         Made so far.
     """
 
-    def __init__(self, real: Real, threads: int | None) -> None:
+    def __init__(self, real: Real, threads: int | None, declared: Config | None = None) -> None:
         self.real, self.threads = real, threads
+        self._stays = declared is not None and has_pulse(declared)
         self._frames = Kept()
         self.simulations = 0
 
@@ -107,9 +116,10 @@ class Bench:
     def matched(self, config: Config, windows: Windows, tolerance: float = NEAR) -> Config:
         """Return `config` with thresholds that match the totals in the windows.
 
-        And with a pulse, if it has one, where the bursts are.
+        And with a pulse, if it has one that was not declared, where the bursts are.
         """
-        config = self.pulse.placed(config) if self.pulse else config
+        if self.pulse is not None and not self._stays:
+            config = self.pulse.placed(config)
         goal = totals(cut(self.real.events, windows.start, windows.stop))
 
         def count(on: float, off: float) -> tuple[int, int]:
@@ -182,9 +192,3 @@ class Bench:
 def means(found: Sequence[Floor]) -> Floor:
     """Return the mean of each measure."""
     return {name: pooled([one[name] for one in found], "mean") for name in found[0]}
-
-
-def without_coupling(config: Config) -> Config:
-    """Return `config` without what the readout of frames does to the pixels."""
-    readout = config.readout
-    return replace(config, readout=readout and replace(readout, frame_coupling=None))

@@ -144,7 +144,7 @@ class Added:
 
     def text(self) -> str:
         """Return name and values."""
-        keys = self.candidate.parameters(self.candidate.inner(self.values))
+        keys = self.candidate.told(self.config, self.candidate.inner(self.values))
         named = ((key.rpartition(".")[2], value) for key, value in keys.items())
         values = ", ".join(f"{key} {_short(value)}" for key, value in named)
         return f"{self.candidate.name}{f' ({values})' if values else ''}"

@@ -68,6 +68,23 @@ def test_too_few_frames_tell_nothing():
     assert between_frames(Pilot(evidence, DECLARED, scene, None, {}, none)) is None
 
 
+def test_frames_that_are_left_out_were_read_out_all_the_same():
+    """Of a scene at rest nothing hangs on what is between the frames, leaps at each or not."""
+    light = np.repeat(wandering_light(frames=1).astype(np.float32), 41, axis=0)
+    evidence = evidence_of(light, 0.02 * np.arange(41))
+    scene = Scene.of(light, evidence.times_s, 0.0)
+    coupling = "readout.frame_coupling={amplitude: 0.45, tau_us: 5000, width_us: 1000}"
+    sets = ["sampling.L=1", "pixel.initial_reference=random", coupling]
+    declared = load_config(["ideal"], ["frames.encoding=linear", *sets])
+    simulator = Simulator(evidence, 2)
+    pilot = Pilot.of(evidence, declared, scene, simulator)
+    assert np.mean([len(stream) for stream in pilot.streams.values()]) > 1000
+    error = between_frames(pilot)
+    simulator.close()
+    assert not np.any(error.bias)
+    assert pilot.undisturbed.declared.readout.frame_coupling is None
+
+
 @pytest.mark.parametrize(("frames", "kept"), [(9, 5), (10, 6), (3, 2)])
 def test_the_last_frame_is_kept(frames, kept):
     light = wandering_light(frames=frames)

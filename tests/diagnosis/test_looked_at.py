@@ -16,6 +16,7 @@ from adv2e.diagnosis.stream import Stream
 
 WIDTH, HEIGHT, COUNT = 32, 24, 25
 TIMES_S = 0.02 * np.arange(COUNT)
+PULSE = "readout.frame_coupling={amplitude: 0.1, tau_us: 30000, delay_us: 5000, width_us: 4000}"
 CONFIG = load_config(["ideal"], ["sampling.L=1"])
 
 
@@ -53,3 +54,11 @@ def test_bursts_are_looked_for_before_the_last_look(part, seen):
     assert any("come at once" in note for note in ready.evidence.notes) is seen
     found = [one for one in ready.candidates if one.name == "frame_coupling"]
     assert all(bool(one.pulse) is seen for one in found)
+
+
+def test_a_pulse_that_is_declared_is_not_told():
+    evidence = recording(parts.FIT)
+    declared = load_config(["ideal"], ["sampling.L=1", PULSE])
+    with closing(Simulator(evidence, 2)) as simulator:
+        ready = make_ready(evidence, declared, simulator, [], False, lambda line: None)
+    assert not any("come at once" in note for note in ready.evidence.notes)

@@ -5,9 +5,16 @@ import pytest
 from made_up_laboratory import HINTS
 from made_up_streams import stream_of
 
+from adv2e.active_effects import active_hooks
 from adv2e.config import load_config
+from adv2e.diagnosis.evidence import Evidence
+from adv2e.diagnosis.fit import Fitted
 from adv2e.diagnosis.library import library
-from adv2e.diagnosis.pulses import Burst, Pulse, pulse_of
+from adv2e.diagnosis.pulses import DELAY, Burst, Pulse, pulse_of
+from adv2e.effects.composition import begin
+from adv2e.effects.frames.clock_drift import ClockDriftHooks
+from adv2e.effects.frames.clock_offset import ClockOffsetHooks
+from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
 
 INTERVAL_US = 40_000.0
 TIMES_S = 5.0 + 1e-6 * INTERVAL_US * np.arange(20)
@@ -48,7 +55,7 @@ def test_sharp_bursts_over_the_border_of_a_bin_are_no_drift(on_us):
     t = np.concatenate([quiet.t, *bursts]).astype(np.int64)
     on = np.concatenate([quiet.on, np.ones(count, np.int8), np.zeros(count, np.int8)])
     found = pulse_of(stream_of(t, 0, 0, on), TIMES_S)
-    assert (found.drift_ppm, found.interval_us) == (0.0, INTERVAL_US)
+    assert (found.drift_ppm, found.interval_us) == (0.0, pytest.approx(INTERVAL_US))
     apart = (found.on.begins_us - on_us + 200.0) % INTERVAL_US - 200.0
     assert apart == pytest.approx(0.0, abs=101.0)
 
@@ -59,6 +66,21 @@ def test_bursts_tell_how_fast_the_clock_of_the_frames_is(ppm):
     assert found.drift_ppm == pytest.approx(ppm, abs=80.0)
     assert found.on.begins_us == pytest.approx(3000.0, abs=150.0)
     assert f"{found.interval_us / 1e3:.2f} ms apart" in found.text()
+
+
+@pytest.mark.parametrize(("fps", "rounded_us"), [(60.0, 100.0), (30.0, 1.0), (24.0, 200.0)])
+def test_stamps_that_are_rounded_are_no_drift(fps, rounded_us):
+    """Their usual interval is not their mean one."""
+    draw = np.random.default_rng(6)
+    frames = 1e6 / fps * np.arange(round(20 * fps))
+    stamps = np.rint(frames / rounded_us) * rounded_us
+    parts = [(frames[:-1, None] + delay + 250.0 * draw.random(40)).ravel() for delay in (700, 1900)]
+    t = np.concatenate([*parts, frames[-1] * draw.random(20_000)])
+    on = np.repeat([1, 0], parts[0].size).tolist() + draw.integers(0, 2, 20_000).tolist()
+    found = pulse_of(stream_of(t.astype(np.int64), 0, 0, np.array(on)), 1e-6 * stamps)
+    assert found.drift_ppm == 0.0
+    assert found.interval_us == pytest.approx(1e6 / fps, rel=1e-5)
+    assert found.on.begins_us == pytest.approx(700.0, abs=150.0)
 
 
 @pytest.mark.parametrize("ppm", [0.0, 40.0, -5000.0])
@@ -135,7 +157,7 @@ PULSE = Pulse(ON, OFF, INTERVAL_US, drift_ppm=0.0)
 def test_the_bursts_in_words():
     assert PULSE.text() == (
         "12% of the ON events come at once -0.40 ms from each frame, 9% of the OFF events come at"
-        " once +0.60 ms from each frame: their readout disturbs the pixels (frame_coupling)"
+        " once +0.60 ms from each frame, as if their readout disturbed the pixels (frame_coupling)"
     )
 
 
@@ -154,6 +176,36 @@ def test_a_pulse_stays_with_the_bursts_wherever_the_frames_are(sets, amplitude, 
     found = PULSE.placed(config).readout.frame_coupling
     assert found.delay_us == pytest.approx(delay_us)
     assert (found.amplitude, found.width_us) == (amplitude, 1000.0)
+
+
+@pytest.mark.parametrize("ppm", [-6400.0, 800.0])
+def test_a_drift_counts_from_the_first_frame_that_is_simulated(ppm):
+    """Leaps of the model lie where bursts are, whatever frames before the recording are run in."""
+    stamps = 10.0 + 1e-6 * INTERVAL_US * np.arange(26)
+    nothing = stream_of([], [], [], [])
+    whole = Evidence("whole", [np.zeros((2, 2), np.uint8)] * 26, stamps, nothing, 2, 2)
+    for part in (whole.during(0, 12), whole.during(13, 25)):
+        frames = part.times_s[0] * 1e6 + INTERVAL_US * (1.0 + 1e-6 * ppm) * np.arange(12)
+        t = np.sort(np.concatenate([frames + 3000.0 + k for k in range(40)] * 2))
+        bursts = np.concatenate([t, t + 5000.0])
+        on = np.repeat([1, 0], len(t))
+        noise = np.linspace(part.times_s[0] * 1e6, part.times_s[-1] * 1e6, 4000)
+        stream = stream_of(
+            np.concatenate([bursts, noise, noise]).astype(np.int64), 0, 0,
+            np.concatenate([on, np.repeat([1, 0], len(noise))]),
+        )  # fmt: skip
+        pulse = pulse_of(stream, part.times_s, part.before_s)
+        assert pulse.drift_ppm == pytest.approx(ppm, abs=150.0)
+        sets = [COUPLING % (0.1, 5000), "frames.exposure_us=4000", "frames.clock_offset_us=300"]
+        config = load_config(["ideal"], [*sets, f"frames.clock_drift_ppm={pulse.drift_ppm}"])
+        hooks = active_hooks(pulse.placed(config))
+        (coupling,) = (hook for hook in hooks if isinstance(hook, FrameCouplingHooks))
+        clocks = [hook for hook in hooks if isinstance(hook, (ClockDriftHooks, ClockOffsetHooks))]
+        light = ((t_ns, np.zeros((2, 2))) for t_ns in part.simulated.times_ns)
+        list(begin([*clocks, coupling], light, 0))
+        leaps = np.array(coupling._leaps) * 1e6
+        leaps = leaps[leaps > part.times_s[0] * 1e6]
+        assert leaps[:11] == pytest.approx(frames[:11] + 3000.0, abs=170.0, rel=0)
 
 
 def test_what_is_no_pulse_is_not_moved():
@@ -182,6 +234,11 @@ def test_the_library_has_the_pulse_in_the_place_of_leaps_at_the_end_of_exposures
     assert (coupling.amplitude, coupling.tau_us) == (pytest.approx(0.05), pytest.approx(4000.0))
     assert coupling.delay_us == pytest.approx(-1400.0)
     assert config.frames.clock_drift_ppm == -6400.0
+    # told as it is in the model, wherever that puts the frames
+    assert up.told(config, up.inner((0.05, 4000.0)))[DELAY] == coupling.delay_us
+    fit = Fitted.at((0.05, 4000.0), up, load_config([], ["frames.exposure_us=6000"]))
+    assert fit.parameters[DELAY] == fit.config.readout.frame_coupling.delay_us
+    assert fit.parameters[DELAY] == pytest.approx(-3400.0)
     # one that is declared stays where it is said to be
     declared = couplings(HINTS, [COUPLING % (0.05, 1000)])
     assert [one.pulse for one in declared] == [None]

@@ -61,6 +61,20 @@ def all_before(first):
     return RunIn(EVIDENCE.frames[:first], EVIDENCE.times_s[:first])
 
 
+@pytest.mark.parametrize("sets", [["frames.exposure_us=4000"], ["sampling.interpolation=flow"]])
+def test_a_coupling_of_nothing_takes_no_steps_of_time(simulator, monkeypatch, sets):
+    config = load_config([], [*LINEAR, *sets])
+    nothing = "readout.frame_coupling={amplitude: 0, tau_us: 300}"
+    coupled = load_config([], [*LINEAR, *sets, nothing])
+    plain = simulator.stream(config, 1)
+
+    def none(*arguments):
+        raise AssertionError("steps of time")
+
+    monkeypatch.setattr("adv2e.stepping.steps_of", none)
+    np.testing.assert_array_equal(simulator.stream(coupled, 1).t, plain.t)
+
+
 def test_both_seeds_decide(simulator):
     config, other = (load_config([], LINEAR, seed=seed) for seed in (1, 2))
     once, again = simulator.stream(config, 7).t, simulator.stream(config, 7).t

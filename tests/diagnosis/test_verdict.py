@@ -4,13 +4,17 @@ import dataclasses
 
 import numpy as np
 import pytest
-from made_up_laboratory import GONE, candidates, error, searched
+from made_up_laboratory import GONE, HINTS, candidates, error, searched
+from made_up_streams import stream_of
 from scipy.stats import chi2
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.conclusion import finding_of, rejected_of
+from adv2e.diagnosis.conclusion import about_drifts, finding_of, rejected_of
+from adv2e.diagnosis.evidence import Evidence
 from adv2e.diagnosis.fit import Fitted
+from adv2e.diagnosis.library import library
+from adv2e.diagnosis.pulses import Burst, Pulse
 from adv2e.diagnosis.verdict import sentence_of, verdict_of
 from adv2e.reports.quantities import interval_text
 
@@ -88,6 +92,25 @@ def test_a_key_that_is_read_off_makes_an_effect_one_that_is_there(declared, wron
     assert f"The declared model {wrong} timestamp_tick" in told
 
 
+@pytest.mark.parametrize(
+    ("sets", "wrong"),
+    [
+        (["frames.clock_drift_ppm=100"], "lacks"),
+        (["readout.frame_coupling={amplitude: 0.02, tau_us: 900}"], "is wrong in"),
+    ],
+)
+def test_a_clock_that_drifts_is_no_frame_coupling(sets, wrong):
+    bursts = (Burst(3000.0, 300.0, 0.1), Burst(4000.0, 300.0, 0.1))
+    hints = dataclasses.replace(HINTS, pulse=Pulse(*bursts, 40_000.0, -6400.0))
+    declared = load_config([], sets)
+    one = next(one for one in library(declared, hints) if one.name == "frame_coupling")
+    fit = Fitted(one, DECLARED, np.array(one.inner(one.probes[0])))
+    _, outcome = searched(["pixel.leak.rate_hz=4"])
+    state = dataclasses.replace(outcome.state, fits=(fit,))
+    told = sentence_of("explained", state, outcome, declared)
+    assert f"The declared model {wrong} frame_coupling" in told
+
+
 def test_statistics_alone_are_no_explanation():
     search, outcome = searched(["pixel.leak.rate_hz=4"])
     assert verdict_of(outcome, error(1.19, 0.75, 0.64)) == "explained"
@@ -123,3 +146,16 @@ def test_of_a_share_of_pixels_no_more_is_known_than_its_number_tells():
         n = 0.01 * pixels
         counted = 0.5 * np.array([chi2.ppf(0.025, 2 * n), chi2.ppf(0.975, 2 * n + 2)])  # Garwood's
         assert list(found) == pytest.approx(counted / pixels, rel=near)
+
+
+def test_from_when_on_drifts_count_in_a_piece_of_a_recording():
+    frames, times_s = [np.zeros((2, 2), np.uint8)] * 26, 10.0 + 0.04 * np.arange(26)
+    whole = Evidence("whole", frames, times_s, stream_of([], [], [], []), 2, 2)
+    piece = whole.during(13, 25)
+    drifting = load_config([], ["frames.clock_drift_ppm=300"])
+    assert about_drifts(whole, drifting) == about_drifts(piece, DECLARED) == []
+    (told,) = about_drifts(piece, drifting)
+    counts = "clock_drift_ppm counts from the first frame simulated, at"
+    assert told == f"in model.yaml {counts} {piece.run_in.times_s[0]:.3f} s"
+    both = load_config([], ["frames.clock_drift_ppm=300", "pixel.thresholds.drift_per_s=0.1"])
+    assert "clock_drift_ppm and drift_per_s" in about_drifts(piece, both)[0]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from real.bursts import bursts
-from real.model import Bench, without_coupling
+from real.model import Bench
 from real.recording import halves, read
 from real.search import Search
 from real.tried import of_the_camera
@@ -15,6 +15,7 @@ from written_recordings import write_recording
 
 from adv2e import simulate
 from adv2e.config import load_config
+from adv2e.diagnosis.readouts import without_coupling
 
 WIDTH, HEIGHT, FRAMES = 32, 24, 13
 TIMES = 0.04 * np.arange(FRAMES)
@@ -62,6 +63,16 @@ def test_the_half_to_judge_by_tells_nothing_of_the_pulse(bench):
     assert beyond.pulse == bench.pulse is not None
 
 
+def test_a_declared_pulse_stays_where_it_is(bench):
+    first, _ = halves(bench.real.windows)
+    declared = load_config(["ideal"], [*PIXEL, COUPLING.replace("-2000", "5000")])
+    held = Bench(bench.real, 1, declared).matched(declared, first)
+    assert held.readout.frame_coupling == declared.readout.frame_coupling
+    # what is found is put where the bursts are
+    moved = bench.matched(declared, first).readout.frame_coupling
+    assert moved.delay_us == pytest.approx(-2000.0, abs=150.0)
+
+
 def test_the_search_finds_the_pulse_that_made_the_bursts(bench, monkeypatch):
     monkeypatch.setattr("real.search.OWN", ())
     first, second = halves(bench.real.windows)
@@ -76,7 +87,7 @@ def test_the_search_finds_the_pulse_that_made_the_bursts(bench, monkeypatch):
     assert coupling.width_us % 37_000.0 == pytest.approx(1500.0, abs=200.0)
 
     text = bursts(bench, found, second, 1)
-    assert "their readout disturbs the pixels" in text
+    assert "as if their readout disturbed the pixels" in text
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     assert [row[0] for row in rows[2:]] == [
         "measured", "as found, without frame coupling", "as found",
