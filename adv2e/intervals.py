@@ -107,7 +107,7 @@ class Intervals:
         Raises
         ------
         DataError
-            A single frame, or times that do not increase.
+            A single frame, or times that do not increase, by a nanosecond for each instant.
         """
         ahead = 1 if self._printed else 0
         for instant in self._cut(self._checked(frames)):
@@ -126,6 +126,11 @@ class Intervals:
                 raise DataError(
                     f"frame {number}: its time {now_ns * 1e-9:.9f} s is not after the one before"
                     f" ({before_ns * 1e-9:.9f} s)"
+                )
+            if now_ns - before_ns < self._L:
+                raise DataError(
+                    f"frame {number}: {now_ns - before_ns} ns after the one before, too near for"
+                    f" {self._L} instants from one to the other (sampling.L)"
                 )
             yield now_ns, now
             before_ns = now_ns

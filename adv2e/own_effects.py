@@ -7,6 +7,7 @@ import hashlib
 import re
 import sys
 import traceback
+from dataclasses import MISSING
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -110,6 +111,9 @@ def _key_complaint(key: Key) -> str | None:
     if not set(kinds) <= set(_KINDS):
         wanted = ", ".join(kind.__name__ for kind in _KINDS)
         return f"Parameters: {key.name}: its type must be one of {wanted} or a tuple of them"
+    wrong = None if key.default is MISSING else key.about.complaint(key.default)
+    if wrong:
+        return f"Parameters: {key.name}: default: {wrong}"
     fit = key.about.fit
     if fit is None:
         return None

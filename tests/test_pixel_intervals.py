@@ -323,3 +323,15 @@ def test_times_that_do_not_increase_name_the_frame(step_ns, at, L):
     )
     with pytest.raises(DataError, match=named):
         cut(frames, times, sampling(L))
+
+
+@pytest.mark.parametrize(
+    ("step_ns", "L", "refused"), [(9, 10, True), (10, 10, False), (1, 1, False)]
+)
+def test_frames_too_near_for_the_instants_between_them_are_refused(step_ns, L, refused):
+    frames, times = clip(4), [0, step_ns, 2 * step_ns, 3 * step_ns]
+    if not refused:
+        assert len(cut(frames, times, sampling(L))) > 0
+        return
+    with pytest.raises(DataError, match=r"^frame 1: 9 ns after the one before, too near for 10 in"):
+        cut(frames, times, sampling(L))

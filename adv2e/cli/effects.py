@@ -27,7 +27,7 @@ def command(name: str | None) -> None:
         return
     from adv2e.effects import EFFECTS
 
-    named = {effect.name: effect for effect in EFFECTS}
+    named = {name: effect for effect in EFFECTS for name in (effect.name, *effect.told_as)}
     if name not in named:
         near = difflib.get_close_matches(name, named, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(named)}"
@@ -44,7 +44,8 @@ def _list() -> None:
             click.echo(f"{stage}: {meaning}")
         for effect in effects:
             paths = ", ".join(key.path for key in _keys(effect))
-            click.echo(f"  {effect.name:<20} {effect.summary()}")
+            parts = f" (a diagnosis also tells {', '.join(effect.told_as)})"
+            click.echo(f"  {effect.name:<20} {effect.summary()}{parts * bool(effect.told_as)}")
             click.echo(f"  {'':<20} {paths}")
 
 

@@ -87,9 +87,9 @@ def command(
 ) -> None:
     """Draw pictures and films of events.
 
-    EVENTS is anything that 'adv2e info' reads. The suffix of OUT says what to make: .mp4 or .gif
-    a film, .avi a film without loss, .png a sheet of one or several instants. Times are counted
-    from the first event or frame.
+    EVENTS is a file of events (.txt, .h5, .hdf5, .npz) or a recording (DAVIS240C folder or zip).
+    The suffix of OUT says what to make: .mp4 or .gif a film, .avi a film without loss, .png a
+    sheet of one or several instants. Times are counted from the first event or frame.
 
     \b
     Examples:

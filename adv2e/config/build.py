@@ -159,7 +159,7 @@ def _scalar(key: Key, value: Value) -> Any:
     if key.kind is int and isinstance(content, float) and content.is_integer():
         hint = f", which is a floating-point number: write {int(content)}"
     elif isinstance(content, str) and key.kind is not str and _reads_as(content, key.kind):
-        hint = ": leave out the quotes"
+        hint = ": leave out the " + ("underscores" if "_" in content else "quotes")
     raise value.origin.complaint(key.path, f"must be {wanted}, got {value}{hint}")
 
 
@@ -187,6 +187,10 @@ def _nearest(name: str, keys: dict[str, Key]) -> str:
     bare = name.partition(":")[0]
     if bare in keys and bare != name:
         return f"did you mean '{bare}: {name.partition(':')[2]}' with a space after the colon?"
+    *above, last = name.split(".")
+    if above and name in {key.path for key in all_keys()}:
+        nested = "".join(f"{part}: {{" for part in above)
+        return f"each part by itself: {nested}{last}: ...{'}' * len(above)}"
     near = difflib.get_close_matches(name, keys, n=1)
     if near:
         return f"did you mean '{near[0]}'?"

@@ -166,7 +166,10 @@ class _Builder:
             place = self.place(key_node)
             if key_node.tag != _TAG + "str":
                 written = key_node.value if isinstance(key_node, yaml.ScalarNode) else "a mapping"
-                raise place.complaint(path, f"a key must be text, got {written}")
+                nothing = isinstance(value_node, yaml.ScalarNode) and not value_node.value
+                comma = nothing and key_node.tag == _TAG + "int" and content
+                hint = ": numbers have a decimal point, not a comma" if comma else ""
+                raise place.complaint(path, f"a key must be text, got {written}{hint}")
             key = key_node.value
             full = f"{path}.{key}" if path else key
             if key in content:

@@ -160,6 +160,12 @@ def read_evidence(path: str | Path) -> Evidence:
             f"{recording.height}"
         )
     kept, masked = _between_frames(recording.events, times_s)
+    if len(recording.events) and not len(kept):
+        spans = (recording.events["t"][[0, -1]] * 1e-6).tolist(), times_s[[0, -1]].tolist()
+        events, pictures = (f"{first:.3f} to {last:.3f} s" for first, last in spans)
+        raise DataError(
+            f"{path}: events come from {events}, frames from {pictures}: they must be on one clock"
+        )
     check_events(len(kept), path, "between its first and its last frame")
     whole = Evidence(
         name=str(path),

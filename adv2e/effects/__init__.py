@@ -30,6 +30,8 @@ class Effect:
     name: str
     own_paths: tuple[str, ...] = ()
     own_module: str = ""
+    told_as: tuple[str, ...] = ()
+    """Names under which a diagnosis finds a part of it."""
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -48,7 +50,9 @@ class Effect:
 
 
 EFFECTS = (
-    Effect("frames", "encoding", ("frames.encoding", "frames.full_scale")),
+    Effect(
+        "frames", "encoding", ("frames.encoding", "frames.full_scale"), told_as=("frame_encoding",)
+    ),
     Effect("frames", "clock_drift", ("frames.clock_drift_ppm",)),
     Effect("frames", "clock_offset", ("frames.clock_offset_us",)),
     Effect("frames", "black_level", ("frames.black_level_dn", "frames.black_depth_dn")),
@@ -62,11 +66,11 @@ EFFECTS = (
     Effect("pixel", "slew_limit"),
     Effect("pixel", "source_follower"),
     Effect("pixel", "initial_reference", ("pixel.initial_reference",)),
-    Effect("pixel", "thresholds"),
+    Effect("pixel", "thresholds", told_as=("threshold_mismatch",)),
     Effect("pixel", "threshold_drift", ("pixel.thresholds.drift_per_s",)),
     Effect("pixel", "refractory"),
     Effect("pixel", "reset_overshoot"),
-    Effect("pixel", "leak"),
+    Effect("pixel", "leak", told_as=("photo_leak",)),
     Effect("pixel", "shot_noise"),
     Effect("pixel", "hot_pixels"),
     Effect("pixel", "dead_pixels"),

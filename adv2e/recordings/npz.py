@@ -76,7 +76,9 @@ def _load(path: Path) -> dict[str, NDArray[Any]]:
         with np.load(path, allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError) as error:
-        raise DataError(f"{path}: not a NumPy archive that can be read: {error}") from error
+        # NumPy's advice for what is no archive at all is to load it unsafely
+        why = "" if "pickle" in str(error) else f": {error}"
+        raise DataError(f"{path}: not a NumPy archive that can be read{why}") from error
 
 
 def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[str, NDArray[Any]]]:

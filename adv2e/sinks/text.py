@@ -183,6 +183,8 @@ class StandardOutput:
         """Do nothing: text holds no frames."""
 
     def __enter__(self) -> StandardOutput:
+        if sys.stdout is None:  # closed before the program began: nobody reads
+            raise BrokenPipeError
         return self
 
     def __exit__(

@@ -10,7 +10,7 @@ from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
 from adv2e.sources.opencv import IMAGE_SUFFIXES, read_image
-from adv2e.sources.times import parse_info, parse_times, read_text
+from adv2e.sources.times import order_note, parse_info, parse_times, read_text
 
 LISTS = {"images.txt": parse_times, "timestamps.txt": parse_times, "info.txt": parse_info}
 """Lists of times that are looked for in the folder, then beside it: name and reader."""
@@ -36,10 +36,11 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     if given:
         shots = given_shots(given, pictures, path)
     elif found is not None:
-        shots = listed_shots(
-            LISTS[found.name](read_text(found), str(found)), str(found), pictures, path
-        )
+        stamps = LISTS[found.name](read_text(found), str(found))
+        shots = listed_shots(stamps, str(found), pictures, path)
         notes.append(f"times from {found}")
+        if order := order_note(stamps):
+            notes.append(f"{found}: {order}")
         if len(shots) < len(pictures):
             notes.append(f"{len(pictures) - len(shots)} images are not in {found} and are left out")
     else:

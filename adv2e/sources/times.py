@@ -96,20 +96,35 @@ def parse_list(text: str, label: str) -> tuple[list[Stamp], str]:
     -------
     stamps : list of Stamp
     note : str
-        What is to be told of their unit; empty for decimal seconds.
+        What is to be told of their unit and order; empty for decimal seconds, sorted.
 
     Raises
     ------
     DataError
         As :func:`parse_times`.
     """
+    unit_ns, unit = _unit_of(text, label)
+    stamps = parse_times(text, label, unit_ns)
+    return stamps, "; ".join(filter(None, (unit, order_note(stamps))))
+
+
+def _unit_of(text: str, label: str) -> tuple[int, str]:
+    """Return the unit of a list's times [ns], and what is to be told of it."""
     words = [words[0] for _, words in _lines(text, label, name_first=False)]
     if len(words) < 2 or not all(re.fullmatch(r"[+-]?\d{1,19}", word) for word in words):
-        return parse_times(text, label), ""
+        return NS_PER_S, ""
     listed = sorted(int(word) for word in words)
     if median(after - before for before, after in pairwise(listed)) < _SHORTEST_US:
-        return parse_times(text, label), WHOLE_SECONDS
-    return parse_times(text, label, 1000), WHOLE
+        return NS_PER_S, WHOLE_SECONDS
+    return 1000, WHOLE
+
+
+def order_note(stamps: list[Stamp]) -> str:
+    """Return what is to be told of the order that the lines of sorted stamps had, if anything."""
+    for before, stamp in pairwise(stamps):
+        if stamp.line < before.line:
+            return f"line {before.line} is earlier than one before it: sorted by time"
+    return ""
 
 
 def parse_times(text: str, label: str, unit_ns: int = NS_PER_S) -> list[Stamp]:

@@ -15,6 +15,7 @@ from adv2e.cli.options import Log
 from adv2e.config import Config, all_keys, load_config, shipped
 from adv2e.config.model import Pixel
 from adv2e.cores import default_threads
+from adv2e.diagnosis.library import names
 from adv2e.effects import EFFECTS, STAGES
 
 
@@ -205,6 +206,11 @@ def test_an_effect_has_a_page_with_physics_parameters_and_references(adv2e, effe
         if not key.is_section:
             assert f"\n{key.path} " in outcome.out
             assert key.about.meaning in outcome.out
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_name_that_a_diagnosis_tells_has_a_page(adv2e, name):
+    assert adv2e("effects", name).status == 0
 
 
 def test_the_page_gives_unit_default_range_and_source(adv2e):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from processes import running_python
 
@@ -246,6 +247,17 @@ def test_a_closed_stdout_is_141_and_quiet():
         err = process.stderr.read()
     assert process.returncode == 141
     assert err == b""
+
+
+def test_a_stdout_that_was_closed_before_is_141_and_quiet(tmp_path):
+    frames = tmp_path / "frames.npy"
+    np.save(frames, np.full((3, 4, 6), 90, np.uint8))
+    code = "import os, sys; os.close(1); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+    command = ["-m", "adv2e", "convert", str(frames), "--fps", "100", "-o", "-", "-q"]
+    done = subprocess.run(
+        [sys.executable, "-c", code, *command], stderr=subprocess.PIPE, check=False
+    )
+    assert (done.returncode, done.stderr) == (141, b"")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")

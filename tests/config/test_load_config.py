@@ -125,6 +125,7 @@ def test_set_wins_over_files_in_order_and_seed_over_set(write):
         ("rate_hz: 1", "pixel.low_pass.rate_hz: unknown key (value 1), did you mean 'pixel."),
         ("zzz: 1", "known here: cutoff_hz, dark_cutoff_hz, update"),
         ("cutoff_hz: '100'", "cutoff_hz: must be a number [Hz], got '100': leave out the quotes"),
+        ("cutoff_hz: 1_000", "must be a number [Hz], got '1_000': leave out the underscores"),
         ("cutoff_hz: true", "cutoff_hz: must be a number [Hz], got true"),
         ("cutoff_hz: null", "cutoff_hz: must be a number [Hz], got null"),
         ("cutoff_hz: [1]", "cutoff_hz: must be a number [Hz], got [1]"),

@@ -101,6 +101,7 @@ def test_an_alias_is_its_anchor():
         ("a: {b: 1, b: 2}", "f.yaml:1: a.b: given twice"),
         ("x: 1\n1: 2\n", "f.yaml:2: a key must be text, got 1"),
         ("true: 2\n", "a key must be text, got true"),
+        ("a: {b: 0,2}\n", "got 2: numbers have a decimal point, not a comma"),
         ("? {a: 1}\n: 2\n", "a key must be text, got a mapping"),
         ("a: [1, 2\n", "f.yaml:2: not YAML"),
         ("a: 1\n\tb: 2\n", "f.yaml:2: not YAML"),

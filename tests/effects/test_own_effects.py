@@ -114,6 +114,12 @@ def test_classes_of_a_file_in_their_order(load):
         (fitted("tuple[float, int]"), r"Parameters: depth: fit: only float, and tuples of it"),
         (fitted("float", "at_least=2"), r"Parameters: depth: fit: must be at least 2, got 1"),
         (fitted("list"), r"depth: its type must be one of float, int, bool, str or a tuple"),
+        (
+            "@dataclass(frozen=True, kw_only=True)\nclass K(Section):\n"
+            "    depth: float = parameter(3.0, unit='-', meaning='m', at_most=1)\n"
+            "class A(Hooks):\n    Parameters = K\n    def drive(self, t): return t",
+            r"mine\.py:8: class A: Parameters: depth: default: must be at most 1, got 3",
+        ),
         (fitted("'Depth'"), r"class A: Parameters: name 'Depth' is not defined"),
     ],
 )

@@ -70,7 +70,8 @@ def test_davis240c_recording(davis):
     assert recording.events.tolist() == [(100_000, 0, 0, 1), (200_000, 2, 1, 0)]
     assert recording.frame_times_ns.tolist() == [100_000_000, 200_000_000]
     assert [frame.image[0, 0] for frame in recording.frames()] == [1, 2]
-    assert recording.problems == []
+    sorted_too = "images.txt: line 2 is earlier than one before it: sorted by time"
+    assert recording.problems == [sorted_too]
 
 
 def test_geometry_of_davis240c_is_that_of_its_images(davis):
@@ -102,7 +103,8 @@ def test_whole_times_of_frames_are_told_with_their_unit(davis, late, unit_ns, to
     recording = read_recording(davis({**recording_files(), "images.txt": listed}))
     assert recording.frame_times_ns.tolist() == [0, late * unit_ns]
     (problem,) = [one for one in recording.problems if one.startswith("images.txt")]
-    assert problem.endswith(f"taken as {told}")
+    assert f"taken as {told}; " in problem
+    assert problem.endswith("line 2 is earlier than one before it: sorted by time")
 
 
 def test_image_that_is_none_is_named(davis):

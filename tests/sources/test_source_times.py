@@ -14,6 +14,7 @@ from adv2e.sources.times import (
     FrameRate,
     Stamp,
     constant_rate,
+    order_note,
     parse_info,
     parse_list,
     parse_ns,
@@ -83,6 +84,19 @@ def test_whole_numbers_beyond_all_clocks_are_told(digits):
 def test_named_lines_are_sorted_by_time():
     stamps = parse_times("0.2 b c.png\n0.1 a.png\n", "t.txt")
     assert stamps == [Stamp(100_000_000, 2, "a.png"), Stamp(200_000_000, 1, "b c.png")]
+
+
+@pytest.mark.parametrize(
+    ("text", "note"),
+    [
+        ("0.1 a\n0.2 b\n0.3 c\n", ""),
+        ("0.1 a\n0.3 c\n0.2 b\n", "line 3 is earlier than one before it: sorted by time"),
+    ],
+)
+def test_lines_that_are_sorted_are_told(text, note):
+    stamps, told = parse_list(text, "images.txt")
+    assert told == note == order_note(stamps)
+    assert [stamp.name for stamp in stamps] == ["a", "b", "c"]
 
 
 def test_info_lists_have_microseconds_behind_the_path():
