@@ -20,8 +20,9 @@ from adv2e.active_effects import frame_hooks
 from adv2e.config import Config
 from adv2e.config.model import Frames
 from adv2e.config.own import user_effects
+from adv2e.diagnosis.readouts import coupling_of
 from adv2e.effects.hooks import Hooks
-from adv2e.effects.readout.frame_coupling import FrameCoupling, FrameCouplingHooks
+from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
 from adv2e.events import Events
 from adv2e.simulation import events_from_light
 from adv2e.stepping import PRECISE, Coarseness
@@ -129,10 +130,6 @@ def _is_along_motion(config: Config) -> bool:
     return config.sampling.interpolation != "linear" and config.sampling.L > 1
 
 
-def _coupling(config: Config) -> FrameCoupling | None:
-    return None if config.readout is None else config.readout.frame_coupling
-
-
 def _is_moved(config: Config) -> bool:
     """Tell whether moved frames may be given as frames: those that are sharp by then."""
     return any(config.frames.shift_px) and (
@@ -197,7 +194,7 @@ def _as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
     frames, sampling, readout = config.frames, config.sampling, config.readout
     effects: list[Hooks] = []
     if is_made_once(config):
-        coupling = _coupling(config)
+        coupling = coupling_of(config)
         if readout is not None and coupling is not None and coupling.amplitude:
             every = sampling.L if _is_along_motion(config) else 1
             effects.append(FrameCouplingHooks(coupling, 0.5 * frames.exposure_us, every))

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.keys import with_keys
-from adv2e.diagnosis.readouts import regular_interval
+from adv2e.diagnosis.readouts import coupling_of, regular_interval
 from adv2e.diagnosis.stream import Stream
-from adv2e.effects.readout.frame_coupling import FrameCoupling
 
 DELAY, WIDTH, RISE = (f"readout.frame_coupling.{name}_us" for name in ("delay", "width", "rise"))
 DRIFT = "frames.clock_drift_ppm"
@@ -108,7 +107,7 @@ class Pulse:
 
         Wherever its clocks and exposure put the frames.
         """
-        coupling = _coupling(config)
+        coupling = coupling_of(config)
         if coupling is None or not has_pulse(config):
             return config
         first = self.on if coupling.amplitude > 0.0 else self.off
@@ -163,12 +162,8 @@ def pulse_of(stream: Stream, times_s: NDArray[np.float64], before_s: float = 0.0
 
 def has_pulse(config: Config) -> bool:
     """Tell whether a configuration says when the signal leaps, and when it leaps back."""
-    coupling = _coupling(config)
+    coupling = coupling_of(config)
     return coupling is not None and coupling.width_us > 0.0
-
-
-def _coupling(config: Config) -> FrameCoupling | None:
-    return None if config.readout is None else config.readout.frame_coupling
 
 
 def _bin_us(interval: float) -> float:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis.keys import with_keys
 from adv2e.diagnosis.stream import Stream
+from adv2e.effects.readout.frame_coupling import FrameCoupling
 
 EXPOSURE = "frames.exposure_us"
 
@@ -56,6 +57,11 @@ class Readouts:
         return with_keys(config, {EXPOSURE: least + count * whole})
 
 
+def coupling_of(config: Config) -> FrameCoupling | None:
+    """Return what the readout of frames does to the pixels, if anything."""
+    return None if config.readout is None else config.readout.frame_coupling
+
+
 def without_coupling(config: Config) -> Config:
     """Return `config` without what the readout of frames does to the pixels.
 
@@ -63,7 +69,7 @@ def without_coupling(config: Config) -> Config:
     all the same: with it both were to be compared without.
     """
     readout = config.readout
-    if readout is None or readout.frame_coupling is None:
+    if readout is None or coupling_of(config) is None:
         return config
     return replace(config, readout=replace(readout, frame_coupling=None))
 
