@@ -14,7 +14,7 @@ from adv2e.diagnosis.evidence import Evidence, check_events
 from adv2e.diagnosis.stream import Stream
 from adv2e.reports.result import Masked
 
-AFFORDABLE_S = 0.18
+AFFORDABLE_S = 0.2
 """What a simulation may take in the mean, in one thread; a diagnosis takes some thousands [s]."""
 
 _BLOCK = 8
