@@ -81,11 +81,14 @@ def conclude(ready: Ready, search: Search, outcome: Outcome) -> Conclusion:
         of_after = Distances.of(measured, list(map(last, after)))
     rows, interpolated = error_rows(of_before, of_after), 0.0
     if kept is not declared and ready.between_frames is not None:
-        bare = without_coupling(kept.config)
-        whole = list(map(last, after if bare == kept.config else drawn(bare)))
+        bare, whole, of_whole = without_coupling(kept.config), list(map(last, after)), of_after
+        if bare != kept.config:
+            whole = list(map(last, drawn(bare)))
+            of_whole = Distances.of(measured, whole)
         with closing(simulator.of(every(ready.evidence, 2))) as fewer:
             half = list(map(last, drawn(bare, fewer, _FIRST_DRAW + DRAWS)))
-        interpolated = of_interpolation(measured, whole, half)
+        floor = float(of_whole.between.mean())
+        interpolated = of_interpolation(measured, whole, half, floor)
     verdict = verdict_of(outcome, rows[0], interpolated)
     if verdict in ("consistent", "unexplained") and kept is not declared:
         kept, after = declared, before

@@ -83,7 +83,9 @@ def error_rows(before: Distances, after: Distances) -> list[ErrorRow]:
     return rows
 
 
-def of_interpolation(measured: Stream, full: Sequence[Stream], half: Sequence[Stream]) -> float:
+def of_interpolation(
+    measured: Stream, full: Sequence[Stream], half: Sequence[Stream], floor: float
+) -> float:
     """Return what the interpolation between frames adds to the error over all scales, in squares.
 
     About half of what leaving out every second frame adds, give or take a factor of two: between a
@@ -94,11 +96,12 @@ def of_interpolation(measured: Stream, full: Sequence[Stream], half: Sequence[St
     measured : Stream
     full, half : sequence of Stream
         Simulations of a model with all frames, and with every second, each with its own chance.
+    floor : float
+        Of the error of that model with all frames.
     """
     unit = _norm(measured)
     apart = np.mean([_apart(a, b, unit).mean() for a, b in zip(full, half, strict=True)])
-    chance = np.mean([_apart(a, b, unit).mean() for a, b in _pairs(full)])
-    square = float(apart) ** 2 - float(chance) ** 2
+    square = float(apart) ** 2 - floor**2
     return 0.5 * math.sqrt(square) if square > 0.0 else 0.0  # not a number: nothing measured
 
 

@@ -108,7 +108,7 @@ class Pulse:
         Wherever its clocks and exposure put the frames.
         """
         coupling = coupling_of(config)
-        if coupling is None or not has_pulse(config):
+        if coupling is None or not coupling.width_us:
             return config
         first = self.on if coupling.amplitude > 0.0 else self.off
         frames = config.frames

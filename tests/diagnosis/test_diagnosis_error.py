@@ -57,14 +57,14 @@ def test_what_interpolation_adds_is_half_of_what_leaving_frames_out_does():
     draws = [random_stream(600, seed) for seed in range(30, 42)]
     others = [random_stream(600, seed) for seed in range(50, 62)]
     between = np.mean([distance(a, b, MEASURED) for a, b in _pairs(draws)])
-    assert of_interpolation(MEASURED, draws, others) < 0.3  # chance alone
+    assert of_interpolation(MEASURED, draws, others, between) < 0.3  # chance alone
     fewer = [random_stream(100, seed) for seed in range(70, 82)]
     apart = np.mean([distance(a, b, MEASURED) for a, b in zip(draws, fewer, strict=True)])
     assert apart < between
-    assert of_interpolation(MEASURED, draws, fewer) == 0.0
+    assert of_interpolation(MEASURED, draws, fewer, between) == 0.0
     more = [random_stream(3000, seed) for seed in range(70, 82)]
     apart = np.mean([distance(a, b, MEASURED) for a, b in zip(draws, more, strict=True)])
-    found = of_interpolation(MEASURED, draws, more)
+    found = of_interpolation(MEASURED, draws, more, between)
     assert found == pytest.approx(0.5 * np.sqrt(apart**2 - between**2))
     assert found > 0.5
 
