@@ -20,16 +20,18 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import click
+import numpy as np
 from real.bursts import bursts
 from real.model import SCORE, Bench, Judged
 from real.peers import peer_rows
 from real.recording import Real, halves, read
 from real.search import Search
+from real.stability import LINES, Stability, compare_halved
 from real.stability import MOST as UNSTABLE
-from real.stability import Stability, compare_halved
 from real.table import COLUMNS as TITLES
 from real.table import number
 from real.tried import UNSEEN, Added, tried_names
@@ -171,7 +173,8 @@ def _where_stable(bench: Bench, steps: list[Step], windows: Windows, seeds: tupl
     """Return what dropping every second frame changes, and the table of where that is little."""
     real, found = bench.real, steps[-1].added
     stability = _stability(bench, found, windows, seeds)
-    measured = stability.alone(real.events)
+    within = partial(stability.alone, most=UNSTABLE)
+    measured = within(real.events)
     kept = len(measured) / len(cut(real.events, windows.start, windows.stop))
     told = (
         f"Dropping every second frame changes the simulation by {stability.change:.2f} of its norm"
@@ -179,15 +182,46 @@ def _where_stable(bench: Bench, steps: list[Step], windows: Windows, seeds: tupl
         " of the measured events. The rest hangs on what was made up between frames and tells"
         " little of the camera."
     )
-    if not len(measured):
-        return told
-    steps = [
-        Step(one.added, bench.judge(one.added.config, windows, seeds, of=stability.alone))
-        for one in steps
-    ]
-    return f"{told} The same of those tiles alone:\n\n" + _table(
-        real.size, measured, steps, windows
-    )
+    if len(measured):
+        steps = [
+            Step(one.added, bench.judge(one.added.config, windows, seeds, of=within))
+            for one in steps
+        ]
+        alone = [
+            f"{told} The same of those tiles alone:",
+            _table(real.size, measured, steps, windows),
+        ]
+    else:
+        alone = [told]
+    by_line = _by_line(bench, found, stability, seeds)
+    return "\n\n".join([*alone, "The model found, by where that line is drawn:", by_line])
+
+
+def _by_line(bench: Bench, found: Added, stability: Stability, seeds: tuple[int, int]) -> str:
+    """Return how far a model is in the tiles that change by no more than each of `LINES`."""
+    real, windows = bench.real, stability.windows
+    everything = len(cut(real.events, windows.start, windows.stop))
+    names = ["change below", "measured events", "events", "ON share", *COLUMNS.values(), "mean"]
+    rows = []
+    for line in LINES:
+        alone = partial(stability.alone, most=line)
+        measured = alone(real.events)
+        if not len(measured):
+            continue
+        judged = bench.judge(found.config, windows, seeds, of=alone)
+        share = totals(measured)[0] / len(measured)
+        split = half_split(measured, windows, *real.size)
+        rows.append(
+            [
+                "any" if np.isinf(line) else f"{line:.0%}",
+                f"{len(measured) / everything:.0%}",
+                f"{judged.events_ratio:.2f}",
+                f"{number(judged.on_share)} / {share:.2f}",
+                *_with_floors(judged),
+                f"{number(split[SCORE])}",
+            ]
+        )
+    return table([*names, f"half split, {COLUMNS[SCORE]}"], rows)
 
 
 def _stability(bench: Bench, found: Added, windows: Windows, seeds: tuple[int, int]) -> Stability:
@@ -211,15 +245,13 @@ def _table(size: tuple[int, int], measured: Events, steps: list[Step], windows: 
     rows = []
     for step in steps:
         levels, judged = step.added.config.pixel.thresholds, step.judged
-        cells = [f"{number(judged.values[n])} ({number(judged.floor[n])})" for n in COLUMNS]
-        cells.append(number(judged.without_chance(SCORE)))
         rows.append(
             [
                 step.added.text(),
                 f"{levels.on:.3f} / {levels.off:.3f}",
                 f"{judged.events_ratio:.2f}",
                 f"{number(judged.on_share)} / {share:.2f}",
-                *cells,
+                *_with_floors(judged),
             ]
         )
     split = half_split(measured, windows, *size)
@@ -227,6 +259,12 @@ def _table(size: tuple[int, int], measured: Events, steps: list[Step], windows: 
     for label, values in (("half split (Poisson)", split), ("no events at all", nothing)):
         rows.append([label, "", "", "", *_cells(values), ""])
     return table(names, rows)
+
+
+def _with_floors(judged: Judged) -> list[str]:
+    """Return the distances, and the one that counts without the simulation's own chance."""
+    cells = [f"{number(judged.values[n])} ({number(judged.floor[n])})" for n in COLUMNS]
+    return [*cells, number(judged.without_chance(SCORE))]
 
 
 def _cells(values: Floor) -> list[str]:

@@ -21,6 +21,8 @@ TILE = 8
 """Pixels along a tile."""
 MOST = 0.2
 """Change of a tile's norm above which it is not judged by, relative."""
+LINES = (0.1, MOST, 0.3, 0.5, 0.7, 1.0, np.inf)
+"""Where that line may be drawn as well: how much hangs on it is told."""
 _BINS = 5
 
 
@@ -32,22 +34,22 @@ class Stability:
     ----------
     change : float
         Norm of the change over that of the simulation, chance taken off; median over windows.
-    stable : (windows, rows, columns) bool
-        Pixels in whose tile it is below MOST.
+    tiles : (windows, rows, columns) float
+        The same of each pixel's tile; infinite where something changes and nothing was.
     windows : Windows
         Those it was told for.
     """
 
     change: float
-    stable: NDArray[np.bool_]
+    tiles: NDArray[np.float64]
     windows: Windows
 
-    def alone(self, events: Events) -> Events:
-        """Return the events in the windows that are in stable tiles of theirs, a copy."""
+    def alone(self, events: Events, most: float) -> Events:
+        """Return the events in the windows whose tiles change by no more than `most`, a copy."""
         parts = []
-        for window, stable in zip(self.windows.used, self.stable, strict=True):
+        for window, changes in zip(self.windows.used, self.tiles, strict=True):
             part = cut(events, *window)
-            parts.append(part[stable[part["y"], part["x"]]])
+            parts.append(part[changes[part["y"], part["x"]] <= most])
         return np.concatenate(parts)
 
 
@@ -65,7 +67,7 @@ def compare_halved(
     windows : Windows
     width, height : int
     """
-    changes, masks = [], []
+    changes, tiles = [], []
 
     def grid(events: Events, window: tuple[int, int]) -> NDArray[Any]:
         return smoothed(voxel_grid(cut(events, *window), window, _BINS, width, height))
@@ -73,11 +75,13 @@ def compare_halved(
     for window in windows.used:
         a, b = (grid(one, window) for one in whole)
         c, d = (grid(one, window) for one in halved)
-        moved, power = _tiled((a - c) * (b - d)), _tiled(a * b)
+        moved, power = np.maximum(_tiled((a - c) * (b - d)), 0.0), _tiled(a * b)
         whole_power = max(float((a * b).sum()), 1e-9)
         changes.append(np.sqrt(max(float(((a - c) * (b - d)).sum()), 0.0) / whole_power))
-        masks.append(_pixels(moved <= MOST**2 * np.maximum(power, 0.0), height, width))
-    return Stability(float(np.median(changes)), np.array(masks), windows)
+        nothing = np.where(moved > 0, np.inf, 0.0)
+        squared = np.divide(moved, power, out=nothing, where=power > 0)
+        tiles.append(_pixels(np.sqrt(squared), height, width))
+    return Stability(float(np.median(changes)), np.array(tiles), windows)
 
 
 def _tiled(grid: NDArray[Any]) -> NDArray[Any]:
@@ -90,6 +94,6 @@ def _tiled(grid: NDArray[Any]) -> NDArray[Any]:
     return tiles
 
 
-def _pixels(tiles: NDArray[np.bool_], rows: int, columns: int) -> NDArray[np.bool_]:
+def _pixels(tiles: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
     full = np.repeat(np.repeat(tiles, TILE, axis=0), TILE, axis=1)
     return full[:rows, :columns]

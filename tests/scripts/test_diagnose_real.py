@@ -14,7 +14,7 @@ from narrow_candidates import BLACK_LEVEL
 from real.model import BEYOND_US, SCORE, Bench, Judged
 from real.recording import halves, read
 from real.search import Search
-from real.stability import compare_halved
+from real.stability import MOST, compare_halved
 from real.tried import UNSEEN, Added, tried_names
 from written_recordings import write_recording
 
@@ -139,20 +139,24 @@ def test_tiles_that_change_are_unstable_and_chance_is_not():
 
     def stream(second_on):
         parts = [noisy(rng, 0, 2000, 1), noisy(rng, 16, 2000, second_on)]
+        if not second_on:
+            parts.append(noisy(rng, 32, 200, 1))  # where there was nothing
         both = np.concatenate(parts)
         return both[np.argsort(both["t"], kind="stable")]
 
     whole, halved = (stream(1), stream(1)), (stream(0), stream(0))
     measured = stream(1)
-    found = compare_halved(whole, halved, windows, 24, 8)
-    assert found.stable[0, 3, :8].all()
-    assert not found.stable[0, 3, 16:].any()
+    found = compare_halved(whole, halved, windows, 40, 8)
+    assert (found.tiles[0, 3, :8] < 0.1).all()
+    assert np.isinf(found.tiles[0, 3, 32:]).all()
+    assert found.tiles[0, 3, 16:24] == pytest.approx(2.0, rel=0.05)
     assert found.change == pytest.approx(np.sqrt(2.0), rel=0.1)
-    alone = found.alone(measured)
+    alone = found.alone(measured, MOST)
     assert len(alone) == 2000
     assert len(alone) / len(measured) == pytest.approx(0.5)
     assert np.all(alone["x"] < 8)
-    assert len(found.alone(empty_events())) == 0
+    assert len(found.alone(measured, 2.2)) == 4000
+    assert len(found.alone(empty_events(), MOST)) == 0
 
 
 def run_script(recording, declared, out):
@@ -202,8 +206,12 @@ def test_tables_before_and_after_each_effect(recording, declared, tmp_path, monk
     assert labels[2:4] == ["as declared", "thresholds"]
     assert labels[4].startswith("black_level")
     chance = ["half split (Poisson)", "no events at all"]
-    assert labels[5:] == chance
-    smoothed = [float(row[5].split(" ")[0]) for row in rows[2:]]
+    assert labels[5:7] == chance
+    assert labels[7] == "change below"
+    assert rows[-1][:2] == ["any", "100%"]
+    of_all = float(rows[-1][5].split(" ")[0])
+    assert of_all == pytest.approx(float(rows[4][5].split(" ")[0]), abs=0.02)
+    smoothed = [float(row[5].split(" ")[0]) for row in rows[2:7]]
     assert smoothed[2] < smoothed[1]
     assert smoothed[4] == 1.0
     assert "hold 0% of the measured events" in text  # the waves are too fast for that
@@ -214,7 +222,7 @@ def test_tables_before_and_after_each_effect(recording, declared, tmp_path, monk
 
 
 def test_where_all_is_stable_its_table_is_that_of_all(recording, declared, tmp_path, monkeypatch):
-    monkeypatch.setattr("real.stability.MOST", 10.0)
+    monkeypatch.setattr("diagnose_real.UNSTABLE", 10.0)
     monkeypatch.setattr("real.search.OWN", ())
     monkeypatch.setattr("real.search.of_the_camera", lambda *_: [])
     out = tmp_path / "table.md"
@@ -223,8 +231,8 @@ def test_where_all_is_stable_its_table_is_that_of_all(recording, declared, tmp_p
     text = out.read_text(encoding="utf-8")
     assert "hold 100% of the measured events" in text
     rows = rows_of(text)
-    assert len(rows) == 12
-    assert rows[:6] == rows[6:]
+    assert rows[:6] == rows[6:12]
+    assert rows[12][0] == "change below"
 
 
 @pytest.mark.parametrize(
