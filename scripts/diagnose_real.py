@@ -12,53 +12,34 @@ Two more numbers tell how far to trust them: how much of the simulation hangs on
 by dropping every second frame, and the score where it does not.
 
 A search can take an hour or two.  Ctrl-C (or ``timeout -s INT 3600``) ends it, and the table is of
-what was found until then.
+what was found until then.  With ``--models FOLDER`` the model that a search ended at is kept, and
+judged again by the next run.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
+from itertools import chain, islice
 from pathlib import Path
 
 import click
-import numpy as np
 from real.bursts import bursts
-from real.model import SCORE, Bench, Judged
+from real.model import SCORE, Bench
 from real.peers import peer_rows
 from real.recording import Real, halves, read
 from real.search import Search
-from real.stability import LINES, Stability, compare_halved
-from real.stability import MOST as UNSTABLE
-from real.table import COLUMNS as TITLES
-from real.table import number
+from real.steps import COLUMNS, Step, cells, steps_table
 from real.tried import UNSEEN, Added, tried_names
+from real.where_stable import where_stable
 from writing.files import write
 from writing.markdown import table
 
-from adv2e.comparison.distances import distances
-from adv2e.comparison.floor import Floor, half_split
-from adv2e.comparison.windows import Windows, cut
-from adv2e.config import Config, load_config, to_dict
+from adv2e.comparison.windows import cut
+from adv2e.config import Config, load_config, to_dict, to_yaml
 from adv2e.config.paths import flat
-from adv2e.diagnosis.nuisances import totals
-from adv2e.diagnosis.readouts import without_coupling
-from adv2e.errors import Adv2eError, DataError
-from adv2e.events import Events, empty_events
-
-COLUMNS = {
-    name: TITLES[name] for name in ("relative_5_bins", SCORE, "relative_1_bin_smoothed", "error")
-}
-
-
-@dataclass(frozen=True)
-class Step:
-    """A model on the way, as judged on data that it was not fitted to."""
-
-    added: Added
-    judged: Judged
+from adv2e.errors import Adv2eError, DataError, OutputError
 
 
 @click.command()
@@ -67,6 +48,11 @@ class Step:
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--effects", default="", help="Try these effects of the camera alone, by commas.")
 @click.option("--threads", type=click.IntRange(min=1), help="[default: all cores]")
+@click.option(
+    "--models",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder for the models found, as NAME.yaml; one that is there is judged, not sought.",
+)
 @click.option("--out", type=click.Path(path_type=Path), help="Write here.  [default: stdout]")
 def main(
     folders: tuple[str, ...],
@@ -74,17 +60,20 @@ def main(
     seed: int,
     effects: str,
     threads: int | None,
+    models: Path | None,
     out: Path | None,
 ) -> None:
     """Add effects to a declared model of real recordings, one by one."""
     try:
         only = _names(effects)
+        if models is not None:
+            _make(models)
         parts = [_preamble(declared, only)]
         for folder in folders:
             real = read(folder)
             for problem in real.problems:
                 click.echo(f"{folder}: {problem}", err=True)
-            parts.append(section(real, declared, seed, only, threads))
+            parts.append(section(real, declared, seed, only, threads, models))
         text = "\n\n".join(parts)
         write(text, out)
     except Adv2eError as error:
@@ -109,6 +98,20 @@ def _names(text: str) -> list[str]:
     return only
 
 
+def _make(folder: Path) -> None:
+    """Make a folder, before hours are spent on what is to be put there.
+
+    Raises
+    ------
+    OutputError
+        It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made: {error.strerror}") from None
+
+
 def _preamble(declared: str, only: Sequence[str]) -> str:
     left_out = "; ".join(f"{name} ({why})" for name, why in UNSEEN.items())
     tried = ", ".join(only) or f"all of the library but {left_out}"
@@ -122,7 +125,14 @@ def _preamble(declared: str, only: Sequence[str]) -> str:
     )
 
 
-def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: int | None) -> str:
+def section(
+    real: Real,
+    declared: str,
+    seed: int,
+    only: Sequence[str],
+    threads: int | None,
+    models: Path | None,
+) -> str:
     """Return what was found for one recording, as Markdown."""
     began = time.perf_counter()
     first, second = halves(real.windows)
@@ -136,11 +146,17 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
     def say(text: str) -> None:
         click.echo(f"{real.name}: {text}", err=True)
 
+    kept = None if models is None else models / f"{real.name}.yaml"
+    search = Search(bench, first, say).run(config, only)
+    if kept is not None and kept.exists():
+        before = Added.plain(f"as found, {kept.name}", load_config([kept], seed=seed))
+        search = chain(islice(search, 1), [before])
+        say(f"judging the model of {kept}")
     as_declared = Added.plain("as declared", config)
     steps = [Step(as_declared, bench.judge(config, second, seeds))]
     ended = True
     try:
-        for added in Search(bench, first, say).run(config, only):
+        for added in search:
             settled = replace(added, config=bench.matched(added.config, first, tolerance=0.01))
             steps.append(Step(settled, bench.judge(settled.config, second, seeds)))
             say(f"{added.text()}: {added.score:.3f}, held out {steps[-1].judged.values[SCORE]:.3f}")
@@ -149,126 +165,26 @@ def section(real: Real, declared: str, seed: int, only: Sequence[str], threads: 
             raise
         ended = False
         say("interrupted: judging what was found so far")
-    last = replace(
-        steps[-1], judged=bench.judge(steps[-1].added.config, second, seeds, in_full=True)
-    )
-    steps[-1] = last
-    stable = _where_stable(bench, steps, second, seeds)
-    at_readouts = bursts(bench, last.added.config, second, seeds[0])
+    found = steps[-1].added.config
+    if kept is not None and ended and not kept.exists():
+        write(to_yaml(found).rstrip("\n"), kept)
+    converted = bench.made(found, second, seeds, in_full=True)
+    steps[-1] = last = replace(steps[-1], judged=bench.against(converted, second))
+    stable = where_stable(bench, steps, second, seeds, converted)
+    at_readouts = bursts(bench, found, second, seeds[0])
     seconds = time.perf_counter() - began
     say(f"{bench.simulations} simulations in {seconds:.0f} s")
+    measured = cut(real.events, second.start, second.stop)
     return "\n\n".join(
         [
             f"## {real.name}",
-            _table(real.size, cut(real.events, second.start, second.stop), steps, second),
-            _found(last, config, bench.missed(last.added.config, first), ended),
+            steps_table(real.size, measured, steps, second),
+            _found(last, config, bench.missed(found, first), ended),
             stable,
             *([at_readouts] if at_readouts else []),
             _beside_peers(real, last),
         ]
     )
-
-
-def _where_stable(bench: Bench, steps: list[Step], windows: Windows, seeds: tuple[int, int]) -> str:
-    """Return what dropping every second frame changes, and the table of where that is little."""
-    real, found = bench.real, steps[-1].added
-    stability = _stability(bench, found, windows, seeds)
-    within = partial(stability.alone, most=UNSTABLE)
-    measured = within(real.events)
-    kept = len(measured) / len(cut(real.events, windows.start, windows.stop))
-    told = (
-        f"Dropping every second frame changes the simulation by {stability.change:.2f} of its norm"
-        f" (chance taken off). Tiles where that is below {UNSTABLE:.0%} hold {kept:.0%}"
-        " of the measured events. The rest hangs on what was made up between frames and tells"
-        " little of the camera."
-    )
-    if len(measured):
-        steps = [
-            Step(one.added, bench.judge(one.added.config, windows, seeds, of=within))
-            for one in steps
-        ]
-        alone = [
-            f"{told} The same of those tiles alone:",
-            _table(real.size, measured, steps, windows),
-        ]
-    else:
-        alone = [told]
-    by_line = _by_line(bench, found, stability, seeds)
-    return "\n\n".join([*alone, "The model found, by where that line is drawn:", by_line])
-
-
-def _by_line(bench: Bench, found: Added, stability: Stability, seeds: tuple[int, int]) -> str:
-    """Return how far a model is in the tiles that change by no more than each of `LINES`."""
-    real, windows = bench.real, stability.windows
-    everything = len(cut(real.events, windows.start, windows.stop))
-    names = ["change below", "measured events", "events", "ON share", *COLUMNS.values(), "mean"]
-    rows = []
-    for line in LINES:
-        alone = partial(stability.alone, most=line)
-        measured = alone(real.events)
-        if not len(measured):
-            continue
-        judged = bench.judge(found.config, windows, seeds, of=alone)
-        share = totals(measured)[0] / len(measured)
-        split = half_split(measured, windows, *real.size)
-        rows.append(
-            [
-                "any" if np.isinf(line) else f"{line:.0%}",
-                f"{len(measured) / everything:.0%}",
-                f"{judged.events_ratio:.2f}",
-                f"{number(judged.on_share)} / {share:.2f}",
-                *_with_floors(judged),
-                f"{number(split[SCORE])}",
-            ]
-        )
-    return table([*names, f"half split, {COLUMNS[SCORE]}"], rows)
-
-
-def _stability(bench: Bench, found: Added, windows: Windows, seeds: tuple[int, int]) -> Stability:
-    """Return what dropping every second frame changes."""
-    half = Bench(bench.real.thinned(), bench.threads)
-    first, second = seeds
-
-    # frames that are dropped were read out all the same
-    config = without_coupling(found.config)
-
-    def pair(one: Bench) -> tuple[Events, Events]:
-        return one.quick(config, windows, first), one.quick(config, windows, second)
-
-    return compare_halved(pair(bench), pair(half), windows, *bench.real.size)
-
-
-def _table(size: tuple[int, int], measured: Events, steps: list[Step], windows: Windows) -> str:
-    """Return a row a step, and what chance and no events come to; `measured`: what it is of."""
-    share = totals(measured)[0] / len(measured)
-    names = ["added", "ON / OFF threshold [ln]", "events", "ON share", *COLUMNS.values(), "mean"]
-    rows = []
-    for step in steps:
-        levels, judged = step.added.config.pixel.thresholds, step.judged
-        rows.append(
-            [
-                step.added.text(),
-                f"{levels.on:.3f} / {levels.off:.3f}",
-                f"{judged.events_ratio:.2f}",
-                f"{number(judged.on_share)} / {share:.2f}",
-                *_with_floors(judged),
-            ]
-        )
-    split = half_split(measured, windows, *size)
-    nothing = distances(measured, empty_events(), windows, *size).values
-    for label, values in (("half split (Poisson)", split), ("no events at all", nothing)):
-        rows.append([label, "", "", "", *_cells(values), ""])
-    return table(names, rows)
-
-
-def _with_floors(judged: Judged) -> list[str]:
-    """Return the distances, and the one that counts without the simulation's own chance."""
-    cells = [f"{number(judged.values[n])} ({number(judged.floor[n])})" for n in COLUMNS]
-    return [*cells, number(judged.without_chance(SCORE))]
-
-
-def _cells(values: Floor) -> list[str]:
-    return [number(values[name]) for name in COLUMNS]
 
 
 def _found(last: Step, declared: Config, missed: float, ended: bool) -> str:
@@ -294,7 +210,7 @@ def _beside_peers(real: Real, last: Step) -> str:
     if not rows:
         return "No other tools were run on this recording."
     names = ["simulator", *list(COLUMNS.values())[:3]]
-    own = ["adv2e, model found", *_cells(last.judged.values)[:3]]
+    own = ["adv2e, model found", *cells(last.judged.values)[:3]]
     return table(names, [own, *rows])
 
 

@@ -164,19 +164,32 @@ class Bench:
         windows: Windows,
         seeds: Sequence[int],
         *,
-        in_full: bool = False,
         of: Callable[[Events], Events] | None = None,
     ) -> Judged:
-        """Return how far a configuration is on the windows, with means over the seeds.
+        """Return how far a configuration is on the windows; `of`: see :meth:`against`."""
+        return self.against(self.made(config, windows, seeds), windows, of=of)
 
-        `in_full`: as ``adv2e convert`` simulates it; `of`: picks the events to judge by.
+    def made(
+        self, config: Config, windows: Windows, seeds: Sequence[int], *, in_full: bool = False
+    ) -> list[Events]:
+        """Return the events in the windows, a seed each; `in_full`: as ``adv2e convert`` does."""
+        if not in_full:
+            return [self.quick(config, windows, seed) for seed in seeds]
+        simulate = self.real.simulator(config, windows.stop + BEYOND_US, self.threads)
+        return [cut(simulate(seed), windows.start, windows.stop) for seed in seeds]
+
+    def against(
+        self,
+        made: Sequence[Events],
+        windows: Windows,
+        *,
+        of: Callable[[Events], Events] | None = None,
+    ) -> Judged:
+        """Return how far simulations of one configuration are on the windows, as means.
+
+        `of` picks the events to judge by.
         """
         real, of = self.real, of or (lambda events: events)
-        if in_full:
-            simulate = real.simulator(config, windows.stop + BEYOND_US, self.threads)
-            made = [cut(simulate(seed), windows.start, windows.stop) for seed in seeds]
-        else:
-            made = [self.quick(config, windows, seed) for seed in seeds]
         streams = [of(one) for one in made]
         measured = of(cut(real.events, windows.start, windows.stop))
         found = [distances(measured, one, windows, *real.size).values for one in streams]

@@ -159,8 +159,9 @@ def test_tiles_that_change_are_unstable_and_chance_is_not():
     assert len(found.alone(empty_events(), MOST)) == 0
 
 
-def run_script(recording, declared, out):
+def run_script(recording, declared, out, *more):
     arguments = [str(recording), "--declared", str(declared), "--threads", "1", "--out", str(out)]
+    arguments += map(str, more)
     return CliRunner().invoke(diagnose_real.main, arguments)
 
 
@@ -222,7 +223,7 @@ def test_tables_before_and_after_each_effect(recording, declared, tmp_path, monk
 
 
 def test_where_all_is_stable_its_table_is_that_of_all(recording, declared, tmp_path, monkeypatch):
-    monkeypatch.setattr("diagnose_real.UNSTABLE", 10.0)
+    monkeypatch.setattr("real.where_stable.MOST", 10.0)
     monkeypatch.setattr("real.search.OWN", ())
     monkeypatch.setattr("real.search.of_the_camera", lambda *_: [])
     out = tmp_path / "table.md"
@@ -233,6 +234,29 @@ def test_where_all_is_stable_its_table_is_that_of_all(recording, declared, tmp_p
     rows = rows_of(text)
     assert rows[:6] == rows[6:12]
     assert rows[12][0] == "change below"
+
+
+def test_a_model_that_was_kept_is_judged_again(recording, declared, tmp_path, monkeypatch):
+    monkeypatch.setattr("real.search.OWN", ())
+    monkeypatch.setattr("real.search.of_the_camera", lambda *_: [BLACK_LEVEL])
+    outs, models = [tmp_path / "first.md", tmp_path / "again.md"], tmp_path / "models"
+    for out in outs:
+        result = run_script(recording, declared, out, "--models", models)
+        assert result.exit_code == 0, result.output
+    kept = load_config([models / "waves.yaml"])
+    assert kept.frames.black_level_dn == pytest.approx(20, abs=3)
+    sought, judged = (rows_of(out.read_text(encoding="utf-8")) for out in outs)
+    assert judged[4][0] == "as found, waves.yaml"
+    assert [row[1:] for row in judged[:5]] == [row[1:] for row in sought[:5]]
+    assert judged[5:] == sought[5:]
+
+
+def test_a_folder_for_models_that_cannot_be_made_is_told_at_once(recording, declared, tmp_path):
+    (tmp_path / "file").write_text("")
+    out = tmp_path / "table.md"
+    result = run_script(recording, declared, out, "--models", tmp_path / "file" / "models")
+    assert result.exit_code == 1
+    assert "models: cannot be made: Not a directory" in result.output
 
 
 @pytest.mark.parametrize(
