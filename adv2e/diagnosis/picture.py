@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.diagnosis import classes, measures
 from adv2e.diagnosis.markers.base import excess
 from adv2e.diagnosis.markers.intervals import BORDERS_MS
 from adv2e.diagnosis.markers.timing import LAGS_MS
-from adv2e.diagnosis.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
+from adv2e.diagnosis.measures import Measure
+from adv2e.diagnosis.scene import BRIGHTNESSES, SPEEDS, Placed, Scene
 from adv2e.reports.result import Band, Curve, ResidualMap
 
 Array = NDArray[np.float64]
-_Measure = Callable[[Placed], Array]
+
+_PER_PIXEL = "events a pixel a second"
+_MOTION = (("in motion", True), ("at rest", False))
+_POLARITIES = (("ON", 1), ("OFF", 0))
+_LOADS = 8
+_STAMPS_US = np.r_[0.5, 2.0 ** np.arange(14.0) + 0.5]
+"""Borders between whole numbers of microseconds, the first for none and one together."""
 
 
 class Gallery:
@@ -33,59 +42,18 @@ class Gallery:
     ) -> None:
         self._scene = scene
         self._measured, self._before, self._after = measured, before, after
-        self._seconds = np.diff(scene.times_us) * 1e-6
 
     def curves(self) -> list[Curve]:
-        """Return all curves."""
-        gaps = np.array([0.05, *BORDERS_MS, 512.0])
-        phase = np.linspace(0.0, 100.0, 11)
-        course = np.linspace(0.0, float(self._seconds.sum()), 25)
-        middle = np.array(LAGS_MS)
+        """Return all curves: by time, by what the light does, by place, by load."""
         return [
-            *(
-                self._curve(
-                    f"Time between events of a pixel, {text}",
-                    "time since the event before [ms]",
-                    "events",
-                    gaps,
-                    _gap_counts(gaps, same),
-                    x_log=True,
-                )
-                for text, same in (("same polarity", True), ("other polarity", False))
-            ),
-            *(
-                self._curve(
-                    f"Rate against brightness, {text}, {name}",
-                    "brightness (thirds)",
-                    "events a pixel a second",
-                    np.arange(BRIGHTNESSES + 1.0),
-                    self._rates(moving, on),
-                )
-                for text, moving in (("in motion", True), ("at rest", False))
-                for name, on in (("ON", 1), ("OFF", 0))
-            ),
-            self._curve(
-                "Rate against speed",
-                "speed (still, then thirds)",
-                "events a pixel a second",
-                np.arange(SPEEDS + 1.0),
-                self._by_speed,
-            ),
-            self._curve(
-                "Light before and after an event",
-                "time before the event [ms]",
-                "mean change of log light in its direction, at most 20 [1/s]",
-                middle,
-                self._lags,
-            ),
-            self._curve(
-                "Place between two frames, at rest",
-                "place [% of the frame interval]",
-                "events",
-                phase,
-                self._phases(phase),
-            ),
-            self._curve("Course", "time [s]", "events a second", course, self._course(course)),
+            *self._between_events(),
+            *self._by_brightness(),
+            *self._by_change(),
+            self._by_row(),
+            self._by_load(),
+            *self._between_frames(),
+            *self._between_stamps(),
+            self._course(),
         ]
 
     def maps(self) -> list[ResidualMap]:
@@ -96,8 +64,147 @@ class Gallery:
                 self._excess(on, self._before),
                 self._excess(on, self._after),
             )
-            for name, on in (("ON", 1), ("OFF", 0))
+            for name, on in _POLARITIES
         ]
+
+    def _between_events(self) -> list[Curve]:
+        gaps = np.array([0.05, *BORDERS_MS, 512.0])
+        return [
+            self._curve(
+                f"Time between events of a pixel, {text}",
+                "time since the event before [ms]",
+                "events",
+                gaps,
+                measures.gaps(gaps, same=same),
+                x_log=True,
+            )
+            for text, same in (("same polarity", True), ("other polarity", False))
+        ]
+
+    def _between_stamps(self) -> list[Curve]:
+        return [
+            self._curve(
+                f"Time between events of the sensor, {text}",
+                "time since the event before, of any pixel [us]",
+                "events",
+                _STAMPS_US,
+                measures.stamps(_STAMPS_US, same_row=same),
+                x_log=True,
+            )
+            for text, same in (("of the same row", True), ("of another row", False))
+        ]
+
+    def _by_brightness(self) -> list[Curve]:
+        scene = self._scene
+        return [
+            self._curve(
+                f"Rate against brightness, {text}, {name}",
+                "brightness (thirds)",
+                _PER_PIXEL,
+                np.arange(BRIGHTNESSES + 1.0),
+                measures.rates(
+                    scene,
+                    measures.restricted(scene, scene.brightness, moving=moving),
+                    BRIGHTNESSES,
+                    on,
+                ),
+            )
+            for text, moving in _MOTION
+            for name, on in _POLARITIES
+        ]
+
+    def _by_change(self) -> list[Curve]:
+        """Return curves against how fast and how far the light changes, and when events follow."""
+        scene = self._scene
+        contrasts = classes.of_contrast(scene)
+        return [
+            self._curve(
+                "Rate against speed",
+                "speed (still, then thirds)",
+                _PER_PIXEL,
+                np.arange(SPEEDS + 1.0),
+                measures.rates(scene, scene.speed, SPEEDS),
+            ),
+            *(
+                self._curve(
+                    f"Rate against contrast, {name}",
+                    "change of log light within 50 ms [ln]",
+                    _PER_PIXEL,
+                    classes.CONTRASTS,
+                    measures.rates(scene, contrasts, len(classes.CONTRASTS) - 1, on),
+                    x_log=True,
+                )
+                for name, on in _POLARITIES
+            ),
+            self._curve(
+                "Light before and after an event",
+                "time before the event [ms]",
+                "mean change of log light in its direction, at most 20 [1/s]",
+                np.array(LAGS_MS),
+                measures.lags(scene),
+            ),
+        ]
+
+    def _by_row(self) -> Curve:
+        scene = self._scene
+        borders = classes.row_borders(scene)
+        rows = classes.of_rows(scene, borders)
+        return self._curve(
+            "Rate against row",
+            "row, from the top",
+            _PER_PIXEL,
+            borders,
+            measures.rates(scene, rows, len(borders) - 1),
+        )
+
+    def _by_load(self) -> Curve:
+        """Return the rate of the sensor against that of the declared model."""
+        scene, declared = self._scene, self._declared_rate
+        step = classes.by_load(declared, _LOADS)
+        kinds, step = np.unique(step, return_inverse=True)
+        number = np.bincount(step, declared * self._seconds)
+        whole = measures.rates(scene, step[:, None], len(kinds))
+        return self._curve(
+            "Rate of the sensor, from times of few events to times of many",
+            "rate of the declared model [events a second]",
+            "events a second",
+            number / np.bincount(step, self._seconds),
+            lambda placed: scene.pixels * whole(placed),
+        )
+
+    def _between_frames(self) -> list[Curve]:
+        phase = np.linspace(0.0, 100.0, 11)
+        return [
+            self._curve(
+                f"Place between two frames, {text}",
+                "place [% of the frame interval]",
+                "events",
+                phase,
+                measures.phases(self._scene, phase, moving=moving),
+            )
+            for text, moving in _MOTION
+        ]
+
+    def _course(self) -> Curve:
+        borders = np.linspace(0.0, float(self._seconds.sum()), 25)
+        return self._curve(
+            "Course",
+            "time [s]",
+            "events a second",
+            borders,
+            measures.course(self._scene, borders),
+        )
+
+    @cached_property
+    def _seconds(self) -> Array:
+        return np.diff(self._scene.times_us) * 1e-6
+
+    @cached_property
+    def _declared_rate(self) -> Array:
+        """Rate of the sensor that the declared model has in each frame interval."""
+        intervals = self._scene.intervals
+        numbers = [np.bincount(one.interval, minlength=intervals) for one in self._before]
+        return np.asarray(np.mean(numbers, axis=0) / self._seconds)
 
     def _curve(
         self,
@@ -105,7 +212,7 @@ class Gallery:
         x_label: str,
         y_label: str,
         x: Array,
-        measure: _Measure,
+        measure: Measure,
         x_log: bool = False,
     ) -> Curve:
         return Curve(
@@ -119,54 +226,6 @@ class Gallery:
             x_log=x_log,
         )
 
-    def _rates(self, moving: bool, on: int) -> _Measure:
-        scene = self._scene
-        kind = (scene.speed != STILL) == moving
-        weight = self._seconds[:, None] * kind
-        time = np.bincount(scene.brightness.ravel(), weight.ravel(), minlength=BRIGHTNESSES)
-
-        def measure(placed: Placed) -> Array:
-            used = ((placed.speed != STILL) == moving) & (placed.stream.on == on)
-            number = np.bincount(placed.brightness[used], minlength=BRIGHTNESSES)
-            return np.where(time > 0.0, number / np.maximum(time, 1e-9), np.nan)
-
-        return measure
-
-    def _by_speed(self, placed: Placed) -> Array:
-        scene = self._scene
-        weight = np.broadcast_to(self._seconds[:, None], scene.speed.shape)
-        time = np.bincount(scene.speed.ravel(), weight.ravel(), minlength=SPEEDS)
-        number = np.bincount(placed.speed, minlength=SPEEDS)
-        return np.where(time > 0.0, number / np.maximum(time, 1e-9), np.nan)
-
-    def _lags(self, placed: Placed) -> Array:
-        scene, stream = self._scene, placed.stream
-        if not len(stream):
-            return np.full(len(LAGS_MS), np.nan)
-        sign = 2.0 * stream.on - 1.0
-        values = []
-        for lag in LAGS_MS:
-            slope = scene.slope[scene.interval_of(stream.t, lag * 1e3), stream.pixel]
-            values.append(float(np.mean(np.clip(slope, -20.0, 20.0) * sign)))
-        return np.array(values)
-
-    def _phases(self, borders: Array) -> _Measure:
-        def measure(placed: Placed) -> Array:
-            still = placed.speed == STILL
-            phase = self._scene.phase_of(placed.stream.t[still], placed.interval[still])
-            return np.histogram(100.0 * phase, borders)[0].astype(np.float64)
-
-        return measure
-
-    def _course(self, borders: Array) -> _Measure:
-        start, width = self._scene.times_us[0], borders[1] - borders[0]
-
-        def measure(placed: Placed) -> Array:
-            number, _ = np.histogram((placed.stream.t - start) * 1e-6, borders)
-            return np.asarray(number / width)
-
-        return measure
-
     def _excess(self, on: int, simulated: Sequence[Placed]) -> Array:
         scene = self._scene
 
@@ -176,16 +235,6 @@ class Gallery:
 
         mean = np.mean([number(placed) for placed in simulated], axis=0)
         return excess(number(self._measured), mean).reshape(scene.height, scene.width)
-
-
-def _gap_counts(borders_ms: Array, same: bool) -> _Measure:
-    def measure(placed: Placed) -> Array:
-        stream = placed.stream
-        used = (stream.since >= 0) & ((stream.on == stream.on_before) == same)
-        gap = np.clip(stream.since[used] * 1e-3, borders_ms[0], borders_ms[-1])
-        return np.histogram(gap, borders_ms)[0].astype(np.float64)
-
-    return measure
 
 
 def _band(rows: Sequence[Array]) -> Band:

@@ -46,12 +46,12 @@ def rejected(given: Sequence[Rejected], own: Own = NO_OWN) -> Markup:
     """Return what was tried and not added, and why."""
     if not given:
         return tag("p", "Nothing else was tried.")
-    columns = [
-        Column("effect"),
-        Column("why not"),
-        Column("tried with"),
-        Column("misfit with it", number=True),
-    ]
+    columns = [Column("effect"), Column("why not"), Column("tried with")]
+    caption = "Effects tried and not added"
+    judged = any(one.held_out is not None for one in given)
+    if judged:  # none is where each is fitted much worse than what was added
+        columns.append(Column("misfit with it", number=True))
+        caption += "; misfit on held-out data relative to that before"
     rows = []
     for one in given:
         tried = [
@@ -60,6 +60,5 @@ def rejected(given: Sequence[Rejected], own: Own = NO_OWN) -> Markup:
         ]
         lines = [tag("span", text, class_="line") for text in tried or [NOTHING]]
         held_out = NOTHING if one.held_out is None else number_text(one.held_out)
-        rows.append((one.name, one.reason, join(*lines), held_out))
-    caption = "Effects tried and not added; misfit on held-out data relative to that before"
+        rows.append((one.name, one.reason, join(*lines), *[held_out] * judged))
     return table(caption, columns, rows, folded_from=SHOWN)

@@ -95,6 +95,16 @@ def test_texts_are_shown_as_they_are():
     assert Outline(characterisation_report.page(strange())).texts.count(whole) >= 10
 
 
+def test_misfits_have_a_column_where_any_is_known(full):
+    held = everything()
+    assert any(one.held_out is not None for one in held.rejected)
+    assert "misfit with it" in Outline(full).texts
+    bare = replace(held, rejected=[replace(one, held_out=None) for one in held.rejected])
+    texts = Outline(page(bare)).texts
+    assert "misfit with it" not in texts
+    assert "Effects tried and not added" in texts
+
+
 def test_headings_come_in_order(full):
     headings = Outline(full).headings
     assert headings[0] == ("h1", "Diagnosis of office_zigzag.zip")

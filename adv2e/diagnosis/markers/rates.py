@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.diagnosis.classes import by_load
 from adv2e.diagnosis.markers.base import (
     LIGHT_NAMES,
     POLARITIES,
@@ -86,11 +87,7 @@ class Load(Numbers):
 
     def __init__(self, rate_hz: NDArray[np.float64], steps: int = 5) -> None:
         """`rate_hz`: (frame intervals,) events a second that the declared model makes."""
-        order = np.argsort(rate_hz, kind="stable")
-        total = np.cumsum(rate_hz[order])
-        step = np.minimum(steps * total / max(total[-1], 1e-9), steps - 1e-9).astype(np.int64)
-        self._step_of = np.empty(len(rate_hz), np.int64)
-        self._step_of[order] = step
+        self._step_of = by_load(rate_hz, steps)
         self._steps = steps
 
     @cached_property
