@@ -16,20 +16,36 @@ pairs           two effects at once
     python scripts/study_diagnosis.py run results --kinds library --sizes middle --shard 3/16
     python scripts/study_diagnosis.py run ordinary --fps 60 --bits 8 --interpolation flow
     python scripts/study_diagnosis.py report results -o tables
+    python scripts/study_diagnosis.py record echo.zip echo
 
 ``run`` adds a line of JSON for each case to a file in its folder and skips what is there already
 from the same commit, so that it can be stopped at any time; all kinds and effects come in turn.
-``report`` writes Markdown tables and a figure from what there is.
+``report`` writes Markdown tables and a figure from what there is.  ``record`` keeps one of the
+recordings, to be diagnosed by hand.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
-from study_diagnosis_parts.cases import KINDS, SIZES, Case, Plan, shard
+from study_diagnosis_parts.cases import (
+    KINDS,
+    LIBRARY,
+    MIDDLE,
+    NO_SIZE,
+    NOTHING,
+    OUTSIDE,
+    PAIRS,
+    SIZES,
+    Case,
+    Plan,
+    shard,
+)
 from study_diagnosis_parts.options import Names
 from study_diagnosis_parts.results import ENDING, append, finished, identity, latest, read
 
@@ -55,6 +71,43 @@ class Shard(click.ParamType):
         return self.fail(f"{value!r}: must be I/N with I from 1 to N, such as 3/16", param, ctx)
 
 
+def _size(ctx: click.Context, param: click.Parameter, text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if width.isdecimal() and height.isdecimal() and min(int(width), int(height)) >= 8:
+        return int(width), int(height)
+    raise click.BadParameter(f"{text!r}: must be as 48x36, at least 8x8", ctx, param)
+
+
+def _of_recordings(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options on how recordings are made."""
+    options = [
+        click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
+        click.option(
+            "--size", metavar="WxH", default="48x36", callback=_size, show_default=True,
+            help="Sensor.",
+        ),
+        click.option("--seconds", type=click.FloatRange(min=0.1), default=0.8, show_default=True),
+        click.option("--fps", type=click.FloatRange(min=10.0), default=500.0, show_default=True),
+        click.option(
+            "--bits", type=click.Choice(["8", "16"]), default="16", help="Of the frames.",
+            show_default=True,
+        ),
+        click.option(
+            "--interpolation", type=click.Choice(["linear", "flow"]), default="linear",
+            show_default=True,
+        ),
+    ]  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def _setup(size: tuple[int, int], seconds: float, fps: float, bits: str, interpolation: str) -> Any:
+    from study_diagnosis_parts.run import Setup  # noqa: PLC0415 - it loads the simulator
+
+    return Setup(*size, seconds, fps, int(bits), interpolation)
+
+
 @click.group()
 def main() -> None:
     """Study how often 'adv2e diagnose' is right."""
@@ -66,18 +119,9 @@ def main() -> None:
 @click.option("--sizes", type=Names(SIZES), default=ALL(SIZES), show_default=True)
 @click.option("--only", multiple=True, metavar="EFFECT", help="Only with this effect. Repeatable.")
 @click.option("--shard", "part", type=Shard(), default="1/1", show_default=True)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--repeats", type=click.IntRange(min=1), default=1, show_default=True)
 @click.option("--nothing", type=click.IntRange(min=0), default=100, show_default=True)
-@click.option("--size", metavar="WxH", default="48x36", show_default=True, help="Sensor.")
-@click.option("--seconds", type=click.FloatRange(min=0.1), default=0.8, show_default=True)
-@click.option("--fps", type=click.FloatRange(min=10.0), default=500.0, show_default=True)
-@click.option(
-    "--bits", type=click.Choice(["8", "16"]), default="16", help="Of the frames.", show_default=True
-)
-@click.option(
-    "--interpolation", type=click.Choice(["linear", "flow"]), default="linear", show_default=True
-)
+@_of_recordings
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True)
 @click.option("--most", type=click.IntRange(min=1), help="Stop after so many cases.")
 @click.option("-v", "verbose", is_flag=True, help="Show what competes.")
@@ -90,14 +134,10 @@ def run(
     seed: int,
     repeats: int,
     nothing: int,
-    size: str,
-    seconds: float,
-    fps: float,
-    bits: str,
-    interpolation: str,
     threads: int,
     most: int | None,
     verbose: bool,
+    **recording: Any,
 ) -> None:
     """Record and diagnose the cases that FOLDER does not have yet."""
     from study_diagnosis_parts import run as running  # noqa: PLC0415 - it loads the simulator
@@ -106,8 +146,7 @@ def run(
     from adv2e.diagnosis.library import names as library_names  # noqa: PLC0415
 
     say = partial(click.echo, err=True)
-    width, height = _size(size)
-    setup = running.Setup(width, height, seconds, fps, int(bits), interpolation)
+    setup = _setup(**recording)
     known = library_names()
     lacking = [name for name in catalogue.LIBRARY if name not in known]
     if lacking:
@@ -140,6 +179,41 @@ def run(
         say(f"    {_said(line)}")
 
 
+@main.command("record")
+@click.argument("path", metavar="FILE.zip", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("effects", metavar="[EFFECT]...", nargs=-1)
+@click.option("--effect-size", type=click.Choice(SIZES), default=MIDDLE, show_default=True)
+@_of_recordings
+def record(
+    path: Path, effects: tuple[str, ...], effect_size: str, seed: int, **recording: Any
+) -> None:
+    """Keep the study's recording with EFFECTs that are not declared.
+
+    Beside FILE.zip come FILE.declared.yaml, what a diagnosis may know, and FILE.truth.yaml.
+    """
+    from study_diagnosis_parts.camera import catalogue  # noqa: PLC0415 - it loads the camera
+
+    if path.suffix != ".zip":
+        raise click.BadParameter(f"{path}: must end with .zip", param_hint="FILE.zip")
+    if path.exists():
+        raise click.ClickException(f"{path}: is there already; choose another name")
+    known = (*catalogue.LIBRARY, *catalogue.OUTSIDE)
+    unknown = [name for name in effects if name not in known]
+    if unknown or len(effects) > 2:
+        what = f"{unknown[0]!r}: none of {', '.join(known)}" if unknown else "two at most"
+        raise click.BadParameter(what, param_hint="EFFECT")
+    if len(effects) == 2:
+        kind = PAIRS
+    elif effects:
+        kind = LIBRARY if effects[0] in catalogue.LIBRARY else OUTSIDE
+    else:
+        kind = NOTHING
+    case = Case(kind, effects, effect_size if effects else NO_SIZE, 0)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _setup(**recording).camera_for(case, seed).record(path)
+    click.echo(f"{path}: {case.key}, scene {case.scene(seed)}")
+
+
 @main.command("report")
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), required=True)
@@ -168,13 +242,6 @@ def report(folder: Path, output: Path, commit: str | None) -> None:
     (output / "diagnosis.md").write_text(text, encoding="utf-8")
     draw(pyplot, wanted, output / "diagnosis.png")
     click.echo(text)
-
-
-def _size(text: str) -> tuple[int, int]:
-    width, _, height = text.partition("x")
-    if width.isdecimal() and height.isdecimal() and min(int(width), int(height)) >= 8:
-        return int(width), int(height)
-    raise click.BadParameter(f"{text!r}: must be as 48x36, at least 8x8", param_hint="--size")
 
 
 def _said(line: dict[str, object]) -> str:

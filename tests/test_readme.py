@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from camera import Camera, patchwork
+from camera.catalogue import cases
 
 from adv2e.cli import COMMANDS
 from adv2e.config import load_config
+from adv2e.diagnosis.library import names
 
 TEXT = (Path(__file__).resolve().parents[1] / "README.md").read_text()
 
@@ -55,6 +58,35 @@ def test_effect_of_ones_own_runs(adv2e, tmp_path, monkeypatch):
     digest = hashlib.sha256(example.encode()).hexdigest()
     assert source == {"name": "echo", "file": "echo.py", "sha256": digest}
     assert "delay_us: 5000.0" in adv2e("config", "show", "--effect", "echo.py").out
+
+
+def test_effect_of_ones_own_is_found_and_its_model_converts(adv2e, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (example,) = (text for text in blocks("python") if "class Echo" in text)
+    Path("echo.py").write_text(example)
+    size = (32, 24)
+    Camera(
+        patchwork(size, seed=4), hidden=next(cases("echo", size="large")).hidden, size=size,
+        duration_s=0.4, fps=800.0, seed=4, step_us=50.0,
+    ).record(Path("a.zip"))  # fmt: skip
+    # what competes are the built-in effects that come nearest; with all, it takes a minute
+    rivals = {"refractory", "event_loss", "shot_noise"}
+    without = [part for name in set(names()) - rivals for part in ("--without", name)]
+    given = ("diagnose", "a.zip", "-c", "a.declared.yaml", *without)
+    outcome = adv2e(*given, "--effect", "echo.py", "-o", "found")
+    assert outcome.status == 0, outcome.err
+    report = json.loads(Path("found/report.json").read_text("utf-8"))
+    assert report["verdict"] == "explained"
+    (effect,) = report["effects"]
+    assert effect["name"] == "echo"
+    assert effect["parameters"]["user.echo.share"] == pytest.approx(0.3, rel=0.1)
+    assert effect["parameters"]["user.echo.delay_us"] == pytest.approx(7000.0, rel=0.1)
+    model = ("-c", "found/model.yaml", "--effect", "echo.py")
+    assert adv2e("convert", "a.zip", *model, "-q", "-o", "a.txt").status == 0
+    kept = json.loads(Path("a.txt.json").read_text("utf-8"))
+    assert kept["config"]["user"]["echo"] == pytest.approx(
+        {key.removeprefix("user.echo."): value for key, value in effect["parameters"].items()}
+    )
 
 
 def test_commands_exist():

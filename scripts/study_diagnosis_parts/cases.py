@@ -24,7 +24,8 @@ SCENES: tuple[str, ...] = tuple(camera.SCENES)
 SAME = (("dark_current", "black_level"), ("leak", "photo_leak"))
 """Effects that are nearly one thing under two keys."""
 
-_NO_SIZE = "none"
+NO_SIZE = "none"
+"""Of recordings with nothing missing."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class Plan:
 
     def cases(self) -> list[Case]:
         """Return the cases: kind after kind in turn, all of the middle size before the others."""
-        quiet = iter(self._queue(NOTHING, _NO_SIZE) if NOTHING in self.kinds else [])
+        quiet = iter(self._queue(NOTHING, NO_SIZE) if NOTHING in self.kinds else [])
         found: list[Case] = []
         for sizes in ((MIDDLE,), (SMALL, LARGE)):
             queues = [

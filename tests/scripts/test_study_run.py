@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import zipfile
 
 import pytest
 import study_diagnosis as study
@@ -138,3 +139,37 @@ def test_what_goes_wrong_is_part_of_the_line(monkeypatch):
     assert line["hidden"] == {"pixel.leak.rate_hz": 2.0}
     assert scoring.outcome(line) == "failed"
     json.dumps(line)
+
+
+def test_a_recording_is_kept_as_the_study_makes_it(tmp_path):
+    path = tmp_path / "new" / "echo.zip"
+    options = ["--seed", "2", "--size", "16x12", "--seconds", "0.1", "--effect-size", "large"]
+    outcome = CliRunner().invoke(study.main, ["record", str(path), "echo", *options])
+    assert outcome.exit_code == 0, outcome.output
+    case = cases.Case("outside", ("echo",), "large", 0)
+    assert outcome.output == f"{path}: {case.key}, scene {case.scene(2)}\n"
+    same = tmp_path / "same.zip"
+    study_run.Setup(width=16, height=12, seconds=0.1).camera_for(case, 2).record(same)
+    for kind in (".declared.yaml", ".truth.yaml"):
+        assert path.with_suffix(kind).read_text() == same.with_suffix(kind).read_text()
+    one, other = zipfile.ZipFile(path), zipfile.ZipFile(same)
+    assert one.namelist() == other.namelist()
+    assert all(one.read(name) == other.read(name) for name in one.namelist())
+
+
+@pytest.mark.parametrize(
+    ("name", "effects", "message"),
+    [
+        ("a.h5", [], "must end with .zip"),
+        ("a.zip", ["ecco"], "'ecco': none of"),
+        ("a.zip", ["leak", "flicker", "echo"], "two at most"),
+        ("there.zip", ["leak"], "is there already"),
+    ],
+)
+def test_a_recording_that_cannot_be_kept_is_told(name, effects, message, tmp_path):
+    (tmp_path / "there.zip").write_bytes(b"mine")
+    outcome = CliRunner().invoke(study.main, ["record", str(tmp_path / name), *effects])
+    assert outcome.exit_code != 0
+    assert message in outcome.output
+    assert [one.name for one in tmp_path.iterdir()] == ["there.zip"]
+    assert (tmp_path / "there.zip").read_bytes() == b"mine"
