@@ -35,12 +35,12 @@ def gaps(borders_ms: Array, *, same: bool) -> Measure:
     return measure
 
 
-def stamps(borders_us: Array, *, same_row: bool) -> Measure:
+def stamps(borders_us: Array, *, same: bool) -> Measure:
     """Count times between events of the whole sensor, of the same row or of another."""
 
     def measure(placed: Placed) -> Array:
         stream = placed.stream
-        used = (np.diff(stream.pixel // stream.width) == 0) == same_row
+        used = (np.diff(stream.pixel // stream.width) == 0) == same
         gap = np.clip(np.diff(stream.t)[used], borders_us[0], borders_us[-1])
         return np.histogram(gap, borders_us)[0].astype(np.float64)
 

@@ -22,6 +22,7 @@ _PER_PIXEL = "events a pixel a second"
 _MOTION = (("in motion", True), ("at rest", False))
 _POLARITIES = (("ON", 1), ("OFF", 0))
 _LOADS = 8
+_GAPS_MS = np.array([0.05, *BORDERS_MS, 512.0])
 _STAMPS_US = np.r_[0.5, 2.0 ** np.arange(14.0) + 0.5]
 """Borders between whole numbers of microseconds, the first for none and one together."""
 
@@ -52,7 +53,6 @@ class Gallery:
             self._by_row(),
             self._by_load(),
             *self._between_frames(),
-            *self._between_stamps(),
             self._course(),
         ]
 
@@ -68,31 +68,22 @@ class Gallery:
         ]
 
     def _between_events(self) -> list[Curve]:
-        gaps = np.array([0.05, *BORDERS_MS, 512.0])
+        """Return curves of the times between events of a pixel, and of the whole sensor."""
+        gaps_ms, stamps_us = _GAPS_MS, _STAMPS_US
+        of_pixel, of_sensor = "the event before [ms]", "the event before, of any pixel [us]"
+        kinds = [
+            ("a pixel, same polarity", of_pixel, gaps_ms, measures.gaps(gaps_ms, same=True)),
+            ("a pixel, other polarity", of_pixel, gaps_ms, measures.gaps(gaps_ms, same=False)),
+            ("the sensor, same row", of_sensor, stamps_us, measures.stamps(stamps_us, same=True)),
+            ("the sensor, other row", of_sensor, stamps_us, measures.stamps(stamps_us, same=False)),
+        ]
         return [
             self._curve(
-                f"Time between events of a pixel, {text}",
-                "time since the event before [ms]",
-                "events",
-                gaps,
-                measures.gaps(gaps, same=same),
+                f"Time between events of {text}", f"time since {since}", "events", borders, measure,
                 x_log=True,
             )
-            for text, same in (("same polarity", True), ("other polarity", False))
-        ]
-
-    def _between_stamps(self) -> list[Curve]:
-        return [
-            self._curve(
-                f"Time between events of the sensor, {text}",
-                "time since the event before, of any pixel [us]",
-                "events",
-                _STAMPS_US,
-                measures.stamps(_STAMPS_US, same_row=same),
-                x_log=True,
-            )
-            for text, same in (("of the same row", True), ("of another row", False))
-        ]
+            for text, since, borders, measure in kinds
+        ]  # fmt: skip
 
     def _by_brightness(self) -> list[Curve]:
         scene = self._scene

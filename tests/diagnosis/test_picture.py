@@ -71,8 +71,8 @@ def test_times_between_events_of_the_sensor_are_counted_by_row():
     t = np.cumsum([10, 0, 1, 2, 3, 60_000])
     events = placed(stream_of(t, [0, 1, 2, 3, 3, 0], [2, 2, 5, 5, 5, 1], [1] * 6), SCENE)
     curves = {c.title: c for c in Gallery(SCENE, events, [events], [events]).curves()}
-    same = curves["Time between events of the sensor, of the same row"]
-    other = curves["Time between events of the sensor, of another row"]
+    same = curves["Time between events of the sensor, same row"]
+    other = curves["Time between events of the sensor, other row"]
     np.testing.assert_array_equal(same.measured[:4], [1, 1, 1, 0])  # at most 1, 2, 3 to 4 us
     np.testing.assert_array_equal(other.measured[[0, -1]], [1, 1])
     assert (same.measured.sum(), other.measured.sum()) == (3, 2)
