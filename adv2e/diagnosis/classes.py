@@ -5,10 +5,12 @@ A place is a pixel in a frame interval.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.scene import Scene
+from adv2e.diagnosis.scene import Placed, Scene
 
 Array = NDArray[np.float64]
 
@@ -37,7 +39,7 @@ def contrast(scene: Scene) -> NDArray[np.float32]:
     It is the range of its log light within 50 ms about the middle of the interval, or from one
     frame to the next where frames are as far apart.
     """
-    seconds = np.diff(scene.times_us).astype(np.float32) * np.float32(1e-6)
+    seconds = scene.seconds.astype(np.float32)
     light = np.zeros((scene.intervals + 1, scene.pixels), np.float32)
     np.cumsum(scene.slope * seconds[:, None], axis=0, out=light[1:])
     beside = int(max(0.0, 0.5 * (_CONTRAST_S / float(np.median(seconds)) - 1.0)))
@@ -52,6 +54,12 @@ def contrast(scene: Scene) -> NDArray[np.float32]:
 def of_contrast(scene: Scene) -> NDArray[np.int64]:
     """Return the class of contrast of each place, (frame intervals, pixels)."""
     return np.digitize(contrast(scene), CONTRASTS[1:-1])
+
+
+def rate_hz(scene: Scene, simulations: Sequence[Placed]) -> Array:
+    """Return events a second on the whole sensor in each frame interval, mean of simulations."""
+    numbers = [np.bincount(one.interval, minlength=scene.intervals) for one in simulations]
+    return np.asarray(np.mean(numbers, axis=0) / scene.seconds)
 
 
 def by_load(rate_hz: Array, steps: int) -> NDArray[np.int64]:

@@ -65,8 +65,7 @@ def rates(scene: Scene, kind: NDArray[Any], classes: int, on: int | None = None)
         NaN for classes that no place has.
     """
     kind = np.broadcast_to(kind, scene.slope.shape)
-    seconds = np.diff(scene.times_us) * 1e-6
-    weight = np.broadcast_to(seconds[:, None], kind.shape)
+    weight = np.broadcast_to(scene.seconds[:, None], kind.shape)
     used = kind != NOWHERE
     time = np.bincount(kind[used], weight[used], minlength=classes)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,16 +149,17 @@ class Gallery:
 
     def _by_load(self) -> Curve:
         """Return the rate of the sensor against that of the declared model."""
-        scene, declared = self._scene, self._declared_rate
+        scene = self._scene
+        declared = classes.rate_hz(scene, self._before)
         step = classes.by_load(declared, _LOADS)
         kinds, step = np.unique(step, return_inverse=True)
-        number = np.bincount(step, declared * self._seconds)
+        number = np.bincount(step, declared * scene.seconds)
         whole = measures.rates(scene, step[:, None], len(kinds))
         return self._curve(
             "Rate of the sensor, from times of few events to times of many",
             "rate of the declared model [events a second]",
             "events a second",
-            number / np.bincount(step, self._seconds),
+            number / np.bincount(step, scene.seconds),
             lambda placed: scene.pixels * whole(placed),
         )
 
@@ -177,7 +177,7 @@ class Gallery:
         ]
 
     def _course(self) -> Curve:
-        borders = np.linspace(0.0, float(self._seconds.sum()), 25)
+        borders = np.linspace(0.0, float(self._scene.seconds.sum()), 25)
         return self._curve(
             "Course",
             "time [s]",
@@ -185,17 +185,6 @@ class Gallery:
             borders,
             measures.course(self._scene, borders),
         )
-
-    @cached_property
-    def _seconds(self) -> Array:
-        return np.diff(self._scene.times_us) * 1e-6
-
-    @cached_property
-    def _declared_rate(self) -> Array:
-        """Rate of the sensor that the declared model has in each frame interval."""
-        intervals = self._scene.intervals
-        numbers = [np.bincount(one.interval, minlength=intervals) for one in self._before]
-        return np.asarray(np.mean(numbers, axis=0) / self._seconds)
 
     def _curve(
         self,

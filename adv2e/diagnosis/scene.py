@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,11 @@ class Scene:
     def intervals(self) -> int:
         """Number of frame intervals."""
         return len(self.slope)
+
+    @cached_property
+    def seconds(self) -> NDArray[np.float64]:
+        """Length of each frame interval [s]."""
+        return np.diff(self.times_us) * 1e-6
 
     @property
     def pixels(self) -> int:

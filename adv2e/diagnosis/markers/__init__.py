@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis import parts
+from adv2e.diagnosis.classes import rate_hz
 from adv2e.diagnosis.markers.base import Entry, Group, Raw
 from adv2e.diagnosis.markers.intervals import Intervals, Runs
 from adv2e.diagnosis.markers.neighbours import Neighbours
@@ -45,15 +46,11 @@ class Markers:
     def __init__(self, scene: Scene, pilot: Sequence[Placed]) -> None:
         counter = Pixels(scene)
         expected = np.mean([counter.count(placed) for placed in pilot], axis=0)
-        seconds = np.diff(scene.times_us) * 1e-6
-        events = np.mean(
-            [np.bincount(placed.interval, minlength=scene.intervals) for placed in pilot], axis=0
-        )
         slopes = Slopes(scene)
         self.groups: list[Group] = [
             Rates(),
             Course(scene.times_us[0], scene.times_us[-1]),
-            Load(events / seconds),
+            Load(rate_hz(scene, pilot)),
             Intervals(),
             Intervals(at_rest=True),
             Runs(),
