@@ -195,8 +195,9 @@ def record(
 
     if path.suffix != ".zip":
         raise click.BadParameter(f"{path}: must end with .zip", param_hint="FILE.zip")
-    if path.exists():
-        raise click.ClickException(f"{path}: is there already; choose another name")
+    for one in (path, path.with_suffix(".declared.yaml"), path.with_suffix(".truth.yaml")):
+        if one.exists():
+            raise click.ClickException(f"{one}: is there already; choose another name")
     known = (*catalogue.LIBRARY, *catalogue.OUTSIDE)
     unknown = [name for name in effects if name not in known]
     if unknown or len(effects) > 2:

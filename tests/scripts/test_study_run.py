@@ -163,13 +163,16 @@ def test_a_recording_is_kept_as_the_study_makes_it(tmp_path):
         ("a.h5", [], "must end with .zip"),
         ("a.zip", ["ecco"], "'ecco': none of"),
         ("a.zip", ["leak", "flicker", "echo"], "two at most"),
-        ("there.zip", ["leak"], "is there already"),
+        ("there.zip", ["leak"], "there.zip: is there already"),
+        ("mine.zip", ["leak"], "mine.declared.yaml: is there already"),
     ],
 )
 def test_a_recording_that_cannot_be_kept_is_told(name, effects, message, tmp_path):
-    (tmp_path / "there.zip").write_bytes(b"mine")
+    held = [tmp_path / "mine.declared.yaml", tmp_path / "there.zip"]
+    for one in held:
+        one.write_bytes(b"mine")
     outcome = CliRunner().invoke(study.main, ["record", str(tmp_path / name), *effects])
     assert outcome.exit_code != 0
     assert message in outcome.output
-    assert [one.name for one in tmp_path.iterdir()] == ["there.zip"]
-    assert (tmp_path / "there.zip").read_bytes() == b"mine"
+    assert sorted(tmp_path.iterdir()) == held
+    assert all(one.read_bytes() == b"mine" for one in held)
