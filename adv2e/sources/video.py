@@ -7,9 +7,8 @@ there the times are first read from the headers of the blocks, which costs no de
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
@@ -20,7 +19,8 @@ from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Image, Selection, Shot, Source
 from adv2e.sources.containers import Container, examine
 from adv2e.sources.opencv import quiet, rgb_of
-from adv2e.sources.times import NS_PER_S, FrameRate, constant_rate, parse_times, read_text
+from adv2e.sources.times import NS_PER_S, parse_times, read_text
+from adv2e.sources.video_times import clock_of
 
 _GREY_8, _GREY_16 = b"Y800", b"Y1\x00\x10"
 _RETRIES = 1000
@@ -28,9 +28,6 @@ _RETRIES = 1000
 
 _DECODER_PIXELS, _DECODERS = 1 << 20, 4
 """Pixels of a frame for which one thread decodes fast enough, and the most threads."""
-
-Clock = Callable[[int, int], int]
-"""Time [ns] of a frame, from its number and its own stamp since the first [ns]."""
 
 
 def open_source(path: Path, given: GivenTimes, selection: Selection) -> VideoSource:
@@ -73,9 +70,14 @@ class VideoSource(Source):
             self._stated = len(self._container.stamps_ns)
         if selection.start_s is None and selection.stop_s is None and self._stated > 0:
             self.count = self._stated
-        self._listed: int | None = None
         self._choose_encoding()
-        self._clock = self._make_clock(given)
+        if given:
+            self.notes.append(f"{given} replaces the times in the file")
+        listed = None
+        if given.timestamps is not None:
+            listed = parse_times(read_text(given.timestamps), str(given.timestamps))
+        self._listed = None if listed is None else len(listed)
+        self._clock = clock_of(given, listed, self._container, self._fps)
 
     def _keep_grey(self, capture: cv2.VideoCapture) -> None:
         # grey pictures come as stored; conversion would repeat them three times, in 8 bits
@@ -92,33 +94,6 @@ class VideoSource(Source):
         self.encoding = "srgb"
         if bits > 8:
             self.notes.append(f"the video has {bits} bits a pixel and is read with 8 of them")
-
-    def _make_clock(self, given: GivenTimes) -> Clock:
-        if given:
-            self.notes.append(f"{given} replaces the times in the file")
-        if given.fps is not None:
-            rate = FrameRate(Fraction(str(given.fps)))
-            return lambda number, _: rate.time_ns(number)
-        if given.timestamps is not None:
-            return self._listed_clock(given.timestamps)
-        snapped = self._snapped_rate()
-        return snapped or _own_time
-
-    def _listed_clock(self, timestamps: Path) -> Clock:
-        stamps = parse_times(read_text(timestamps), str(timestamps))
-        self._listed = len(stamps)
-        return lambda number, _: stamps[number].t_ns
-
-    def _snapped_rate(self) -> Clock | None:
-        stamps_ns, tick_ns = self._container.stamps_ns, self._container.tick_ns
-        if stamps_ns is None:
-            return None
-        # VP8 has blocks that are never shown, at the time of the block after them
-        for times_ns in (stamps_ns, sorted(set(stamps_ns))):
-            rate = constant_rate(times_ns, stated_hz=self._fps, tolerance_ns=tick_ns)
-            if rate is not None:
-                return _snapping(rate, tick_ns)
-        return None
 
     def _decoders(self) -> int:
         # each has frames of its own, and handing work over costs more than small frames are worth
@@ -170,21 +145,6 @@ class VideoSource(Source):
             )
         if self._listed is not None and self._listed != count:
             raise DataError(f"{self.path}: {self._listed} times given for {count} frames")
-
-
-def _own_time(_: int, own_ns: int) -> int:
-    return own_ns
-
-
-def _snapping(rate: FrameRate, tick_ns: int) -> Clock:
-    def time_ns(number: int, own_ns: int) -> int:
-        at_number = rate.time_ns(number)
-        if abs(at_number - own_ns) <= tick_ns:
-            return at_number
-        # frames that could not be shown are missing before this one
-        return rate.time_ns(round(own_ns * rate.hz / NS_PER_S))
-
-    return time_ns
 
 
 def _load(capture: cv2.VideoCapture, label: str) -> Image:
