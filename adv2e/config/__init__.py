@@ -12,7 +12,7 @@ from adv2e.config.merge import merge_all, parse_set
 from adv2e.config.model import Config
 from adv2e.config.own import config_class
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
-from adv2e.config.yaml12 import Origin, Value
+from adv2e.config.yaml12 import Origin, Value, key_text
 
 if TYPE_CHECKING:
     from adv2e.effects.hooks import Hooks
@@ -109,9 +109,16 @@ def from_dict(
     return build(config_class(effects), _tree(values, Origin(name)))
 
 
+def _name(key: Any) -> str:
+    return key_text(key if isinstance(key, bool) else str(key))
+
+
 def _tree(values: Any, origin: Origin) -> Value:
     if isinstance(values, Mapping):
-        return Value({str(key): _tree(item, origin) for key, item in values.items()}, origin)
+        content = {_name(key): _tree(item, origin) for key, item in values.items()}
+        if len(content) < len(values):
+            raise origin.complaint("", "two keys have the same name: true is on, false is off")
+        return Value(content, origin)
     if isinstance(values, (list, tuple)):
         return Value([_tree(item, origin) for item in values], origin)
     return Value(values, origin)

@@ -62,26 +62,26 @@ def _lines(section: Section, path: str, depth: int) -> Iterator[tuple[str, str]]
     indent = "  " * depth
     for key, value in _entries(section, path):
         if isinstance(value, Section) and keys_of(type(value)):
-            yield f"{indent}{key.name}:", _note(key)
+            yield f"{indent}{scalar_text(key.name)}:", _note(key)
             yield from _lines(value, key.path, depth + 1)
         elif isinstance(value, Section):
-            yield f"{indent}{key.name}: {{}}", _note(key)
+            yield f"{indent}{scalar_text(key.name)}: {{}}", _note(key)
         elif key.is_section:
-            yield f"{indent}{key.name}: null", f"{_note(key)}; off"
+            yield f"{indent}{scalar_text(key.name)}: null", f"{_note(key)}; off"
             yield from _lines_off(key, indent + "  # ")
         else:
-            yield f"{indent}{key.name}: {scalar_text(value)}", _note(key)
+            yield f"{indent}{scalar_text(key.name)}: {scalar_text(value)}", _note(key)
 
 
 def _lines_off(section: Key, indent: str) -> Iterator[tuple[str, str]]:
     """Yield the keys of a section that is off, and of those in it."""
     for key in keys_of(section.kind):
         if key.is_section:
-            yield f"{indent}{key.name}: null", f"{_note(key)}; off"
+            yield f"{indent}{scalar_text(key.name)}: null", f"{_note(key)}; off"
             yield from _lines_off(key, indent + "  ")
         else:
             default = "" if key.default is MISSING else f" {scalar_text(key.default)}"
-            yield f"{indent}{key.name}:{default}", _note(key)
+            yield f"{indent}{scalar_text(key.name)}:{default}", _note(key)
 
 
 def _is_comment(line: str) -> bool:

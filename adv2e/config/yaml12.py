@@ -5,6 +5,10 @@ number and ``1e3`` is text.  Here the rules are those of the 1.2 core schema: on
 ``false`` are booleans, ``null``, ``~`` and nothing are none, ``1e3``, ``.inf`` and ``0o17`` are
 numbers.  Keys must be text, and giving one twice is an error.
 
+Programs that follow YAML 1.1 read a key ``on`` that is not quoted as true, and write it back as
+``true``.  So the keys ``true`` and ``false`` are read as ``on`` and ``off``, and what is written
+here is quoted where the two versions differ.
+
 References
 ----------
 .. [1] YAML Ain't Markup Language, version 1.2.2, section 10.3 (core schema), https://yaml.org/spec.
@@ -105,6 +109,14 @@ def _number(text: str) -> float:
     return float(text.replace(".", "") if text.lower().endswith(("inf", "nan")) else text)
 
 
+_KEYS_OF_1_1 = {"true": "on", "false": "off"}
+
+
+def key_text(key: bool | str) -> str:
+    """Return the name of the key that was read as `key`; true and false stand for on and off."""
+    return _KEYS_OF_1_1[str(key).lower()] if isinstance(key, bool) else key
+
+
 _SCALARS: dict[str, Callable[[str], Scalar]] = {
     _TAG + "null": lambda text: None,
     _TAG + "bool": lambda text: text.lower() == "true",
@@ -164,18 +176,21 @@ class _Builder:
         lines: dict[str, Origin] = {}
         for key_node, value_node in node.value:
             place = self.place(key_node)
-            if key_node.tag != _TAG + "str":
+            if key_node.tag not in (_TAG + "str", _TAG + "bool"):
                 written = key_node.value if isinstance(key_node, yaml.ScalarNode) else "a mapping"
                 nothing = isinstance(value_node, yaml.ScalarNode) and not value_node.value
                 comma = nothing and key_node.tag == _TAG + "int" and content
                 hint = ": numbers have a decimal point, not a comma" if comma else ""
                 raise place.complaint(path, f"a key must be text, got {written}{hint}")
-            key = key_node.value
+            name = self.scalar(key_node, path)
+            assert isinstance(name, (str, bool))
+            key = key_text(name)
             full = f"{path}.{key}" if path else key
             if key in content:
                 first = lines[key].line
                 where = f" (first on line {first})" if first is not None else ""
-                raise place.complaint(full, f"given twice{where}: keep one")
+                also = f" (a key {key_node.value} is {key})" if isinstance(name, bool) else ""
+                raise place.complaint(full, f"given twice{where}{also}: keep one")
             # the line of the key says more than that of a section's first entry
             content[key] = self.relocated(self.build(value_node, full), place)
             lines[key] = place

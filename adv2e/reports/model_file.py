@@ -60,8 +60,7 @@ def _origins(diagnosis: Diagnosis) -> dict[str, str]:
 def _lines(values: Mapping[str, Any], path: str, depth: int, notes: _Notes) -> Iterator[str]:
     for name, value in values.items():
         full = f"{path}.{name}" if path else name
-        # names that YAML 1.1 takes for a boolean, such as "on", are plain in YAML 1.2
-        start = f"{'  ' * depth}{name if name.isidentifier() else scalar_text(name)}:"
+        start = f"{'  ' * depth}{scalar_text(name)}:"
         if isinstance(value, dict) and value:
             yield f"{start}{notes.comment(full)}"
             yield from _lines(value, full, depth + 1, notes)
@@ -71,7 +70,9 @@ def _lines(values: Mapping[str, Any], path: str, depth: int, notes: _Notes) -> I
 
 def _flow(value: Any) -> str:
     if isinstance(value, dict):
-        return "{}"
+        return (
+            f"{{{', '.join(f'{scalar_text(key)}: {_flow(item)}' for key, item in value.items())}}}"
+        )
     if isinstance(value, list):
         return f"[{', '.join(_flow(item) for item in value)}]"
     return scalar_text(value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -232,6 +233,8 @@ def test_writing_and_reading_gives_the_same_configuration(write, config):
     assert load_config([write(to_yaml(config))]) == config
     assert load_config([write(to_annotated_yaml(config))]) == config
     assert from_dict(to_dict(config)) == config
+    for text in (to_yaml(config), to_annotated_yaml(config)):
+        assert yaml.safe_load(text) == to_dict(config)
 
 
 @settings(max_examples=50, deadline=None)
@@ -254,6 +257,12 @@ def test_to_dict_holds_plain_values():
     assert values["readout"]["loss"] is None
     assert values["frames"]["shift_px"] == [0.5, -1.0]
     assert list(values) == [item.name for item in dataclasses.fields(Config)]
+
+
+def test_on_given_twice_is_an_error_though_one_is_called_true():
+    assert from_dict({"pixel": {"thresholds": {True: 0.3}}}).pixel.thresholds.on == 0.3
+    with pytest.raises(ConfigError, match=r"^old\.h5: two keys have the same name: true is on"):
+        from_dict({"pixel": {"thresholds": {True: 0.3, "on": 0.2}}}, "old.h5")
 
 
 def test_from_dict_is_as_strict_as_a_file():

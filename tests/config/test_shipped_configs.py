@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 
 import pytest
+import yaml
 
-from adv2e.config import Config, all_keys, files, load_config, shipped, to_dict
+from adv2e.config import Config, all_keys, files, from_dict, load_config, shipped, to_dict
 from adv2e.errors import ConfigError
 
 NAMES = ["adv2e", "davis240c", "davis346", "ideal", "paper", "v2e", "vid2e"]
@@ -33,9 +34,16 @@ def test_adv2e_is_the_defaults_and_gives_every_key():
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_a_reader_of_yaml_1_1_reads_the_same(name):
+    text = (files.shipped_folder() / f"{name}.yaml").read_text(encoding="utf-8")
+    assert from_dict(yaml.safe_load(text)) == load_config([name])
+    assert not re.search(r"^\s*(on|off):", text, re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_every_number_has_a_comment(name):
     lines = (files.shipped_folder() / f"{name}.yaml").read_text(encoding="utf-8").splitlines()
-    bare = [line for line in lines if re.fullmatch(r"\s*\w+:\s*[-+.\d][-+.\deE]*\s*", line)]
+    bare = [line for line in lines if re.fullmatch(r"\s*\"?\w+\"?:\s*[-+.\d][-+.\deE]*\s*", line)]
     assert [line for line in bare if line != "seed: 0"] == []
 
 

@@ -82,6 +82,12 @@ def test_on_and_off_are_plain_keys_in_a_block():
     }
 
 
+@pytest.mark.parametrize("text", ["{on: 1, off: 2}", "{true: 1, False: 2}", "{TRUE: 1, off: 2}"])
+def test_what_yaml_1_1_makes_of_on_and_off_is_read_as_these(text):
+    """PyYAML reads a bare on as true, and writes it back as true."""
+    assert plain(parse(text, FILE)) == {"on": 1, "off": 2}
+
+
 def test_every_value_knows_its_line_and_how_it_was_written():
     tree = parse("a: 1\nb:\n  c: 1e3\n", FILE)
     c = tree.content["b"].content["c"]
@@ -100,7 +106,12 @@ def test_an_alias_is_its_anchor():
         ("a:\n  b: 1\n  b: 1\n", "f.yaml:3: a.b: given twice"),
         ("a: {b: 1, b: 2}", "f.yaml:1: a.b: given twice"),
         ("x: 1\n1: 2\n", "f.yaml:2: a key must be text, got 1"),
-        ("true: 2\n", "a key must be text, got true"),
+        ("null: 2\n", "a key must be text, got null"),
+        (
+            "a:\n  on: 1\n  true: 2\n",
+            "a.on: given twice (first on line 2) (a key true is on): keep",
+        ),
+        ("a: {False: 1, off: 2}", "f.yaml:1: a.off: given twice (first on line 1): keep one"),
         ("a: {b: 0,2}\n", "got 2: numbers have a decimal point, not a comma"),
         ("? {a: 1}\n: 2\n", "a key must be text, got a mapping"),
         ("a: [1, 2\n", "f.yaml:2: not YAML"),

@@ -5,10 +5,13 @@ from pathlib import Path
 
 import pytest
 import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from made_up_diagnosis import MODEL, everything, nothing, strange
 
 from adv2e.characterisation import report as characterisation_report
 from adv2e.config import from_dict, load_config
+from adv2e.config.yaml12 import Origin, parse
 from adv2e.diagnosis.report import write_reports
 from adv2e.diagnosis.report.page import WORDING
 from adv2e.errors import OutputError
@@ -121,11 +124,60 @@ def test_the_model_says_where_its_values_are_from():
     }
     assert lines["period_us"].endswith("# [us] added: refractory, 95 % interval 5,500 to 6,500")
     assert lines["cutoff_hz"].endswith("# [Hz] added: low_pass, 95 % interval 172 to 204")
-    assert lines["on"].endswith("on: 0.21  # [ln] nuisance")
-    assert lines["off"].endswith("off: 0.2  # [ln]")
+    assert lines['"on"'].endswith('"on": 0.21  # [ln] nuisance')
+    assert lines['"off"'].endswith('"off": 0.2  # [ln]')
     assert lines["encoding"].endswith("# nuisance")
     assert lines["source_follower"].strip() == "source_follower: null"
     assert all(len(line) <= 100 for line in model_text(everything(), WORDING).splitlines())
+
+
+_SCALARS = (
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats(allow_nan=False)
+    | st.text(max_size=20)
+    | st.sampled_from(["on", "No", "y", "~", "1e3", "1_000", "12:30:00", "2001-12-14", "0x1F"])
+)
+_KEYS = st.text(max_size=20) | st.sampled_from(["on", "off", "yes", "n", "null", "1e3", "on: 1"])
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.dictionaries(
+        _KEYS,
+        st.recursive(
+            _SCALARS,
+            lambda part: st.lists(part, max_size=3) | st.dictionaries(_KEYS, part, max_size=3),
+            max_leaves=5,
+        ),
+        max_size=4,
+    )
+)
+def test_readers_of_either_version_of_yaml_read_what_was_written(model):
+    text = model_text(replace(everything(), model=model), WORDING)
+    assert yaml.safe_load(text) == model
+    assert _content(parse(text, Origin("model.yaml"))) == model
+
+
+def _content(value):
+    if isinstance(value.content, dict):
+        return {key: _content(item) for key, item in value.content.items()}
+    if isinstance(value.content, list):
+        return [_content(item) for item in value.content]
+    return value.content
+
+
+def test_a_model_that_another_program_wrote_back_is_the_same(tmp_path):
+    """PyYAML reads and writes YAML 1.1, in which a bare on is true."""
+    write_reports(everything(), tmp_path / "found")
+    path = tmp_path / "found" / "model.yaml"
+    config = load_config([path])
+    bare = path.read_text("utf-8").replace('"on"', "on").replace('"off"', "off")
+    for text in (path.read_text("utf-8"), bare):
+        read = yaml.safe_load(text)
+        path.write_text(yaml.safe_dump(read), "utf-8")
+        assert load_config([path]) == config == from_dict(read)
 
 
 def test_lists_are_written_in_one_line():
