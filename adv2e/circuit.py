@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from adv2e import rng
 from adv2e.additions import Additions
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.pixel.low_pass import UPDATES
@@ -53,7 +54,7 @@ def make_circuit(pixel: Pixel, sampling: Sampling, seed: int) -> Circuit:
         ),
         noise_rms=noise.rms if noise else 0.0,
         noise_step=noise.step if noise else 0.1,
-        seed=seed,
+        seed=rng.key_of(seed),
     )
 
 

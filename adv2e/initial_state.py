@@ -45,7 +45,6 @@ from adv2e.stepping import Stepping
 def initial_state(
     pixel: Pixel,
     circuit: Circuit,
-    seed: int,
     first: NDArray[Any],
     start: float,
     dense: bool,
@@ -59,7 +58,6 @@ def initial_state(
         The configuration's section.
     circuit : Circuit
         What it makes.
-    seed : int
     first : (rows, columns)
         Light of the first frame [DN].
     start : float
@@ -69,6 +67,7 @@ def initial_state(
     threads : int
     """
     fill = partial(_over_pixels, threads, first.size)
+    seed = circuit.seed
     used = {
         S_SHOT_DRAW: circuit.shot_rate > 0,
         S_HOT_DRAW: circuit.hot_rate > 0,

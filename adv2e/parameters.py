@@ -14,6 +14,9 @@ from typing import Any
 
 from adv2e.errors import ConfigError
 
+_MANY_BITS = 256
+"""Whole numbers of more are not written out in messages."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -64,15 +67,22 @@ class Parameter:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return None
         unit = f" {self.unit}" if self.unit not in ("", "-") else ""
-        if not math.isfinite(value):
+        if isinstance(value, float) and not math.isfinite(value):
             return f"must be a finite number, got {value!r}"
         if self.above is not None and not value > self.above:
-            return f"must be above {self.above:g}{unit}, got {value:g}"
+            return f"must be above {_digits(self.above)}{unit}, got {_digits(value)}"
         if self.at_least is not None and not value >= self.at_least:
-            return f"must be at least {self.at_least:g}{unit}, got {value:g}"
+            return f"must be at least {_digits(self.at_least)}{unit}, got {_digits(value)}"
         if self.at_most is not None and not value <= self.at_most:
-            return f"must be at most {self.at_most:g}{unit}, got {value:g}"
+            return f"must be at most {_digits(self.at_most)}{unit}, got {_digits(value)}"
         return None
+
+
+def _digits(value: int | float) -> str:
+    """Return a number for people; whole ones with all their digits, unless these are too many."""
+    if not isinstance(value, int):
+        return f"{value:g}"
+    return str(value) if value.bit_length() < _MANY_BITS else f"one of {value.bit_length()} bits"
 
 
 def parameter(

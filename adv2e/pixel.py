@@ -122,7 +122,7 @@ class PixelArray:
         self.started = False
         self._driver = driver_of(pixel, self.circuit, additions, method)
         start, dense = self._relative(t_ns), self._driver == "run_dense"
-        self.state = initial_state(pixel, self.circuit, seed, first, start, dense, self.threads)
+        self.state = initial_state(pixel, self.circuit, first, start, dense, self.threads)
         if dense:
             self._stepping = Stepping(
                 self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,

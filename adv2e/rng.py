@@ -35,6 +35,9 @@ DEAD_CHOICE = 11
 LOSS = 12
 REQUEST = 13
 
+LARGEST_SEED = (1 << 64) - 1
+"""Seeds are the 64 bits of the generator's key."""
+
 _LOW = np.uint64(0xFFFFFFFF)
 _M0 = np.uint64(0xD2511F53)
 _M1 = np.uint64(0xCD9E8D57)
@@ -42,6 +45,11 @@ _W0 = np.uint64(0x9E3779B9)
 _W1 = np.uint64(0xBB67AE85)
 _32 = np.uint64(32)
 _2, _3, _4, _5, _6, _7, _8, _9 = (np.uint64(k) for k in range(2, 10))
+
+
+def key_of(seed: int) -> np.uint64:
+    """Return `seed` as compiled code takes it: of one type, so that none is compiled anew."""
+    return np.uint64(seed)
 
 
 @kernel
@@ -88,7 +96,7 @@ def _philox_unrolled(
 
 
 @kernel
-def uniforms(seed: int, stream: int, pixel: int, draw: float) -> tuple[float, float]:
+def uniforms(seed: np.uint64, stream: int, pixel: int, draw: float) -> tuple[float, float]:
     """Return two independent uniform numbers in (0, 1), 53 bits each."""
     s = np.uint64(seed)
     d = np.uint64(draw)
@@ -108,21 +116,21 @@ def normal_of(u: float, v: float) -> float:
 
 
 @kernel
-def normal(seed: int, stream: int, pixel: int, draw: float) -> float:
+def normal(seed: np.uint64, stream: int, pixel: int, draw: float) -> float:
     """Return a standard normal number (Box and Muller)."""
     u, v = uniforms(seed, stream, pixel, draw)
     return normal_of(u, v)
 
 
 @kernel
-def exponential(seed: int, stream: int, pixel: int, draw: float) -> float:
+def exponential(seed: np.uint64, stream: int, pixel: int, draw: float) -> float:
     """Return an exponential number of mean 1."""
     return -math.log(uniforms(seed, stream, pixel, draw)[0])
 
 
 @kernel
 def uniforms_of_pixels(
-    seed: int, stream: int, first: int, u: NDArray[np.float64], v: NDArray[np.float64]
+    seed: np.uint64, stream: int, first: int, u: NDArray[np.float64], v: NDArray[np.float64]
 ) -> None:
     """Draw what `uniforms` gives for draw 0 of the pixels first.. into `u` and `v`.
 
@@ -142,7 +150,7 @@ def uniforms_of_pixels(
 
 @kernel
 def _fill_uniforms(
-    seed: int,
+    seed: np.uint64,
     stream: int,
     pixels: NDArray[np.int64],
     draws: NDArray[np.int64],
@@ -160,13 +168,13 @@ def uniform_array(
     out = np.empty(both[0].shape)
     # writable, too: one type for the compiled code
     flat = [np.require(part, requirements=["C", "W"]).reshape(-1) for part in both]
-    _fill_uniforms(seed, stream, flat[0], flat[1], out.reshape(-1))
+    _fill_uniforms(key_of(seed), stream, flat[0], flat[1], out.reshape(-1))
     return out
 
 
 @kernel
 def _fill_next(
-    seed: int,
+    seed: np.uint64,
     stream: int,
     pixels: NDArray[np.int64],
     numbers: NDArray[np.int64],
@@ -191,7 +199,7 @@ def next_uniforms(
         How often each pixel has drawn before; counted on.
     """
     out = np.empty(pixels.size)
-    _fill_next(seed, stream, np.ascontiguousarray(pixels), numbers, out)
+    _fill_next(key_of(seed), stream, np.ascontiguousarray(pixels), numbers, out)
     return out
 
 
@@ -219,7 +227,7 @@ def _cos_sin(turns: float) -> tuple[float, float]:
 
 @kernel
 def normals_of_four(
-    seed: int, stream: int, first: int, count: int, block: int, out: NDArray[np.float64]
+    seed: np.uint64, stream: int, first: int, count: int, block: int, out: NDArray[np.float64]
 ) -> None:
     """Draw four standard normal numbers for each of the pixels first.. into `out`, (4, count..).
 

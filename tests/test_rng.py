@@ -1,7 +1,12 @@
 import numpy as np
+import pytest
 from scipy import stats
 
 from adv2e import rng
+from adv2e.circuit import make_circuit
+from adv2e.cli.options import SEED
+from adv2e.config.model import Pixel, Sampling
+from adv2e.machine_code import lay_out
 
 
 def test_philox_known_answers():
@@ -41,3 +46,19 @@ def test_every_argument_matters_and_only_they():
         changed[k] += 1
         assert rng.uniforms(*changed) != first
     assert rng.uniforms(3 + (1 << 40), *base[1:]) != first
+
+
+@pytest.mark.parametrize("seed", [1 << 63, rng.LARGEST_SEED])
+def test_large_seeds_need_no_code_of_their_own(seed):
+    """Code is kept for the types of its arguments, and takes a minute to compile."""
+    small, large = (make_circuit(Pixel(), Sampling(), s) for s in (0, seed))
+    assert lay_out((small,))[0] == lay_out((large,))[0]
+    pixels = np.arange(5)
+    drawn = rng.uniform_array(seed, rng.LOSS, pixels, 0)
+    assert len({*drawn, *rng.uniform_array(seed - 1, rng.LOSS, pixels, 0)}) == 10
+    counts = np.zeros(5, np.int64)
+    assert np.array_equal(rng.next_uniforms(seed, rng.LOSS, pixels, counts), drawn)
+
+
+def test_the_command_line_knows_the_largest_seed():
+    assert SEED.max == rng.LARGEST_SEED

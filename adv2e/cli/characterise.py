@@ -24,9 +24,7 @@ if TYPE_CHECKING:
     help="What is known of the camera: every key written there is held. Repeatable.",
 )
 @click.option("--set", "sets", metavar="KEY=VALUE", multiple=True, help="Declare one key.")
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the drawn tables."
-)
+@click.option("--seed", type=options.SEED, default=0, metavar="N", help="Seed of the drawn tables.")
 @click.option(
     "--where", metavar="COL=VALUE", multiple=True, help="Use only such rows. Repeatable: all hold."
 )

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 Body = TypeVar("Body", bound=Callable[..., Any])
 
+# adv2e.rng.LARGEST_SEED, without the time that importing it takes
+SEED = click.IntRange(0, (1 << 64) - 1)
+
 
 @dataclass(frozen=True)
 class Log:
@@ -96,9 +99,7 @@ def late_config_options(body: Body) -> Body:
         multiple=True,
         help="Set one key, such as pixel.low_pass.cutoff_hz=100 or pixel.leak=null. Repeatable.",
     )
-    @click.option(
-        "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all random numbers."
-    )
+    @click.option("--seed", type=SEED, metavar="N", help="Seed of all random numbers, below 2^64.")
     @effect_option
     @functools.wraps(body)
     def with_config(

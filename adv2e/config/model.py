@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from adv2e import rng
 from adv2e.effects.frames.encoding import check_encoding
 from adv2e.effects.frames.flicker import Flicker
 from adv2e.effects.pixel.dark_current import DarkCurrent
@@ -106,13 +107,19 @@ class Sampling(Section):
     """Frames and samples made between the input frames."""
 
     L: int = parameter(
-        10, unit="-", meaning="frames made of each input interval", at_least=1, source="ADV2E"
+        10,
+        unit="-",
+        meaning="frames made of each input interval",
+        at_least=1,
+        at_most=1_000_000,
+        source="ADV2E",
     )
     K: int = parameter(
         10,
         unit="-",
         meaning="continuity samples of each of those; exact does not depend on it",
         at_least=1,
+        at_most=1_000_000,
         source="ADV2E",
     )
     interpolation: str = parameter(
@@ -204,7 +211,9 @@ class Readout(Section):
 class Config(Section):
     """Everything that decides which events come out."""
 
-    seed: int = parameter(0, unit="-", meaning="seed of all random numbers", at_least=0)
+    seed: int = parameter(
+        0, unit="-", meaning="seed of all random numbers", at_least=0, at_most=rng.LARGEST_SEED
+    )
     frames: Frames = subsection(Frames, meaning="the input's numbers")
     sampling: Sampling = subsection(Sampling, meaning="in-between frames and samples")
     pixel: Pixel = subsection(Pixel, meaning="the pixel")

@@ -52,7 +52,7 @@ class Circuit(NamedTuple):
     hot_rate: float  # events of a hot pixel a us
     noise_rms: float  # photoreceptor noise
     noise_step: float
-    seed: int
+    seed: np.uint64
 
 
 # rows of the state: one column a pixel; those of effects that are off, at the end, are left out

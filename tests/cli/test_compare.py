@@ -87,6 +87,12 @@ def test_a_configuration_gives_the_floor_of_two_seeds(adv2e, pair, simulation):
     assert simulation[0][2] == 1
 
 
+def test_the_largest_seed_has_another_beside_it(adv2e, pair, simulation):
+    args = ("-c", "ideal", "--set", "frames.encoding=linear", "--seed", str(2**64 - 1))
+    assert adv2e("compare", *pair, *args).status == 0
+    assert [config.seed for _, config, _ in simulation] == [2**64 - 1, 0]
+
+
 def test_frames_of_a_file_of_ours_keep_their_encoding(adv2e, write, simulation):
     metadata = {"source": {"encoding": "srgb"}}
     measured = write("first.h5", some_events(1), (0, 50, 60), metadata=metadata)

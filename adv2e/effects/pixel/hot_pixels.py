@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from adv2e import rng
 from adv2e.jit import entry, inlined
 from adv2e.kernel.workspace import S_HOT_DRAW, S_HOT_TIME, Array, Circuit
@@ -51,7 +53,7 @@ def next_hot_time(i: int, circuit: Circuit, state: Array) -> None:
 
 @entry
 def fill_first_hot_times(
-    seed: int, fraction: float, rate: float, start: float, times: Array
+    seed: np.uint64, fraction: float, rate: float, start: float, times: Array
 ) -> None:
     """Choose the hot pixels and draw their first times [us]; the others never fire."""
     for i in range(times.shape[0]):

@@ -30,7 +30,9 @@ SETTLED, RANDOM = REFERENCES = ("settled", "random")
 
 
 @entry
-def fill_random_reference(seed: int, on: Array, off: Array, x: Array, reference: Array) -> None:
+def fill_random_reference(
+    seed: np.uint64, on: Array, off: Array, x: Array, reference: Array
+) -> None:
     """Draw references so that x lies uniformly between the thresholds of each pixel."""
     for i in range(x.shape[0]):
         u = rng.uniforms(seed, rng.INITIAL_REFERENCE, i, 0)[0]

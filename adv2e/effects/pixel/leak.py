@@ -21,6 +21,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from adv2e import rng
 from adv2e.jit import entry, inlined, kernel
 from adv2e.kernel.workspace import (
@@ -93,7 +95,7 @@ def fill_falls(
 
 
 @kernel
-def _factor(seed: int, jitter: float, i: int, draw: float) -> float:
+def _factor(seed: np.uint64, jitter: float, i: int, draw: float) -> float:
     """Leak speed of one cycle of pixel i, relative to the nominal one."""
     g = rng.normal(seed, rng.LEAK_PERIOD, i, draw)
     return 1.0 / (1.0 + jitter * min(max(g, -3.0), 3.0))
@@ -109,7 +111,7 @@ def next_leak_factor(i: int, circuit: Circuit, state: Array) -> float:
 
 
 @entry
-def fill_first_factors(seed: int, jitter: float, factors: Array) -> None:
+def fill_first_factors(seed: np.uint64, jitter: float, factors: Array) -> None:
     """Draw the leak speed of every pixel's first cycle."""
     for i in range(factors.shape[0]):
         factors[i] = _factor(seed, jitter, i, 0)

@@ -19,6 +19,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from adv2e import rng
 from adv2e.jit import entry, kernel
 from adv2e.kernel.workspace import Array
@@ -45,13 +47,13 @@ class PhotoreceptorNoise(Section):
 
 
 @entry
-def fill_first_noise(seed: int, rms: float, noise: Array) -> None:
+def fill_first_noise(seed: np.uint64, rms: float, noise: Array) -> None:
     """Draw the noise of every pixel at the start from its stationary distribution."""
     for i in range(noise.shape[0]):
         noise[i] = rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)
 
 
 @kernel
-def fill_normals(seed: int, first: int, count: int, block: int, normals: Array) -> None:
+def fill_normals(seed: np.uint64, first: int, count: int, block: int, normals: Array) -> None:
     """Draw the normal numbers of four steps in time, (4, count..), for the pixels first.. ."""
     rng.normals_of_four(seed, rng.PHOTORECEPTOR_STEPS, first, count, block, normals)

@@ -20,6 +20,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from adv2e import rng
 from adv2e.jit import entry, inlined
 from adv2e.kernel.workspace import S_SHOT_DRAW, S_SHOT_TIME, Array, Circuit
@@ -61,7 +63,7 @@ def candidate_polarity(i: int, light: float, circuit: Circuit, state: Array) -> 
 
 @entry
 def fill_first_candidates(
-    lo: int, hi: int, seed: int, rate: float, start: float, times: Array, draws: Array
+    lo: int, hi: int, seed: np.uint64, rate: float, start: float, times: Array, draws: Array
 ) -> None:
     """Draw the first candidate time [us] of the pixels lo..hi; rate in events a us.
 

@@ -19,6 +19,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from adv2e import rng
 from adv2e.jit import entry, kernel
 from adv2e.kernel.workspace import Array
@@ -66,8 +68,9 @@ class Thresholds(Section):
 
 @kernel
 def _fill_normal_levels(
-    seed: int, stream: int, first: int, mean: float, mismatch: float, levels: Array, spare: Array
-) -> None:
+    seed: np.uint64, stream: int, first: int, mean: float, mismatch: float, levels: Array,
+    spare: Array,
+) -> None:  # fmt: skip
     rng.uniforms_of_pixels(seed, stream, first, levels, spare)
     for k in range(levels.shape[0]):
         level = mean + mismatch * rng.normal_of(levels[k], spare[k])
@@ -76,7 +79,7 @@ def _fill_normal_levels(
 
 @entry
 def fill_levels(
-    lo: int, hi: int, seed: int, mean_on: float, mean_off: float, mismatch: float, on: Array,
+    lo: int, hi: int, seed: np.uint64, mean_on: float, mean_off: float, mismatch: float, on: Array,
     off: Array, spare: Array,
 ) -> None:  # fmt: skip
     """Draw the thresholds of the pixels lo..hi into `on` and `off`; `spare` is overwritten."""
