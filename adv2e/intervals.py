@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config.model import Sampling
+from adv2e.effects.frames.brightness import check_light
 from adv2e.errors import DataError
+from adv2e.sources.times import seconds
 from adv2e.upsampling import make_upsampler
 from adv2e.upsampling.sequence import Timed, instant_ns, neighbours
 
@@ -25,6 +27,9 @@ FRAME_BYTES = 16 << 20
 
 EVENTS = 1_000_000
 """Events that a part should not exceed, judged by the parts before; they are all in memory."""
+
+LONGEST_S = 1000
+"""Longest time from a frame to the next: the steps of a pixel grow with it [s]."""
 
 _MOST = 64
 _FIRST = 1
@@ -132,6 +137,12 @@ class Intervals:
                     f"frame {number}: {now_ns - before_ns} ns after the one before, too near for"
                     f" {self._L} instants from one to the other (sampling.L)"
                 )
+            if now_ns - before_ns > LONGEST_S * 10**9:
+                raise DataError(
+                    f"frame {number}: {seconds(now_ns - before_ns)} s after the one before, at"
+                    f" {seconds(now_ns)} s; {LONGEST_S} s is the longest that is simulated: are"
+                    " the times in another unit?"
+                )
             yield now_ns, now
             before_ns = now_ns
         if number == 0:
@@ -157,6 +168,7 @@ class Intervals:
         for (start_ns, a), (stop_ns, b), beside in neighbours(chain([self._first], frames)):
             for step, made in enumerate(upsampler.between(a, b, beside), start=1):
                 t_ns = instant_ns(start_ns, stop_ns, step, count)
+                check_light(made, f"a frame made {t_ns * 1e-9:.6f} s in")
                 yield _Instant(self._hold(made), 1.0, t_ns, step == count)
 
     def _part(self, intervals: int) -> Part:

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from adv2e import __version__
 from adv2e.active_effects import user_sources
 from adv2e.config import Config, to_dict
-from adv2e.effects.frames.encoding import LightDecoder, check_white
+from adv2e.effects.frames.brightness import check_white
+from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
 from adv2e.overlap import WriteBehind
 from adv2e.reading import Decoding, Reading, Still
@@ -196,7 +197,8 @@ def convert(
             if compile_apart and not user_sources(config):
                 name = "txt" if target == "-" else format_name(Path(target), format)
                 _compile_apart(recording, config, name, layout, workers)
-        stills = reading.stills(Decoding(decoder, table is not None, out.wants_frames))
+        stated = config.frames.full_scale
+        stills = reading.stills(Decoding(decoder, table is not None, out.wants_frames, stated))
         frames = _Passing(_progress(stills, recording.count, progress), out, call)
         for events in events_from_light(frames.light(), config, threads=workers, table=table):
             for piece in _pieces(events):

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.cores import default_threads
+from adv2e.effects.frames.brightness import check_floats, check_light
 from adv2e.errors import Adv2eError
 from adv2e.heap import return_large_blocks
 from adv2e.overlap import ReadAhead
@@ -60,18 +61,24 @@ class Decoding:
         They stay as they were read: the kernel decodes them itself.
     with_pictures : bool
         What is seen of them is kept, too.
+    full_scale : float, optional
+        Number that somebody said to mean white.
     """
 
     decoder: LightDecoder
     coded: bool
     with_pictures: bool
+    full_scale: float | None = None
 
     def still(self, frame: Frame) -> Still:
-        """Return a frame as the pixel wants it."""
+        """Return a frame as the pixel wants it; DataError if it is far above white."""
+        check_floats(frame.image, frame.label, self.full_scale)
         picture = None
         if self.with_pictures:
             picture = _viewable(frame.image, self.decoder.full_scale)
         light = frame.image if self.coded else self.decoder.decode(frame.image)
+        if frame.image.dtype.kind == "f":  # here, where its name is known
+            check_light(light, frame.label)
         return Still(frame.t_ns, light, picture)
 
 
@@ -190,5 +197,6 @@ def _viewable(image: NDArray[Any], full_scale: float) -> NDArray[Any]:
     """Return the frame as 8 or 16 bit, for storing beside the events."""
     if image.dtype in (np.uint8, np.uint16):
         return image
-    scaled = np.clip(np.rint(image * (65535.0 / full_scale)), 0, 65535)
+    with np.errstate(over="ignore"):
+        scaled = np.clip(np.rint(image * (65535.0 / full_scale)), 0, 65535)
     return scaled.astype(np.uint16)

@@ -26,7 +26,8 @@ from adv2e.active_effects import active_hooks
 from adv2e.config.model import Config
 from adv2e.decoding import decoder_for
 from adv2e.effects.composition import additions_of, begin, changes_light, map_events
-from adv2e.effects.frames.encoding import LightDecoder, check_white, encoding_of_images
+from adv2e.effects.frames.brightness import bounded, check_floats
+from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.errors import ConfigError, DataError
 from adv2e.events import Events
@@ -106,6 +107,7 @@ class _Raw:
         if image is None:
             raise DataError("no frames: at least two are needed")
         self._first = np.asarray(image)
+        self._stated = config.frames.full_scale
         self._decoder = _decoder_for(self._first, config)
         # decoded by the kernel, unless many instants are made of each frame
         self.table = self._decoder.grey_table if config.sampling.L == 1 else None
@@ -131,6 +133,7 @@ class _Raw:
                 f" {first.dtype} {first.shape}"
             )
         check_values(image, f"frame {number}")
+        check_floats(image, f"frame {number}", self._stated)
         return t_ns, image if self.table is not None else self._decoder.decode(image)
 
 
@@ -140,8 +143,6 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
         raise DataError(
             f"frame 0: shape {image.shape}, must be (rows, columns) or (rows, columns, 3)"
         )
-    if image.dtype.kind == "f" and image.size:
-        check_white(float(image.max()), "frame 0", config.frames.full_scale)
     auto = encoding_of_images(image.dtype, colour)
     return decoder_for(config.frames, image.dtype, colour, auto=auto)
 
@@ -170,7 +171,7 @@ def events_from_light(
     hooks = active_hooks(config, effects)
     if table is not None and changes_light(hooks):
         light, table = _decoded(light, table), None
-    frames = begin(hooks, iter(light), config.seed)
+    frames = bounded(begin(hooks, iter(light), config.seed), table)
     how = {"method": method, "coarseness": coarseness}
     yield from map_events(hooks, _pixel_events(frames, config, hooks, threads, table, how))
 

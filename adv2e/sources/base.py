@@ -28,10 +28,11 @@ Image = NDArray[Any]
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame: its time [ns] and its image as read, colour as RGB."""
+    """One frame: its time [ns], its image as read, colour as RGB, and its name for messages."""
 
     t_ns: int
     image: Image
+    label: str = ""
 
 
 @dataclass(frozen=True)
@@ -212,7 +213,7 @@ class Source(ABC):
             if origin is None:
                 origin = self._origin(first, shot)
             yielded += 1
-            yield Frame(shot.t_ns - origin, self._load(shot))
+            yield Frame(shot.t_ns - origin, self._load(shot), shot.label)
         if yielded < 2:
             span = previous.t_ns - first.t_ns if first is not None and previous is not None else 0
             raise self._too_few(yielded, span)

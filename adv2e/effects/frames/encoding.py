@@ -46,10 +46,6 @@ def check_encoding(encoding: str) -> None:
     )
 
 
-_NO_WHITE = 16.0
-"""Light this many times white is not taken for meant."""
-
-
 def full_scale_of(dtype: DTypeLike) -> float:
     """Return the number that means white in frames of `dtype`: 255, 65535 or 1.0.
 
@@ -67,33 +63,6 @@ def full_scale_of(dtype: DTypeLike) -> float:
 def encoding_of_images(dtype: DTypeLike, colour: bool) -> str:
     """Return what ``encoding: auto`` means for still images and arrays: 8-bit colour is sRGB."""
     return "srgb" if colour and np.dtype(dtype) == np.uint8 else "linear"
-
-
-def check_white(largest: float, label: str, full_scale: float | None) -> None:
-    """Refuse floats that are far above white, unless somebody said what white is.
-
-    A pixel that sees light a hundred times too bright is another one, and takes a thousand times as
-    long to simulate.
-
-    Parameters
-    ----------
-    largest : float
-        Of the numbers of a frame.
-    label : str
-        What it is called.
-    full_scale : float, optional
-        Number that is said to mean white.
-
-    Raises
-    ------
-    DataError
-        Naming `label`, the largest number, and the key that says what is white.
-    """
-    if full_scale is None and largest > _NO_WHITE:
-        raise DataError(
-            f"{label}: floats up to {largest:g}, where 1 is white; say what is, with"
-            " frames.full_scale=255 or another number (1, if they are right)"
-        )
 
 
 def decode_values(values: NDArray[Any], encoding: str, full_scale: float) -> NDArray[Any]:
@@ -160,9 +129,10 @@ class LightDecoder:
         self._tables: list[NDArray[np.float32]] = []
         if self.dtype.kind == "u":
             codes = np.arange(np.iinfo(self.dtype).max + 1, dtype=np.float64)
-            dn = decode_values(codes, encoding, full_scale)
             weights = LUMA_WEIGHTS if colour else (1.0,)
-            self._tables = [(weight * dn).astype(np.float32) for weight in weights]
+            with np.errstate(over="ignore"):  # what becomes infinite is refused with its frame
+                dn = decode_values(codes, encoding, full_scale)
+                self._tables = [(weight * dn).astype(np.float32) for weight in weights]
 
     @property
     def grey_table(self) -> NDArray[np.float32] | None:
@@ -189,11 +159,12 @@ class LightDecoder:
             )
         if self._tables:
             return self._look_up(image)
-        dn = decode_values(image, self.encoding, self.full_scale)
-        if not self.colour:
-            return dn
-        red, green, blue = LUMA_WEIGHTS
-        luma: NDArray[Any] = red * dn[..., 0] + green * dn[..., 1] + blue * dn[..., 2]
+        with np.errstate(over="ignore"):  # see above
+            dn = decode_values(image, self.encoding, self.full_scale)
+            if not self.colour:
+                return dn
+            red, green, blue = LUMA_WEIGHTS
+            luma: NDArray[Any] = red * dn[..., 0] + green * dn[..., 1] + blue * dn[..., 2]
         return luma
 
     def _look_up(self, image: NDArray[Any]) -> NDArray[Any]:

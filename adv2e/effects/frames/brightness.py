@@ -1,0 +1,101 @@
+"""How bright the light of a frame may be.
+
+The corner of the low-pass rises with the light, and with it the steps that a pixel takes: 3 ms for
+each frame interval of 10 ms at a thousand times white, which a frame in other units or a single
+broken number multiplies at will.  What is beyond is refused, wherever the light comes from: the
+numbers of a frame, an encoding, an effect, an interpolation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.errors import DataError
+
+UNSTATED = 16.0
+"""Floats so many times white are refused where nobody said what white is."""
+
+BRIGHTEST = 1000.0
+"""Light so many times white is the most that is simulated."""
+
+_WHITE = 255.0
+
+
+def check_white(largest: float, label: str, full_scale: float | None) -> None:
+    """Refuse floats that are far above white, unless somebody said what white is.
+
+    Parameters
+    ----------
+    largest : float
+        Of the numbers of a frame.
+    label : str
+        What it is called.
+    full_scale : float, optional
+        Number that is said to mean white.
+
+    Raises
+    ------
+    DataError
+        Naming `label`, the largest number, and the key that says what is white.
+    """
+    if full_scale is None and largest > UNSTATED:
+        raise DataError(
+            f"{label}: floats up to {largest:g}, where 1 is white; say what is, with"
+            " frames.full_scale=255 or another number (1, if they are right)"
+        )
+
+
+def check_floats(image: NDArray[Any], label: str, full_scale: float | None) -> None:
+    """Apply :func:`check_white` to a frame as read, if it holds floats."""
+    if image.dtype.kind == "f" and image.size:
+        check_white(float(image.max()), label, full_scale)
+
+
+def bounded(
+    frames: Iterator[tuple[int, NDArray[Any]]], table: NDArray[np.float32] | None
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    """Yield (t_ns, light) as they come, each looked at.
+
+    Parameters
+    ----------
+    frames : iterator of (int, array)
+        Times and light [DN], or grey values for the `table`.
+    table : (256,) array, optional
+        Light of the grey values [DN].
+
+    Raises
+    ------
+    DataError
+        Light that is no finite number from 0 to `BRIGHTEST` times white; names the frame.
+    """
+    harmless = table is not None and float(table.max()) <= BRIGHTEST * _WHITE
+    for number, (t_ns, light) in enumerate(frames):
+        if not harmless:
+            check_light(light if table is None else table.take(light), f"frame {number}")
+        yield t_ns, light
+
+
+def check_light(light: NDArray[Any], label: str) -> None:
+    """Raise DataError unless all light [DN] is finite and at most `BRIGHTEST` times white."""
+    if not light.size:
+        return
+    low, high = float(light.min()), float(light.max())
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise DataError(
+            f"{label}: its light is {low if not math.isfinite(low) else high}; it must be a"
+            " finite number (see frames.encoding, frames.full_scale and the effects)"
+        )
+    if low < 0:
+        raise DataError(f"{label}: light of {low:g} DN; light cannot be negative")
+    if high > BRIGHTEST * _WHITE:
+        row, column = np.unravel_index(int(light.argmax()), light.shape)
+        raise DataError(
+            f"{label}: light {high / _WHITE:.4g} times white at x {column}, y {row};"
+            f" {BRIGHTEST:g} is the most that is simulated: say with frames.full_scale which number"
+            " is white, or clip the frames"
+        )
