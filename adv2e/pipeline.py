@@ -23,6 +23,7 @@ from adv2e.config import Config, to_dict
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
+from adv2e.names import shown
 from adv2e.overlap import WriteBehind
 from adv2e.reading import Decoding, Reading, Still
 from adv2e.simulation import events_from_light, is_compiled
@@ -248,7 +249,7 @@ def _metadata(config: Config, recording: Source) -> dict[str, Any]:
         "seed": config.seed,
         **({"effects": own} if own else {}),
         "source": {
-            "name": Path(recording.path).name,
+            "name": shown(Path(recording.path).name),
             "kind": recording.kind,
             "encoding": _encoding(recording, config),
             "full_scale": _full_scale(recording, config),

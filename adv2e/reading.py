@@ -25,6 +25,7 @@ from adv2e.heap import return_large_blocks
 from adv2e.overlap import ReadAhead
 from adv2e.sources import open_source
 from adv2e.sources.base import Frame, Source
+from adv2e.sources.rates import Rate
 
 if TYPE_CHECKING:
     from adv2e.effects.frames.encoding import LightDecoder
@@ -100,7 +101,7 @@ class Reading:
         self,
         path: str,
         *,
-        fps: float | None = None,
+        fps: Rate | None = None,
         timestamps: str | Path | None = None,
         start_s: float | None = None,
         stop_s: float | None = None,

@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from adv2e import __version__
-from adv2e.cli.run import flush_stdout, reporting, stopping_on_signals
+from adv2e.cli.run import flush_stdout, print_any_character, reporting, stopping_on_signals
 from adv2e.garbage import collect_seldom
 
 COMMANDS = {
@@ -84,6 +84,7 @@ class Program(click.Group):
         """Run the program; always ends with SystemExit."""
         if len(args) < 2:
             kwargs["prog_name"] = kwargs.get("prog_name") or "adv2e"
+        print_any_character()
         with stopping_on_signals(), _rare_collection():
             try:
                 return super().main(*args, **kwargs)

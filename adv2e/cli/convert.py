@@ -22,7 +22,7 @@ SECONDS = options.FiniteNumber(min=0)
 @click.argument("source", metavar="INPUT")
 @options.late_config_options
 @options.run_options
-@click.option("--fps", type=options.FiniteNumber(min=0, min_open=True), help="Frames a second.")
+@options.fps_option
 @click.option(
     "--timestamps",
     type=click.Path(path_type=Path),
@@ -63,7 +63,7 @@ def command(
     threads: int | None,
     progress: bool,
     log: Log,
-    fps: float | None,
+    fps: str | None,
     timestamps: Path | None,
     start: float | None,
     stop: float | None,

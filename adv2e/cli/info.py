@@ -12,11 +12,7 @@ from adv2e.cli import options
 @click.command("info")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print JSON; all keys are always there.")
-@click.option(
-    "--fps",
-    type=options.FiniteNumber(min=0, min_open=True),
-    help="Frames a second, for images without times.",
-)
+@options.fps_option
 @click.option(
     "--timestamps",
     type=click.Path(path_type=Path),
@@ -25,7 +21,7 @@ from adv2e.cli import options
 )
 @options.verbosity_options
 def command(
-    file: Path, as_json: bool, fps: float | None, timestamps: Path | None, log: options.Log
+    file: Path, as_json: bool, fps: str | None, timestamps: Path | None, log: options.Log
 ) -> None:
     """Say what a recording or event file holds.
 

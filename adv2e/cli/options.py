@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from adv2e.cli.run import VERBOSITY
+from adv2e.names import shown
 
 if TYPE_CHECKING:
     from adv2e.config import Config
@@ -37,7 +38,7 @@ class Log:
     def __call__(self, text: str, level: int = 0) -> None:
         """Write `text`; `level` 1 only with -v, 2 only with -vv."""
         if self.level >= level:
-            click.echo(text, err=True)
+            click.echo(shown(text), err=True)
 
 
 class FiniteNumber(click.FloatRange):
@@ -53,6 +54,27 @@ class FiniteNumber(click.FloatRange):
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number", param, ctx)
         return number
+
+
+def fps_option(body: Body) -> Body:
+    """Add --fps; the command gets ``fps``, as it was written, or None."""
+    return click.option(
+        "--fps",
+        metavar="F",
+        callback=_rate,
+        help="Frames a second, such as 30 or 30000/1001.",
+    )(body)
+
+
+def _rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    from adv2e.sources.rates import parse_rate
+
+    try:
+        if value is not None:
+            parse_rate(value)
+    except ValueError as error:
+        raise click.BadParameter(str(error), ctx, param) from error
+    return value
 
 
 def effect_option(body: Body) -> Body:

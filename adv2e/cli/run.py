@@ -16,6 +16,7 @@ Where files cannot be removed like that, it arrives as an exception, and they ar
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -29,6 +30,7 @@ import click
 
 from adv2e import unfinished
 from adv2e.errors import Adv2eError
+from adv2e.names import shown
 
 VERBOSITY = "adv2e.verbosity"
 """Key of ``click.Context.meta`` that holds how often -v was given."""
@@ -45,9 +47,14 @@ class Terminated(BaseException):
 
 
 def complain(text: str) -> None:
-    """Write one line to stderr, whatever line breaks `text` holds."""
+    """Write one line to stderr, whatever characters and line breaks `text` holds."""
     with suppress(OSError):  # nobody is left to read it
-        click.echo(f"adv2e: {' '.join(text.split())}", err=True)
+        click.echo(f"adv2e: {shown(text)}", err=True)
+
+
+def _joined(error: BaseException) -> str:
+    """Return what a library says, which may have lines, as one."""
+    return " ".join(str(error).split())
 
 
 @contextmanager
@@ -83,11 +90,11 @@ def reporting(context: click.Context | None = None) -> Iterator[None]:
         raise SystemExit(error.exit_status) from None
     except MemoryError as error:
         _trace(context)
-        complain(f"error: not enough memory: {error}")
+        complain(f"error: not enough memory: {_joined(error)}")
         raise SystemExit(1) from None
     except Exception as error:
         hint = "" if _trace(context) else "; run with -vv for the traceback"
-        complain(f"error: internal error: {type(error).__name__}: {error}{hint}")
+        complain(f"error: internal error: {type(error).__name__}: {_joined(error)}{hint}")
         raise SystemExit(1) from None
 
 
@@ -110,7 +117,7 @@ def _as_signalled() -> Iterator[None]:
 
 
 def _click_text(error: click.ClickException) -> str:
-    text = error.format_message().rstrip(".")
+    text = " ".join(error.format_message().split()).rstrip(".")
     if isinstance(error, click.UsageError) and error.ctx is not None:
         text += f" (see '{error.ctx.command_path} --help')"
     return text
@@ -172,6 +179,13 @@ def _say_at_once(text: str) -> None:
         # over a progress bar, if there is one
         start = "\r\x1b[K" if os.isatty(2) else ""
         os.write(2, f"{start}adv2e: {text}\n".encode())
+
+
+def print_any_character() -> None:
+    """Let standard output escape characters that it has no code for, as standard error does."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def flush_stdout(*, quiet: bool) -> None:

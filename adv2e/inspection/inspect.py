@@ -11,15 +11,17 @@ from numpy.typing import NDArray
 
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.inspection.frames import describe_times
+from adv2e.names import shown
 from adv2e.recordings import Recording, read_recording
 from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
+from adv2e.sources.rates import Rate
 
 EVENTS = "events.txt"
 """The file of events in a DAVIS240C folder or zip."""
 
 
 def inspect(
-    path: Path, *, fps: float | None = None, timestamps: Path | None = None
+    path: Path, *, fps: Rate | None = None, timestamps: Path | None = None
 ) -> dict[str, Any]:
     """Return what a recording, an event file or an input with frames holds, ready for JSON.
 
@@ -75,7 +77,7 @@ def _of_recording(recording: Recording) -> dict[str, Any]:
             "colour": None if first is None else first.image.ndim == 3,
         }
     return {
-        "file": str(recording.path),
+        "file": shown(recording.path),
         "layout": recording.layout,
         "width": recording.width,
         "height": recording.height,
@@ -89,7 +91,7 @@ def _of_recording(recording: Recording) -> dict[str, Any]:
 
 def _of_source(source: Source) -> dict[str, Any]:
     return {
-        "file": source.path,
+        "file": shown(source.path),
         "layout": source.kind,
         "width": source.width,
         "height": source.height,
@@ -101,7 +103,7 @@ def _of_source(source: Source) -> dict[str, Any]:
             "encoding": source.encoding,
             "own_clock": source.has_clock,
         },
-        "problems": [],
+        "problems": list(source.doubts),
         "notes": list(source.notes),
         "metadata": {},
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from adv2e.names import shown
 from adv2e.sources.times import seconds
 
 _WIDTH = 12
@@ -23,7 +24,7 @@ def text(report: dict[str, Any]) -> str:
     rows += _origin(report["metadata"])
     rows += [("problem", line) for line in report["problems"]]
     rows += [("note", line) for line in report["notes"]]
-    return "\n".join(f"{name:<{_WIDTH}}{value}" for name, value in rows)
+    return "\n".join(f"{name:<{_WIDTH}}{shown(value)}" for name, value in rows)
 
 
 def _events(events: dict[str, Any]) -> list[tuple[str, str]]:

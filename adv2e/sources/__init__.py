@@ -7,6 +7,7 @@ from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.sources.base import Frame, GivenTimes, Selection, Source
+from adv2e.sources.rates import Rate
 
 __all__ = ["Frame", "Source", "open_source"]
 
@@ -27,7 +28,7 @@ OPENERS = {
 def open_source(
     path: str | Path,
     *,
-    fps: float | None = None,
+    fps: Rate | None = None,
     timestamps: str | Path | None = None,
     start_s: float | None = None,
     stop_s: float | None = None,
@@ -39,8 +40,8 @@ def open_source(
     ----------
     path : path
         Video file, folder of images, DAVIS240C folder or zip, or ``.npy`` stack.
-    fps : float, optional
-        Frames are at this constant rate [Hz], whatever the source says.
+    fps : float, Fraction or str, optional
+        Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
     timestamps : path, optional
         File with the time of each frame, ``t`` or ``t name`` a line, t in seconds.
     start_s, stop_s : float, optional

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import encoding_of_images, full_scale_of
 from adv2e.errors import DataError, UsageError
-from adv2e.sources.times import NS_PER_S, seconds
+from adv2e.sources.rates import Rate, parse_rate
+from adv2e.sources.times import NS_PER_S, FrameRate, seconds
 
 Image = NDArray[Any]
 """(rows, columns) or (rows, columns, 3) RGB; uint8, uint16, float32 or float64."""
@@ -51,20 +52,32 @@ class GivenTimes:
     Raises
     ------
     UsageError
-        If both are given or the rate is not above zero.
+        If both are given or the rate is impossible.
     """
 
-    fps: float | None = None
+    fps: Rate | None = None
     timestamps: Path | None = None
 
     def __post_init__(self) -> None:
         if self.fps is not None and self.timestamps is not None:
             raise UsageError("--fps and --timestamps both say when the frames are; give one")
-        if self.fps is not None and not (self.fps > 0 and math.isfinite(self.fps)):
-            raise UsageError(f"--fps: must be above 0 Hz, got {self.fps:g}")
+        if self.fps is not None:
+            try:
+                parse_rate(self.fps)
+            except ValueError as error:
+                raise UsageError(f"--fps: {error}") from error
+
+    @property
+    def rate(self) -> FrameRate | None:
+        """The constant rate, exactly; None if none is given."""
+        return None if self.fps is None else FrameRate(parse_rate(self.fps))
 
     def __str__(self) -> str:
-        return f"--fps {self.fps:g}" if self.fps is not None else f"--timestamps {self.timestamps}"
+        return f"--timestamps {self.timestamps}" if self.fps is None else f"--fps {self._fps_text}"
+
+    @property
+    def _fps_text(self) -> str:
+        return f"{self.fps:g}" if isinstance(self.fps, float) else str(self.fps)
 
     def __bool__(self) -> bool:
         return self.fps is not None or self.timestamps is not None

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Image, Selection, Shot, Source, check_values
-from adv2e.sources.times import FrameRate, Stamp, parse_times, read_text
+from adv2e.sources.times import Stamp, parse_times, read_text
 
 _LONG_S = 10.0
 """Mean time between frames from which on their times are doubted [s]."""
@@ -41,8 +40,7 @@ def given_shots(given: GivenTimes, pictures: Sequence[Picture], path: Path) -> l
     DataError
         The file cannot be read or has times for other pictures.
     """
-    if given.fps is not None:
-        rate = FrameRate(Fraction(str(given.fps)))
+    if (rate := given.rate) is not None:
         return [Shot(rate.time_ns(n), p.label, p.load) for n, p in enumerate(pictures)]
     assert given.timestamps is not None
     label = str(given.timestamps)

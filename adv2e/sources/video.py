@@ -19,6 +19,7 @@ from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Image, Selection, Shot, Source
 from adv2e.sources.containers import Container, examine
 from adv2e.sources.opencv import quiet, rgb_of
+from adv2e.sources.opening import openable
 from adv2e.sources.times import NS_PER_S, parse_times, read_text
 from adv2e.sources.video_times import clock_of
 
@@ -102,9 +103,9 @@ class VideoSource(Source):
 
     @contextmanager
     def _opened(self, threads: int = 1) -> Iterator[cv2.VideoCapture]:
-        with quiet():
+        with quiet(), openable(self.path) as name:
             options = [cv2.CAP_PROP_N_THREADS, threads]
-            capture = cv2.VideoCapture(self.path, cv2.CAP_FFMPEG, options)
+            capture = cv2.VideoCapture(name, cv2.CAP_FFMPEG, options)
         try:
             if not capture.isOpened():
                 raise DataError(f"{self.path}: not a video that can be read, or damaged")

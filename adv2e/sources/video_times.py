@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from fractions import Fraction
 
 from adv2e.sources.base import GivenTimes
 from adv2e.sources.containers import Container
@@ -29,8 +28,7 @@ def clock_of(
     fps : float
         Rate that FFmpeg found [Hz]; 0 if it found none.
     """
-    if given.fps is not None:
-        rate = FrameRate(Fraction(str(given.fps)))
+    if (rate := given.rate) is not None:
         return lambda number, _: rate.time_ns(number)
     if listed is not None:
         return lambda number, _: listed[number].t_ns
