@@ -6,9 +6,17 @@ from numpy.typing import DTypeLike
 
 from adv2e.config.model import Frames
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.sources.base import Light
 
 
-def decoder_for(frames: Frames, dtype: DTypeLike, colour: bool, *, auto: str) -> LightDecoder:
+def encoding_for(frames: Frames, auto: str) -> str:
+    """Return the encoding that a configuration asks for, `auto` being what ``auto`` means."""
+    return auto if frames.encoding == "auto" else frames.encoding
+
+
+def decoder_for(
+    frames: Frames, dtype: DTypeLike, colour: bool, *, auto: str, white: float | None = None
+) -> LightDecoder:
     """Return the decoder that a configuration asks for.
 
     Parameters
@@ -19,6 +27,35 @@ def decoder_for(frames: Frames, dtype: DTypeLike, colour: bool, *, auto: str) ->
         Of the frames; see :class:`adv2e.effects.frames.encoding.LightDecoder`.
     auto : str
         What ``encoding: auto`` means for them.
+    white : float, optional
+        The number that means white in them; default: that of the data type.
     """
-    encoding = auto if frames.encoding == "auto" else frames.encoding
-    return LightDecoder(encoding, frames.full_scale or full_scale_of(dtype), dtype, colour)
+    full_scale = frames.full_scale or white or full_scale_of(dtype)
+    return LightDecoder(encoding_for(frames, auto), full_scale, dtype, colour)
+
+
+def light_text(light: Light, white: float, frames: Frames | None = None) -> str:
+    """Return in one line which light the numbers of frames are taken for, why, and what changes it.
+
+    Parameters
+    ----------
+    light : Light
+        What the source of the frames says of them.
+    white : float
+        The number that means white in them, unless the configuration says another.
+    frames : Frames, optional
+        The configuration's section; default: one that says nothing.
+    """
+    frames = frames or Frames()
+    if frames.encoding != "auto":
+        why = ["as frames.encoding says"]
+    elif "frames.encoding" in light.encoding_reason:
+        why = [light.encoding_reason]
+    else:
+        why = [light.encoding_reason, "frames.encoding changes it"]
+    if frames.full_scale is not None:
+        why.append("white as frames.full_scale says")
+    elif light.full_scale_reason:
+        why.append(f"white {light.full_scale_reason}")
+    encoding = encoding_for(frames, light.encoding)
+    return f"{encoding}, white {frames.full_scale or white:g} ({'; '.join(why)})"

@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 from adv2e import __version__
 from adv2e.active_effects import user_sources
 from adv2e.config import Config, to_dict
+from adv2e.decoding import decoder_for, light_text
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
 from adv2e.names import shown
 from adv2e.overlap import WriteBehind
+from adv2e.pictures import drawn, picture_white
 from adv2e.reading import Decoding, Reading, Still
 from adv2e.simulation import events_from_light, is_compiled
 from adv2e.sinks import Sink, format_name, open_sink
@@ -73,8 +75,8 @@ def _call_now(_: int, function: Callable[..., None], *arguments: Any) -> None:
 class _Output:
     """What frames and events go to: the sink, the preview if there is one, and the counts."""
 
-    def __init__(self, sink: Sink, preview: Preview | None) -> None:
-        self._sink, self._preview = sink, preview
+    def __init__(self, sink: Sink, preview: Preview | None, white: float) -> None:
+        self._sink, self._preview, self._white = sink, preview, white
         self.wants_frames = sink.wants_frames or preview is not None
         self.events = 0
         self.on = 0
@@ -82,7 +84,7 @@ class _Output:
     def add_frame(self, t_ns: int, picture: NDArray[Any]) -> None:
         self._sink.write_frame(t_ns, picture)
         if self._preview is not None:
-            self._preview.add_frame(t_ns, picture)
+            self._preview.add_frame(t_ns, drawn(picture, self._white))
 
     def add_events(self, events: Events) -> None:
         self.events += events.size
@@ -169,6 +171,16 @@ def convert(
     for written in (target, preview):
         if written not in (None, "-"):
             check_apart(written, reading.inputs)
+    keeps_all_bits = _holds_frames(target, format)
+    with_frames = with_frames or keeps_all_bits
+    decoder = decoder_for(
+        config.frames,
+        recording.dtype,
+        recording.colour,
+        auto=recording.encoding,
+        white=recording.full_scale,
+    )
+    white = picture_white(recording.dtype, decoder.full_scale, not keeps_all_bits)
     with ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
@@ -177,13 +189,13 @@ def convert(
                 height=recording.height,
                 format=format,
                 layout=layout,
-                metadata=_metadata(config, recording),
+                metadata=_metadata(config, recording, decoder, white if with_frames else None),
                 overwrite=overwrite,
-                with_frames=with_frames or _holds_frames(target, format),
+                with_frames=with_frames,
                 threads=workers,
             )
         )
-        out = _Output(sink, _open_preview(preview, recording, overwrite, stack))
+        out = _Output(sink, _open_preview(preview, recording, overwrite, stack), white)
         call: _Call = _call_now
         # a write to standard output may block until the reader pleases, and only the main thread
         # can be interrupted in it
@@ -191,21 +203,24 @@ def convert(
             call = stack.enter_context(WriteBehind(BEHIND_BYTES)).call
         for doubt in recording.doubts:
             log(doubt)
-        decoder = _decoder_for(recording, config)
         table = _table_for_the_kernel(decoder, config)
         if not is_compiled(config):
             log("compiling the pixel's kernel (once; about half a minute)")
             if compile_apart and not user_sources(config):
                 name = "txt" if target == "-" else format_name(Path(target), format)
-                _compile_apart(recording, config, name, layout, workers)
+                _compile_apart(recording, config, decoder.encoding, name, layout, workers)
         stated = config.frames.full_scale
-        stills = reading.stills(Decoding(decoder, table is not None, out.wants_frames, stated))
+        stills = reading.stills(
+            Decoding(decoder, table is not None, out.wants_frames, stated, not keeps_all_bits)
+        )
         frames = _Passing(_progress(stills, recording.count, progress), out, call)
         for events in events_from_light(frames.light(), config, threads=workers, table=table):
             for piece in _pieces(events):
                 call(piece.nbytes, out.add_events, piece)
             del events, piece  # or they would stay while the next ones are made
-    for note in recording.notes:  # at the end: an error is to be the only line
+    # at the end: an error is to be the only line
+    log(f"light: {light_text(recording.light, recording.full_scale, config.frames)}")
+    for note in recording.notes:
         log(note)
     return Summary(
         output=target,
@@ -220,7 +235,12 @@ def convert(
 
 
 def _compile_apart(
-    recording: Source, config: Config, format: str, layout: str | None, threads: int
+    recording: Source,
+    config: Config,
+    encoding: str,
+    format: str,
+    layout: str | None,
+    threads: int,
 ) -> None:
     from adv2e.compiling import compile_apart  # noqa: PLC0415 - once in the life of a release
 
@@ -228,7 +248,7 @@ def _compile_apart(
         config,
         dtype=recording.dtype,
         colour=recording.colour,
-        encoding=_encoding(recording, config),
+        encoding=encoding,
         format=format,
         layout=layout,
         threads=threads,
@@ -240,9 +260,15 @@ def _holds_frames(target: str, format: str | None) -> bool:
     return target != "-" and format_name(Path(target), format) in ("folder", "zip")
 
 
-def _metadata(config: Config, recording: Source) -> dict[str, Any]:
-    """Return what makes the file again, apart from the input itself."""
+def _metadata(
+    config: Config, recording: Source, decoder: LightDecoder, white: float | None
+) -> dict[str, Any]:
+    """Return what makes the file again, apart from the input itself, and what it holds.
+
+    `white` is that of the frames stored; None where there are none.
+    """
     own = user_sources(config)
+    stored = {"encoding": decoder.encoding, "full_scale": white}
     return {
         "adv2e": __version__,
         "config": to_dict(config),
@@ -251,19 +277,12 @@ def _metadata(config: Config, recording: Source) -> dict[str, Any]:
         "source": {
             "name": shown(Path(recording.path).name),
             "kind": recording.kind,
-            "encoding": _encoding(recording, config),
-            "full_scale": _full_scale(recording, config),
+            "encoding": decoder.encoding,
+            "full_scale": decoder.full_scale,
+            "light": light_text(recording.light, recording.full_scale, config.frames),
         },
+        **({"frames": stored} if white is not None else {}),
     }
-
-
-def _encoding(recording: Source, config: Config) -> str:
-    chosen = config.frames.encoding
-    return recording.encoding if chosen == "auto" else chosen
-
-
-def _full_scale(recording: Source, config: Config) -> float:
-    return config.frames.full_scale or recording.full_scale
 
 
 def _open_preview(
@@ -275,15 +294,6 @@ def _open_preview(
 
     return stack.enter_context(
         Preview(Path(preview), recording.width, recording.height, overwrite=overwrite)
-    )
-
-
-def _decoder_for(recording: Source, config: Config) -> LightDecoder:
-    return LightDecoder(
-        _encoding(recording, config),
-        _full_scale(recording, config),
-        recording.dtype,
-        recording.colour,
     )
 
 

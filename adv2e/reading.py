@@ -15,14 +15,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.cores import default_threads
 from adv2e.effects.frames.brightness import check_floats, check_light
-from adv2e.errors import Adv2eError
+from adv2e.errors import Adv2eError, DataError
 from adv2e.heap import return_large_blocks
 from adv2e.overlap import ReadAhead
+from adv2e.pictures import picture_of
 from adv2e.sources import open_source
 from adv2e.sources.base import Frame, Source
 from adv2e.sources.rates import Rate
@@ -64,20 +64,30 @@ class Decoding:
         What is seen of them is kept, too.
     full_scale : float, optional
         Number that somebody said to mean white.
+    eight_bit : bool
+        What is seen of them must be of 8 bits.
     """
 
     decoder: LightDecoder
     coded: bool
     with_pictures: bool
     full_scale: float | None = None
+    eight_bit: bool = False
 
     def still(self, frame: Frame) -> Still:
-        """Return a frame as the pixel wants it; DataError if it is far above white."""
+        """Return a frame as the pixel wants it; DataError if white is not what was said."""
         check_floats(frame.image, frame.label, self.full_scale)
+        if frame.odd_white and self.full_scale is None:
+            raise DataError(f"{frame.label}: {frame.odd_white}")
         picture = None
         if self.with_pictures:
-            picture = _viewable(frame.image, self.decoder.full_scale)
-        light = frame.image if self.coded else self.decoder.decode(frame.image)
+            picture = picture_of(frame.image, frame.alpha, self.decoder, self.eight_bit)
+        if not self.coded:
+            light = self.decoder.decode(frame.image, frame.alpha)
+        elif frame.alpha is None:
+            light = frame.image
+        else:
+            light = self.decoder.over_black(frame.image, frame.alpha)
         if frame.image.dtype.kind == "f":  # here, where its name is known
             check_light(light, frame.label)
         return Still(frame.t_ns, light, picture)
@@ -192,12 +202,3 @@ def _stills(frames: Iterator[Frame], decoding: Future[Decoding]) -> Generator[St
         del frame
         yield still
         del still
-
-
-def _viewable(image: NDArray[Any], full_scale: float) -> NDArray[Any]:
-    """Return the frame as 8 or 16 bit, for storing beside the events."""
-    if image.dtype in (np.uint8, np.uint16):
-        return image
-    with np.errstate(over="ignore"):
-        scaled = np.clip(np.rint(image * (65535.0 / full_scale)), 0, 65535)
-    return scaled.astype(np.uint16)

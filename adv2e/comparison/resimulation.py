@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from adv2e.config.model import Config
 from adv2e.decoding import decoder_for
 from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.simulation import events_from_light
 from adv2e.sources.base import Frame
@@ -53,5 +54,9 @@ def _light(
     for frame in frames:
         if decoder is None:
             image = frame.image
-            decoder = decoder_for(config.frames, image.dtype, image.ndim == 3, auto=encoding)
-        yield frame.t_ns, decoder.decode(frame.image)
+            decoder = decoder_for(
+                config.frames, image.dtype, image.ndim == 3, auto=encoding, white=frame.white
+            )
+        if frame.odd_white and config.frames.full_scale is None:
+            raise DataError(f"{frame.label}: {frame.odd_white}")
+        yield frame.t_ns, decoder.decode(frame.image, frame.alpha)

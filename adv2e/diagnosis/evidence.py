@@ -68,6 +68,8 @@ class Evidence:
     notes : list of str
     run_in : RunIn
         What pixels saw before; events of that time are of no recording and no simulation.
+    white : float, optional
+        Number that means white in the frames; None: that of their data type.
     """
 
     name: str
@@ -80,6 +82,7 @@ class Evidence:
     masked: list[Masked] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     run_in: RunIn = field(default_factory=RunIn)
+    white: float | None = None
 
     @property
     def times_ns(self) -> list[int]:
@@ -143,7 +146,13 @@ def read_evidence(path: str | Path) -> Evidence:
     if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
         raise DataError(f"{path}: holds no frames, from which the events could be simulated")
     frames, times = [], []
+    white = None
     for frame in recording.frames():
+        if frame.odd_white or frame.alpha is not None:
+            raise DataError(
+                f"{frame.label}: {frame.odd_white or 'must have no transparent pixels'}"
+            )
+        white = frame.white
         frames.append(np.asarray(frame.image))
         times.append(frame.t_ns * 1e-9)
     if len(frames) < 3:
@@ -177,6 +186,7 @@ def read_evidence(path: str | Path) -> Evidence:
         encoding=recording.encoding,
         masked=masked,
         notes=list(recording.problems),
+        white=white,
     )
     first, last = _covered(kept, times_s)
     if (first, last) == (0, len(frames) - 1):

@@ -40,4 +40,10 @@ def quantum_dn(evidence: Evidence, declared: Config) -> float:
 
 def _decoder(evidence: Evidence, declared: Config) -> LightDecoder:
     image = evidence.frames[0]
-    return decoder_for(declared.frames, image.dtype, image.ndim == 3, auto=evidence.encoding)
+    return decoder_for(
+        declared.frames,
+        image.dtype,
+        image.ndim == 3,
+        auto=evidence.encoding,
+        white=evidence.white,
+    )

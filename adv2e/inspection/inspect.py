@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.decoding import light_text
+from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.inspection.frames import describe_times
 from adv2e.names import shown
 from adv2e.recordings import Recording, read_recording
 from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
+from adv2e.sources.base import Light
 from adv2e.sources.rates import Rate
 
 EVENTS = "events.txt"
@@ -76,6 +79,9 @@ def _of_recording(recording: Recording) -> dict[str, Any]:
             "dtype": None if first is None else first.image.dtype.name,
             "colour": None if first is None else first.image.ndim == 3,
         }
+        if first is not None:
+            white = first.white or full_scale_of(first.image.dtype)
+            frames.update(_light(recording.light, white))
     return {
         "file": shown(recording.path),
         "layout": recording.layout,
@@ -86,6 +92,14 @@ def _of_recording(recording: Recording) -> dict[str, Any]:
         "problems": [*recording.problems, *oddities_of(recording.events, *size)],
         "notes": [],
         "metadata": recording.metadata,
+    }
+
+
+def _light(light: Light, white: float) -> dict[str, Any]:
+    return {
+        "encoding": light.encoding,
+        "full_scale": white,
+        "light": light_text(light, white),
     }
 
 
@@ -100,7 +114,7 @@ def _of_source(source: Source) -> dict[str, Any]:
             **describe_times(_times_ns(source)),
             "dtype": source.dtype.name,
             "colour": source.colour,
-            "encoding": source.encoding,
+            **_light(source.light, source.full_scale),
             "own_clock": source.has_clock,
         },
         "problems": list(source.doubts),

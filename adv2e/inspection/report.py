@@ -50,9 +50,11 @@ def _frames(frames: dict[str, Any]) -> list[tuple[str, str]]:
         shortest, longest = frames["shortest_interval_ms"], frames["longest_interval_ms"]
         steps = f"{shortest:.6g}" + (f" to {longest:.6g}" if longest > shortest else "")
         rows.append(("frame rate", f"{frames['rate_hz']:.6g} Hz, intervals of {steps} ms"))
-    if "encoding" in frames:
+    if "light" in frames:
+        rows.append(("light", frames["light"]))
+    if "own_clock" in frames:
         clock = "the source's own" if frames["own_clock"] else "zero at the first frame"
-        rows += [("encoding", frames["encoding"]), ("clock", clock)]
+        rows.append(("clock", clock))
     return rows
 
 

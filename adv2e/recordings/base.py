@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import Events
-from adv2e.sources.base import Frame, Image
+from adv2e.sources.base import RECORDED, Frame, Image, Light, Pixels, as_pixels, odd_white
+from adv2e.sources.stored import light_stored
 
 
-def _no_images() -> Iterator[Image]:
+def _no_images() -> Iterator[Image | Pixels]:
     return iter(())
 
 
@@ -50,17 +51,26 @@ class Recording:
     frame_times_ns: NDArray[np.int64] | None = None
     metadata: dict[str, Any] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
-    images: Callable[[], Iterator[Image]] = field(default=_no_images, repr=False)
+    images: Callable[[], Iterator[Image | Pixels]] = field(default=_no_images, repr=False)
+
+    @property
+    def light(self) -> Light:
+        """What the numbers of the frames stand for, as a conversion of them takes it.
+
+        Frames that cameras recorded beside events are linear; of those that this program stored,
+        the file says it.
+
+        Raises
+        ------
+        DataError
+            The file says what cannot be.
+        """
+        return light_stored(self.metadata, self.path) or Light("linear", RECORDED)
 
     @property
     def encoding(self) -> str:
-        """What ``frames.encoding: auto`` means for the frames, as a conversion of them takes it.
-
-        Frames that cameras recorded beside events are linear; those that this program stored are
-        encoded as it read them.
-        """
-        stored = self.metadata.get("source")
-        return str(stored.get("encoding", "linear")) if isinstance(stored, dict) else "linear"
+        """What ``frames.encoding: auto`` means for the frames."""
+        return self.light.encoding
 
     def frames(self) -> Iterator[Frame]:
         """Yield the frames one by one, as often as asked.
@@ -71,8 +81,14 @@ class Recording:
             An image cannot be read.
         """
         times = [] if self.frame_times_ns is None else self.frame_times_ns.tolist()
-        for t_ns, image in zip(times, self.images(), strict=True):
-            yield Frame(t_ns, image)
+        stored = self.light.full_scale
+        first: float | None = None
+        for number, (t_ns, image) in enumerate(zip(times, self.images(), strict=True)):
+            pixels = as_pixels(image)
+            first = pixels.white if number == 0 else first
+            odd = "" if stored is not None else odd_white(pixels, first)
+            label = f"{self.path}: frame {number}"
+            yield Frame(t_ns, pixels.image, label, pixels.alpha, stored or first, odd)
 
 
 def parse_description(text: str, label: str, problems: list[str]) -> dict[str, Any]:

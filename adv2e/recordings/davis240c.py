@@ -26,7 +26,7 @@ from adv2e.errors import DataError
 from adv2e.recordings.base import Recording, described_geometry, parse_description
 from adv2e.recordings.gather import Gatherer
 from adv2e.recordings.text import gather_lines
-from adv2e.sources.base import Image
+from adv2e.sources.base import Pixels
 from adv2e.sources.opencv import decode_image
 from adv2e.sources.times import parse_list
 
@@ -101,7 +101,7 @@ def read_zip(path: Path) -> Recording:
     with _opened(path) as archive:
         top, name = _events_member(path, archive)
 
-        def images(names: list[str]) -> Iterator[Image]:
+        def images(names: list[str]) -> Iterator[Pixels]:
             with _opened(path) as again:
                 yield from _images(_Archive(path, again, top), names)
 
@@ -143,7 +143,7 @@ def _read(files: _Files, path: Path, name: str, images: Any) -> Recording:
     times, names = _listed(files, gatherer.problems)
     geometry, whence = described_geometry(description), DESCRIPTION
     if geometry is None and names:
-        first = next(iter(images(names[:1])))
+        first = next(iter(images(names[:1]))).image
         geometry, whence = (first.shape[1], first.shape[0]), names[0]
     if geometry is None:
         geometry, whence = header, f"the first line of {name}"
@@ -188,7 +188,7 @@ def _listed(files: _Files, problems: list[str]) -> tuple[NDArray[np.int64] | Non
     return times, [stamp.name for stamp in stamps if stamp.name is not None]
 
 
-def _images(files: _Files, names: list[str]) -> Iterator[Image]:
+def _images(files: _Files, names: list[str]) -> Iterator[Pixels]:
     for name in names:
         with files.open(name) as file:
             yield decode_image(file.read(), files.label(name))

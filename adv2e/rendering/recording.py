@@ -11,6 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from adv2e.errors import DataError
+from adv2e.pictures import drawn_frame
 from adv2e.rendering.preview import Preview
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Caption, caption
@@ -96,7 +97,7 @@ def render_recording(
     ) as preview:
         for frame, events in _parts(recording, first_us, until_us, frames, progress):
             if frame is not None:
-                preview.add_frame(frame.t_ns, frame.image)
+                preview.add_frame(frame.t_ns, drawn_frame(frame, recording.encoding))
             preview.add_events(events)
 
 

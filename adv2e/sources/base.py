@@ -28,21 +28,95 @@ Image = NDArray[Any]
 
 
 @dataclass(frozen=True)
+class Pixels:
+    """An image as its file has it.
+
+    Attributes
+    ----------
+    image : array
+        Grey or RGB.
+    alpha : (rows, columns) float32, optional
+        How much of each pixel is there, 0..1; None: all of it.  The colours are not multiplied
+        by it.
+    composed : bool
+        The file has transparent pixels, and its colours are light over black already.
+    white : float, optional
+        Number that means white, where the file says it and it is not that of the data type.
+    """
+
+    image: Image
+    alpha: NDArray[np.float32] | None = None
+    composed: bool = False
+    white: float | None = None
+
+
+OVER_BLACK = "transparent pixels are composed over black, in linear light"
+"""What is told, once, of a source that has some."""
+
+
+RECORDED = "frames of a recording"
+"""Why those are linear that cameras recorded beside events."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """What the numbers of frames stand for, and why, in a few words.
+
+    Attributes
+    ----------
+    encoding : str
+        What ``encoding: auto`` means.
+    encoding_reason : str
+    full_scale : float, optional
+        Number that means white, whatever the files of the frames say of it.
+    full_scale_reason : str
+        Empty where the reason is the same, or the data type says it.
+    """
+
+    encoding: str
+    encoding_reason: str
+    full_scale: float | None = None
+    full_scale_reason: str = ""
+
+
+@dataclass(frozen=True)
 class Frame:
-    """One frame: its time [ns], its image as read, colour as RGB, and its name for messages."""
+    """One frame.
+
+    Attributes
+    ----------
+    t_ns : int
+        Its time [ns].
+    image : array
+        As read, colour as RGB.
+    label : str
+        Its name, for messages.
+    alpha : array, optional
+        See :class:`Pixels`.
+    white : float, optional
+        Number that means white in it; None: that of the data type.
+    odd_white : str
+        How the white that its file states differs from that of the first frame.
+    """
 
     t_ns: int
     image: Image
     label: str = ""
+    alpha: NDArray[np.float32] | None = None
+    white: float | None = None
+    odd_white: str = ""
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A frame not loaded yet: time on the source's clock [ns], name for messages, loader."""
+    """A frame not loaded yet: time on the source's clock [ns], name for messages, loader.
+
+    A plain array stands for pixels that are all there, and of which no more is said.
+    """
 
     t_ns: int
     label: str
-    load: Callable[[], Image]
+    load: Callable[[], Image | Pixels]
 
 
 @dataclass(frozen=True)
@@ -149,9 +223,13 @@ class Source(ABC):
     has_clock : bool
         Times are on a clock of the source's own, not counted from its first frame.
     encoding : str
-        What ``encoding: auto`` means here, ``srgb`` or ``linear``.
+        What ``encoding: auto`` means here.
+    encoding_reason : str
+        Why, in a few words.
     full_scale : float
-        Number that means white, from the data type.
+        Number that means white.
+    full_scale_reason : str
+        Who says so; empty where the data type does.
     largest : float or None
         Largest number of the first frame, where frames are floats.
     doubts : list of str
@@ -173,8 +251,13 @@ class Source(ABC):
         self.count: int | None = None
         self.threads = 1
 
-    def _describe(self, image: Image, label: str) -> None:
-        """Take geometry, data type and meaning of the numbers from the first frame."""
+    def _describe(self, first: Image | Pixels, label: str, light: Light | None = None) -> None:
+        """Take geometry, data type and meaning of the numbers from the first frame.
+
+        `light` is what they mean where the kind of source says it, and not the image.
+        """
+        pixels = as_pixels(first)
+        image = pixels.image
         try:
             self.full_scale = full_scale_of(image.dtype)
         except DataError as error:
@@ -182,7 +265,19 @@ class Source(ABC):
         self.height, self.width = image.shape[:2]
         self.dtype = image.dtype
         self.colour = image.ndim == 3
-        self.encoding = encoding_of_images(image.dtype, self.colour)
+        light = light or _light_of_images(image.dtype, self.colour)
+        self.encoding, self.encoding_reason = light.encoding, light.encoding_reason
+        self.full_scale_reason = ""
+        self._white_told, self._white_stated = light.full_scale, pixels.white
+        if light.full_scale is not None:
+            self.full_scale, self.full_scale_reason = light.full_scale, light.full_scale_reason
+        elif pixels.white is not None:
+            self.full_scale, self.full_scale_reason = pixels.white, "as its header says"
+
+    @property
+    def light(self) -> Light:
+        """What the numbers of the frames stand for."""
+        return Light(self.encoding, self.encoding_reason, self.full_scale, self.full_scale_reason)
 
     @abstractmethod
     def shots(self) -> Iterator[Shot]:
@@ -226,7 +321,10 @@ class Source(ABC):
             if origin is None:
                 origin = self._origin(first, shot)
             yielded += 1
-            yield Frame(shot.t_ns - origin, self._load(shot), shot.label)
+            pixels = self._load(shot)
+            odd = "" if self._white_told is not None else odd_white(pixels, self._white_stated)
+            t_ns = shot.t_ns - origin
+            yield Frame(t_ns, pixels.image, shot.label, pixels.alpha, self.full_scale, odd)
         if yielded < 2:
             span = previous.t_ns - first.t_ns if first is not None and previous is not None else 0
             raise self._too_few(yielded, span)
@@ -245,14 +343,45 @@ class Source(ABC):
             f" {seconds(span_ns)} s; at least two are needed"
         )
 
-    def _load(self, shot: Shot) -> Image:
-        image, label = shot.load(), shot.label
+    def _load(self, shot: Shot) -> Pixels:
+        pixels, label = as_pixels(shot.load()), shot.label
+        image = pixels.image
         first = _description(self.width, self.height, self.dtype, self.colour)
         this = _description(image.shape[1], image.shape[0], image.dtype, image.ndim == 3)
         if this != first:
             raise DataError(f"{label}: {this}, but the first frame is {first}")
         check_values(image, label)
-        return image
+        if (pixels.alpha is not None or pixels.composed) and OVER_BLACK not in self.notes:
+            self.notes.append(OVER_BLACK)
+        return pixels
+
+
+def odd_white(pixels: Pixels, first: float | None) -> str:
+    """Return how the white of an image differs from `first`, that of the first; or nothing.
+
+    None is that of the data type.  Where all is black, white does not matter.
+    """
+    usual = full_scale_of(pixels.image.dtype)
+    white, expected = pixels.white or usual, first or usual
+    if white == expected or not pixels.image.any():
+        return ""
+    return (
+        f"white is {white:g} in it, but {expected:g} in the first frame; say what it is in all,"
+        f" with frames.full_scale={expected:g} or another number"
+    )
+
+
+def as_pixels(loaded: Image | Pixels) -> Pixels:
+    """Return what a loader gave as pixels."""
+    return loaded if isinstance(loaded, Pixels) else Pixels(loaded)
+
+
+def _light_of_images(dtype: np.dtype[Any], colour: bool) -> Light:
+    depth = "floating-point" if dtype.kind == "f" else f"{8 * dtype.itemsize}-bit"
+    reason = f"{depth} {'colour' if colour else 'grey'} images"
+    if dtype == np.uint8 and not colour:
+        reason += "; frames.encoding=srgb if they are ordinary pictures"
+    return Light(encoding_of_images(dtype, colour), reason)
 
 
 def check_values(image: Image, label: str) -> None:

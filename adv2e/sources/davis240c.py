@@ -18,9 +18,10 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
-from adv2e.sources.base import GivenTimes, Image, Selection, Shot
+from adv2e.sources.base import RECORDED, GivenTimes, Light, Pixels, Selection, Shot
 from adv2e.sources.listed import ListedSource, Picture, given_shots
 from adv2e.sources.opencv import decode_image, read_image
+from adv2e.sources.stored import DESCRIPTION, MOST_BYTES, light_beside, read_light
 from adv2e.sources.times import Stamp, parse_list, read_text
 
 LIST = "images.txt"
@@ -60,7 +61,8 @@ def _open_folder(path: Path, given: GivenTimes, selection: Selection) -> ListedS
         if not file.is_file():
             raise DataError(f"{label} line {stamp.line}: no image {file}")
         pictures.append(Picture(str(file), file.name, partial(read_image, file)))
-    return _source(path, label, stamps, unit, pictures, given, selection)
+    light = light_beside(path)
+    return _source(path, label, stamps, unit, pictures, given, selection, light)
 
 
 def _open_zip(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
@@ -80,7 +82,8 @@ def _open_zip(path: Path, given: GivenTimes, selection: Selection) -> ListedSour
             raise DataError(f"{label} line {stamp.line}: no image {member} in the zip")
         load = partial(_read_member, archive, member, f"{path}: {member}")
         pictures.append(Picture(f"{path}: {member}", PurePosixPath(member).name, load))
-    return _source(path, label, stamps, unit, pictures, given, selection)
+    light = _light_in(archive, str(PurePosixPath(listed).parent / DESCRIPTION), path)
+    return _source(path, label, stamps, unit, pictures, given, selection, light)
 
 
 def _list_in(path: Path, names: set[str]) -> str:
@@ -98,7 +101,19 @@ def _list_in(path: Path, names: set[str]) -> str:
     return lists[0]
 
 
-def _read_member(archive: zipfile.ZipFile, member: str, label: str) -> Image:
+def _light_in(archive: zipfile.ZipFile, member: str, path: Path) -> Light | None:
+    if member not in archive.namelist():
+        return None
+    label = f"{path}: {member}"
+    try:
+        with archive.open(member) as file:
+            text = file.read(MOST_BYTES + 1)
+    except _UNREADABLE as error:
+        raise DataError(f"{label}: cannot be read from the zip, or damaged") from error
+    return read_light(text, label)
+
+
+def _read_member(archive: zipfile.ZipFile, member: str, label: str) -> Pixels:
     try:
         data = archive.read(member)
     except _UNREADABLE as error:
@@ -120,14 +135,16 @@ def _source(
     pictures: list[Picture],
     given: GivenTimes,
     selection: Selection,
+    stored: Light | None,
 ) -> ListedSource:
+    light = stored or Light("linear", RECORDED)
     if given:
         shots = given_shots(given, pictures, path)
     else:
         pairs = zip(stamps, pictures, strict=True)
         shots = [Shot(stamp.t_ns, picture.label, picture.load) for stamp, picture in pairs]
     source = ListedSource(
-        path, "davis240c", shots, selection, has_clock=given.fps is None, encoding="linear"
+        path, "davis240c", shots, selection, has_clock=given.fps is None, light=light
     )
     if given:
         source.notes.append(f"{given} replaces the times in {label}")

@@ -10,6 +10,7 @@ from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
 from adv2e.sources.opencv import IMAGE_SUFFIXES, read_image
+from adv2e.sources.stored import light_beside
 from adv2e.sources.times import order_note, parse_info, parse_times, read_text
 
 LISTS = {"images.txt": parse_times, "timestamps.txt": parse_times, "info.txt": parse_info}
@@ -50,7 +51,11 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         )
     if given and found is not None:
         notes.append(f"{given} replaces the times in {found}")
-    source = ListedSource(path, "images", shots, selection, has_clock=given.fps is None)
+    # the folder may be that of the frames of a recording of ours
+    light = light_beside(found.parent) if found is not None and found.name == "images.txt" else None
+    source = ListedSource(
+        path, "images", shots, selection, has_clock=given.fps is None, light=light
+    )
     source.notes += notes
     return source
 

@@ -7,7 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
-from adv2e.sources.base import GivenTimes, Image, Selection, Shot, Source, check_values
+from adv2e.sources.base import (
+    GivenTimes,
+    Image,
+    Light,
+    Pixels,
+    Selection,
+    Shot,
+    Source,
+    check_values,
+)
 from adv2e.sources.times import Stamp, parse_times, read_text
 
 _LONG_S = 10.0
@@ -20,7 +29,7 @@ class Picture:
 
     label: str
     name: str | None
-    load: Callable[[], Image]
+    load: Callable[[], Image | Pixels]
 
 
 def given_shots(given: GivenTimes, pictures: Sequence[Picture], path: Path) -> list[Shot]:
@@ -94,8 +103,8 @@ class ListedSource(Source):
         Frames wanted.
     has_clock : bool
         Times are on a clock of the source's own.
-    encoding : str, optional
-        What ``auto`` means, where the kind of source decides and not the image.
+    light : Light, optional
+        What the numbers stand for, where the kind of source decides and not the image.
 
     Raises
     ------
@@ -111,15 +120,15 @@ class ListedSource(Source):
         selection: Selection,
         *,
         has_clock: bool,
-        encoding: str | None = None,
+        light: Light | None = None,
     ) -> None:
         super().__init__(path, kind, selection, has_clock)
         self._shots = shots
         self._count()
-        image = shots[0].load()
-        self._describe(image, shots[0].label)
+        first = shots[0].load()
+        self._describe(first, shots[0].label, light)
+        image = first.image if isinstance(first, Pixels) else first
         check_values(image, shots[0].label)
-        self.encoding = encoding or self.encoding
         apart_s = (shots[-1].t_ns - shots[0].t_ns) * 1e-9 / (len(shots) - 1)
         if has_clock and apart_s > _LONG_S:
             self.doubts.append(f"{path}: frames are {apart_s:,.0f} s apart; times are in seconds")

@@ -15,9 +15,11 @@ import numpy as np
 
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
-from adv2e.sources.base import GivenTimes, Image, Selection
+from adv2e.sources.base import GivenTimes, Image, Light, Selection
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
 from adv2e.sources.times import Stamp, parse_times, read_text, seconds_to_ns
+
+_LIGHT = Light("linear", "a .npy stack")
 
 
 def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
@@ -45,9 +47,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
             f"{path}: when are the frames? give --fps F or --timestamps FILE, or put"
             f" {path.stem}_ts.npy or {path.stem}.timestamps.txt beside it"
         )
-    source = ListedSource(
-        path, "npy", shots, selection, has_clock=given.fps is None, encoding="linear"
-    )
+    source = ListedSource(path, "npy", shots, selection, has_clock=given.fps is None, light=_LIGHT)
     if found is not None:
         source.notes.append(
             f"{given} replaces the times in {found}" if given else f"times from {found}"

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from adv2e.errors import DataError, MissingExtraError
-from adv2e.sources.base import Image
+from adv2e.sources.base import Image, Pixels
 
 IMAGE_SUFFIXES = (
     *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pfm"),
@@ -59,7 +59,7 @@ def rgb_of(image: Any) -> Image:
     return np.asarray(cv2.cvtColor(image, code))
 
 
-def read_image(path: Path) -> Image:
+def read_image(path: Path) -> Pixels:
     """Return the image in a file, all its bits kept; DataError if it cannot be read."""
     try:
         data = path.read_bytes()
@@ -68,7 +68,7 @@ def read_image(path: Path) -> Image:
     return decode_image(data, str(path))
 
 
-def decode_image(data: bytes, label: str) -> Image:
+def decode_image(data: bytes, label: str) -> Pixels:
     """Return the image in the bytes of a file: grey or RGB, data type as stored, alpha dropped.
 
     Parameters
@@ -86,7 +86,7 @@ def decode_image(data: bytes, label: str) -> Image:
         For EXR without the optional package.
     """
     if label.lower().endswith(".exr"):
-        return _decode_exr(data, label)
+        return Pixels(_decode_exr(data, label))
     image: Any = None
     if data and _is_whole(data):
         try:
@@ -98,7 +98,7 @@ def decode_image(data: bytes, label: str) -> Image:
         raise DataError(f"{label}: not an image that can be read, or damaged")
     if data.startswith(b"\x89PNG") and data[25] == _PNG_GREY_ALPHA:
         image = image[..., 0]  # OpenCV repeats the grey of grey+alpha three times
-    return rgb_of(image)
+    return Pixels(rgb_of(image))
 
 
 def _is_whole(data: bytes) -> bool:

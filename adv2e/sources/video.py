@@ -90,9 +90,9 @@ class VideoSource(Source):
         ends = (self._pixels[-1:] + self._pixels[:1]) or b"\0"
         bits = next((byte for byte in ends if 8 < byte <= 16), 8)
         if self.dtype == np.uint16:
-            self.notes.append("16-bit grey video, taken as linear light (frames.encoding)")
+            self.encoding_reason = "16-bit grey video"
             return
-        self.encoding = "srgb"
+        self.encoding, self.encoding_reason = "srgb", "a video"
         if bits > 8:
             self.notes.append(f"the video has {bits} bits a pixel and is read with 8 of them")
 

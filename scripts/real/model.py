@@ -109,7 +109,10 @@ class Bench:
     def _read(self, config: Config) -> Instants:
         """Return the light of the frames, without what is laid over it."""
         source = self.real.source
-        decoder = decoder_for(config.frames, source.dtype, source.colour, auto=source.encoding)
+        decoder = decoder_for(
+            config.frames, source.dtype, source.colour, auto=source.encoding,
+            white=source.full_scale,
+        )  # fmt: skip
         frames = list(self.real.frames())
         return [one.t_ns for one in frames], np.array([decoder.decode(one.image) for one in frames])
 

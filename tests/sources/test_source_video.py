@@ -53,7 +53,8 @@ def test_lossless_grey_comes_back_as_stored(write_video, picture, dtype, encodin
     assert all(np.array_equal(f.image, image) for f, image in zip(frames, stored, strict=True))
     assert (source.dtype, source.colour, source.encoding) == (dtype, False, encoding)
     assert source.full_scale == np.iinfo(dtype).max
-    assert [note[:6] for note in source.notes] == (["16-bit"] if dtype == np.uint16 else [])
+    depth = "16-bit grey video" if dtype == np.uint16 else "a video"
+    assert (source.encoding_reason, source.notes) == (depth, [])
 
 
 def test_threads_that_decode_change_nothing(write_video, colours, monkeypatch):

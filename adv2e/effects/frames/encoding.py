@@ -139,13 +139,15 @@ class LightDecoder:
         """Light [DN] of each grey value of 8 bits; None for other frames."""
         return self._tables[0] if self.dtype == np.uint8 and not self.colour else None
 
-    def decode(self, image: NDArray[Any]) -> NDArray[Any]:
+    def decode(self, image: NDArray[Any], alpha: NDArray[Any] | None = None) -> NDArray[Any]:
         """Return the light of `image`.
 
         Parameters
         ----------
         image : array, (rows, columns) or (rows, columns, 3)
             A frame as read, of the data type and colour given to the constructor.
+        alpha : (rows, columns) array, optional
+            How much of each pixel is there before black, 0..1: its light is multiplied by it.
 
         Returns
         -------
@@ -157,6 +159,26 @@ class LightDecoder:
                 f"a frame of {image.dtype} and shape {image.shape} for a decoder of {self.dtype},"
                 f" {'colour' if self.colour else 'grey'}"
             )
+        light = self._decode(image)
+        return light if alpha is None else light * alpha
+
+    def over_black(self, image: NDArray[Any], alpha: NDArray[Any]) -> NDArray[Any]:
+        """Return the whole numbers whose light is nearest to that of `image` times `alpha`.
+
+        Parameters
+        ----------
+        image : array of uint8 or uint16, (rows, columns) or (rows, columns, 3)
+        alpha : (rows, columns) array
+            0..1.
+        """
+        planes = image if self.colour else image[..., np.newaxis]
+        composed = np.empty_like(planes)
+        for number, table in enumerate(self._tables):
+            middles = (table[1:] + table[:-1]) / 2
+            composed[..., number] = np.searchsorted(middles, table[planes[..., number]] * alpha)
+        return composed if self.colour else composed[..., 0]
+
+    def _decode(self, image: NDArray[Any]) -> NDArray[Any]:
         if self._tables:
             return self._look_up(image)
         with np.errstate(over="ignore"):  # see above

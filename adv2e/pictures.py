@@ -1,0 +1,80 @@
+"""Frames as pictures: what is stored beside the events, and what is drawn.
+
+Whole numbers are stored as they are, so that what is read back is the same light; floats become
+whole numbers of 16 bits, and all become 8 bits where the format holds no more.  Transparent pixels
+are composed over black.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.sources.base import Frame
+
+
+def _stays(dtype: DTypeLike, eight_bit: bool) -> bool:
+    return np.dtype(dtype) == np.uint8 or (np.dtype(dtype) == np.uint16 and not eight_bit)
+
+
+def picture_white(dtype: DTypeLike, white: float, eight_bit: bool) -> float:
+    """Return the number that means white in the pictures of frames of `dtype`.
+
+    Parameters
+    ----------
+    dtype : dtype
+        Of the frames.
+    white : float
+        Number that means white in the frames.
+    eight_bit : bool
+        Pictures must be of 8 bits.
+    """
+    if _stays(dtype, eight_bit):
+        return white
+    return 255.0 if eight_bit else 65535.0
+
+
+def picture_of(
+    image: NDArray[Any], alpha: NDArray[Any] | None, decoder: LightDecoder, eight_bit: bool
+) -> NDArray[Any]:
+    """Return a frame as a picture of 8 or 16 bits, encoded as the frame is.
+
+    Parameters
+    ----------
+    image : (rows, columns[, 3]) array
+    alpha : (rows, columns) array, optional
+        How much of each pixel is there, 0..1.
+    decoder : LightDecoder
+        Of the frames.
+    eight_bit : bool
+        It must be of 8 bits.
+    """
+    picture = image
+    if not _stays(image.dtype, eight_bit):
+        white = picture_white(image.dtype, decoder.full_scale, eight_bit)
+        kind = np.uint8 if eight_bit else np.uint16
+        picture = np.clip(np.rint(image * (white / decoder.full_scale)), 0, white).astype(kind)
+        if alpha is not None:
+            decoder = LightDecoder(decoder.encoding, white, kind, decoder.colour)
+    return picture if alpha is None else decoder.over_black(picture, alpha)
+
+
+def drawn(picture: NDArray[Any], white: float) -> NDArray[np.uint8]:
+    """Return a picture in the 8 bits of a screen, `white` of it being 255."""
+    if picture.dtype == np.uint8 and white == 255.0:
+        return picture
+    return np.clip(np.rint(picture * (255.0 / white)), 0, 255).astype(np.uint8)
+
+
+def drawn_frame(frame: Frame, encoding: str) -> NDArray[np.uint8]:
+    """Return a frame, encoded as `encoding` says, in the 8 bits of a screen."""
+    dtype = frame.image.dtype
+    white = frame.white or full_scale_of(dtype)
+    if frame.alpha is None:
+        return drawn(frame.image, white)
+    decoder = LightDecoder(encoding, white, dtype, frame.image.ndim == 3)
+    picture = picture_of(frame.image, frame.alpha, decoder, eight_bit=True)
+    return drawn(picture, picture_white(dtype, white, eight_bit=True))
