@@ -321,10 +321,7 @@ class Source(ABC):
             if origin is None:
                 origin = self._origin(first, shot)
             yielded += 1
-            pixels = self._load(shot)
-            odd = "" if self._white_told is not None else odd_white(pixels, self._white_stated)
-            t_ns = shot.t_ns - origin
-            yield Frame(t_ns, pixels.image, shot.label, pixels.alpha, self.full_scale, odd)
+            yield self._frame(shot, shot.t_ns - origin)
         if yielded < 2:
             span = previous.t_ns - first.t_ns if first is not None and previous is not None else 0
             raise self._too_few(yielded, span)
@@ -342,6 +339,11 @@ class Source(ABC):
             f"{self.path}: --start and --stop leave {found} of those read up to"
             f" {seconds(span_ns)} s; at least two are needed"
         )
+
+    def _frame(self, shot: Shot, t_ns: int) -> Frame:
+        pixels = self._load(shot)
+        odd = "" if self._white_told is not None else odd_white(pixels, self._white_stated)
+        return Frame(t_ns, pixels.image, shot.label, pixels.alpha, self.full_scale, odd)
 
     def _load(self, shot: Shot) -> Pixels:
         pixels, label = as_pixels(shot.load()), shot.label

@@ -245,7 +245,7 @@ def test_writing_and_reading_gives_the_same_configuration(write, config):
 @given(
     rate=st.floats(min_value=0, allow_infinity=False),
     cutoff=st.floats(min_value=5e-324, allow_infinity=False),
-    seed=st.integers(min_value=0),
+    seed=st.integers(min_value=0, max_value=2**64 - 1),
 )
 def test_any_number_survives_the_round_trip(rate, cutoff, seed):
     pixel = Pixel(leak=Leak(rate_hz=rate), low_pass=LowPass(cutoff_hz=cutoff))
