@@ -144,7 +144,7 @@ def test_config_defaults_has_every_key(adv2e, tmp_path):
     path.write_text(out)
     assert load_config([path]) == Config()
     for key in all_keys():
-        assert re.search(rf"^ *(# *)?{key.name}:", out, re.MULTILINE), key.path
+        assert re.search(rf'^ *(# *)?"?{key.name}"?:', out, re.MULTILINE), key.path
         assert key.about.meaning[:30] in out, key.path
 
 
