@@ -86,6 +86,14 @@ class _Output:
         if self._preview is not None:
             self._preview.add_frame(t_ns, drawn(picture, self._white))
 
+    def no_more_frames(self) -> None:
+        if self._preview is not None:
+            self._preview.no_more_frames()
+
+    def complete_until(self, t_us: int) -> None:
+        if self._preview is not None:
+            self._preview.complete_until(t_us)
+
     def add_events(self, events: Events) -> None:
         self.events += events.size
         self.on += int(np.count_nonzero(events["p"]))
@@ -115,6 +123,7 @@ class _Passing:
             now = still.t_ns, still.light
             del still  # with its picture
             yield now
+        self._call(0, self._output.no_more_frames)
 
 
 def default_output(source: str) -> str:
@@ -214,7 +223,14 @@ def convert(
             Decoding(decoder, table is not None, out.wants_frames, stated, not keeps_all_bits)
         )
         frames = _Passing(_progress(stills, recording.count, progress), out, call)
-        for events in events_from_light(frames.light(), config, threads=workers, table=table):
+        chunks = events_from_light(
+            frames.light(),
+            config,
+            threads=workers,
+            table=table,
+            complete=None if preview is None else lambda t_us: call(0, out.complete_until, t_us),
+        )
+        for events in chunks:
             for piece in _pieces(events):
                 call(piece.nbytes, out.add_events, piece)
             del events, piece  # or they would stay while the next ones are made
@@ -293,7 +309,7 @@ def _open_preview(
     from adv2e.rendering import Preview  # noqa: PLC0415 - most conversions draw nothing
 
     return stack.enter_context(
-        Preview(Path(preview), recording.width, recording.height, overwrite=overwrite)
+        Preview(Path(preview), recording.width, recording.height, frames=True, overwrite=overwrite)
     )
 
 

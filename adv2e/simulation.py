@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from contextlib import nullcontext
 from typing import Any
 
@@ -25,7 +25,7 @@ from adv2e import pixel
 from adv2e.active_effects import active_hooks
 from adv2e.config.model import Config
 from adv2e.decoding import decoder_for
-from adv2e.effects.composition import additions_of, begin, changes_light, map_events
+from adv2e.effects.composition import additions_of, begin, changes_light, map_events, overrides
 from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images
 from adv2e.effects.hooks import Frames, Hooks
@@ -156,12 +156,15 @@ def events_from_light(
     effects: Sequence[Hooks] = (),
     method: str = "auto",
     coarseness: Coarseness = PRECISE,
+    complete: Callable[[int], None] | None = None,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 
     With a `table` of 256 entries [DN], the frames are grey values of 8 bits that it decodes; then
     `sampling.L` should be 1, as every instant looks its frames up again.  `effects`: see
-    :func:`simulate`; `method`, `coarseness`: see :class:`adv2e.pixel.PixelArray`.
+    :func:`simulate`; `method`, `coarseness`: see :class:`adv2e.pixel.PixelArray`.  `complete` is
+    called now and then with a time [us] before which no event will come any more; not so if
+    effects change events, as they may change times.
 
     Raises
     ------
@@ -173,7 +176,14 @@ def events_from_light(
         light, table = _decoded(light, table), None
     frames = bounded(begin(hooks, iter(light), config.seed), table)
     how = {"method": method, "coarseness": coarseness}
-    yield from map_events(hooks, _pixel_events(frames, config, hooks, threads, table, how))
+    if complete is None or any(overrides(hook, "events") for hook in hooks):
+        complete = _ignore
+    chunks = _pixel_events(frames, config, hooks, threads, table, how, complete)
+    yield from map_events(hooks, chunks)
+
+
+def _ignore(t_us: int) -> None:
+    pass
 
 
 def _decoded(
@@ -190,6 +200,7 @@ def _pixel_events(
     threads: int | None,
     table: NDArray[np.float32] | None,
     how: Mapping[str, Any],
+    complete: Callable[[int], None],
 ) -> Iterator[Events]:
     """Yield the sorted events of all pixels, as they are before the readout."""
     t_ns, first = next(source)
@@ -217,6 +228,7 @@ def _pixel_events(
                 count += events.size
                 yield from order.add(events, end_us)
                 del events  # or they would stay while the next ones are made
+            complete(end_us)
             intervals.expect(count)
             for hook in hooks:
                 hook.passed(part.times_ns[-1] * 1e-9)

@@ -53,7 +53,7 @@ POSITIVE = options.FiniteNumber(min=0, min_open=True)
     type=click.IntRange(min=1, max=100),
     default=6,
     show_default=True,
-    help="Instants of a .png without --at, evenly spaced.",
+    help="Instants of a .png without --at, about evenly spaced.",
 )
 @click.option(
     "--beside/--no-beside",

@@ -39,8 +39,11 @@ def check_suffix(path: str | Path) -> str:
 class Album(Protocol):
     """Takes cells one by one."""
 
-    def wants(self, number: int) -> bool:
-        """Tell whether the cell of instant `number`, counted from 0, would be kept."""
+    whole: bool
+    """Whether every event is to be in a picture, the last one included."""
+
+    def wanted_from(self, number: int) -> int:
+        """Return the first instant that would be kept, counted from 0, at or after `number`."""
 
     def add(self, number: int, cell: Cell) -> None:
         """Take the cell of instant `number`."""
@@ -113,6 +116,8 @@ class VideoFile:
 class Film:
     """Cells as a film, each shown for 1/fps."""
 
+    whole = True
+
     def __init__(self, path: Path, fps: float, style: Style, scale: int | None) -> None:
         self._style, self._scale = style, scale
         self._file: VideoFile | GifWriter
@@ -121,9 +126,9 @@ class Film:
         else:
             self._file = VideoFile(path, fps)
 
-    def wants(self, number: int) -> bool:
-        """Tell that every cell is shown."""
-        return True
+    def wanted_from(self, number: int) -> int:
+        """Return `number`: every cell is shown."""
+        return number
 
     def add(self, number: int, cell: Cell) -> None:
         """Append the cell."""
@@ -139,38 +144,60 @@ class Film:
         self._file.close()
 
 
-class Sheet:
-    """Cells as one picture: at most `count` of them, spread evenly over however many come.
+KEPT = 4
+"""Cells that a sheet holds at most while it does not know the end, for each that it shows."""
 
-    At most 2 `count` cells are kept: when there are more, every second one is dropped, and from
-    then on only every second one is wanted.
+
+def stride_of(instants: int, count: int) -> int:
+    """Return how many `instants` lie from one that a sheet of `count` cells holds to the next.
+
+    A power of two, so that those held are among those held before.
     """
+    stride = 1
+    while instants // stride > KEPT * count:
+        stride *= 2
+    return stride
+
+
+def spread(held: int, count: int) -> list[int]:
+    """Return which of the `held` cells are shown, at most `count`, spread evenly."""
+    shown = min(count, held)
+    return [int((n + 0.5) * held / shown) for n in range(shown)]
+
+
+class Sheet:
+    """Cells as one picture: at most `count` of them, spread over however many come.
+
+    While it is not known how many will come, more are held than shown.
+    """
+
+    whole = False
 
     def __init__(self, path: Path, count: int, style: Style, scale: int | None) -> None:
         self._path, self._count = path, count
         self._style, self._scale = style, scale
-        self._cells: list[tuple[int, Cell]] = []
+        self._cells: dict[int, Cell] = {}
         self._stride = 1
 
-    def wants(self, number: int) -> bool:
-        """Tell whether instant `number` is on the grid that is kept now."""
-        return number % self._stride == 0
+    def wanted_from(self, number: int) -> int:
+        """Return the first instant at or after `number` on the grid that is kept now."""
+        return -(-(number + 1) // self._stride) * self._stride - 1
 
     def add(self, number: int, cell: Cell) -> None:
         """Take the cell."""
-        self._cells.append((number, cell))
-        if len(self._cells) > 2 * self._count:
-            self._stride *= 2
-            self._cells = [item for item in self._cells if self.wants(item[0])]
+        self._cells[number] = cell
+        self._stride = stride_of(number + 1, self._count)
+        self._cells = {n: cell for n, cell in self._cells.items() if self.wanted_from(n) == n}
 
     def finish(self) -> None:
         """Choose the cells and write the picture."""
-        count = min(self._count, len(self._cells))
-        places = (np.arange(count) + 0.5) * len(self._cells) / count
-        cells = [self._cells[int(place)][1] for place in places]
-        picture = sheet(cells, self._style, self._scale)
-        if not cv2.imwrite(str(self._path), picture[:, :, ::-1]):
-            raise NotWritten("a .png picture cannot be written there")
+        cells = list(self._cells.values())
+        shown = [cells[place] for place in spread(len(cells), self._count)]
+        picture = sheet(shown, self._style, self._scale)
+        done, data = cv2.imencode(".png", picture[:, :, ::-1])
+        if not done:
+            raise NotWritten("a .png picture cannot be made of it")
+        self._path.write_bytes(data.tobytes())
 
     def close(self) -> None:
         """Forget the cells."""

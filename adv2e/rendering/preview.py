@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -17,16 +17,15 @@ from adv2e.rendering.output import replacing
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Caption, Timeline, caption
 
-SHEET_STEP_US = 10_000
-"""Instants between which a sheet of a stream chooses, at first; later they are further apart."""
+SHEET_STEP_US = 1000
+"""Instants between which a sheet chooses, at first; later they are further apart."""
 
 
 class Preview:
     """Takes events and frames as they come; writes a film (.mp4, .avi, .gif) or a sheet (.png).
 
-    Give each frame before the events that follow it; events may lag behind the frames by as much
-    as lies between two calls of :meth:`add_events`, and two frames.  Leaving the ``with`` block
-    normally completes the file; an exception leaves none.
+    Events are sorted and so are frames; which of them come first, and in which pieces, makes no
+    difference.  Leaving the ``with`` block normally completes the file; an exception leaves none.
 
     Parameters
     ----------
@@ -101,18 +100,24 @@ class Preview:
             else:
                 album = Film(unfinished, self._fps, self._style, self._scale)
             try:
-                yield album
-                if not self._timeline.finish():
-                    raise OutputError(f"{self._path}: there are no events or frames to draw")
+                self._timeline = Timeline(
+                    album,
+                    self._size,
+                    self._style,
+                    step_us=self._step_us,
+                    folder=unfinished.parent,
+                    **self._timing,
+                )
+                with closing(self._timeline):
+                    yield album
+                    if not self._timeline.finish():
+                        raise OutputError(f"{self._path}: there are no events or frames to draw")
                 album.finish()
             finally:
                 album.close()  # before the file is removed: Windows keeps open files
 
     def __enter__(self) -> Preview:
-        album = self._file.__enter__()
-        self._timeline = Timeline(
-            album, self._size, self._style, step_us=self._step_us, **self._timing
-        )
+        self._file.__enter__()
         return self
 
     def __exit__(
@@ -130,3 +135,11 @@ class Preview:
     def add_events(self, events: Events) -> None:
         """Take events, sorted, not before those of earlier calls; there may be none."""
         self._timeline.add_events(events)
+
+    def complete_until(self, t_us: int) -> None:
+        """Take notice that no event before `t_us` will come any more; spares memory and disk."""
+        self._timeline.complete_until(t_us)
+
+    def no_more_frames(self) -> None:
+        """Take notice that no frame will come any more; spares memory and disk."""
+        self._timeline.no_more_frames()

@@ -12,13 +12,13 @@ from tqdm import tqdm
 
 from adv2e.errors import DataError
 from adv2e.pictures import drawn_frame
-from adv2e.rendering.preview import Preview
+from adv2e.rendering.films import spread, stride_of
+from adv2e.rendering.preview import SHEET_STEP_US, Preview
 from adv2e.rendering.styles import Style
-from adv2e.rendering.timeline import Caption, caption
+from adv2e.rendering.timeline import Caption, caption, microseconds
 from adv2e.sinks.staging import check_apart
 
 if TYPE_CHECKING:
-    from adv2e.events import Events
     from adv2e.recordings import Recording
 
 _CHUNK = 1 << 18  # events handed on at once where no frames divide them
@@ -49,7 +49,8 @@ def render_recording(
     path : str or Path
         Output.
     at_s : sequence of float
-        Instants of a sheet [s after the first event or frame]; none: `count`, evenly spaced.
+        Instants of a sheet [s after the first event or frame]; none: up to `count`, about evenly
+        spaced, the same as a :class:`Preview` takes from a stream.
     start_s, stop_s : float
         Part to show [s after the first event or frame].
     style, fps, speed, frames, scale, caption, overwrite
@@ -80,7 +81,10 @@ def render_recording(
         instants = [begin_us + round(time * 1e6) for time in sorted(at_s)]
         if instants and instants[-1] > until_us:
             raise DataError(f"{lasts}, the instant {max(at_s):g} s is after the end")
-        instants = instants or _even(first_us, until_us, count)
+        last_us = until_us - 1
+        if not frames and recording.events.size:
+            last_us = min(last_us, int(recording.events["t"][-1]))
+        instants = instants or _instants(first_us, last_us, count)
     with Preview(
         path,
         recording.width,
@@ -95,55 +99,57 @@ def render_recording(
         caption=lambda since_us, shown: caption(since_us + first_us - begin_us, shown),
         overwrite=overwrite,
     ) as preview:
-        for frame, events in _parts(recording, first_us, until_us, frames, progress):
-            if frame is not None:
-                preview.add_frame(frame.t_ns, drawn_frame(frame, recording.encoding))
-            preview.add_events(events)
+        _feed(preview, recording, first_us, until_us, frames, progress)
+
+
+def _instants(first_us: int, last_us: int, count: int) -> list[int]:
+    """Return the instants that a sheet chooses that is not told the end before it comes."""
+    instants = max(1, (last_us - first_us) // SHEET_STEP_US)
+    step_us = SHEET_STEP_US * stride_of(instants, count)
+    places = spread(instants * SHEET_STEP_US // step_us, count)
+    return [first_us + (place + 1) * step_us for place in places]
 
 
 def _span_us(recording: Recording) -> tuple[int, int]:
     """Return the time of the first event or frame, and 1 us after the last [us]."""
     times = [recording.events["t"][[0, -1]]] if recording.events.size else []
     if recording.frame_times_ns is not None and recording.frame_times_ns.size:
-        times.append(np.asarray(recording.frame_times_ns)[[0, -1]] // 1000)
+        times.append((np.asarray(recording.frame_times_ns)[[0, -1]] + 500) // 1000)
     if not times:
         raise DataError(f"{recording.path}: holds no events and no frames")
     return min(int(pair[0]) for pair in times), max(int(pair[1]) for pair in times) + 1
 
 
-def _even(first_us: int, until_us: int, count: int) -> list[int]:
-    """Return the middles of `count` equal parts."""
-    span = until_us - first_us
-    return sorted({first_us + round(span * (k + 0.5) / count) for k in range(count)})
-
-
-def _parts(
-    recording: Recording, first_us: int, until_us: int, frames: bool, progress: bool
-) -> Iterator[tuple[Any, Events]]:
-    """Yield (frame or None, the events from it up to the next), within the part to show."""
+def _feed(
+    preview: Preview,
+    recording: Recording,
+    first_us: int,
+    until_us: int,
+    frames: bool,
+    progress: bool,
+) -> None:
+    """Hand on the part to show: each frame, then the events before it."""
     events = recording.events
     begin, end = np.searchsorted(events["t"], [first_us, until_us])
     with tqdm(total=int(end - begin), unit="event", unit_scale=True, disable=not progress) as bar:
-        for frame, next_us in _frames(recording, first_us, until_us, frames):
-            stop = max(begin, np.searchsorted(events["t"][:end], next_us))
-            yield frame, events[:0]
+        for frame, t_us in _frames(recording, until_us, frames):
+            if frame is None:
+                preview.no_more_frames()
+            else:
+                preview.add_frame(frame.t_ns, drawn_frame(frame, recording.encoding))
+            stop = max(begin, np.searchsorted(events["t"][:end], t_us))
             for low, high in pairwise([*range(begin, stop, _CHUNK), stop]):
-                yield None, events[low:high]
+                preview.add_events(events[low:high])
                 bar.update(high - low)
             begin = stop
 
 
-def _frames(
-    recording: Recording, first_us: int, until_us: int, frames: bool
-) -> Iterator[tuple[Any, int]]:
-    """Yield (frame, time of the next one or end of the part); first None, if events come first."""
-    before: Any = None
+def _frames(recording: Recording, until_us: int, frames: bool) -> Iterator[tuple[Any, int]]:
+    """Yield each frame before `until_us` and its time; then None and `until_us`."""
     if frames:
         for frame in recording.frames():
-            t_us = frame.t_ns // 1000
+            t_us = microseconds(frame.t_ns)
             if t_us >= until_us:
                 break
-            if t_us > first_us:
-                yield before, t_us
-            before = frame
-    yield before, until_us
+            yield frame, t_us
+    yield None, until_us

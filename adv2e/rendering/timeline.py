@@ -1,9 +1,13 @@
-"""From a stream of events and frames to pictures at instants, in bounded memory."""
+"""From a stream of events and frames to pictures at instants, in bounded memory.
+
+An instant is drawn when all that it shows is known to have come, so that the pictures do not hang
+on the order and the size of the pieces in which it came.
+"""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -11,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import Events, empty_events
+from adv2e.rendering.backlog import Backlog
 from adv2e.rendering.films import Album
 from adv2e.rendering.layout import Cell
 from adv2e.rendering.styles import Picture, Style, draw
@@ -27,7 +32,11 @@ def caption(since_us: int, count: int) -> str:
 
 
 class Timeline:
-    """Draws an instant as soon as all its events have come, and hands it to an album.
+    """Draws the instants one after the other, and hands them to an album.
+
+    That an event has come tells that those before it have, and likewise for frames; events and
+    frames may come in any order relative to one another.  What is not drawn yet waits, beyond
+    some memory on disk; :meth:`complete_until` and :meth:`no_more_frames` shorten the wait.
 
     Parameters
     ----------
@@ -43,10 +52,12 @@ class Timeline:
     start_us : int, optional
         Time that counts as 0; by default that of the first frame or event.
     frames : bool, optional
-        Keep a panel for the frames beside the events; by default, if a frame comes before the first
-        picture is drawn.
+        Keep a panel for the frames beside the events; by default, if there is a frame.  Without
+        the panel, the first of them still counts as the start.
     caption : callable
         What to write above a picture.
+    folder : Path, optional
+        Where to keep what has to wait on disk.
     """
 
     def __init__(
@@ -60,117 +71,155 @@ class Timeline:
         start_us: int | None = None,
         frames: bool | None = None,
         caption: Caption = caption,
+        folder: Path | None = None,
     ) -> None:
         self._album, self._size, self._style = album, size, style
         self._step_us, self._given_us = step_us, instants_us
         self._start_us, self._with_frames, self._caption = start_us, frames, caption
-        self._events = empty_events()
-        self._frames: deque[tuple[int, Picture | None]] = deque()
-        self._instants: Iterator[int] | None = None
-        self._next_us: int | None = None
-        self._number = 0
+        self._number = 0  # of the instant to draw next
         self._drawn = 0
-        self._complete_us = _LONG_AGO  # all events before this have come
-        self._last_event_us = _LONG_AGO
-        self._last_frame_us = _LONG_AGO
+        self._first_us: dict[str, int] = {}  # times of the first event and the first frame
+        self._last_event_us = self._last_frame_us = _LONG_AGO
+        self._told_us = _LONG_AGO  # all events before this have come
+        self._frames_over = False
+        self._coming, self._frames = Backlog(folder), Backlog(folder)
+        self._events = empty_events()  # taken from those coming
+        self._shown: Picture | None = None  # the frame taken last
 
     def add_frame(self, t_ns: int, image: NDArray[Any]) -> None:
-        """Take a frame (rows, columns) or (rows, columns, 3), 8 or 16 bit, of time `t_ns` [ns]."""
-        t_us = t_ns // 1000
-        self._begin(t_us)
-        self._last_frame_us = t_us
-        unseen = self._with_frames is False
-        self._frames.append((t_us, None if unseen else _panel(image, self._size)))
+        """Take a frame (rows, columns) or (rows, columns, 3), 8 or 16 bit, of time `t_ns` [ns].
+
+        Frames come sorted by time.
+        """
+        t_us = microseconds(t_ns)
+        self._first_us.setdefault("frame", t_us)
+        if self._with_frames is not False:
+            self._with_frames = True
+            self._last_frame_us = t_us
+            self._frames.append(t_us, _reduced(image, self._size))
+        self._draw_up_to(self._known_us())
 
     def add_events(self, events: Events) -> None:
         """Take events, sorted, not before those of earlier calls; there may be none."""
         if events.size:
-            self._begin(int(events["t"][0]))
+            self._first_us.setdefault("event", int(events["t"][0]))
             self._last_event_us = int(events["t"][-1])
-            self._complete_us = max(self._complete_us, self._last_event_us)
-            self._events = np.concatenate([self._events, events])
-        if len(self._frames) > 2:
-            self._complete_us = max(self._complete_us, self._frames[-3][0])
-        self._draw_up_to(self._complete_us)
+            self._coming.append(self._last_event_us, events)
+            self._draw_up_to(self._known_us())
+
+    def complete_until(self, t_us: int) -> None:
+        """Take notice that no event before `t_us` will come any more."""
+        self._told_us = max(self._told_us, t_us)
+        self._draw_up_to(self._known_us())
+
+    def no_more_frames(self) -> None:
+        """Take notice that no frame will come any more."""
+        self._frames_over = True
+        self._draw_up_to(self._known_us())
 
     def finish(self) -> bool:
         """Draw what is left, the last event included; False if nothing came to draw."""
-        if self._instants is None:
+        if max(self._last_event_us, self._last_frame_us) == _LONG_AGO:
             return False
+        if self._start_us is None:
+            self._start_us = min(self._first_us.values())
         if self._given_us is not None:
             self._draw_up_to(_FAR_OFF)
             return True
         self._draw_up_to(max(self._last_event_us, self._last_frame_us))
-        assert self._next_us is not None
-        if not self._drawn or self._next_us - self._step_us <= self._last_event_us:
-            self._draw(self._next_us)
+        next_us = self._next_us()
+        to_come = self._album.whole and next_us - self._step_us <= self._last_event_us
+        if to_come or not self._drawn:
+            self._draw(next_us)
         return True
 
-    def _begin(self, t_us: int) -> None:
-        """Set the clock at the first frame or event."""
-        if self._instants is not None:
-            return
+    def close(self) -> None:
+        """Let go of what waits on disk."""
+        self._coming.close()
+        self._frames.close()
+
+    def _known_us(self) -> int:
+        """Return the time of the last instant of which everything has come."""
+        events_us = max(self._last_event_us, self._told_us)
+        if self._frames_over or self._with_frames is False:
+            return events_us
+        return min(events_us, self._last_frame_us - 1)
+
+    def _begin(self) -> bool:
+        """Set the clock once the first frame and event are known; tell whether it is set."""
         if self._start_us is None:
-            self._start_us = t_us
+            first = self._first_us
+            frame_known = "frame" in first or self._frames_over
+            event_known = "event" in first or self._told_us > first.get("frame", _FAR_OFF)
+            if frame_known and event_known:
+                self._start_us = min(first.values())
+        return self._start_us is not None
+
+    def _next_us(self) -> int:
+        """Return the instant to draw next; far off if there is none."""
+        assert self._start_us is not None
+        self._number = self._album.wanted_from(self._number)
         if self._given_us is None:
-            self._instants = _steps(self._start_us, self._step_us)
-        else:
-            self._instants = iter(self._given_us)
-        self._next_us = next(self._instants, None)
+            return self._start_us + round((self._number + 1) * self._step_us)
+        return self._given_us[self._number] if self._number < len(self._given_us) else _FAR_OFF
 
     def _draw_up_to(self, t_us: int) -> None:
         """Draw the instants up to `t_us` and forget what no later one needs."""
-        while self._next_us is not None and self._next_us <= t_us:
-            self._draw(self._next_us)
-            assert self._instants is not None
-            self._next_us = next(self._instants, None)
-        next_us = _FAR_OFF if self._next_us is None else self._next_us
-        gone = np.searchsorted(self._events["t"], next_us - self._style.window_us)
-        self._events = self._events[gone:]
-        # three frames stay, by which add_events knows how far the events have come
-        while len(self._frames) > 3 and self._frames[1][0] <= next_us:
-            self._frames.popleft()
+        if not self._begin():
+            return
+        while (next_us := self._next_us()) <= t_us and next_us != _FAR_OFF:
+            self._draw(next_us)
+        since_us = next_us - self._style.window_us
+        self._events = self._events[np.searchsorted(self._events["t"], since_us) :]
+        while self._coming and self._coming.time(0) < since_us:
+            self._coming.drop()
+        self._drop_frames(next_us)
 
     def _draw(self, t_us: int) -> None:
         """Draw the instant `t_us`."""
-        if self._with_frames is None:
-            self._with_frames = bool(self._frames)
-        if self._album.wants(self._number):
-            assert self._start_us is not None
-            window = [t_us - self._style.window_us, t_us]
-            first, last = np.searchsorted(self._events["t"], window)
-            events = self._events[first:last]
-            panels = [draw(events, *self._size, t_us, self._style)]
-            if self._with_frames:
-                panels.insert(0, self._frame_at(t_us))
-            text = self._caption(t_us - self._start_us, int(events.size))
-            self._album.add(self._number, Cell(tuple(panels), text))
-            self._drawn += 1
+        assert self._start_us is not None
+        while self._coming and not (self._events.size and self._events["t"][-1] >= t_us):
+            self._events = np.concatenate([self._events, self._coming.take()])
+        window = [t_us - self._style.window_us, t_us]
+        first, last = np.searchsorted(self._events["t"], window)
+        events = self._events[first:last]
+        panels = [draw(events, *self._size, t_us, self._style)]
+        if self._with_frames:
+            panels.insert(0, self._frame_at(t_us))
+        text = self._caption(t_us - self._start_us, int(events.size))
+        self._album.add(self._number, Cell(tuple(panels), text))
+        self._drawn += 1
         self._number += 1
+
+    def _drop_frames(self, t_us: int) -> None:
+        """Forget the frames that have a later one at or before `t_us`."""
+        while len(self._frames) > 1 and self._frames.time(1) <= t_us:
+            self._frames.drop()
 
     def _frame_at(self, t_us: int) -> Picture:
         """Return the last frame at or before `t_us`, or a grey panel."""
-        for time, picture in reversed(self._frames):
-            if time <= t_us and picture is not None:
-                return picture
-        return np.full((self._size[1], self._size[0], 3), 128, np.uint8)
+        self._drop_frames(t_us)
+        if self._frames and self._frames.time(0) <= t_us:
+            self._shown = _panel(self._frames.take())
+        if self._shown is None:
+            self._shown = np.full((self._size[1], self._size[0], 3), 128, np.uint8)
+        return self._shown
 
 
-def _steps(start_us: int, step_us: float) -> Iterator[int]:
-    """Yield the instants a step, two steps, ... after the start."""
-    number = 0
-    while True:
-        number += 1
-        yield start_us + round(number * step_us)
+def microseconds(t_ns: int) -> int:
+    """Return the time of a frame in the unit of events, rounded as theirs."""
+    return (t_ns + 500) // 1000
 
 
-def _panel(image: NDArray[Any], size: tuple[int, int]) -> Picture:
-    """Return a frame as a picture of `size` (width, height)."""
-    if image.dtype == np.uint16:
-        image = image >> 8
-    picture = image.astype(np.uint8)  # a copy: the source may use its array again
-    if picture.ndim == 2:
-        picture = np.repeat(picture[:, :, None], 3, axis=2)
-    if picture.shape[1::-1] != size:
-        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8)
-    return picture
+def _reduced(image: NDArray[Any], size: tuple[int, int]) -> Picture:
+    """Return a frame in 8 bits and of `size` (width, height)."""
+    if image.dtype == np.uint16:  # as layouts of 8 bits store it
+        image = ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+    if image.shape[1::-1] != size:
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return image.astype(np.uint8, copy=False)
+
+
+def _panel(image: Picture) -> Picture:
+    """Return a frame, grey or in colours, in colours."""
+    return image if image.ndim == 3 else np.repeat(image[:, :, None], 3, axis=2)

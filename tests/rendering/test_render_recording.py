@@ -84,7 +84,7 @@ def test_sheet_of_chosen_instants(cells):
 
 def test_sheet_of_even_instants(cells):
     seen = cells(recording(), "out.png", count=4)
-    assert [text.split()[0] for text, _ in seen] == ["0.125", "0.375", "0.624", "0.874"]
+    assert [text.split()[0] for text, _ in seen] == ["0.128", "0.384", "0.640", "0.896"]
 
 
 def test_frames_can_be_left_out(cells):

@@ -12,12 +12,14 @@ MS = 1_000_000  # ns
 class Kept:
     """An album that keeps everything."""
 
+    whole = True
+
     def __init__(self, every=1):
         self.cells = {}
         self.every = every
 
-    def wants(self, number):
-        return number % self.every == 0
+    def wanted_from(self, number):
+        return -(-number // self.every) * self.every
 
     def add(self, number, cell):
         self.cells[number] = cell
@@ -196,15 +198,43 @@ def test_a_frame_may_be_written_over_by_its_source():
 
 
 def test_memory_does_not_grow():
-    line = timeline(Kept(every=1 << 40), step_us=1000, window_us=5000)
-    for k in range(300):
-        line.add_frame(k * MS, np.zeros((2, 4), np.uint8))
-        line.add_events(at(np.arange(1000 * k, 1000 * k + 1000, 10)))
-    assert line._events.size <= 700
-    assert len(line._frames) <= 4
+    line = timeline(Kept(every=1 << 40), step_us=1000, window_us=5000, start_us=0, frames=True)
     sparse = timeline(Kept(), instants_us=[250_000], window_us=10)
     for k in range(300):
-        sparse.add_frame(k * MS, np.zeros((2, 4), np.uint8))
-        sparse.add_events(at(np.arange(1000 * k, 1000 * k + 1000, 10)))
-    assert sparse._events.size == 0
-    assert len(sparse._frames) <= 4
+        for one in (line, sparse):
+            one.add_frame(k * MS, np.zeros((2, 4), np.uint8))
+            one.add_events(at(np.arange(1000 * k, 1000 * k + 1000, 10)))
+    for one in (line, sparse):
+        assert one._events.size + sum(chunk[1].size for chunk in one._coming._items) <= 700
+        assert len(one._frames) <= 2
+
+
+def test_frames_do_not_wait_for_events_when_it_is_told_that_there_are_none():
+    line = timeline(Kept(), step_us=1000)
+    for k in range(300):
+        line.add_frame(k * MS, np.zeros((2, 4), np.uint8))
+        line.complete_until(1000 * k)
+        assert len(line._frames) <= 2
+    line.no_more_frames()
+    line.add_events(at([500_000]))
+    assert not line._frames
+    assert len(line._album.cells) == 500
+
+
+def test_what_waits_beyond_some_memory_waits_on_disk(monkeypatch, tmp_path):
+    def run(**more):
+        album = Kept()
+        line = timeline(album, step_us=1000, window_us=2500, **more)
+        for k in range(200):
+            line.add_events(at(1000 * k + np.arange(0, 1000, 7)))
+        for k in range(200):
+            line.add_frame(k * MS, np.full((2, 4), k, np.uint8))
+        waiting = len(line._coming) + len(line._frames)
+        line.finish()
+        line.close()
+        return waiting, [(c.caption, int(c.panels[0][0, 0, 0])) for c in album.cells.values()]
+
+    _, expected = run()
+    monkeypatch.setattr("adv2e.rendering.backlog.LIMIT_BYTES", 1000)
+    assert run(folder=tmp_path) == (2, expected)
+    assert list(tmp_path.iterdir()) == []
