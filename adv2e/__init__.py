@@ -8,18 +8,17 @@ and Discrete Frames in the Video-to-Events Simulator").
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 __version__ = "0.1.0"
 
 __all__ = ["Config", "__version__", "load_config", "simulate"]
 
+TYPE_CHECKING = False  # as in `typing`, which takes longer to import than all else here
 if TYPE_CHECKING:
     from adv2e.config import Config, load_config
     from adv2e.simulation import simulate
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Import the public names on first use, so that ``adv2e --help`` stays instant."""
     if name in ("Config", "load_config"):
         from adv2e import config  # noqa: PLC0415

@@ -1,6 +1,29 @@
-"""``python -m adv2e`` is the same as the command ``adv2e``."""
+"""The command ``adv2e``, and the same as ``python -m adv2e``."""
 
-from adv2e.cli import main
+import os
+import sys
+
+
+def _leave_current_folder() -> None:
+    """Look in the current folder, which ``-m`` puts first, for no library."""
+    try:
+        here = os.getcwd()  # noqa: PTH109 - as little as can be is imported before
+    except OSError:
+        return
+    if sys.path[:1] == [here]:
+        del sys.path[0]
+
+
+def main() -> None:
+    """Run the command line; a signal that comes while it is imported ends it quietly, too."""
+    from adv2e.stopping import stop_on_signals  # noqa: PLC0415
+
+    stop_on_signals()
+    from adv2e.cli import main as command  # noqa: PLC0415
+
+    command()
+
 
 if __name__ == "__main__":
+    _leave_current_folder()
     main()

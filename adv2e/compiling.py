@@ -4,15 +4,21 @@ The compiler takes some 600 MiB, most of which stays with the process that it ra
 conversion would hold it to its end, which may be hours away.  A conversion of a few small frames,
 with all that decides what code is needed, fills the cache from which the large one then loads.
 
-``python -m adv2e.compiling`` reads what to convert like from standard input, as JSON.
+The process reads what to convert like, a line of JSON, from its standard input, and ends when that
+is closed: so it never outlives the one that waits for it.
 """
 
 from __future__ import annotations
 
+import io
 import json
+import os
+import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -22,10 +28,22 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config, from_dict, to_dict
 from adv2e.garbage import collect_seldom
-from adv2e.jit import keeps_code
+from adv2e.jit import environment, others_find_code
 
 _ROWS, _COLUMNS = 40, 64
 """Of the small frames; large enough for motion to be looked for."""
+
+_START = """\
+import sys
+sys.path[:] = sys.argv[2:]
+from importlib.util import module_from_spec, spec_from_file_location
+spec = spec_from_file_location("adv2e", sys.argv[1])
+sys.modules["adv2e"] = module_from_spec(spec)
+spec.loader.exec_module(sys.modules["adv2e"])
+from adv2e.compiling import main
+main()
+"""
+"""What the process runs: this very package, and all else from where this process has it."""
 
 
 def compile_apart(
@@ -54,7 +72,8 @@ def compile_apart(
     threads : int
         Of the conversion.
     """
-    if not keeps_code():
+    # an application that brings its own Python along would start itself
+    if not others_find_code() or not sys.executable or getattr(sys, "frozen", False):
         return
     values = to_dict(config)
     values["frames"]["encoding"] = encoding
@@ -67,13 +86,38 @@ def compile_apart(
         "threads": threads,
     }
     with suppress(OSError):
-        subprocess.run(
-            [sys.executable, "-m", "adv2e.compiling"],
-            input=json.dumps(request).encode(),
+        child = subprocess.Popen(
+            _command(),
+            stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            check=False,
+            env=environment(),
         )
+        with child:
+            assert child.stdin is not None
+            child.stdin.write(json.dumps(request).encode() + b"\n")
+            child.stdin.flush()
+            child.wait()
+
+
+def _command() -> list[str]:
+    """Return how to start a Python that imports nothing from the current folder.
+
+    With ``-I`` it looks neither there nor where variables of the environment say, also while it
+    starts; then it is told where this one looks.
+    """
+    package = Path(__file__).absolute().with_name("__init__.py")
+    set_here = {"-S": sys.flags.no_site, "-B": sys.dont_write_bytecode}
+    options = ["-I", *(option for option, is_set in set_here.items() if is_set)]
+    places = [place for place in sys.path if Path(place).is_absolute() and not _is_here(place)]
+    return [sys.executable, *options, "-c", _START, str(package), *places]
+
+
+def _is_here(place: str) -> bool:
+    try:
+        return Path(place).samefile(".")
+    except OSError:
+        return False
 
 
 def _frames(dtype: np.dtype[Any], colour: bool) -> NDArray[Any]:
@@ -92,8 +136,13 @@ def main() -> None:
     from adv2e.reading import Reading  # noqa: PLC0415
 
     collect_seldom()
-    request = json.load(sys.stdin)
-    with tempfile.TemporaryDirectory(prefix="adv2e-compiling-") as folder:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of Ctrl-C, the one that waits is told, too
+    with (
+        open(0, "rb", buffering=0, closefd=False) as asked,
+        tempfile.TemporaryDirectory(prefix="adv2e-compiling-") as folder,
+    ):
+        request = json.loads(asked.readline())
+        threading.Thread(target=_end_with, args=(asked, folder), daemon=True).start()
         source = Path(folder) / "frames.npy"
         np.save(source, _frames(np.dtype(request["dtype"]), request["colour"]))
         target = str(Path(folder) / "events")
@@ -102,5 +151,8 @@ def main() -> None:
             convert(reading, target, config=from_dict(request["config"]), **how)
 
 
-if __name__ == "__main__":
-    main()
+def _end_with(asked: io.RawIOBase, folder: str) -> None:
+    """End this process when the other end of its standard input is closed."""
+    asked.read(1)
+    shutil.rmtree(folder, ignore_errors=True)
+    os._exit(1)

@@ -6,8 +6,8 @@ entry is kept so that it runs without Numba, which is imported only to compile.
 Numba's own cache looks only at the file that a function stands in, so a function that calls an
 edited one from another file would run as its old self.  The cache folder is therefore named after
 a digest of all sources that hold compiled code.  It lies in the user's cache folder (or below
-``NUMBA_CACHE_DIR`` where that is set), so that a read-only installation starts fast too.  Folders
-of other sources are removed when they have not been used for a month.
+``NUMBA_CACHE_DIR`` where that is set), so that a read-only installation starts fast too; see
+:mod:`adv2e.kept`.  Folders of other sources are removed when they have not been used for a month.
 
 Compiled functions release the interpreter lock and run in ordinary threads, one tile each.
 Fast-math is off, but for one flag: ``contract`` lets a product and a sum round once (FMA), which
@@ -20,25 +20,20 @@ from __future__ import annotations
 
 import hashlib
 import os
-import shutil
 import sys
-import tempfile
 import threading
-import time
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cached_property, update_wrapper
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
+from adv2e.kept import place_for
 from adv2e.machine_code import file_of, lay_out, load, read_code, write_code
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent
-_UNUSED_S = 30 * 24 * 3600.0
-_USE_NOTED_S = 24 * 3600.0
 _PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 _LOADING = threading.Lock()
 
@@ -68,54 +63,27 @@ def _digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def _writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
+_PLACE = place_for(f"kernels-{_digest()}")
+_FOLDER = _PLACE.folder
 
 
-def cache_folder() -> Path:
-    """Return the folder for compiled code, made if need be; the first that can be written to."""
-    bases: list[Path] = []
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        bases.append(Path(os.environ["NUMBA_CACHE_DIR"]) / "adv2e")
-    if os.environ.get("XDG_CACHE_HOME"):
-        bases.append(Path(os.environ["XDG_CACHE_HOME"]) / "adv2e")
-    if sys.platform == "win32" and os.environ.get("LOCALAPPDATA"):
-        bases.append(Path(os.environ["LOCALAPPDATA"]) / "adv2e" / "Cache")
-    home = Path(os.path.expanduser("~"))  # noqa: PTH111 - Path.home() raises where there is none
-    bases.append(home / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "adv2e")
-    user = os.getuid() if hasattr(os, "getuid") else "user"
-    bases.append(Path(tempfile.gettempdir()) / f"adv2e-{user}")
-    name = f"kernels-{_digest()}"
-    for base in bases:
-        if _writable(base / name):
-            note_use(base / name)
-            return base / name
-    return Path(tempfile.mkdtemp(prefix="adv2e-"))
+def announcement() -> str:
+    """Return what is said before the pixel is compiled."""
+    lost = _PLACE.why_lost or _PLACE.why_full
+    when = f"in every run, as it cannot be kept: {lost}" if lost else "once"
+    return f"compiling the pixel's kernel ({when}; about half a minute)"
 
 
-def note_use(folder: Path) -> None:
-    """Remember that the code in `folder` is in use; once a day, remove what nobody has used.
-
-    A process that still runs with the code in a folder removed here has it in memory.
-    """
-    now = time.time()
-    with suppress(OSError):  # of no matter to whoever wants to compute
-        noted = folder / "used"
-        if noted.exists() and now - noted.stat().st_mtime < _USE_NOTED_S:
-            return
-        noted.touch()
-        for other in folder.parent.glob("kernels-*"):
-            last = max(path.stat().st_mtime for path in (other, *other.glob("used")))
-            if now - last > _UNUSED_S:
-                shutil.rmtree(other, ignore_errors=True)
+def others_find_code() -> bool:
+    """Tell whether other processes find what is compiled in this one, and it what they compile."""
+    return not _PLACE.why_full
 
 
-_FOLDER = cache_folder()
+def environment() -> dict[str, str]:
+    """Return the environment in which another process keeps its code where this one does."""
+    if not _PLACE.why_lost:
+        return dict(os.environ)
+    return {**os.environ, "NUMBA_CACHE_DIR": str(_FOLDER.parent.parent)}
 
 
 def _numba() -> Any:
@@ -140,11 +108,16 @@ class _Compiled:
     def __getattr__(self, name: str) -> Any:
         if name == "dispatcher":
             # without a lock: whoever compiles another function may ask for it, and wait for Numba's
-            made = _numba().make_dispatcher(self._function, _FOLDER, **self._options)
+            options = {**self._options, "cached": self._options["cached"] and self._is_of_package()}
+            made = _numba().make_dispatcher(self._function, _FOLDER, **options)
             return self.__dict__.setdefault(name, made)
         if name.startswith("__"):  # asked of all objects, by whoever copies or inspects
             raise AttributeError(name)
         return getattr(self.dispatcher, name)
+
+    def _is_of_package(self) -> bool:
+        """Tell whether its source is one of those that the folder's name stands for."""
+        return _PACKAGE in Path(self._function.__code__.co_filename).resolve().parents
 
     def __call__(self, *arguments: Any) -> Any:
         return self.dispatcher(*arguments)
@@ -167,8 +140,7 @@ class _Entry(_Compiled):
         return call(contents) if call else self.dispatcher(*arguments)
 
     def _code(self, kind: Any, arguments: tuple[Any, ...]) -> Callable[[list[Any]], Any] | None:
-        # the folder stands for the sources of this package alone
-        if _PACKAGE not in Path(self._function.__code__.co_filename).resolve().parents:
+        if not self._is_of_package():
             return load(_numba().translate(self.dispatcher, arguments), kind)
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         path = file_of(_FOLDER, name, kind)
@@ -197,7 +169,7 @@ class _Intrinsic:
 
 
 def kernel(function: Function) -> Function:
-    """Compile `function`, cached in :func:`cache_folder`; it must not make arrays."""
+    """Compile `function`, kept for the next run; it must not make arrays."""
     return _wrapped(_Compiled, function, cached=True)
 
 
@@ -231,8 +203,3 @@ def _wrapped(how: type[_Compiled], function: Function, **options: Any) -> Functi
 def is_cached(name: str) -> bool:
     """Tell whether there is compiled code of the function `name`, of these sources."""
     return any(_FOLDER.glob(f"*.{name}-*.code")) or any(_FOLDER.rglob(f"*.{name}-*.nbc"))
-
-
-def keeps_code() -> bool:
-    """Tell whether other processes find what is compiled in this one."""
-    return _FOLDER.name.startswith("kernels-")

@@ -15,7 +15,6 @@ import json
 import os
 import struct
 import threading
-import zlib
 from collections.abc import Callable, Hashable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -24,6 +23,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from adv2e.kept import read_kept, write_kept
 
 _NUMBERS = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q"}
 _NUMBERS |= {"f4": "f", "f8": "d", "b1": "?"}
@@ -198,25 +199,15 @@ def file_of(folder: Path, name: str, kind: Any) -> Path:
 
 def read_code(path: Path) -> Code | None:
     """Return the code in a file; None where there is none, or not all of it."""
-    try:
-        head, _, binary = path.read_bytes().partition(b"\n")
-        known = json.loads(head)
-        if zlib.crc32(binary) != known.pop("crc32"):
-            return None
-        return Code(**{**known, "needed": tuple(known["needed"])}, binary=binary)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    kept = read_kept(path)
+    if kept is None:
         return None
+    head, _, binary = kept.partition(b"\n")
+    known = json.loads(head)
+    return Code(**{**known, "needed": tuple(known["needed"])}, binary=binary)
 
 
 def write_code(path: Path, code: Code) -> None:
     """Keep code in a file, if that is possible; other processes see all of it or nothing."""
     head = {key: value for key, value in asdict(code).items() if key != "binary"}
-    head["crc32"] = zlib.crc32(code.binary)
-    unfinished = path.with_name(f"{path.name}.{os.getpid()}-{threading.get_ident()}")
-    with suppress(OSError):
-        try:
-            unfinished.write_bytes(json.dumps(head).encode() + b"\n" + code.binary)
-            unfinished.replace(path)
-        finally:
-            with suppress(OSError):
-                unfinished.unlink()
+    write_kept(path, json.dumps(head).encode() + b"\n" + code.binary)

@@ -24,6 +24,7 @@ from adv2e.decoding import decoder_for, light_text
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
+from adv2e.jit import announcement
 from adv2e.names import shown
 from adv2e.overlap import WriteBehind
 from adv2e.pictures import drawn, picture_white
@@ -214,7 +215,7 @@ def convert(
             log(doubt)
         table = _table_for_the_kernel(decoder, config)
         if not is_compiled(config):
-            log("compiling the pixel's kernel (once; about half a minute)")
+            log(announcement())
             if compile_apart and not user_sources(config):
                 name = "txt" if target == "-" else format_name(Path(target), format)
                 _compile_apart(recording, config, decoder.encoding, name, layout, workers)

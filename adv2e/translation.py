@@ -6,7 +6,9 @@ the layout of arguments, is used with the releases that were tried; see :func:`t
 
 from __future__ import annotations
 
-import secrets
+import hashlib
+import pickle
+import re
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -14,19 +16,19 @@ from typing import Any
 
 import numba
 from numba import extending
-from numba.core import caching, cgutils, compiler, compiler_lock, dispatcher, registry, types
+from numba.core import cgutils, compiler, compiler_lock, dispatcher, registry, serialize, types
 from numba.core.datamodel import packer
 
+from adv2e.kept import read_kept, write_kept
 from adv2e.machine_code import NOT_SO, Code
 
-_FunctionCache: Any = caching.FunctionCache  # it has no types
+_Result: Any = compiler.CompileResult
+_dumps: Any = serialize.dumps
 _numba: Any = numba
 _ir: Any = vars(cgutils)["ir"]
 _Packer: Any = packer.DataPacker
-_config: Any = _numba.config
 _target: Any = registry.cpu_target
 _OWN = "NRT_", "numba_", "Numba"
-_PROCESS = secrets.token_hex(4)
 _RETURNED = {
     types.int64: "q",
     types.uint64: "Q",
@@ -36,57 +38,52 @@ _RETURNED = {
 }
 
 
-class _Cache(_FunctionCache):  # type: ignore[misc]
-    """Numba's cache of one function, made to bear what happens to files.
+class _Kept:
+    """The compiled code of one function as Numba keeps it, in a file for each signature.
 
-    What cannot be read counts as missing, what cannot be written is not kept.  Machine code lies
-    under names that no other process gives: two processes that fill the cache at once would else
-    number the code of two signatures alike, and one of them would later run as the other.
+    It stands in for Numba's own cache, which numbers its files, so that two processes that fill it
+    at once may take the code of one signature for that of another, and loads damaged ones.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
-        files = self._cache_file
-        files._data_name_pattern = files._data_name_pattern.replace(
-            "{number:d}", f"{_PROCESS}-{{number:d}}"
-        )
-
-    def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return the compiled code for a signature, or None."""
-        try:
-            return super().load_overload(signature, context)
-        except Exception:  # a file cut short may raise anything
-            return None
-
-    def save_overload(self, signature: Any, code: Any) -> None:
-        """Keep the compiled code for a signature, if that is possible."""
-        with suppress(OSError):
-            try:
-                super().save_overload(signature, code)
-            except OSError:
-                raise
-            except Exception:  # the index is damaged: begin a new one
-                self.flush()
-                super().save_overload(signature, code)
-
-
-class _LateCache:
-    """A :class:`_Cache` made when something is asked of it: of most functions nothing ever is."""
+    cache_path = ""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._function = function
-        self._folder = folder
+        self._folder = folder / "numba"
 
-    def __getattr__(self, name: str) -> Any:
-        if name == "_made":
-            before = _config.CACHE_DIR
-            _config.CACHE_DIR = str(self._folder)
-            try:
-                self._made = _Cache(self._function)  # as the option `cache` does
-            finally:
-                _config.CACHE_DIR = before
-            return self._made
-        return getattr(self._made, name)
+    def _file(self, signature: Any, codegen: Any) -> Path:
+        function = self._function
+        code = function.__code__
+        cells = tuple(cell.cell_contents for cell in function.__closure__ or ())
+        made_of = (code.co_firstlineno, code.co_code, _dumps(cells) if cells else b"")
+        told = (str(signature), codegen.magic_tuple(), made_of)
+        digest = hashlib.sha256(repr(told).encode()).hexdigest()[:24]
+        name = re.sub("[<>]", "", f"{function.__module__}.{function.__qualname__}")
+        return self._folder / f"{name}-{digest}.nbc"
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Return the compiled code for a signature, or None."""
+        context.refresh()
+        with suppress(Exception):  # another release of Numba may go about it in another way
+            data = read_kept(self._file(signature, context.codegen()))
+            return data and _Result._rebuild(context, *pickle.loads(data))
+        return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep the compiled code for a signature, if that is possible."""
+        with suppress(Exception):
+            if not (result.lifted or result.library.has_dynamic_globals):  # of this process alone
+                data = _dumps(result._reduce())
+                write_kept(self._file(signature, result.codegen), data)
+
+    def enable(self) -> None:
+        """Do nothing: it is in use."""
+
+    def disable(self) -> None:
+        """Do nothing: it is in use."""
+
+    def flush(self) -> None:
+        """Do nothing: what is kept stays."""
 
 
 def make_dispatcher(
@@ -101,7 +98,7 @@ def make_dispatcher(
     # nobody calls it as a function of C: a twentieth of the time to compile
     made: Any = _numba.njit(no_cfunc_wrapper=True, **options)(function)
     if cached:
-        made._cache = _LateCache(function, folder)
+        made._cache = _Kept(function, folder)
     return made
 
 

@@ -9,14 +9,14 @@ which takes no lock, and the process exits.
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Protocol
 
 
-class Unfinished(Protocol):
+class Unfinished:
     """Files or folders that nobody is to find when the program has ended."""
 
     def remove_now(self) -> bool:
         """Remove them, whoever writes to them; tell whether all are gone."""
+        raise NotImplementedError
 
 
 _listed: dict[int, Unfinished] = {}

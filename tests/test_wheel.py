@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,9 @@ def test_wheel_holds_the_shipped_configurations(tmp_path):
     options = ["--no-deps", "--no-build-isolation"]
     subprocess.run([*pip, "wheel", *options, "-w", str(tmp_path), str(ROOT)], check=True)
     (wheel,) = tmp_path.glob("adv2e-*.whl")
+    with zipfile.ZipFile(wheel) as files:  # what it starts in meets signals before all is imported
+        (listed,) = (name for name in files.namelist() if name.endswith("entry_points.txt"))
+        assert b"adv2e = adv2e.__main__:main" in files.read(listed)
     target = tmp_path / "installed"
     subprocess.run([*pip, "install", "--no-deps", "--target", str(target), str(wheel)], check=True)
     script = (

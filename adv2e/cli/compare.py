@@ -105,6 +105,7 @@ def _resimulation(
     from adv2e.comparison.compare import Resimulation
     from adv2e.comparison.resimulation import resimulator
     from adv2e.errors import DataError
+    from adv2e.jit import announcement
     from adv2e.rng import LARGEST_SEED
     from adv2e.simulation import is_compiled
 
@@ -118,6 +119,6 @@ def _resimulation(
             " --frames"
         )
     if not is_compiled(config):
-        log("compiling the pixel's kernel (once; about half a minute)")
+        log(announcement())
     simulate_events = resimulator(frames, config, encoding, threads=threads)
     return Resimulation(simulate_events, (config.seed, (config.seed + 1) % (LARGEST_SEED + 1)))

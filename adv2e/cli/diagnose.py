@@ -66,6 +66,7 @@ def command(
     from adv2e.diagnosis.library import names
     from adv2e.diagnosis.own_effects import without_user_effects
     from adv2e.diagnosis.report import write_reports
+    from adv2e.jit import announcement
     from adv2e.pixel import is_compiled
     from adv2e.reports.files import check_folder
     from adv2e.reports.summary import summary_text
@@ -80,7 +81,7 @@ def command(
     check_folder(folder, overwrite=overwrite)
     evidence = read_evidence(recording)
     if not is_compiled(config.pixel, config.sampling):
-        log("compiling the pixel's kernel (once; about half a minute)")
+        log(announcement())
     with _counting(progress) as count:
         found = diagnose(
             evidence,

@@ -10,8 +10,7 @@
 143    told to stop (SIGTERM)
 ====== ===================================================================================
 
-A signal removes unfinished files and ends the program where it is; see :mod:`adv2e.unfinished`.
-Where files cannot be removed like that, it arrives as an exception, and they are as for any error.
+A signal removes unfinished files and ends the program where it is; see :mod:`adv2e.stopping`.
 """
 
 from __future__ import annotations
@@ -20,30 +19,20 @@ import io
 import os
 import signal
 import sys
-import threading
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from types import FrameType
 
 import click
 
-from adv2e import unfinished
 from adv2e.errors import Adv2eError
 from adv2e.names import shown
+from adv2e.stopping import Terminated, last_words
 
 VERBOSITY = "adv2e.verbosity"
 """Key of ``click.Context.meta`` that holds how often -v was given."""
 
 _CLOSED_OUTPUT = 128 + 13  # SIGPIPE, which Windows does not name
-
-
-class Terminated(BaseException):
-    """A signal told the program to stop."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(signal.Signals(number).name)
-        self.exit_status = 128 + number
 
 
 def complain(text: str) -> None:
@@ -83,10 +72,10 @@ def reporting(context: click.Context | None = None) -> Iterator[None]:
         complain(f"error: {place}{error.strerror or error}")
         raise SystemExit(1) from None
     except (KeyboardInterrupt, click.Abort) as error:
-        complain(_last_words(error))
+        complain(last_words(error))
         raise SystemExit(128 + signal.SIGINT) from None
     except Terminated as error:
-        complain(_last_words(error))
+        complain(last_words(error))
         raise SystemExit(error.exit_status) from None
     except MemoryError as error:
         _trace(context)
@@ -129,56 +118,6 @@ def _trace(context: click.Context | None) -> bool:
         return False
     traceback.print_exc()
     return True
-
-
-@contextmanager
-def stopping_on_signals() -> Iterator[None]:
-    """Let SIGINT, SIGTERM and SIGHUP end the program in the body; ignored ones stay ignored.
-
-    Nothing changes where the caller has handlers of its own, or is not the main thread.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    usual = {
-        "SIGINT": signal.default_int_handler,
-        "SIGTERM": signal.SIG_DFL,
-        "SIGHUP": signal.SIG_DFL,
-    }
-    caught = {
-        getattr(signal, name): handler
-        for name, handler in usual.items()
-        if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is handler
-    }
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        for other in caught:
-            signal.signal(other, signal.SIG_IGN)  # a second one must not stop the tidying up
-        ending = KeyboardInterrupt() if number == signal.SIGINT else Terminated(number)
-        if not unfinished.remove_all():
-            raise ending
-        _say_at_once(_last_words(ending))
-        os._exit(128 + number)
-
-    for number in caught:
-        signal.signal(number, stop)
-    try:
-        yield
-    finally:
-        for number, handler in caught.items():
-            signal.signal(number, handler)
-
-
-def _last_words(ending: BaseException) -> str:
-    return f"stopped by {ending}" if isinstance(ending, Terminated) else "interrupted"
-
-
-def _say_at_once(text: str) -> None:
-    """Write one line to stderr past its buffer, which the main thread may be in the midst of."""
-    with suppress(OSError):
-        # over a progress bar, if there is one
-        start = "\r\x1b[K" if os.isatty(2) else ""
-        os.write(2, f"{start}adv2e: {text}\n".encode())
 
 
 def print_any_character() -> None:

@@ -29,7 +29,7 @@ class _Output:
     replaced: Path | None = None
 
 
-class Staging:
+class Staging(unfinished.Unfinished):
     """Files and folders on their way to their final names.
 
     First all are named with :meth:`file` and :meth:`folder`, which check and touch nothing; then

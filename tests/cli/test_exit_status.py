@@ -245,6 +245,25 @@ def test_a_signal_ends_it_tidily(tmp_path, work, name, status):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_a_signal_while_the_program_is_imported_is_as_quiet(tmp_path, name, status):
+    (tmp_path / "click.py").write_text("import time; print('ready', flush=True); time.sleep(30)")
+    code = (
+        "import signal, sys;"
+        "signal.signal(signal.SIGINT, signal.default_int_handler);"
+        "signal.signal(signal.SIGTERM, signal.SIG_DFL);"
+        f"sys.path.insert(0, {str(tmp_path)!r});"
+        "from adv2e.__main__ import main; main()"
+    )
+    with running_python(code, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(getattr(signal, name))
+        _, err = process.communicate(timeout=20)
+    assert process.returncode == status
+    assert err in ("adv2e: interrupted\n", "adv2e: stopped by SIGTERM\n")
+
+
 def test_a_closed_stdout_is_141_and_quiet():
     with subprocess.Popen(
         [sys.executable, "-m", "adv2e", "--help"],

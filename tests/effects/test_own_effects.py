@@ -129,6 +129,12 @@ def test_a_file_that_is_wrong_is_told_where_and_what(load, text, message):
     assert "\n" not in str(caught.value)
 
 
+def test_its_neighbours_are_not_imported(load, tmp_path):
+    (tmp_path / "beside.py").write_text("raise SystemExit('ran')")
+    with pytest.raises(ConfigError, match="No module named 'beside'"):
+        load("import beside\n" + DIM)
+
+
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(ConfigError, match=r"none\.py: No such file"):
         load_effects(tmp_path / "none.py")
