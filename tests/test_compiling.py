@@ -15,6 +15,7 @@ from threads import wait_until
 
 from adv2e import compiling
 from adv2e.config import Config, load_config
+from adv2e.decoding import encoding_for
 from adv2e.pipeline import _compile_apart
 from adv2e.sinks import format_name
 from adv2e.sources import open_source
@@ -99,7 +100,9 @@ def test_nothing_is_left_to_compile(sources, monkeypatch, name, target, sets):
     source = open_source(sources / name, fps=None if name.endswith("avi") else 50.0)
     with monkeypatch.context() as patch:
         patch.setattr(compiling.subprocess, "Popen", Child)
-        _compile_apart(source, load_config([], sets), format_name(Path(target), None), None, 2)
+        config, form = load_config([], sets), format_name(Path(target), None)
+        encoding = encoding_for(config.frames, source.encoding)
+        _compile_apart(source, config, encoding, form, None, 2)
     made, _ = codes(SMALL, request=requests[0])
     rate = [] if name.endswith("avi") else ["--fps", "50"]
     options = [option for one in sets for option in ("--set", one)]
