@@ -101,7 +101,7 @@ class Reading:
 
     Parameters
     ----------
-    path, fps, timestamps, start_s, stop_s, t0
+    path, fps, timestamps, start_s, stop_s, t0, allow_damaged
         See :func:`adv2e.sources.open_source`.
     threads : int, optional
         Threads that the whole conversion may compute with; default: all cores.
@@ -116,12 +116,14 @@ class Reading:
         start_s: float | None = None,
         stop_s: float | None = None,
         t0: str = "auto",
+        allow_damaged: bool = False,
         threads: int | None = None,
     ) -> None:
         self.path = path
         self.threads = threads or default_threads()
         self.given: dict[str, Any] = {
-            "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0
+            "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
+            "allow_damaged": allow_damaged,
         }  # fmt: skip
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()

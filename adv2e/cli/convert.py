@@ -38,6 +38,7 @@ SECONDS = options.FiniteNumber(min=0)
     show_default=True,
     help="Time of the first frame: zero, or as on the source's clock; auto: keep where it has one.",
 )
+@options.allow_damaged_option
 @click.option(
     "--format",
     "format_",
@@ -68,6 +69,7 @@ def command(
     start: float | None,
     stop: float | None,
     t0: str,
+    allow_damaged: bool,
     format_: str | None,
     layout: str | None,
     with_frames: bool,
@@ -102,6 +104,7 @@ def command(
         start_s=start,
         stop_s=stop,
         t0=t0,
+        allow_damaged=allow_damaged,
         threads=threads,
     )
     with reading:  # it reads while all else that is needed is imported

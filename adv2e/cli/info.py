@@ -19,9 +19,15 @@ from adv2e.cli import options
     metavar="FILE",
     help="Times of the frames [s], one a line.",
 )
+@options.allow_damaged_option
 @options.verbosity_options
 def command(
-    file: Path, as_json: bool, fps: str | None, timestamps: Path | None, log: options.Log
+    file: Path,
+    as_json: bool,
+    fps: str | None,
+    timestamps: Path | None,
+    allow_damaged: bool,
+    log: options.Log,
 ) -> None:
     """Say what a recording or event file holds.
 
@@ -38,7 +44,7 @@ def command(
     from adv2e.inspection.inspect import inspect
 
     log(f"reading {file}", 1)
-    report = inspect(file, fps=fps, timestamps=timestamps)
+    report = inspect(file, fps=fps, timestamps=timestamps, allow_damaged=allow_damaged)
     if as_json:
         import json
 

@@ -66,6 +66,15 @@ def fps_option(body: Body) -> Body:
     )(body)
 
 
+def allow_damaged_option(body: Body) -> Body:
+    """Add --allow-damaged; the command gets ``allow_damaged``."""
+    return click.option(
+        "--allow-damaged",
+        is_flag=True,
+        help="Take what can be decoded of a damaged video, and say what is missing.",
+    )(body)
+
+
 def _rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     from adv2e.sources.rates import parse_rate
 

@@ -24,7 +24,11 @@ EVENTS = "events.txt"
 
 
 def inspect(
-    path: Path, *, fps: Rate | None = None, timestamps: Path | None = None
+    path: Path,
+    *,
+    fps: Rate | None = None,
+    timestamps: Path | None = None,
+    allow_damaged: bool = False,
 ) -> dict[str, Any]:
     """Return what a recording, an event file or an input with frames holds, ready for JSON.
 
@@ -34,6 +38,8 @@ def inspect(
         Any file or folder that can be compared or converted.
     fps, timestamps
         Times of frames, see :func:`adv2e.sources.open_source`; for inputs without events.
+    allow_damaged : bool
+        Damage of a video becomes one of the problems.
 
     Returns
     -------
@@ -47,7 +53,9 @@ def inspect(
         The file is missing, of an unknown kind, or cannot be read.
     """
     if _has_only_frames(path):
-        return _of_source(open_source(path, fps=fps, timestamps=timestamps))
+        return _of_source(
+            open_source(path, fps=fps, timestamps=timestamps, allow_damaged=allow_damaged)
+        )
     return _of_recording(read_recording(path))
 
 

@@ -33,6 +33,7 @@ def open_source(
     start_s: float | None = None,
     stop_s: float | None = None,
     t0: str = "auto",
+    allow_damaged: bool = False,
 ) -> Source:
     """Open an input with frames.
 
@@ -49,6 +50,8 @@ def open_source(
     t0 : {'auto', 'keep', 'zero'}
         auto, keep: times on the source's own clock where there is one, else from its first frame;
         zero: from the first frame wanted.
+    allow_damaged : bool
+        Take what can be decoded of a damaged video, and tell what is missing.
 
     Returns
     -------
@@ -63,7 +66,7 @@ def open_source(
         If the input is missing, of an unknown kind, or wrong.
     """
     given = GivenTimes(fps, Path(timestamps) if timestamps is not None else None)
-    selection = Selection(start_s, stop_s, t0)
+    selection = Selection(start_s, stop_s, t0, allow_damaged)
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")
     named, path = str(path), Path(path)

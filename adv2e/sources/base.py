@@ -169,6 +169,8 @@ class Selection:
     t0 : {'auto', 'keep', 'zero'}
         auto, keep: the source's own clock where there is one, else zero at the source's first
         frame.  zero: zero at the first frame wanted.
+    allow_damaged : bool
+        What can be decoded of a damaged video is wanted; what is missing is told.
 
     Raises
     ------
@@ -179,6 +181,7 @@ class Selection:
     start_s: float | None = None
     stop_s: float | None = None
     t0: str = "auto"
+    allow_damaged: bool = False
 
     def __post_init__(self) -> None:
         for name, value in (("--start", self.start_s), ("--stop", self.stop_s)):

@@ -258,11 +258,14 @@ def constant_rate(
 
 
 def _candidates(stated_hz: float, mean_hz: float) -> list[Fraction]:
-    candidates = []
-    for about in (stated_hz, mean_hz):
-        whole, broadcast = Fraction(round(about)), Fraction(round(about * 1.001) * 1000, 1001)
-        near = [hz for hz in (whole, broadcast) if abs(float(hz) - about) <= 0.002 * about]
-        candidates += sorted((hz for hz in near if hz > 0), key=lambda hz: abs(float(hz) - about))
+    candidates = rates_near(stated_hz) + rates_near(mean_hz)
     if stated_hz > 0:
         candidates.append(Fraction(stated_hz).limit_denominator(1001))
     return [hz for hz in candidates if hz > 0]
+
+
+def rates_near(about: float) -> list[Fraction]:
+    """Return the usual rates within 0.2 % of one [Hz], nearest first: whole, or over 1.001."""
+    whole, broadcast = Fraction(round(about)), Fraction(round(about * 1.001) * 1000, 1001)
+    near = [hz for hz in (whole, broadcast) if hz > 0 and abs(float(hz) - about) <= 0.002 * about]
+    return sorted(near, key=lambda hz: abs(float(hz) - about))

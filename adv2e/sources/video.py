@@ -1,13 +1,12 @@
 """Video files, through OpenCV and the FFmpeg in it, each frame at its own time.
 
-Files are read in one pass: a frame's time is known when the frame is.  Matroska rounds times to
-milliseconds, and whether a constant rate stands behind them can be told only from all of them;
-there the times are first read from the headers of the blocks, which costs no decoding.
+Frames are decoded in one pass.  Before, the pictures are listed, from the file's index or by going
+through it without decoding: how many there are, and what is known of their times.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -17,16 +16,15 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Image, Selection, Shot, Source
-from adv2e.sources.containers import Container, examine
+from adv2e.sources.containers import examine
+from adv2e.sources.gaps import gap_doubts
 from adv2e.sources.opencv import quiet, rgb_of
 from adv2e.sources.opening import openable
-from adv2e.sources.times import NS_PER_S, parse_times, read_text
-from adv2e.sources.video_times import clock_of
+from adv2e.sources.packets import RETRIES, list_packets, stamp_of
+from adv2e.sources.times import parse_times, read_text, seconds
+from adv2e.sources.video_times import VideoTimes
 
 _GREY_8, _GREY_16 = b"Y800", b"Y1\x00\x10"
-_RETRIES = 1000
-"""How many packets after the end of a video may fail before it counts as its end."""
-
 _DECODER_PIXELS, _DECODERS = 1 << 20, 4
 """Pixels of a frame for which one thread decodes fast enough, and the most threads."""
 
@@ -56,29 +54,67 @@ class VideoSource(Source):
 
     def __init__(self, path: Path, given: GivenTimes, selection: Selection) -> None:
         super().__init__(path, "video", selection, has_clock=given.timestamps is not None)
-        self._container = examine(path)
+        self._container = examine(path, allow_damaged=selection.allow_damaged)
+        self.doubts += [f"{path}: {fault}" for fault in self._container.faults]
         with self._opened() as capture:
             pixels = int(capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT))
             self._pixels = pixels.to_bytes(4, "little") if pixels >= 0 else b""
             self._fps = max(float(capture.get(cv2.CAP_PROP_FPS)), 0.0)
-            self._stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
             self._keep_grey(capture)
             if not capture.grab():
                 raise DataError(f"{path}: no frame in it can be decoded")
             self._describe(_load(capture, f"{path}: frame 0"), f"{path}: frame 0")
-        if self._container.stamps_ns is not None:
-            # counted, where FFmpeg multiplies the rate and the length of the longest track
-            self._stated = len(self._container.stamps_ns)
-        if selection.start_s is None and selection.stop_s is None and self._stated > 0:
-            self.count = self._stated
+            self._first_ns = stamp_of(capture)
+        self._times = self._known_times()
+        if selection.start_s is None and selection.stop_s is None:
+            self.count = self._times.expected
         self._choose_encoding()
+        self._own_clock = not given
+        self._given = self._given_times(given)
+        if self._own_clock:
+            self._tell_times()
+
+    def _known_times(self) -> VideoTimes:
+        packets = None if self._container.stamps_ns else list_packets(self.path)
+        return VideoTimes(self._container, packets, self._fps)
+
+    def _given_times(self, given: GivenTimes) -> Callable[[int], int] | None:
+        """Return the times that replace those in the file: a function of a frame's number."""
         if given:
             self.notes.append(f"{given} replaces the times in the file")
-        listed = None
+        self._listed: int | None = None
         if given.timestamps is not None:
-            listed = parse_times(read_text(given.timestamps), str(given.timestamps))
-        self._listed = None if listed is None else len(listed)
-        self._clock = clock_of(given, listed, self._container, self._fps)
+            stamps = parse_times(read_text(given.timestamps), str(given.timestamps))
+            self._listed = len(stamps)
+            self._check_listed(len(stamps))
+            self.doubts += gap_doubts([stamp.t_ns for stamp in stamps], str(given.timestamps))
+            return lambda number: stamps[number].t_ns
+        return None if given.rate is None else given.rate.time_ns
+
+    def _check_listed(self, listed: int) -> None:
+        # pictures that cannot stand alone at the start are in the index and never shown
+        sure = self._times.exact and (self._first_ns or 0) <= self._container.tick_ns
+        if sure and listed == self._times.expected:
+            return
+        with self._opened(self._decoders()) as capture:
+            count = sum(1 for _ in self._grabbed(capture))
+        if listed != count:
+            raise DataError(f"{self.path}: {listed} times given for {count} frames")
+
+    def _tell_times(self) -> None:
+        back = self._times.back
+        if back is not None and back.latest_ns <= self.selection.stop_ns:
+            raise DataError(
+                f"{self.path}: times begin again near frame {back.number}: {seconds(back.t_ns)} s"
+                f" follows {seconds(back.latest_ns)} s, as in files that were joined; give --fps or"
+                " --timestamps"
+            )
+        if not self._times.shown_ns:
+            raise DataError(f"{self.path}: OpenCV finds no times in it; give --fps or --timestamps")
+        if self._times.note:
+            self.notes.append(self._times.note)
+        if back is None and self._times.rate is None:
+            self.doubts += gap_doubts(self._times.shown_ns, self.path)
 
     def _keep_grey(self, capture: cv2.VideoCapture) -> None:
         # grey pictures come as stored; conversion would repeat them three times, in 8 bits
@@ -121,31 +157,51 @@ class VideoSource(Source):
         DataError
             If decoding stops before the end, or times given do not fit the frames.
         """
+        clock, given = self._times.clock(), self._given
+        stamps: list[int | None] = []
         with self._opened(self._decoders()) as capture:
             self._keep_grey(capture)
-            number, first_ns, stamp_ns = 0, 0, 0
-            while capture.grab():
+            for number in self._grabbed(capture):
                 # of the frame just grabbed; before the first one it means nothing
-                stamp_ns = round(capture.get(cv2.CAP_PROP_POS_MSEC) * 1e6)
-                first_ns = stamp_ns if number == 0 else first_ns
-                if self._listed is None or number < self._listed:  # the others are only counted
-                    label = f"{self.path}: frame {number}"
-                    t_ns = self._clock(number, stamp_ns - first_ns)
-                    yield Shot(t_ns, label, partial(_load, capture, label))
-                number += 1
-            self._check_end(capture, number, stamp_ns)
+                stamp = stamp_of(capture)
+                if stamp == 0 and number and self._times.zero_means_none:
+                    stamp = None
+                stamps.append(stamp)
+                if self._listed is not None and number >= self._listed:
+                    continue  # only counted
+                label = f"{self.path}: frame {number}"
+                own = None if stamp is None else stamp - (stamps[0] or 0)
+                t_ns = given(number) if given is not None else clock(number, own)
+                yield Shot(t_ns, label, partial(_load, capture, label))
+        self._check_end(stamps)
 
-    def _check_end(self, capture: cv2.VideoCapture, count: int, last_ns: int) -> None:
-        complete = self._container.exact_count and count >= self._stated
-        if not complete and any(capture.grab() for _ in range(_RETRIES)):
-            raise DataError(f"{self.path}: damaged after frame {count - 1}; re-encode it")
-        if _ends_early(self._container, self._fps, self._stated, count, last_ns):
-            raise DataError(
-                f"{self.path}: {count} frames could be decoded where it states {self._stated}: cut"
-                " short or damaged"
-            )
+    def _grabbed(self, capture: cv2.VideoCapture) -> Iterator[int]:
+        """Grab frame after frame, past what cannot be decoded, and yield their numbers."""
+        number, failed = 0, 0
+        while failed < RETRIES:
+            if capture.grab():
+                yield number
+                number, failed = number + 1, 0
+            elif number >= (self._times.expected or RETRIES):
+                return
+            else:
+                failed += 1
+
+    def _check_end(self, stamps: list[int | None]) -> None:
+        count = len(stamps)
         if self._listed is not None and self._listed != count:
             raise DataError(f"{self.path}: {self._listed} times given for {count} frames")
+        lost = self._times.lost(stamps)
+        if not lost:
+            return
+        fault = (
+            f"{self.path}: {count} frames could be decoded where it states {count + lost}: cut"
+            " short or damaged"
+        )
+        if not self.selection.allow_damaged:
+            raise DataError(f"{fault}; --allow-damaged takes those")
+        if fault not in self.notes:
+            self.notes.append(fault)
 
 
 def _load(capture: cv2.VideoCapture, label: str) -> Image:
@@ -153,12 +209,3 @@ def _load(capture: cv2.VideoCapture, label: str) -> Image:
     if not good or image is None:
         raise DataError(f"{label}: cannot be decoded")
     return rgb_of(image)
-
-
-def _ends_early(container: Container, fps: float, stated: int, count: int, last_ns: int) -> bool:
-    # a count alone does not tell: an edit list hides frames at the start, AVI may leave some out
-    if not container.exact_count or count >= stated or not fps > 0:
-        return False
-    interval_ns = NS_PER_S / fps
-    end_ns = stated * interval_ns if container.end_ns is None else container.end_ns
-    return last_ns + 1.5 * interval_ns < end_ns

@@ -1,62 +1,185 @@
-"""When the pictures of a video are shown."""
+"""When the pictures of a video are shown.
+
+Containers differ in what they say.  MP4, Matroska, MPEG-TS and others state when each picture is
+shown.  AVI knows nothing but a rate, and when pictures are decoded; ASF and MXF state times of
+decoding; MPEG-PS states a time for some pictures.  FFmpeg passes on what there is, and has nothing
+for the last pictures of those, as they leave the decoder after its last packet.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from itertools import pairwise
+from statistics import median
 
-from adv2e.sources.base import GivenTimes
+import numpy as np
+
+from adv2e.sources.completeness import lost_by_count, lost_by_time
 from adv2e.sources.containers import Container
-from adv2e.sources.times import NS_PER_S, FrameRate, Stamp, constant_rate
+from adv2e.sources.packets import Packets
+from adv2e.sources.times import NS_PER_S, FrameRate, constant_rate, rates_near
 
-Clock = Callable[[int, int], int]
-"""Time [ns] of a frame, from its number and its own stamp since the first [ns]."""
+Clock = Callable[[int, int | None], int]
+"""Time [ns] of a frame, from its number and its own stamp since the first [ns], if it has one.
+
+It is asked for all frames in their order, once.
+"""
+
+_MOVED = 4.5
+"""Intervals by which FFmpeg's guesses are off where times are those of decoding."""
+_ROUNDED = 0.02
+"""Intervals by which times are off that FFmpeg fills in, in whole ticks."""
+_CLEAR_SHARE = 0.5
+"""Share of the pictures whose times are known from which on their mean tells the rate."""
 
 
-def clock_of(
-    given: GivenTimes, listed: list[Stamp] | None, container: Container, fps: float
-) -> Clock:
-    """Return the clock of a video.
+class VideoTimes:
+    """What is known of the times of a video's pictures, before any is decoded.
 
     Parameters
     ----------
-    given : GivenTimes
-        Times in place of the file's own.
-    listed : list of Stamp or None
-        The times in the file that `given` names, if it names one.
     container : Container
-        What the file's headers say.
+        What the headers say.
+    packets : Packets or None
+        The coded pictures, where the headers do not list them.
     fps : float
         Rate that FFmpeg found [Hz]; 0 if it found none.
+
+    Attributes
+    ----------
+    shown_ns : list of int
+        When the pictures are shown as far as that is known, sorted [ns].
+    expected : int or None
+        How many pictures there are; None where nothing tells.
+    exact : bool
+        An index says so.
+    rate : FrameRate or None
+        The rate at which all pictures are, where there is one.
+    back : Jump or None
+        Where times begin again, as in files that were joined.
+    note : str
+        What is to be told of how the times came about.
     """
-    if (rate := given.rate) is not None:
-        return lambda number, _: rate.time_ns(number)
-    if listed is not None:
-        return lambda number, _: listed[number].t_ns
-    return _snapped_rate(container, fps) or _own_time
+
+    def __init__(self, container: Container, packets: Packets | None, fps: float) -> None:
+        self._container, self._packets = container, packets
+        self._snaps_within_ns = container.tick_ns
+        self.rate: FrameRate | None = None
+        self.note = ""
+        self._grid: Fraction | None = None
+        if packets is None:
+            self.shown_ns = sorted(set(container.stamps_ns or []))
+            if container.rate is not None:
+                self.rate = FrameRate(container.rate)
+            elif container.tick_ns:
+                self.rate = _behind(container.stamps_ns or [], container.tick_ns, fps)
+        else:
+            self.shown_ns = packets.known_ns
+            if container.decoding_times or not packets.complete:
+                self._grid = container.rate
+                self._find_rate(container, packets, fps)
+        steps = [after - before for before, after in pairwise(self.shown_ns)]
+        nominal = round(NS_PER_S / fps) if fps > 0 else NS_PER_S
+        self.usual_ns = round(median(steps)) if steps else nominal
+        if self.rate is not None:
+            self.usual_ns = self.rate.time_ns(1)
+        counted = len(self.shown_ns) if packets is None else packets.count
+        self.back = None if packets is None else packets.back
+        self.exact = packets is None or container.pictures == counted
+        self.expected = max(counted, container.pictures or 0) or None
+
+    def _find_rate(self, container: Container, packets: Packets, fps: float) -> None:
+        known, count = packets.known_ns, packets.count
+        tick_ns = container.tick_ns or 1000
+        missing = count - len(known)
+        hz = None if packets.back else _standing(known, count, container.rate, fps, tick_ns)
+        if hz is not None and not packets.tiny:
+            self.rate, self._snaps_within_ns = FrameRate(hz), round(_MOVED * NS_PER_S / hz)
+        if missing > 0:
+            rest = "the others follow"
+            if hz is not None:
+                rest = f"taken at {float(hz):.6g} frames a second"
+            self.note = f"the file states times for {len(known)} of its {count} frames: {rest}"
+
+    @property
+    def zero_means_none(self) -> bool:
+        """Whether a frame beyond the first whose stamp is zero has none."""
+        return self._packets is not None
+
+    def lost(self, stamps_ns: Sequence[int | None]) -> int:
+        """Return how many pictures are missing, from the stamps of those that came [ns].
+
+        Stamps are as FFmpeg counts them, not from the first that came.
+        """
+        container, packets = self._container, self._packets
+        if self.expected is None:
+            return 0
+        if packets is None or (packets.complete and not container.decoding_times):
+            known = [stamp for stamp in stamps_ns if stamp is not None]
+            lost = len(lost_by_time(self.shown_ns, known, container.tick_ns))
+        else:
+            lost = lost_by_count(self.expected, stamps_ns, packets.known_ns)
+        tiny = container.tiny if packets is None else packets.tiny
+        return max(lost - tiny, 0)
+
+    def clock(self) -> Clock:
+        """Return a clock for one pass over the frames."""
+        previous = -self.usual_ns
+
+        def time_ns(number: int, own_ns: int | None) -> int:
+            nonlocal previous
+            if self.rate is not None:
+                previous = self._at_rate(self.rate, number, own_ns)
+            elif own_ns is None:
+                previous += self.usual_ns
+            else:
+                previous = own_ns if self._grid is None else _snapped(own_ns, self._grid)
+            return previous
+
+        return time_ns
+
+    def _at_rate(self, rate: FrameRate, number: int, own_ns: int | None) -> int:
+        at_number = rate.time_ns(number)
+        if own_ns is None or abs(at_number - own_ns) <= self._snaps_within_ns:
+            return at_number
+        # frames that could not be shown are missing before this one
+        return _snapped(own_ns, rate.hz)
 
 
-def _snapped_rate(container: Container, fps: float) -> Clock | None:
-    stamps_ns, tick_ns = container.stamps_ns, container.tick_ns
-    if stamps_ns is None:
-        return None
+def _snapped(own_ns: int, hz: Fraction) -> int:
+    return FrameRate(hz).time_ns(round(own_ns * hz / NS_PER_S))
+
+
+def _behind(stamps_ns: Sequence[int], tick_ns: int, fps: float) -> FrameRate | None:
+    """Return the rate behind stamps of a coarse clock."""
     # VP8 has blocks that are never shown, at the time of the block after them
     for times_ns in (stamps_ns, sorted(set(stamps_ns))):
         rate = constant_rate(times_ns, stated_hz=fps, tolerance_ns=tick_ns)
         if rate is not None:
-            return _snapping(rate, tick_ns)
+            return rate
     return None
 
 
-def _own_time(_: int, own_ns: int) -> int:
-    return own_ns
-
-
-def _snapping(rate: FrameRate, tick_ns: int) -> Clock:
-    def time_ns(number: int, own_ns: int) -> int:
-        at_number = rate.time_ns(number)
-        if abs(at_number - own_ns) <= tick_ns:
-            return at_number
-        # frames that could not be shown are missing before this one
-        return rate.time_ns(round(own_ns * rate.hz / NS_PER_S))
-
-    return time_ns
+def _standing(
+    known_ns: Sequence[int], count: int, stated: Fraction | None, fps: float, tick_ns: int
+) -> Fraction | None:
+    """Return the rate at which `count` pictures are if some of them are at the times known."""
+    if not known_ns or count < 2:
+        return None
+    since_first = np.array(known_ns, dtype=np.int64) - known_ns[0]
+    span_ns = int(since_first[-1])
+    clear = len(known_ns) > _CLEAR_SHARE * count
+    tried = [stated] if stated is not None else []
+    for about in (fps, (len(known_ns) - 1) * NS_PER_S / span_ns if clear and span_ns else 0):
+        tried += rates_near(about)
+    if clear and fps > 0:
+        tried.append(Fraction(fps).limit_denominator(1001))
+    for hz in tried:
+        places = since_first * (float(hz) / NS_PER_S)
+        numbers = np.rint(places)
+        within = max(2 * tick_ns * float(hz) / NS_PER_S, _ROUNDED)
+        near = np.all(np.abs(places - numbers) <= within)
+        if near and numbers[-1] < count and np.all(np.diff(numbers) > 0):
+            return hz
+    return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from fractions import Fraction
 
 import pytest
 
@@ -60,7 +61,7 @@ def test_matroska_lists_the_pictures_of_its_video_track_in_order(examined):
     second = cluster(2000, block(2, -800), block(2, 40, flags=0x08))
     found = examined(matroska(tracks(2, 1), first, second))
     assert found.stamps_ns == [t * 10**6 for t in (1000, 1080, 1120, 1200)]
-    assert (found.tick_ns, found.end_ns, found.exact_count) == (10**6, 200 * 10**6, True)
+    assert (found.tick_ns, found.tiny, found.rate) == (10**6, 4, None)
 
 
 def test_matroska_with_finer_ticks(examined):
@@ -97,48 +98,128 @@ def test_matroska_whose_parts_do_not_fit(examined):
         examined(matroska(tracks(1), bytes(16), after))
 
 
-def mp4(duration=3000, width=640, version=0):
-    if version:
-        movie = struct.pack(">B3xQQIQ", 1, 0, 0, 600, 9)
-        track = struct.pack(">B3xQQI4xQ", 1, 0, 0, 1, duration)
-    else:
-        movie = struct.pack(">B3xIIII", 0, 0, 0, 600, 9)
-        track = struct.pack(">B3xIII4xI", 0, 0, 0, 1, duration)
-    sizes = bytes(52) + struct.pack(">II", width << 16, width << 16)
-    sound = box(b"trak", box(b"tkhd", track + bytes(60)))
-    video = box(b"trak", box(b"tkhd", track + sizes))
-    return box(b"ftyp", b"mp42") + box(b"moov", box(b"mvhd", movie), sound, video)
+def full(kind, *contents, version=0):
+    return box(kind, bytes([version, 0, 0, 0]), *contents)
 
 
-@pytest.mark.parametrize("version", [0, 1])
-def test_mp4_states_when_its_pictures_end(examined, version):
-    found = examined(mp4(version=version) + box(b"mdat", bytes(100)))
-    assert (found.end_ns, found.exact_count) == (5 * 10**9, True)
+def table(kind, *rows, version=0):
+    """Return a table of 32-bit numbers behind the number of its rows."""
+    numbers = [n for row in rows for n in row]
+    count = struct.pack(">I", len(rows))
+    return full(kind, count, struct.pack(f">{len(numbers)}i", *numbers), version=version)
 
 
-def test_mp4_with_a_large_box_and_one_to_the_end(examined):
-    large = struct.pack(">I4sQ", 1, b"mdat", 116) + bytes(100)
-    assert examined(large + mp4()[12:]).end_ns == 5 * 10**9
-    assert examined(mp4() + struct.pack(">I4s", 0, b"mdat") + bytes(50)).end_ns == 5 * 10**9
+def track(handler, *tables, scale=1000, edits=b""):
+    media = full(b"mdhd", struct.pack(">IIIII", 0, 0, scale, 0, 0))
+    who = full(b"hdlr", bytes(4), handler, bytes(12))
+    inner = box(b"minf", full(b"hdlr", bytes(4), b"url ", bytes(12)), box(b"stbl", *tables))
+    return box(b"trak", edits, box(b"mdia", media, who, inner))
 
 
-def test_mp4_with_padding_at_its_end(examined):
-    assert examined(mp4() + bytes(64)).end_ns == 5 * 10**9
+def samples(sizes, offset, durations=((4, 40),), shifts=()):
+    """Return the tables of samples that lie in one chunk."""
+    return [
+        table(b"stts", *durations),
+        *([table(b"ctts", *shifts)] if shifts else []),
+        full(b"stsz", struct.pack(f">II{len(sizes)}I", 0, len(sizes), *sizes)),
+        table(b"stsc", (1, len(sizes), 1)),
+        table(b"stco", (offset,)),
+    ]
 
 
-def test_mp4_in_fragments_states_no_count(examined):
-    assert not examined(mp4() + box(b"moof", b"")).exact_count
+def mp4(tables=None, *, edits=b"", after=b"", sound=True):
+    """Return a file of four pictures of 10 bytes, 40 ms apart, whose samples begin at byte 16."""
+    movie = full(b"mvhd", struct.pack(">IIII", 0, 0, 600, 9))
+    tracks = [track(b"vide", *(tables or samples([10] * 4, 24)), edits=edits)]
+    if sound:
+        tracks.insert(0, track(b"soun", *samples([3, 4], 64, ((2, 1),))))
+    data = box(b"ftyp", b"mp42", bytes(4)) + box(b"mdat", bytes(47))
+    return data + box(b"moov", movie, *tracks) + after
 
 
-def test_mp4_without_a_duration(examined):
-    assert examined(mp4(duration=0)).end_ns is None
+def ms(found):
+    return [t / 10**6 for t in found.stamps_ns]
+
+
+def test_mp4_lists_when_its_pictures_are_shown(examined):
+    found = examined(mp4())
+    assert ms(found) == [0, 40, 80, 120]
+    assert (found.tick_ns, found.tiny, found.faults) == (0, 0, [])
+
+
+def test_mp4_in_the_order_of_decoding(examined):
+    shifts = ((1, 40), (1, 80), (1, -10), (1, 0))
+    tables = samples([10, 10, 10, 5], 24, ((2, 40), (2, 30)), shifts)
+    found = examined(mp4(tables))
+    assert ms(found) == [40, 70, 110, 120]
+    assert found.tiny == 1
+
+
+@pytest.mark.parametrize(
+    ("edits", "shown"),
+    [
+        ([(60, 40, 1 << 16)], [40, 80, 120]),  # 100 ms from 40 ms on
+        ([(36, 40, 1 << 16)], [40, 80]),
+        ([(600, -1, 1 << 16), (48, 0, 1 << 16)], [0, 40]),  # a second of nothing before it
+        ([(0, 80, 1 << 16)], [80, 120]),  # to the end
+    ],
+)
+def test_mp4_cut_by_its_edit_list(examined, edits, shown):
+    assert ms(examined(mp4(edits=box(b"edts", table(b"elst", *edits))))) == shown
+
+
+def test_mp4_of_several_pieces_or_videos_is_left_to_the_decoder(examined):
+    pieces = box(b"edts", table(b"elst", (10, 0, 1 << 16), (10, 80, 1 << 16)))
+    assert examined(mp4(edits=pieces)).stamps_ns is None
+    second = track(b"vide", *samples([10], 24, ((1, 40),)))
+    movie = full(b"mvhd", struct.pack(">IIII", 0, 0, 600, 9))
+    both = box(b"moov", movie, second, second)
+    assert examined(box(b"ftyp", b"mp42") + both + bytes(60)).stamps_ns is None
+
+
+@pytest.mark.parametrize(
+    "after",
+    [
+        bytes(64),
+        b"\xff" * 7,
+        b"trailing bytes of whatever kind, longer than a box",
+        struct.pack(">I4s", 10**6, b"free"),
+        struct.pack(">I4s", 10**6, b"uuid") + bytes(16),
+        struct.pack(">I4sQ", 1, b"mdat", 10**9),
+        struct.pack(">I4s", 0, b"skip") + bytes(9),
+    ],
+)
+def test_mp4_may_be_followed_by_anything(examined, after):
+    assert ms(examined(mp4(after=after))) == [0, 40, 80, 120]
+
+
+def test_mp4_in_fragments_lists_nothing(examined):
+    assert examined(mp4(after=box(b"moof", b""))).stamps_ns is None
+    with pytest.raises(DataError, match="clip: cut short"):
+        examined(mp4(after=box(b"moof", b"") + box(b"mdat", bytes(9))[:-1]))
 
 
 def test_mp4_cut_short(examined):
+    index = mp4()[71:]
+    assert index[4:8] == b"moov"
+    front = box(b"ftyp", b"mp42", bytes(4)) + index
+    shifted = front.replace(struct.pack(">II", 1, 24), struct.pack(">II", 1, len(front) + 8))
+    shifted = shifted.replace(struct.pack(">II", 1, 64), struct.pack(">II", 1, len(front) + 48))
+    whole = shifted + box(b"mdat", bytes(47))
+    assert ms(examined(whole)) == [0, 40, 80, 120]
     with pytest.raises(DataError, match="clip: cut short: it holds"):
-        examined((mp4() + box(b"mdat", bytes(100)))[:-1])
+        examined(whole[:-1])
+    with pytest.raises(DataError, match="clip: cut short or never finished: its index"):
+        examined(mp4()[:-1])
     with pytest.raises(DataError, match="clip: cut short or never finished: its index"):
         examined(box(b"ftyp", b"mp42") + box(b"mdat", bytes(100)))
+
+
+def test_damage_that_is_allowed_is_a_fault(examined, tmp_path):
+    (tmp_path / "clip").write_bytes(mp4()[:-1])
+    found = examine(tmp_path / "clip", allow_damaged=True)
+    assert found.stamps_ns is None
+    assert found.faults[0].startswith("cut short or never finished")
 
 
 def test_mp4_with_broken_headers(examined):
@@ -147,23 +228,97 @@ def test_mp4_with_broken_headers(examined):
         examined(broken)
 
 
-def riff(size, kind=b"AVI "):
-    return b"RIFF" + struct.pack("<I", size) + kind
+def riff(*contents, kind=b"AVI ", size=None):
+    data = b"".join(contents)
+    return b"RIFF" + struct.pack("<I", 4 + len(data) if size is None else size) + kind + data
+
+
+def chunk(kind, *contents):
+    data = b"".join(contents)
+    return kind + struct.pack("<I", len(data)) + data + bytes(len(data) % 2)
+
+
+def listed(kind, *contents):
+    return chunk(b"LIST", kind, *contents)
+
+
+def stream(kind, scale, hz, *more):
+    return listed(b"strl", chunk(b"strh", kind, bytes(16), struct.pack("<II", scale, hz)), *more)
+
+
+HEADERS = listed(b"hdrl", stream(b"auds", 1, 44100), stream(b"vids", 1001, 30000))
+
+
+def test_avi_states_its_rate_and_lists_its_pictures(examined):
+    sizes = [(b"01dc", 90), (b"00wb", 4), (b"01dc", 0), (b"01db", 7), (b"01pc", 5)]
+    index = chunk(b"idx1", *(kind + struct.pack("<III", 0, 0, size) for kind, size in sizes))
+    found = examined(riff(HEADERS, listed(b"movi", bytes(8)), index))
+    assert (found.rate, found.pictures) == (Fraction(30000, 1001), 2)
+    assert found.decoding_times
+
+
+def test_avi_with_indexes_of_indexes(examined):
+    def index(*sizes):
+        entries = b"".join(struct.pack("<II", 0, size) for size in sizes)
+        return chunk(b"ix01", struct.pack("<HBBI4sQI", 2, 0, 1, len(sizes), b"01dc", 0, 0), entries)
+
+    first, second = index(5, 0x80000006, 0), index(9)
+    movie = listed(b"movi", first, second)
+
+    def avi(places):
+        entries = b"".join(struct.pack("<QII", place, 40, 3) for place in places)
+        top = chunk(b"indx", struct.pack("<HBBI4s12x", 4, 0, 0, 2, b"01dc"), entries)
+        streams = stream(b"auds", 1, 9), stream(b"vids", 1, 25, top)
+        return riff(movie, listed(b"hdrl", *streams)) + riff(kind=b"AVIX")
+
+    assert examined(avi([24, 24 + len(first)])).pictures == 3
+    astray = examined(avi([24, 28 + len(first)]))
+    assert (astray.rate, astray.pictures) == (Fraction(25), None)
 
 
 def test_avi_of_several_lists(examined):
-    assert examined(riff(14) + bytes(10) + riff(20, b"AVIX") + bytes(16)).exact_count
+    large = riff(bytes(10)) + riff(bytes(16), kind=b"AVIX")
+    assert examined(large).pictures is None
+    assert examined(large + b"anything").pictures is None
     with pytest.raises(DataError, match="clip: cut short"):
-        examined(riff(14) + bytes(10) + riff(20, b"AVIX") + bytes(15))
+        examined(large[:-1])
 
 
 def test_avi_never_finished_states_nothing(examined):
-    assert not examined(riff(0) + bytes(10)).exact_count
+    assert examined(riff(HEADERS, size=0)).rate is None
+
+
+Y4M = b"YUV4MPEG2 W6 H3 F30000:1001 Ip A1:1 "
+
+
+@pytest.mark.parametrize(
+    ("layout", "size"),
+    [
+        (b"", 18 + 12), (b"C420jpeg", 18 + 12), (b"C420mpeg2", 18 + 12), (b"C422", 18 + 18),
+        (b"C411", 18 + 12), (b"C444", 54), (b"Cmono", 18), (b"C444alpha", 72),
+        (b"C420p10", 60), (b"Cmono16", 36), (b"C444p16 XYSCSS=444P16", 108),
+    ],
+)  # fmt: skip
+def test_y4m_holds_pictures_of_one_size(examined, layout, size):
+    data = Y4M + layout + b"\n" + b"".join(b"FRAME Ip\n" + bytes(size) for _ in range(3))
+    found = examined(data)
+    assert found.stamps_ns == [0, 33_366_667, 66_733_333]
+    assert found.rate == Fraction(30000, 1001)
+    with pytest.raises(DataError, match="clip: cut short: it holds"):
+        examined(data[:-1])
+    with pytest.raises(DataError, match="clip: cut short: it holds"):
+        examined(data + b"FRA")
+    with pytest.raises(DataError, match="clip: damaged after frame 1, at byte"):
+        examined(data[: -size - 9] + bytes(size + 9))
+
+
+def test_y4m_of_another_layout_is_left_to_the_decoder(examined):
+    assert examined(Y4M + b"Cyuv2\nFRAME\n" + bytes(9)).stamps_ns is None
 
 
 def test_other_files_state_nothing(examined):
     found = examined(b"G" * 376)
-    assert (found.stamps_ns, found.end_ns, found.exact_count) == (None, None, False)
+    assert (found.stamps_ns, found.rate, found.pictures) == (None, None, None)
 
 
 def test_an_empty_file(examined, tmp_path):

@@ -162,12 +162,13 @@ def test_given_times_replace_the_files_and_a_note_says_so(write_video, colours, 
 
 
 @pytest.mark.parametrize("count", [11, 13, 3])
-def test_another_number_of_times_names_both(write_video, colours, tmp_path, count):
+@pytest.mark.parametrize("name", ["clip.avi", "clip.mkv"])
+def test_another_number_of_times_is_told_at_once(write_video, colours, tmp_path, name, count):
     times = tmp_path / "t.txt"
     times.write_text("".join(f"{n}\n" for n in range(count)))
-    source = open_source(write_video("clip.avi", colours), timestamps=times)
-    with pytest.raises(DataError, match=rf"clip\.avi: {count} times given for 12 frames"):
-        times_of(source)
+    path = write_video(name, colours)
+    with pytest.raises(DataError, match=rf"{name}: {count} times given for 12 frames"):
+        open_source(path, timestamps=times)
 
 
 def test_selection_reads_no_further_than_asked(write_video, colours):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 
 
 @dataclass(frozen=True)
@@ -13,19 +14,35 @@ class Container:
     ----------
     stamps_ns : list of int or None
         Times of all pictures in the order they are shown [ns], where the file lists them
-        cheaply (Matroska).
+        cheaply (MP4, Matroska, Y4M).
     tick_ns : int
-        Step of those times [ns].
-    end_ns : int or None
-        When the last picture ends, from the first (MP4, Matroska) [ns].
-    exact_count : bool
-        The number of pictures that FFmpeg reports was read from the file, not estimated.
+        Step of the times in the file [ns], where it is coarse (Matroska, ASF).
+    rate : Fraction or None
+        The exact rate of a file that has no times but for that rate [Hz] (AVI, Y4M).
+    decoding_times : bool
+        The times in the file, if any, are those of decoding, or not all of them are there.
+    pictures : int or None
+        How many pictures the index lists, where it lists no times (AVI).
+    tiny : int
+        How many of those that are listed are too small to hold a picture.
+    faults : list of str
+        What is wrong with the structure, with where.
+    doubts : list of str
+        What may be wrong with it.
     """
 
     stamps_ns: list[int] | None = None
     tick_ns: int = 0
-    end_ns: int | None = None
-    exact_count: bool = False
+    rate: Fraction | None = None
+    decoding_times: bool = False
+    pictures: int | None = None
+    tiny: int = 0
+    faults: list[str] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+
+
+TINY_BYTES = 8
+"""Coded pictures of no more than this may stand for the one before them (MPEG-4's N-VOP)."""
 
 
 class DamagedError(Exception):

@@ -11,7 +11,7 @@ import mmap
 import struct
 from collections.abc import Iterator
 
-from adv2e.sources.containers.base import Container, DamagedError, cut_short
+from adv2e.sources.containers.base import TINY_BYTES, Container, DamagedError, cut_short
 
 _SEGMENT, _INFO, _TIMESTAMP_SCALE = 0x18538067, 0x1549A966, 0x2AD7B1
 _TRACKS, _TRACK_ENTRY, _TRACK_NUMBER, _TRACK_TYPE = 0x1654AE6B, 0xAE, 0xD7, 0x83
@@ -24,6 +24,7 @@ def examine(data: mmap.mmap) -> Container:
     """Return the times of all pictures; DamagedError if the elements do not fit each other."""
     scale_ns, number, video, cluster = 1_000_000, 0, None, 0
     ticks: list[int] = []
+    tiny = 0
     for kind, start, stop in _elements(data):
         if kind == _TIMESTAMP_SCALE:
             scale_ns = _unsigned(data, start, stop)
@@ -38,10 +39,10 @@ def examine(data: mmap.mmap) -> Container:
             relative, flags = struct.unpack_from(">hB", data, after)
             if track == video and not flags & _INVISIBLE:
                 ticks.append(cluster + relative)
-    stamps_ns = [tick * scale_ns for tick in sorted(ticks)]
-    if not stamps_ns:
+                tiny += stop - after - 3 <= TINY_BYTES
+    if not ticks:
         return Container()
-    return Container(stamps_ns, scale_ns, stamps_ns[-1] - stamps_ns[0], exact_count=True)
+    return Container([tick * scale_ns for tick in sorted(ticks)], scale_ns, tiny=tiny)
 
 
 def _elements(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:

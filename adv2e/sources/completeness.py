@@ -1,0 +1,90 @@
+"""Whether all pictures of a video came out of the decoder.
+
+OpenCV leaves out what its decoder refuses, and says nothing.  Pictures that were expected and did
+not come tell, but for those that no decoder shows: pictures before the first that can stand alone,
+and second fields where each field is stored as a picture.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from itertools import pairwise
+from statistics import median
+
+
+def lost_by_time(expected_ns: Sequence[int], stamps_ns: Sequence[int], tick_ns: int) -> list[int]:
+    """Return those of the expected times at which no picture came, from the first that came on.
+
+    Parameters
+    ----------
+    expected_ns : sequence of int
+        When pictures are shown, sorted [ns].
+    stamps_ns : sequence of int
+        When those that came are shown, from zero where FFmpeg begins to count: at the first
+        expected one, or the first that came [ns].
+    tick_ns : int
+        How far the two may differ [ns].
+    """
+    if not expected_ns:
+        return []
+    if not stamps_ns:
+        return list(expected_ns)
+    came = sorted(stamps_ns)
+    within = max(tick_ns, 2000)
+    offset = expected_ns[0]
+    if not _near(came[0] + offset, expected_ns, within):
+        offset = expected_ns[0] - came[0]
+    came = [stamp + offset for stamp in came]
+    lost = [t for t in expected_ns if t > came[0] + within and not _near(t, came, within)]
+    if len(came) > 2 and lost and _are_second_fields(lost, came):
+        return []
+    return lost
+
+
+def _near(t: int, times: Sequence[int], within: int) -> bool:
+    place = bisect_left(times, t)
+    return any(abs(t - times[n]) <= within for n in (place - 1, place) if 0 <= n < len(times))
+
+
+def _are_second_fields(lost: Sequence[int], came: Sequence[int]) -> bool:
+    """Tell whether one picture is missing in the middle of each step, all of one length."""
+    steps = [after - before for before, after in pairwise(came)]
+    usual = median(steps)
+    if any(abs(step - usual) > 0.05 * usual for step in steps):
+        return False
+    middles = {bisect_left(came, t) for t in lost}
+    return len(middles) == len(lost) and len(lost) >= len(came) - 1
+
+
+def lost_by_count(expected: int, stamps_ns: Sequence[int | None], known_ns: Sequence[int]) -> int:
+    """Return how many pictures are missing where times are those of decoding.
+
+    Parameters
+    ----------
+    expected : int
+        How many pictures there are.
+    stamps_ns : sequence of int or None
+        Stamps of those that came [ns]; FFmpeg has none for those that it held back to the end.
+    known_ns : sequence of int
+        Stamps of all, as far as known, sorted [ns].
+    """
+    missing = expected - len(stamps_ns)
+    if missing <= 0:
+        return 0
+    if abs(expected - 2 * len(stamps_ns)) <= 2 and _is_even(stamps_ns):
+        return 0  # two fields a picture
+    held = 0
+    for stamp in reversed(stamps_ns):
+        if stamp is not None:
+            break
+        held += 1
+    first = next((stamp for stamp in stamps_ns if stamp is not None), 0)
+    # the first comes out late by as many as are held back, and by those that could not be shown
+    leading = max(bisect_left(known_ns, first) - held, 0)
+    return max(missing - leading, 0)
+
+
+def _is_even(stamps_ns: Sequence[int | None]) -> bool:
+    steps = [b - a for a, b in pairwise(stamps_ns) if a is not None and b is not None]
+    return len(steps) > 2 and max(steps) - min(steps) <= 0.05 * median(steps)

@@ -1,0 +1,143 @@
+"""Times of frames in containers of every kind, written by another library."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from adv2e.errors import DataError
+from adv2e.sources import open_source
+
+av = pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
+
+COUNT = 36
+
+
+def pictures(count=COUNT):
+    rows, columns = np.mgrid[:48, :64]
+    ramps = [(2 * rows + 3 * columns + 7 * n) % 256 for n in range(count)]
+    return [np.stack([ramp] * 3, -1).astype(np.uint8) for ramp in ramps]
+
+
+def written(path, codec, rate, *, reordered=0, numbers=None, container=None, sound=False):
+    """Write pictures at a rate, at the numbers given of its ticks, and return the path."""
+    with av.open(str(path), "w", format=container) as film:
+        stream = film.add_stream(codec, rate=rate)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.codec_context.max_b_frames = reordered
+        stream.codec_context.time_base = 1 / Fraction(rate)
+        beside = film.add_stream("mp2", rate=48000) if sound else None
+        for number, image in zip(numbers or range(COUNT), pictures(), strict=False):
+            frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+            frame.pts, frame.time_base = number, 1 / Fraction(rate)
+            film.mux(stream.encode(frame))
+        film.mux(stream.encode(None))
+        if beside is not None:
+            for n in range(2 * 48000 // 1152):
+                quiet = av.AudioFrame.from_ndarray(np.zeros((1, 2304), np.int16), layout="stereo")
+                quiet.sample_rate, quiet.pts = 48000, n * 1152
+                film.mux(beside.encode(quiet))
+            film.mux(beside.encode(None))
+    return path
+
+
+def times_of(path, **options):
+    return [frame.t_ns for frame in open_source(path, **options).frames()]
+
+
+def at_rate(hz, numbers=range(COUNT)):
+    return [round(Fraction(n * 10**9) / hz) for n in numbers]
+
+
+FILES = [
+    ("clip.avi", "mpeg4", 2),
+    ("clip.avi", "libx264", 2),
+    ("clip.avi", "mpeg2video", 0),
+    ("clip.wmv", "libx264", 3),
+    ("clip.wmv", "wmv2", 0),
+    ("clip.mpg", "mpeg1video", 2),
+    ("clip.mpg", "mpeg2video", 2),
+    ("clip.mpg", "mpeg2video", 0),
+    ("clip.mpg", "libx264", 2),
+    ("clip.mxf", "mpeg2video", 2),
+    ("clip.ts", "libx264", 2),
+    ("clip.mp4", "libx264", 3),
+    ("clip.mov", "mpeg4", 2),
+    ("clip.mkv", "libx264", 2),
+    ("clip.flv", "libx264", 2),
+]
+
+
+@pytest.mark.parametrize(("name", "codec", "reordered"), FILES)
+@pytest.mark.parametrize("rate", [Fraction(30), Fraction(30000, 1001), Fraction(25)])
+def test_every_frame_is_at_its_time(tmp_path, name, codec, reordered, rate):
+    if name.endswith("mxf") and rate == 30:
+        pytest.skip("MXF does not know this rate")
+    path = written(tmp_path / name, codec, rate, reordered=reordered)
+    source = open_source(path)
+    times = [frame.t_ns for frame in source.frames()]
+    clock_ns = 10**6 if name.endswith("flv") else 20_000 if name.endswith("ts") else 1
+    assert len(times) == COUNT == source.count
+    assert np.abs(np.subtract(times, at_rate(rate))).max() <= clock_ns
+    assert source.doubts == []
+
+
+@pytest.mark.parametrize("name", ["clip.avi", "clip.mpg", "clip.mp4", "clip.mkv", "clip.wmv"])
+def test_sound_that_is_longer_changes_nothing(tmp_path, name):
+    codec = "mpeg2video" if name.endswith("mpg") else "mpeg4"
+    path = written(tmp_path / name, codec, 30, reordered=2, sound=True)
+    source = open_source(path)
+    assert [frame.t_ns for frame in source.frames()] == at_rate(30)
+    assert source.count == COUNT
+
+
+@pytest.mark.parametrize("name", ["clip.avi", "clip.mp4", "clip.ts", "clip.mkv"])
+@pytest.mark.parametrize("reordered", [0, 2])
+def test_a_rate_that_varies_is_followed(tmp_path, name, reordered):
+    numbers = [n for n in range(45) if n % 5 != 3]
+    path = written(tmp_path / name, "mpeg4", 30, reordered=reordered, numbers=numbers)
+    times = times_of(path)
+    step = np.subtract(times, at_rate(30, numbers))
+    # AVI has no time for the last ones
+    settled = step[: -reordered - 1] if reordered and name.endswith("avi") else step
+    assert np.abs(settled).max() <= 10**6
+    assert all(after > before for before, after in pairwise(times))
+    assert len(times) == COUNT
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "clip.ts", "clip.avi"])
+def test_a_gap_is_told_before_the_work(tmp_path, name):
+    numbers = [n + 40 * (n >= 20) for n in range(COUNT)]
+    path = written(tmp_path / name, "mpeg4", 30, numbers=numbers)
+    (told,) = open_source(path).doubts
+    assert told.startswith(f"{path}: no frame for 1.36666666")
+    assert "between frames 19 and 20; usual are 0.03333333" in told
+    assert open_source(path, fps=30).doubts == []
+
+
+@pytest.mark.parametrize("name", ["clip.ts", "clip.mpg"])
+def test_files_that_were_joined_say_where(tmp_path, name):
+    part = written(tmp_path / name, "mpeg2video", 30, reordered=2)
+    part.write_bytes(part.read_bytes() * 2)
+    with pytest.raises(
+        DataError, match=rf"{name}: times begin again near frame 3[678]: .*give --fps"
+    ):
+        open_source(part)
+    assert times_of(part, fps=30) == at_rate(30, range(2 * COUNT))
+    assert len(times_of(part, stop_s=1)) == 31
+
+
+@pytest.mark.parametrize("name", ["clip.mpg", "clip.ts", "clip.avi"])
+def test_times_for_frames_that_no_header_counts(tmp_path, name):
+    path = written(tmp_path / name, "mpeg2video", 30, reordered=2)
+    times = tmp_path / "t.txt"
+    for count in (COUNT, COUNT - 1):
+        times.write_text("".join(f"{n}.5\n" for n in range(count)))
+        if count == COUNT:
+            assert times_of(path, timestamps=times)[-1] == 35_500_000_000
+        else:
+            with pytest.raises(DataError, match=rf"{name}: 35 times given for 36 frames"):
+                open_source(path, timestamps=times)
