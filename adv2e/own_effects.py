@@ -17,6 +17,7 @@ from adv2e.effects import STAGES
 from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError
 from adv2e.parameters import Section
+from adv2e.regular import read_text_bytes
 
 METHODS = ("light", "gain", "drive", "signal", "thresholds", "inject", "events")
 """The methods of which an effect overrides one at least."""
@@ -33,7 +34,7 @@ def load_effects(path: str | Path) -> list[type[Hooks]]:
     """
     path = Path(path)
     try:
-        source = path.read_bytes()
+        source = read_text_bytes(path, ConfigError)
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}") from None
     digest = hashlib.sha256(source).hexdigest()

@@ -37,6 +37,7 @@ from adv2e.overlap import worker_pool
 from adv2e.pixel import PixelArray, thread_count
 from adv2e.sources.base import check_values
 from adv2e.stepping import PRECISE, Coarseness
+from adv2e.ticks import check_time
 
 
 def simulate(
@@ -125,6 +126,7 @@ class _Raw:
             raise DataError(f"frame {number}: has no time (there are fewer times)") from None
         if not math.isfinite(t_s):
             raise DataError(f"frame {number}: its time is {t_s}, must be a number of seconds")
+        check_time(t_s * 1e9, f"frame {number}")
         t_ns = round(t_s * 1e9)
         first = self._first
         if image.shape != first.shape or image.dtype != first.dtype:

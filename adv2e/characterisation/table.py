@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError, UsageError
+from adv2e.regular import read_text_bytes
 
 DELIMITERS = ",;\t"
 
@@ -146,7 +147,7 @@ def read_table(path: str | Path) -> Table:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text_bytes(path).decode("utf-8-sig")
     except OSError as error:
         raise DataError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.comparison.compact import compact
 from adv2e.comparison.counts import count_statistics
 from adv2e.comparison.distances import MEASURES, Distances, distances
 from adv2e.comparison.floor import Floor, half_split, two_seeds
@@ -133,8 +134,9 @@ def compare(
     times = measured.frame_times_ns if frame_times_ns is None else frame_times_ns
     windows = _windows(spans, times, window_s)
     size = (measured.width, measured.height)
-    found = distances(measured.events, simulated.events, windows, *size)
-    floors = {"half_split": half_split(measured.events, windows, *size)}
+    (ours, theirs), *kept = compact([measured.events, simulated.events], *size)
+    found = distances(ours, theirs, windows, *kept)
+    floors = {"half_split": half_split(ours, windows, *kept)}
     if again is not None:
         floors["two_seeds"] = two_seeds(
             again.simulate_events, again.seeds, measured.events, windows, *size

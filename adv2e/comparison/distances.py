@@ -14,7 +14,7 @@ import numpy as np
 
 from adv2e.comparison.grids import Grid, own_window, smoothed, voxel_grid, z_scored
 from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_errors
-from adv2e.comparison.windows import Window, Windows, cut
+from adv2e.comparison.windows import Window, Windows, cut, holding_events
 from adv2e.events import Events
 
 BINS = 5
@@ -102,9 +102,15 @@ def distances(
     """
     unit = [] if whole is None else [whole]
     per_window: dict[str, list[float | None]] = {name: [] for name in MEASURES}
-    for window in windows.used:
-        parts = [cut(events, *window) for events in (measured, simulated, *unit)]
-        for name, value in _window_distances(parts, window, width, height).items():
+    streams = (measured, simulated, *unit)
+    nothing = [events[:0] for events in streams]
+    still = _window_distances(nothing, (0, 0), 1, 1)  # the same wherever nothing fires
+    for window, fires in zip(windows.used, holding_events(windows, streams), strict=True):
+        found = still
+        if fires:
+            parts = [cut(events, *window) for events in streams]
+            found = _window_distances(parts, window, width, height)
+        for name, value in found.items():
             per_window[name].append(value)
     a, b, *c = (cut(events, windows.start, windows.stop) for events in (measured, simulated, *unit))
     errors = smoothed_errors(a, b, width, SIGMAS_US, whole=c[0] if c else None)

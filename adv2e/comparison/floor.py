@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from adv2e.comparison.distances import Distances, distances, pooled
+from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.windows import Windows
 from adv2e.events import Events
 
@@ -52,7 +52,7 @@ def half_split(
     for _ in range(splits):
         heads = coin.random(len(measured)) < 0.5
         halves = measured[heads], measured[~heads]
-        found.append(distances(*halves, windows, width, height, whole=measured))
+        found.append(distances(*halves, windows, width, height, whole=measured).values)
     return _mean(found)
 
 
@@ -83,5 +83,5 @@ def two_seeds(
     return distances(first, second, windows, width, height, whole=measured).values
 
 
-def _mean(found: Sequence[Distances]) -> Floor:
-    return {name: pooled([one.values[name] for one in found], "mean") for name in found[0].values}
+def _mean(found: Sequence[Floor]) -> Floor:
+    return {name: pooled([one[name] for one in found], "mean") for name in found[0]}

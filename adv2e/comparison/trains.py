@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.errors import DataError
 from adv2e.events import Events, pixels_of
 
 Keys = NDArray[np.int64]
@@ -27,5 +28,10 @@ def stride_of(*streams: Events, reach: int = 0) -> tuple[int, int]:
 def keys(events: Events, width: int, start: int, stride: int) -> Keys:
     """Return the key of each event, in the order of `events`."""
     pixel = pixels_of(events, width)
+    if len(pixel) and (int(pixel.max()) + 1) * stride > np.iinfo(np.int64).max:
+        raise DataError(
+            f"events {stride / 1e6:,.6g} s apart, of pixels up to {int(pixel.max()):,}, are too far"
+            " from each other to be compared: is a time wrong ('adv2e info' tells gaps)?"
+        )
     key: Keys = pixel * stride + (events["t"] - start)
     return key

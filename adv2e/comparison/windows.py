@@ -21,6 +21,9 @@ from adv2e.events import Events
 Window = tuple[int, int]
 """Start and stop [us], half open."""
 
+MOST = 1_000_000
+"""Windows of one comparison: 14 hours of the usual length."""
+
 
 @dataclass(frozen=True)
 class Windows:
@@ -52,6 +55,15 @@ def cut(events: Events, start: int, stop: int) -> Events:
     """Return the part of the sorted `events` with start <= t < stop [us], as a view."""
     first, last = np.searchsorted(events["t"], (start, stop))
     return events[first:last]
+
+
+def holding_events(windows: Windows, streams: Sequence[Events]) -> NDArray[np.bool_]:
+    """Tell of each window in use whether any of the sorted `streams` has an event in it."""
+    edges = np.array([*(start for start, _ in windows.used), windows.stop], np.int64)
+    fires = np.zeros(len(windows.used), np.bool_)
+    for events in streams:
+        fires |= np.diff(np.searchsorted(events["t"], edges)) > 0
+    return fires
 
 
 def span_of(events: Events, frame_times_ns: NDArray[np.int64] | None = None) -> Window | None:
@@ -98,10 +110,16 @@ def fixed_windows(length_us: int, spans: Sequence[Window]) -> Windows:
     Raises
     ------
     DataError
-        The spans have no whole window in common.
+        The spans have no whole window in common, or more than `MOST`.
     """
     first, last = _common(spans)
     starts = range(first, last - length_us + 1, length_us)
+    if len(starts) > MOST:
+        raise DataError(
+            f"the streams share {(last - first) / 1e6:,.6g} s, which are {len(starts):,} windows of"
+            f" {length_us / 1e6:g} s; {MOST:,} are the most: 'adv2e info' tells gaps that a wrong"
+            " time makes; else give longer windows with --window"
+        )
     windows = [(start, start + length_us) for start in starts]
     return _inside(f"windows of {length_us / 1e6:g} s", windows, spans)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from adv2e.config.yaml12 import Origin, Value, parse
 from adv2e.errors import ConfigError
+from adv2e.regular import read_text_bytes
 
 
 def shipped_folder() -> Path:
@@ -60,7 +61,7 @@ def read(name: str | Path) -> Value:
     """
     path = find(name)
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_text_bytes(path, ConfigError).decode("utf-8-sig")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:

@@ -126,6 +126,17 @@ _SCALARS: dict[str, Callable[[str], Scalar]] = {
 }
 
 
+_MOST = 100_000
+"""Values of one document."""
+
+
+def _parts(node: yaml.Node) -> list[yaml.Node]:
+    """Return the nodes of the values in a list or mapping."""
+    if isinstance(node, yaml.MappingNode):
+        return [value for _, value in node.value]
+    return list(node.value) if isinstance(node, yaml.SequenceNode) else []
+
+
 class _Builder:
     """Turns YAML nodes into :class:`Value` trees."""
 
@@ -133,6 +144,7 @@ class _Builder:
         self.origin = origin
         self.done: dict[int, Value] = {}
         self.open: set[int] = set()
+        self.sizes: dict[int, int] = {}
 
     def place(self, node: yaml.Node) -> Origin:
         """Return the place of `node`; a command line has no lines."""
@@ -155,6 +167,11 @@ class _Builder:
             content = [self.build(item, f"{path}[{n}]") for n, item in enumerate(node.value)]
         else:
             content = self.scalar(node, path)
+        self.sizes[key] = size = 1 + sum(self.sizes[id(part)] for part in _parts(node))
+        if size > _MOST:
+            raise self.place(node).complaint(
+                path, f"over {_MOST:,} values, aliases (*) counted where they stand: write fewer"
+            )
         text = node.value if isinstance(node, yaml.ScalarNode) else ""
         self.done[key] = Value(content, self.place(node), text)
         return self.done[key]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.events import Events, pixels_of
 from adv2e.sources.times import seconds
@@ -87,15 +88,27 @@ def _gaps(events: Events) -> str:
 
 
 def _hot(events: Events, width: int, height: int) -> str:
-    counts = np.bincount(pixels_of(events, width))
-    usual = np.quantile(np.pad(counts, (0, width * height - len(counts))), 0.999)
-    hot = np.flatnonzero(counts > HOT_FACTOR * max(usual, 1.0))
+    # of the pixels that fired, as a sensor may be stated to be of any size
+    pixels, counts = np.unique(pixels_of(events, width), return_counts=True)
+    hot = np.flatnonzero(counts > HOT_FACTOR * max(_quantile(counts, width * height, 0.999), 1.0))
     if not len(hot):
         return ""
     top = hot[np.argsort(-counts[hot], kind="stable")][:HOT_LISTED]
-    listed = ", ".join(f"({i % width}, {i // width}): {counts[i]:,} events" for i in top)
+    listed = ", ".join(
+        f"({pixels[i] % width}, {pixels[i] // width}): {counts[i]:,} events" for i in top
+    )
     more = f" and {len(hot) - len(top):,} more" if len(hot) > len(top) else ""
     return f"{_number_of(len(hot), 'hot pixel')} (x, y): {listed}{more}"
+
+
+def _quantile(counts: NDArray[np.int64], pixels: int, share: float) -> float:
+    """Return a quantile of the counts of so many pixels, of which all others have none."""
+    ordered = np.sort(counts)
+    place = share * (pixels - 1)
+    below = int(place)
+    ranks = np.array([below, min(below + 1, pixels - 1)]) - (pixels - len(counts))
+    low, high = np.where(ranks >= 0, ordered[np.maximum(ranks, 0)], 0)
+    return float(low + (high - low) * (place - below))
 
 
 def _number_of(count: int, what: str) -> str:

@@ -15,9 +15,11 @@ from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.inspection.frames import describe_times
 from adv2e.names import shown
 from adv2e.recordings import Recording, read_recording
+from adv2e.regular import check_ends
 from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
 from adv2e.sources.base import Light
 from adv2e.sources.rates import Rate
+from adv2e.zips import UNREADABLE
 
 EVENTS = "events.txt"
 """The file of events in a DAVIS240C folder or zip."""
@@ -52,6 +54,7 @@ def inspect(
     DataError
         The file is missing, of an unknown kind, or cannot be read.
     """
+    check_ends(path)
     if _has_only_frames(path):
         return _of_source(
             open_source(path, fps=fps, timestamps=timestamps, allow_damaged=allow_damaged)
@@ -73,7 +76,7 @@ def _members(path: Path) -> set[str]:
     try:
         with zipfile.ZipFile(path) as archive:
             return {PurePosixPath(name).name for name in archive.namelist()}
-    except (OSError, zipfile.BadZipFile):
+    except UNREADABLE:
         return set()
 
 

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from adv2e.errors import DataError
 from adv2e.recordings.base import Recording
+from adv2e.regular import check_ends
 
 __all__ = ["Recording", "read_recording"]
+
+MOST_PIXELS = 1 << 25
+"""Pixels of the largest sensor: 8192x4096."""
 
 _SUFFIXES = (".txt", ".zip", ".h5", ".hdf5", ".npz")
 
@@ -34,9 +40,29 @@ def read_recording(path: str | Path) -> Recording:
     """
     path = Path(path)
     try:
-        return _read(path)
+        check_ends(path)
+        recording = _read(path)
     except OSError as error:
         raise DataError(f"{path}: cannot be read: {error.strerror or error}") from error
+    _check_size(recording)
+    return recording
+
+
+def _check_size(recording: Recording) -> None:
+    """Refuse sensors too large to make a picture of, as one stray coordinate makes them."""
+    width, height, events = recording.width, recording.height, recording.events
+    if width * height <= MOST_PIXELS:
+        return
+    why = "is stated"
+    if events.size and (int(events["x"].max()) + 1, int(events["y"].max()) + 1) == (width, height):
+        far = events[int(np.argmax(np.maximum(events["x"], events["y"])))]
+        why = (
+            f"the event at {far['t'] / 1e6:.6f} s, x {far['x']}, y {far['y']} needs; if it is"
+            " wrong, state the size, and what lies outside is left out"
+        )
+    raise DataError(
+        f"{recording.path}: a sensor of {width}x{height} pixels, over {MOST_PIXELS:,}, {why}"
+    )
 
 
 def _read(path: Path) -> Recording:
@@ -69,14 +95,10 @@ def _check_there(path: Path) -> None:
 
 
 def _read_hdf5(path: Path) -> Recording:
-    import h5py  # noqa: PLC0415
+    from adv2e.recordings import hdf5, monash  # noqa: PLC0415
 
-    from adv2e.recordings import monash  # noqa: PLC0415
-
-    if not h5py.is_hdf5(path):
-        raise DataError(f"{path}: not an HDF5 file")
-    with h5py.File(path, "r") as file:
-        if all(isinstance(file.get(name), h5py.Dataset) for name in monash.COLUMNS):
+    with hdf5.opened(path) as file:
+        if all(hdf5.find(file, name) is not None for name in monash.COLUMNS):
             return monash.read_monash(path, file)
     raise DataError(
         f"{path}: unknown HDF5 layout, must be monash (datasets {', '.join(monash.COLUMNS)})"

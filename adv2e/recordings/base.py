@@ -14,6 +14,9 @@ from adv2e.events import Events
 from adv2e.sources.base import RECORDED, Frame, Image, Light, Pixels, as_pixels, odd_white
 from adv2e.sources.stored import light_stored
 
+MOST_COLUMNS = 1 << 16
+"""Columns and rows that coordinates of events can name."""
+
 
 def _no_images() -> Iterator[Image | Pixels]:
     return iter(())
@@ -95,7 +98,7 @@ def parse_description(text: str, label: str, problems: list[str]) -> dict[str, A
     """Return what a file of ours says of itself; if that is broken, {} and a problem."""
     try:
         description = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         description = None
     if isinstance(description, dict):
         return description
@@ -106,6 +109,8 @@ def parse_description(text: str, label: str, problems: list[str]) -> dict[str, A
 def described_geometry(description: dict[str, Any]) -> tuple[int, int] | None:
     """Return (width, height) [pixels] that a description holds, or None."""
     width, height = description.get("width"), description.get("height")
-    if isinstance(width, int) and isinstance(height, int) and width > 0 and height > 0:
-        return width, height
-    return None
+    if not (isinstance(width, int) and isinstance(height, int)):
+        return None
+    return (
+        (width, height) if min(width, height) > 0 and max(width, height) <= MOST_COLUMNS else None
+    )

@@ -13,9 +13,7 @@ References
 from __future__ import annotations
 
 import zipfile
-import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import IO, Any, Protocol
 
@@ -29,6 +27,7 @@ from adv2e.recordings.text import gather_lines
 from adv2e.sources.base import Pixels
 from adv2e.sources.opencv import decode_image
 from adv2e.sources.times import parse_list
+from adv2e.zips import open_member, zip_archive
 
 EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
 
@@ -73,7 +72,7 @@ class _Archive:
         return f"{self._path}: {self._top}{name}"
 
     def open(self, name: str) -> IO[bytes]:
-        return self._archive.open(self._top + name)
+        return open_member(self._archive, self._top + name)
 
 
 def read_folder(path: Path) -> Recording:
@@ -98,23 +97,14 @@ def read_zip(path: Path) -> Recording:
     DataError
         As :func:`read_folder`; or not a zip archive, or damaged.
     """
-    with _opened(path) as archive:
+    with zip_archive(path) as archive:
         top, name = _events_member(path, archive)
 
         def images(names: list[str]) -> Iterator[Pixels]:
-            with _opened(path) as again:
+            with zip_archive(path) as again:
                 yield from _images(_Archive(path, again, top), names)
 
         return _read(_Archive(path, archive, top), path, name, images)
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            yield archive
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        raise DataError(f"{path}: not a zip archive that can be read: {error}") from error
 
 
 def _events_member(path: Path, archive: zipfile.ZipFile) -> tuple[str, str]:

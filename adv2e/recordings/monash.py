@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.recordings.base import Recording, described_geometry, parse_description
+from adv2e.recordings import hdf5
+from adv2e.recordings.base import MOST_COLUMNS, Recording, described_geometry, parse_description
 from adv2e.recordings.gather import Gatherer
 from adv2e.sources.base import Image
-from adv2e.sources.times import seconds_to_ns
+from adv2e.ticks import NS, US, S, to_ticks
 
 COLUMNS = ("events/ts", "events/xs", "events/ys", "events/ps")
 
@@ -31,7 +32,8 @@ def read_monash(path: Path, file: h5py.File) -> Recording:
     Raises
     ------
     DataError
-        Columns of different lengths or kinds, times that are not finite, or a broken image.
+        Columns of different lengths or kinds, times that are not finite or beyond 146 years, a
+        broken image, or something that is not in the file itself.
     """
     gatherer = Gatherer()
     _gather_events(path, file, gatherer)
@@ -39,9 +41,11 @@ def read_monash(path: Path, file: h5py.File) -> Recording:
     if "adv2e" in file.attrs:
         text = str(file.attrs["adv2e"])
         description = parse_description(text, f"{path}: attribute adv2e", gatherer.problems)
-    names = sorted(file["images"]) if "images" in file else []
-    times = np.array([_time_ns(path, file["images"], name) for name in names], np.int64)
-    geometry, whence = _geometry(file, names), "sensor_resolution"
+    images = hdf5.find(file, "images")
+    names = [f"images/{name}" for name in sorted(images)] if images is not None else []
+    found = [hdf5.dataset(file, name) for name in names]
+    times = np.array([_time_ns(f"{path}: {image.name}", image) for image in found], np.int64)
+    geometry, whence = _geometry(path, file, found), "sensor_resolution"
     if described_geometry(description):
         geometry, whence = described_geometry(description), "the attribute adv2e"
     events, width, height = gatherer.finish(geometry, whence)
@@ -59,58 +63,72 @@ def read_monash(path: Path, file: h5py.File) -> Recording:
 
 
 def _gather_events(path: Path, file: h5py.File, gatherer: Gatherer) -> None:
-    columns = [file[name] for name in COLUMNS]
+    columns = [hdf5.dataset(file, name) for name in COLUMNS]
     if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
-        shapes = ", ".join(f"{name} {file[name].shape}" for name in COLUMNS)
+        shapes = ", ".join(
+            f"{name} {column.shape}" for name, column in zip(COLUMNS, columns, strict=True)
+        )
         raise DataError(f"{path}: columns must be of one length, got {shapes}")
     for name, column, kinds in zip(COLUMNS, columns, ("fiu", "iu", "iu", "biuf"), strict=True):
         if column.dtype.kind not in kinds:
             raise DataError(f"{path}: {name} must hold numbers, not {column.dtype}")
+    hdf5.check_stored(columns, f"{path}: events")
+    unit_ns = US if columns[0].dtype.kind in "iu" else S
     for begin in range(0, columns[0].size, _PART):
         t, x, y, p = (column[begin : begin + _PART] for column in columns)
-        gatherer.add(_microseconds(path, t), x, y, p.astype(np.int8))
-    if columns[0].size and columns[0].dtype.kind in "iu":
+        gatherer.add(to_ticks(t, unit_ns, US, f"{path}: events/ts"), x, y, _signs(p))
+    if columns[0].size and unit_ns == US:
         gatherer.problems.append("times are whole numbers: taken as microseconds")
 
 
-def _microseconds(path: Path, t: NDArray[Any]) -> NDArray[np.int64]:
-    if t.dtype.kind in "iu":
-        return t.astype(np.int64)
-    if not np.all(np.isfinite(t)):
-        raise DataError(f"{path}: events/ts holds NaN or infinite times")
-    whole = np.floor(t.astype(np.float64))
-    # the fraction is exact in float64, while t * 1e6 would round a second time
-    part = np.rint((t - whole) * 1e6)
-    return whole.astype(np.int64) * 1_000_000 + part.astype(np.int64)
+def _signs(p: NDArray[Any]) -> NDArray[np.int8]:
+    """Return polarities in 8 bits; those that do not fit keep their sign, and stay odd."""
+    if p.dtype.kind == "b":
+        return p.astype(np.int8)
+    if p.dtype.kind == "u":  # -1 without a sign
+        p = p.view(p.dtype.str.replace("u", "i"))
+    signs: NDArray[np.int8] = np.clip(np.nan_to_num(p, nan=-2.0), -2, 2).astype(np.int8)
+    return signs
 
 
-def _geometry(file: h5py.File, names: list[str]) -> tuple[int, int] | None:
+def _geometry(path: Path, file: h5py.File, images: list[h5py.Dataset]) -> tuple[int, int] | None:
     """Return (width, height) as the attribute or the first image has it."""
     stated = np.atleast_1d(file.attrs.get("sensor_resolution", ()))
     if stated.size >= 2 and stated.dtype.kind in "iuf" and np.all(stated[:2] > 0):
+        if not np.all(stated[:2] <= MOST_COLUMNS):
+            raise DataError(f"{path}: sensor_resolution is {stated[:2]}, must be rows and columns")
         return int(stated[1]), int(stated[0])
-    if names:
-        rows, columns = file["images"][names[0]].shape[:2]
+    if images:
+        rows, columns = _pixels(path, images[0])[:2]
         return columns, rows
     return None
 
 
-def _time_ns(path: Path, images: h5py.Group, name: str) -> int:
-    attributes = images[name].attrs
-    if "timestamp_ns" in attributes:
-        return int(attributes["timestamp_ns"])
-    try:
-        return int(seconds_to_ns(np.array([float(attributes["timestamp"])]))[0])
-    except (KeyError, ValueError, TypeError):
-        raise DataError(f"{path}: images/{name} has no attribute timestamp [s]") from None
+def _pixels(path: Path, image: h5py.Dataset) -> tuple[int, ...]:
+    """Return the shape of an image; DataError if it is none."""
+    shape = tuple(image.shape)
+    if len(shape) not in (2, 3) or (len(shape) == 3 and shape[2] not in (1, 3)) or 0 in shape:
+        raise DataError(f"{path}: {image.name[1:]} is no image, but of shape {shape}")
+    if image.dtype.kind not in "uif":
+        raise DataError(f"{path}: {image.name[1:]} is no image, but of {image.dtype}")
+    return shape
+
+
+def _time_ns(label: str, image: h5py.Dataset) -> int:
+    for name, unit_ns in (("timestamp_ns", NS), ("timestamp", S)):
+        if name in image.attrs:
+            stamp = np.asarray(image.attrs[name])
+            if stamp.size == 1 and stamp.dtype.kind in "iuf":
+                return int(to_ticks(stamp.reshape(1), unit_ns, NS, f"{label}: {name}")[0])
+    raise DataError(f"{label} has no attribute timestamp [s]")
 
 
 def _images(path: Path, names: list[str]) -> Iterator[Image]:
-    with h5py.File(path, "r") as file:
+    with hdf5.opened(path) as file:
         for name in names:
-            image = np.asarray(file["images"][name][()])
-            if image.ndim == 3 and image.shape[2] == 1:
-                image = image[..., 0]
-            if image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
-                raise DataError(f"{path}: images/{name} is no image, but of shape {image.shape}")
-            yield np.ascontiguousarray(image[..., ::-1]) if image.ndim == 3 else image
+            found = hdf5.dataset(file, name)
+            shape = _pixels(path, found)
+            image = hdf5.read_all(found, f"{path}: {name}")
+            if len(shape) == 3:
+                image = image[..., 0] if shape[2] == 1 else image[..., ::-1]
+            yield np.ascontiguousarray(image)

@@ -16,8 +16,6 @@ polarity   p, ps, pol(arity)       ON above 0
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -26,8 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
+from adv2e.npy import read_array
 from adv2e.recordings.base import Recording, described_geometry, parse_description
 from adv2e.recordings.gather import Gatherer
+from adv2e.ticks import NS, US, S, to_ticks
+from adv2e.zips import open_member, zip_archive
 
 _NAMES = {
     "time": ("t_us", "t_ns", "t", "ts", "time", "times", "timestamp", "timestamps"),
@@ -35,6 +36,8 @@ _NAMES = {
     "y": ("y", "ys"),
     "polarity": ("p", "ps", "pol", "polarity"),
 }
+
+_BEYOND = 1 << 31
 
 
 def read_npz(path: Path) -> Recording:
@@ -56,7 +59,9 @@ def read_npz(path: Path) -> Recording:
     x, y, p = (_whole(path, *columns[name]) for name in ("x", "y", "polarity"))
     gatherer.add(t, x, y, p)
     sizes: dict[str, Any] = {
-        name: arrays[name].item() for name in ("width", "height") if name in arrays
+        name: arrays[name].item()
+        for name in ("width", "height")
+        if name in arrays and arrays[name].size == 1
     }
     geometry = described_geometry(description) or described_geometry(sizes)
     events, width, height = gatherer.finish(geometry, "the file")
@@ -72,13 +77,14 @@ def read_npz(path: Path) -> Recording:
 
 
 def _load(path: Path) -> dict[str, NDArray[Any]]:
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError) as error:
-        # NumPy's advice for what is no archive at all is to load it unsafely
-        why = "" if "pickle" in str(error) else f": {error}"
-        raise DataError(f"{path}: not a NumPy archive that can be read{why}") from error
+    arrays = {}
+    with zip_archive(path, "a NumPy archive") as archive:
+        for member in archive.infolist():
+            name, suffix = member.filename[:-4], member.filename[-4:]
+            if suffix == ".npy":
+                with open_member(archive, member) as file:
+                    arrays[name] = read_array(file, member.file_size, f"{path}: {name}")
+    return arrays
 
 
 def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[str, NDArray[Any]]]:
@@ -103,26 +109,18 @@ def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[
 
 
 def _microseconds(path: Path, name: str, t: NDArray[Any], problems: list[str]) -> NDArray[np.int64]:
-    if t.dtype.kind == "f":
-        if not np.all(np.isfinite(t)):
-            raise DataError(f"{path}: {name} holds NaN or infinite times")
-        scale = {"t_us": 1.0, "t_ns": 1e-3}.get(name, 1e6)
-        whole = np.floor(t.astype(np.float64))
-        part = np.rint((t - whole) * scale)
-        return np.rint(whole * scale).astype(np.int64) + part.astype(np.int64)
-    t = _whole(path, name, t)
-    if name == "t_ns":
-        return (t + 500) // 1000
-    if name != "t_us":
+    unit_ns = {"t_us": US, "t_ns": NS}.get(name, S if t.dtype.kind == "f" else US)
+    if name not in ("t_us", "t_ns") and unit_ns == US:
         problems.append(f"{name} holds whole numbers: taken as microseconds")
-    return t
+    return to_ticks(t, unit_ns, US, f"{path}: {name}")
 
 
 def _whole(path: Path, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
     """Return a column of whole numbers, whatever their type."""
     if column.dtype.kind not in "biuf":
         raise DataError(f"{path}: {name} must hold numbers, not {column.dtype}")
-    whole = column.astype(np.int64)
-    if column.dtype.kind == "f" and not np.array_equal(whole, column):
+    if column.dtype.kind == "f" and not np.array_equal(np.floor(column), column):
         raise DataError(f"{path}: {name} must hold whole numbers")
+    # beyond any sensor, and within 64 bits whatever the type
+    whole: NDArray[np.int64] = np.clip(column, -_BEYOND, _BEYOND).astype(np.int64)
     return whole

@@ -9,7 +9,9 @@ microsecond, so that 1.47e9 s loses nothing.  A first line of two numbers is the
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,9 +22,13 @@ from adv2e.jit import entry, kernel
 from adv2e.recordings.base import Recording, described_geometry, parse_description
 from adv2e.recordings.gather import Gatherer
 from adv2e.sources.times import WHOLE
+from adv2e.ticks import LARGEST_NS, US, check_us
 
 _BLOCK = 1 << 22  # bytes read at once
 _SECONDS, _MICROSECONDS = 6, 0  # decimals that make a microsecond
+
+_SIZE = re.compile(rb"0{0,9}[1-9][0-9]{0,4}")
+_HOLDS = re.compile(rb"[\x00-\x20]*[^\x00-\x20#]")
 
 _MALFORMED, _WHOLE, _ROUNDED = -1, 0, 1
 
@@ -219,6 +225,10 @@ def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer) -> tuple[int, 
         count, lines, wrong = parse_lines(data, decimals, *columns)
         if wrong:
             raise _malformed(data.tobytes(), label, before, wrong)
+        late = np.flatnonzero(np.abs(columns[0][:count]) > LARGEST_NS // US)
+        if late.size:
+            line = before + _line_of(data.tobytes(), int(late[0]))
+            check_us(columns[0][late[:1]], f"{label} line {line}")
         gatherer.add(*(column[:count] for column in columns))
         before += lines
     if before and decimals == _MICROSECONDS:
@@ -249,10 +259,16 @@ def _header(block: bytes) -> tuple[tuple[int, int] | None, int, int]:
         fields = block[at:end].split()
         at, lines = min(end + 1, len(block)), lines + 1
         if fields and not fields[0].startswith(b"#"):
-            if len(fields) == 2 and all(field.isdigit() and int(field) for field in fields):
+            if len(fields) == 2 and all(_SIZE.fullmatch(field) for field in fields):
                 return (int(fields[0]), int(fields[1])), at, lines
             break
     return None, begin, 0
+
+
+def _line_of(data: bytes, event: int) -> int:
+    """Return the number of the line, from 1, that holds an event, from 0."""
+    lines = (n for n, line in enumerate(data.split(b"\n"), 1) if _HOLDS.match(line))
+    return next(islice(lines, event, None))
 
 
 def _malformed(data: bytes, label: str, before: int, wrong: int) -> DataError:

@@ -21,6 +21,9 @@ from adv2e.sinks.staging import check_apart
 if TYPE_CHECKING:
     from adv2e.recordings import Recording
 
+MOST_PICTURES = 400_000
+"""Pictures of a film: 3.7 hours of the usual rate."""
+
 _CHUNK = 1 << 18  # events handed on at once where no frames divide them
 
 
@@ -85,6 +88,11 @@ def render_recording(
         if not frames and recording.events.size:
             last_us = min(last_us, int(recording.events["t"][-1]))
         instants = instants or _instants(first_us, last_us, count)
+    elif (until_us - first_us) * 1e-6 * fps / speed > MOST_PICTURES:
+        raise DataError(
+            f"{lasts}, of which a film has over {MOST_PICTURES:,} pictures; 'adv2e info' tells gaps"
+            " that a wrong time makes; else choose a part with --start and --stop, or --speed"
+        )
     with Preview(
         path,
         recording.width,

@@ -6,6 +6,7 @@ import importlib
 from pathlib import Path
 
 from adv2e.errors import DataError
+from adv2e.regular import check_ends
 from adv2e.sources.base import Frame, GivenTimes, Selection, Source
 from adv2e.sources.rates import Rate
 
@@ -70,6 +71,10 @@ def open_source(
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")
     named, path = str(path), Path(path)
+    try:
+        check_ends(path)
+    except OSError as error:
+        raise DataError(f"{named}: {error.strerror or error}") from error
     if not path.exists():
         raise DataError(f"{named}: no such file or folder{_advice(named)}")
     opener = importlib.import_module(_opener(path))

@@ -22,6 +22,7 @@ from adv2e.effects.frames.encoding import encoding_of_images, full_scale_of
 from adv2e.errors import DataError, UsageError
 from adv2e.sources.rates import Rate, parse_rate
 from adv2e.sources.times import NS_PER_S, FrameRate, seconds
+from adv2e.ticks import check_time
 
 Image = NDArray[Any]
 """(rows, columns) or (rows, columns, 3) RGB; uint8, uint16, float32 or float64."""
@@ -309,6 +310,7 @@ class Source(ABC):
         origin: int | None = None
         yielded = 0
         for shot in self.shots():
+            check_time(shot.t_ns, shot.label)
             first = first or shot
             if previous is not None and shot.t_ns <= previous.t_ns:
                 raise DataError(

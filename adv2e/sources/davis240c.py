@@ -13,7 +13,6 @@ References
 from __future__ import annotations
 
 import zipfile
-import zlib
 from functools import partial
 from pathlib import Path, PurePosixPath
 
@@ -23,11 +22,9 @@ from adv2e.sources.listed import ListedSource, Picture, given_shots
 from adv2e.sources.opencv import decode_image, read_image
 from adv2e.sources.stored import DESCRIPTION, MOST_BYTES, light_beside, read_light
 from adv2e.sources.times import Stamp, parse_list, read_text
+from adv2e.zips import UNREADABLE, open_member
 
 LIST = "images.txt"
-
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, UnicodeDecodeError, RuntimeError, OSError)
-"""What zipfile raises for archives that are damaged, encrypted or packed in an unknown way."""
 
 
 def is_recording(folder: Path) -> bool:
@@ -70,8 +67,9 @@ def _open_zip(path: Path, given: GivenTimes, selection: Selection) -> ListedSour
         archive = zipfile.ZipFile(path)  # stays open as long as its members may be read
         names = set(archive.namelist())
         listed = _list_in(path, names)
-        text = archive.read(listed).decode("utf-8-sig")
-    except _UNREADABLE as error:
+        with open_member(archive, listed) as file:
+            text = file.read().decode("utf-8-sig")
+    except UNREADABLE as error:
         raise DataError(f"{path}: not a zip that can be read, or damaged") from error
     label = f"{path}: {listed}"
     stamps, unit = parse_list(text, label)
@@ -108,15 +106,16 @@ def _light_in(archive: zipfile.ZipFile, member: str, path: Path) -> Light | None
     try:
         with archive.open(member) as file:
             text = file.read(MOST_BYTES + 1)
-    except _UNREADABLE as error:
+    except UNREADABLE as error:
         raise DataError(f"{label}: cannot be read from the zip, or damaged") from error
     return read_light(text, label)
 
 
 def _read_member(archive: zipfile.ZipFile, member: str, label: str) -> Pixels:
     try:
-        data = archive.read(member)
-    except _UNREADABLE as error:
+        with open_member(archive, member) as file:
+            data = file.read()
+    except UNREADABLE as error:
         raise DataError(f"{label}: cannot be read from the zip, or damaged") from error
     return decode_image(data, label)
 

@@ -7,17 +7,24 @@ Frames are read one by one.  Times come from the command line or from beside the
 from __future__ import annotations
 
 import math
+import os
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
+from adv2e.npy import Header, read_array, read_header
 from adv2e.sources.base import GivenTimes, Image, Light, Selection
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
-from adv2e.sources.times import Stamp, parse_times, read_text, seconds_to_ns
+from adv2e.sources.times import Stamp, parse_times, read_text
+from adv2e.ticks import NS, S, to_ticks
+
+_BLOCK_BYTES = 16 << 20
+"""Memory for frames whose pixels are strewn over the file."""
 
 _LIGHT = Light("linear", "a .npy stack")
 
@@ -33,8 +40,8 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     stack = _open_stack(path)
     found = _found_times(path)
     pictures = [
-        Picture(f"{path}: frame {number}", None, partial(_read, path, stack, number))
-        for number in range(stack.shape[0])
+        Picture(f"{path}: frame {number}", None, partial(stack.read, number))
+        for number in range(stack.count)
     ]
     if not pictures:
         raise DataError(f"{path}: no frames in it; at least two are needed")
@@ -55,40 +62,85 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     return source
 
 
-def _open_stack(path: Path) -> np.memmap[Any, Any]:
+def _open_stack(path: Path) -> _Stack:
     try:
-        stack: np.memmap[Any, Any] = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        raise DataError(f"{path}: not a .npy array that can be read, or cut short") from error
-    shape = stack.shape
-    if not (stack.ndim == 3 or (stack.ndim == 4 and shape[3] == 3)) or 0 in shape[1:]:
+        with path.open("rb") as file:
+            header = read_header(file, os.fstat(file.fileno()).st_size, str(path))
+    except OSError as error:
+        raise DataError(f"{path}: {error.strerror or error}") from error
+    shape = header.shape
+    if len(shape) not in (3, 4) or (len(shape) == 4 and shape[3] != 3) or 0 in shape[1:]:
         raise DataError(
             f"{path}: an array of shape {shape}; expected (frames, rows, columns) or (frames, rows,"
             " columns, 3)"
         )
     try:
-        full_scale_of(stack.dtype)
+        full_scale_of(header.dtype)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
-    return stack
+    return _Stack(path, header)
 
 
-def _read(path: Path, stack: np.memmap[Any, Any], number: int) -> Image:
-    """Return a frame in the machine's byte order."""
-    native = stack.dtype.newbyteorder("=")
-    if not stack.flags.c_contiguous:  # frame by frame, it is all over the file
-        return np.array(stack[number], dtype=native, order="C")
-    # not through the mapping: what was read of it would count as memory of this process
-    shape = stack.shape[1:]
-    pixels = math.prod(shape)
-    offset = stack.offset + number * pixels * stack.itemsize
-    try:
-        image = np.fromfile(path, stack.dtype, pixels, offset=offset)
-    except OSError as error:
-        raise DataError(f"{path}: frame {number}: {error.strerror or error}") from error
-    if image.size < pixels:
-        raise DataError(f"{path}: frame {number}: cut short while it was read")
-    return image.reshape(shape).astype(native, copy=False)
+class _Stack:
+    """The frames of a file, read one by one.
+
+    Not through a mapping: what was read of it would count as memory of this process, and a file
+    that is cut short meanwhile would end the program.
+    """
+
+    def __init__(self, path: Path, header: Header) -> None:
+        self.count, *self._shape = header.shape
+        self._path, self._header = path, header
+        self._pixels = math.prod(self._shape)
+        self._block: tuple[range, NDArray[Any]] = range(0), np.empty(0)
+
+    def read(self, number: int) -> Image:
+        """Return a frame in the machine's byte order; DataError if it is not there."""
+        header, label = self._header, f"{self._path}: frame {number}"
+        try:
+            if header.fortran:
+                image = self._strewn(number, label)
+            else:
+                image = self._run(number * self._pixels, self._pixels, label)
+        except OSError as error:
+            raise DataError(f"{label}: {error.strerror or error}") from error
+        shaped = image.reshape(self._shape, order="F" if header.fortran else "C")
+        return np.require(shaped, header.dtype.newbyteorder("="), ["C"])
+
+    def _run(self, first: int, count: int, label: str) -> NDArray[Any]:
+        dtype = self._header.dtype
+        found = np.fromfile(
+            self._path, dtype, count, offset=self._header.begin + first * dtype.itemsize
+        )
+        if found.size < count:
+            raise DataError(f"{label}: cut short while it was read")
+        return found
+
+    def _strewn(self, number: int, label: str) -> NDArray[Any]:
+        """Return a frame whose pixels lie apart, each beside the same one of other frames."""
+        held, block = self._block
+        if number not in held:
+            nbytes = self._pixels * self._header.dtype.itemsize
+            together = max(1, min(self.count, _BLOCK_BYTES // nbytes))
+            held = range(number, min(number + together, self.count))
+            block = np.empty((len(held), self._pixels), self._header.dtype)
+            if len(held) == self.count:
+                block[:] = self._run(0, block.size, label).reshape(self._pixels, -1).T
+            else:
+                self._gather(held, block, label)
+            self._block = held, block
+        image: NDArray[Any] = block[number - held.start]
+        return image
+
+    def _gather(self, frames: range, block: NDArray[Any], label: str) -> None:
+        size = self._header.dtype.itemsize
+        with self._path.open("rb", buffering=0) as file:
+            for pixel in range(self._pixels):
+                file.seek(self._header.begin + (pixel * self.count + frames.start) * size)
+                found = np.frombuffer(file.read(len(frames) * size), np.uint8)
+                if found.size < len(frames) * size:
+                    raise DataError(f"{label}: cut short while it was read")
+                block[:, pixel] = found.view(self._header.dtype)
 
 
 def _found_times(path: Path) -> Path | None:
@@ -100,15 +152,14 @@ def _read_times(file: Path) -> list[Stamp]:
     if file.suffix != ".npy":
         return parse_times(read_text(file), str(file))
     try:
-        times = np.load(file, allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        raise DataError(f"{file}: not a .npy array that can be read, or cut short") from error
+        with file.open("rb") as opened:
+            times = read_array(opened, os.fstat(opened.fileno()).st_size, str(file))
+    except OSError as error:
+        raise DataError(f"{file}: {error.strerror or error}") from error
     if times.ndim != 1 or times.dtype.kind != "f" or times.dtype.itemsize < 8:
         raise DataError(
             f"{file}: {times.dtype.name} of shape {times.shape}; expected float64 seconds, one a"
             " frame"
         )
-    if not np.all(np.isfinite(times)) or np.any(np.abs(times) > 9e9):
-        raise DataError(f"{file}: times that are not finite seconds")
-    times_ns = seconds_to_ns(times.astype(np.float64)).tolist()
+    times_ns = to_ticks(times, S, NS, f"{file}").tolist()
     return [Stamp(t_ns, number, None) for number, t_ns in enumerate(times_ns)]

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
+from adv2e.regular import read_text_bytes
+from adv2e.ticks import LARGEST_NS
 
 NS_PER_S = 10**9
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
-_LARGEST_NS = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -52,13 +53,13 @@ def parse_ns(text: str, unit_ns: int = NS_PER_S) -> int:
     Raises
     ------
     ValueError
-        If the text is not a plain or scientific decimal number, or is beyond 292 years.
+        If the text is not a plain or scientific decimal number, or is beyond 146 years.
     """
     if not _NUMBER.fullmatch(text):
-        raise ValueError(f"{text!r} is not a number")
+        raise ValueError(f"{text[:40]!r} is not a number")
     t_ns = round(Fraction(Decimal(text)) * unit_ns)
-    if abs(t_ns) > _LARGEST_NS:
-        raise ValueError(f"{text!r} is out of range")
+    if abs(t_ns) > LARGEST_NS:
+        raise ValueError(f"{text[:40]!r} is out of range: over 146 years")
     return t_ns
 
 
@@ -72,7 +73,7 @@ def seconds(t_ns: int) -> str:
 def read_text(path: Path) -> str:
     """Return the text of a list of times; DataError unless it is a readable text file."""
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return read_text_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DataError(f"{path}: not a text file; one time [s] a line is expected") from error
     except OSError as error:

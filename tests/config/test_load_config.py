@@ -293,3 +293,27 @@ def test_the_annotated_form_gives_unit_and_meaning():
 def test_a_list_of_numbers_is_checked_part_by_part(value, text):
     with pytest.raises(UsageError, match=text):
         load_config(sets=[f"frames.shift_px={value}"])
+
+
+def test_aliases_within_aliases_are_counted_where_they_stand(tmp_path):
+    levels = ["a: &a [x, x, x, x, x, x, x, x, x]"]
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True):
+        levels.append(f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]")
+    path = tmp_path / "laughs.yaml"
+    path.write_text("\n".join(levels))
+    assert path.stat().st_size < 500
+    with pytest.raises(ConfigError, match=r"laughs\.yaml:6: f: over 100,000 values, aliases"):
+        load_config([path])
+
+
+@pytest.mark.parametrize("text", ["[" * 5000, "{a: " * 5000, "a:\n" + "- " * 5000, "? " * 5000])
+def test_text_nested_too_deeply(tmp_path, text):
+    (tmp_path / "deep.yaml").write_text(text)
+    with pytest.raises(ConfigError, match=r"deep\.yaml.*not YAML"):
+        load_config([tmp_path / "deep.yaml"])
+
+
+def test_numbers_of_thousands_of_digits(tmp_path):
+    (tmp_path / "long.yaml").write_text(f"seed: {'9' * 5000}\n")
+    with pytest.raises(ConfigError, match=r"long\.yaml:1: seed: '9{40}' is not a value of !!int"):
+        load_config([tmp_path / "long.yaml"])

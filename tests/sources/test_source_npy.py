@@ -88,7 +88,7 @@ def test_times_in_an_array_must_be_float64_seconds(path, tmp_path, times):
 
 @pytest.mark.parametrize(
     ("times", "message"),
-    [([0.0, np.nan, 1.0], "not finite"), ([0.0, 1.0, 1.0], "frame 2: times must increase")],
+    [([0.0, np.nan, 1.0], "NaN"), ([0.0, 1.0, 1.0], "frame 2: times must increase")],
 )
 def test_wrong_times_in_an_array(path, tmp_path, times, message):
     save(path, np.zeros((3, 2, 2), np.uint8))
@@ -126,7 +126,7 @@ def test_light_above_white_is_kept_and_told(path):
         (np.zeros((2, 0, 4), np.uint8), "expected"),
         (np.zeros((2, 4, 4), np.int64), "int64: give uint8, uint16, float32, float64"),
         (np.zeros((2, 4, 4), bool), "bool"),
-        (np.array([None, {}]), "not a .npy array"),
+        (np.array([None, {}]), "Python objects"),
     ],
 )
 def test_arrays_that_are_no_stacks(path, array, message):
@@ -139,7 +139,7 @@ def test_files_that_are_no_arrays(path, tmp_path):
     whole = save(tmp_path / "whole.npy", np.zeros((4, 8, 8), np.uint8)).read_bytes()
     for data in (b"", b"text", whole[:-20]):
         path.write_bytes(data)
-        with pytest.raises(DataError, match=r"stack\.npy: not a \.npy array"):
+        with pytest.raises(DataError, match=r"stack\.npy: (not a \.npy array|cut short)"):
             open_source(path, fps=10)
 
 

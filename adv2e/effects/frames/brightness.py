@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
+from adv2e.ticks import check_time
 
 UNSTATED = 16.0
 """Floats so many times white are refused where nobody said what white is."""
@@ -59,7 +60,7 @@ def check_floats(image: NDArray[Any], label: str, full_scale: float | None) -> N
 def bounded(
     frames: Iterator[tuple[int, NDArray[Any]]], table: NDArray[np.float32] | None
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Yield (t_ns, light) as they come, each looked at.
+    """Yield (t_ns, light) as they come, light and time of each looked at.
 
     Parameters
     ----------
@@ -71,10 +72,12 @@ def bounded(
     Raises
     ------
     DataError
-        Light that is no finite number from 0 to `BRIGHTEST` times white; names the frame.
+        Light that is no finite number from 0 to `BRIGHTEST` times white, or a time beyond what is
+        possible; names the frame.
     """
     harmless = table is not None and float(table.max()) <= BRIGHTEST * _WHITE
     for number, (t_ns, light) in enumerate(frames):
+        check_time(t_ns, f"frame {number}")
         if not harmless:
             check_light(light if table is None else table.take(light), f"frame {number}")
         yield t_ns, light

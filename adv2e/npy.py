@@ -1,0 +1,114 @@
+"""Arrays in the ``.npy`` format, of which no more is believed than is there.
+
+NumPy's own reader allocates what the header states before it looks for it, and maps files into
+memory, where one that is cut short meanwhile ends the program.
+
+References
+----------
+.. [1] NumPy, "NPY format", numpy.lib.format, https://numpy.org/neps/nep-0001-npy-format.html.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import struct
+from dataclasses import dataclass
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib.format import MAGIC_PREFIX, descr_to_dtype
+from numpy.typing import NDArray
+
+from adv2e.errors import DataError
+
+_LONGEST_HEADER = 10_000
+_LENGTHS = {b"\1\0": ("<H", "latin1"), b"\2\0": ("<I", "latin1"), b"\3\0": ("<I", "utf-8")}
+
+
+@dataclass(frozen=True)
+class Header:
+    """What stands before the numbers.
+
+    Attributes
+    ----------
+    dtype : numpy.dtype
+    shape : tuple of int
+    fortran : bool
+        The first index runs fastest.
+    begin : int
+        Where the numbers begin [bytes].
+    """
+
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+    fortran: bool
+    begin: int
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the numbers."""
+        return math.prod(self.shape) * self.dtype.itemsize
+
+
+def read_header(file: IO[bytes], available: int, label: str) -> Header:
+    """Return the header at the beginning of a binary file, which then stands behind it.
+
+    Parameters
+    ----------
+    file : binary file
+    available : int
+        Bytes in it, header included.
+    label : str
+        Its name, for messages.
+
+    Raises
+    ------
+    DataError
+        No such array, one of Python objects, or one of which a part is missing.
+    """
+    begin = file.read(len(MAGIC_PREFIX) + 2)
+    layout = _LENGTHS.get(begin[-2:])
+    if not begin.startswith(MAGIC_PREFIX) or layout is None:
+        raise DataError(f"{label}: not a .npy array that can be read")
+    try:
+        (length,) = struct.unpack(layout[0], file.read(struct.calcsize(layout[0])))
+        if length > _LONGEST_HEADER:
+            raise ValueError
+        header = _parse(file.read(length).decode(layout[1]), begin=file.tell())
+    except (
+        *(ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError),
+        *(SyntaxError, RecursionError, MemoryError, struct.error),
+    ) as error:
+        raise DataError(
+            f"{label}: not a .npy array that can be read: its header is wrong"
+        ) from error
+    if header.dtype.hasobject:
+        raise DataError(f"{label}: an array of Python objects, must be one of numbers")
+    if header.begin + header.nbytes > available:
+        raise DataError(
+            f"{label}: cut short: it holds {max(0, available - header.begin):,} bytes of an array"
+            f" of {header.nbytes:,}"
+        )
+    return header
+
+
+def _parse(text: str, begin: int) -> Header:
+    stated = ast.literal_eval(text.strip())
+    shape = stated["shape"]
+    if not isinstance(shape, tuple) or not all(type(n) is int and n >= 0 for n in shape):
+        raise ValueError
+    dtype = descr_to_dtype(stated["descr"])
+    if dtype.itemsize == 0 or type(stated["fortran_order"]) is not bool:
+        raise ValueError
+    return Header(dtype, shape, stated["fortran_order"], begin)
+
+
+def read_array(file: IO[bytes], available: int, label: str) -> NDArray[Any]:
+    """Return the array in a binary file; see :func:`read_header`."""
+    header = read_header(file, available, label)
+    data = file.read(header.nbytes)
+    if len(data) < header.nbytes:
+        raise DataError(f"{label}: cut short while it was read")
+    array = np.frombuffer(data, header.dtype, math.prod(header.shape))
+    return array.reshape(header.shape, order="F" if header.fortran else "C")

@@ -1,0 +1,70 @@
+"""Files that end: what is to be read is a file, and no pipe, device or socket that never does.
+
+Text that people hand over by the shell, ``-c <(...)`` or ``--timestamps /dev/stdin``, comes through
+descriptors that are open already; there somebody writes, and it is read to its end.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from adv2e.errors import Adv2eError, DataError
+
+_KINDS = (
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
+
+_LONGEST = 64 << 20
+"""Text that comes through a descriptor is no longer [bytes]."""
+
+
+def check_ends(path: Path, kind: type[Adv2eError] = DataError) -> None:
+    """Raise unless `path` is a file or a folder, or is missing.
+
+    Raises
+    ------
+    Adv2eError
+        Of the `kind` given: a pipe, a device, a socket, or links that lead to each other.
+    OSError
+        The file system does not say.
+    """
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        return
+    for is_kind, name in _KINDS:
+        if is_kind(mode):
+            raise kind(f"{path}: is {name}, must be a file")
+
+
+def read_text_bytes(path: Path, kind: type[Adv2eError] = DataError) -> bytes:
+    """Return what a small text file holds, or what comes through a descriptor that is open.
+
+    Raises
+    ------
+    Adv2eError
+        As :func:`check_ends`; or more than 64 MiB came.
+    OSError
+        It cannot be read.
+    """
+    if not _is_open_already(path):
+        check_ends(path, kind)
+        return path.read_bytes()
+    with path.open("rb") as file:
+        data = file.read(_LONGEST + 1)
+    if len(data) > _LONGEST:
+        raise kind(f"{path}: does not end within {_LONGEST >> 20} MiB")
+    return data
+
+
+def _is_open_already(path: Path) -> bool:
+    """Tell whether a path names a descriptor of this process, or nothing at all."""
+    if str(path) in ("/dev/stdin", os.devnull):
+        return True
+    folder = os.path.realpath(path.parent)
+    return folder == "/dev/fd" or (folder.startswith("/proc/") and folder.endswith("/fd"))
