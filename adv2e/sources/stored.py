@@ -8,7 +8,6 @@ in ``source``.
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +56,7 @@ def light_stored(description: Any, label: str) -> Light | None:
 
 def _is_white(value: Any) -> bool:
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and value > 0 and math.isfinite(value)
+    return number and 0 < value < 1e300
 
 
 def read_light(text: bytes, label: str) -> Light | None:
