@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -41,7 +43,59 @@ def test_gamma_of_sixteen_bits():
     assert np.allclose(light[0], 255 * (codes[0] / 65535) ** 2.2, rtol=1e-6, atol=0)
 
 
-@pytest.mark.parametrize("encoding", ["linear", "srgb", "gamma:2.2"])
+def camera(light, encoding):
+    """Value that stands for light in 0..1, by the other direction of the recommendations."""
+    if encoding == "bt709":
+        # the constants as BT.2020 prints them for twelve bits
+        return 4.5 * light if light < 0.0181 else 1.0993 * light**0.45 - 0.0993
+    if encoding == "hlg":  # the constants as BT.2100 prints them
+        if light <= 1 / 12:
+            return math.sqrt(3 * light)
+        return 0.17883277 * math.log(12 * light - 0.28466892) + 0.55991073
+    power = light**0.1593017578125  # pq: the constants as ST 2084 prints them
+    return ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
+
+
+@pytest.mark.parametrize("encoding", ["bt709", "hlg", "pq"])
+def test_curves_of_video_undo_those_of_the_recommendations(encoding):
+    light = np.concatenate([[0.0, 1e-5, 1e-3, 1 / 12, 1.0], np.linspace(0.002, 1, 400)])
+    values = np.array([camera(each, encoding) for each in light.tolist()])
+    decoded = decode_values(values, encoding, 1.0)
+    assert np.allclose(decoded, 255 * light, rtol=1e-3 if encoding == "bt709" else 1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "value", "share"),
+    [
+        *[("pq", 0.25, 5.1549e-4), ("pq", 0.5, 92.2457e-4), ("pq", 0.75, 983.38e-4), ("pq", 1, 1)],
+        *[("hlg", 0.5, 1 / 12), ("hlg", 0.75, 0.26496), ("hlg", 1, 1)],
+        *[("bt709", 0.5, 0.25960), ("bt709", 0.045, 0.01), ("bt709", 1, 1)],
+    ],
+)
+def test_curves_of_video_at_published_points(encoding, value, share):
+    codes = np.array([[float(value)]])
+    light = LightDecoder(encoding, 1.0, np.float64, colour=False).decode(codes)
+    assert light[0, 0] == pytest.approx(255 * share, rel=5e-4)
+
+
+@pytest.mark.parametrize("encoding", ["srgb", "bt709", "hlg", "pq", "gamma:2.2"])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_curves_rise_with_every_code(encoding, dtype):
+    codes = np.arange(np.iinfo(dtype).max + 1, dtype=dtype).reshape(256, -1)
+    light = LightDecoder(encoding, float(codes.max()), dtype, colour=False).decode(codes).ravel()
+    assert light[0] == 0
+    assert light[-1] == pytest.approx(255)
+    assert (np.diff(light) > 0).all()
+
+
+@pytest.mark.parametrize("encoding", ["bt709", "hlg", "pq"])
+def test_curves_of_video_stay_finite_far_above_white(encoding):
+    light = decode_values(np.array([1.0, 2.0, 1e9], np.float32), encoding, 1.0)
+    assert np.isfinite(light).all()
+    assert (np.diff(light) >= 0).all()
+
+
+@pytest.mark.parametrize("encoding", ["linear", "srgb", "bt709", "hlg", "pq", "gamma:2.2"])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_floats_keep_their_type_and_agree_with_whole_numbers(encoding, dtype):
     codes = np.arange(256, dtype=np.uint8).reshape(16, 16)
@@ -50,7 +104,7 @@ def test_floats_keep_their_type_and_agree_with_whole_numbers(encoding, dtype):
         codes.astype(dtype) / dtype(255)
     )
     assert light.dtype == dtype
-    assert np.allclose(light, whole, rtol=2e-6, atol=1e-6)
+    assert np.allclose(light, whole, rtol=1e-4 if encoding == "pq" else 2e-6, atol=1e-6)
 
 
 def test_float64_is_computed_in_float64():

@@ -2,22 +2,35 @@ r"""Encoding of the frames: how their numbers stand for light.
 
 ======== ====================================================================================
 linear   light = value
-srgb     light = value/12.92 up to 0.04045, ((value + 0.055)/1.055)^2.4 above
+srgb     light = value/12.92 up to 0.04045, ((value + 0.055)/1.055)^2.4 above [1]_
+bt709    light = value/4.5 below 4.5 d, ((value + e - 1)/e)^(1/0.45) above [2]_
 gamma:g  light = value^g
+hlg      light = value^2/3 up to 0.5, (exp((value - c)/a) + b)/12 above [3]_
+pq       light = (max(value^(1/m2) - c1, 0) / (c2 - c3 value^(1/m2)))^(1/m1) [3]_
 ======== ====================================================================================
 
-with value and light in 0..1 of full scale.  Colour is decoded first, each channel by itself, and
-then weighed to luma in linear light (0.2126 R + 0.7152 G + 0.0722 B).  The pixel is told
-DN = 255 light.
+with value and light in 0..1 of full scale; a = 0.17883277, b = 1 - 4a, c = 0.5 - a ln(4a);
+m1 = 2610/16384, m2 = 2523/32, c1 = 3424/4096, c2 = 2413/128, c3 = 2392/128; e = 1.0993 and
+d = 0.0181 to as many digits as make the curve smooth (1.099 and 0.018 leave a step at 0.081).
+
+bt709 and hlg are the inverse of what a camera does to the light (OETF), so that light is that of
+the scene; BT.601 and BT.2020 have the curve of BT.709.  pq is light of a display (EOTF), whose
+10000 cd/m^2 are white here: what was made for a display of 1000 reaches a tenth of it.
+
+Colour is decoded first, each channel by itself, and then weighed to luma in linear light
+(0.2126 R + 0.7152 G + 0.0722 B, whatever the primaries).  The pixel is told DN = 255 light.
 
 References
 ----------
 .. [1] IEC 61966-2-1:1999 (sRGB).
-.. [2] Recommendation ITU-R BT.709-6 (luma weights).
+.. [2] Recommendation ITU-R BT.709-6 (luma weights; opto-electronic transfer).
+.. [3] Recommendation ITU-R BT.2100-2, tables 4 (PQ, as SMPTE ST 2084) and 5 (HLG).
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -31,9 +44,17 @@ LUMA_WEIGHTS = (0.2126, 0.7152, 0.0722)
 _FULL_SCALES = {"uint8": 255.0, "uint16": 65535.0, "float32": 1.0, "float64": 1.0}
 
 
+_BT709_D, _BT709_E = 0.018053968510807, 1.09929682680944
+_HLG_A = 0.17883277
+_HLG_B = 1 - 4 * _HLG_A
+_HLG_C = 0.5 - _HLG_A * math.log(4 * _HLG_A)
+_PQ_M1, _PQ_M2 = 2610 / 16384, 2523 / 32
+_PQ_C1, _PQ_C2, _PQ_C3 = 3424 / 4096, 2413 / 128, 2392 / 128
+
+
 def check_encoding(encoding: str) -> None:
-    """Raise ConfigError unless `encoding` is auto, linear, srgb or gamma:<g> with g above 0."""
-    if encoding in ("auto", "linear", "srgb"):
+    """Raise ConfigError unless `encoding` is auto, a curve, or gamma:<g> with g above 0."""
+    if encoding == "auto" or encoding in _CURVES:
         return
     name, _, exponent = encoding.partition(":")
     try:
@@ -42,7 +63,8 @@ def check_encoding(encoding: str) -> None:
     except ValueError:
         pass
     raise ConfigError(
-        f"encoding: must be auto, linear, srgb or gamma:<g> (such as gamma:2.2), got {encoding!r}"
+        f"encoding: must be auto, {', '.join(_CURVES)} or gamma:<g> (such as gamma:2.2),"
+        f" got {encoding!r}"
     )
 
 
@@ -73,7 +95,7 @@ def decode_values(values: NDArray[Any], encoding: str, full_scale: float) -> NDA
     values : array of float32 or float64
         Encoded values, at or above zero; above `full_scale` they are kept, not clipped.
     encoding : str
-        ``linear``, ``srgb`` or ``gamma:<g>``.
+        Any but ``auto``.
     full_scale : float
         The value that means white.
     """
@@ -81,13 +103,47 @@ def decode_values(values: NDArray[Any], encoding: str, full_scale: float) -> NDA
         # multiplied first: whole numbers of 0..255 come back as they are
         return np.divide(values * 255.0, full_scale, dtype=values.dtype)
     value = np.divide(values, full_scale, dtype=values.dtype)
-    if encoding == "srgb":
-        above = ((value + 0.055) / 1.055) ** 2.4
-        light: NDArray[Any] = np.where(value <= 0.04045, value / 12.92, above)
+    if encoding in _CURVES:
+        light = _CURVES[encoding](value)
     else:
         light = np.power(value, float(encoding.partition(":")[2]), dtype=values.dtype)
     light *= 255.0
     return light
+
+
+def _linear(value: NDArray[Any]) -> NDArray[Any]:
+    return value
+
+
+def _srgb(value: NDArray[Any]) -> NDArray[Any]:
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def _bt709(value: NDArray[Any]) -> NDArray[Any]:
+    above = ((value + (_BT709_E - 1)) / _BT709_E) ** (1 / 0.45)
+    return np.where(value < 4.5 * _BT709_D, value / 4.5, above)
+
+
+def _hlg(value: NDArray[Any]) -> NDArray[Any]:
+    # floats may be above white, where the curve goes on; far above they have no light to stand for
+    above = (np.exp(np.minimum((value - _HLG_C) / _HLG_A, 80.0)) + _HLG_B) / 12
+    return np.where(value <= 0.5, value * value / 3, above)
+
+
+def _pq(value: NDArray[Any]) -> NDArray[Any]:
+    # the curve ends at white: beyond, its denominator goes through zero
+    root = np.minimum(value, 1) ** (1 / _PQ_M2)
+    return (np.maximum(root - _PQ_C1, 0) / (_PQ_C2 - _PQ_C3 * root)) ** (1 / _PQ_M1)
+
+
+_CURVES: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
+    "linear": _linear,
+    "srgb": _srgb,
+    "bt709": _bt709,
+    "pq": _pq,
+    "hlg": _hlg,
+}
+"""Light of values, both in 0..1 of white, by the name of the encoding."""
 
 
 class LightDecoder:
@@ -96,7 +152,7 @@ class LightDecoder:
     Parameters
     ----------
     encoding : str
-        ``linear``, ``srgb`` or ``gamma:<g>``; ``auto`` must be settled before.
+        Any but ``auto``, which must be settled before.
     full_scale : float
         The number that means white.
     dtype : uint8, uint16, float32 or float64
