@@ -33,6 +33,7 @@ from adv2e.simulation import events_from_light, is_compiled
 from adv2e.sinks import Sink, format_name, open_sink
 from adv2e.sinks.staging import check_apart
 from adv2e.sources.base import Source
+from adv2e.versions import versions
 
 if TYPE_CHECKING:
     from adv2e.rendering import Preview
@@ -288,6 +289,7 @@ def _metadata(
     stored = {"encoding": decoder.encoding, "full_scale": white}
     return {
         "adv2e": __version__,
+        "versions": versions(recording.packages),
         "config": to_dict(config),
         "seed": config.seed,
         **({"effects": own} if own else {}),

@@ -44,8 +44,8 @@ class Frames(Section):
     encoding: str = parameter(
         "auto",
         unit="-",
-        meaning="auto | linear | srgb | bt709 | pq | hlg | gamma:<g> (light = value^g); auto: what a"
-        " video states, else srgb for it and 8-bit colour images, linear for everything else",
+        meaning="auto | linear | srgb | bt709 | pq | hlg | gamma:<g> (light = value^g); auto: what"
+        " a video states, else srgb for it and 8-bit colour images, linear for everything else",
     )
     full_scale: float | None = parameter(
         None,

@@ -242,6 +242,8 @@ class Source(ABC):
         Things to tell the user.
     threads : int
         Threads that decoding may use; one, unless set otherwise before `frames`.
+    packages : tuple of str
+        Optional packages that decode it.
     """
 
     def __init__(self, path: Path, kind: str, selection: Selection, has_clock: bool) -> None:
@@ -254,6 +256,7 @@ class Source(ABC):
         self.notes: list[str] = []
         self.count: int | None = None
         self.threads = 1
+        self.packages: tuple[str, ...] = ()
 
     def _describe(self, first: Image | Pixels, label: str, light: Light | None = None) -> None:
         """Take geometry, data type and meaning of the numbers from the first frame.

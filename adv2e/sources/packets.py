@@ -10,12 +10,16 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import cv2
 
 from adv2e.sources.containers.base import TINY_BYTES
 from adv2e.sources.opencv import quiet
 from adv2e.sources.opening import openable
+
+if TYPE_CHECKING:
+    from adv2e.sources.pyav import PyavCapture
 
 RETRIES = 1000
 """How often the next picture may fail to come before that counts as the end."""
@@ -84,7 +88,7 @@ def list_packets(path: str) -> Packets:
     return arranged(stamps, tiny)
 
 
-def stamp_of(capture: cv2.VideoCapture) -> int | None:
+def stamp_of(capture: cv2.VideoCapture | PyavCapture) -> int | None:
     """Return the stamp of the picture just grabbed [ns]; None where OpenCV says it has none.
 
     Most that have none are at zero instead.

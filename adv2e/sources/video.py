@@ -10,12 +10,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from adv2e.errors import DataError
+from adv2e.sources import pyav
 from adv2e.sources.base import GivenTimes, Image, Selection, Shot, Source
+from adv2e.sources.choice import choose
+from adv2e.sources.colours import encoding_of, is_stated
 from adv2e.sources.containers import examine
 from adv2e.sources.gaps import gap_doubts
 from adv2e.sources.opencv import quiet, rgb_of
@@ -23,6 +27,9 @@ from adv2e.sources.opening import openable
 from adv2e.sources.packets import RETRIES, list_packets, stamp_of
 from adv2e.sources.times import parse_times, read_text, seconds
 from adv2e.sources.video_times import VideoTimes
+
+if TYPE_CHECKING:
+    Capture = cv2.VideoCapture | pyav.PyavCapture
 
 _GREY_8, _GREY_16 = b"Y800", b"Y1\x00\x10"
 _DECODER_PIXELS, _DECODERS = 1 << 20, 4
@@ -56,9 +63,8 @@ class VideoSource(Source):
         super().__init__(path, "video", selection, has_clock=given.timestamps is not None)
         self._container = examine(path, allow_damaged=selection.allow_damaged)
         self.doubts += [f"{path}: {fault}" for fault in self._container.faults]
+        self._choose_decoder()
         with self._opened() as capture:
-            pixels = int(capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT))
-            self._pixels = pixels.to_bytes(4, "little") if pixels >= 0 else b""
             self._fps = max(float(capture.get(cv2.CAP_PROP_FPS)), 0.0)
             self._keep_grey(capture)
             if not capture.grab():
@@ -116,21 +122,39 @@ class VideoSource(Source):
         if back is None and self._times.rate is None:
             self.doubts += gap_doubts(self._times.shown_ns, self.path)
 
-    def _keep_grey(self, capture: cv2.VideoCapture) -> None:
-        # grey pictures come as stored; conversion would repeat them three times, in 8 bits
-        if self._pixels in (_GREY_8, _GREY_16):
-            capture.set(cv2.CAP_PROP_CONVERT_RGB, 0)
-
-    def _choose_encoding(self) -> None:
+    def _choose_decoder(self) -> None:
+        self._why_pyav, self._pixels = "", b""
+        with self._opened() as capture:
+            pixels = int(capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT))
+            self._pixels = pixels.to_bytes(4, "little") if pixels >= 0 else b""
+            height = int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
+        choice = choose(self.path, height)
+        self._why_pyav, self._transfer = choice.why_pyav, choice.transfer
+        self.notes += choice.notes
         # FFmpeg's tags of deeper formats end with the number of bits, or begin with it (big endian)
         ends = (self._pixels[-1:] + self._pixels[:1]) or b"\0"
         bits = next((byte for byte in ends if 8 < byte <= 16), 8)
-        if self.dtype == np.uint16:
-            self.encoding_reason = "16-bit grey video"
-            return
-        self.encoding, self.encoding_reason = "srgb", "a video"
-        if bits > 8:
-            self.notes.append(f"the video has {bits} bits a pixel and is read with 8 of them")
+        if bits > 8 and not self._why_pyav and self._pixels != _GREY_16:
+            if pyav.is_installed():
+                self._why_pyav = f"it has {bits} bits a pixel"
+            else:
+                self.notes.append(
+                    f"the video has {bits} bits a pixel and is read with 8 of them;"
+                    " pip install 'adv2e[video]' reads all"
+                )
+        if self._why_pyav:
+            self.packages = ("av",)
+
+    def _keep_grey(self, capture: Capture) -> None:
+        # grey pictures come as stored; conversion would repeat them three times, in 8 bits
+        if not self._why_pyav and self._pixels in (_GREY_8, _GREY_16):
+            capture.set(cv2.CAP_PROP_CONVERT_RGB, 0)
+
+    def _choose_encoding(self) -> None:
+        encoding, self.encoding_reason = encoding_of(self._transfer)
+        if self.dtype == np.uint16 and not self.colour and not is_stated(self._transfer):
+            encoding, self.encoding_reason = "linear", "16-bit grey video"
+        self.encoding = encoding
 
     def _decoders(self) -> int:
         # each has frames of its own, and handing work over costs more than small frames are worth
@@ -138,7 +162,14 @@ class VideoSource(Source):
         return min(wanted, _DECODERS, self.threads)
 
     @contextmanager
-    def _opened(self, threads: int = 1) -> Iterator[cv2.VideoCapture]:
+    def _opened(self, threads: int = 1) -> Iterator[Capture]:
+        if self._why_pyav:
+            decoder = pyav.PyavCapture(self.path, self._why_pyav, threads)
+            try:
+                yield decoder
+            finally:
+                decoder.release()
+            return
         with quiet(), openable(self.path) as name:
             options = [cv2.CAP_PROP_N_THREADS, threads]
             capture = cv2.VideoCapture(name, cv2.CAP_FFMPEG, options)
@@ -175,7 +206,7 @@ class VideoSource(Source):
                 yield Shot(t_ns, label, partial(_load, capture, label))
         self._check_end(stamps)
 
-    def _grabbed(self, capture: cv2.VideoCapture) -> Iterator[int]:
+    def _grabbed(self, capture: Capture) -> Iterator[int]:
         """Grab frame after frame, past what cannot be decoded, and yield their numbers."""
         number, failed = 0, 0
         while failed < RETRIES:
@@ -204,7 +235,7 @@ class VideoSource(Source):
             self.notes.append(fault)
 
 
-def _load(capture: cv2.VideoCapture, label: str) -> Image:
+def _load(capture: Capture, label: str) -> Image:
     good, image = capture.retrieve()
     if not good or image is None:
         raise DataError(f"{label}: cannot be decoded")

@@ -38,6 +38,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from adv2e.errors import ConfigError, DataError
 
+UNKNOWN = "unknown: "
+"""How what ``auto`` means begins where a source states an encoding that is not one of these."""
+
 LUMA_WEIGHTS = (0.2126, 0.7152, 0.0722)
 """Shares of red, green and blue light in luma."""
 
@@ -62,10 +65,7 @@ def check_encoding(encoding: str) -> None:
             return
     except ValueError:
         pass
-    raise ConfigError(
-        f"encoding: must be auto, {', '.join(_CURVES)} or gamma:<g> (such as gamma:2.2),"
-        f" got {encoding!r}"
-    )
+    raise ConfigError(f"encoding: must be auto, {_KNOWN}, got {encoding!r}")
 
 
 def full_scale_of(dtype: DTypeLike) -> float:
@@ -133,7 +133,8 @@ def _hlg(value: NDArray[Any]) -> NDArray[Any]:
 def _pq(value: NDArray[Any]) -> NDArray[Any]:
     # the curve ends at white: beyond, its denominator goes through zero
     root = np.minimum(value, 1) ** (1 / _PQ_M2)
-    return (np.maximum(root - _PQ_C1, 0) / (_PQ_C2 - _PQ_C3 * root)) ** (1 / _PQ_M1)
+    light: NDArray[Any] = np.maximum(root - _PQ_C1, 0) / (_PQ_C2 - _PQ_C3 * root)
+    return light ** (1 / _PQ_M1)
 
 
 _CURVES: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
@@ -144,6 +145,8 @@ _CURVES: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
     "hlg": _hlg,
 }
 """Light of values, both in 0..1 of white, by the name of the encoding."""
+
+_KNOWN = f"{', '.join(_CURVES)} or gamma:<g> (such as gamma:2.2)"
 
 
 class LightDecoder:
@@ -174,6 +177,11 @@ class LightDecoder:
     """
 
     def __init__(self, encoding: str, full_scale: float, dtype: DTypeLike, colour: bool) -> None:
+        if encoding.startswith(UNKNOWN):
+            raise ConfigError(
+                f"frames.encoding: auto: the frames are said to be {encoding[len(UNKNOWN) :]}, which"
+                f" is not known; say what they are: {_KNOWN}"
+            )
         check_encoding(encoding)
         if encoding == "auto":
             raise ConfigError("encoding: auto must be settled by the source of the frames")

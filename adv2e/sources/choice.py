@@ -1,0 +1,86 @@
+"""Which decoder a video needs, decided by the file alone, and what it says its light is.
+
+OpenCV is the decoder wherever it gives the pictures that are in the file.  Else it is PyAV, and
+without that the video is refused.  The one exception are more than 8 bits of usual dynamic range:
+without PyAV they are read with 8, and that is told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adv2e.errors import DataError
+from adv2e.sources.colours import HIGH_RANGE, Colours, encoding_of, is_stated
+from adv2e.sources.stated import Stated, stated_by
+from adv2e.sources.streams import RAW, Stream, examine_stream
+
+_FIELDS = (
+    "interlaced: each picture is taken whole, with the two fields that it has of different times;"
+    " ffmpeg -vf bwdif makes pictures of them"
+)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How a video is to be read.
+
+    Attributes
+    ----------
+    why_pyav : str
+        What it has that OpenCV cannot give; empty if it can.
+    transfer : int
+        Code of ITU-T H.273 for the transfer that it states.
+    notes : list of str
+        Things to tell the user.
+    """
+
+    why_pyav: str
+    transfer: int
+    notes: tuple[str, ...] = ()
+
+
+def choose(path: str, height: int) -> Choice:
+    """Look at the headers of a video and of all its coded pictures.
+
+    Parameters
+    ----------
+    path : str
+        The video.
+    height : int
+        Rows that its container states.
+
+    Raises
+    ------
+    DataError
+        Parts of it state transfers that differ.
+    """
+    stated, stream = stated_by(path), examine_stream(path, height)
+    colours = [each.completed(stated.colours) for each in stream.colours] or [stated.colours]
+    transfer = _only_transfer(path, colours)
+    interlaced = stream.interlaced or (stated.interlaced and stream.codec in (RAW, "FFV1"))
+    why = _beyond_opencv(stated, stream, interlaced, colours, transfer)
+    return Choice(why, transfer, (_FIELDS,) if interlaced else ())
+
+
+def _only_transfer(path: str, colours: list[Colours]) -> int:
+    meanings = {encoding_of(each.transfer) for each in colours}
+    if len({encoding for encoding, _ in meanings}) > 1:
+        reasons = " and ".join(sorted(reason for _, reason in meanings))
+        raise DataError(f"{path}: its parts differ ({reasons}); cut it where that changes")
+    return colours[-1].transfer
+
+
+def _beyond_opencv(
+    stated: Stated, stream: Stream, interlaced: bool, colours: list[Colours], transfer: int
+) -> str:
+    if interlaced:
+        return "its pictures are interlaced, or could be"
+    if not stream.known:
+        return f"its codec ({stream.codec}) does not say whether pictures are interlaced"
+    if transfer in HIGH_RANGE:
+        return f"it has a high dynamic range ({encoding_of(transfer)[0]})"
+    if not all(each.kept_by_opencv for each in colours):
+        return "it states colours that OpenCV does not keep"
+    if not stated.readable and not is_stated(transfer):
+        return "its container may state colours that cannot be read here"
+    return ""

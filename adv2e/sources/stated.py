@@ -1,0 +1,152 @@
+"""What the container of a video states of its pictures: their colours, and whether they are fields.
+
+Nothing here raises for a file that is damaged: then nothing is stated.
+
+References
+----------
+.. [1] ISO/IEC 14496-12 and Apple, QuickTime File Format: sample descriptions, ``colr``, ``fiel``.
+.. [2] VP Codec ISO Media File Format Binding: ``vpcC``.
+.. [3] RFC 9559 (Matroska, WebM): ``Video``, ``Colour``.
+"""
+
+from __future__ import annotations
+
+import mmap
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from adv2e.sources.colours import Colours
+
+_MXF, _Y4M, _EBML = b"\x06\x0e\x2b\x34", b"YUV4MPEG2 ", b"\x1a\x45\xdf\xa3"
+_MP4 = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
+_WITHIN = (b"moov", b"trak", b"mdia", b"minf", b"stbl")
+_SAMPLE_ENTRY = 86
+"""Bytes of the description of pictures before the boxes in it, from its size on."""
+
+_SEGMENT, _TRACKS, _TRACK, _TRACK_TYPE = 0x18538067, 0x1654AE6B, 0xAE, 0x83
+_CLUSTER, _VIDEO, _COLOUR = 0x1F43B675, 0xE0, 0x55B0
+_INTERLACED, _MATRIX, _TRANSFER, _PRIMARIES = 0x9A, 0x55B1, 0x55BA, 0x55BB
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What a container states.
+
+    Attributes
+    ----------
+    colours : Colours
+    interlaced : bool
+        Pictures are two fields each.
+    readable : bool
+        False where it may state more than is read here (MXF).
+    """
+
+    colours: Colours = field(default_factory=Colours)
+    interlaced: bool = False
+    readable: bool = True
+
+
+def stated_by(path: str | Path) -> Stated:
+    """Return what the container of a video states."""
+    try:
+        with (
+            Path(path).open("rb") as file,
+            mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data,
+        ):
+            return _read(data)
+    except (OSError, ValueError, struct.error, IndexError):
+        return Stated()
+
+
+def _read(data: mmap.mmap) -> Stated:
+    if data[4:8] in _MP4:
+        return _mp4(data)
+    if data[:4] == _EBML:
+        return _matroska(data)
+    if data[: len(_Y4M)] == _Y4M:
+        fields = data[: max(data.find(b"\n", 0, 1000), 0)].split(b" ")
+        return Stated(interlaced=any(field in (b"It", b"Ib", b"Im") for field in fields))
+    return Stated(readable=data[:4] != _MXF)
+
+
+def _mp4(data: mmap.mmap) -> Stated:
+    colours, interlaced = Colours(), False
+    for kind, begin, end in _pictures(data, 0, len(data), is_video=False):
+        if kind == b"colr" and data[begin : begin + 4] in (b"nclx", b"nclc"):
+            colours = Colours(*struct.unpack_from(">HHH", data, begin + 4))
+        elif kind == b"vpcC" and end - begin >= 10:
+            colours = Colours(*data[begin + 7 : begin + 10]).completed(colours)
+        elif kind == b"fiel":
+            interlaced = data[begin] == 2
+    return Stated(colours, interlaced)
+
+
+def _pictures(
+    data: mmap.mmap, start: int, stop: int, *, is_video: bool
+) -> Iterator[tuple[bytes, int, int]]:
+    """Yield kind, start and end of the boxes that describe the pictures of the first video."""
+    for kind, begin, end in _boxes(data, start, stop):
+        if kind == b"hdlr":
+            is_video = data[begin + 8 : begin + 12] == b"vide"
+        elif kind == b"stsd" and is_video:
+            yield from _boxes(data, begin + 8 + _SAMPLE_ENTRY, min(end, _entry_end(data, begin)))
+            return
+        elif kind in _WITHIN:
+            found = list(_pictures(data, begin, end, is_video=is_video))
+            if found:
+                yield from found
+                return
+
+
+def _entry_end(data: mmap.mmap, begin: int) -> int:
+    (size,) = struct.unpack_from(">I", data, begin + 8)
+    return int(begin + 8 + size)
+
+
+def _boxes(data: mmap.mmap, start: int, stop: int) -> Iterator[tuple[bytes, int, int]]:
+    while start + 8 <= stop:
+        size, kind = struct.unpack_from(">I4s", data, start)
+        head = 8
+        if size == 1:
+            (size,) = struct.unpack_from(">Q", data, start + 8)
+            head = 16
+        end = start + size if size else stop
+        if end < start + head or end > stop:
+            return
+        yield kind, start + head, end
+        start = end
+
+
+def _matroska(data: mmap.mmap) -> Stated:
+    colours, interlaced, is_video = dict.fromkeys((_PRIMARIES, _TRANSFER, _MATRIX), 2), False, False
+    for kind, begin, end in _elements(data):
+        if kind == _TRACK_TYPE:
+            if is_video:
+                break  # the next track: the first video has been read
+            is_video = data[begin] == 1
+        elif kind == _INTERLACED and is_video:
+            interlaced = data[end - 1] == 1
+        elif kind in colours and is_video:
+            colours[kind] = data[end - 1]
+    return Stated(Colours(*colours.values()), interlaced)
+
+
+def _elements(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:
+    """Yield kind, start and end of the contents of elements before the first cluster."""
+    place = 0
+    while place < len(data):
+        kind, place = _variable(data, place, keep_marker=True)
+        size, begin = _variable(data, place, keep_marker=False)
+        if kind == _CLUSTER:
+            return
+        yield kind, begin, begin + size
+        into = kind in (_SEGMENT, _TRACKS, _TRACK, _VIDEO, _COLOUR)
+        place = begin if into else begin + size
+
+
+def _variable(data: mmap.mmap, place: int, *, keep_marker: bool) -> tuple[int, int]:
+    length = 9 - data[place].bit_length()
+    value = int.from_bytes(data[place : place + length], "big")
+    return value if keep_marker else value & ((1 << 7 * length) - 1), place + length

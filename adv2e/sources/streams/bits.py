@@ -1,0 +1,50 @@
+"""Numbers packed into bits, first bit highest."""
+
+from __future__ import annotations
+
+
+class Bits:
+    """Reads numbers from bytes, one after another.
+
+    Raises
+    ------
+    IndexError
+        From every method, when the bytes end.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._place = 0
+
+    def take(self, count: int) -> int:
+        """Return the next `count` bits as a number."""
+        begin, end = self._place, self._place + count
+        if end > 8 * len(self._data):
+            raise IndexError("the bits end")
+        self._place = end
+        whole = int.from_bytes(self._data[begin // 8 : -(-end // 8)], "big")
+        return (whole >> (-end % 8)) & ((1 << count) - 1)
+
+    def skip(self, count: int) -> None:
+        """Pass over `count` bits."""
+        self._place += count
+        if self._place > 8 * len(self._data):
+            raise IndexError("the bits end")
+
+    def flag(self) -> bool:
+        """Return the next bit."""
+        return bool(self.take(1))
+
+    def ue(self) -> int:
+        """Return an unsigned number in the code of Exp-Golomb, of up to 32 bits."""
+        zeros = 0
+        while not self.take(1):
+            zeros += 1
+            if zeros > 32:
+                raise IndexError("no number")
+        return (1 << zeros) - 1 + self.take(zeros)
+
+    def se(self) -> int:
+        """Return a signed number in the code of Exp-Golomb."""
+        code = self.ue()
+        return (code + 1) // 2 if code % 2 else -(code // 2)
