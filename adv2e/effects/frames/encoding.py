@@ -179,8 +179,8 @@ class LightDecoder:
     def __init__(self, encoding: str, full_scale: float, dtype: DTypeLike, colour: bool) -> None:
         if encoding.startswith(UNKNOWN):
             raise ConfigError(
-                f"frames.encoding: auto: the frames are said to be {encoding[len(UNKNOWN) :]}, which"
-                f" is not known; say what they are: {_KNOWN}"
+                f"frames.encoding: auto: frames are said to be {encoding[len(UNKNOWN) :]}, which is"
+                f" not known; say what they are: {_KNOWN}"
             )
         check_encoding(encoding)
         if encoding == "auto":

@@ -21,7 +21,7 @@ from adv2e.sources.streams.base import Findings, Parser
 from adv2e.sources.streams.ffv1 import Ffv1
 from adv2e.sources.streams.h264 import H264
 from adv2e.sources.streams.hevc import Hevc
-from adv2e.sources.streams.intra import DnxHd, MotionJpeg, ProRes, UtVideo
+from adv2e.sources.streams.intra import DnxHd, Dv, MotionJpeg, ProRes, UtVideo
 from adv2e.sources.streams.mpeg import Mpeg2, Mpeg4
 
 __all__ = ["RAW", "Stream", "examine_stream"]
@@ -35,6 +35,7 @@ _WITH_FIELDS: dict[str, tuple[Callable[[], Parser], str]] = {
     "MPEG-4": (Mpeg4, "fmp4 mp4v xvid divx dx50 mp4s 3iv2 m4s2"),
     "ProRes": (ProRes, "apch apcn apcs apco ap4h ap4x aprh aprn"),
     "DNxHD": (DnxHd, "avdn avdh avd1"),
+    "DV": (Dv, "dvsd dvsl dvhd dvh1 dvh2 dvh3 dvh5 dvh6 dv25 dv50 dvc dvcp dvcs dvis dvpp cdvc"),
     "FFV1": (Ffv1, "ffv1"),
     "Ut Video": (UtVideo, "ulrg ulra uly0 uly2 uly4 ulh0 ulh2 ulh4"),
 }

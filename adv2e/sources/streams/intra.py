@@ -42,6 +42,17 @@ class DnxHd:
         findings.interlaced |= bool(data[5] & 2)
 
 
+class Dv:
+    """Parser of DV, whose pictures are always two fields."""
+
+    def header(self, data: bytes, findings: Findings) -> None:
+        """Nothing stands before the pictures."""
+
+    def picture(self, data: bytes, findings: Findings) -> None:
+        """Note a picture."""
+        findings.interlaced = True
+
+
 class UtVideo:
     """Parser of Ut Video."""
 

@@ -1,0 +1,99 @@
+"""Pictures of two fields: OpenCV says that it has them, and gives what was in its buffer before."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from adv2e.errors import MissingExtraError
+from adv2e.sources import open_source
+from coded import write
+
+RAMP = list(range(25, 115, 3))
+
+
+def grey(luma):
+    """Code of 0..255 for a luma of 16..235."""
+    return (luma - 16) * 255 / 219
+
+
+def values(source):
+    return [frame.image for frame in source.frames()]
+
+
+def assert_ramp(images, lumas, tolerance=1.5):
+    assert len(images) == len(lumas)
+    for image, luma in zip(images, lumas, strict=True):
+        assert np.abs(image - grey(luma)).max() <= tolerance
+
+
+CODED = {
+    "h264.mp4": {"options": {"x264-params": "tff=1"}},
+    "h264.mkv": {"options": {"x264-params": "bff=1"}},
+    "h264.ts": {"options": {"x264-params": "tff=1"}},
+    "mpeg2.ts": {"codec": "mpeg2video", "fields": True},
+    "mpeg2.mpg": {"codec": "mpeg2video", "fields": True},
+    "mpeg4.avi": {"codec": "mpeg4", "fields": True},
+    "prores.mov": {"codec": "prores_ks", "pixels": "yuv422p10le", "fields": True},
+    "dv.avi": {"codec": "dvvideo", "size": (720, 576)},
+}
+
+
+def written(folder, name, lumas=RAMP):
+    settings = CODED[name]
+    deep = "10" in settings.get("pixels", "")
+    return write(folder / name, [luma << 2 if deep else luma for luma in lumas], **settings)
+
+
+@pytest.mark.parametrize("name", CODED)
+def test_interlaced_pictures_are_those_in_the_file(tmp_path, name):
+    source = open_source(written(tmp_path, name))
+    images = values(source)
+    if images[0].dtype == np.uint16:
+        images = [image / 257 for image in images]
+    assert_ramp(images, RAMP)
+    assert [note[:10] for note in source.notes] == ["interlaced"]
+    assert source.packages == ("av",)
+
+
+@pytest.mark.parametrize("name", CODED)
+def test_interlaced_video_is_refused_without_pyav(tmp_path, name, monkeypatch):
+    path = written(tmp_path, name)
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(MissingExtraError, match=r"interlaced.*adv2e\[video\]"):
+        open_source(path)
+
+
+@pytest.mark.parametrize("suffix", ["ts", "mkv"])
+@pytest.mark.parametrize("fields_first", [False, True])
+def test_pictures_that_turn_into_fields_are_those_in_the_file(tmp_path, suffix, fields_first):
+    av = pytest.importorskip("av")
+    halves = RAMP[:15], RAMP[15:]
+    parts = []
+    for number, lumas in enumerate(halves):
+        options = {"x264-params": "tff=1"} if fields_first == (number == 0) else {}
+        path = tmp_path / f"part{number}.ts"
+        parts.append(write(path, lumas, options={"bf": "0", **options}, first=15 * number))
+    mixed = tmp_path / "mixed.ts"
+    mixed.write_bytes(b"".join(part.read_bytes() for part in parts))
+    if suffix == "mkv":
+        path, stream = tmp_path / "mixed.mkv", mixed
+        with av.open(str(stream)) as source, av.open(str(path), "w") as target:
+            copied = target.add_stream_from_template(source.streams.video[0])
+            for packet in source.demux(video=0):
+                if packet.dts is not None:
+                    packet.stream = copied
+                    target.mux(packet)
+        mixed = path
+    assert_ramp(values(open_source(mixed)), RAMP)
+
+
+@pytest.mark.parametrize("codec", ["libx264", "mpeg2video", "mpeg4", "ffv1"])
+def test_progressive_pictures_need_no_pyav(tmp_path, codec, monkeypatch):
+    path = write(tmp_path / "clip.mkv", RAMP, codec)
+    monkeypatch.setitem(sys.modules, "av", None)
+    source = open_source(path)
+    assert_ramp(values(source), RAMP)
+    assert source.packages == ()
