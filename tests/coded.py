@@ -1,4 +1,4 @@
-"""Videos that OpenCV cannot write: fields, tags, deep pixels; written by PyAV, where it is there."""
+"""Videos that OpenCV cannot write, written by PyAV: fields, tags, deep pixels."""
 
 from __future__ import annotations
 
