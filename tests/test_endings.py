@@ -56,17 +56,18 @@ def test_a_signal_ends_a_conversion_without_a_trace(long_stack, tmp_path, name, 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("threads", ["1", "2"])
 def test_a_signal_ends_a_conversion_in_the_midst_of_compiled_code(tmp_path, threads):
-    """Times in us where seconds are read: one call makes the leak events of days."""
+    """Frames half a minute apart: each call makes millions of leak events."""
     stack, times = tmp_path / "stack.npy", tmp_path / "times.txt"
     np.save(stack, np.array([picture(k) for k in range(20)]))
-    times.write_text("".join(f"{33_333 * k}\n" for k in range(20)))
+    times.write_text("".join(f"{1_500_000_000 + 30 * k}\n" for k in range(20)))
     options = ["--timestamps", times, "-o", tmp_path / "out.txt", "--threads", threads]
+    options += ["--set", "pixel.leak.rate_hz=300"]
     with running_python(
         "import sys; from adv2e.cli import main; main(sys.argv[1:])",
         *("convert", stack, *options, "--no-progress"),
         text=True,
     ) as process:
-        assert "stack.npy: frames are 33,333 s apart; times are in seconds" in (
+        assert "times.txt: no unit is stated: times 30 apart are taken as s" in (
             process.stderr.readline()
         )
         time.sleep(1.0)

@@ -135,7 +135,7 @@ def spoil_nan(video):
     stack = np.full((4, 6, 8), 0.5, np.float32)
     stack[2, 3, 3] = np.nan
     np.save(path, stack)
-    (video.with_name("nan.timestamps.txt")).write_text("0\n1\n2\n3\n")
+    (video.with_name("nan.timestamps.txt")).write_text("0.0\n0.1\n0.2\n0.3\n")
     return path
 
 

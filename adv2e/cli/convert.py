@@ -23,12 +23,7 @@ SECONDS = options.FiniteNumber(min=0)
 @options.late_config_options
 @options.run_options
 @options.fps_option
-@click.option(
-    "--timestamps",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Times of the frames [s], one a line.",
-)
+@options.list_options
 @click.option("--start", type=SECONDS, metavar="S", help="Begin S seconds after the first frame.")
 @click.option("--stop", type=SECONDS, metavar="S", help="End S seconds after the first frame.")
 @click.option(
@@ -66,6 +61,8 @@ def command(
     log: Log,
     fps: str | None,
     timestamps: Path | None,
+    time_unit: str | None,
+    images_anywhere: bool,
     start: float | None,
     stop: float | None,
     t0: str,
@@ -93,6 +90,8 @@ def command(
     """
     if fps is not None and timestamps is not None:
         raise click.UsageError("--fps and --timestamps both give the times of the frames: keep one")
+    if fps is not None and time_unit is not None:
+        raise click.UsageError("--time-unit is for lists of times, which --fps replaces: keep one")
     if start is not None and stop is not None and stop <= start:
         raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
     from adv2e.reading import Reading
@@ -101,6 +100,8 @@ def command(
         source,
         fps=fps,
         timestamps=timestamps,
+        time_unit=time_unit,
+        images_anywhere=images_anywhere,
         start_s=start,
         stop_s=stop,
         t0=t0,

@@ -13,12 +13,7 @@ from adv2e.cli import options
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print JSON; all keys are always there.")
 @options.fps_option
-@click.option(
-    "--timestamps",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Times of the frames [s], one a line.",
-)
+@options.list_options
 @options.allow_damaged_option
 @options.verbosity_options
 def command(
@@ -26,6 +21,8 @@ def command(
     as_json: bool,
     fps: str | None,
     timestamps: Path | None,
+    time_unit: str | None,
+    images_anywhere: bool,
     allow_damaged: bool,
     log: options.Log,
 ) -> None:
@@ -44,7 +41,14 @@ def command(
     from adv2e.inspection.inspect import inspect
 
     log(f"reading {file}", 1)
-    report = inspect(file, fps=fps, timestamps=timestamps, allow_damaged=allow_damaged)
+    report = inspect(
+        file,
+        fps=fps,
+        timestamps=timestamps,
+        time_unit=time_unit,
+        images_anywhere=images_anywhere,
+        allow_damaged=allow_damaged,
+    )
     if as_json:
         import json
 

@@ -11,6 +11,7 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -159,6 +160,32 @@ def config_options(body: Body) -> Body:
         return body(*args, config=config(), **kw)
 
     return late_config_options(with_config)  # type: ignore[return-value]
+
+
+def list_options(body: Body) -> Body:
+    """Add --timestamps, --time-unit and --images-anywhere, all as :class:`GivenTimes` has them."""
+    body = click.option(
+        "--images-anywhere",
+        is_flag=True,
+        help="Let a recording's images.txt name images outside its folder.",
+    )(body)
+    body = time_unit_option(body)
+    return click.option(
+        "--timestamps",
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help="Times of the frames, one a line.",
+    )(body)
+
+
+def time_unit_option(body: Body) -> Body:
+    """Add --time-unit; the command gets ``time_unit``, a name or None."""
+    return click.option(
+        "--time-unit",
+        type=click.Choice(["s", "ms", "us", "ns"]),
+        help="Unit of the times in lists and event files.  [default: what the file says, else told"
+        " from the times, with a line where that leaves doubt]",
+    )(body)
 
 
 def output_options(body: Body) -> Body:

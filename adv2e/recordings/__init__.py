@@ -18,7 +18,9 @@ MOST_PIXELS = 1 << 25
 _SUFFIXES = (".txt", ".zip", ".h5", ".hdf5", ".npz")
 
 
-def read_recording(path: str | Path) -> Recording:
+def read_recording(
+    path: str | Path, *, time_unit: str | None = None, images_anywhere: bool = False
+) -> Recording:
     """Read an event file, or a folder in the DAVIS240C layout.
 
     Parameters
@@ -26,6 +28,10 @@ def read_recording(path: str | Path) -> Recording:
     path : str or Path
         The suffix tells the format: .txt, .zip (DAVIS240C, or a single text file), .h5 or .hdf5
         (layout ``monash``), .npz.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times; default: see :mod:`adv2e.sources.units`.
+    images_anywhere : bool
+        The ``images.txt`` of a folder may name images outside of it.
 
     Returns
     -------
@@ -41,7 +47,7 @@ def read_recording(path: str | Path) -> Recording:
     path = Path(path)
     try:
         check_ends(path)
-        recording = _read(path)
+        recording = _read(path, time_unit, images_anywhere)
     except OSError as error:
         raise DataError(f"{path}: cannot be read: {error.strerror or error}") from error
     _check_size(recording)
@@ -65,18 +71,20 @@ def _check_size(recording: Recording) -> None:
     )
 
 
-def _read(path: Path) -> Recording:
+def _read(path: Path, time_unit: str | None, images_anywhere: bool) -> Recording:
     suffix = path.suffix.lower()
     if path.is_dir() or suffix == ".zip":
         from adv2e.recordings import davis240c  # noqa: PLC0415
 
         _check_there(path)
-        return davis240c.read_folder(path) if path.is_dir() else davis240c.read_zip(path)
+        if path.is_dir():
+            return davis240c.read_folder(path, time_unit, images_anywhere=images_anywhere)
+        return davis240c.read_zip(path, time_unit)
     _check_there(path)
     if suffix == ".txt":
         from adv2e.recordings.text import read_text  # noqa: PLC0415
 
-        return read_text(path)
+        return read_text(path, time_unit)
     if suffix in (".h5", ".hdf5"):
         return _read_hdf5(path)
     if suffix == ".npz":

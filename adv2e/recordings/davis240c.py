@@ -13,20 +13,21 @@ References
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import IO, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.recordings.base import Recording, described_geometry, parse_description
 from adv2e.recordings.gather import Gatherer
-from adv2e.recordings.text import gather_lines
+from adv2e.recordings.text import Clock, Lines, gather_lines
 from adv2e.sources.base import Pixels
+from adv2e.sources.columns import has_lines
+from adv2e.sources.lists import FrameList, decoded, parse_list
+from adv2e.sources.names import found_outside, members_of, nowhere
 from adv2e.sources.opencv import decode_image
-from adv2e.sources.times import parse_list
 from adv2e.zips import open_member, zip_archive
 
 EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
@@ -75,8 +76,10 @@ class _Archive:
         return open_member(self._archive, self._top + name)
 
 
-def read_folder(path: Path) -> Recording:
-    """Return the recording in a folder.
+def read_folder(
+    path: Path, time_unit: str | None = None, *, images_anywhere: bool = False
+) -> Recording:
+    """Return the recording in a folder; `images_anywhere`: also those that lead out of it.
 
     Raises
     ------
@@ -86,10 +89,11 @@ def read_folder(path: Path) -> Recording:
     if not (path / EVENTS).is_file():
         raise DataError(f"{path}: no {EVENTS} in it; a folder must be a DAVIS240C recording")
     files = _Folder(path)
-    return _read(files, path, EVENTS, lambda names: _images(files, names))
+    outside = found_outside(path) if images_anywhere else nowhere
+    return _read(files, path, EVENTS, lambda names: _images(files, names), time_unit, outside)
 
 
-def read_zip(path: Path) -> Recording:
+def read_zip(path: Path, time_unit: str | None = None) -> Recording:
     """Return the recording in a zip archive.
 
     Raises
@@ -104,7 +108,7 @@ def read_zip(path: Path) -> Recording:
             with zip_archive(path) as again:
                 yield from _images(_Archive(path, again, top), names)
 
-        return _read(_Archive(path, archive, top), path, name, images)
+        return _read(_Archive(path, archive, top), path, name, images, time_unit, nowhere)
 
 
 def _events_member(path: Path, archive: zipfile.ZipFile) -> tuple[str, str]:
@@ -122,21 +126,38 @@ def _events_member(path: Path, archive: zipfile.ZipFile) -> tuple[str, str]:
     return top, found[0].name
 
 
-def _read(files: _Files, path: Path, name: str, images: Any) -> Recording:
+def _read(
+    files: _Files,
+    path: Path,
+    name: str,
+    images: Any,
+    time_unit: str | None,
+    outside: Callable[[str], str | None],
+) -> Recording:
     gatherer = Gatherer()
     description: dict[str, Any] = {}
     if files.has(DESCRIPTION):
         text = _text(files, DESCRIPTION, "replace")
         description = parse_description(text, files.label(DESCRIPTION), gatherer.problems)
+    stated = "s" if "adv2e" in description else None
+    found = _listed(files, stated=stated)
+    frames = found if found is not None and len(found.stamps) > 1 else None
     with files.open(name) as file:
-        header = gather_lines(file, files.label(name), gatherer)
-    times, names = _listed(files, gatherer.problems)
+        clock = Clock(time_unit, stated, frames)
+        lines = gather_lines(file, files.label(name), gatherer, clock)
+    times, names = None, []
+    if found is not None:
+        if unit := _unit_beside(lines, found, time_unit):
+            found = _listed(files, time_unit=unit) or found
+        gatherer.problems += [f"{LIST}: {line}" for line in (found.unit.doubt, found.order) if line]
+        names = members_of(found.stamps, files.label(LIST), files.has, outside=outside)
+        times = np.array([stamp.t_ns for stamp in found.stamps], np.int64)
     geometry, whence = described_geometry(description), DESCRIPTION
     if geometry is None and names:
         first = next(iter(images(names[:1]))).image
         geometry, whence = (first.shape[1], first.shape[0]), names[0]
     if geometry is None:
-        geometry, whence = header, f"the first line of {name}"
+        geometry, whence = lines.geometry, f"the first line of {name}"
     events, width, height = gatherer.finish(geometry, whence)
     return Recording(
         str(path),
@@ -156,26 +177,22 @@ def _text(files: _Files, name: str, errors: str) -> str:
         return file.read().decode("utf-8-sig", errors)
 
 
-def _listed(files: _Files, problems: list[str]) -> tuple[NDArray[np.int64] | None, list[str]]:
-    """Return times [ns], or None without frames, and names of the frames.
-
-    What is to be told of them is added to `problems`.
-    """
+def _listed(files: _Files, **evidence: Any) -> FrameList | None:
+    """Return the list of frames, or None without frames."""
     if not files.has(LIST):
-        return None, []
-    text, label = _text(files, LIST, "backslashreplace"), files.label(LIST)
-    if not any(line.strip() and not line.strip().startswith("#") for line in text.splitlines()):
-        return None, []
-    stamps, unit = parse_list(text, label)
-    if unit:
-        problems.append(f"{LIST}: {unit}")
-    for stamp in stamps:
-        if stamp.name is None:
-            raise DataError(f"{label} line {stamp.line}: must be 'time name', the name is missing")
-        if not files.has(stamp.name):
-            raise DataError(f"{label} line {stamp.line}: no image {stamp.name}")
-    times = np.array([stamp.t_ns for stamp in stamps], np.int64)
-    return times, [stamp.name for stamp in stamps if stamp.name is not None]
+        return None
+    label = files.label(LIST)
+    with files.open(LIST) as file:
+        text = decoded(file.read(), label)
+    return parse_list(text, label, **evidence) if has_lines(text) else None
+
+
+def _unit_beside(lines: Lines, found: FrameList, time_unit: str | None) -> str | None:
+    """Return the unit of the frames that user or events say; None: the list itself tells."""
+    alike = lines.whole == found.whole
+    if time_unit is not None:
+        return time_unit if alike or found.whole else None
+    return lines.unit if alike and len(found.stamps) == 1 else None
 
 
 def _images(files: _Files, names: list[str]) -> Iterator[Pixels]:

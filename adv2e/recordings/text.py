@@ -3,29 +3,32 @@
 A line is ``time x y polarity``, separated by blanks.  Lines that begin with ``#`` and empty lines
 are skipped.  Times are seconds, plain or scientific, read digit by digit to the nearest
 microsecond, so that 1.47e9 s loses nothing.  A first line of two numbers is the geometry
-(``width height``, as rpg_e2vid writes it).  Times without any decimal point are microseconds
-(as DVS-Voltmeter writes them).
+(``width height``, as rpg_e2vid writes it).  Other units than seconds, such as the microseconds of
+DVS-Voltmeter, are told from the times: see :mod:`adv2e.sources.units`.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.jit import entry, kernel
 from adv2e.recordings.base import Recording, described_geometry, parse_description
 from adv2e.recordings.gather import Gatherer
-from adv2e.sources.times import WHOLE
+from adv2e.sources.lists import FrameList
+from adv2e.sources.units import Unit, event_unit
 from adv2e.ticks import LARGEST_NS, US, check_us
 
 _BLOCK = 1 << 22  # bytes read at once
-_SECONDS, _MICROSECONDS = 6, 0  # decimals that make a microsecond
+_DECIMALS = {"s": 6, "ms": 3, "us": 0, "ns": -3}  # that make a microsecond
 
 _SIZE = re.compile(rb"0{0,9}[1-9][0-9]{0,4}")
 _HOLDS = re.compile(rb"[\x00-\x20]*[^\x00-\x20#]")
@@ -161,7 +164,7 @@ def has_decimal_times(data: Any) -> bool:
     return False
 
 
-def read_text(path: Path) -> Recording:
+def read_text(path: Path, time_unit: str | None = None) -> Recording:
     """Return the recording in a text file of events.
 
     ``<name>.json`` beside it, or ``adv2e.json`` beside an ``events.txt``, tells the geometry.
@@ -181,10 +184,11 @@ def read_text(path: Path) -> Recording:
         text = whence.read_text("utf-8", errors="replace")
         description = parse_description(text, str(whence), gatherer.problems)
     with path.open("rb") as file:
-        geometry = gather_lines(file, str(path), gatherer)
+        told = "s" if "adv2e" in description else None
+        lines = gather_lines(file, str(path), gatherer, Clock(time_unit, told))
     stated = described_geometry(description)
     source = whence.name if stated and whence else "the first line"
-    events, width, height = gatherer.finish(stated or geometry, source)
+    events, width, height = gatherer.finish(stated or lines.geometry, source)
     return Recording(
         str(path),
         "text",
@@ -196,8 +200,46 @@ def read_text(path: Path) -> Recording:
     )
 
 
-def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer) -> tuple[int, int] | None:
-    """Read all lines of `file` into `gatherer`; return (width, height) if the first line has it.
+@dataclass(frozen=True)
+class Clock:
+    """What is known of the unit of a file's times before it is read.
+
+    Parameters
+    ----------
+    given : {'s', 'ms', 'us', 'ns'}, optional
+        What the user says.
+    stated : {'s', 'ms', 'us', 'ns'}, optional
+        What the file says.
+    frames : FrameList, optional
+        The list of two or more frames beside the events.
+    """
+
+    given: str | None = None
+    stated: str | None = None
+    frames: FrameList | None = None
+
+
+@dataclass(frozen=True)
+class Lines:
+    """What the lines of a file told beside its events.
+
+    Attributes
+    ----------
+    geometry : (int, int) or None
+        Width and height [pixels], if the first line has them.
+    whole : bool
+        Times are written as whole numbers.
+    unit : str
+        Their unit.
+    """
+
+    geometry: tuple[int, int] | None
+    whole: bool
+    unit: str
+
+
+def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer, clock: Clock) -> Lines:
+    """Read all lines of `file` into `gatherer`.
 
     Parameters
     ----------
@@ -205,35 +247,66 @@ def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer) -> tuple[int, 
         Read from where it stands to its end.
     label : str
         Its name, for messages.
+    clock : Clock
+        What is known of the unit; beside frames whose times are written in another way, what the
+        user says is meant for those of the two that are whole numbers.
 
     Raises
     ------
     DataError
         A line is not ``time x y polarity``; the text names file and line.
     """
-    geometry = None
-    decimals = _SECONDS
+    geometry, whole, unit = None, False, Unit("s")
     before = 0  # lines in earlier blocks
     for number, block in enumerate(_blocks(file)):
         begin = 0
         if number == 0:
             geometry, begin, before = _header(block)
         data = np.frombuffer(block, np.uint8)[begin:]
-        if number == 0 and not has_decimal_times(data):
-            decimals = _MICROSECONDS
-        columns = [np.empty(block.count(b"\n") + 1, np.int64) for _ in range(4)]
-        count, lines, wrong = parse_lines(data, decimals, *columns)
+        if number == 0:
+            whole = not has_decimal_times(data)
+            unit = _unit_of(data, whole, geometry, clock)
+        t, x, y, p, lines, wrong = _columns(data, whole, unit.name)
         if wrong:
             raise _malformed(data.tobytes(), label, before, wrong)
-        late = np.flatnonzero(np.abs(columns[0][:count]) > LARGEST_NS // US)
+        late = np.flatnonzero(np.abs(t) > LARGEST_NS // US)
         if late.size:
             line = before + _line_of(data.tobytes(), int(late[0]))
-            check_us(columns[0][late[:1]], f"{label} line {line}")
-        gatherer.add(*(column[:count] for column in columns))
+            check_us(t[late[:1]], f"{label} line {line}")
+        gatherer.add(t, x, y, p)
         before += lines
-    if before and decimals == _MICROSECONDS:
-        gatherer.problems.append(WHOLE)
-    return geometry
+    if unit.doubt:
+        gatherer.problems.append(unit.doubt)
+    return Lines(geometry, whole, unit.name)
+
+
+def _unit_of(
+    data: NDArray[np.uint8], whole: bool, geometry: tuple[int, int] | None, clock: Clock
+) -> Unit:
+    """Return the unit of the times in the first lines of a file."""
+    alike = clock.frames is None or clock.frames.whole == whole
+    t, x, y, *_ = _columns(data, whole, "us" if whole else "s")
+    if geometry is None:
+        geometry = (int(x.max()) + 1, int(y.max()) + 1) if t.size else (1, 1)
+    return event_unit(
+        t if whole else t / 1e6,
+        max(1, geometry[0] * geometry[1]),
+        whole=whole,
+        given=clock.given if alike or whole else None,
+        stated=clock.stated,
+        beside=clock.frames.unit if clock.frames is not None and alike else None,
+    )
+
+
+def _columns(data: NDArray[np.uint8], whole: bool, unit: str) -> tuple[Any, ...]:
+    """Return time [us], x, y and polarity of each line, lines read, and the wrong one or 0."""
+    rows = int(np.count_nonzero(data == 10)) + 1
+    columns = [np.empty(rows, np.int64) for _ in range(4)]
+    # digits behind the point of microseconds are rounded, where some were expected
+    parts = 1000 if unit == "us" and not whole else 1
+    count, lines, wrong = parse_lines(data, 3 if parts > 1 else _DECIMALS[unit], *columns)
+    t, x, y, p = (column[:count] for column in columns)
+    return (t + parts // 2) // parts, x, y, p, lines, wrong
 
 
 def _blocks(file: IO[bytes]) -> Iterator[bytes]:

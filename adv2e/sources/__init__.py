@@ -34,6 +34,8 @@ def open_source(
     start_s: float | None = None,
     stop_s: float | None = None,
     t0: str = "auto",
+    time_unit: str | None = None,
+    images_anywhere: bool = False,
     allow_damaged: bool = False,
 ) -> Source:
     """Open an input with frames.
@@ -45,12 +47,17 @@ def open_source(
     fps : float, Fraction or str, optional
         Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
     timestamps : path, optional
-        File with the time of each frame, ``t`` or ``t name`` a line, t in seconds.
+        File with the time of each frame, ``t`` or ``t name`` a line; see
+        :mod:`adv2e.sources.columns`.
     start_s, stop_s : float, optional
         First and last time wanted, counted from the first frame [s]; both inclusive.
     t0 : {'auto', 'keep', 'zero'}
         auto, keep: times on the source's own clock where there is one, else from its first frame;
         zero: from the first frame wanted.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times in lists; default: see :mod:`adv2e.sources.units`.
+    images_anywhere : bool
+        The ``images.txt`` of a recording may name images outside its folder.
     allow_damaged : bool
         Take what can be decoded of a damaged video, and tell what is missing.
 
@@ -66,7 +73,8 @@ def open_source(
     DataError
         If the input is missing, of an unknown kind, or wrong.
     """
-    given = GivenTimes(fps, Path(timestamps) if timestamps is not None else None)
+    listed = Path(timestamps) if timestamps is not None else None
+    given = GivenTimes(fps, listed, time_unit, images_anywhere)
     selection = Selection(start_s, stop_s, t0, allow_damaged)
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")

@@ -22,6 +22,7 @@ from adv2e.effects.frames.encoding import encoding_of_images, full_scale_of
 from adv2e.errors import DataError, UsageError
 from adv2e.sources.rates import Rate, parse_rate
 from adv2e.sources.times import NS_PER_S, FrameRate, seconds
+from adv2e.sources.units import UNITS
 from adv2e.ticks import check_time
 
 Image = NDArray[Any]
@@ -122,18 +123,33 @@ class Shot:
 
 @dataclass(frozen=True)
 class GivenTimes:
-    """Times given by the user in place of the source's own: a rate, a file, or neither.
+    """What the user says of times: a rate or a file in place of the source's own, and the unit.
+
+    Parameters
+    ----------
+    fps : float, Fraction or str, optional
+    timestamps : Path, optional
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times in lists.
+    images_anywhere : bool
+        The list of a recording may name images outside its folder.
 
     Raises
     ------
     UsageError
-        If both are given or the rate is impossible.
+        If rate and file or rate and unit are given, or a value is impossible.
     """
 
     fps: Rate | None = None
     timestamps: Path | None = None
+    time_unit: str | None = None
+    images_anywhere: bool = False
 
     def __post_init__(self) -> None:
+        if self.time_unit is not None and self.time_unit not in UNITS:
+            raise UsageError(f"--time-unit: must be s, ms, us or ns, got {self.time_unit!r}")
+        if self.fps is not None and self.time_unit is not None:
+            raise UsageError("--time-unit is for lists of times, which --fps replaces; give one")
         if self.fps is not None and self.timestamps is not None:
             raise UsageError("--fps and --timestamps both say when the frames are; give one")
         if self.fps is not None:

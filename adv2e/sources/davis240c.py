@@ -18,10 +18,11 @@ from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
 from adv2e.sources.base import RECORDED, GivenTimes, Light, Pixels, Selection, Shot
-from adv2e.sources.listed import ListedSource, Picture, given_shots
+from adv2e.sources.listed import ListedSource, Picture, given_shots, told
+from adv2e.sources.lists import FrameList, decoded, parse_list, read_list
+from adv2e.sources.names import found_outside, member_of, members_of, nowhere
 from adv2e.sources.opencv import decode_image, read_image
 from adv2e.sources.stored import DESCRIPTION, MOST_BYTES, light_beside, read_light
-from adv2e.sources.times import Stamp, parse_list, read_text
 from adv2e.zips import UNREADABLE, open_member
 
 LIST = "images.txt"
@@ -31,9 +32,10 @@ def is_recording(folder: Path) -> bool:
     """Tell whether a folder has this layout: a list of images that are in folders below it."""
     if not (folder / LIST).is_file():
         return False
-    stamps, _ = parse_list(read_text(folder / LIST), str(folder / LIST))
-    below = any(len(PurePosixPath(stamp.name or "").parts) > 1 for stamp in stamps)
-    return below or (folder / "events.txt").is_file()
+    if (folder / "events.txt").is_file():
+        return True
+    name = read_list(folder / LIST).stamps[0].name or ""
+    return "/" in (member_of(name, lambda member: (folder / member).is_file()) or name)
 
 
 def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
@@ -51,15 +53,17 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
 
 def _open_folder(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
     label = str(path / LIST)
-    stamps, unit = parse_list(read_text(path / LIST), label)
-    pictures = []
-    for stamp in _named(stamps, label):
-        file = path / str(stamp.name)
-        if not file.is_file():
-            raise DataError(f"{label} line {stamp.line}: no image {file}")
-        pictures.append(Picture(str(file), file.name, partial(read_image, file)))
-    light = light_beside(path)
-    return _source(path, label, stamps, unit, pictures, given, selection, light)
+    found = read_list(path / LIST, time_unit=_unit(given))
+    members = members_of(
+        found.stamps,
+        label,
+        lambda member: (path / member).is_file(),
+        where=f" in {path}",
+        outside=found_outside(path) if given.images_anywhere else nowhere,
+    )
+    files = [path / member for member in members]
+    pictures = [Picture(str(f), str(f.absolute()), partial(read_image, f)) for f in files]
+    return _source(path, label, found, pictures, given, selection, light_beside(path))
 
 
 def _open_zip(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
@@ -68,20 +72,29 @@ def _open_zip(path: Path, given: GivenTimes, selection: Selection) -> ListedSour
         names = set(archive.namelist())
         listed = _list_in(path, names)
         with open_member(archive, listed) as file:
-            text = file.read().decode("utf-8-sig")
+            data = file.read()
     except UNREADABLE as error:
         raise DataError(f"{path}: not a zip that can be read, or damaged") from error
     label = f"{path}: {listed}"
-    stamps, unit = parse_list(text, label)
+    top = listed.removesuffix(LIST)
+    stated = "s" if top + DESCRIPTION in names else None
+    found = parse_list(decoded(data, label), label, time_unit=_unit(given), stated=stated)
+    members = members_of(
+        found.stamps, label, lambda member: top + member in names, where=" in the zip"
+    )
     pictures = []
-    for stamp in _named(stamps, label):
-        member = str(PurePosixPath(listed).parent / str(stamp.name))
-        if member not in names:
-            raise DataError(f"{label} line {stamp.line}: no image {member} in the zip")
-        load = partial(_read_member, archive, member, f"{path}: {member}")
-        pictures.append(Picture(f"{path}: {member}", PurePosixPath(member).name, load))
-    light = _light_in(archive, str(PurePosixPath(listed).parent / DESCRIPTION), path)
-    return _source(path, label, stamps, unit, pictures, given, selection, light)
+    for member in members:
+        name = f"{path}: {top}{member}"
+        pictures.append(
+            Picture(name, top + member, partial(_read_member, archive, top + member, name))
+        )
+    light = _light_in(archive, top + DESCRIPTION, path)
+    return _source(path, label, found, pictures, given, selection, light)
+
+
+def _unit(given: GivenTimes) -> str | None:
+    """Return the unit that the user says the list has; with another list it is that one's."""
+    return None if given else given.time_unit
 
 
 def _list_in(path: Path, names: set[str]) -> str:
@@ -120,17 +133,10 @@ def _read_member(archive: zipfile.ZipFile, member: str, label: str) -> Pixels:
     return decode_image(data, label)
 
 
-def _named(stamps: list[Stamp], label: str) -> list[Stamp]:
-    if stamps[0].name is None:
-        raise DataError(f"{label} line {stamps[0].line}: expected 'time name' of an image")
-    return stamps
-
-
 def _source(
     path: Path,
     label: str,
-    stamps: list[Stamp],
-    unit: str,
+    found: FrameList,
     pictures: list[Picture],
     given: GivenTimes,
     selection: Selection,
@@ -138,15 +144,12 @@ def _source(
 ) -> ListedSource:
     light = stored or Light("linear", RECORDED)
     if given:
-        shots = given_shots(given, pictures, path)
+        timed = given_shots(given, pictures, path)
+        timed.notes.append(f"{given} replaces the times in {label}")
     else:
-        pairs = zip(stamps, pictures, strict=True)
+        pairs = zip(found.stamps, pictures, strict=True)
         shots = [Shot(stamp.t_ns, picture.label, picture.load) for stamp, picture in pairs]
-    source = ListedSource(
-        path, "davis240c", shots, selection, has_clock=given.fps is None, light=light
+        timed = told(found, label, shots)
+    return ListedSource(
+        path, "davis240c", timed, selection, has_clock=given.fps is None, light=light
     )
-    if given:
-        source.notes.append(f"{given} replaces the times in {label}")
-    elif unit:
-        source.notes.append(f"{label}: {unit}")
-    return source

@@ -9,12 +9,12 @@ from pathlib import Path
 from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
+from adv2e.sources.lists import read_list
 from adv2e.sources.opencv import IMAGE_SUFFIXES, read_image
 from adv2e.sources.stored import light_beside
-from adv2e.sources.times import order_note, parse_info, parse_times, read_text
 
-LISTS = {"images.txt": parse_times, "timestamps.txt": parse_times, "info.txt": parse_info}
-"""Lists of times that are looked for in the folder, then beside it: name and reader."""
+LISTS = ("images.txt", "timestamps.txt", "info.txt")
+"""Lists of times that are looked for in the folder, then beside it."""
 
 
 def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
@@ -29,35 +29,30 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     DataError
         No images, no times, or images and times that do not fit each other.
     """
-    pictures = [Picture(str(f), f.name, partial(read_image, f)) for f in image_files(path)]
+    pictures = [
+        Picture(str(f), str(f.absolute()), partial(read_image, f)) for f in image_files(path)
+    ]
     if not pictures:
         raise _no_images(path)
     found = _found_list(path)
-    notes: list[str] = []
     if given:
-        shots = given_shots(given, pictures, path)
+        timed = given_shots(given, pictures, path)
     elif found is not None:
-        stamps = LISTS[found.name](read_text(found), str(found))
-        shots = listed_shots(stamps, str(found), pictures, path)
-        notes.append(f"times from {found}")
-        if order := order_note(stamps):
-            notes.append(f"{found}: {order}")
-        if len(shots) < len(pictures):
-            notes.append(f"{len(pictures) - len(shots)} images are not in {found} and are left out")
+        timed = listed_shots(
+            read_list(found, time_unit=given.time_unit), str(found), pictures, path
+        )
+        if missing := len(pictures) - len(timed.shots):
+            timed.notes.append(f"{missing} images are not in {found} and are left out")
     else:
         raise DataError(
             f"{path}: when are the frames? give --fps F or --timestamps FILE, or put one of"
             f" {', '.join(LISTS)} there"
         )
     if given and found is not None:
-        notes.append(f"{given} replaces the times in {found}")
+        timed.notes.append(f"{given} replaces the times in {found}")
     # the folder may be that of the frames of a recording of ours
     light = light_beside(found.parent) if found is not None and found.name == "images.txt" else None
-    source = ListedSource(
-        path, "images", shots, selection, has_clock=given.fps is None, light=light
-    )
-    source.notes += notes
-    return source
+    return ListedSource(path, "images", timed, selection, has_clock=given.fps is None, light=light)
 
 
 def image_files(folder: Path) -> list[Path]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.sources.base import (
@@ -17,22 +17,30 @@ from adv2e.sources.base import (
     Source,
     check_values,
 )
-from adv2e.sources.times import Stamp, parse_times, read_text
-
-_LONG_S = 10.0
-"""Mean time between frames from which on their times are doubted [s]."""
+from adv2e.sources.lists import FrameList, read_list
+from adv2e.sources.names import match
+from adv2e.sources.numbering import numbering_doubt
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A frame without a time: label for messages, name in lists (if any), loader."""
+    """A frame without a time: label for messages, path that lists may name (if any), loader."""
 
     label: str
-    name: str | None
+    path: str | None
     load: Callable[[], Image | Pixels]
 
 
-def given_shots(given: GivenTimes, pictures: Sequence[Picture], path: Path) -> list[Shot]:
+@dataclass(frozen=True)
+class Timed:
+    """Frames with their times, and what is doubtful and what else is to be told of these."""
+
+    shots: list[Shot]
+    doubts: list[str]
+    notes: list[str]
+
+
+def given_shots(given: GivenTimes, pictures: Sequence[Picture], path: Path) -> Timed:
     """Return the pictures at the times that the user gave.
 
     Parameters
@@ -50,42 +58,54 @@ def given_shots(given: GivenTimes, pictures: Sequence[Picture], path: Path) -> l
         The file cannot be read or has times for other pictures.
     """
     if (rate := given.rate) is not None:
-        return [Shot(rate.time_ns(n), p.label, p.load) for n, p in enumerate(pictures)]
+        shots = [Shot(rate.time_ns(n), p.label, p.load) for n, p in enumerate(pictures)]
+        doubt = numbering_doubt([picture.path or "" for picture in pictures], rate)
+        return Timed(shots, [f"{path}: {doubt}"] if doubt else [], [])
     assert given.timestamps is not None
     label = str(given.timestamps)
-    stamps = parse_times(read_text(given.timestamps), label)
-    if len(stamps) != len(pictures):
-        raise DataError(f"{label}: {len(stamps)} times for the {len(pictures)} frames of {path}")
-    return listed_shots(stamps, label, pictures, path)
+    timed = listed_shots(
+        read_list(given.timestamps, time_unit=given.time_unit), label, pictures, path
+    )
+    if len(timed.shots) != len(pictures):
+        raise _other_number(label, len(timed.shots), len(pictures), path)
+    return timed
 
 
-def listed_shots(
-    stamps: Sequence[Stamp], label: str, pictures: Sequence[Picture], path: Path
-) -> list[Shot]:
+def listed_shots(found: FrameList, label: str, pictures: Sequence[Picture], path: Path) -> Timed:
     """Return the pictures that a list of times names, or all in order if it names none.
 
     Raises
     ------
     DataError
-        A picture is missing, with the line of the list; or a list without names is of another
-        length.
+        A picture is missing or named twice, with the line of the list; or a list without names is
+        of another length.
     """
-    if stamps[0].name is None or pictures[0].name is None:
+    others = 0
+    stamps, paths = found.stamps, [p.path for p in pictures if p.path is not None]
+    if stamps[0].name is None or not paths:
         if len(stamps) != len(pictures):
-            raise DataError(
-                f"{label}: {len(stamps)} times for the {len(pictures)} frames of {path}"
-            )
-        pairs = zip(stamps, pictures, strict=True)
-        return [Shot(stamp.t_ns, picture.label, picture.load) for stamp, picture in pairs]
-    by_name = {picture.name: picture for picture in pictures}
-    shots = []
-    for stamp in stamps:
-        # lists name pictures from where they were written: only the last part holds here
-        name = PurePosixPath(stamp.name or "").name
-        if name not in by_name:
-            raise DataError(f"{label} line {stamp.line}: no image {name} in {path}")
-        shots.append(Shot(stamp.t_ns, by_name[name].label, by_name[name].load))
-    return shots
+            raise _other_number(label, len(stamps), len(pictures), path)
+        pairs = list(zip(stamps, range(len(pictures)), strict=True))
+    else:
+        pairs, others = match(stamps, paths, label, path)
+    shots = [Shot(stamp.t_ns, pictures[at].label, pictures[at].load) for stamp, at in pairs]
+    timed = told(found, label, shots)
+    if others:
+        timed.notes.append(f"{label}: {others} lines name images of other folders: left out")
+    return timed
+
+
+def told(found: FrameList, label: str, shots: list[Shot]) -> Timed:
+    """Return frames timed by a list, with what is to be told of it."""
+    doubts = [f"{label}: {found.unit.doubt}"] if found.unit.doubt else []
+    notes = [f"times from {label}: {found.columns}"]
+    if found.order:
+        notes.append(f"{label}: {found.order}")
+    return Timed(shots, doubts, notes)
+
+
+def _other_number(label: str, times: int, frames: int, path: Path) -> DataError:
+    return DataError(f"{label}: {times} times for the {frames} frames of {path}")
 
 
 class ListedSource(Source):
@@ -97,7 +117,7 @@ class ListedSource(Source):
         What was opened.
     kind : str
         The kind of source.
-    shots : sequence of Shot
+    timed : Timed
         Every frame, in the order of time.
     selection : Selection
         Frames wanted.
@@ -116,22 +136,21 @@ class ListedSource(Source):
         self,
         path: Path,
         kind: str,
-        shots: Sequence[Shot],
+        timed: Timed,
         selection: Selection,
         *,
         has_clock: bool,
         light: Light | None = None,
     ) -> None:
         super().__init__(path, kind, selection, has_clock)
-        self._shots = shots
+        shots = self._shots = timed.shots
+        self.doubts += timed.doubts
+        self.notes += timed.notes
         self._count()
         first = shots[0].load()
         self._describe(first, shots[0].label, light)
         image = first.image if isinstance(first, Pixels) else first
         check_values(image, shots[0].label)
-        apart_s = (shots[-1].t_ns - shots[0].t_ns) * 1e-9 / (len(shots) - 1)
-        if has_clock and apart_s > _LONG_S:
-            self.doubts.append(f"{path}: frames are {apart_s:,.0f} s apart; times are in seconds")
         if image.dtype.kind == "f":
             self.largest = float(image.max())
         if self.largest is not None and self.largest > 1:

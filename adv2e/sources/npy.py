@@ -1,13 +1,14 @@
 """Stacks of frames in a ``.npy`` file: (frames, rows, columns) or (frames, rows, columns, 3) RGB.
 
 Frames are read one by one.  Times come from the command line or from beside the file:
-``<stem>_ts.npy`` (float64 seconds) or ``<stem>.timestamps.txt`` (one time [s] a line).
+``<stem>_ts.npy`` or ``<stem>.timestamps.txt`` (one time a line).
 """
 
 from __future__ import annotations
 
 import math
 import os
+from decimal import Decimal
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,10 @@ from adv2e.errors import DataError
 from adv2e.npy import Header, read_array, read_header
 from adv2e.sources.base import GivenTimes, Image, Light, Selection
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
-from adv2e.sources.times import Stamp, parse_times, read_text
-from adv2e.ticks import NS, S, to_ticks
+from adv2e.sources.lists import FrameList, read_list
+from adv2e.sources.times import Stamp
+from adv2e.sources.units import frame_unit
+from adv2e.ticks import NS, to_ticks
 
 _BLOCK_BYTES = 16 << 20
 """Memory for frames whose pixels are strewn over the file."""
@@ -46,19 +49,17 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     if not pictures:
         raise DataError(f"{path}: no frames in it; at least two are needed")
     if given:
-        shots = given_shots(given, pictures, path)
+        timed = given_shots(given, pictures, path)
     elif found is not None:
-        shots = listed_shots(_read_times(found), str(found), pictures, path)
+        timed = listed_shots(_read_times(found, given), str(found), pictures, path)
     else:
         raise DataError(
             f"{path}: when are the frames? give --fps F or --timestamps FILE, or put"
             f" {path.stem}_ts.npy or {path.stem}.timestamps.txt beside it"
         )
-    source = ListedSource(path, "npy", shots, selection, has_clock=given.fps is None, light=_LIGHT)
-    if found is not None:
-        source.notes.append(
-            f"{given} replaces the times in {found}" if given else f"times from {found}"
-        )
+    source = ListedSource(path, "npy", timed, selection, has_clock=given.fps is None, light=_LIGHT)
+    if given and found is not None:
+        source.notes.append(f"{given} replaces the times in {found}")
     return source
 
 
@@ -148,18 +149,22 @@ def _found_times(path: Path) -> Path | None:
     return next((file for file in beside if file.is_file()), None)
 
 
-def _read_times(file: Path) -> list[Stamp]:
+def _read_times(file: Path, given: GivenTimes) -> FrameList:
     if file.suffix != ".npy":
-        return parse_times(read_text(file), str(file))
+        return read_list(file, time_unit=given.time_unit)
     try:
         with file.open("rb") as opened:
             times = read_array(opened, os.fstat(opened.fileno()).st_size, str(file))
     except OSError as error:
         raise DataError(f"{file}: {error.strerror or error}") from error
-    if times.ndim != 1 or times.dtype.kind != "f" or times.dtype.itemsize < 8:
+    if times.ndim != 1 or times.dtype.kind not in "iuf" or times.dtype.itemsize < 8:
         raise DataError(
-            f"{file}: {times.dtype.name} of shape {times.shape}; expected float64 seconds, one a"
-            " frame"
+            f"{file}: {times.dtype.name} of shape {times.shape}; expected float64 or int64, one"
+            " time a frame"
         )
-    times_ns = to_ticks(times, S, NS, f"{file}").tolist()
-    return [Stamp(t_ns, number, None) for number, t_ns in enumerate(times_ns)]
+    if not np.all(np.isfinite(times)):
+        raise DataError(f"{file} holds NaN or infinite times")
+    unit = frame_unit([Decimal(time) for time in times.tolist()], given=given.time_unit)
+    times_ns = to_ticks(times, unit.ns, NS, f"{file}").tolist()
+    stamps = [Stamp(t_ns, number, None) for number, t_ns in enumerate(times_ns)]
+    return FrameList(stamps, f"time [{unit.name}]", unit)

@@ -22,10 +22,11 @@ from adv2e.sources.choice import choose
 from adv2e.sources.colours import encoding_of, is_stated
 from adv2e.sources.containers import examine
 from adv2e.sources.gaps import gap_doubts
+from adv2e.sources.lists import read_list
 from adv2e.sources.opencv import quiet, rgb_of
 from adv2e.sources.opening import openable
 from adv2e.sources.packets import RETRIES, list_packets, stamp_of
-from adv2e.sources.times import parse_times, read_text, seconds
+from adv2e.sources.times import Stamp, seconds
 from adv2e.sources.video_times import VideoTimes
 
 if TYPE_CHECKING:
@@ -90,11 +91,15 @@ class VideoSource(Source):
             self.notes.append(f"{given} replaces the times in the file")
         self._listed: int | None = None
         if given.timestamps is not None:
-            stamps = parse_times(read_text(given.timestamps), str(given.timestamps))
+            stamps = self._list(given.timestamps, given.time_unit)
             self._listed = len(stamps)
             self._check_listed(len(stamps))
             self.doubts += gap_doubts([stamp.t_ns for stamp in stamps], str(given.timestamps))
             return lambda number: stamps[number].t_ns
+        if given.time_unit is not None:
+            raise DataError(
+                f"{self.path}: --time-unit is for lists of times; this video has its own"
+            )
         return None if given.rate is None else given.rate.time_ns
 
     def _check_listed(self, listed: int) -> None:
@@ -121,6 +126,15 @@ class VideoSource(Source):
             self.notes.append(self._times.note)
         if back is None and self._times.rate is None:
             self.doubts += gap_doubts(self._times.shown_ns, self.path)
+
+    def _list(self, timestamps: Path, time_unit: str | None) -> list[Stamp]:
+        steps = np.diff(self._times.shown_ns)
+        own_s = float(np.median(steps)) / 1e9 if steps.size else 1 / self._fps if self._fps else 0
+        found = read_list(timestamps, time_unit=time_unit, own_step_s=own_s)
+        self.notes.append(f"times from {timestamps}: {found.columns}")
+        if found.unit.doubt:
+            self.doubts.append(f"{timestamps}: {found.unit.doubt}")
+        return found.stamps
 
     def _choose_decoder(self) -> None:
         self._why_pyav, self._pixels = "", b""

@@ -52,6 +52,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         *("convert", "frames", "-o", "out.h5", "-c", "ideal", "--set", "sampling.L=3"),
         *("--seed", "7", "--threads", "2", "--overwrite", "--progress", "--start", "0.5"),
         *("--stop", "2", "--t0", "keep", "--timestamps", "t.txt", "--format", "h5"),
+        *("--time-unit", "us", "--images-anywhere"),
         *("--layout", "dsec", "--with-frames", "--preview", "p.gif", "--allow-damaged"),
     )
     assert outcome.status == 0
@@ -60,6 +61,8 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
     assert reading.given == {
         "fps": None,
         "timestamps": Path("t.txt"),
+        "time_unit": "us",
+        "images_anywhere": True,
         "start_s": 0.5,
         "stop_s": 2.0,
         "t0": "keep",
@@ -85,8 +88,7 @@ def test_convert_by_default(adv2e, pipeline):
     assert (reading.path, output, reading.threads) == ("clip.mp4", None, default_threads())
     assert options["config"] == Config()
     assert reading.given.pop("t0") == "auto"
-    assert reading.given.pop("allow_damaged") is False
-    assert set(reading.given.values()) == {None}
+    assert set(reading.given.values()) == {None, False}
     assert options["progress"] is False  # stderr is not a terminal here
     assert options["format"] is options["layout"] is None
 

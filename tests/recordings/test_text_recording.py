@@ -105,7 +105,7 @@ def test_times_without_any_point_are_microseconds(read):
     recording = read("1500 1 2 1\n1468941032229165 3 4 0\n")
 
     assert times(recording) == [1500, 1_468_941_032_229_165]
-    assert recording.problems[0] == "times have no decimal point: taken as microseconds"
+    assert recording.problems[0].startswith("no unit is stated: times are taken as us;")
 
 
 def test_polarity_minus_and_plus_one(read):

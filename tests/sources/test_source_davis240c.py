@@ -61,17 +61,17 @@ def test_whole_numbers_are_microseconds_as_those_of_its_events_are(recording, pa
     (recording / "images.txt").write_text("".join(lines))
     for source in (open_source(recording), open_source(pack())):
         assert [frame.t_ns for frame in source.frames()] == [t // 1000 * 1000 for t in TIMES]
-        assert any("times have no decimal point" in note for note in source.notes)
+        assert any("are taken as us (" in doubt for doubt in source.doubts)
     given = open_source(recording, fps=10.0)
-    assert not any("decimal point" in note for note in given.notes)
+    assert not given.doubts
 
 
-def test_whole_numbers_too_near_for_microseconds_are_seconds(recording, pack):
+def test_whole_numbers_that_could_count_the_frames_are_seconds_in_doubt(recording, pack):
     lines = [f"{t} images/frame_{n}.png\n" for n, t in enumerate((0, 1, 3))]
     (recording / "images.txt").write_text("".join(lines))
     for source in (open_source(recording), open_source(pack())):
         assert [frame.t_ns for frame in source.frames()] == [0, 10**9, 3 * 10**9]
-        assert any("taken as seconds" in note for note in source.notes)
+        assert any("taken as s (" in doubt for doubt in source.doubts)
 
 
 @pytest.mark.parametrize("top", ["", "rec/"])
@@ -99,7 +99,8 @@ def test_given_times_replace_the_list_and_a_note_says_so(recording, picture, tmp
     source = open_source(recording, timestamps=times)
     assert [frame.t_ns for frame in source.frames()] == [10**9, 2 * 10**9, 3 * 10**9]
     assert source.notes == [
-        f"--timestamps {times} replaces the times in {recording / 'images.txt'}"
+        f"times from {times}: time [s]",
+        f"--timestamps {times} replaces the times in {recording / 'images.txt'}",
     ]
     source = open_source(recording, fps=20)
     assert [frame.t_ns for frame in source.frames()] == [0, 50_000_000, 100_000_000]

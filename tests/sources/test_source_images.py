@@ -149,7 +149,7 @@ def test_times_found_in_or_beside_the_folder(write_images, picture, name, place)
     assert times_of(source) == [250_000_000, 500_000_000]
     assert same(images_of(source), frames if name == "timestamps.txt" else frames[::-1])
     assert (source.kind, source.has_clock) == ("images", True)
-    assert any(f"times from {folder.parent}" in n and n.endswith(name) for n in source.notes)
+    assert any(f"times from {folder.parent}" in n and f"{name}: " in n for n in source.notes)
 
 
 def test_given_times_replace_a_list_and_a_note_says_so(write_images, picture):

@@ -78,12 +78,29 @@ def test_another_number_of_times_names_both(path, tmp_path):
         open_source(path)
 
 
-@pytest.mark.parametrize("times", [np.arange(3), np.arange(3, dtype=np.float32), np.eye(3)])
-def test_times_in_an_array_must_be_float64_seconds(path, tmp_path, times):
+@pytest.mark.parametrize(
+    "times", [np.arange(3, dtype=np.float32), np.arange(3, dtype=np.int32), np.eye(3)]
+)
+def test_times_in_an_array_must_be_float64_or_int64(path, tmp_path, times):
     save(path, np.zeros((3, 2, 2), np.uint8))
     save(tmp_path / "stack_ts.npy", times)
-    with pytest.raises(DataError, match=r"stack_ts\.npy: .*expected float64 seconds"):
+    with pytest.raises(DataError, match=r"stack_ts\.npy: .*expected float64 or int64"):
         open_source(path)
+
+
+@pytest.mark.parametrize(
+    ("times", "unit"),
+    [([0, 33_000, 67_000], "us"), ([0.0, 33.0, 67.0], "ms"), ([0.0, 0.033, 0.067], "s")],
+)
+def test_the_unit_of_times_in_an_array_is_told_apart(path, tmp_path, times, unit):
+    save(path, np.zeros((3, 2, 2), np.uint8))
+    save(tmp_path / "stack_ts.npy", np.array(times))
+    source = open_source(path)
+    assert [frame.t_ns for frame in source.frames()] == [0, 33_000_000, 67_000_000]
+    assert bool(source.doubts) is (unit != "s")
+    settled = open_source(path, time_unit=unit)
+    assert [frame.t_ns for frame in settled.frames()] == [0, 33_000_000, 67_000_000]
+    assert settled.doubts == []
 
 
 @pytest.mark.parametrize(

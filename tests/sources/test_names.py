@@ -1,0 +1,170 @@
+"""Names in lists: whole, then by their end, never one picture for two."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from adv2e.errors import DataError
+from adv2e.sources import open_source
+from adv2e.sources.names import leads_out, match, member_of
+from adv2e.sources.times import Stamp
+
+LEFT = ["/data/rec/left/0000.png", "/data/rec/left/0001.png"]
+
+
+def stamps(*names):
+    return [Stamp(10**7 * n, n + 1, name) for n, name in enumerate(names)]
+
+
+def matched(*names):
+    """The picture of each line, None for those of other folders."""
+    pairs, others = match(stamps(*names), LEFT, "info.txt", Path("/data/rec/left"))
+    assert len(pairs) + others == len(names)
+    found = {stamp.name: number for stamp, number in pairs}
+    return [found.get(name) for name in names]
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["0001.png", "0000.png"], [1, 0]),
+        (["./0000.png", "left/0001.png"], [0, 1]),
+        (["../left/0000.png", "../left/0001.png"], [0, 1]),
+        (["/data/rec/left/0000.png", "/data/rec/left/0001.png"], [0, 1]),
+        (["C:/clip/left/0000.png", "C:/clip/left/0001.png"], [0, 1]),
+        (["C:/moved/since/0000.png", "C:/moved/since/0001.png"], [0, 1]),
+        (["left/0000.png", "right/0000.png", "left/0001.png"], [0, None, 1]),
+        (["/a/left/0000.png", "/a/right/0000.png", "/a/left/0001.png"], [0, None, 1]),
+        (["left/0000.png", "right/9999.png"], [0, None]),
+    ],
+)
+def test_a_name_is_matched_whole_or_by_its_end(names, expected):
+    assert matched(*names) == expected
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (
+            ["a/0000.png", "b/0000.png"],
+            "info.txt line 2: b/0000.png is the same picture as a/0000.png on line 1: there is one"
+            " 0000.png in /data/rec/left",
+        ),
+        (["a/left/0000.png", "b/left/0000.png"], "line 2: b/left/0000.png is the same picture as"),
+        (["0000.png", "left/0000.png"], "line 2: left/0000.png is the same picture as"),
+        (["left/0000.png", "left/0002.png"], "line 2: no image left/0002.png in /data/rec/left"),
+        (["1540821840.6 0001.png"], "line 1: no image 1540821840.6 0001.png"),
+    ],
+)
+def test_lines_without_a_picture_of_their_own_are_named(names, message):
+    with pytest.raises(DataError, match=message):
+        matched(*names)
+
+
+@pytest.mark.parametrize(
+    ("name", "member"),
+    [
+        ("images/a.png", "images/a.png"),
+        ("images\\a.png", "images/a.png"),
+        ("./images//a.png", "images/a.png"),
+        ("images/../images/a.png", "images/a.png"),
+        ("C:\\clip\\images\\a.png", "images/a.png"),
+        ("/home/x/rec/images/a.png", "images/a.png"),
+        ("rec/b.png", "b.png"),
+        ("../rec/images/a.png", None),
+        ("images/../../b.png", None),
+        ("other.png", None),
+        ("", None),
+    ],
+)
+def test_a_name_in_a_recording_means_a_file_below_it(name, member):
+    assert member_of(name, {"images/a.png", "b.png"}.__contains__) == member
+
+
+@pytest.mark.parametrize("name", ["../a.png", "a/../../b", "/a", "C:\\a", "\\\\host\\share\\a"])
+def test_names_that_lead_out(name):
+    assert leads_out(name)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a/../b.png", "a..b/c", "..a/b"])
+def test_names_that_stay_inside(name):
+    assert not leads_out(name)
+
+
+# whole inputs
+
+
+@pytest.fixture
+def two_folders(write_images, picture):
+    """Folders left and right with two pictures each, and a list of all four beside them."""
+    for number, folder in enumerate(("left", "right")):
+        write_images([picture(2 * number), picture(2 * number + 1)], folder, "{:04d}.png")
+    root = write_images([], "left").parent
+    rows = ["left/0000.png 0", "right/0000.png 2000", "left/0001.png 10000", "right/0001.png 12000"]
+    (root / "info.txt").write_text("\n".join(rows))
+    return root
+
+
+def test_a_list_of_two_folders_gives_each_its_own(two_folders):
+    for folder, begin in (("left", 0), ("right", 2_000_000)):
+        source = open_source(two_folders / folder)
+        assert [frame.t_ns for frame in source.frames()] == [begin, begin + 10_000_000]
+        assert any("2 lines name images of other folders" in note for note in source.notes)
+
+
+def test_a_list_of_two_other_folders_is_an_error(two_folders):
+    (two_folders / "left").rename(two_folders / "middle")
+    with pytest.raises(DataError, match=r"info\.txt line 2: right/0000\.png is the same picture"):
+        open_source(two_folders / "middle")
+
+
+def test_windows_paths_of_a_recording(write_images, picture):
+    images = write_images([picture(0), picture(1)], "rec/images")
+    rows = [f"0.{n + 1} C:\\rec\\images\\frame_{n}.png\n" for n in range(2)]
+    (images.parent / "images.txt").write_text("".join(rows))
+    assert [frame.t_ns for frame in open_source(images.parent).frames()] == [10**8, 2 * 10**8]
+
+
+@pytest.fixture
+def reaching_out(write_images, picture):
+    """A recording whose list names an image beside its folder, by the name given."""
+    images = write_images([picture(0)], "rec/images")
+    outside = write_images([picture(1)], "elsewhere", "secret.png") / "secret.png"
+
+    def write(name):
+        (images.parent / "images.txt").write_text(f"0.1 images/frame_0.png\n0.2 {name}\n")
+        (images.parent / "events.txt").write_text("0.1 1 1 1\n")
+        return images.parent
+
+    return write, outside
+
+
+@pytest.mark.parametrize(
+    "way", ["../elsewhere/secret.png", "/", "images/../../elsewhere/secret.png"]
+)
+def test_images_outside_a_recording_are_refused_unless_the_user_says_so(
+    adv2e, reaching_out, picture, tmp_path, way
+):
+    write, outside = reaching_out
+    folder = write(str(outside) if way == "/" else way)
+    with pytest.raises(DataError, match=r"images\.txt line 2: .* --images-anywhere allows that"):
+        open_source(folder)
+    told = adv2e("info", folder)
+    assert told.status == 1
+    assert "--images-anywhere" in told.err
+
+    last = list(open_source(folder, images_anywhere=True).frames())[-1]
+    assert (last.image == picture(1)).all()
+    assert "frames      2" in adv2e("info", folder, "--images-anywhere").out
+    converted = adv2e("convert", folder, "--images-anywhere", "-o", tmp_path / "a.txt")
+    assert converted.status == 0, converted.err
+
+
+def test_an_absolute_path_that_is_not_there_is_taken_by_its_end(reaching_out):
+    write, _ = reaching_out
+    with pytest.raises(DataError, match=r"line 2: /gone/frame_0\.png is not in the folder"):
+        open_source(write("/gone/frame_0.png"))
+    with pytest.raises(DataError, match=r"line 2: .* is the same picture as .* on line 1"):
+        open_source(write("/gone/images/frame_0.png"))

@@ -1,0 +1,155 @@
+"""One rule for the unit of times, whatever is opened; --time-unit settles what it leaves open."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from adv2e.errors import DataError, UsageError
+from adv2e.recordings import read_recording
+from adv2e.sources import open_source
+
+PER_S = {"s": 1, "ms": 1000, "us": 10**6, "ns": 10**9}
+
+
+def times_of(source):
+    return [frame.t_ns for frame in source.frames()]
+
+
+def listed(unit, fps, count, *, whole=False):
+    """Times of frames as a list has them."""
+    number = "{:.0f}" if whole else "{:.6f}"
+    return [number.format(n * PER_S[unit] / fps) for n in range(count)]
+
+
+@pytest.fixture
+def clip(write_video, picture):
+    return write_video("clip.mkv", [picture(n, (24, 32, 3)) for n in range(6)], 30)
+
+
+@pytest.mark.parametrize("fps", [25, 400])
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_times_of_a_video_in_another_unit_are_found_and_told(clip, tmp_path, adv2e, unit, fps):
+    times = tmp_path / "t.txt"
+    times.write_text("\n".join(listed(unit, fps, 6)))
+    source = open_source(clip, timestamps=times)
+    assert times_of(source) == [n * 10**9 // fps for n in range(6)]
+    (doubt,) = source.doubts
+    assert f"taken as {unit} ({fps} frames a second)" in doubt
+    assert "--time-unit" in doubt
+    assert f"problem     {doubt}" in adv2e("info", clip, "--timestamps", times).out
+    told = adv2e("convert", clip, "--timestamps", times, "-o", tmp_path / "a.txt")
+    assert told.err.splitlines()[0] == doubt
+    assert open_source(clip, timestamps=times, time_unit=unit).doubts == []
+
+
+def test_a_thousandfold_from_the_times_of_the_video_is_told(clip, tmp_path):
+    times = tmp_path / "t.txt"
+    times.write_text("\n".join(f"{n / 30e3:.12f}" for n in range(6)))
+    (doubt,) = open_source(clip, timestamps=times).doubts
+    assert "3.33333e-05 s apart, where the video's own are 0.03" in doubt
+
+
+def test_a_video_of_its_own_times_has_no_use_for_a_unit(clip):
+    with pytest.raises(DataError, match=r"clip\.mkv: --time-unit is for lists of times"):
+        open_source(clip, time_unit="ms")
+    with pytest.raises(UsageError, match="--time-unit is for lists of times, which --fps"):
+        open_source(clip, fps=30, time_unit="ms")
+    with pytest.raises(UsageError, match="--time-unit: must be s, ms, us or ns, got 'm'"):
+        open_source(clip, time_unit="m")
+
+
+@pytest.fixture
+def recording(write_images, picture):
+    """Write a recording with its lists in the units given; returns its folder."""
+    folder = write_images([picture(n) for n in range(4)], "rec/images").parent
+
+    def write(frames, events):
+        rows = zip(frames, range(4), strict=True)
+        (folder / "images.txt").write_text("".join(f"{t} images/frame_{n}.png\n" for t, n in rows))
+        (folder / "events.txt").write_text(
+            "".join(f"{t} {n % 32} 3 1\n" for n, t in enumerate(events))
+        )
+        return folder
+
+    return write
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_frames_and_events_of_a_recording_are_in_one_unit(recording, unit):
+    events = sorted(f"{n * 150 * PER_S[unit] // 10**6:020d}" for n in range(500))
+    folder = recording(listed(unit, 40, 4, whole=True), events)
+    frames_ns = [0, 25_000_000, 50_000_000, 75_000_000]
+    found = read_recording(folder)
+    assert found.frame_times_ns.tolist() == frames_ns
+    assert abs(int(found.events["t"].max()) - 499 * 150) < 1000
+    assert any(f"taken as {unit}" in problem for problem in found.problems)
+    for opened in (folder, folder / "images"):
+        assert times_of(open_source(opened)) == frames_ns
+        assert f"taken as {unit}" in open_source(opened).doubts[0]
+
+
+def test_a_unit_given_is_that_of_the_list_without_points(recording):
+    folder = recording(listed("us", 40, 4, whole=True), ["0.001", "0.07"])
+    found = read_recording(folder, time_unit="ms")
+    assert found.frame_times_ns.tolist() == [0, 25 * 10**9, 50 * 10**9, 75 * 10**9]
+    assert found.events["t"].tolist() == [1000, 70_000]
+
+
+def test_a_unit_given_is_that_of_both(recording):
+    folder = recording(["0.0", "0.5", "1.5", "2.5"], ["1.5", "2.25"])
+    found = read_recording(folder, time_unit="ms")
+    assert found.frame_times_ns.tolist() == [0, 500_000, 1_500_000, 2_500_000]
+    assert found.events["t"].tolist() == [1500, 2250]
+    assert found.problems == []
+
+
+@pytest.mark.parametrize(
+    ("unit", "text", "t_us"),
+    [
+        ("s", "1500 1 2 1\n", 1_500_000_000),
+        ("ms", "1500 1 2 1\n", 1_500_000),
+        ("us", "1500 1 2 1\n", 1500),
+        ("ns", "1500 1 2 1\n", 2),
+        ("ns", "1468941032229165635 1 2 1\n", 1_468_941_032_229_166),
+        ("us", "1500.4 1 2 1\n", 1500),
+        ("ms", "1.0005 1 2 1\n", 1001),
+    ],
+)
+def test_a_unit_given_for_events_in_text(tmp_path, unit, text, t_us):
+    path = tmp_path / "e.txt"
+    path.write_text(text)
+    assert read_recording(path, time_unit=unit).events["t"].tolist() == [t_us]
+
+
+def test_slow_frames_that_we_wrote_are_in_seconds(recording, adv2e, tmp_path):
+    folder = recording(["0.0", "2.0", "4.0", "6.0"], ["0.1"])
+    assert open_source(folder).doubts
+    out = tmp_path / "out"
+    assert adv2e("convert", folder, "--time-unit", "s", "-o", out).status == 0
+    for path in (out, out / "images"):
+        source = open_source(path)
+        assert (times_of(source)[-1], source.doubts) == (6 * 10**9, [])
+    report = json.loads(adv2e("info", out, "--json").out)
+    assert report["frames"]["last_ns"] == 6 * 10**9
+
+
+def test_what_dvs_voltmeter_writes_is_in_microseconds(write_images, picture):
+    folder = write_images([picture(n) for n in range(3)])
+    (folder / "info.txt").write_text(
+        "".join(f"frames/frame_{n}.png {n * 41667}\n" for n in range(3))
+    )
+    source = open_source(folder)
+    assert times_of(source) == [0, 41_667_000, 83_334_000]
+    assert source.doubts == []
+
+
+def test_info_of_a_stack_tells_its_doubts(adv2e, tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros((3, 4, 5), np.uint8))
+    np.save(tmp_path / "a_ts.npy", np.array([0, 40_000, 80_000]))
+    out = adv2e("info", tmp_path / "a.npy").out
+    assert "frame span  0 to 0.08 s" in out
+    assert "are taken as us (25 frames a second); --time-unit settles it" in out
+    assert "0 to 80 s" in adv2e("info", tmp_path / "a.npy", "--time-unit", "ms").out
