@@ -63,7 +63,8 @@ class VideoSource(Source):
     def __init__(self, path: Path, given: GivenTimes, selection: Selection) -> None:
         super().__init__(path, "video", selection, has_clock=given.timestamps is not None)
         self._container = examine(path, allow_damaged=selection.allow_damaged)
-        self.doubts += [f"{path}: {fault}" for fault in self._container.faults]
+        told = [*self._container.faults, *self._container.doubts]
+        self.doubts += [f"{path}: {line}" for line in told]
         self._choose_decoder()
         with self._opened() as capture:
             self._fps = max(float(capture.get(cv2.CAP_PROP_FPS)), 0.0)
@@ -124,6 +125,7 @@ class VideoSource(Source):
             raise DataError(f"{self.path}: OpenCV finds no times in it; give --fps or --timestamps")
         if self._times.note:
             self.notes.append(self._times.note)
+        self.doubts += [f"{self.path}: {doubt}" for doubt in self._times.doubts]
         if back is None and self._times.rate is None:
             self.doubts += gap_doubts(self._times.shown_ns, self.path)
 

@@ -14,11 +14,12 @@ from itertools import pairwise
 from statistics import median
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.sources.completeness import lost_by_count, lost_by_time
 from adv2e.sources.containers import Container
 from adv2e.sources.packets import Packets
-from adv2e.sources.times import NS_PER_S, FrameRate, constant_rate, rates_near
+from adv2e.sources.times import NS_PER_S, FrameRate, constant_rate, rates_near, seconds
 
 Clock = Callable[[int, int | None], int]
 """Time [ns] of a frame, from its number and its own stamp since the first [ns], if it has one.
@@ -60,6 +61,8 @@ class VideoTimes:
         Where times begin again, as in files that were joined.
     note : str
         What is to be told of how the times came about.
+    doubts : list of str
+        What may be wrong with them.
     """
 
     def __init__(self, container: Container, packets: Packets | None, fps: float) -> None:
@@ -67,6 +70,7 @@ class VideoTimes:
         self._snaps_within_ns = container.tick_ns
         self.rate: FrameRate | None = None
         self.note = ""
+        self.doubts: list[str] = []
         self._grid: Fraction | None = None
         if packets is None:
             self.shown_ns = sorted(set(container.stamps_ns or []))
@@ -84,6 +88,9 @@ class VideoTimes:
         self.usual_ns = round(median(steps)) if steps else nominal
         if self.rate is not None:
             self.usual_ns = self.rate.time_ns(1)
+        elif packets is not None and not (container.pictures or container.whole or packets.back):
+            self._look_for_holes(packets, container.tick_ns or 1000)
+        self._compare_end(container.end_ns)
         counted = len(self.shown_ns) if packets is None else packets.count
         self.back = None if packets is None else packets.back
         self.exact = packets is None or container.pictures == counted
@@ -94,13 +101,44 @@ class VideoTimes:
         tick_ns = container.tick_ns or 1000
         missing = count - len(known)
         hz = None if packets.back else _standing(known, count, container.rate, fps, tick_ns)
-        if hz is not None and not packets.tiny:
+        hz = None if packets.tiny else hz
+        if hz is not None:
             self.rate, self._snaps_within_ns = FrameRate(hz), round(_MOVED * NS_PER_S / hz)
         if missing > 0:
             rest = "the others follow"
             if hz is not None:
                 rest = f"taken at {float(hz):.6g} frames a second"
             self.note = f"the file states times for {len(known)} of its {count} frames: {rest}"
+
+    def _look_for_holes(self, packets: Packets, tick_ns: int) -> None:
+        """Doubt times that leave some of those at a constant rate out."""
+        steps = np.diff(np.array(self.shown_ns, dtype=np.float64))
+        if steps.size < 2:
+            return
+        usual = steps[np.abs(steps - np.median(steps)) <= max(0.1 * np.median(steps), tick_ns)]
+        if not usual.size:
+            return
+        hz = NS_PER_S / float(usual.mean())
+        for rate in [*map(float, rates_near(hz)), hz]:
+            numbers = _numbers(self.shown_ns, rate, tick_ns)
+            missing = 0 if numbers is None else int(numbers[-1]) + 1 - packets.count
+            if 0 < missing <= packets.count:  # more are a gap
+                self.doubts.append(
+                    f"at {rate:.6g} frames a second {missing} are missing among its"
+                    f" {packets.count}: left out when it was recorded, or damaged"
+                )
+                return
+
+    def _compare_end(self, end_ns: int | None) -> None:
+        if end_ns is None or not self.shown_ns:
+            return
+        last_ns = self.shown_ns[-1] - self.shown_ns[0]
+        moved = _MOVED if self._container.rate is None else 1.5
+        if last_ns + moved * self.usual_ns < end_ns:
+            self.doubts.append(
+                f"it states a length of {seconds(end_ns)} s, and its last picture is at"
+                f" {seconds(last_ns)} s: cut short or damaged"
+            )
 
     @property
     def zero_means_none(self) -> bool:
@@ -118,6 +156,7 @@ class VideoTimes:
         if packets is None or (packets.complete and not container.decoding_times):
             known = [stamp for stamp in stamps_ns if stamp is not None]
             lost = len(lost_by_time(self.shown_ns, known, container.tick_ns))
+            lost += self.expected - (len(self.shown_ns) if packets is None else packets.count)
         else:
             lost = lost_by_count(self.expected, stamps_ns, packets.known_ns)
         tiny = container.tiny if packets is None else packets.tiny
@@ -167,8 +206,7 @@ def _standing(
     """Return the rate at which `count` pictures are if some of them are at the times known."""
     if not known_ns or count < 2:
         return None
-    since_first = np.array(known_ns, dtype=np.int64) - known_ns[0]
-    span_ns = int(since_first[-1])
+    span_ns = known_ns[-1] - known_ns[0]
     clear = len(known_ns) > _CLEAR_SHARE * count
     tried = [stated] if stated is not None else []
     for about in (fps, (len(known_ns) - 1) * NS_PER_S / span_ns if clear and span_ns else 0):
@@ -176,10 +214,17 @@ def _standing(
     if clear and fps > 0:
         tried.append(Fraction(fps).limit_denominator(1001))
     for hz in tried:
-        places = since_first * (float(hz) / NS_PER_S)
-        numbers = np.rint(places)
-        within = max(2 * tick_ns * float(hz) / NS_PER_S, _ROUNDED)
-        near = np.all(np.abs(places - numbers) <= within)
-        if near and numbers[-1] < count and np.all(np.diff(numbers) > 0):
+        numbers = _numbers(known_ns, float(hz), tick_ns)
+        if numbers is not None and numbers[-1] < count:
             return hz
     return None
+
+
+def _numbers(times_ns: Sequence[int], hz: float, tick_ns: int) -> NDArray[np.float64] | None:
+    """Return which pictures at a rate are at these times; None if some are at none."""
+    since_first = np.array(times_ns, dtype=np.int64) - times_ns[0]
+    places = since_first * (hz / NS_PER_S)
+    numbers: NDArray[np.float64] = np.rint(places)
+    within = max(2 * tick_ns * hz / NS_PER_S, _ROUNDED)
+    near = np.all(np.abs(places - numbers) <= within) and np.all(np.diff(numbers) > 0)
+    return numbers if near else None

@@ -8,21 +8,39 @@ from __future__ import annotations
 
 import mmap
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 from adv2e.errors import DataError
-from adv2e.sources.containers import avi, matroska, mp4, y4m
+from adv2e.sources.containers import (
+    asf,
+    avi,
+    flv,
+    gif,
+    matroska,
+    mp4,
+    mpegps,
+    mpegts,
+    mxf,
+    ogg,
+    y4m,
+)
 from adv2e.sources.containers.base import Container, DamagedError
 
 __all__ = ["Container", "examine"]
 
-_DECODING_TIMES = {
-    b"\x30\x26\xb2\x75\x8e\x66\xcf\x11": 1_000_000,  # ASF, WMV
-    b"\x00\x00\x01\xba": 11_112,  # MPEG program stream: ticks of 90 kHz
-    b"\x00\x00\x01\xb3": 11_112,  # MPEG video without a container
-    b"\x06\x0e\x2b\x34": 1000,  # MXF
+_FAMILIES: dict[bytes, Callable[[mmap.mmap], Container]] = {
+    matroska.MAGIC: matroska.examine,
+    y4m.MAGIC: y4m.examine,
+    gif.MAGIC: gif.examine,
+    flv.MAGIC: flv.examine,
+    ogg.MAGIC: ogg.examine,
+    asf.MAGIC: asf.examine,
+    mxf.MAGIC: mxf.examine,
+    mpegps.MAGIC: mpegps.examine,
 }
-"""How files begin that state no times of showing for all pictures, and the step of those."""
+"""How files begin, and what reads them."""
+_MPEG_VIDEO = b"\x00\x00\x01\xb3"
 
 
 def examine(path: Path, *, allow_damaged: bool = False) -> Container:
@@ -61,11 +79,10 @@ def _examine(data: mmap.mmap) -> Container:
         return mp4.examine(data)
     if data[:4] == b"RIFF" and data[8:12] == b"AVI ":
         return avi.examine(data)
-    if data[:4] == b"\x1a\x45\xdf\xa3":
-        return matroska.examine(data)
-    if data[: len(y4m.MAGIC)] == y4m.MAGIC:
-        return y4m.examine(data)
-    for magic, tick_ns in _DECODING_TIMES.items():
+    for magic, family in _FAMILIES.items():
         if data[: len(magic)] == magic:
-            return Container(decoding_times=True, tick_ns=tick_ns)
-    return Container()
+            return family(data)
+    if layout := mpegts.layout_of(data):
+        return mpegts.examine(data, *layout)
+    # pictures of MPEG-1 and -2 without a container have no times
+    return Container(decoding_times=data[:4] == _MPEG_VIDEO)

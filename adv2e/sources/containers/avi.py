@@ -16,6 +16,7 @@ from fractions import Fraction
 import numpy as np
 
 from adv2e.sources.containers.base import Container, cut_short
+from adv2e.sources.times import FrameRate
 
 _INDEX_OF_INDEXES = 0
 
@@ -34,13 +35,13 @@ def examine(data: mmap.mmap) -> Container:
         start = end + size % 2
     if not ends:
         return Container()
-    number, rate, indexes = 0, None, None
+    number, rate, indexes, length = 0, None, None, 0
     for kind, begin, stop in _chunks(data, *ends[0]):
         if kind == b"strl":
             header = {name: (a, b) for name, a, b in _chunks(data, begin, stop)}
             at = header.get(b"strh", (0, 0))[0]
             if at and data[at : at + 4] == b"vids":
-                scale, hz = struct.unpack_from("<II", data, at + 20)
+                scale, hz, length = struct.unpack_from("<II4xI", data, at + 20)
                 rate = Fraction(hz, scale) if scale and hz else None
                 indexes = header.get(b"indx")
                 break
@@ -50,7 +51,8 @@ def examine(data: mmap.mmap) -> Container:
     pictures = _counted(data, indexes) if indexes else None
     if pictures is None and len(ends) == 1:
         pictures = _listed(data, *ends[0], b"%02d" % number)
-    return Container(rate=rate, decoding_times=True, pictures=pictures)
+    end_ns = FrameRate(rate).time_ns(length) if length and pictures is None else None
+    return Container(rate=rate, decoding_times=True, pictures=pictures, end_ns=end_ns)
 
 
 def _chunks(data: mmap.mmap, start: int, stop: int) -> Iterator[tuple[bytes, int, int]]:

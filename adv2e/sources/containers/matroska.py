@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 from adv2e.sources.containers.base import TINY_BYTES, Container, DamagedError, cut_short
 
+MAGIC = b"\x1a\x45\xdf\xa3"
 _SEGMENT, _INFO, _TIMESTAMP_SCALE = 0x18538067, 0x1549A966, 0x2AD7B1
 _TRACKS, _TRACK_ENTRY, _TRACK_NUMBER, _TRACK_TYPE = 0x1654AE6B, 0xAE, 0xD7, 0x83
 _CLUSTER, _TIMESTAMP, _SIMPLE_BLOCK, _BLOCK_GROUP, _BLOCK = 0x1F43B675, 0xE7, 0xA3, 0xA0, 0xA1

@@ -15,13 +15,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.sources.containers import fragments
 from adv2e.sources.containers.base import TINY_BYTES, Container, DamagedError, cut_short
 from adv2e.sources.times import NS_PER_S
 
 _Span = tuple[int, int]
 """Where the contents of a box begin and end."""
-
-_FRAGMENTS = (b"moof", b"mdat", b"sidx", b"styp", b"mfra", b"free", b"skip", b"emsg", b"prft")
 
 
 def examine(data: mmap.mmap) -> Container:
@@ -29,22 +28,19 @@ def examine(data: mmap.mmap) -> Container:
 
     What follows the last box, and boxes that hold no samples, may be anything: players ignore it.
     """
-    top = list(_boxes(data, 0, len(data)))
+    top = list(boxes(data, 0, len(data)))
     index = [(start, stop) for kind, start, stop in top if kind == b"moov"]
     if not index or index[0][1] > len(data):
         raise DamagedError("cut short or never finished: its index ('moov') is missing")
-    if any(kind == b"moof" for kind, _, _ in top):  # fragments have indices of their own
-        kind, _, stop = top[-1]
-        if stop > len(data) and kind in _FRAGMENTS:
-            raise cut_short(stop, len(data))
-        return Container()
     movie_scale, tracks = 0, []
-    for kind, start, stop in _boxes(data, *index[0]):
+    for kind, start, stop in boxes(data, *index[0]):
         if kind == b"mvhd":
             (movie_scale,) = struct.unpack_from(">I", data, start + (20 if data[start] else 12))
         elif kind == b"trak":
             tracks.append(_Track(data, start, stop))
     videos = [track for track in tracks if track.is_video]
+    if any(kind in (b"moof", b"sidx") for kind, _, _ in top):
+        return fragments.examine(data, boxes, videos[0].number if len(videos) == 1 else None)
     end = max((track.end for track in tracks), default=0)
     if end > len(data):
         raise cut_short(end, len(data))
@@ -53,7 +49,7 @@ def examine(data: mmap.mmap) -> Container:
     return Container(stamps_ns=videos[0].stamps_ns(movie_scale), tiny=videos[0].tiny)
 
 
-def _boxes(data: mmap.mmap, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:
+def boxes(data: mmap.mmap, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:
     """Yield kind, start and end of the contents of each box between two places."""
     while start + 8 <= end:
         size, kind = struct.unpack_from(">I4s", data, start)
@@ -79,13 +75,22 @@ class _Track:
         self.is_video = handler is not None and data[handler[0] + 8 : handler[0] + 12] == b"vide"
 
     def _open(self, start: int, stop: int) -> None:
-        for kind, begin, end in _boxes(self._data, start, stop):
+        for kind, begin, end in boxes(self._data, start, stop):
             if end > stop:
                 raise DamagedError("its index ('moov') is damaged")
             if kind in (b"mdia", b"minf", b"stbl", b"edts"):
                 self._open(begin, end)
             elif kind != b"hdlr" or kind not in self._found:  # minf may have one of its own
                 self._found[kind] = begin, end
+
+    @property
+    def number(self) -> int | None:
+        """By which fragments name it."""
+        span = self._found.get(b"tkhd")
+        if span is None:
+            return None
+        place = span[0] + (20 if self._data[span[0]] else 12)
+        return int(struct.unpack_from(">I", self._data, place)[0])
 
     def _table(self, kind: bytes, layout: str, skip: int = 4) -> NDArray[np.int64]:
         """Return the (entries, columns) of a table; `skip` bytes stand before their number."""
