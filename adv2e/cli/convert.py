@@ -50,7 +50,12 @@ SECONDS = options.FiniteNumber(min=0)
     is_flag=True,
     help="Store the input frames in HDF5 too; DAVIS240C folders and zips always hold them.",
 )
-@click.option("--preview", metavar="FILE", help="Also draw the events: .mp4, .gif or .png.")
+@click.option(
+    "--preview",
+    metavar="FILE",
+    help="Also draw frames and events, as 'adv2e render' does: .mp4 or .webm plays in browsers,"
+    " .gif everywhere, .avi (without loss) in VLC; .png is a sheet.",
+)
 def command(
     source: str,
     output: str | None,

@@ -88,8 +88,16 @@ def command(
     """Draw pictures and films of events.
 
     EVENTS is a file of events (.txt, .h5, .hdf5, .npz) or a recording (DAVIS240C folder or zip).
-    The suffix of OUT says what to make: .mp4 or .gif a film, .avi a film without loss, .png a
-    sheet of one or several instants. Times are counted from the first event or frame.
+    The suffix of OUT says what to make; times are counted from the first event or frame.
+
+    \b
+      .mp4    film for browsers and slides: H.264 with the extra 'video' (PyAV), which plays
+              everywhere; without it VP9, which plays in Chrome, Edge, Firefox and VLC, and takes
+              twenty times as long to write
+      .webm   film for browsers (VP8): Chrome, Edge, Firefox, Safari from 14.1 on, VLC
+      .gif    film for everything that shows pictures, at most 50 pictures a second
+      .avi    film without any loss (FFV1): VLC, mpv, ffmpeg; no browser
+      .png    sheet of one or several instants
 
     \b
     Examples:
@@ -98,7 +106,7 @@ def command(
       adv2e render urban.zip -o urban.png --at 1.5 --at 2.5 --window 10 --style grey
     """
     if output is None:
-        raise click.UsageError("-o is missing: a .mp4, .avi, .gif or .png file")
+        raise click.UsageError("-o is missing: a .mp4, .webm, .avi, .gif or .png file")
     if stop is not None and stop <= start:
         raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
     from adv2e.recordings import read_recording

@@ -3,7 +3,7 @@
 ======== =========================================================================================
 styles   ``adv2e.rendering.styles``: events of a window -> picture (rows, columns, 3), uint8 RGB
 layout   panels side by side, captions, contact sheets
-films    files that take pictures one by one: .mp4, .avi, .gif; and .png, a contact sheet
+films    files that take pictures one by one: .mp4, .webm, .avi, .gif; and .png, a sheet
 preview  :class:`Preview`: a stream of events and frames -> film or sheet, in bounded memory
 ======== =========================================================================================
 """

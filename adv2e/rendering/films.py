@@ -1,22 +1,18 @@
-"""Files that take pictures one by one: .mp4, .avi, .gif hold a film, .png a contact sheet."""
+"""Files that take pictures one by one: .mp4, .webm, .avi, .gif: a film; .png: a contact sheet."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
 from typing import Protocol
 
 import cv2
-import numpy as np
 
 from adv2e.errors import UsageError
 from adv2e.rendering.gif import GifWriter, palette
 from adv2e.rendering.layout import Cell, compose, default_scale, sheet
 from adv2e.rendering.output import NotWritten
-from adv2e.rendering.styles import Picture, Style
-
-CODES = {".mp4": "mp4v", ".avi": "FFV1"}
-"""Coders of video files: MPEG-4 part 2, which loses a little, and FFV1, which loses nothing."""
+from adv2e.rendering.styles import Style
+from adv2e.rendering.video import CODES, VideoFile
 
 SUFFIXES = (*CODES, ".gif", ".png")
 """The kinds of file there are."""
@@ -32,7 +28,7 @@ def check_suffix(path: str | Path) -> str:
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        raise UsageError(f"{path}: a film ends in .mp4, .avi or .gif, a picture in .png")
+        raise UsageError(f"{path}: a film ends in .mp4, .webm, .avi or .gif, a picture in .png")
     return suffix
 
 
@@ -53,64 +49,6 @@ class Album(Protocol):
 
     def close(self) -> None:
         """Let go of the file."""
-
-
-class VideoFile:
-    """A film in an .mp4 or .avi file, written picture by picture.
-
-    Raises
-    ------
-    NotWritten
-        The file cannot be written.
-    """
-
-    def __init__(self, path: Path, fps: float) -> None:
-        self._path, self._fps = path, fps
-        self._writer: cv2.VideoWriter | None = None
-        self._size = (0, 0)
-        self._count = 0
-
-    def add(self, picture: Picture) -> None:
-        """Append a picture (rows, columns, 3), RGB, all of one size; odd sizes gain a line."""
-        rows, columns = picture.shape[:2]
-        if rows % 2 or columns % 2:  # the coder halves the resolution of colour
-            picture = np.pad(picture, ((0, rows % 2), (0, columns % 2), (0, 0)), mode="edge")
-        if self._writer is None:
-            self._size = (picture.shape[1], picture.shape[0])
-            code = cv2.VideoWriter.fourcc(*CODES[self._path.suffix.lower()])
-            self._writer = cv2.VideoWriter(str(self._path), code, self._fps, self._size)
-            if not self._writer.isOpened():
-                raise NotWritten("a video cannot be written there")
-        self._writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
-        self._count += 1
-
-    def finish(self) -> None:
-        """Complete the file and check that it holds all pictures."""
-        self.close()
-        written = cv2.VideoCapture(str(self._path))
-        held = int(written.get(cv2.CAP_PROP_FRAME_COUNT)) if written.isOpened() else 0
-        written.release()
-        if held != self._count:
-            raise NotWritten(f"holds {held} of {self._count} pictures (is the disk full?)")
-
-    def close(self) -> None:
-        """Let go of the file."""
-        if self._writer is not None:
-            self._writer.release()
-
-    def __enter__(self) -> VideoFile:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if kind is None:
-            self.finish()
-        else:
-            self.close()
 
 
 class Film:

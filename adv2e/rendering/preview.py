@@ -22,7 +22,7 @@ SHEET_STEP_US = 1000
 
 
 class Preview:
-    """Takes events and frames as they come; writes a film (.mp4, .avi, .gif) or a sheet (.png).
+    """Writes a film (.mp4, .webm, .avi, .gif) or a sheet (.png) of events and frames as they come.
 
     Events are sorted and so are frames; which of them come first, and in which pieces, makes no
     difference.  Leaving the ``with`` block normally completes the file; an exception leaves none.
@@ -51,7 +51,7 @@ class Preview:
     Raises
     ------
     UsageError
-        The suffix is none of .mp4, .avi, .gif, .png; or the film is too fast for a GIF.
+        The suffix is none of .mp4, .webm, .avi, .gif, .png; or the film is too fast for a GIF.
     OutputError
         The file exists or cannot be written; nothing came that could be drawn.
     """

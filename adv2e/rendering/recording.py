@@ -44,7 +44,7 @@ def render_recording(
     overwrite: bool = False,
     progress: bool = False,
 ) -> None:
-    """Write a film (.mp4, .avi, .gif) or a contact sheet (.png) of `recording`.
+    """Write a film (.mp4, .webm, .avi, .gif) or a contact sheet (.png) of `recording`.
 
     Parameters
     ----------

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import os
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,22 +30,49 @@ IMAGE_SUFFIXES = (
 _PNG_GREY_ALPHA = 4
 
 
+class _Quiet:
+    """Sets what OpenCV prints, for all threads at once: the last to leave sets it back."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._level, self._ffmpeg = 0, False
+
+    def enter(self) -> None:
+        with self._lock:
+            self._inside += 1
+            if self._inside == 1:
+                self._level = _logging().getLogLevel()
+                _logging().setLogLevel(0)
+                # read by OpenCV once, when it first opens a video; -8 is AV_LOG_QUIET
+                self._ffmpeg = "OPENCV_FFMPEG_LOGLEVEL" in os.environ
+                os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+    def leave(self) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                _logging().setLogLevel(self._level)
+                if not self._ffmpeg:
+                    os.environ.pop("OPENCV_FFMPEG_LOGLEVEL", None)
+
+
+def _logging() -> Any:
+    # OpenCV 5 has cv2.utils.logging, OpenCV 4 has it only as cv2.setLogLevel
+    return cv2.utils.logging if hasattr(cv2.utils, "logging") else cv2
+
+
+_QUIET = _Quiet()
+
+
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep OpenCV and FFmpeg from printing about the files they open or decode."""
-    # OpenCV 5 has cv2.utils.logging, OpenCV 4 has it only as cv2.setLogLevel
-    logging: Any = cv2.utils.logging if hasattr(cv2.utils, "logging") else cv2
-    level = logging.getLogLevel()
-    ffmpeg = os.environ.get("OPENCV_FFMPEG_LOGLEVEL")
-    # read by OpenCV once, when it first opens a video; -8 is AV_LOG_QUIET
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    logging.setLogLevel(0)
+    """Keep OpenCV and FFmpeg from printing about the files they open, decode or write."""
+    _QUIET.enter()
     try:
         yield
     finally:
-        logging.setLogLevel(level)
-        if ffmpeg is None:
-            os.environ.pop("OPENCV_FFMPEG_LOGLEVEL", None)
+        _QUIET.leave()
 
 
 def rgb_of(image: Any) -> Image:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.rendering.films import VideoFile
 from adv2e.rendering.output import replacing
+from adv2e.rendering.video import VideoFile
 
 if TYPE_CHECKING:
     from adv2e.synthetic.scene import Scene

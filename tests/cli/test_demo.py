@@ -16,6 +16,7 @@ def small(monkeypatch):
     monkeypatch.setattr(module, "WIDTH", 64)
     monkeypatch.setattr(module, "HEIGHT", 48)
     monkeypatch.setattr(module, "DURATION_S", 1.0)
+    monkeypatch.setattr("adv2e.rendering.films.default_scale", lambda width: 2)
     monkeypatch.setattr(module, "INSTANTS_S", (0.2, 0.4, 0.7, 0.9))
 
 

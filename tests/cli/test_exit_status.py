@@ -102,7 +102,7 @@ def test_vv_shows_no_traceback_of_a_mistake_of_the_user(adv2e, pipeline):
         (["characterise", "a", "--seed", str(2**64)], "in the range 0<=x<=18446744073709551615"),
         (["convert", "a", "--set", "pixel.leak"], "--set pixel.leak: must be KEY=VALUE"),
         (["convert", "a", "--set", "pixel.leek=null"], "did you mean 'leak'?"),
-        (["render", "a", "-o", "a.foo"], "a film ends in .mp4, .avi or .gif"),
+        (["render", "a", "-o", "a.foo"], "a film ends in .mp4, .webm, .avi or .gif"),
         (["convert", "a", "-o", ""], "Invalid value for '-o' / '--output': is empty"),
         (["convert", "a", "--fps", "0"], "Invalid value for '--fps': must be above 0 Hz, got 0"),
         (["convert", "a", "--fps", "30000/0"], "must be above 0 Hz, got 30000/0"),

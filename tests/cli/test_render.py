@@ -71,7 +71,7 @@ def test_frames_are_shown_unless_not_wanted(adv2e, recording, tmp_path):
     ("options", "text"),
     [
         ([], "-o is missing"),
-        (["-o", "out.webm"], "out.webm: a film ends in"),
+        (["-o", "out.mov"], "out.mov: a film ends in"),
         (["-o", "out.png", "--on-color", "rouge"], "colour 'rouge'"),
         (["-o", "out.png", "--style", "pink"], "'pink'"),
         (["-o", "out.mp4", "--at", "1"], "--at is for a .png"),

@@ -12,6 +12,7 @@ from adv2e.errors import OutputError, UsageError
 from adv2e.events import empty_events, make_events
 from adv2e.rendering import Preview, Style
 from adv2e.rendering.layout import GAP
+from adv2e.rendering.video import writes_h264
 
 EVENTS = make_events(np.arange(0, 1_000_000, 500), np.arange(2000) % 32, [0] * 2000, [1, 0] * 1000)
 
@@ -24,7 +25,7 @@ def make(path, *, frames=True, **more):
             preview.add_events(EVENTS[200 * k : 200 * (k + 1)])
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".avi", ".gif", ".png"])
+@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".avi", ".gif", ".png"])
 def test_only_the_finished_file_is_left(tmp_path, suffix):
     path = tmp_path / f"view{suffix}"
     make(path)
@@ -32,27 +33,44 @@ def test_only_the_finished_file_is_left(tmp_path, suffix):
     assert path.stat().st_size > 1000
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="needs resource limits")
-@pytest.mark.parametrize("suffix", [".mp4", ".gif", ".png"])
-def test_a_full_disk_is_told_with_the_name_of_the_file(tmp_path, suffix):
-    code = """
-import resource
-import sys
+FULL_DISK = """
+import resource, sys
 from pathlib import Path
-sys.path[:0] = sys.argv[2:]
+sys.path[:0] = sys.argv[4:]
 from adv2e.errors import OutputError
+from adv2e.rendering import video
 from test_preview import make
-resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))
-try:
-    make(Path(sys.argv[1]))
-except OutputError as error:
-    print(error)
+path, h264, steps = Path(sys.argv[1]), sys.argv[2] == "True", int(sys.argv[3])
+video.writes_h264 = lambda: h264
+make(path, scale=1, fps=15)
+size = path.stat().st_size
+path.unlink()
+for limit in [size - 1, *(size * k // steps for k in range(steps))]:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    try:
+        make(path, scale=1, fps=15)
+    except OutputError as error:
+        print(error)
 """
-    path = tmp_path / f"view{suffix}"
-    with running_python(code, path, *Path(__file__).parents[:2], text=True) as process:
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs resource limits")
+@pytest.mark.parametrize(
+    "name", ["view.mp4", "view.mp4 H.264", "view.webm", "v.avi", "v.gif", "v.png"]
+)
+def test_a_full_disk_is_told_with_the_name_of_the_file(tmp_path, name):
+    h264 = name.endswith("H.264")
+    if h264 and not writes_h264():
+        pytest.skip("needs PyAV, the extra 'video'")
+    path = tmp_path / name.split()[0]
+    steps = 3 if path.suffix == ".gif" else 24
+    arguments = (path, h264, steps, *Path(__file__).parents[:2])
+    with running_python(FULL_DISK, *arguments, text=True) as process:
         out, err = process.communicate(timeout=60)
-    assert out.startswith(f"{path}: "), err
-    assert out.count("\n") == 1
+    assert err == ""
+    lines = out.splitlines()
+    assert len(lines) == steps + 1
+    assert all(line.startswith(f"{path}: ") for line in lines)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -131,7 +149,7 @@ def test_an_error_keeps_the_old_file(tmp_path):
 
 def test_wrong_suffix_and_rate_are_found_at_once(tmp_path):
     with pytest.raises(UsageError, match="a film ends in"):
-        Preview(tmp_path / "view.webm", 32, 24)
+        Preview(tmp_path / "view.mov", 32, 24)
     with pytest.raises(UsageError, match="at most 50"), Preview(tmp_path / "v.gif", 4, 4, fps=60):
         pass
     assert list(tmp_path.iterdir()) == []
