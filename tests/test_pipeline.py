@@ -1,5 +1,6 @@
 """Whole conversions through the command line: formats, the record of their making, bad input."""
 
+import importlib.metadata
 import json
 import shutil
 import subprocess
@@ -69,6 +70,10 @@ def test_files_say_how_they_were_made(adv2e, folder, tmp_path):
     for record in metadata:
         assert record["seed"] == 7
         assert record["config"]["pixel"]["leak"] is None
+        assert record["versions"]["numpy"] == np.__version__
+        assert record["versions"]["numba"] == importlib.metadata.version("numba")
+        assert record["versions"]["opencv"].startswith(cv2.__version__)
+        assert "av" not in record["versions"]
         assert record["adv2e"]
         assert record["source"]["encoding"] == "linear"
 

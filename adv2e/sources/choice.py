@@ -28,14 +28,14 @@ class Choice:
     ----------
     why_pyav : str
         What it has that OpenCV cannot give; empty if it can.
-    transfer : int
-        Code of ITU-T H.273 for the transfer that it states.
+    colours : Colours
+        What it states of them.
     notes : list of str
         Things to tell the user.
     """
 
     why_pyav: str
-    transfer: int
+    colours: Colours
     notes: tuple[str, ...] = ()
 
 
@@ -56,23 +56,21 @@ def choose(path: str, height: int) -> Choice:
     """
     stated, stream = stated_by(path), examine_stream(path, height)
     colours = [each.completed(stated.colours) for each in stream.colours] or [stated.colours]
-    transfer = _only_transfer(path, colours)
+    _check_transfer(path, colours)
     interlaced = stream.interlaced or (stated.interlaced and stream.codec in (RAW, "FFV1"))
-    why = _beyond_opencv(stated, stream, interlaced, colours, transfer)
-    return Choice(why, transfer, (_FIELDS,) if interlaced else ())
+    why = _beyond_opencv(stated, stream, interlaced, colours)
+    return Choice(why, colours[-1], (_FIELDS,) if interlaced else ())
 
 
-def _only_transfer(path: str, colours: list[Colours]) -> int:
+def _check_transfer(path: str, colours: list[Colours]) -> None:
     meanings = {encoding_of(each.transfer) for each in colours}
     if len({encoding for encoding, _ in meanings}) > 1:
         reasons = " and ".join(sorted(reason for _, reason in meanings))
         raise DataError(f"{path}: its parts differ ({reasons}); cut it where that changes")
-    return colours[-1].transfer
 
 
-def _beyond_opencv(
-    stated: Stated, stream: Stream, interlaced: bool, colours: list[Colours], transfer: int
-) -> str:
+def _beyond_opencv(stated: Stated, stream: Stream, interlaced: bool, colours: list[Colours]) -> str:
+    transfer = colours[-1].transfer
     if interlaced:
         return "its pictures are interlaced, or could be"
     if not stream.known:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError, MissingExtraError
+from adv2e.sources.colours import UNSTATED, is_stated
 from adv2e.sources.opening import openable
 
 _FULL, _WHITE = 2, 65535
@@ -54,6 +55,8 @@ class PyavCapture:
         What it needs PyAV for; begins the message if that is not installed.
     threads : int
         Threads that may decode.
+    matrix : int
+        Code of ITU-T H.273 for the matrix of pictures that do not state theirs.
 
     Raises
     ------
@@ -63,12 +66,12 @@ class PyavCapture:
         It is no video that can be read.
     """
 
-    def __init__(self, path: str, why: str, threads: int = 1) -> None:
+    def __init__(self, path: str, why: str, threads: int = 1, matrix: int = UNSTATED) -> None:
         try:
             self._av: Any = importlib.import_module("av")
         except ImportError as error:
             raise MissingExtraError(f"{path}: {why}; reading that", "video") from error
-        self._path = path
+        self._path, self._matrix = path, matrix
         try:
             with openable(path) as name:
                 self._file: Any = self._av.open(name)
@@ -113,6 +116,11 @@ class PyavCapture:
             return float(self._stream.frames)
         return 0.0
 
+    @property
+    def transfer(self) -> int:
+        """Code of ITU-T H.273 for the transfer of what was decoded."""
+        return int(self._stream.codec_context.color_trc)
+
     def set(self, name: int, value: float) -> bool:
         """Change nothing, as there is nothing of OpenCV's that could be changed."""
         return False
@@ -120,15 +128,21 @@ class PyavCapture:
     def retrieve(self) -> tuple[bool, NDArray[Any]]:
         """Return the picture grabbed, as BGR or grey, of uint8 or uint16, turned upright."""
         try:
-            image = codes_of(self._frame)
+            image = codes_of(self._frame, self._matrix)
         except (ValueError, OSError) as error:
             raise DataError(f"{self._path}: {error}") from error
         turn = _TURNS.get(round(self._frame.rotation) % 360)
         return True, image if turn is None else np.asarray(cv2.rotate(image, turn))
 
 
-def codes_of(frame: Any) -> NDArray[Any]:
+def codes_of(frame: Any, matrix: int = UNSTATED) -> NDArray[Any]:
     """Return the codes of a frame of PyAV as (rows, columns, 3) BGR, or (rows, columns).
+
+    Parameters
+    ----------
+    frame : av.VideoFrame
+    matrix : int
+        Of frames that do not state theirs.
 
     Returns
     -------
@@ -141,14 +155,17 @@ def codes_of(frame: Any) -> NDArray[Any]:
         Its pixels cannot be converted.
     """
     parts = frame.format.components
-    bits, matrix = parts[0].bits, int(frame.colorspace)
+    bits = parts[0].bits
+    matrix = int(frame.colorspace) if is_stated(int(frame.colorspace)) else matrix
     rgb = frame.format.is_rgb or len(parts) < 3
     if not rgb and matrix not in _SHARES and matrix != _YCGCO:
         raise ValueError(f"colours by the matrix {frame.colorspace} cannot be read")
     if bits > 16 or frame.format.name.startswith(("xyz", "bayer", "grayf", "gbrpf", "rgbf")):
         raise ValueError(f"pixels of {frame.format.name} cannot be read")
     if bits <= 8 and matrix != _YCGCO:
-        return np.asarray(frame.to_ndarray(format="gray" if len(parts) == 1 else "bgr24"))
+        if len(parts) == 1 and not frame.format.has_palette:
+            return np.asarray(frame.to_ndarray(format="gray"))
+        return np.asarray(frame.to_ndarray(format="bgr24"))
     planes = _planes(frame)
     top = (1 << bits) - 1
     if rgb:

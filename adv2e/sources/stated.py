@@ -88,7 +88,7 @@ def _pictures(
 ) -> Iterator[tuple[bytes, int, int]]:
     """Yield kind, start and end of the boxes that describe the pictures of the first video."""
     for kind, begin, end in _boxes(data, start, stop):
-        if kind == b"hdlr":
+        if kind == b"hdlr" and data[begin + 4 : begin + 8] != b"dhlr":
             is_video = data[begin + 8 : begin + 12] == b"vide"
         elif kind == b"stsd" and is_video:
             yield from _boxes(data, begin + 8 + _SAMPLE_ENTRY, min(end, _entry_end(data, begin)))

@@ -19,7 +19,7 @@ from adv2e.errors import DataError
 from adv2e.sources import pyav
 from adv2e.sources.base import GivenTimes, Image, Selection, Shot, Source
 from adv2e.sources.choice import choose
-from adv2e.sources.colours import encoding_of, is_stated
+from adv2e.sources.colours import Colours, encoding_of, is_stated
 from adv2e.sources.containers import examine
 from adv2e.sources.gaps import gap_doubts
 from adv2e.sources.lists import read_list
@@ -65,6 +65,8 @@ class VideoSource(Source):
         self._container = examine(path, allow_damaged=selection.allow_damaged)
         told = [*self._container.faults, *self._container.doubts]
         self.doubts += [f"{path}: {line}" for line in told]
+        self._why_pyav, self._pixels = "", b""
+        self._colours = Colours()
         self._choose_decoder()
         with self._opened() as capture:
             self._fps = max(float(capture.get(cv2.CAP_PROP_FPS)), 0.0)
@@ -73,6 +75,9 @@ class VideoSource(Source):
                 raise DataError(f"{path}: no frame in it can be decoded")
             self._describe(_load(capture, f"{path}: frame 0"), f"{path}: frame 0")
             self._first_ns = stamp_of(capture)
+            if isinstance(capture, pyav.PyavCapture):
+                # of codecs whose own headers are not read here
+                self._colours = self._colours.completed(Colours(transfer=capture.transfer))
         self._times = self._known_times()
         if selection.start_s is None and selection.stop_s is None:
             self.count = self._times.expected
@@ -139,13 +144,12 @@ class VideoSource(Source):
         return found.stamps
 
     def _choose_decoder(self) -> None:
-        self._why_pyav, self._pixels = "", b""
         with self._opened() as capture:
             pixels = int(capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT))
             self._pixels = pixels.to_bytes(4, "little") if pixels >= 0 else b""
             height = int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
         choice = choose(self.path, height)
-        self._why_pyav, self._transfer = choice.why_pyav, choice.transfer
+        self._why_pyav, self._colours = choice.why_pyav, choice.colours
         self.notes += choice.notes
         # FFmpeg's tags of deeper formats end with the number of bits, or begin with it (big endian)
         ends = (self._pixels[-1:] + self._pixels[:1]) or b"\0"
@@ -167,8 +171,9 @@ class VideoSource(Source):
             capture.set(cv2.CAP_PROP_CONVERT_RGB, 0)
 
     def _choose_encoding(self) -> None:
-        encoding, self.encoding_reason = encoding_of(self._transfer)
-        if self.dtype == np.uint16 and not self.colour and not is_stated(self._transfer):
+        transfer = self._colours.transfer
+        encoding, self.encoding_reason = encoding_of(transfer)
+        if self.dtype == np.uint16 and not self.colour and not is_stated(transfer):
             encoding, self.encoding_reason = "linear", "16-bit grey video"
         self.encoding = encoding
 
@@ -180,7 +185,7 @@ class VideoSource(Source):
     @contextmanager
     def _opened(self, threads: int = 1) -> Iterator[Capture]:
         if self._why_pyav:
-            decoder = pyav.PyavCapture(self.path, self._why_pyav, threads)
+            decoder = pyav.PyavCapture(self.path, self._why_pyav, threads, self._colours.matrix)
             try:
                 yield decoder
             finally:

@@ -38,6 +38,9 @@ def _usual_transitions() -> list[int]:
     return after
 
 
+_USUAL = _usual_transitions()
+
+
 class _RangeDecoder:
     def __init__(self, data: bytes, after_one: list[int]) -> None:
         self._data, self.after_one = data, after_one
@@ -80,14 +83,13 @@ class Ffv1:
     def __init__(self) -> None:
         self._version = 0
         self._tables = 0
-        self._after_one = _usual_transitions()
+        self._after_one = _USUAL
 
     def header(self, data: bytes, findings: Findings) -> None:
         """Read the configuration record, which versions before 3 have not."""
         if not data:
             return
-        usual = _usual_transitions()
-        decoder = _RangeDecoder(data, usual)
+        decoder = _RangeDecoder(data, _USUAL)
         states = [128] * _CONTEXTS
         self._version = decoder.number(states)
         if self._version < 3:
@@ -95,7 +97,7 @@ class Ffv1:
         decoder.number(states)
         if decoder.number(states) == _CUSTOM_TABLE:
             self._after_one = [0] + [
-                (usual[state] + decoder.number(states, signed=True)) & 0xFF
+                (_USUAL[state] + decoder.number(states, signed=True)) & 0xFF
                 for state in range(1, 256)
             ]
         decoder.number(states)
@@ -110,7 +112,7 @@ class Ffv1:
         """Read the header of the first slice."""
         if self._version < 3:
             return
-        decoder = _RangeDecoder(data, _usual_transitions())
+        decoder = _RangeDecoder(data, _USUAL)
         decoder.bit([128], 0)
         decoder.after_one = self._after_one
         states = [128] * _CONTEXTS

@@ -1,0 +1,261 @@
+"""What light the numbers of a video are: transfer, matrix, range and depth as its file states."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from coded import flat, write
+
+from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.errors import ConfigError, DataError, MissingExtraError
+from adv2e.sources import open_source
+from adv2e.sources.choice import choose
+from adv2e.sources.pyav import codes_of
+
+ENCODINGS = {
+    **{1: "bt709", 6: "bt709", 11: "bt709", 14: "bt709", 15: "bt709", 4: "gamma:2.2"},
+    **{5: "gamma:2.8", 8: "linear", 13: "srgb", 16: "pq", 18: "hlg", 2: "srgb"},
+}
+
+
+def light(source):
+    """Return the light of all pictures, in the middle [DN]."""
+    decoder = LightDecoder(source.encoding, source.full_scale, source.dtype, source.colour)
+    rows, columns = source.height // 2, source.width // 2
+    return [float(decoder.decode(frame.image)[rows, columns]) for frame in source.frames()]
+
+
+@pytest.mark.parametrize("transfer", ENCODINGS)
+def test_light_is_what_the_video_states(tmp_path, transfer):
+    path = write(tmp_path / "clip.mp4", [60, 90, 120], tags=(2, transfer, 2))
+    source = open_source(path)
+    assert source.encoding == ENCODINGS[transfer]
+    assert ("no transfer" in source.encoding_reason) == (transfer == 2)
+
+
+CONTAINERS = {
+    "h264": ("libx264", "mp4 mov mkv ts avi flv"),
+    "hevc": ("libx265", "mp4 mkv ts"),
+    "mpeg2": ("mpeg2video", "ts mpg mkv mov"),
+    "vp9": ("libvpx-vp9", "webm mp4"),
+    "vp8": ("libvpx", "webm"),
+    "ffv1": ("ffv1", "mkv"),
+    "mjpeg": ("mjpeg", "mkv"),
+    "mpeg4": ("mpeg4", "mp4 mov mkv"),
+}
+MOST = [(name, suffix) for name, (_, kinds) in CONTAINERS.items() for suffix in kinds.split()]
+PIXELS = {"mjpeg": "yuvj420p"}
+
+
+@pytest.mark.parametrize(("name", "suffix"), MOST)
+def test_headers_state_what_ffmpeg_finds_in_them(tmp_path, name, suffix):
+    av = pytest.importorskip("av")
+    pixels = PIXELS.get(name, "yuv420p")
+    options = {"x265-params": "log-level=none"} if name == "hevc" else {}
+    path = write(
+        tmp_path / f"clip.{suffix}",
+        [90 + 5 * n for n in range(12)],
+        CONTAINERS[name][0],
+        pixels,
+        options=options,
+        tags=(9, 16, 9 if name not in PIXELS else 2),
+        full=name in PIXELS,
+    )
+    with av.open(str(path)) as file:
+        next(file.decode(video=0))
+        found = file.streams.video[0].codec_context
+    choice = choose(str(path), 48)
+    assert choice.colours.transfer == found.color_trc == 16
+    assert choice.colours.primaries == found.color_primaries == 9
+    assert "high dynamic range" in choice.why_pyav
+
+
+@pytest.mark.parametrize(("transfer", "factor"), [(18, 1 / 0.26496), (16, 1 / 0.098338)])
+def test_high_dynamic_range_is_not_clipped(tmp_path, transfer, factor):
+    lumas = [64 + 876 * quarter // 4 for quarter in (1, 2, 3, 4)]
+    path = write(
+        tmp_path / "clip.mp4",
+        lumas,
+        "libx265",
+        "yuv420p10le",
+        options={"x265-params": "log-level=none:lossless=1"},
+        tags=(9, transfer, 9),
+    )
+    found = light(open_source(path))
+    assert found[3] == pytest.approx(255, rel=1e-6)
+    assert found[3] / found[2] == pytest.approx(factor, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("tags", "why"),
+    [
+        ((9, 16, 9), "high dynamic range"),
+        ((9, 18, 9), "high dynamic range"),
+        ((12, 1, 1), "colours"),
+        ((2, 2, 8), "colours"),
+        ((2, 9, 2), "colours"),
+    ],
+)
+def test_what_opencv_does_not_keep_is_refused_without_pyav(tmp_path, monkeypatch, tags, why):
+    path = write(tmp_path / "clip.mp4", [60, 90, 120], tags=tags)
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(MissingExtraError, match=rf"{why}.*adv2e\[video\]"):
+        open_source(path)
+
+
+def test_wide_primaries_do_not_change_the_codes(tmp_path):
+    colours = [(60, 90, 160), (120, 200, 90), (200, 128, 128)]
+    kept = [
+        frame.image
+        for frame in open_source(
+            write(tmp_path / "usual.mkv", colours, "ffv1", tags=(1, 1, 1))
+        ).frames()
+    ]
+    wide = [
+        frame.image
+        for frame in open_source(
+            write(tmp_path / "wide.mkv", colours, "ffv1", tags=(9, 1, 1))
+        ).frames()
+    ]
+    assert np.array_equal(kept, wide)
+
+
+def test_a_transfer_that_is_not_known_is_refused_by_name(tmp_path):
+    path = write(tmp_path / "clip.mp4", [60, 90, 120], tags=(2, 7, 2))
+    source = open_source(path)
+    with pytest.raises(ConfigError, match=r"frames\.encoding.*SMPTE 240M.*linear"):
+        LightDecoder(source.encoding, 255.0, source.dtype, source.colour)
+
+
+def test_a_transfer_that_changes_on_the_way_is_refused(tmp_path):
+    parts = [
+        write(tmp_path / f"{transfer}.ts", [60, 90], tags=(2, transfer, 2), first=2 * number)
+        for number, transfer in enumerate((1, 8))
+    ]
+    joined = tmp_path / "joined.ts"
+    joined.write_bytes(b"".join(part.read_bytes() for part in parts))
+    with pytest.raises(DataError, match=r"BT\.709 and .*linear"):
+        open_source(joined)
+
+
+MATRICES = {1: (0.2126, 0.0722), 6: (0.299, 0.114), 9: (0.2627, 0.0593), 2: (0.299, 0.114)}
+
+
+def coded(rgb, matrix, bits, full):
+    """Return luma and chromas of R'G'B' in 0..1, as ITU-T H.273 writes them."""
+    red, blue = MATRICES[matrix]
+    y = red * rgb[0] + (1 - red - blue) * rgb[1] + blue * rgb[2]
+    cb, cr = (rgb[2] - y) / (2 - 2 * blue), (rgb[0] - y) / (2 - 2 * red)
+    top, step = (1 << bits) - 1, 1 << bits - 8
+    if full:
+        return tuple(
+            min(round(v), top) for v in (y * top, cb * top + 128 * step, cr * top + 128 * step)
+        )
+    return tuple(
+        round(v) for v in ((219 * y + 16) * step, (224 * cb + 128) * step, (224 * cr + 128) * step)
+    )
+
+
+@pytest.mark.parametrize("matrix", MATRICES)
+@pytest.mark.parametrize("full", [False, True])
+@pytest.mark.parametrize("pixels", ["yuv420p", "yuv444p", "yuv420p10le", "yuv422p10le"])
+def test_primary_colours_have_their_light(tmp_path, matrix, full, pixels):
+    bits = 10 if "10" in pixels else 8
+    shares = {(1, 0, 0): 0.2126, (0, 1, 0): 0.7152, (0, 0, 1): 0.0722, (1, 1, 1): 1, (0, 0, 0): 0}
+    colours = [coded(rgb, matrix, bits, full) for rgb in shares]
+    source = open_source(
+        write(tmp_path / "clip.mkv", colours, "ffv1", pixels, tags=(1, 1, matrix), full=full)
+    )
+    assert source.dtype == (np.uint16 if bits > 8 else np.uint8)
+    assert source.packages == (("av",) if bits > 8 else ())
+    # half a code of luma, and of each chroma times two, at a slope of 2.2
+    assert np.allclose(light(source), 255 * np.array([*shares.values()]), atol=600 / 2**bits * 2.2)
+
+
+@pytest.mark.parametrize("full", [False, True])
+@pytest.mark.parametrize("pixels", ["yuv420p10le", "yuv444p12le", "yuv422p16le", "p010le"])
+def test_every_deep_luma_has_its_code(pixels, full):
+    av = pytest.importorskip("av")
+    frame = flat(av, 0, pixels, (64, 16))
+    bits = frame.format.components[0].bits
+    frame.color_range = 2 if full else 1
+    lumas = np.linspace(0, (1 << bits) - 1, 64).astype(np.uint16)
+    shift = 6 if pixels == "p010le" else 0
+    for plane, value in zip(frame.planes, (lumas, 1 << bits - 1, 1 << bits - 1), strict=False):
+        rows = np.zeros((plane.height, plane.line_size // 2), np.uint16)
+        samples = rows[:, : 64 if plane is frame.planes[0] else None]
+        samples[:] = value << shift
+        plane.update(rows.tobytes())
+    black, white = (0, (1 << bits) - 1) if full else (16 << bits - 8, 235 << bits - 8)
+    expected = np.clip((lumas - float(black)) / (white - black), 0, 1) * 65535
+    image = codes_of(frame)
+    assert image.dtype == np.uint16
+    assert np.abs(image - expected[None, :, None]).max() <= 0.51 + 65535 * 2**-22
+
+
+@pytest.mark.parametrize("pixels", ["yuv420p", "yuv422p", "yuv444p", "gray"])
+@pytest.mark.parametrize("full", [False, True])
+def test_codes_of_both_decoders_are_the_same(tmp_path, monkeypatch, pixels, full):
+    colours = [(60, 90, 160), (120, 200, 90), (220, 128, 128), (16, 128, 128)]
+    path = write(tmp_path / "clip.mkv", colours, "ffv1", pixels, tags=(1, 1, 1), full=full)
+    opencv = [frame.image for frame in open_source(path).frames()]
+    monkeypatch.setattr("adv2e.sources.choice._beyond_opencv", lambda *_: "it is asked for")
+    source = open_source(path)
+    assert source.packages == ("av",)
+    assert np.array_equal(opencv, [frame.image for frame in source.frames()])
+
+
+@pytest.mark.parametrize("pixels", ["gbrp10le", "gbrp12be", "gray12le", "rgb48le"])
+def test_deep_codes_without_luma_are_scaled(pixels):
+    av = pytest.importorskip("av")
+    frame = av.VideoFrame(64, 16, pixels)
+    bits = frame.format.components[0].bits
+    order = np.dtype(">u2" if pixels.endswith("be") else "<u2")
+    codes = [np.uint16(number * ((1 << bits) - 1) // 10) for number in (2, 5, 9)]  # green blue red
+    if pixels == "rgb48le":
+        green, blue, red = codes
+        frame.planes[0].update(np.tile(np.array([red, green, blue], order), 64 * 16).tobytes())
+    else:
+        for plane, code in zip(frame.planes, codes, strict=False):
+            plane.update(np.full(plane.buffer_size // 2, code, order).tobytes())
+    expected = [round(int(code) * 65535 / ((1 << bits) - 1)) for code in codes]
+    pixel = codes_of(frame)[5, 5]
+    if pixels.startswith("gray"):
+        assert pixel == expected[0]
+    else:
+        green, blue, red = expected
+        assert np.abs(pixel.astype(int) - [blue, green, red]).max() <= 1
+
+
+def test_ten_bits_are_read_in_full_or_with_eight_and_a_word(tmp_path, monkeypatch):
+    path = write(tmp_path / "clip.mkv", [400, 401, 402, 403], "ffv1", "yuv420p10le")
+    whole = light(open_source(path))
+    assert (np.diff(whole) > 0).all()
+    monkeypatch.setitem(sys.modules, "av", None)
+    source = open_source(path)
+    assert len(set(light(source))) < 4
+    assert [note for note in source.notes if "10 bits" in note and "adv2e[video]" in note]
+
+
+@pytest.mark.parametrize("turned", [0, 90, 180, 270])
+def test_pictures_are_turned_alike_by_both_decoders(tmp_path, monkeypatch, turned):
+    path = write(tmp_path / "clip.mp4", [(60, 90, 160), (120, 200, 90)])
+    data = path.read_bytes()
+    place = data.index(b"tkhd") + 44
+    one = (1 << 16).to_bytes(4, "big", signed=True)
+    less = (-1 << 16).to_bytes(4, "big", signed=True)
+    none = bytes(4)
+    matrix = {
+        0: (one, none, none, one),
+        90: (none, one, less, none),
+        180: (less, none, none, less),
+        270: (none, less, one, none),
+    }[turned]
+    a, b, c, d = matrix
+    path.write_bytes(data[:place] + a + b + none + c + d + none + data[place + 24 :])
+    opencv = [frame.image for frame in open_source(path).frames()]
+    assert opencv[0].shape[:2] == ((64, 48) if turned % 180 else (48, 64))
+    monkeypatch.setattr("adv2e.sources.choice._beyond_opencv", lambda *_: "it is asked for")
+    assert np.array_equal(opencv, [frame.image for frame in open_source(path).frames()])
