@@ -13,6 +13,7 @@ from typing import IO
 
 from adv2e.errors import DataError
 from adv2e.expansion import check_expansion
+from adv2e.machine import machine_complaint
 
 UNREADABLE = (
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, struct.error, OSError),
@@ -28,6 +29,8 @@ def zip_archive(path: Path, kind: str = "a zip archive") -> Iterator[zipfile.Zip
         with zipfile.ZipFile(path) as archive:
             yield archive
     except UNREADABLE as error:
+        if machine_complaint(error):
+            raise
         raise DataError(f"{path}: not {kind} that can be read, or damaged: {error}") from error
 
 

@@ -26,6 +26,7 @@ from contextlib import contextmanager, suppress
 import click
 
 from adv2e.errors import Adv2eError
+from adv2e.machine import machine_complaint
 from adv2e.names import shown
 from adv2e.stopping import Terminated, last_words
 
@@ -66,25 +67,28 @@ def reporting(context: click.Context | None = None) -> Iterator[None]:
     except BrokenPipeError:
         silence_stdout()
         raise SystemExit(_CLOSED_OUTPUT) from None
-    except OSError as error:
-        _trace(context)
-        place = f"{error.filename}: " if isinstance(error.filename, str) else ""
-        complain(f"error: {place}{error.strerror or error}")
-        raise SystemExit(1) from None
     except (KeyboardInterrupt, click.Abort) as error:
         complain(last_words(error))
         raise SystemExit(128 + signal.SIGINT) from None
     except Terminated as error:
         complain(last_words(error))
         raise SystemExit(error.exit_status) from None
-    except MemoryError as error:
-        _trace(context)
-        complain(f"error: not enough memory: {_joined(error)}")
-        raise SystemExit(1) from None
     except Exception as error:
-        hint = "" if _trace(context) else "; run with -vv for the traceback"
+        raise SystemExit(_explained(error, context)) from None
+
+
+def _explained(error: Exception, context: click.Context | None) -> int:
+    """Say what an exception means that nobody made for people; return the exit status."""
+    traced = _trace(context)
+    if told := machine_complaint(error):
+        complain(f"error: {told}")
+    elif isinstance(error, OSError):
+        place = f"{error.filename}: " if isinstance(error.filename, str) else ""
+        complain(f"error: {place}{error.strerror or error}")
+    else:
+        hint = "" if traced else "; run with -vv for the traceback"
         complain(f"error: internal error: {type(error).__name__}: {_joined(error)}{hint}")
-        raise SystemExit(1) from None
+    return 1
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from adv2e.errors import DataError
+from adv2e.machine import machine_complaint
 from adv2e.recordings.base import Recording
 from adv2e.regular import check_ends
 
@@ -49,6 +50,8 @@ def read_recording(
         check_ends(path)
         recording = _read(path, time_unit, images_anywhere)
     except OSError as error:
+        if machine_complaint(error):
+            raise
         raise DataError(f"{path}: cannot be read: {error.strerror or error}") from error
     _check_size(recording)
     return recording

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.expansion import check_expansion
+from adv2e.machine import machine_complaint
 
 _LINKS = 16
 """Soft links on the way to one name, as in the library itself."""
@@ -42,6 +43,8 @@ def opened(path: Path) -> Iterator[h5py.File]:
     except DataError:
         raise
     except _FAILURES as error:
+        if machine_complaint(error):
+            raise
         why = str(error).partition("(")[2].rstrip(")") or str(error)
         raise DataError(f"{path}: not an HDF5 file that can be read, or damaged: {why}") from error
 

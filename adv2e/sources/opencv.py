@@ -120,7 +120,9 @@ def decode_image(data: bytes, label: str) -> Pixels:
         try:
             with quiet():
                 image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-        except cv2.error:
+        except cv2.error as error:
+            if error.code == cv2.Error.StsNoMem:
+                raise MemoryError(f"{label}: {error.err}") from error
             image = None
     if image is None:
         raise DataError(f"{label}: not an image that can be read, or damaged")

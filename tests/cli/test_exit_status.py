@@ -39,7 +39,7 @@ def test_done_is_0(adv2e, pipeline):
         (MissingExtraError("aedat4", "aedat"), 1, "pip install 'adv2e[aedat]'\n"),
         (FileNotFoundError(errno.ENOENT, "No such file", "x.h5"), 1, "error: x.h5: No such file\n"),
         (OSError("no signature"), 1, "adv2e: error: no signature\n"),
-        (MemoryError("12 GiB"), 1, "adv2e: error: not enough memory: 12 GiB\n"),
+        (MemoryError("12 GiB"), 1, "error: not enough memory (see ulimit -v): 12 GiB\n"),
         (EOFError("short"), 1, "internal error: EOFError: short; run with -vv for the traceback\n"),
         (ZeroDivisionError("a\nb"), 1, "ZeroDivisionError: a b; run with -vv for the traceback\n"),
         (KeyboardInterrupt(), 130, "adv2e: interrupted\n"),
