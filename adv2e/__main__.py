@@ -17,8 +17,10 @@ def _leave_current_folder() -> None:
 def main() -> None:
     """Run the command line; a signal that comes while it is imported ends it quietly, too."""
     from adv2e.stopping import stop_on_signals  # noqa: PLC0415
+    from adv2e.streams import keep_errors_for_ourselves  # noqa: PLC0415
 
     stop_on_signals()
+    keep_errors_for_ourselves()
     from adv2e.cli import main as command  # noqa: PLC0415
 
     command()

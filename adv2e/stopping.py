@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 from adv2e import unfinished
+from adv2e.streams import errors_descriptor
 
 
 class Terminated(BaseException):
@@ -80,5 +81,6 @@ def _say_at_once(text: str) -> None:
     """Write one line to stderr past its buffer, which the main thread may be in the midst of."""
     with suppress(OSError):
         # over a progress bar, if there is one
-        start = "\r\x1b[K" if os.isatty(2) else ""
-        os.write(2, f"{start}adv2e: {text}\n".encode())
+        errors = errors_descriptor()
+        start = "\r\x1b[K" if os.isatty(errors) else ""
+        os.write(errors, f"{start}adv2e: {text}\n".encode())

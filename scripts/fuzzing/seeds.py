@@ -1,0 +1,380 @@
+"""Small files of every kind that can be read, whole, and what is done with each."""
+
+from __future__ import annotations
+
+import io
+import json
+import random
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+
+from adv2e.sources.opencv import quiet
+from fuzzing.mutations import ODD_NUMBERS, mutated
+
+Content = dict[str, bytes]
+"""Bytes by name; a name with a slash lies in a folder."""
+
+COUNT, ROWS, COLUMNS = 4, 12, 16
+"""Frames of a seed, and their size."""
+
+
+@dataclass(frozen=True)
+class Seed:
+    """A good input.
+
+    Attributes
+    ----------
+    name : str
+        What kind it is.
+    content : dict
+        Its files.
+    commands : tuple of tuples of str
+        Arguments of ``adv2e``, one of them is taken; ``{}`` is the folder of the files.
+    archive : str
+        Name of the archive that the files are packed into; empty: they lie there.
+    """
+
+    name: str
+    content: Content
+    commands: tuple[tuple[str, ...], ...]
+    archive: str = ""
+
+    def write(self, folder: Path, draw: random.Random) -> None:
+        """Write the input into a folder, with one of its files changed."""
+        content = dict(self.content)
+        within = not self.archive or draw.random() < 0.6
+        if within:
+            changed = draw.choice(sorted(content))
+            content[changed] = mutated(content[changed], draw, text=_is_text(changed))
+        if self.archive:
+            packed = _packed(content)
+            content = {self.archive: packed if within else mutated(packed, draw, text=False)}
+        for name, data in content.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(data)
+
+
+def _is_text(name: str) -> bool:
+    return name.endswith((".txt", ".json", ".yaml", ".csv", ".pgm", ".npy", ".y4m"))
+
+
+def _packed(content: Content) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+    return file.getvalue()
+
+
+def all_seeds(scratch: Path) -> list[Seed]:
+    """Return every seed; `scratch` is a folder for files that only libraries can write."""
+    seeds = [*_stacks(), *_events(), *_recordings(), *_images(), *_texts()]
+    with quiet():
+        return [*seeds, *_hdf5(scratch), *_videos(scratch)]
+
+
+def _frames(dtype: str = "u1", *, colour: bool = False) -> np.ndarray:
+    shape = (COUNT, ROWS, COLUMNS, 3) if colour else (COUNT, ROWS, COLUMNS)
+    made = np.random.default_rng(0).random(shape)
+    return (made if dtype.startswith("f") else made * 250).astype(dtype)
+
+
+def _npy(array: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+def _info(name: str, *more: str) -> tuple[str, ...]:
+    return ("info", f"{{}}/{name}", *more)
+
+
+def _convert(name: str, *more: str) -> tuple[str, ...]:
+    return ("convert", f"{{}}/{name}", "-o", "{}/out.txt", "-c", "ideal", *more)
+
+
+def _render(name: str) -> tuple[str, ...]:
+    return ("render", f"{{}}/{name}", "-o", "{}/out.png")
+
+
+def _compare(name: str) -> tuple[str, ...]:
+    return ("compare", f"{{}}/{name}", f"{{}}/{name}")
+
+
+def _stacks() -> list[Seed]:
+    both = (_info("a.npy", "--fps", "10"), _convert("a.npy", "--fps", "10"))
+    seeds = [
+        Seed(f"npy {dtype}", {"a.npy": _npy(_frames(dtype))}, both)
+        for dtype in ("u1", "<u2", ">f4", "f8")
+    ]
+    strewn = np.asfortranarray(_frames(colour=True))
+    times = _npy(np.arange(COUNT) * 0.01)
+    lines = "".join(f"{n * 0.01:.6f}\n" for n in range(COUNT)).encode()
+    return [
+        *seeds,
+        Seed("npy fortran", {"a.npy": _npy(strewn)}, both),
+        Seed("npy times", {"a.npy": _npy(_frames()), "a_ts.npy": times}, (_info("a.npy"),)),
+        Seed(
+            "npy list",
+            {"a.npy": _npy(_frames()), "list.txt": lines},
+            (_info("a.npy", "--timestamps", "{}/list.txt"),),
+        ),
+    ]
+
+
+def _columns() -> dict[str, np.ndarray]:
+    draw = np.random.default_rng(1)
+    count = 60
+    return {
+        "t": np.sort(draw.random(count)), "x": draw.integers(0, COLUMNS, count),
+        "y": draw.integers(0, ROWS, count), "p": draw.integers(0, 2, count),
+    }  # fmt: skip
+
+
+def _event_lines(header: str = "") -> bytes:
+    rows = zip(*_columns().values(), strict=True)
+    return (header + "".join(f"{t:.9f} {x} {y} {p}\n" for t, x, y, p in rows)).encode()
+
+
+def _of_events(name: str) -> tuple[tuple[str, ...], ...]:
+    return (_info(name), _info(name), _render(name), _compare(name))
+
+
+def _events() -> list[Seed]:
+    columns = _columns()
+    whole = columns | {"t_us": (columns["t"] * 1e6).astype(np.int64), "width": np.int64(20)}
+    del whole["t"]
+    text = {"a.txt": _event_lines()}
+    described = {"a.txt.json": json.dumps({"adv2e": "0", "width": 20, "height": 20}).encode()}
+    table = np.zeros(60, [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
+    table["x"], table["y"] = columns["x"], columns["y"]
+    npz = {f"{name}.npy": _npy(np.asarray(values)) for name, values in columns.items()}
+    return [
+        Seed("text", text, _of_events("a.txt")),
+        Seed("text described", text | described, _of_events("a.txt")),
+        Seed("text sized", {"a.txt": _event_lines("20 20\n")}, _of_events("a.txt")),
+        Seed("text zip", text, _of_events("a.zip"), archive="a.zip"),
+        Seed("npz", npz, _of_events("a.npz"), archive="a.npz"),
+        Seed(
+            "npz us",
+            {f"{name}.npy": _npy(np.asarray(values)) for name, values in whole.items()},
+            _of_events("a.npz"),
+            archive="a.npz",
+        ),
+        Seed("npz table", {"e.npy": _npy(table)}, _of_events("a.npz"), archive="a.npz"),
+    ]
+
+
+def _image(suffix: str, frame: np.ndarray, *how: int) -> bytes:
+    done, data = cv2.imencode(suffix, frame, how)
+    assert done, suffix
+    return data.tobytes()
+
+
+def _recordings() -> list[Seed]:
+    frames = _frames()
+    content = {
+        "events.txt": _event_lines(),
+        "images.txt": "".join(f"{n * 0.2} images/{n}.png\n" for n in range(COUNT)).encode(),
+        "adv2e.json": json.dumps(
+            {"adv2e": "0.1.0", "seed": 1, "width": COLUMNS, "height": ROWS,
+             "source": {"name": "a", "encoding": "srgb"},
+             "frames": {"encoding": "gamma:2.2", "full_scale": 255.0}}
+        ).encode(),
+        **{f"images/{n}.png": _image(".png", frame) for n, frame in enumerate(frames)},
+    }  # fmt: skip
+    folder = {f"r/{name}": data for name, data in content.items()}
+    return [
+        Seed("recording zip", content, (*_of_events("a.zip"), _convert("a.zip")), archive="a.zip"),
+        Seed("recording folder", folder, (*_of_events("r"), _convert("r"))),
+    ]
+
+
+def _images() -> list[Seed]:
+    grey, colour, deep = _frames(), _frames(colour=True), _frames("u2")
+    kinds: dict[str, Callable[[int], bytes]] = {
+        "png": lambda n: _image(".png", colour[n]),
+        "png 16": lambda n: _image(".png", deep[n]),
+        "jpg": lambda n: _image(".jpg", colour[n]),
+        "tif": lambda n: _image(".tif", deep[n]),
+        "tif float": lambda n: _image(".tif", _frames("f4")[n]),
+        "bmp": lambda n: _image(".bmp", colour[n]),
+        "webp": lambda n: _image(".webp", colour[n]),
+        "pfm": lambda n: _image(".pfm", _frames("f4")[n]),
+        "hdr": lambda n: _image(".hdr", _frames("f4", colour=True)[n]),
+        "ppm": lambda n: _image(".ppm", colour[n]),
+        "pgm": lambda n: (
+            f"P2\n{COLUMNS} {ROWS}\n255\n".encode() + " ".join(map(str, grey[n].ravel())).encode()
+        ),
+    }
+    both = (_info("f", "--fps", "10"), _convert("f", "--fps", "10"))
+    seeds = []
+    for kind, encode in kinds.items():
+        suffix = kind.split()[0]
+        files = {f"f/{n:03d}.{suffix}": encode(n) for n in range(COUNT)}
+        seeds.append(Seed(f"images {kind}", files, both))
+    files = {f"f/{n:03d}.png": _image(".png", frame) for n, frame in enumerate(grey)}
+    named = "".join(f"{n * 0.01} {n:03d}.png\n" for n in range(COUNT)).encode()
+    plain = "".join(f"{n * 0.01}\n" for n in range(COUNT)).encode()
+    in_us = "".join(f"f/{n:03d}.png {n * 10_000}\n" for n in range(COUNT)).encode()
+    for name, lines in (("images", named), ("timestamps", plain), ("info", in_us)):
+        seeds.append(Seed(f"list {name}", files | {f"f/{name}.txt": lines}, (_info("f"),)))
+    return seeds
+
+
+def _texts() -> list[Seed]:
+    config = (Path(__file__).parents[2] / "configs" / "adv2e.yaml").read_bytes()
+    shared = b"a: &a {on: 0.3, off: .2}\npixel: {thresholds: *a, refractory: {period_us: 500.0}}\n"
+    check = ("config", "check", "{}/a.yaml")
+    table = b"light,latency_us\n" + b"".join(b"%d,%d\n" % (n, 5000 - 50 * n) for n in range(1, 20))
+    return [
+        Seed("config", {"a.yaml": config}, (check,)),
+        Seed("config small", {"a.yaml": shared[25:]}, (check,)),
+        Seed("config aliases", {"a.yaml": shared}, (check,)),
+        Seed("table", {"a.csv": table}, (("characterise", "{}/a.csv", "-o", "{}/report"),)),
+    ]
+
+
+def _hdf5(scratch: Path) -> list[Seed]:
+    commands = (*_of_events("a.h5"), _convert("a.h5"))
+    seeds = []
+    for packed in (False, True):
+        path = scratch / "a.h5"
+        _write_hdf5(path, packed=packed)
+        name = "hdf5 packed" if packed else "hdf5"
+        seeds += [Seed(name, {"a.h5": path.read_bytes()}, commands[:4])] * 2
+    return [*seeds, _Structured("hdf5 structure", {}, commands[:4])]
+
+
+def _write_hdf5(path: Path, *, packed: bool) -> None:
+    with h5py.File(path, "w") as file:
+        how = {"chunks": (16,), "compression": "gzip", "shuffle": True} if packed else {}
+        for name, values in _columns().items():
+            file.create_dataset(f"events/{name}s", data=values, **how)
+        file.attrs["sensor_resolution"] = (ROWS, COLUMNS)
+        file.attrs["adv2e"] = json.dumps({"adv2e": "0", "width": COLUMNS, "height": ROWS})
+        for n, frame in enumerate(_frames()):
+            file[f"images/image{n:09d}"] = frame
+            file[f"images/image{n:09d}"].attrs["timestamp"] = 0.2 * n
+
+
+class _Structured(Seed):
+    """An HDF5 file of which one dataset is of another making."""
+
+    def write(self, folder: Path, draw: random.Random) -> None:
+        """Write the file, and one beside it that it may point to."""
+        _write_hdf5(folder / "b.h5", packed=False)
+        _write_hdf5(folder / "a.h5", packed=draw.random() < 0.5)
+        with h5py.File(folder / "a.h5", "a") as file:
+            names = [f"events/{name}s" for name in "txyp"]
+            name = draw.choice([*names, *names, "images/image000000000", "images", "events"])
+            whole = file[name]
+            shape = whole.shape if isinstance(whole, h5py.Dataset) else (60,)
+            del file[name]
+            draw.choice(_ODD_OBJECTS)(file, name, shape, draw)
+
+
+def _odd_array(file: h5py.File, name: str, shape: tuple[int, ...], draw: random.Random) -> None:
+    dtype = draw.choice(("u1", "i8", "u8", "f2", "f4", "f8", "S3", "?", ">i4", "c8"))
+    other = draw.choice((shape, (), (0,), (1,), shape[:1], (*shape, 2), (2, 2, 2, 2), (*shape, 1)))
+    values = np.zeros(other, dtype)
+    if values.dtype.kind in "iuf":
+        values[...] = draw.choice((0, 1, 100, np.nan if values.dtype.kind == "f" else 2))
+        if values.dtype.kind == "f":
+            values[...] = draw.choice((np.inf, -1e300 if dtype == "f8" else -1e4, 1e4))
+    with np.errstate(all="ignore"):
+        file[name] = values
+
+
+def _huge(file: h5py.File, name: str, shape: tuple[int, ...], draw: random.Random) -> None:
+    size = draw.choice((1 << 24, 1 << 31, 1 << 40))
+    how = {"chunks": (1 << 16,)} if draw.random() < 0.5 else {}
+    file.create_dataset(name, (size,), draw.choice(("u1", "f8")), **how)
+
+
+def _link(file: h5py.File, name: str, shape: tuple[int, ...], draw: random.Random) -> None:
+    file[name] = draw.choice((
+        h5py.SoftLink(f"/{name}"), h5py.SoftLink("/none"), h5py.SoftLink("/events/ts"),
+        h5py.SoftLink("/"), h5py.ExternalLink("b.h5", f"/{name}"),
+        h5py.ExternalLink("none.h5", "/"), h5py.ExternalLink("a.h5", f"/{name}"),
+    ))  # fmt: skip
+
+
+def _virtual(file: h5py.File, name: str, shape: tuple[int, ...], draw: random.Random) -> None:
+    layout = h5py.VirtualLayout(shape, "f8")
+    layout[:] = h5py.VirtualSource(draw.choice((".", "b.h5", "a.h5")), name, shape)
+    file.create_virtual_dataset(name, layout)
+
+
+def _raw(file: h5py.File, name: str, shape: tuple[int, ...], draw: random.Random) -> None:
+    source = draw.choice(("b.h5", "none", "/dev/zero", "/etc/hostname"))
+    file.create_dataset(name, shape, "i4", external=[(source, 0, h5py.h5f.UNLIMITED)])
+
+
+def _nothing(file: h5py.File, name: str, shape: tuple[int, ...], draw: random.Random) -> None:
+    made = draw.randrange(4)
+    if made == 1:
+        file.create_group(name)
+    elif made == 2:
+        file.create_dataset(name, data=h5py.Empty("f8"))
+    elif made == 3:
+        file[name] = np.dtype("f8")
+
+
+def _odd_attributes(
+    file: h5py.File, name: str, shape: tuple[int, ...], draw: random.Random
+) -> None:
+    file[name] = np.zeros(shape, "f8")
+    value = draw.choice((
+        h5py.Empty("f8"), "text", np.zeros((2, 2)), np.nan, 1e300, -1, np.uint64(2**64 - 1),
+        "[" * 5000, '{"width": 1e999}', draw.choice(ODD_NUMBERS[:24]), np.array([1e18, 3, 4]),
+        json.dumps({"width": 10**30, "height": -3}), json.dumps({"frames": {"encoding": []}}),
+    ))  # fmt: skip
+    holder, key = draw.choice((
+        (file, "sensor_resolution"), (file, "adv2e"), (file[name], "timestamp"),
+        (file[name], "timestamp_ns"),
+    ))  # fmt: skip
+    holder.attrs[key] = value
+
+
+_ODD_OBJECTS = (_odd_array, _odd_array, _huge, _link, _link, _virtual, _raw, _nothing,
+                _odd_attributes, _odd_attributes)  # fmt: skip
+
+
+def _videos(scratch: Path) -> list[Seed]:
+    seeds = []
+    for suffix, code in (("mp4", "mp4v"), ("avi", "MJPG"), ("mkv", "mp4v"), ("mov", "mp4v")):
+        path = scratch / f"a.{suffix}"
+        writer = cv2.VideoWriter(
+            str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*code), 25.0, (64, 48)
+        )
+        if not writer.isOpened():
+            continue
+        for frame in np.random.default_rng(3).integers(0, 255, (COUNT, 48, 64, 3), np.uint8):
+            writer.write(frame)
+        writer.release()
+        name = f"a.{suffix}"
+        seeds.append(
+            Seed(f"video {suffix}", {name: path.read_bytes()}, (_info(name), _convert(name)))
+        )
+    planes = b"".join(
+        b"FRAME\n" + frame.tobytes() + bytes(ROWS * COLUMNS // 2) for frame in _frames()
+    )
+    y4m = f"YUV4MPEG2 W{COLUMNS} H{ROWS} F25:1 Ip C420jpeg\n".encode() + planes
+    return [*seeds, Seed("video y4m", {"a.y4m": y4m}, (_info("a.y4m"), _convert("a.y4m")))]
+
+
+def named(seeds: list[Seed], part: str) -> list[Seed]:
+    """Return the seeds with `part` in their name."""
+    return list(filter(partial(_holds, part), seeds))
+
+
+def _holds(part: str, seed: Seed) -> bool:
+    return part in seed.name
