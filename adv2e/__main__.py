@@ -14,8 +14,16 @@ def _leave_current_folder() -> None:
         del sys.path[0]
 
 
+def _fill_standard_streams() -> None:
+    """Open those that were closed, or a file that is written would be taken for one of them."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
+
+
 def main() -> None:
     """Run the command line; a signal that comes while it is imported ends it quietly, too."""
+    _fill_standard_streams()
     from adv2e.stopping import stop_on_signals  # noqa: PLC0415
     from adv2e.streams import keep_errors_for_ourselves  # noqa: PLC0415
 

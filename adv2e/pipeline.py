@@ -31,7 +31,8 @@ from adv2e.pictures import drawn, picture_white
 from adv2e.reading import Decoding, Reading, Still
 from adv2e.simulation import events_from_light, is_compiled
 from adv2e.sinks import Sink, format_name, open_sink
-from adv2e.sinks.staging import check_apart
+from adv2e.sinks.apart import check_apart
+from adv2e.sinks.staging import Staging
 from adv2e.sources.base import Source
 from adv2e.versions import versions
 
@@ -147,6 +148,7 @@ def convert(
     preview: str | None = None,
     progress: bool = False,
     compile_apart: bool = False,
+    also_read: Iterable[str | Path] = (),
     log: Callable[[str], None] = lambda text: None,
 ) -> Summary:
     """Convert one video, image sequence or recording to events.
@@ -166,6 +168,8 @@ def convert(
         Show a progress bar on stderr.
     compile_apart : bool
         Have what is not compiled yet compiled by a process of its own.
+    also_read : iterable of str or Path
+        Files that `config` is made of, which must not be written over.
     log : callable
         Takes lines for people.
 
@@ -179,9 +183,10 @@ def convert(
     if recording.largest is not None:
         check_white(recording.largest, recording.path, config.frames.full_scale)
     target = output or default_output(reading.path)
+    inputs = (*reading.inputs, *also_read)
     for written in (target, preview):
         if written not in (None, "-"):
-            check_apart(written, reading.inputs)
+            check_apart(written, inputs)
     keeps_all_bits = _holds_frames(target, format)
     with_frames = with_frames or keeps_all_bits
     decoder = decoder_for(
@@ -192,7 +197,8 @@ def convert(
         white=recording.full_scale,
     )
     white = picture_white(recording.dtype, decoder.full_scale, not keeps_all_bits)
-    with ExitStack() as stack:
+    # events and preview come into place together, when all is written
+    with Staging(overwrite) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
                 target if target == "-" else Path(target),
@@ -201,12 +207,13 @@ def convert(
                 format=format,
                 layout=layout,
                 metadata=_metadata(config, recording, decoder, white if with_frames else None),
-                overwrite=overwrite,
                 with_frames=with_frames,
                 threads=workers,
+                staging=staging,
             )
         )
-        out = _Output(sink, _open_preview(preview, recording, overwrite, stack), white)
+        out = _Output(sink, _open_preview(preview, recording, staging, stack), white)
+        staging.keep_apart(inputs)
         call: _Call = _call_now
         # a write to standard output may block until the reader pleases, and only the main thread
         # can be interrupted in it
@@ -305,14 +312,14 @@ def _metadata(
 
 
 def _open_preview(
-    preview: str | None, recording: Source, overwrite: bool, stack: ExitStack
+    preview: str | None, recording: Source, staging: Staging, stack: ExitStack
 ) -> Preview | None:
     if preview is None:
         return None
     from adv2e.rendering import Preview  # noqa: PLC0415 - most conversions draw nothing
 
     return stack.enter_context(
-        Preview(Path(preview), recording.width, recording.height, frames=True, overwrite=overwrite)
+        Preview(Path(preview), recording.width, recording.height, frames=True, staging=staging)
     )
 
 

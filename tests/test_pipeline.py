@@ -1,11 +1,14 @@
 """Whole conversions through the command line: formats, the record of their making, bad input."""
 
+import errno
 import importlib.metadata
 import json
+import os
 import shutil
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import cv2
 import h5py
@@ -228,6 +231,131 @@ def test_an_input_is_never_written_over(adv2e, folder, tmp_path):
     assert outcome.status == 1
     assert "holds the input" in outcome.err
     assert (recording.read_bytes(), stamps.read_bytes()) == before
+
+
+def inputs_of_all_kinds(root, folder):
+    """Return commands of conversions and what each reads beside its input."""
+    stack, model, effect = root / "s.npy", root / "model.yaml", root / "effect.py"
+    np.save(stack, np.array([picture(k) for k in range(4)]))
+    np.save(root / "s_ts.npy", np.arange(4) * 0.01)
+    model.write_text("pixel: {leak: null}\n")
+    effect.write_text(
+        "from adv2e.effects.hooks import Hooks\n"
+        "class Nothing(Hooks):\n    def events(self, chunks):\n        yield from chunks\n"
+    )
+    images = root / "images"
+    shutil.copytree(folder / "images", images)
+    (images / "timestamps.txt").write_text("0\n.01\n.02\n.03\n.04\n")
+    (folder / "events.txt").write_text("100.0 1 1 1\n")
+    frame = "frame_00000002.png"
+    yield ("convert", stack), root / "s_ts.npy"
+    yield ("convert", stack, "-c", model), model
+    yield ("convert", stack, "--effect", effect), effect
+    yield ("convert", images), images / frame
+    yield ("convert", images), images / "timestamps.txt"
+    for name in ("images.txt", "events.txt", f"images/{frame}"):
+        yield ("convert", folder), folder / name
+        yield ("render", folder), folder / name
+
+
+@pytest.mark.parametrize("linked", ["", "hard", "symbolic"])
+def test_nothing_that_is_read_beside_the_input_is_written_over(adv2e, folder, tmp_path, linked):
+    for command, read in list(inputs_of_all_kinds(tmp_path, folder)):
+        target, before = read, read.read_bytes()
+        if linked:
+            target = tmp_path / "linked"
+            target.unlink(missing_ok=True)
+            target.hardlink_to(read) if linked == "hard" else target.symlink_to(read)
+        options = ["-o", target, "--overwrite"]
+        outcome = adv2e(
+            *command, *options, *(["--format", "h5"] if command[0] == "convert" else [])
+        )
+        if command[0] == "render" and target.suffix != ".png":
+            assert outcome.status == 2
+        else:
+            assert outcome.status == 1
+            assert "would be lost; choose another name" in outcome.err
+        assert read.read_bytes() == before, (command, read)
+
+
+def test_what_lies_beside_the_input_and_is_not_read_may_be_written_over(adv2e, folder):
+    for name in ("events.h5", "preview.png"):
+        (folder / name).write_bytes(b"of before")
+    more = ["--preview", folder / "preview.png", "--overwrite"]
+    assert adv2e("convert", folder, "-o", folder / "events.h5", *more).status == 0
+    assert len(read_recording(folder / "events.h5").events) > 300
+
+
+@pytest.mark.parametrize("existing", [False, True])
+@pytest.mark.parametrize(
+    ("output", "preview"), [("a.gif", "a.gif"), ("a.gif", "b/../a.gif"), ("a", "a/b.gif")]
+)
+def test_output_and_preview_are_two_files(adv2e, video, tmp_path, output, preview, existing):
+    form = "folder" if output == "a" else "txt"
+    if existing:
+        assert adv2e("convert", video, "-o", tmp_path / output, "--format", form).status == 0
+    (tmp_path / "b").mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    outcome = adv2e(
+        "convert", video, "-o", tmp_path / output, "--format", form,
+        "--preview", tmp_path / preview, "--overwrite",
+    )  # fmt: skip
+    assert outcome.status == 1
+    assert "choose another name" in outcome.err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_preview_is_not_the_metadata_of_the_text(adv2e, video, tmp_path):
+    (tmp_path / "a.gif.json").symlink_to("b.gif")
+    options = ["--format", "txt", "--preview", tmp_path / "b.gif"]
+    outcome = adv2e("convert", video, "-o", tmp_path / "a.gif", *options)
+    assert (outcome.status, "is to be two outputs" in outcome.err) == (1, True)
+
+
+def no_room(*args):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    "fails", ["adv2e.sinks.monash.MonashSink._finish", "adv2e.rendering.gif.GifWriter.finish"]
+)
+def test_events_and_preview_come_together_or_not_at_all(adv2e, video, tmp_path, monkeypatch, fails):
+    target, preview = tmp_path / "out" / "a.h5", tmp_path / "out" / "a.gif"
+    arguments = ("convert", video, "-o", target, "--preview", preview)
+    with monkeypatch.context() as patch:
+        patch.setattr(fails, no_room)
+        outcome = adv2e(*arguments)
+    assert outcome.status == 1
+    assert "cannot be written: No space left on device" in outcome.err
+    assert not target.parent.exists()
+    assert adv2e(*arguments).status == 0
+    before = target.read_bytes(), preview.read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr(fails, no_room)
+        assert adv2e(*arguments, "--overwrite", "--seed", "2").status == 1
+    assert (target.read_bytes(), preview.read_bytes()) == before
+    assert sorted(path.name for path in target.parent.iterdir()) == ["a.gif", "a.h5"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="files of POSIX")
+@pytest.mark.parametrize("stderr", ["full", "closed"])
+def test_what_is_written_is_done_though_nothing_can_be_said(video, tmp_path, stderr):
+    if stderr == "full" and not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    target = tmp_path / "a.h5"
+    code = "from adv2e.__main__ import main; main()"
+    arguments = ["convert", str(video), "-o", str(target), "-v", "--preview", f"{tmp_path}/a.gif"]
+    with open("/dev/full" if stderr == "full" else os.devnull, "wb") as full:  # noqa: PTH123
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments],
+            stderr=full,
+            stdout=subprocess.PIPE,
+            preexec_fn=(lambda: os.close(2)) if stderr == "closed" else None,
+            check=False,
+        )
+    assert done.returncode == 0
+    assert b"events" in done.stdout
+    assert len(read_recording(target).events) > 300
 
 
 def test_floats_far_above_white_are_told_before_any_work(adv2e, tmp_path):

@@ -94,9 +94,11 @@ def command(
     from adv2e.characterisation.report import summary, write_reports
     from adv2e.characterisation.table import read_table
     from adv2e.reports.files import check_folder
+    from adv2e.sinks.apart import check_apart
 
     if output is not None:
         check_folder(output, overwrite=overwrite)
+        check_apart(output, [table, *options.files_given()])
     declared = read_declared(config_files, sets, seed)
     settings = Settings(
         where=where,

@@ -128,6 +128,7 @@ def command(
             preview=preview,
             progress=progress,
             compile_apart=True,
+            also_read=options.files_given(),
             log=log,
         )
     if log.level >= 0:

@@ -70,6 +70,7 @@ def command(
     from adv2e.pixel import is_compiled
     from adv2e.reports.files import check_folder
     from adv2e.reports.summary import summary_text
+    from adv2e.sinks.apart import check_apart
 
     check_names(without, names(config))
     _check_own_names(user_effects(config), names())
@@ -79,6 +80,7 @@ def command(
     config = without_user_effects(config, written)
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     check_folder(folder, overwrite=overwrite)
+    check_apart(folder, [recording, *options.files_given()])
     evidence = read_evidence(recording)
     if not is_compiled(config.pixel, config.sampling):
         log(announcement())

@@ -10,6 +10,7 @@ import functools
 import math
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -20,6 +21,8 @@ from adv2e.cli.run import VERBOSITY
 from adv2e.names import shown
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from adv2e.config import Config
     from adv2e.effects.hooks import Hooks
 
@@ -39,7 +42,8 @@ class Log:
     def __call__(self, text: str, level: int = 0) -> None:
         """Write `text`; `level` 1 only with -v, 2 only with -vv."""
         if self.level >= level:
-            click.echo(shown(text), err=True)
+            with suppress(OSError):  # what is said is not what was asked for
+                click.echo(shown(text), err=True)
 
 
 class FiniteNumber(click.FloatRange):
@@ -106,6 +110,14 @@ def own_effects(files: tuple[str, ...]) -> list[type[Hooks]]:
     from adv2e.own_effects import load_effects
 
     return [effect for name in files for effect in load_effects(name)]
+
+
+def files_given() -> list[str | Path]:
+    """Return the configurations and effects that the command line names."""
+    from adv2e.config.files import find
+
+    given = click.get_current_context().params
+    return [*map(find, given["config_files"]), *given.get("effect_files", ())]
 
 
 def late_config_options(body: Body) -> Body:

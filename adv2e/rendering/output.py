@@ -18,17 +18,18 @@ class NotWritten(OutputError):
 
 
 @contextmanager
-def replacing(path: Path, overwrite: bool) -> Iterator[Path]:
+def replacing(path: Path, overwrite: bool, staging: Staging | None = None) -> Iterator[Path]:
     """Give the body a temporary name with the suffix of `path`; rename when it ends well.
 
-    If the body raises, what it wrote is removed and `path` stays as it was.
+    If the body raises, what it wrote is removed and `path` stays as it was.  `staging` takes the
+    file together with others, and says whether what exists is replaced.
 
     Raises
     ------
     OutputError
         `path` exists and `overwrite` is false, or it cannot be a file, or cannot be written.
     """
-    staging = Staging(overwrite)
+    staging = staging or Staging(overwrite)
     part = staging.file(path)
     try:
         staging.prepare()

@@ -16,6 +16,7 @@ from adv2e.rendering.films import Album, Film, Sheet, check_suffix
 from adv2e.rendering.output import replacing
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Caption, Timeline, caption
+from adv2e.sinks.staging import Staging
 
 SHEET_STEP_US = 1000
 """Instants between which a sheet chooses, at first; later they are further apart."""
@@ -47,6 +48,8 @@ class Preview:
         Replace a file that exists.
     instants_us, start_us, frames, caption
         See :class:`adv2e.rendering.timeline.Timeline`.
+    staging : Staging, optional
+        Takes the file together with others; it says whether a file that exists is replaced.
 
     Raises
     ------
@@ -72,6 +75,7 @@ class Preview:
         start_us: int | None = None,
         frames: bool | None = None,
         caption: Caption = caption,
+        staging: Staging | None = None,
     ) -> None:
         self._path = Path(path)
         self._is_sheet = check_suffix(self._path) == ".png"
@@ -81,7 +85,7 @@ class Preview:
         )
         self._fps, self._scale = fps, scale
         self._count = count if instants_us is None else len(instants_us)
-        self._file = self._opened(overwrite)
+        self._file = self._opened(overwrite, staging)
         self._size = (width, height)
         self._timing: dict[str, Any] = {
             "instants_us": instants_us,
@@ -91,9 +95,9 @@ class Preview:
         }
 
     @contextmanager
-    def _opened(self, overwrite: bool) -> Iterator[Album]:
+    def _opened(self, overwrite: bool, staging: Staging | None) -> Iterator[Album]:
         """Open the file under a temporary name; finish it, or leave nothing."""
-        with replacing(self._path, overwrite) as unfinished:
+        with replacing(self._path, overwrite, staging) as unfinished:
             album: Album
             if self._is_sheet:
                 album = Sheet(unfinished, self._count, self._style, self._scale)

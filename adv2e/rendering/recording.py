@@ -16,7 +16,7 @@ from adv2e.rendering.films import spread, stride_of
 from adv2e.rendering.preview import SHEET_STEP_US, Preview
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Caption, caption, microseconds
-from adv2e.sinks.staging import check_apart
+from adv2e.sinks.apart import check_apart
 
 if TYPE_CHECKING:
     from adv2e.recordings import Recording

@@ -19,8 +19,8 @@ NAMES = ("report.html", "report.json", "model.yaml")
 def check_folder(folder: str | Path, *, overwrite: bool = False) -> None:
     """Check before long work that :func:`write_reports` will take `folder`.
 
-    What is there is not touched; a folder is made for a moment where its own would be made, as
-    nothing else tells everywhere whether that can be done.
+    What is there is not touched; a nameless file is made for a moment where the folder would be
+    made, as nothing else tells everywhere whether that can be done.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def check_folder(folder: str | Path, *, overwrite: bool = False) -> None:
     Staging(overwrite).folder(Path(folder), _foreign)
     above = nearest_there(Path(folder).absolute())
     try:
-        with tempfile.TemporaryDirectory(prefix=".adv2e-", dir=above):
+        with tempfile.TemporaryFile(dir=above):
             pass
     except OSError as error:
         raise OutputError(f"{folder}: cannot be made in {above}: {error.strerror}") from None

@@ -19,6 +19,7 @@ from typing import Any
 from adv2e.cores import default_threads
 from adv2e.errors import UsageError
 from adv2e.sinks.base import Sink, describe
+from adv2e.sinks.staging import Staging
 
 __all__ = ["FORMATS", "LAYOUTS", "Sink", "format_name", "open_sink"]
 
@@ -31,7 +32,7 @@ class _Request:
     width: int
     height: int
     description: dict[str, Any]
-    overwrite: bool
+    staging: Staging
     with_frames: bool
     threads: int
 
@@ -39,7 +40,7 @@ class _Request:
 def _text(request: _Request) -> Sink:
     from adv2e.sinks.text import TextSink  # noqa: PLC0415
 
-    return TextSink(request.path, request.description, request.overwrite)
+    return TextSink(request.path, request.description, request.staging)
 
 
 def _folder(request: _Request) -> Sink:
@@ -48,7 +49,7 @@ def _folder(request: _Request) -> Sink:
     return FolderSink(
         request.path,
         request.description,
-        overwrite=request.overwrite,
+        staging=request.staging,
         with_frames=request.with_frames,
         threads=request.threads,
     )
@@ -60,7 +61,7 @@ def _zip(request: _Request) -> Sink:
     return ZipSink(
         request.path,
         request.description,
-        overwrite=request.overwrite,
+        staging=request.staging,
         with_frames=request.with_frames,
         threads=request.threads,
     )
@@ -74,7 +75,7 @@ def _monash(request: _Request) -> Sink:
         width=request.width,
         height=request.height,
         description=request.description,
-        overwrite=request.overwrite,
+        staging=request.staging,
         with_frames=request.with_frames,
         threads=request.threads,
     )
@@ -111,6 +112,7 @@ def open_sink(
     overwrite: bool = False,
     with_frames: bool = False,
     threads: int | None = None,
+    staging: Staging | None = None,
 ) -> Sink:
     """Return a sink for `path`, to be used in a ``with`` block.
 
@@ -135,6 +137,8 @@ def open_sink(
         Store frames, where the format can.
     threads : int, optional
         Threads that compress; default: all cores.  The bytes do not depend on it.
+    staging : Staging, optional
+        Takes the output together with others; it says whether what exists is replaced.
 
     Raises
     ------
@@ -160,7 +164,7 @@ def open_sink(
             width=width,
             height=height,
             description=describe(metadata, width, height),
-            overwrite=overwrite,
+            staging=staging or Staging(overwrite),
             with_frames=with_frames,
             threads=threads or default_threads(),
         )

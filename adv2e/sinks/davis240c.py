@@ -100,8 +100,10 @@ class FolderSink(_Davis240cSink):
         The folder; one that exists is replaced as a whole, if it holds nothing else.
     description : dict
         Content of ``adv2e.json``.
-    overwrite, with_frames : bool
-        Replace what exists; store frames.
+    staging : Staging
+        Takes it.
+    with_frames : bool
+        Store frames.
     threads : int
         Threads that compress frames.
     """
@@ -111,11 +113,10 @@ class FolderSink(_Davis240cSink):
         path: Path,
         description: dict[str, Any],
         *,
-        overwrite: bool,
+        staging: Staging,
         with_frames: bool,
         threads: int,
     ) -> None:
-        staging = Staging(overwrite)
         self._folder = staging.folder(path, _foreign)
         self._events: BinaryIO | None = None
         super().__init__(path, staging, description, with_frames, threads)
@@ -169,8 +170,10 @@ class ZipSink(_Davis240cSink):
         The archive.
     description : dict
         Content of ``adv2e.json``.
-    overwrite, with_frames : bool
-        Replace what exists; store frames.
+    staging : Staging
+        Takes it.
+    with_frames : bool
+        Store frames.
     threads : int
         Threads that compress frames.
     """
@@ -180,11 +183,10 @@ class ZipSink(_Davis240cSink):
         path: Path,
         description: dict[str, Any],
         *,
-        overwrite: bool,
+        staging: Staging,
         with_frames: bool,
         threads: int,
     ) -> None:
-        staging = Staging(overwrite)
         self._temporary = staging.file(path)
         self._archive: zipfile.ZipFile | None = None
         self._events: IO[bytes] | None = None

@@ -55,8 +55,10 @@ class MonashSink(FileSink):
         Geometry [pixels].
     description : dict
         Content of the attribute ``adv2e``.
-    overwrite, with_frames : bool
-        Replace what exists; store frames.
+    staging : Staging
+        Takes it.
+    with_frames : bool
+        Store frames.
     threads : int
         Threads that compress.
     """
@@ -68,11 +70,10 @@ class MonashSink(FileSink):
         width: int,
         height: int,
         description: dict[str, Any],
-        overwrite: bool,
+        staging: Staging,
         with_frames: bool,
         threads: int,
     ) -> None:
-        staging = Staging(overwrite)
         self._temporary = staging.file(path)
         super().__init__(path, staging)
         self.wants_frames = with_frames

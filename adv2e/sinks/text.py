@@ -126,14 +126,13 @@ class TextSink(FileSink):
         The text file.
     description : dict
         What the file beside it says.
-    overwrite : bool
-        Replace both if they exist.
+    staging : Staging
+        Takes both.
     """
 
-    def __init__(self, path: Path, description: dict[str, Any], overwrite: bool) -> None:
-        staging = Staging(overwrite)
-        self._beside = staging.file(path.with_name(path.name + ".json"))
+    def __init__(self, path: Path, description: dict[str, Any], staging: Staging) -> None:
         self._temporary = staging.file(path)
+        self._beside = staging.file(path.with_name(path.name + ".json"), about=self._temporary)
         self._description = to_json(description)
         self._file: BinaryIO | None = None
         super().__init__(path, staging)
