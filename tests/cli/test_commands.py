@@ -13,6 +13,7 @@ import adv2e as package
 from adv2e.cli import COMMANDS, main
 from adv2e.cli.options import Log
 from adv2e.config import Config, all_keys, load_config, shipped
+from adv2e.config.files import find
 from adv2e.config.model import Pixel
 from adv2e.cores import default_threads
 from adv2e.diagnosis.library import names
@@ -78,6 +79,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "preview": "p.gif",
         "progress": True,
         "compile_apart": True,
+        "also_read": [find("ideal")],
     }
     assert log.level == 0
 
