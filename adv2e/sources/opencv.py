@@ -20,6 +20,7 @@ import numpy as np
 
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.sources.base import Image, Pixels
+from adv2e.sources.claims import check_claim
 
 IMAGE_SUFFIXES = (
     *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pfm"),
@@ -115,6 +116,7 @@ def decode_image(data: bytes, label: str) -> Pixels:
     """
     if label.lower().endswith(".exr"):
         return Pixels(_decode_exr(data, label))
+    check_claim(data, label)
     image: Any = None
     if data and _is_whole(data):
         try:

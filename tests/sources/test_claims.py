@@ -1,0 +1,98 @@
+"""Pictures that state a size which their file cannot hold."""
+
+import struct
+import zlib
+
+import cv2
+import numpy as np
+import pytest
+
+from adv2e.errors import DataError
+from adv2e.sources import claims
+from adv2e.sources.claims import check_claim
+from adv2e.sources.opencv import decode_image
+
+
+def encoded(suffix, shape=(30, 50), *how):
+    picture = np.random.default_rng(0).integers(0, 255, (*shape, 3), np.uint8)
+    return cv2.imencode(suffix, picture, how)[1].tobytes()
+
+
+KINDS = {
+    "png": encoded(".png"),
+    "jpg": encoded(".jpg"),
+    "jpg progressive": encoded(".jpg", (30, 50), cv2.IMWRITE_JPEG_PROGRESSIVE, 1),
+    "tif": encoded(".tif"),
+    "webp": encoded(".webp", (30, 50), cv2.IMWRITE_WEBP_QUALITY, 50),
+    "webp lossless": encoded(".webp", (30, 50), cv2.IMWRITE_WEBP_QUALITY, 101),
+}
+
+
+def png(width, height):
+    def chunk(kind, data):
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", header)
+        + chunk(b"IDAT", zlib.compress(bytes(1000)))
+        + chunk(b"IEND", b"")
+    )
+
+
+def jpeg(width, height):
+    data = bytearray(KINDS["jpg"])
+    at = data.index(b"\xff\xc0")
+    struct.pack_into(">HH", data, at + 5, height, width)
+    return bytes(data)
+
+
+def tiff(width, height):
+    order, size = "<", struct.pack
+    tags = [(256, 4, 1, width), (257, 4, 1, height), (258, 3, 1, 8), (259, 3, 1, 1), (262, 3, 1, 1),
+            (273, 4, 1, 8), (277, 3, 1, 1), (278, 4, 1, height), (279, 4, 1, 64)]  # fmt: skip
+    directory = size(order + "H", len(tags)) + b"".join(size(order + "HHII", *tag) for tag in tags)
+    return b"II*\0" + size(order + "I", 8 + 64) + bytes(64) + directory + bytes(4)
+
+
+def webp(width, height):
+    data = bytearray(KINDS["webp lossless"])
+    struct.pack_into("<I", data, 21, (width - 1) | (height - 1) << 14)
+    return bytes(data)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_size_is_that_which_the_decoder_finds(monkeypatch, kind):
+    monkeypatch.setattr(claims, "FREE", 0)
+    monkeypatch.setattr(claims, "MOST", 0)
+    with pytest.raises(DataError, match=r"^a: states 50x30 pixels in "):
+        check_claim(KINDS[kind], "a")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_whole_pictures_are_read(kind):
+    assert decode_image(KINDS[kind], f"a.{kind[:3]}") is not None
+
+
+def test_a_large_picture_of_one_colour_is_read():
+    for suffix in (".png", ".jpg"):
+        data = cv2.imencode(suffix, np.zeros((4320, 7680), np.uint8))[1].tobytes()
+        check_claim(data, f"8k{suffix}")
+
+
+@pytest.mark.parametrize(
+    ("make", "size"),
+    [(png, (30000, 30000)), (jpeg, (30000, 30000)), (tiff, (30000, 30000)), (webp, (16384, 16384))],
+)
+def test_a_size_that_is_not_there(make, size):
+    with pytest.raises(DataError, match=rf"^a\.x: states {size[0]}x{size[1]} pixels in "):
+        decode_image(make(*size), "a.x")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_part_of_a_file_may_be_missing(kind):
+    for length in range(min(len(KINDS[kind]), 700)):
+        check_claim(KINDS[kind][:length], "a")
