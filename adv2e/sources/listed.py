@@ -17,6 +17,7 @@ from adv2e.sources.base import (
     Source,
     check_values,
 )
+from adv2e.sources.gaps import gap_doubts
 from adv2e.sources.lists import FrameList, read_list
 from adv2e.sources.names import match
 from adv2e.sources.numbering import numbering_doubt
@@ -147,6 +148,7 @@ class ListedSource(Source):
         self.doubts += timed.doubts
         self.notes += timed.notes
         self._count()
+        self.doubts += gap_doubts([shot.t_ns for shot in shots], str(path))
         first = shots[0].load()
         self._describe(first, shots[0].label, light)
         image = first.image if isinstance(first, Pixels) else first

@@ -58,6 +58,11 @@ class PyavCapture:
     matrix : int
         Code of ITU-T H.273 for the matrix of pictures that do not state theirs.
 
+    Attributes
+    ----------
+    spoilt : int
+        Pictures grabbed in which the decoder met errors, and guessed.
+
     Raises
     ------
     MissingExtraError
@@ -85,6 +90,7 @@ class PyavCapture:
         self._packets = self._file.demux(self._stream)
         self._ready: deque[Any] = deque()
         self._frame: Any = None
+        self.spoilt = 0
 
     def release(self) -> None:
         """Close the file."""
@@ -100,6 +106,7 @@ class PyavCapture:
         except (StopIteration, self._av.error.FFmpegError):
             return False
         self._frame = self._ready.popleft()
+        self.spoilt += bool(self._frame.is_corrupt)
         return True
 
     def get(self, name: int) -> float:

@@ -128,8 +128,6 @@ class VideoSource(Source):
             )
         if not self._times.shown_ns:
             raise DataError(f"{self.path}: OpenCV finds no times in it; give --fps or --timestamps")
-        if self._times.note:
-            self.notes.append(self._times.note)
         self.doubts += [f"{self.path}: {doubt}" for doubt in self._times.doubts]
         if back is None and self._times.rate is None:
             self.doubts += gap_doubts(self._times.shown_ns, self.path)
@@ -225,7 +223,8 @@ class VideoSource(Source):
                 own = None if stamp is None else stamp - (stamps[0] or 0)
                 t_ns = given(number) if given is not None else clock(number, own)
                 yield Shot(t_ns, label, partial(_load, capture, label))
-        self._check_end(stamps)
+            spoilt = capture.spoilt if isinstance(capture, pyav.PyavCapture) else 0
+        self._check_end(stamps, spoilt)
 
     def _grabbed(self, capture: Capture) -> Iterator[int]:
         """Grab frame after frame, past what cannot be decoded, and yield their numbers."""
@@ -239,8 +238,10 @@ class VideoSource(Source):
             else:
                 failed += 1
 
-    def _check_end(self, stamps: list[int | None]) -> None:
+    def _check_end(self, stamps: list[int | None], spoilt: int) -> None:
         count = len(stamps)
+        if spoilt:  # OpenCV does not tell
+            self._note(f"{self.path}: the decoder met errors in {spoilt} of {count} frames")
         if self._listed is not None and self._listed != count:
             raise DataError(f"{self.path}: {self._listed} times given for {count} frames")
         lost = self._times.lost(stamps)
@@ -252,8 +253,11 @@ class VideoSource(Source):
         )
         if not self.selection.allow_damaged:
             raise DataError(f"{fault}; --allow-damaged takes those")
-        if fault not in self.notes:
-            self.notes.append(fault)
+        self._note(fault)
+
+    def _note(self, text: str) -> None:
+        if text not in self.notes:  # frames may be read more than once
+            self.notes.append(text)
 
 
 def _load(capture: Capture, label: str) -> Image:

@@ -59,17 +59,14 @@ class VideoTimes:
         The rate at which all pictures are, where there is one.
     back : Jump or None
         Where times begin again, as in files that were joined.
-    note : str
-        What is to be told of how the times came about.
     doubts : list of str
-        What may be wrong with them.
+        What is guessed, and what may be wrong.
     """
 
     def __init__(self, container: Container, packets: Packets | None, fps: float) -> None:
         self._container, self._packets = container, packets
         self._snaps_within_ns = container.tick_ns
         self.rate: FrameRate | None = None
-        self.note = ""
         self.doubts: list[str] = []
         self._grid: Fraction | None = None
         if packets is None:
@@ -108,7 +105,8 @@ class VideoTimes:
             rest = "the others follow"
             if hz is not None:
                 rest = f"taken at {float(hz):.6g} frames a second"
-            self.note = f"the file states times for {len(known)} of its {count} frames: {rest}"
+            told = f"it states times for {len(known)} of its {count} frames: {rest}"
+            self.doubts.append(told)
 
     def _look_for_holes(self, packets: Packets, tick_ns: int) -> None:
         """Doubt times that leave some of those at a constant rate out."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from adv2e.sources import open_source
@@ -46,3 +47,16 @@ def test_gaps_in_given_times_are_told(write_video, picture, tmp_path):
     (told,) = open_source(path, timestamps=times).doubts
     assert told == f"{times}: no frame for 4.8 s between frames 2 and 3; usual are 0.1 s"
     assert open_source(path).doubts == []
+
+
+@pytest.mark.parametrize("kind", ["npy", "images"])
+def test_gaps_of_other_sources_are_told(write_images, picture, tmp_path, kind):
+    pictures = [picture(n) for n in range(5)]
+    times = tmp_path / "t.txt"
+    times.write_text("0\n0.1\n0.2\n5\n5.1\n")
+    path = tmp_path / "stack.npy"
+    np.save(path, np.stack(pictures))
+    path = path if kind == "npy" else write_images(pictures)
+    source = open_source(path, timestamps=times)
+    assert source.doubts == [f"{path}: no frame for 4.8 s between frames 2 and 3; usual are 0.1 s"]
+    assert open_source(path, fps=10).doubts == []

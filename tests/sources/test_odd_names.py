@@ -88,6 +88,22 @@ def test_folder_of_images_and_timestamps(write_images, picture, odd, tmp_path):
     assert times_and_images(open_source(folder, timestamps=times)) == expected
 
 
+def test_lists_name_images_by_what_they_are_called(write_images, picture, odd):
+    plain = write_images([picture(n) for n in range(3)])
+    folder = odd.parent / "frames"
+    folder.mkdir()
+    name = odd.name.strip()
+    if "\n" in name or "\\" in name:
+        pytest.skip("a list cannot hold this name: lines end, and backslashes separate folders")
+    lines = []
+    for n, image in enumerate(sorted(plain.iterdir())):
+        shutil.copy(image, folder / f"{name}.{2 - n}.png")
+        lines.append(f"0.{n} {name}.{2 - n}.png\n")
+    (folder / "images.txt").write_bytes(os.fsencode("".join(lines)))
+    expected = times_and_images(open_source(plain, fps=10))
+    assert times_and_images(open_source(folder)) == expected
+
+
 def test_npy(picture, odd):
     path = odd.parent / f"{odd.name}.npy"
     stack = np.stack([picture(n) for n in range(3)])

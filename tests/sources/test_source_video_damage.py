@@ -9,6 +9,8 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
+from adv2e.sources.choice import Choice
+from adv2e.sources.colours import UNSTATED
 
 pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
 from video_files import COUNT, written
@@ -40,7 +42,9 @@ def read(path, **options):
 
 def test_whole_files_are_not_doubted(whole):
     source, frames = read(whole)
-    assert (len(frames), source.doubts) == (COUNT, [])
+    assert len(frames) == COUNT
+    assert all("of its 36 frames: taken at 30 frames a second" in line for line in source.doubts)
+    assert len(source.doubts) == whole.name.endswith("mpg")
 
 
 @pytest.mark.parametrize("after", [bytes(100), b"\xff" * 61, bytes(range(1, 200))])
@@ -125,3 +129,20 @@ def test_conversion_takes_what_is_left(adv2e, tmp_path):
     assert told.status == 0
     assert "cut short" in told.out
     assert np.loadtxt(out).shape[1] == 4
+
+
+def test_errors_that_a_decoder_of_pyav_meets_are_told(tmp_path, monkeypatch):
+    path = written(tmp_path / "clip.mkv", "mpeg4", 30)
+    data = bytearray(path.read_bytes())
+    place = data.index(b"\0\0\1\xb6") + 100
+    data[place : place + 60] = bytes(60)
+    path.write_bytes(data)
+    monkeypatch.setattr(
+        "adv2e.sources.video.choose", lambda *_: Choice("for a test", transfer=UNSTATED)
+    )
+    source, frames = read(path)
+    assert len(frames) == COUNT
+    (told,) = [note for note in source.notes if "the decoder met errors in" in note]
+    assert told.endswith(f" of {COUNT} frames")
+    list(source.frames())
+    assert source.notes.count(told) == 1

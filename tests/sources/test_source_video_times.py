@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import pairwise
 
+import cv2
 import numpy as np
 import pytest
 
@@ -47,13 +48,17 @@ FILES = [
 def test_every_frame_is_at_its_time(tmp_path, name, codec, reordered, rate):
     if name.endswith("mxf") and rate == 30:
         pytest.skip("MXF does not know this rate")
+    if (name[-3:], codec) == ("wmv", "libx264") and cv2.__version__.startswith("4.10."):
+        pytest.skip("this OpenCV passes no times on for H.264 in ASF, and the file is refused")
     path = written(tmp_path / name, codec, rate, reordered=reordered)
     source = open_source(path)
     times = [frame.t_ns for frame in source.frames()]
     clock_ns = 10**6 if name.endswith("flv") else 20_000 if name.endswith("ts") else 1
     assert len(times) == COUNT == source.count
     assert np.abs(np.subtract(times, at_rate(rate))).max() <= clock_ns
-    assert source.doubts == []
+    told = [doubt for doubt in source.doubts if "frames: taken at" not in doubt]
+    assert told == []
+    assert bool(source.doubts) == name.endswith("mpg")
 
 
 @pytest.mark.parametrize("name", ["clip.avi", "clip.mpg", "clip.mp4", "clip.mkv", "clip.wmv"])
