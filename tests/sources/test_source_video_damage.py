@@ -10,7 +10,7 @@ import pytest
 from adv2e.errors import DataError
 from adv2e.sources import open_source
 from adv2e.sources.choice import Choice
-from adv2e.sources.colours import UNSTATED
+from adv2e.sources.colours import Colours
 
 pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
 from video_files import COUNT, written
@@ -137,9 +137,8 @@ def test_errors_that_a_decoder_of_pyav_meets_are_told(tmp_path, monkeypatch):
     place = data.index(b"\0\0\1\xb6") + 100
     data[place : place + 60] = bytes(60)
     path.write_bytes(data)
-    monkeypatch.setattr(
-        "adv2e.sources.video.choose", lambda *_: Choice("for a test", transfer=UNSTATED)
-    )
+    choice = Choice("for a test", Colours())
+    monkeypatch.setattr("adv2e.sources.video.choose", lambda *_: choice)
     source, frames = read(path)
     assert len(frames) == COUNT
     (told,) = [note for note in source.notes if "the decoder met errors in" in note]
