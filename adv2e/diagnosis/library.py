@@ -363,7 +363,7 @@ def _exponent(encoding: str) -> float:
     """Return the exponent that an encoding has, or is about as steep as."""
     if encoding.startswith("gamma:"):
         return float(encoding.partition(":")[2])
-    return 2.2 if encoding == "srgb" else 1.0
+    return {"srgb": 2.2, "bt709": 2.0}.get(encoding, 1.0)
 
 
 _BUILDERS = (

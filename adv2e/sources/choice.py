@@ -20,6 +20,9 @@ _FIELDS = (
 )
 
 
+_PACKED_ALPHA = (b"BGRA", b"RGBA", b"ARGB", b"ABGR", b"RBA@", b"BRA@")
+
+
 @dataclass(frozen=True)
 class Choice:
     """How a video is to be read.
@@ -39,7 +42,7 @@ class Choice:
     notes: tuple[str, ...] = ()
 
 
-def choose(path: str, height: int) -> Choice:
+def choose(path: str, height: int, pixels: bytes = b"") -> Choice:
     """Look at the headers of a video and of all its coded pictures.
 
     Parameters
@@ -48,18 +51,33 @@ def choose(path: str, height: int) -> Choice:
         The video.
     height : int
         Rows that its container states.
+    pixels : bytes
+        FFmpeg's tag of the kind of pixels.
 
     Raises
     ------
     DataError
-        Parts of it state transfers that differ.
+        Parts of it state transfers that differ, or it has transparency that cannot be read.
     """
     stated, stream = stated_by(path), examine_stream(path, height)
+    if stated.alpha_apart:
+        raise DataError(
+            f"{path}: its transparency is beside the pictures, where it cannot be read; make"
+            " pictures of it with ffmpeg -c:v libvpx-vp9 -i VIDEO folder/%06d.png"
+        )
     colours = [each.completed(stated.colours) for each in stream.colours] or [stated.colours]
     _check_transfer(path, colours)
     interlaced = stream.interlaced or (stated.interlaced and stream.codec in (RAW, "FFV1"))
     why = _beyond_opencv(stated, stream, interlaced, colours)
+    if not why and stream.transparent and _has_alpha(pixels):
+        why = "its pixels could be transparent"
     return Choice(why, colours[-1], (_FIELDS,) if interlaced else ())
+
+
+def _has_alpha(pixels: bytes) -> bool:
+    # planes are counted in the second letter, with the bits behind, or before for big endian
+    kinds = {pixels[:2], pixels[:1:-1]}
+    return pixels in _PACKED_ALPHA or bool(kinds & {b"Y4", b"G4", b"Y2"})
 
 
 def _check_transfer(path: str, colours: list[Colours]) -> None:
@@ -74,7 +92,9 @@ def _beyond_opencv(stated: Stated, stream: Stream, interlaced: bool, colours: li
     if interlaced:
         return "its pictures are interlaced, or could be"
     if not stream.known:
-        return f"its codec ({stream.codec}) does not say whether pictures are interlaced"
+        return f"its codec ({stream.codec}) is not one that OpenCV is known to read rightly"
+    if not stream.clear:
+        return "headers of its coded pictures are damaged, or unlike those that are known"
     if transfer in HIGH_RANGE:
         return f"it has a high dynamic range ({encoding_of(transfer)[0]})"
     if not all(each.kept_by_opencv for each in colours):

@@ -145,6 +145,8 @@ class PyavCapture:
 def codes_of(frame: Any, matrix: int = UNSTATED) -> NDArray[Any]:
     """Return the codes of a frame of PyAV as (rows, columns, 3) BGR, or (rows, columns).
 
+    Where pixels can be transparent, how much of each is there is a fourth number.
+
     Parameters
     ----------
     frame : av.VideoFrame
@@ -164,7 +166,8 @@ def codes_of(frame: Any, matrix: int = UNSTATED) -> NDArray[Any]:
     parts = frame.format.components
     bits = parts[0].bits
     matrix = int(frame.colorspace) if is_stated(int(frame.colorspace)) else matrix
-    rgb = frame.format.is_rgb or len(parts) < 3
+    alpha = parts[-1].is_alpha
+    rgb = frame.format.is_rgb or len(parts) - alpha < 3
     if not rgb and matrix not in _SHARES and matrix != _YCGCO:
         raise ValueError(f"colours by the matrix {frame.colorspace} cannot be read")
     if bits > 16 or frame.format.name.startswith(("xyz", "bayer", "grayf", "gbrpf", "rgbf")):
@@ -172,21 +175,23 @@ def codes_of(frame: Any, matrix: int = UNSTATED) -> NDArray[Any]:
     if bits <= 8 and matrix != _YCGCO:
         if len(parts) == 1 and not frame.format.has_palette:
             return np.asarray(frame.to_ndarray(format="gray"))
-        return np.asarray(frame.to_ndarray(format="bgr24"))
+        return np.asarray(frame.to_ndarray(format="bgra" if alpha else "bgr24"))
     planes = _planes(frame)
     top = (1 << bits) - 1
+    if len(planes) == 1:
+        return _rounded(planes[0], 1 / top, bits)
+    there = planes[3:]
     if rgb:
-        image = planes[0] if len(planes) == 1 else cv2.merge([planes[1], planes[0], planes[2]])
-        return _rounded(image, 1 / top, bits)
+        return _rounded(cv2.merge([planes[1], planes[0], planes[2], *there]), 1 / top, bits)
     luma, chroma = 1 / top, 1 / top
     black = 0
     if int(frame.color_range) != _FULL:
         black, luma, chroma = 16 << bits - 8, 1 / (219 << bits - 8), 1 / (224 << bits - 8)
-    whole = [planes[0], *(_spread(plane, planes[0].shape) for plane in planes[1:])]
+    whole = [planes[0], *(_spread(plane, planes[0].shape) for plane in planes[1:3])]
     to_bgr = _to_bgr(matrix) * [luma, chroma, chroma]
     offset = to_bgr @ np.array([black, 1 << bits - 1, 1 << bits - 1])
     image = cv2.transform(cv2.merge(whole), np.column_stack([to_bgr, -offset]).astype(np.float32))
-    return _rounded(image, 1.0, bits)
+    return _rounded(np.dstack([image, *(plane / top for plane in there)]), 1.0, bits)
 
 
 def _spread(plane: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
@@ -216,10 +221,10 @@ def _to_bgr(matrix: int) -> NDArray[np.float64]:
 
 
 def _planes(frame: Any) -> list[NDArray[np.float32]]:
-    """Return the planes: luma and two chromas; or green, blue and red; or grey."""
+    """Return the planes: luma and two chromas, or green, blue and red, and alpha; or grey."""
     bits = frame.format.components[0].bits
     name = frame.format.name
-    count = min(len(frame.format.components), 3)
+    count = len(frame.format.components)
     # shared by interleaved samples, or not in the lowest bits: laid out anew, the same samples
     if len(frame.planes) < count or name.startswith(("p0", "p2", "p4")):
         frame = frame.reformat(format=_planar(frame, bits))
@@ -232,9 +237,10 @@ def _planes(frame: Any) -> list[NDArray[np.float32]]:
 
 
 def _planar(frame: Any, bits: int) -> str:
-    if frame.format.is_rgb:
-        return "gbrp16le"
+    alpha = "a" if frame.format.components[-1].is_alpha else ""
+    if frame.format.is_rgb or len(frame.format.components) < 3:
+        return f"gbr{alpha}p16le"
     luma, chroma = frame.format.components[:2]
     kind = {(False, False): 444, (True, False): 422, (True, True): 420, (False, True): 440}
     halved = luma.width > chroma.width, luma.height > chroma.height
-    return f"yuv{kind[halved]}p{'' if bits <= 8 else f'{bits}le'}"
+    return f"yuv{alpha}{kind[halved]}p{'' if bits <= 8 else f'{bits}le'}"

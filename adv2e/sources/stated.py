@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from adv2e.sources.colours import Colours
+from adv2e.sources.colours import UNSTATED, Colours
 
 _MXF, _Y4M, _EBML = b"\x06\x0e\x2b\x34", b"YUV4MPEG2 ", b"\x1a\x45\xdf\xa3"
 _MP4 = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
@@ -27,7 +27,8 @@ _SAMPLE_ENTRY = 86
 
 _SEGMENT, _TRACKS, _TRACK, _TRACK_TYPE = 0x18538067, 0x1654AE6B, 0xAE, 0x83
 _CLUSTER, _VIDEO, _COLOUR = 0x1F43B675, 0xE0, 0x55B0
-_INTERLACED, _MATRIX, _TRANSFER, _PRIMARIES = 0x9A, 0x55B1, 0x55BA, 0x55BB
+_INTERLACED, _ALPHA = 0x9A, 0x53C0
+_MATRIX, _TRANSFER, _PRIMARIES = 0x55B1, 0x55BA, 0x55BB
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,15 @@ class Stated:
     colours : Colours
     interlaced : bool
         Pictures are two fields each.
+    alpha_apart : bool
+        Transparency is stored beside the pictures (WebM), where decoders do not look for it.
     readable : bool
         False where it may state more than is read here (MXF).
     """
 
     colours: Colours = field(default_factory=Colours)
     interlaced: bool = False
+    alpha_apart: bool = False
     readable: bool = True
 
 
@@ -120,7 +124,8 @@ def _boxes(data: mmap.mmap, start: int, stop: int) -> Iterator[tuple[bytes, int,
 
 
 def _matroska(data: mmap.mmap) -> Stated:
-    colours, interlaced, is_video = dict.fromkeys((_PRIMARIES, _TRANSFER, _MATRIX), 2), False, False
+    colours = dict.fromkeys((_PRIMARIES, _TRANSFER, _MATRIX), UNSTATED)
+    interlaced, alpha, is_video = False, False, False
     for kind, begin, end in _elements(data):
         if kind == _TRACK_TYPE:
             if is_video:
@@ -128,9 +133,11 @@ def _matroska(data: mmap.mmap) -> Stated:
             is_video = data[begin] == 1
         elif kind == _INTERLACED and is_video:
             interlaced = data[end - 1] == 1
+        elif kind == _ALPHA and is_video:
+            alpha = data[end - 1] == 1
         elif kind in colours and is_video:
             colours[kind] = data[end - 1]
-    return Stated(Colours(*colours.values()), interlaced)
+    return Stated(Colours(*colours.values()), interlaced, alpha)
 
 
 def _elements(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:

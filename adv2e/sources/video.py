@@ -17,7 +17,7 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.sources import pyav
-from adv2e.sources.base import GivenTimes, Image, Selection, Shot, Source
+from adv2e.sources.base import GivenTimes, Pixels, Selection, Shot, Source
 from adv2e.sources.choice import choose
 from adv2e.sources.colours import Colours, encoding_of, is_stated
 from adv2e.sources.containers import examine
@@ -146,7 +146,7 @@ class VideoSource(Source):
             pixels = int(capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT))
             self._pixels = pixels.to_bytes(4, "little") if pixels >= 0 else b""
             height = int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
-        choice = choose(self.path, height)
+        choice = choose(self.path, height, self._pixels)
         self._why_pyav, self._colours = choice.why_pyav, choice.colours
         self.notes += choice.notes
         # FFmpeg's tags of deeper formats end with the number of bits, or begin with it (big endian)
@@ -260,8 +260,12 @@ class VideoSource(Source):
             self.notes.append(text)
 
 
-def _load(capture: Capture, label: str) -> Image:
+def _load(capture: Capture, label: str) -> Pixels:
     good, image = capture.retrieve()
     if not good or image is None:
         raise DataError(f"{label}: cannot be decoded")
-    return rgb_of(image)
+    if image.ndim < 3 or image.shape[2] < 4:
+        return Pixels(rgb_of(image))
+    white, alpha = np.iinfo(image.dtype).max, image[..., 3]
+    there = None if alpha.min() == white else alpha.astype(np.float32) / np.float32(white)
+    return Pixels(rgb_of(image), there)

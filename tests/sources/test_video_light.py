@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 
 import numpy as np
@@ -11,6 +12,7 @@ from coded import flat, write
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import ConfigError, DataError, MissingExtraError
 from adv2e.sources import open_source
+from adv2e.sources.base import OVER_BLACK
 from adv2e.sources.choice import choose
 from adv2e.sources.pyav import codes_of
 
@@ -237,6 +239,87 @@ def test_ten_bits_are_read_in_full_or_with_eight_and_a_word(tmp_path, monkeypatc
     source = open_source(path)
     assert len(set(light(source))) < 4
     assert [note for note in source.notes if "10 bits" in note and "adv2e[video]" in note]
+
+
+ALPHA = {
+    "clip.mov": ("png", "rgba"),
+    "animation.mov": ("qtrle", "argb"),
+    "clip.mkv": ("ffv1", "yuva420p"),
+    "deep.mkv": ("ffv1", "yuva444p10le"),
+    "prores.mov": ("prores_ks", "yuva444p10le"),
+}
+
+
+def transparent(path, codec, pixels, there=0.5):
+    """Write pictures of white that is half there."""
+    av = pytest.importorskip("av")
+    bits = 10 if "10" in pixels else 8
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream(codec, rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, pixels
+        for number in range(3):
+            share = there if number else 1
+            if "yuv" in pixels:
+                step = 1 << bits - 8
+                frame = flat(av, (235 * step, 128 * step, 128 * step), pixels, (64, 48))
+                alpha = np.uint16(share * ((1 << bits) - 1)).tobytes()[: (bits + 7) // 8]
+                frame.planes[3].update(alpha * (frame.planes[3].buffer_size // len(alpha)))
+            else:
+                image = np.full((48, 64, 4), 255, np.uint8)
+                image[..., 0 if pixels == "argb" else 3] = int(share * 255)
+                frame = av.VideoFrame.from_ndarray(image, pixels)
+            frame.pts = number
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    return path
+
+
+@pytest.mark.parametrize("name", ALPHA)
+def test_transparent_pixels_come_with_how_much_of_them_is_there(tmp_path, monkeypatch, name):
+    path = transparent(tmp_path / name, *ALPHA[name])
+    source = open_source(path)
+    first, *others = source.frames()
+    assert first.alpha is None
+    assert first.image.min() > 0.99 * source.full_scale
+    for frame in others:
+        assert frame.image.min() > 0.99 * source.full_scale  # not multiplied
+        assert np.allclose(frame.alpha, 0.5, atol=0.01)
+    assert OVER_BLACK in source.notes
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(MissingExtraError, match=r"transparent.*adv2e\[video\]"):
+        open_source(path)
+
+
+def test_transparency_that_decoders_do_not_look_for_is_refused(tmp_path):
+    path = transparent(tmp_path / "clip.webm", "libvpx-vp9", "yuva420p")
+    with pytest.raises(DataError, match="transparency"):
+        open_source(path)
+
+
+@pytest.mark.parametrize("hole", [False, True])
+def test_gif_with_holes_is_told_from_one_without(tmp_path, monkeypatch, hole):
+    path = tmp_path / "clip.gif"
+    path.write_bytes(gif(hole))
+    source = open_source(path)
+    images = [frame.image for frame in source.frames()]
+    assert [image[0, 0].tolist() for image in images] == [[255, 255, 255], [0, 0, 0]]
+    monkeypatch.setitem(sys.modules, "av", None)
+    if hole:
+        with pytest.raises(MissingExtraError, match="transparent"):
+            open_source(path)
+    else:
+        assert open_source(path).packages == ()
+
+
+def gif(hole):
+    """Return a GIF of 1x1: white, then black; the first with a colour that is a hole."""
+    data = b"GIF89a" + struct.pack("<HHBBB", 1, 1, 0x80, 0, 0) + bytes([255] * 3 + [0] * 3)
+    for number in (0, 1):
+        flags = 1 if hole and number == 0 else 0
+        data += b"\x21\xf9\4" + struct.pack("<BHBB", flags, 10, 1, 0)
+        data += b"\x2c" + struct.pack("<HHHHB", 0, 0, 1, 1, 0)
+        data += b"\2\2" + (b"\x44\1" if number == 0 else b"\x4c\1") + b"\0"
+    return data + b";"
 
 
 @pytest.mark.parametrize("turned", [0, 90, 180, 270])

@@ -17,8 +17,10 @@ import cv2
 from adv2e.sources.colours import Colours
 from adv2e.sources.opencv import quiet
 from adv2e.sources.opening import openable
+from adv2e.sources.packets import RETRIES
 from adv2e.sources.streams.base import Findings, Parser
 from adv2e.sources.streams.ffv1 import Ffv1
+from adv2e.sources.streams.gif import Gif
 from adv2e.sources.streams.h264 import H264
 from adv2e.sources.streams.hevc import Hevc
 from adv2e.sources.streams.intra import DnxHd, Dv, MotionJpeg, ProRes, UtVideo
@@ -28,7 +30,7 @@ __all__ = ["RAW", "Stream", "examine_stream"]
 
 RAW = "raw"
 
-_WITH_FIELDS: dict[str, tuple[Callable[[], Parser], str]] = {
+_PARSERS: dict[str, tuple[Callable[[], Parser], str]] = {
     "H.264": (H264, "h264 avc1 avc3 x264"),
     "HEVC": (Hevc, "hevc hev1 hvc1 h265 x265"),
     "MPEG-2": (Mpeg2, "mpg2 mp2v m2v1 hdv1 hdv2 hdv3 mx3p mx5p xdv1 xdv2 xdv3 xdva"),
@@ -37,17 +39,18 @@ _WITH_FIELDS: dict[str, tuple[Callable[[], Parser], str]] = {
     "DNxHD": (DnxHd, "avdn avdh avd1"),
     "DV": (Dv, "dvsd dvsl dvhd dvh1 dvh2 dvh3 dvh5 dvh6 dv25 dv50 dvc dvcp dvcs dvis dvpp cdvc"),
     "FFV1": (Ffv1, "ffv1"),
+    "GIF": (Gif, "gif"),
     "Ut Video": (UtVideo, "ulrg ulra uly0 uly2 uly4 ulh0 ulh2 ulh4"),
 }
-"""Codecs that can hold fields, the parser and the four letters by which FFmpeg knows each."""
+"""Codecs whose pictures say what counts here: the parser, and the letters FFmpeg has for each."""
 
 _JPEG = ("mjpg", "jpeg", "avrn", "ljpg", "dmb1", "mjpa")
 
 _WITHOUT_FIELDS = (
-    "vp80 vp90 vp8 vp9 vp6f vp6a vp60 vp61 vp62 vp30 vp31 theo mpg1 mp1v m1v1 mpeg gif mpng png"
+    "vp80 vp90 vp8 vp9 vp6f vp6a vp60 vp61 vp62 vp30 vp31 theo mpg1 mp1v m1v1 mpng png"
     " hfyu ffvh rle wrle mrle msrl cvid svq1 svq3 flv1 flv h263 s263 u263 h261 mp41 mp42 mp43 div3"
     " div4 mpg4 wmv1 wmv2 wmv3 snow asv1 asv2 tscc tsc2 zmbv cram msvc rpza smc zlib mszh lagr fps1"
-    " iv31 iv32 iv41 iv50 rv10 rv20 rv30 rv40 magy cfhd webp"
+    " iv31 iv32 iv41 iv50 rv10 rv20 rv30 rv40 webp"
 )
 """Codecs whose pictures FFmpeg never flags as fields."""
 
@@ -60,20 +63,23 @@ class Stream:
     ----------
     codec : str
         Its name, or the four letters by which FFmpeg knows it; ``raw`` for pictures not coded.
-    readable : bool
-        OpenCV hands over coded pictures at all.
     known : bool
-        It can be told from its coded pictures whether they are fields.
+        It is known how its coded pictures say whether they are fields.
+    clear : bool
+        All of them could be read.
     interlaced : bool
         They are, or could be.
+    transparent : bool
+        Pixels could be transparent, or nothing but the kind of pixels tells.
     colours : tuple of Colours
         All that are stated, none twice.
     """
 
     codec: str
-    readable: bool
     known: bool
+    clear: bool
     interlaced: bool
+    transparent: bool
     colours: tuple[Colours, ...]
 
 
@@ -90,22 +96,35 @@ def examine_stream(path: str, height: int) -> Stream:
     findings = Findings()
     with _raw(path) as capture:
         letters = (int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).to_bytes(4, "little")
-        name = letters.decode("latin-1").lower().rstrip("\0")
+        name = letters.decode("latin-1").lower().strip("\0 ")
         codec, parser = _parser_of(name, height)
-        readable = capture.isOpened()
         if parser is None:
             known = codec == RAW or codec in _WITHOUT_FIELDS.split()
-            return Stream(codec, readable, known, False, ())
-        known = readable
+            return Stream(codec, known, True, False, True, ())
         try:
             parser.header(_extra(capture), findings)
-            while not findings.interlaced and capture.grab():
-                good, data = capture.retrieve()
-                if good and data is not None:
-                    parser.picture(data.tobytes(), findings)
+            for data in _pictures(capture):
+                parser.picture(data, findings)
+                if findings.interlaced:
+                    break
+            clear = True
         except (IndexError, struct.error):
-            known = False
-    return Stream(codec, readable, known, findings.interlaced, tuple(findings.colours))
+            clear = False
+    transparent = findings.transparent or codec != "GIF"
+    colours = tuple(findings.colours)
+    return Stream(codec, True, clear, findings.interlaced, transparent, colours)
+
+
+def _pictures(capture: cv2.VideoCapture) -> Iterator[bytes]:
+    failed = 0
+    while failed < RETRIES and capture.isOpened():
+        if not capture.grab():
+            failed += 1
+            continue
+        failed = 0
+        good, data = capture.retrieve()
+        if good and data is not None:
+            yield data.tobytes()
 
 
 def _parser_of(name: str, height: int) -> tuple[str, Parser | None]:
@@ -113,10 +132,10 @@ def _parser_of(name: str, height: int) -> tuple[str, Parser | None]:
         return RAW, None
     if name in _JPEG:
         return "Motion JPEG", MotionJpeg(height)
-    for codec, (parser, names) in _WITH_FIELDS.items():
+    for codec, (parser, names) in _PARSERS.items():
         if name in names.split():
             return codec, parser()
-    return name.strip(), None
+    return name, None
 
 
 @contextmanager

@@ -16,11 +16,14 @@ class Findings:
     ----------
     interlaced : bool
         A picture is flagged as two fields, or could be.
+    transparent : bool
+        Pixels could be transparent, where the codec decides it.
     colours : list of Colours
         All that are stated, in the order met, none twice.
     """
 
     interlaced: bool = False
+    transparent: bool = False
     colours: list[Colours] = field(default_factory=list)
 
     def state(self, stated: Colours) -> None:
