@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     help="Frames for the intervals and the floor of two seeds, on the clock of MEASURED."
     "  [default: those in MEASURED]",
 )
+@options.time_unit_option
 @options.config_options
 @options.threads_option
 @options.verbosity_options
@@ -47,6 +48,7 @@ def command(
     as_json: bool,
     window_s: float | None,
     frames_path: str | None,
+    time_unit: str | None,
     config: Config,
     threads: int | None,
     log: Log,
@@ -68,8 +70,11 @@ def command(
     from adv2e.recordings import read_recording
     from adv2e.sources import open_source
 
-    ours, theirs = read_recording(measured), read_recording(simulated)
+    ours = read_recording(measured, time_unit=time_unit)
+    theirs = read_recording(simulated, time_unit=time_unit)
     source = open_source(frames_path) if frames_path else None
+    for doubt in source.doubts if source else []:
+        log(doubt)
     times = _frame_times(source) if source else None
     again = _resimulation(ours, source, config, threads, log) if _configured() else None
     report = compare(ours, theirs, frame_times_ns=times, window_s=window_s, again=again)

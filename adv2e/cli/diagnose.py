@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     is_flag=True,
     help="The contrast thresholds are not known: fit them first, to the totals of ON and OFF.",
 )
+@options.time_unit_option
 def command(
     recording: str,
     config: Config,
@@ -38,6 +39,7 @@ def command(
     overwrite: bool,
     without: tuple[str, ...],
     fit_thresholds: bool,
+    time_unit: str | None,
     threads: int | None,
     progress: bool,
     log: Log,
@@ -81,7 +83,7 @@ def command(
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     check_folder(folder, overwrite=overwrite)
     check_apart(folder, [recording, *options.files_given()])
-    evidence = read_evidence(recording)
+    evidence = read_evidence(recording, time_unit)
     if not is_compiled(config.pixel, config.sampling):
         log(announcement())
     with _counting(progress) as count:

@@ -66,6 +66,7 @@ POSITIVE = options.FiniteNumber(min=0, min_open=True)
     type=click.IntRange(min=1, max=32),
     help="Repeat pixels so often.  [default: panels about 640 pixels wide]",
 )
+@options.time_unit_option
 def command(
     events: str,
     output: str | None,
@@ -84,6 +85,7 @@ def command(
     count: int,
     frames: bool | None,
     scale: int | None,
+    time_unit: str | None,
 ) -> None:
     """Draw pictures and films of events.
 
@@ -122,7 +124,9 @@ def command(
         off=parse_colour(off_color),
         window_us=max(1, round(1e3 * (window or usual_ms))),
     )
-    recording = read_recording(events)
+    recording = read_recording(events, time_unit=time_unit)
+    for problem in recording.problems:
+        log(f"{events}: {problem}")
     if frames and recording.frame_times_ns is None:
         log(f"{events}: holds no frames to show beside the events")
     render_recording(

@@ -132,8 +132,8 @@ class Evidence:
         )
 
 
-def read_evidence(path: str | Path) -> Evidence:
-    """Read a recording that holds frames and events.
+def read_evidence(path: str | Path, time_unit: str | None = None) -> Evidence:
+    """Read a recording that holds frames and events; its unit as :func:`read_recording` has it.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def read_evidence(path: str | Path) -> Evidence:
         not overlap in time; frames are out of order, not all alike, or of another size than the
         events.
     """
-    recording = read_recording(path)
+    recording = read_recording(path, time_unit=time_unit)
     if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
         raise DataError(f"{path}: holds no frames, from which the events could be simulated")
     frames, times = [], []

@@ -89,11 +89,11 @@ def _read(path: Path, time_unit: str | None, images_anywhere: bool) -> Recording
 
         return read_text(path, time_unit)
     if suffix in (".h5", ".hdf5"):
-        return _read_hdf5(path)
+        return _read_hdf5(path, time_unit)
     if suffix == ".npz":
         from adv2e.recordings.npz import read_npz  # noqa: PLC0415
 
-        return read_npz(path)
+        return read_npz(path, time_unit)
     raise DataError(
         f"{path}: unknown suffix '{suffix}', must be one of {', '.join(_SUFFIXES)}"
         " or a DAVIS240C folder"
@@ -105,12 +105,12 @@ def _check_there(path: Path) -> None:
         raise DataError(f"{path}: no such file or folder")
 
 
-def _read_hdf5(path: Path) -> Recording:
+def _read_hdf5(path: Path, time_unit: str | None) -> Recording:
     from adv2e.recordings import hdf5, monash  # noqa: PLC0415
 
     with hdf5.opened(path) as file:
         if all(hdf5.find(file, name) is not None for name in monash.COLUMNS):
-            return monash.read_monash(path, file)
+            return monash.read_monash(path, file, time_unit)
     raise DataError(
         f"{path}: unknown HDF5 layout, must be monash (datasets {', '.join(monash.COLUMNS)})"
     )

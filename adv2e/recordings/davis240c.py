@@ -21,8 +21,9 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.recordings.base import Recording, described_geometry, parse_description
+from adv2e.recordings.clock import Beside, Clock, disagreement
 from adv2e.recordings.gather import Gatherer
-from adv2e.recordings.text import Clock, Lines, gather_lines
+from adv2e.recordings.text import Lines, gather_lines
 from adv2e.sources.base import Pixels
 from adv2e.sources.columns import has_lines
 from adv2e.sources.lists import FrameList, decoded, parse_list
@@ -139,15 +140,17 @@ def _read(
     if files.has(DESCRIPTION):
         text = _text(files, DESCRIPTION, "replace")
         description = parse_description(text, files.label(DESCRIPTION), gatherer.problems)
-    stated = "s" if "adv2e" in description else None
+    stated = "s" if description else None
     found = _listed(files, stated=stated)
-    frames = found if found is not None and len(found.stamps) > 1 else None
+    frames = None
+    if found is not None and len(found.stamps) > 1:
+        frames = Beside(found.unit, found.whole)
     with files.open(name) as file:
         clock = Clock(time_unit, stated, frames)
         lines = gather_lines(file, files.label(name), gatherer, clock)
     times, names = None, []
     if found is not None:
-        if unit := _unit_beside(lines, found, time_unit):
+        if unit := _unit_beside(lines, found, clock):
             found = _listed(files, time_unit=unit) or found
         gatherer.problems += [f"{LIST}: {line}" for line in (found.unit.doubt, found.order) if line]
         names = members_of(found.stamps, files.label(LIST), files.has, outside=outside)
@@ -159,6 +162,7 @@ def _read(
     if geometry is None:
         geometry, whence = lines.geometry, f"the first line of {name}"
     events, width, height = gatherer.finish(geometry, whence)
+    gatherer.problems += disagreement(events, times)
     return Recording(
         str(path),
         "davis240c" if name == EVENTS else "text",
@@ -187,12 +191,11 @@ def _listed(files: _Files, **evidence: Any) -> FrameList | None:
     return parse_list(text, label, **evidence) if has_lines(text) else None
 
 
-def _unit_beside(lines: Lines, found: FrameList, time_unit: str | None) -> str | None:
+def _unit_beside(lines: Lines, found: FrameList, clock: Clock) -> str | None:
     """Return the unit of the frames that user or events say; None: the list itself tells."""
-    alike = lines.whole == found.whole
-    if time_unit is not None:
-        return time_unit if alike or found.whole else None
-    return lines.unit if alike and len(found.stamps) == 1 else None
+    if clock.given is not None:
+        return clock.given_for_frames(whole=found.whole, events_whole=lines.whole)
+    return lines.unit if lines.whole == found.whole and clock.beside is None else None
 
 
 def _images(files: _Files, names: list[str]) -> Iterator[Pixels]:

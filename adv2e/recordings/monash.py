@@ -1,12 +1,13 @@
 """HDF5 recordings in the layout of ``event_utils`` and ``event_cnn_minimal``.
 
-See :mod:`adv2e.sinks.monash`.  Polarity may be bool, 0/1 or -1/+1; times are seconds (whole
-numbers: microseconds); frames come in the order of their names.
+See :mod:`adv2e.sinks.monash`.  Polarity may be bool, 0/1 or -1/+1; times are seconds, unless they
+tell another unit (:mod:`adv2e.sources.units`); frames come in the order of their names.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +18,18 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.recordings import hdf5
 from adv2e.recordings.base import MOST_COLUMNS, Recording, described_geometry, parse_description
+from adv2e.recordings.clock import Beside, Clock, disagreement
 from adv2e.recordings.gather import Gatherer
 from adv2e.sources.base import Image
-from adv2e.ticks import NS, US, S, to_ticks
+from adv2e.sources.units import Unit, frame_unit
+from adv2e.ticks import NS, US, to_ticks
 
 COLUMNS = ("events/ts", "events/xs", "events/ys", "events/ps")
 
 _PART = 1 << 20  # events read at once
 
 
-def read_monash(path: Path, file: h5py.File) -> Recording:
+def read_monash(path: Path, file: h5py.File, time_unit: str | None = None) -> Recording:
     """Return the recording in an open file of this layout.
 
     Raises
@@ -36,7 +39,6 @@ def read_monash(path: Path, file: h5py.File) -> Recording:
         broken image, or something that is not in the file itself.
     """
     gatherer = Gatherer()
-    _gather_events(path, file, gatherer)
     description: dict[str, Any] = {}
     if "adv2e" in file.attrs:
         text = str(file.attrs["adv2e"])
@@ -44,25 +46,40 @@ def read_monash(path: Path, file: h5py.File) -> Recording:
     images = hdf5.find(file, "images")
     names = [f"images/{name}" for name in sorted(images)] if images is not None else []
     found = [hdf5.dataset(file, name) for name in names]
-    times = np.array([_time_ns(f"{path}: {image.name}", image) for image in found], np.int64)
+    ours = "s" if description else None
+    frames = _Stamps(path, found)
+    clock = Clock(time_unit, ours, frames.beside(ours))
     geometry, whence = _geometry(path, file, found), "sensor_resolution"
     if described_geometry(description):
         geometry, whence = described_geometry(description), "the attribute adv2e"
+    whole = _gather_events(path, file, gatherer, geometry, clock)
+    given = clock.given_for_frames(whole=frames.whole, events_whole=whole)
+    times, doubt = frames.times_ns(given, ours)
+    if doubt:
+        gatherer.problems.append(f"images: {doubt}")
     events, width, height = gatherer.finish(geometry, whence)
+    gatherer.problems += disagreement(events, times)
     return Recording(
         str(path),
         "monash",
         width,
         height,
         events,
-        times if names else None,
+        times,
         description,
         gatherer.problems,
         lambda: _images(path, names),
     )
 
 
-def _gather_events(path: Path, file: h5py.File, gatherer: Gatherer) -> None:
+def _gather_events(
+    path: Path,
+    file: h5py.File,
+    gatherer: Gatherer,
+    size: tuple[int, int] | None,
+    clock: Clock,
+) -> bool:
+    """Read all events into `gatherer`; return whether their times are whole numbers."""
     columns = [hdf5.dataset(file, name) for name in COLUMNS]
     if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
         shapes = ", ".join(
@@ -73,12 +90,15 @@ def _gather_events(path: Path, file: h5py.File, gatherer: Gatherer) -> None:
         if column.dtype.kind not in kinds:
             raise DataError(f"{path}: {name} must hold numbers, not {column.dtype}")
     hdf5.check_stored(columns, f"{path}: events")
-    unit_ns = US if columns[0].dtype.kind in "iu" else S
+    whole = columns[0].dtype.kind in "iu"
+    t, x, y = (column[:_PART] for column in columns[:3])
+    unit = clock.of_events(t, x, y, size, whole=whole)
     for begin in range(0, columns[0].size, _PART):
         t, x, y, p = (column[begin : begin + _PART] for column in columns)
-        gatherer.add(to_ticks(t, unit_ns, US, f"{path}: events/ts"), x, y, _signs(p))
-    if columns[0].size and unit_ns == US:
-        gatherer.problems.append("times are whole numbers: taken as microseconds")
+        gatherer.add(to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, _signs(p))
+    if columns[0].size and unit.doubt:
+        gatherer.problems.append(unit.doubt)
+    return whole
 
 
 def _signs(p: NDArray[Any]) -> NDArray[np.int8]:
@@ -114,12 +134,47 @@ def _pixels(path: Path, image: h5py.Dataset) -> tuple[int, ...]:
     return shape
 
 
-def _time_ns(label: str, image: h5py.Dataset) -> int:
-    for name, unit_ns in (("timestamp_ns", NS), ("timestamp", S)):
-        if name in image.attrs:
-            stamp = np.asarray(image.attrs[name])
-            if stamp.size == 1 and stamp.dtype.kind in "iuf":
-                return int(to_ticks(stamp.reshape(1), unit_ns, NS, f"{label}: {name}")[0])
+class _Stamps:
+    """When the images were taken, as their attributes say."""
+
+    def __init__(self, path: Path, images: list[h5py.Dataset]) -> None:
+        self._labels = [f"{path}: {image.name}" for image in images]
+        exact = all("timestamp_ns" in image.attrs for image in images)
+        self._name = "timestamp_ns" if exact else "timestamp"
+        pairs = zip(self._labels, images, strict=True)
+        self._stamps = [_stamp(label, image, self._name) for label, image in pairs]
+        self.whole = all(stamp.dtype.kind != "f" for stamp in self._stamps)
+
+    def beside(self, stated: str | None) -> Beside | None:
+        """Return what tells the unit of the events, if it does."""
+        if self._name == "timestamp_ns" or len(self._stamps) < 2:
+            return None
+        return Beside(self._unit(None, stated), self.whole)
+
+    def times_ns(
+        self, given: str | None, stated: str | None
+    ) -> tuple[NDArray[np.int64] | None, str]:
+        """Return the times [ns], None without images, and what is to be told of their unit."""
+        unit = self._unit(given, stated)
+        pairs = zip(self._labels, self._stamps, strict=True)
+        ticks = [to_ticks(stamp, unit.ns, NS, f"{label}: {self._name}") for label, stamp in pairs]
+        return (np.concatenate(ticks), unit.doubt) if ticks else (None, "")
+
+    def _unit(self, given: str | None, stated: str | None) -> Unit:
+        if self._name == "timestamp_ns":
+            return Unit("ns")
+        values = [Decimal(stamp.item()) for stamp in self._stamps]
+        return frame_unit(values, given=given, stated=stated)
+
+
+def _stamp(label: str, image: h5py.Dataset, name: str) -> NDArray[Any]:
+    """Return an array of the one number in an attribute."""
+    if name in image.attrs:
+        stamp = np.asarray(image.attrs[name])
+        if stamp.size == 1 and stamp.dtype.kind in "iuf":
+            if not np.all(np.isfinite(stamp)):
+                raise DataError(f"{label}: {name} holds NaN or infinite times")
+            return stamp.reshape(1)
     raise DataError(f"{label} has no attribute timestamp [s]")
 
 

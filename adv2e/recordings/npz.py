@@ -3,9 +3,8 @@
 ========== ======================= =================================================
 column     names                   meaning
 ========== ======================= =================================================
-time       t_us                    microseconds
-           t_ns                    nanoseconds
-           t, ts, time(stamp)(s)   whole numbers: microseconds; floats: seconds
+time       t_s, t_ms, t_us, t_ns   as they say
+           t, ts, time(stamp)(s)   told from the times: :mod:`adv2e.sources.units`
 column     x, xs                   from the left
 row        y, ys                   from the top
 polarity   p, ps, pol(arity)       ON above 0
@@ -26,12 +25,13 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.npy import read_array
 from adv2e.recordings.base import Recording, described_geometry, parse_description
+from adv2e.recordings.clock import Clock
 from adv2e.recordings.gather import Gatherer
-from adv2e.ticks import NS, US, S, to_ticks
+from adv2e.ticks import US, to_ticks
 from adv2e.zips import open_member, zip_archive
 
 _NAMES = {
-    "time": ("t_us", "t_ns", "t", "ts", "time", "times", "timestamp", "timestamps"),
+    "time": ("t_us", "t_ns", "t_ms", "t_s", "t", "ts", "time", "times", "timestamp", "timestamps"),
     "x": ("x", "xs"),
     "y": ("y", "ys"),
     "polarity": ("p", "ps", "pol", "polarity"),
@@ -40,7 +40,7 @@ _NAMES = {
 _BEYOND = 1 << 31
 
 
-def read_npz(path: Path) -> Recording:
+def read_npz(path: Path, time_unit: str | None = None) -> Recording:
     """Return the recording in a NumPy archive.
 
     Raises
@@ -55,15 +55,21 @@ def read_npz(path: Path) -> Recording:
         text = str(arrays["adv2e"])
         description = parse_description(text, f"{path}: adv2e", gatherer.problems)
     columns = _columns(path, arrays)
-    t = _microseconds(path, *columns["time"], gatherer.problems)
     x, y, p = (_whole(path, *columns[name]) for name in ("x", "y", "polarity"))
-    gatherer.add(t, x, y, p)
     sizes: dict[str, Any] = {
         name: arrays[name].item()
         for name in ("width", "height")
         if name in arrays and arrays[name].size == 1
     }
     geometry = described_geometry(description) or described_geometry(sizes)
+    name, t = columns["time"]
+    if t.dtype.kind not in "iuf":
+        raise DataError(f"{path}: {name} must hold numbers, not {t.dtype}")
+    stated = name[2:] if name.startswith("t_") else None
+    unit = Clock(time_unit or stated).of_events(t, x, y, geometry, whole=t.dtype.kind != "f")
+    if unit.doubt:
+        gatherer.problems.append(unit.doubt)
+    gatherer.add(to_ticks(t, unit.ns, US, f"{path}: {name}"), x, y, p)
     events, width, height = gatherer.finish(geometry, "the file")
     return Recording(
         str(path),
@@ -106,13 +112,6 @@ def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[
     if len(shapes) != 1 or len(next(iter(shapes))) != 1:
         raise DataError(f"{path}: columns must be of one length, got {sorted(shapes)}")
     return found
-
-
-def _microseconds(path: Path, name: str, t: NDArray[Any], problems: list[str]) -> NDArray[np.int64]:
-    unit_ns = {"t_us": US, "t_ns": NS}.get(name, S if t.dtype.kind == "f" else US)
-    if name not in ("t_us", "t_ns") and unit_ns == US:
-        problems.append(f"{name} holds whole numbers: taken as microseconds")
-    return to_ticks(t, unit_ns, US, f"{path}: {name}")
 
 
 def _whole(path: Path, name: str, column: NDArray[Any]) -> NDArray[np.int64]:

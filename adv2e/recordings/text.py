@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.jit import entry, kernel
 from adv2e.recordings.base import Recording, described_geometry, parse_description
+from adv2e.recordings.clock import Clock
 from adv2e.recordings.gather import Gatherer
-from adv2e.sources.lists import FrameList
-from adv2e.sources.units import Unit, event_unit
+from adv2e.sources.units import Unit
 from adv2e.ticks import LARGEST_NS, US, check_us
 
 _BLOCK = 1 << 22  # bytes read at once
@@ -184,7 +184,7 @@ def read_text(path: Path, time_unit: str | None = None) -> Recording:
         text = whence.read_text("utf-8", errors="replace")
         description = parse_description(text, str(whence), gatherer.problems)
     with path.open("rb") as file:
-        told = "s" if "adv2e" in description else None
+        told = "s" if description else None
         lines = gather_lines(file, str(path), gatherer, Clock(time_unit, told))
     stated = described_geometry(description)
     source = whence.name if stated and whence else "the first line"
@@ -198,25 +198,6 @@ def read_text(path: Path, time_unit: str | None = None) -> Recording:
         metadata=description,
         problems=gatherer.problems,
     )
-
-
-@dataclass(frozen=True)
-class Clock:
-    """What is known of the unit of a file's times before it is read.
-
-    Parameters
-    ----------
-    given : {'s', 'ms', 'us', 'ns'}, optional
-        What the user says.
-    stated : {'s', 'ms', 'us', 'ns'}, optional
-        What the file says.
-    frames : FrameList, optional
-        The list of two or more frames beside the events.
-    """
-
-    given: str | None = None
-    stated: str | None = None
-    frames: FrameList | None = None
 
 
 @dataclass(frozen=True)
@@ -248,8 +229,7 @@ def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer, clock: Clock) 
     label : str
         Its name, for messages.
     clock : Clock
-        What is known of the unit; beside frames whose times are written in another way, what the
-        user says is meant for those of the two that are whole numbers.
+        What is known of the unit of its times.
 
     Raises
     ------
@@ -265,7 +245,8 @@ def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer, clock: Clock) 
         data = np.frombuffer(block, np.uint8)[begin:]
         if number == 0:
             whole = not has_decimal_times(data)
-            unit = _unit_of(data, whole, geometry, clock)
+            t, x, y, *_ = _columns(data, whole, "us" if whole else "s")
+            unit = clock.of_events(t if whole else t / 1e6, x, y, geometry, whole=whole)
         t, x, y, p, lines, wrong = _columns(data, whole, unit.name)
         if wrong:
             raise _malformed(data.tobytes(), label, before, wrong)
@@ -278,24 +259,6 @@ def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer, clock: Clock) 
     if unit.doubt:
         gatherer.problems.append(unit.doubt)
     return Lines(geometry, whole, unit.name)
-
-
-def _unit_of(
-    data: NDArray[np.uint8], whole: bool, geometry: tuple[int, int] | None, clock: Clock
-) -> Unit:
-    """Return the unit of the times in the first lines of a file."""
-    alike = clock.frames is None or clock.frames.whole == whole
-    t, x, y, *_ = _columns(data, whole, "us" if whole else "s")
-    if geometry is None:
-        geometry = (int(x.max()) + 1, int(y.max()) + 1) if t.size else (1, 1)
-    return event_unit(
-        t if whole else t / 1e6,
-        max(1, geometry[0] * geometry[1]),
-        whole=whole,
-        given=clock.given if alike or whole else None,
-        stated=clock.stated,
-        beside=clock.frames.unit if clock.frames is not None and alike else None,
-    )
 
 
 def _columns(data: NDArray[np.uint8], whole: bool, unit: str) -> tuple[Any, ...]:

@@ -165,7 +165,6 @@ def event_unit(
     *,
     whole: bool,
     given: str | None = None,
-    stated: str | None = None,
     beside: Unit | None = None,
 ) -> Unit:
     """Return the unit of the times of events, as the rule of this module has it.
@@ -178,16 +177,16 @@ def event_unit(
         Pixels of the sensor.
     whole : bool
         They are written as whole numbers.
-    given, stated : {'s', 'ms', 'us', 'ns'}, optional
-        What the user and the file say.
+    given : {'s', 'ms', 'us', 'ns'}, optional
+        What the user says.
     beside : Unit, optional
         That of the frames in the same recording, where they are written as whole numbers exactly
         if these are.
     """
-    if given or stated:
-        return Unit(given or stated or "")
+    if given is not None:
+        return Unit(given)
     span = float(times.max()) - float(times.min()) if times.size else 0.0
-    tells = times.size >= _FEW and span > 0
+    tells = times.size >= _FEW and 0 < span < np.inf
     if tells and not whole:
         whole = bool(np.all(times == np.floor(times)))
     usual = "us" if whole else "s"

@@ -198,8 +198,8 @@ def test_frames_of_another_size_than_the_events_say(adv2e, record, monkeypatch):
 
     read = evidence.read_recording
 
-    def wider(path):
-        recording = read(path)
+    def wider(path, **options):
+        recording = read(path, **options)
         object.__setattr__(recording, "width", 50)
         return recording
 

@@ -210,7 +210,7 @@ def test_monash_whole_numbers_are_microseconds(tmp_path):
     recording = read_recording(path)
 
     assert recording.events["t"].tolist() == [7, 9]
-    assert "times are whole numbers: taken as microseconds" in recording.problems
+    assert recording.problems[0].startswith("no unit is stated: times are taken as us;")
 
 
 def test_monash_geometry_is_height_then_width(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import h5py
 import numpy as np
 import pytest
 
@@ -153,3 +154,96 @@ def test_info_of_a_stack_tells_its_doubts(adv2e, tmp_path):
     assert "frame span  0 to 0.08 s" in out
     assert "are taken as us (25 frames a second); --time-unit settles it" in out
     assert "0 to 80 s" in adv2e("info", tmp_path / "a.npy", "--time-unit", "ms").out
+
+
+# files of events that are no text
+
+
+def hdf5(path, ts, stamps=(), **attributes):
+    with h5py.File(path, "w") as file:
+        n = np.arange(len(ts))
+        columns = {"ts": np.asarray(ts), "xs": n % 40, "ys": n % 30, "ps": n % 2 == 0}
+        for name, column in columns.items():
+            file[f"events/{name}"] = column
+        for number, stamp in enumerate(stamps):
+            image = file.create_dataset(f"images/image{number:09d}", data=np.zeros((30, 40), "u1"))
+            image.attrs["timestamp"] = stamp
+        file.attrs.update(attributes)
+    return path
+
+
+def npz(path, t, name="t"):
+    n = np.arange(len(t))
+    np.savez(path, **{name: np.asarray(t)}, x=n % 40, y=n % 30, p=n % 2)
+    return path
+
+
+EVENTS_US = np.arange(1000) * 137
+
+
+@pytest.mark.parametrize("write", [hdf5, npz])
+@pytest.mark.parametrize(
+    ("t", "name", "told"),
+    [
+        (EVENTS_US / 1e6, "s", False),
+        (EVENTS_US, "us", True),
+        (EVENTS_US.astype(np.float64), "us", True),
+        (EVENTS_US.astype(np.uint32), "us", True),
+        (EVENTS_US + 1_468_941_032 * 10**6, "us", False),
+        ((EVENTS_US + 1_468_941_032 * 10**6) * 1000, "ns", False),
+    ],
+)
+def test_event_files_are_read_by_the_same_rule(tmp_path, write, t, name, told):
+    found = read_recording(write(tmp_path / ("a.npz" if write is npz else "a.h5"), t))
+    begin = 1_468_941_032 * 10**6 if t.max() > 1e9 else 0
+    assert np.array_equal(found.events["t"], EVENTS_US + begin)
+    doubts = [problem for problem in found.problems if "no unit is stated" in problem]
+    assert [f"times are taken as {name}" in doubt for doubt in doubts] == [True] * told
+
+
+@pytest.mark.parametrize("write", [hdf5, npz])
+def test_a_unit_given_for_event_files(tmp_path, write):
+    path = write(tmp_path / ("a.npz" if write is npz else "a.h5"), np.array([1000, 2000]))
+    for unit, rate in PER_S.items():
+        found = read_recording(path, time_unit=unit)
+        assert found.events["t"].tolist() == [10**9 // rate, 2 * 10**9 // rate]
+        assert not any("no unit" in problem for problem in found.problems)
+
+
+@pytest.mark.parametrize(("name", "scale"), [("t_s", 1e6), ("t_ms", 1e3), ("t_ns", 1e-3)])
+def test_a_column_may_state_its_unit(tmp_path, name, scale):
+    found = read_recording(npz(tmp_path / "a.npz", [1000, 2000], name))
+    assert found.events["t"].tolist() == [1000 * scale, 2000 * scale]
+    assert not any("no unit" in problem for problem in found.problems)
+
+
+def test_images_in_hdf5_tell_the_unit_of_events_beside_them(tmp_path):
+    path = hdf5(tmp_path / "a.h5", EVENTS_US / 1000, [0.0, 40.0, 80.0, 120.0])
+    found = read_recording(path)
+    assert found.frame_times_ns.tolist() == [0, 40_000_000, 80_000_000, 120_000_000]
+    assert np.array_equal(found.events["t"], EVENTS_US)
+    assert "images: no unit is stated: times 40 apart are taken as ms" in found.problems[0]
+    ours = hdf5(tmp_path / "b.h5", [0.1, 90.0], [0.0, 40.0, 80.0], adv2e='{"adv2e": "1"}')
+    assert read_recording(ours).frame_times_ns.tolist() == [0, 40 * 10**9, 80 * 10**9]
+
+
+def test_events_and_frames_that_share_no_time_are_told(tmp_path):
+    def problems(*stamps):
+        path = hdf5(tmp_path / "a.h5", EVENTS_US / 1e6, stamps)
+        return [one for one in read_recording(path).problems if "another unit" in one]
+
+    assert problems(0.0, 0.04, 0.08) == []
+    assert problems(5.0, 5.04, 5.08) == [
+        "events are from 0 to 0.136863 s, frames from 5 to 5.08 s: are some in another unit?"
+        " --time-unit settles it"
+    ]
+
+
+def test_other_commands_take_the_unit(adv2e, tmp_path):
+    path = npz(tmp_path / "a.npz", EVENTS_US)
+    told = adv2e("compare", path, path)
+    assert told.err.count("no unit is stated: times are taken as us") == 2
+    settled = adv2e("compare", path, path, "--time-unit", "us")
+    assert (settled.status, "no unit" in settled.err, settled.out) == (0, False, told.out)
+    drawn = adv2e("render", path, "-o", tmp_path / "a.png", "--time-unit", "us")
+    assert (drawn.status, "no unit" in drawn.err) == (0, False)
