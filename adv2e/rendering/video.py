@@ -30,6 +30,7 @@ from adv2e.rendering.output import NotWritten
 from adv2e.rendering.styles import Picture
 from adv2e.sources.containers import examine
 from adv2e.sources.opencv import quiet
+from adv2e.sources.opening import openable
 
 CODES = {".mp4": "vp09", ".webm": "VP80", ".avi": "FFV1"}
 """Coders of OpenCV; its VP8 and VP9 are set to lose next to nothing."""
@@ -51,9 +52,9 @@ class _OpenCv:
 
     def __init__(self, path: Path, fps: float, width: int, height: int) -> None:
         code = CODES[path.suffix.lower()]
-        with quiet(), _unprinted():
+        with quiet(), _unprinted(), openable(path) as name:
             fourcc = cv2.VideoWriter.fourcc(*code)
-            self._writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, fourcc, fps, (width, height))
+            self._writer = cv2.VideoWriter(name, cv2.CAP_FFMPEG, fourcc, fps, (width, height))
         if not self._writer.isOpened():
             raise NotWritten(f"a video ({code}) cannot be written there")
 
@@ -83,16 +84,25 @@ class _PyAv:
 
     def add(self, picture: Picture) -> None:
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
-        self._container.mux(self._stream.encode(frame))
+        with self._telling():
+            self._container.mux(self._stream.encode(frame))
 
     def close(self) -> None:
         if self._file.closed:
             return
-        with self._file:
+        with self._telling(), self._file:
             try:
                 self._container.mux(self._stream.encode())
             finally:
                 self._container.close()
+
+    @contextmanager
+    def _telling(self) -> Iterator[None]:
+        """Turn what cannot be written into an error that says so; PyAV may wrap the system's."""
+        try:
+            yield
+        except (OSError, self._av.FFmpegError) as error:
+            raise NotWritten("cannot be written to the end (is the disk full?)") from error
 
 
 @lru_cache(maxsize=1)

@@ -7,7 +7,9 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -121,6 +123,37 @@ def test_a_video_that_cannot_be_written(tmp_path, coder, capfd):
     with pytest.raises(OutputError, match="cannot be written there"):
         write(tmp_path / "absent" / f"film{coder[0]}", [noise(16, 16)])
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="names are UTF-8, without colons")
+@pytest.mark.parametrize("stem", ["14:30:00", "film%03d", "pipe:1", "caf\udce9", "a' b"])
+def test_a_film_may_have_any_name(tmp_path, coder, stem):
+    path = tmp_path / f"{stem}{coder[0]}"
+    write(path, [noise(16, 16)])
+    assert path.stat().st_size > 200
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_disk_that_fills_is_no_error_of_ours(tmp_path, monkeypatch):
+    """PyAV hands on an error of its own where writing fails within FFmpeg."""
+    if not video.writes_h264():
+        pytest.skip("needs PyAV, the extra 'video'")
+
+    class Full:
+        closed = False
+
+        def write(self, data):
+            raise OSError(28, "No space left on device")
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            self.closed = True
+
+    monkeypatch.setattr(Path, "open", lambda path, mode: Full())
+    with pytest.raises(OutputError, match="cannot be written to the end"):
+        write(tmp_path / "film.mp4", [noise(480, 640, k) for k in range(9)])
 
 
 def test_a_video_that_came_out_short(tmp_path, coder):
