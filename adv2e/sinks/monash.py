@@ -109,7 +109,8 @@ class MonashSink(FileSink):
         assert self._columns is not None
         if events.size:
             self._columns.append(events)
-            self._indices.add_events(events["t"])
+            if self.wants_frames:
+                self._indices.add_events(events["t"])
             self._totals.add(events)
 
     def _write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
@@ -218,29 +219,38 @@ class _Totals:
 
 
 class _EventIndices:
-    """Finds the last event before each frame; frames may come before the events around them."""
+    """Finds the last event before each frame; either may come before the other."""
 
     def __init__(self) -> None:
         self._count = 0
         self._last = -np.inf
         self._waiting: list[float] = []
+        self._late: list[NDArray[np.float64]] = []  # times of events that a frame may yet precede
         self._found: list[int] = []
 
     def add_frame(self, seconds: float) -> None:
         """Note a frame; it is settled once an event at or after its time has come."""
-        if seconds <= self._last:
-            raise ValueError("a frame must come before the events that follow it")
-        self._waiting.append(seconds)
+        if seconds > self._last:
+            self._waiting.append(seconds)
+            self._late.clear()
+            return
+        times = np.concatenate(self._late)
+        before = int(np.searchsorted(times, seconds, side="left"))
+        self._found.append(max(self._count - times.size + before - 1, 0))
+        self._late = [times[before:]]
 
     def add_events(self, t_us: NDArray[np.int64]) -> None:
         """Settle the frames that come before the last of these events, one at least."""
         self._last = float(t_us[-1]) / 1e6
+        seconds = t_us / 1e6
         if self._waiting:
-            seconds = t_us / 1e6
             settled = int(np.searchsorted(self._waiting, self._last, side="right"))
             before = np.searchsorted(seconds, self._waiting[:settled], side="left")
             self._found.extend(max(self._count + int(n) - 1, 0) for n in before)
             del self._waiting[:settled]
+            self._late.clear()
+        if not self._waiting:
+            self._late.append(seconds)
         self._count += t_us.size
 
     def finish(self) -> list[int]:

@@ -109,7 +109,7 @@ SETTINGS = {
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("sets", SETTINGS.values(), ids=SETTINGS.keys())
 def test_preview_of_a_conversion_is_what_render_makes_of_its_file(clip, tmp_path, sets, threads):
-    for target, preview in (("out.zip", "film.avi"), ("out", "sheet.png")):
+    for target, preview in (("out.zip", "film.avi"), ("out.h5", "sheet.png")):
         output, made, expected = (tmp_path / name for name in (target, preview, "_" + preview))
         with Reading(str(clip), threads=threads) as reading:
             convert(

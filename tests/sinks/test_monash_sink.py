@@ -168,6 +168,8 @@ def test_event_index_is_that_of_the_last_event_before_the_frame(tmp_path):
     ]
     orders = {
         "frames_first": [*frames, *parts],
+        "events_first": [*parts, *frames],
+        "late": [parts[0], *frames[:2], *parts[1:3], *frames[2:5], parts[3], frames[5]],
         "as_they_come": [*frames[:2], parts[0], *frames[2:4], *parts[1:3], *frames[4:], parts[3]],
     }
     for name, steps in orders.items():
@@ -179,14 +181,13 @@ def test_event_index_is_that_of_the_last_event_before_the_frame(tmp_path):
             assert found == [0, 0, 1, 4, 6, 8]
 
 
-def test_a_frame_after_its_events_is_a_mistake_of_the_caller(tmp_path):
-    with (
-        pytest.raises(ValueError, match="before the events that follow it"),
-        open_sink(tmp_path / "a.h5", width=346, height=260, metadata={}, with_frames=True) as sink,
-    ):
-        sink.write_events(many(10, begin=100))
-        sink.write_frame(100_000, grey())
-    assert list(tmp_path.iterdir()) == []
+def test_frames_far_ahead_leave_no_times_of_events_in_memory(tmp_path):
+    sink = open_sink(tmp_path / "a.h5", width=346, height=260, metadata={}, with_frames=True)
+    with sink:
+        for k in range(5):
+            sink.write_frame((k + 1) * 10_000_000, grey())
+            sink.write_events(many(10, begin=10_000 * k))
+            assert not sink._indices._late
 
 
 def test_metadata_may_be_long(tmp_path):
