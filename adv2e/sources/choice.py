@@ -60,7 +60,7 @@ def choose(path: str, height: int, pixels: bytes = b"") -> Choice:
         Parts of it state transfers that differ, or it has transparency that cannot be read.
     """
     stated, stream = stated_by(path), examine_stream(path, height)
-    if stated.alpha_apart:
+    if stated.alpha_apart and stream.codec in ("vp80", "vp90"):
         raise DataError(
             f"{path}: its transparency is beside the pictures, where it cannot be read; make"
             " pictures of it with ffmpeg -c:v libvpx-vp9 -i VIDEO folder/%06d.png"

@@ -35,13 +35,24 @@ _YCGCO = 8
 _TURNS = {90: cv2.ROTATE_90_COUNTERCLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_CLOCKWISE}
 
 
+_FIRST = 17
+"""First release of PyAV that converts by the matrix of the stream, not by that of BT.601."""
+
+
 def is_installed() -> bool:
-    """Tell whether PyAV is."""
+    """Tell whether PyAV is, in a release that can be used."""
     try:
-        importlib.import_module("av")
+        _import()
     except ImportError:
         return False
     return True
+
+
+def _import() -> Any:
+    av: Any = importlib.import_module("av")
+    if int(av.__version__.partition(".")[0]) < _FIRST:
+        raise ImportError(f"PyAV {av.__version__} is too old")
+    return av
 
 
 class PyavCapture:
@@ -73,7 +84,7 @@ class PyavCapture:
 
     def __init__(self, path: str, why: str, threads: int = 1, matrix: int = UNSTATED) -> None:
         try:
-            self._av: Any = importlib.import_module("av")
+            self._av: Any = _import()
         except ImportError as error:
             raise MissingExtraError(f"{path}: {why}; reading that", "video") from error
         self._path, self._matrix = path, matrix

@@ -107,6 +107,14 @@ def test_what_opencv_does_not_keep_is_refused_without_pyav(tmp_path, monkeypatch
         open_source(path)
 
 
+def test_pyav_that_takes_one_matrix_for_all_is_not_used(tmp_path, monkeypatch):
+    av = pytest.importorskip("av")
+    path = write(tmp_path / "clip.mp4", [60, 90, 120], tags=(9, 16, 9))
+    monkeypatch.setattr(av, "__version__", "16.1.0")
+    with pytest.raises(MissingExtraError, match=r"adv2e\[video\]"):
+        open_source(path)
+
+
 def test_wide_primaries_do_not_change_the_codes(tmp_path):
     colours = [(60, 90, 160), (120, 200, 90), (200, 128, 128)]
     kept = [
