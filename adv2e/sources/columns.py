@@ -159,8 +159,8 @@ def _table(lines: list[Line], comments: list[str], label: str) -> tuple[list[Lin
     width = len(cut[-1].fields)
     if all(re.fullmatch(r"\d+,\d+", line.text) for line in lines):
         raise DataError(
-            f"{label} line {lines[0].number}: {lines[0].text!r}: two columns, or a decimal comma?"
-            " write decimal points, or put a line such as '# id timestamp' above"
+            f"{label} line {lines[0].number}: {lines[0].text[:40]!r}: two columns, or a decimal"
+            " comma? write decimal points, or put a line such as '# id timestamp' above"
         )
     for line in cut:
         if len(line.fields) != width:
@@ -285,7 +285,7 @@ def _meaning(lines: list[Line], comments: list[str], label: str) -> Table:
     for line in lines:
         if not _is_number(line.fields[time]):
             raise DataError(
-                f"{label} line {line.number}: {line.fields[time]!r} is not a number; a time is"
+                f"{label} line {line.number}: {line.fields[time][:40]!r} is not a number; a time is"
                 " expected there"
             )
     named = [at for at in others if roles[at] == "name"] or others
@@ -379,7 +379,7 @@ def _unit_in(comments: list[str]) -> str | None:
 
 def _open(lines: list[Line], columns: list[int], what: str, label: str) -> DataError:
     line = lines[0]
-    shown = " or ".join(line.fields[at] for at in columns[:4])
+    shown = " or ".join(line.fields[at][:40] for at in columns[:4])
     which = f"which is the {what}, {shown}?" if len(columns) > 1 else f"no {what} in it;"
     return DataError(
         f"{label} line {line.number}: {line.text[:80]!r}: {which} put a line such as"

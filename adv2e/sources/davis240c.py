@@ -19,7 +19,7 @@ from pathlib import Path, PurePosixPath
 from adv2e.errors import DataError
 from adv2e.sources.base import RECORDED, GivenTimes, Light, Pixels, Selection, Shot
 from adv2e.sources.listed import ListedSource, Picture, given_shots, told
-from adv2e.sources.lists import FrameList, decoded, parse_list, read_list
+from adv2e.sources.lists import FrameList, decoded, first_name, parse_list, read_list
 from adv2e.sources.names import found_outside, member_of, members_of, nowhere
 from adv2e.sources.opencv import decode_image, read_image
 from adv2e.sources.stored import DESCRIPTION, MOST_BYTES, light_beside, read_light
@@ -34,7 +34,7 @@ def is_recording(folder: Path) -> bool:
         return False
     if (folder / "events.txt").is_file():
         return True
-    name = read_list(folder / LIST).stamps[0].name or ""
+    name = first_name(folder / LIST)
     return "/" in (member_of(name, lambda member: (folder / member).is_file()) or name)
 
 

@@ -46,21 +46,30 @@ class FrameList:
     whole: bool = False
 
 
+def first_name(path: Path) -> str:
+    """Return the name on the first line of a list; "" if lines have none."""
+    table = table_of(_text(path), str(path))
+    return _name(table.lines[0], table) or ""
+
+
 def read_list(path: Path, **evidence: Any) -> FrameList:
     """Read a list of frames from a file; parameters and errors as :func:`parse_list`.
 
     The ``info.txt`` of DVS-Voltmeter is in microseconds, and what lies beside our own
     ``adv2e.json`` in seconds.
     """
-    try:
-        data = read_text_bytes(path)
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror}") from error
     if path.name == "info.txt":
         evidence.setdefault("usual", "us")
     if path.name == "images.txt" and path.with_name("adv2e.json").is_file():
         evidence.setdefault("stated", "s")
-    return parse_list(decoded(data, str(path)), str(path), **evidence)
+    return parse_list(_text(path), str(path), **evidence)
+
+
+def _text(path: Path) -> str:
+    try:
+        return decoded(read_text_bytes(path), str(path))
+    except OSError as error:
+        raise DataError(f"{path}: {error.strerror}") from error
 
 
 def decoded(data: bytes, label: str) -> str:
@@ -135,8 +144,11 @@ def _stamp(line: Line, table: Table, unit: Unit, label: str) -> Stamp:
         raise DataError(
             f"{label} line {line.number}: {error}; a time in {unit.name} is expected there"
         ) from error
-    name = None if table.name is None else line.fields[table.name].replace("\\", "/")
-    return Stamp(t_ns, line.number, name)
+    return Stamp(t_ns, line.number, _name(line, table))
+
+
+def _name(line: Line, table: Table) -> str | None:
+    return None if table.name is None else line.fields[table.name].replace("\\", "/")
 
 
 def _check_names(stamps: list[Stamp], label: str) -> None:

@@ -19,7 +19,7 @@ from adv2e.ticks import LARGEST_NS
 
 NS_PER_S = 10**9
 
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 """A time in a list."""
 
 

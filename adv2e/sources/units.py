@@ -26,11 +26,18 @@ Frames that are a thousandfold nearer or farther apart than the video's own time
 too.
 
 Events come at any rate, so that their times tell less.  Those of frames beside them decide where
-both are whole numbers, or neither is.  Else whole numbers that are dates are in the unit that
-makes them so; other whole numbers are microseconds and others are seconds, unless that makes a
-rate no camera has (`_FEWEST`, `_MOST`): then the unit that comes nearest to one event a pixel a
-second is taken.  It is told unless times are finer than a thousandth (milliseconds are not written
-finer than a camera's clock ticks) and come at a rate that cameras have.
+both are whole numbers, or neither is.  Else they are, of the first kind that fits:
+
+============================================ ===============================================
+dates from 2000 to 2100                      in the unit that makes them so
+finer than a thousandth                      s: ms are not written finer than cameras' ticks
+whole numbers at a rate that us allow        us, told as a doubt
+others                                       in the unit that comes nearest to one event a
+                                             pixel a second, told as a doubt
+fewer than 100                               us if whole numbers, told as a doubt; else s
+============================================ ===============================================
+
+What no camera's rate is (`_FEWEST`, `_MOST`) is told, too.
 """
 
 from __future__ import annotations
@@ -195,18 +202,17 @@ def event_unit(
     if not tells:
         return Unit(usual, taken(usual) if whole else "")
     rates = {name: times.size / span * (1e9 / ns) for name, ns in UNITS.items()}
-    if whole:
-        first, last = int(times.min()), int(times.max())
-        for name in UNITS:
-            if _are_dates(first, last, name) and _is_rate(rates[name], pixels):
-                return Unit(name)
-    if _is_rate(rates[usual], pixels):
-        open_to = not _are_fine(times) and _is_rate(1e3 * rates[usual], pixels)
-        return Unit(usual, taken(usual, rates[usual]) if whole or open_to else "")
+    first, last = times.min().item(), times.max().item()
+    for name in UNITS:
+        if _are_dates(first, last, name) and _is_rate(rates[name], pixels):
+            return Unit(name)
     if not whole and _are_fine(times):
-        return Unit("s", taken("s", rates["s"]))
-    best = min(UNITS, key=lambda name: abs(np.log10(rates[name] / pixels)))
-    return Unit(best, taken(best, rates[best]))
+        return Unit("s", "" if _is_rate(rates["s"], pixels) else taken("s", rates["s"]))
+    nearest = min(UNITS, key=lambda name: abs(np.log10(rates[name] / pixels)))
+    if whole and _is_rate(rates["us"], pixels):
+        nearest = "us"
+    sure = not whole and nearest == "s" and not _is_rate(1e3 * rates["s"], pixels)
+    return Unit(nearest, "" if sure else taken(nearest, rates[nearest]))
 
 
 def _is_rate(rate_hz: float, pixels: int) -> bool:

@@ -207,6 +207,11 @@ def test_a_comment_may_state_the_unit(comment, unit):
     assert (times_s(found), found.unit) == ([0.1, 0.2], Unit(unit))
 
 
+def test_endless_numbers_take_no_time_and_are_shown_in_part():
+    for text in (f"0.1\n{'9' * 10**6}x\n0.2\n", f"0.1,a\n{'9' * 10**5}x,b\n0.2,c\n"):
+        assert len(error_of(text)) < 200
+
+
 def test_what_is_no_text(tmp_path):
     path = tmp_path / "times.txt"
     path.write_bytes(b"\x93NUMPY\xff\xfe\x00")

@@ -134,6 +134,11 @@ def test_the_usual_units_are_read_rightly(rate_hz, begin_s):
     assert bool(whole.doubt) is (begin_s == 0)
 
 
+def test_dates_in_floats_tell_the_unit_of_events():
+    times = stream(1e5, 1000, "ms", whole=False, begin_s=EPOCH_S)
+    assert event_unit(times, 43_200, whole=False) == Unit("ms")
+
+
 def test_few_events_are_in_the_usual_unit():
     assert event_unit(np.array([1500, 1_468_941_032_229_165]), 5, whole=True).name == "us"
     assert event_unit(np.array([0.5, 0.6]), 5, whole=False) == Unit("s")
@@ -144,7 +149,16 @@ def test_frames_beside_events_decide():
     assert event_unit(times, 43_200, whole=True, beside=Unit("ms", "doubt")) == Unit("ms")
 
 
-@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
-def test_typical_streams_in_other_units_are_found(unit):
-    found = event_unit(stream(2e5, 5000, unit, whole=unit != "us"), 346 * 260, whole=unit != "us")
-    assert (found.name, "taken as" in found.doubt) == (unit if unit != "ns" else "us", True)
+@pytest.mark.parametrize(
+    ("unit", "whole", "found"),
+    [
+        ("ms", True, "ms"),
+        ("ms", False, "ms"),
+        ("us", True, "us"),
+        ("us", False, "us"),
+        ("ns", True, "us"),  # 200 events a second are few for a sensor, but may be
+    ],
+)
+def test_typical_streams_in_other_units_are_told(unit, whole, found):
+    result = event_unit(stream(2e5, 5000, unit, whole=whole), 346 * 260, whole=whole)
+    assert (result.name, "taken as" in result.doubt) == (found, True)
