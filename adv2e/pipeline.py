@@ -180,7 +180,7 @@ def convert(
     """
     began = time.perf_counter()
     recording, workers = reading.source, reading.threads
-    if recording.largest is not None:
+    if recording.largest is not None and recording.dtype.kind == "f":
         check_white(recording.largest, recording.path, config.frames.full_scale)
     target = output or default_output(reading.path)
     inputs = (*reading.inputs, *also_read)
@@ -219,7 +219,8 @@ def convert(
         # can be interrupted in it
         if workers > 1 and target != "-":
             call = stack.enter_context(WriteBehind(BEHIND_BYTES)).call
-        for doubt in recording.doubts:
+        told = _doubt_of_white(recording, recording.largest, config)
+        for doubt in filter(None, (*recording.doubts, told)):
             log(doubt)
         table = _table_for_the_kernel(decoder, config)
         if not is_compiled(config):
@@ -245,7 +246,11 @@ def convert(
             del events, piece  # or they would stay while the next ones are made
     # at the end: an error is to be the only line
     log(f"light: {light_text(recording.light, recording.full_scale, config.frames)}")
-    for note in recording.notes:
+    found = _doubt_of_white(recording, recording.largest_read, config)
+    if told:
+        largest = f"{recording.path}: whole numbers up to {recording.largest_read:g} came"
+        found = "" if found else f"{largest}: what was said of white does not hold"
+    for note in filter(None, (*recording.notes, found)):
         log(note)
     return Summary(
         output=target,
@@ -283,6 +288,10 @@ def _compile_apart(
 def _holds_frames(target: str, format: str | None) -> bool:
     """Tell whether the output is a whole DAVIS240C recording, to which the frames belong."""
     return target != "-" and format_name(Path(target), format) in ("folder", "zip")
+
+
+def _doubt_of_white(recording: Source, largest: float | None, config: Config) -> str:
+    return "" if config.frames.full_scale else recording.doubt_of_white(largest)
 
 
 def _metadata(

@@ -125,6 +125,8 @@ def _light(light: Light, white: float) -> dict[str, Any]:
 
 
 def _of_source(source: Source) -> dict[str, Any]:
+    times_ns = _times_ns(source)
+    doubt = source.doubt_of_white(source.largest_read)  # known once all frames were read
     return {
         "file": shown(source.path),
         "layout": source.kind,
@@ -132,13 +134,13 @@ def _of_source(source: Source) -> dict[str, Any]:
         "height": source.height,
         "events": None,
         "frames": {
-            **describe_times(_times_ns(source)),
+            **describe_times(times_ns),
             "dtype": source.dtype.name,
             "colour": source.colour,
             **_light(source.light, source.full_scale),
             "own_clock": source.has_clock,
         },
-        "problems": list(source.doubts),
+        "problems": list(filter(None, (*source.doubts, doubt))),
         "notes": list(source.notes),
         "metadata": {},
     }

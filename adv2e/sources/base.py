@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.effects.frames.brightness import doubt_of_white
 from adv2e.effects.frames.encoding import encoding_of_images, full_scale_of
 from adv2e.errors import DataError, UsageError
 from adv2e.sources.rates import Rate, parse_rate
@@ -251,7 +252,9 @@ class Source(ABC):
     full_scale_reason : str
         Who says so; empty where the data type does.
     largest : float or None
-        Largest number of the first frame, where frames are floats.
+        Largest number of the frames that were looked at when it was opened; None: of none.
+    largest_read : float
+        Largest whole number of the frames read until now, as long as it may be far below white.
     doubts : list of str
         Things to tell the user before any work.
     notes : list of str
@@ -268,6 +271,7 @@ class Source(ABC):
         self.selection = selection
         self.has_clock = has_clock
         self.largest: float | None = None
+        self.largest_read = 0.0
         self.doubts: list[str] = []
         self.notes: list[str] = []
         self.count: int | None = None
@@ -301,6 +305,14 @@ class Source(ABC):
     def light(self) -> Light:
         """What the numbers of the frames stand for."""
         return Light(self.encoding, self.encoding_reason, self.full_scale, self.full_scale_reason)
+
+    def doubt_of_white(self, largest: float | None) -> str:
+        """Return what is to be told if `largest` is the largest of all numbers; often nothing."""
+        known = self._white_told is not None or self.full_scale != full_scale_of(self.dtype)
+        decoded = self.kind == "video" and self.dtype == np.uint8
+        if largest is None or known or decoded:
+            return ""
+        return doubt_of_white(largest, self.dtype, self.path)
 
     @abstractmethod
     def shots(self) -> Iterator[Shot]:
@@ -379,6 +391,8 @@ class Source(ABC):
         check_values(image, label)
         if (pixels.alpha is not None or pixels.composed) and OVER_BLACK not in self.notes:
             self.notes.append(OVER_BLACK)
+        if self.largest_read == 0 or self.doubt_of_white(self.largest_read):
+            self.largest_read = max(self.largest_read, float(image.max()))
         return pixels
 
 

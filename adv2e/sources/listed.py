@@ -15,6 +15,7 @@ from adv2e.sources.base import (
     Selection,
     Shot,
     Source,
+    as_pixels,
     check_values,
 )
 from adv2e.sources.gaps import gap_doubts
@@ -149,17 +150,25 @@ class ListedSource(Source):
         self.notes += timed.notes
         self._count()
         self.doubts += gap_doubts([shot.t_ns for shot in shots], str(path))
-        first = shots[0].load()
+        first = as_pixels(shots[0].load())
         self._describe(first, shots[0].label, light)
-        image = first.image if isinstance(first, Pixels) else first
-        check_values(image, shots[0].label)
-        if image.dtype.kind == "f":
-            self.largest = float(image.max())
-        if self.largest is not None and self.largest > 1:
+        check_values(first.image, shots[0].label)
+        self.largest = float(first.image.max())
+        if self.dtype.kind == "u":
+            self._look_for_white()
+        elif self.largest > 1:
             self.notes.append(
                 f"values above 1.0 (up to {self.largest:g} in the first frame); white is 1.0 unless"
                 " frames.full_scale says otherwise"
             )
+
+    def _look_for_white(self) -> None:
+        """Look at more frames than the first, should it be far below white."""
+        for shot in (self._shots[len(self._shots) // 2], self._shots[-1]):
+            assert self.largest is not None
+            if self.largest and not self.doubt_of_white(self.largest):
+                break
+            self.largest = max(self.largest, float(as_pixels(shot.load()).image.max()))
 
     def _count(self) -> None:
         if len(self._shots) < 2:

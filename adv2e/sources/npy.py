@@ -73,7 +73,7 @@ def _open_stack(path: Path) -> _Stack:
     if len(shape) not in (3, 4) or (len(shape) == 4 and shape[3] != 3) or 0 in shape[1:]:
         raise DataError(
             f"{path}: an array of shape {shape}; expected (frames, rows, columns) or (frames, rows,"
-            " columns, 3)"
+            " columns, 3), without alpha"
         )
     try:
         full_scale_of(header.dtype)

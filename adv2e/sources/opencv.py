@@ -12,23 +12,26 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
+from adv2e.effects.frames.encoding import full_scale_of, is_light
 from adv2e.errors import DataError, MissingExtraError
+from adv2e.sources import netpbm, tiff
+from adv2e.sources.alpha import Alpha, with_alpha
 from adv2e.sources.base import Image, Pixels
 from adv2e.sources.claims import check_claim
+from adv2e.sources.headers import read_header
 
 IMAGE_SUFFIXES = (
-    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pfm"),
-    *(".webp", ".hdr", ".exr"),
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pbm", ".pam"),
+    *(".pfm", ".webp", ".hdr", ".exr"),
 )
 """Still images that can be read (``.exr`` with the optional package OpenEXR)."""
-
-_PNG_GREY_ALPHA = 4
 
 
 class _Quiet:
@@ -98,7 +101,7 @@ def read_image(path: Path) -> Pixels:
 
 
 def decode_image(data: bytes, label: str) -> Pixels:
-    """Return the image in the bytes of a file: grey or RGB, data type as stored, alpha dropped.
+    """Return the image in the bytes of a file: upright, grey or RGB, data type as stored.
 
     Parameters
     ----------
@@ -110,13 +113,74 @@ def decode_image(data: bytes, label: str) -> Pixels:
     Raises
     ------
     DataError
-        If it is not an image that can be read, or not all of it is there.
+        If it is not an image that can be read, not all of it is there, or it holds several.
     MissingExtraError
         For EXR without the optional package.
     """
     if label.lower().endswith(".exr"):
-        return Pixels(_decode_exr(data, label))
+        return _decode_exr(data, label)
     check_claim(data, label)
+    if netpbm.is_netpbm(data):
+        return netpbm.decode(data, label)
+    if tiff.is_tiff(data):
+        return _decode_tiff(data, label)
+    header = read_header(data)
+    if header.pictures > 1:
+        raise DataError(
+            f"{label}: {header.pictures} pictures in it; give each frame a file of its own"
+        )
+    image = upright(_decoded(data, label), header.orientation)
+    colours, alpha = rgb_of(image), _fourth(image)
+    if header.grey:
+        colours = np.ascontiguousarray(colours[..., 0])
+    elif header.clear is not None:
+        there = np.iinfo(colours.dtype).max
+        alpha = np.where(colours == header.clear, 0, there).astype(colours.dtype)
+    white = _white_of_bits(colours, header.bits)
+    if alpha is None:
+        return Pixels(colours, white=white)
+    most = white or full_scale_of(colours.dtype)
+    return replace(with_alpha(colours, alpha, header.alpha, most, label), white=white)
+
+
+def upright(image: Image, orientation: int) -> Image:
+    """Return an image as it is to be seen.
+
+    Parameters
+    ----------
+    image : (rows, columns, ...) array
+        As stored.
+    orientation : int
+        Where its first row and first column belong, as Exif counts it, 1 to 8.
+    """
+    if orientation >= 5:
+        image = np.swapaxes(image, 0, 1)
+    if orientation in (3, 4, 7, 8):
+        image = image[::-1]
+    if orientation in (2, 3, 6, 7):
+        image = image[:, ::-1]
+    return np.ascontiguousarray(image)
+
+
+def _decode_tiff(data: bytes, label: str) -> Pixels:
+    header = tiff.examine(data, label)
+    if header is None:
+        raise _unreadable(label)
+    image = _decoded(header.data, label)
+    colours, alpha, white = rgb_of(image), _fourth(image), header.white
+    if not is_light(colours.dtype):  # its source refuses it
+        return Pixels(colours)
+    usual = full_scale_of(colours.dtype)
+    if white is not None and colours.max() > white:
+        white = None  # it is not what the number says: the largest of the image, perhaps
+    if header.inverted:
+        colours = np.asarray((white or usual) - colours).astype(colours.dtype)
+    if alpha is None:
+        return Pixels(colours, white=white)
+    return replace(with_alpha(colours, alpha, header.alpha, white or usual, label), white=white)
+
+
+def _decoded(data: bytes, label: str) -> Any:
     image: Any = None
     if data and _is_whole(data):
         try:
@@ -127,10 +191,27 @@ def decode_image(data: bytes, label: str) -> Pixels:
                 raise MemoryError(f"{label}: {error.err}") from error
             image = None
     if image is None:
-        raise DataError(f"{label}: not an image that can be read, or damaged")
-    if data.startswith(b"\x89PNG") and data[25] == _PNG_GREY_ALPHA:
-        image = image[..., 0]  # OpenCV repeats the grey of grey+alpha three times
-    return Pixels(rgb_of(image))
+        raise _unreadable(label)
+    return image
+
+
+def _unreadable(label: str) -> DataError:
+    return DataError(f"{label}: not an image that can be read, or damaged")
+
+
+def _fourth(image: Any) -> Any:
+    return image[..., 3] if image.ndim == 3 and image.shape[2] == 4 else None
+
+
+def _white_of_bits(image: Image, bits: int | None) -> float | None:
+    """Return the white of numbers of fewer bits that lie at the lower end of 16, if they do.
+
+    A PNG that states its bits is to have them at the upper end, with zeros below in what is dark;
+    many a camera's software leaves them where they were.
+    """
+    if bits is None or not 0 < bits < 16 or image.max() >> bits:
+        return None
+    return float((1 << bits) - 1) if np.any(image & ((1 << (16 - bits)) - 1)) else None
 
 
 def _is_whole(data: bytes) -> bool:
@@ -139,7 +220,7 @@ def _is_whole(data: bytes) -> bool:
     return not data.startswith(b"\xff\xd8") or data.find(b"\xff\xd9", data.rfind(b"\xff\xda")) > 0
 
 
-def _decode_exr(data: bytes, label: str) -> Image:
+def _decode_exr(data: bytes, label: str) -> Pixels:
     # not through OpenCV: its wheels differ in whether they read EXR at all
     try:
         openexr: Any = importlib.import_module("OpenEXR")
@@ -150,11 +231,19 @@ def _decode_exr(data: bytes, label: str) -> Image:
         copy.write_bytes(data)
         try:
             with openexr.File(str(copy)) as file:
+                parts = len(file.parts)
                 channels = {name: channel.pixels for name, channel in file.channels().items()}
         except (RuntimeError, ValueError) as error:
-            raise DataError(f"{label}: not an image that can be read, or damaged") from error
+            raise _unreadable(label) from error
+    if parts > 1:
+        raise DataError(f"{label}: {parts} parts in it; give each frame a file of its own")
     for name in ("RGB", "RGBA", "Y"):
         if name in channels:
             image = np.asarray(channels[name], dtype=np.float32)
-            return np.ascontiguousarray(image[..., :3]) if image.ndim == 3 else image
+            alpha = channels.get("A") if image.ndim == 2 or image.shape[2] < 4 else image[..., 3]
+            colours = np.ascontiguousarray(image[..., :3]) if image.ndim == 3 else image
+            if alpha is None:
+                return Pixels(colours)
+            # by convention its colours are light that is multiplied by alpha
+            return with_alpha(colours, np.asarray(alpha), Alpha.MULTIPLIED, 1.0, label)
     raise DataError(f"{label}: EXR without channels R, G, B or Y; it has {', '.join(channels)}")

@@ -74,7 +74,7 @@ def test_formats_that_lose_a_little(write_images, suffix):
     assert np.abs(images_of(source)[0].astype(float) - image).max() < tolerance
 
 
-def test_alpha_is_dropped(write_images, picture):
+def test_alpha_is_no_colour(write_images, picture):
     frames = [picture(n, (24, 32, 4)) for n in range(2)]
     assert same(images_of(open_source(write_images(frames), fps=10)), [f[..., :3] for f in frames])
 

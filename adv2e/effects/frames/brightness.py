@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from adv2e.errors import DataError
 from adv2e.ticks import check_time
@@ -49,6 +49,38 @@ def check_white(largest: float, label: str, full_scale: float | None) -> None:
             f"{label}: floats up to {largest:g}, where 1 is white; say what is, with"
             " frames.full_scale=255 or another number (1, if they are right)"
         )
+
+
+_BITS = {8: (1, 4), 16: (8, 10, 12, 14)}
+"""Bits that cameras put at the lower end of so many."""
+
+_USUAL = 12
+
+
+def doubt_of_white(largest: float, dtype: DTypeLike, label: str) -> str:
+    """Return what is to be told of whole numbers of which none is near white; often nothing.
+
+    Parameters
+    ----------
+    largest : float
+        Of all the numbers.
+    dtype : dtype
+        Theirs.
+    label : str
+        What they are called.
+    """
+    whole = 8 * np.dtype(dtype).itemsize
+    fitting = [bits for bits in _BITS.get(whole, ()) if largest < 1 << bits]
+    if np.dtype(dtype).kind != "u" or not fitting or largest <= 0:
+        return ""
+    likely = _USUAL if _USUAL in fitting else fitting[0]
+    others = [f"{(1 << bits) - 1} for {bits}" for bits in fitting if bits != likely]
+    others.append(f"{(1 << whole) - 1}, if they are right")
+    having = f"{likely} bit{'s' if likely > 1 else ''}"
+    return (
+        f"{label}: whole numbers up to {largest:g}, where {(1 << whole) - 1} is white; if they have"
+        f" {having}, say frames.full_scale={(1 << likely) - 1} ({'; '.join(others)})"
+    )
 
 
 def check_floats(image: NDArray[Any], label: str, full_scale: float | None) -> None:

@@ -68,6 +68,11 @@ def check_encoding(encoding: str) -> None:
     raise ConfigError(f"encoding: must be auto, {_KNOWN}, got {encoding!r}")
 
 
+def is_light(dtype: DTypeLike) -> bool:
+    """Tell whether frames may be of `dtype`."""
+    return np.dtype(dtype).name in _FULL_SCALES
+
+
 def full_scale_of(dtype: DTypeLike) -> float:
     """Return the number that means white in frames of `dtype`: 255, 65535 or 1.0.
 
