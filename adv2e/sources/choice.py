@@ -14,12 +14,6 @@ from adv2e.sources.colours import HIGH_RANGE, Colours, encoding_of, is_stated
 from adv2e.sources.stated import Stated, stated_by
 from adv2e.sources.streams import RAW, Stream, examine_stream
 
-_FIELDS = (
-    "interlaced: each picture is taken whole, with the two fields that it has of different times;"
-    " ffmpeg -vf bwdif makes pictures of them"
-)
-
-
 _PACKED_ALPHA = (b"BGRA", b"RGBA", b"ARGB", b"ABGR", b"RBA@", b"BRA@")
 
 
@@ -33,13 +27,10 @@ class Choice:
         What it has that OpenCV cannot give; empty if it can.
     colours : Colours
         What it states of them.
-    notes : list of str
-        Things to tell the user.
     """
 
     why_pyav: str
     colours: Colours
-    notes: tuple[str, ...] = ()
 
 
 def choose(path: str, height: int, pixels: bytes = b"") -> Choice:
@@ -71,7 +62,7 @@ def choose(path: str, height: int, pixels: bytes = b"") -> Choice:
     why = _beyond_opencv(stated, stream, interlaced, colours)
     if not why and stream.transparent and _has_alpha(pixels):
         why = "its pixels could be transparent"
-    return Choice(why, colours[-1], (_FIELDS,) if interlaced else ())
+    return Choice(why, colours[-1])
 
 
 def _has_alpha(pixels: bytes) -> bool:

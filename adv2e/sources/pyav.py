@@ -35,6 +35,9 @@ _YCGCO = 8
 _TURNS = {90: cv2.ROTATE_90_COUNTERCLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_CLOCKWISE}
 
 
+_ATTEMPTS = 64
+"""Damaged pictures in a row that are passed over in search of the next, as OpenCV does."""
+
 _FIRST = 17
 """First release of PyAV that converts by the matrix of the stream, not by that of BT.601."""
 
@@ -73,6 +76,8 @@ class PyavCapture:
     ----------
     spoilt : int
         Pictures grabbed in which the decoder met errors, and guessed.
+    has_fields : bool
+        A picture grabbed so far is two fields.
 
     Raises
     ------
@@ -101,6 +106,7 @@ class PyavCapture:
         self._packets = self._file.demux(self._stream)
         self._ready: deque[Any] = deque()
         self._frame: Any = None
+        self.has_fields = False
         self.spoilt = 0
 
     def release(self) -> None:
@@ -110,15 +116,20 @@ class PyavCapture:
         self._file.close()
 
     def grab(self) -> bool:
-        """Decode the next picture; False at the end, and once for each that is damaged."""
-        try:
-            while not self._ready:
-                self._ready.extend(next(self._packets).decode())
-        except (StopIteration, self._av.error.FFmpegError):
-            return False
-        self._frame = self._ready.popleft()
-        self.spoilt += bool(self._frame.is_corrupt)
-        return True
+        """Decode the next picture; False at the end, and where too many in a row are damaged."""
+        for _ in range(_ATTEMPTS):
+            try:
+                while not self._ready:
+                    self._ready.extend(next(self._packets).decode())
+            except StopIteration:
+                return False
+            except self._av.error.FFmpegError:
+                continue
+            self._frame = self._ready.popleft()
+            self.spoilt += self._frame.is_corrupt
+            self.has_fields |= self._frame.interlaced_frame
+            return True
+        return False
 
     def get(self, name: int) -> float:
         """Return what OpenCV calls `name`: time [ms], rate [Hz] or number of frames; 0: unknown."""

@@ -32,6 +32,10 @@ from adv2e.sources.video_times import VideoTimes
 if TYPE_CHECKING:
     Capture = cv2.VideoCapture | pyav.PyavCapture
 
+_FIELDS = (
+    "interlaced: each picture is taken whole, with the two fields that it has of different times;"
+    " ffmpeg -vf bwdif makes pictures of them"
+)
 _GREY_8, _GREY_16 = b"Y800", b"Y1\x00\x10"
 _DECODER_PIXELS, _DECODERS = 1 << 20, 4
 """Pixels of a frame for which one thread decodes fast enough, and the most threads."""
@@ -148,7 +152,6 @@ class VideoSource(Source):
             height = int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
         choice = choose(self.path, height, self._pixels)
         self._why_pyav, self._colours = choice.why_pyav, choice.colours
-        self.notes += choice.notes
         # FFmpeg's tags of deeper formats end with the number of bits, or begin with it (big endian)
         ends = (self._pixels[-1:] + self._pixels[:1]) or b"\0"
         bits = next((byte for byte in ends if 8 < byte <= 16), 8)
@@ -222,9 +225,15 @@ class VideoSource(Source):
                 label = f"{self.path}: frame {number}"
                 own = None if stamp is None else stamp - (stamps[0] or 0)
                 t_ns = given(number) if given is not None else clock(number, own)
+                if isinstance(capture, pyav.PyavCapture) and capture.has_fields:
+                    self._tell_fields()
                 yield Shot(t_ns, label, partial(_load, capture, label))
             spoilt = capture.spoilt if isinstance(capture, pyav.PyavCapture) else 0
         self._check_end(stamps, spoilt)
+
+    def _tell_fields(self) -> None:
+        if _FIELDS not in self.notes:
+            self.notes.append(_FIELDS)
 
     def _grabbed(self, capture: Capture) -> Iterator[int]:
         """Grab frame after frame, past what cannot be decoded, and yield their numbers."""

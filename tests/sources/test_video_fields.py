@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from coded import write
 
-from adv2e.errors import MissingExtraError
+from adv2e.errors import DataError, MissingExtraError
 from adv2e.sources import open_source
 
 RAMP = list(range(25, 115, 3))
@@ -90,6 +90,13 @@ def test_pictures_that_turn_into_fields_are_those_in_the_file(tmp_path, suffix, 
     assert_ramp(values(open_source(mixed)), RAMP)
 
 
+def test_frames_in_a_stream_that_could_hold_fields_are_not_called_fields(tmp_path):
+    options = {"x264-params": "fake-interlaced=1"}
+    source = open_source(write(tmp_path / "clip.mkv", RAMP, options=options))
+    assert_ramp(values(source), RAMP)
+    assert (source.packages, source.notes) == (("av",), [])
+
+
 @pytest.mark.parametrize("codec", ["libx264", "mpeg2video", "mpeg4", "ffv1"])
 def test_progressive_pictures_need_no_pyav(tmp_path, codec, monkeypatch):
     path = write(tmp_path / "clip.mkv", RAMP, codec)
@@ -97,3 +104,14 @@ def test_progressive_pictures_need_no_pyav(tmp_path, codec, monkeypatch):
     source = open_source(path)
     assert_ramp(values(source), RAMP)
     assert source.packages == ()
+
+
+def test_a_damaged_picture_is_passed_over_and_missed(tmp_path):
+    path = written(tmp_path, "prores.mov")
+    data = bytearray(path.read_bytes())
+    place = data.find(b"icpf", len(data) // 2)
+    data[place : place + 4] = b"none"
+    path.write_bytes(data)
+    with pytest.raises(DataError, match="29 frames could be decoded where it states 30"):
+        values(open_source(path))
+    assert len(values(open_source(path, allow_damaged=True))) == 29
