@@ -7,9 +7,11 @@ line that people see.
 from __future__ import annotations
 
 import faulthandler
+import io
 import os
 import sys
 from contextlib import suppress
+from typing import BinaryIO, cast
 
 _descriptor = 2
 
@@ -35,5 +37,9 @@ def keep_errors_for_ourselves() -> None:
         os.dup2(nothing, 2, inheritable=True)
         os.close(nothing)
         encoding = sys.stderr.encoding
-        sys.stderr = open(kept, "w", 1, encoding, "backslashreplace")  # noqa: PTH123, SIM115
+        # nothing may stay in a buffer: where it cannot be written, the end would try again and fail
+        unbuffered = open(kept, "wb", 0)  # noqa: PTH123, SIM115
+        sys.stderr = io.TextIOWrapper(
+            cast(BinaryIO, unbuffered), encoding, "backslashreplace", write_through=True
+        )
         _descriptor = kept

@@ -134,10 +134,10 @@ class PyavCapture:
     def get(self, name: int) -> float:
         """Return what OpenCV calls `name`: time [ms], rate [Hz] or number of frames; 0: unknown."""
         if name == cv2.CAP_PROP_POS_MSEC:
-            stamp = self._frame.dts if self._frame.pts is None else self._frame.pts
-            if stamp is None:
+            # not the time of decoding: unlike OpenCV's it is that of the picture's own packet
+            if self._frame.pts is None:
                 return 0.0
-            ticks = stamp - (self._stream.start_time or 0)
+            ticks = self._frame.pts - (self._stream.start_time or 0)
             return float(ticks * 1000 * Fraction(self._stream.time_base))
         if name == cv2.CAP_PROP_FPS:
             return float(self._stream.guessed_rate or 0)

@@ -73,9 +73,8 @@ class VideoSource(Source):
         self._colours = Colours()
         self._choose_decoder()
         with self._opened() as capture:
-            self._fps = max(float(capture.get(cv2.CAP_PROP_FPS)), 0.0)
             self._keep_grey(capture)
-            if not capture.grab():
+            if not any(capture.grab() for _ in range(RETRIES)):
                 raise DataError(f"{path}: no frame in it can be decoded")
             self._describe(_load(capture, f"{path}: frame 0"), f"{path}: frame 0")
             self._first_ns = stamp_of(capture)
@@ -149,6 +148,7 @@ class VideoSource(Source):
         with self._opened() as capture:
             pixels = int(capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT))
             self._pixels = pixels.to_bytes(4, "little") if pixels >= 0 else b""
+            self._fps = max(float(capture.get(cv2.CAP_PROP_FPS)), 0.0)
             height = int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
         choice = choose(self.path, height, self._pixels)
         self._why_pyav, self._colours = choice.why_pyav, choice.colours
@@ -210,7 +210,7 @@ class VideoSource(Source):
         DataError
             If decoding stops before the end, or times given do not fit the frames.
         """
-        clock, given = self._times.clock(), self._given
+        clock, given = self._times.clock(in_order=not self._why_pyav), self._given
         stamps: list[int | None] = []
         with self._opened(self._decoders()) as capture:
             self._keep_grey(capture)
@@ -242,7 +242,7 @@ class VideoSource(Source):
             if capture.grab():
                 yield number
                 number, failed = number + 1, 0
-            elif number >= (self._times.expected or RETRIES):
+            elif self._times.expected is not None and number >= self._times.expected:
                 return
             else:
                 failed += 1

@@ -160,18 +160,30 @@ class VideoTimes:
         tiny = container.tiny if packets is None else packets.tiny
         return max(lost - tiny, 0)
 
-    def clock(self) -> Clock:
-        """Return a clock for one pass over the frames."""
+    def clock(self, *, in_order: bool = True) -> Clock:
+        """Return a clock for one pass over the frames.
+
+        Parameters
+        ----------
+        in_order : bool
+            Where times are those of decoding, stamps are brought into the order of showing, as
+            OpenCV does.
+        """
         previous = -self.usual_ns
+        packets = self._packets
+        listed = not in_order and self._container.decoding_times
+        listed &= packets is not None and packets.complete
 
         def time_ns(number: int, own_ns: int | None) -> int:
             nonlocal previous
             if self.rate is not None:
-                previous = self._at_rate(self.rate, number, own_ns)
-            elif own_ns is None:
-                previous += self.usual_ns
-            else:
+                previous = self._at_rate(self.rate, number, own_ns if in_order else None)
+            elif listed and number < len(self.shown_ns):
+                previous = self.shown_ns[number] - self.shown_ns[0]
+            elif own_ns is not None:
                 previous = own_ns if self._grid is None else _snapped(own_ns, self._grid)
+            else:
+                previous += self.usual_ns
             return previous
 
         return time_ns

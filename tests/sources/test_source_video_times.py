@@ -11,6 +11,8 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
+from adv2e.sources.choice import Choice
+from adv2e.sources.colours import Colours
 
 pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
 from video_files import COUNT, written
@@ -59,6 +61,18 @@ def test_every_frame_is_at_its_time(tmp_path, name, codec, reordered, rate):
     told = [doubt for doubt in source.doubts if "frames: taken at" not in doubt]
     assert told == []
     assert bool(source.doubts) == name.endswith("mpg")
+
+
+@pytest.mark.parametrize(("name", "codec", "reordered"), FILES)
+def test_every_frame_is_at_its_time_when_pyav_decodes(
+    tmp_path, monkeypatch, name, codec, reordered
+):
+    path = written(tmp_path / name, codec, Fraction(25), reordered=reordered)
+    expected = times_of(path)
+    choice = Choice("for a test", Colours())
+    monkeypatch.setattr("adv2e.sources.video.choose", lambda *_: choice)
+    assert times_of(path) == expected
+    assert len(expected) == COUNT
 
 
 @pytest.mark.parametrize("name", ["clip.avi", "clip.mpg", "clip.mp4", "clip.mkv", "clip.wmv"])
