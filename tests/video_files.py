@@ -19,11 +19,14 @@ def pictures(count=COUNT):
     return [np.stack([ramp] * 3, -1).astype(np.uint8) for ramp in ramps]
 
 
-def written(path, codec, rate, *, reordered=0, numbers=None, sound=False, options=None):
+def written(
+    path, codec, rate, *, reordered=0, numbers=None, sound=False, options=None, codec_options=None
+):
     """Write pictures at a rate, at the numbers given of its ticks, and return the path."""
     with av.open(str(path), "w", container_options=options or {}) as film:
         stream = film.add_stream(codec, rate=rate)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.options = codec_options or {}
         stream.codec_context.max_b_frames = reordered
         stream.codec_context.time_base = 1 / Fraction(rate)
         beside = film.add_stream("mp2", rate=48000) if sound else None

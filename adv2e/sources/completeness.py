@@ -13,7 +13,9 @@ from itertools import pairwise
 from statistics import median
 
 
-def lost_by_time(expected_ns: Sequence[int], stamps_ns: Sequence[int], tick_ns: int) -> list[int]:
+def lost_by_time(
+    expected_ns: Sequence[int], stamps_ns: Sequence[int], tick_ns: int, leading: int = 0
+) -> list[int]:
     """Return those of the expected times at which no picture came, from the first that came on.
 
     Parameters
@@ -25,6 +27,8 @@ def lost_by_time(expected_ns: Sequence[int], stamps_ns: Sequence[int], tick_ns: 
         expected one, or the first that came [ns].
     tick_ns : int
         How far the two may differ [ns].
+    leading : int
+        How many are shown before the first in the file, which FFmpeg may begin to count at.
     """
     if not expected_ns:
         return []
@@ -32,10 +36,17 @@ def lost_by_time(expected_ns: Sequence[int], stamps_ns: Sequence[int], tick_ns: 
         return list(expected_ns)
     came = sorted(stamps_ns)
     within = max(tick_ns, 2000)
-    offset = expected_ns[0]
-    if not _near(came[0] + offset, expected_ns, within):
-        offset = expected_ns[0] - came[0]
-    came = [stamp + offset for stamp in came]
+    first = expected_ns[0]
+    offsets = (first, 0, first - came[0], expected_ns[leading] - came[0])
+    attempts = (
+        _lost(expected_ns, [stamp + offset for stamp in came], within) for offset in offsets
+    )
+    return min(attempts, key=len)
+
+
+def _lost(expected_ns: Sequence[int], came: Sequence[int], within: int) -> list[int]:
+    if not _near(came[0], expected_ns, within):
+        return list(expected_ns)
     lost = [t for t in expected_ns if t > came[0] + within and not _near(t, came, within)]
     if len(came) > 2 and lost and _are_second_fields(lost, came):
         return []

@@ -49,6 +49,10 @@ class Packets:
         Each has a time, and no two the same.
     tiny : int
         How many are too small to hold a picture, and may stand for the one before them.
+    leading : int
+        How many are shown before the first in the file.
+    unstamped : int
+        How many have no time.
     back : Jump or None
         Where times begin again, if they do.
     """
@@ -57,6 +61,8 @@ class Packets:
     known_ns: list[int]
     complete: bool
     tiny: int
+    leading: int
+    unstamped: int
     back: Jump | None
 
 
@@ -122,4 +128,12 @@ def arranged(stamps_ns: list[int | None], tiny: int = 0) -> Packets:
             back = Jump(number, latest, stamp)
             break
         latest = max(latest, stamp)
-    return Packets(count, known, len(known) == count > 0, tiny, back)
+    return Packets(
+        count=count,
+        known_ns=known,
+        complete=len(known) == count > 0,
+        tiny=tiny,
+        leading=sum(t < stamps[0][1] for t in known),
+        unstamped=count - len(stamps),
+        back=back,
+    )

@@ -77,7 +77,7 @@ class VideoTimes:
                 self.rate = _behind(container.stamps_ns or [], container.tick_ns, fps)
         else:
             self.shown_ns = packets.known_ns
-            if container.decoding_times or not packets.complete:
+            if container.decoding_times or packets.unstamped:
                 self._grid = container.rate
                 self._find_rate(container, packets, fps)
         steps = [after - before for before, after in pairwise(self.shown_ns)]
@@ -153,7 +153,8 @@ class VideoTimes:
             return 0
         if packets is None or (packets.complete and not container.decoding_times):
             known = [stamp for stamp in stamps_ns if stamp is not None]
-            lost = len(lost_by_time(self.shown_ns, known, container.tick_ns))
+            leading = container.leading if packets is None else packets.leading
+            lost = len(lost_by_time(self.shown_ns, known, container.tick_ns, leading))
             lost += self.expected - (len(self.shown_ns) if packets is None else packets.count)
         else:
             lost = lost_by_count(self.expected, stamps_ns, packets.known_ns)

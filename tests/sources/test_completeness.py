@@ -27,6 +27,14 @@ def test_pictures_before_the_first_that_stands_alone_are_not_missing():
     assert lost_by_time(AT, without(0, 1, 7), 0) == [AT[7]]
 
 
+def test_stamps_may_begin_at_the_first_in_the_file():
+    late = [t - AT[2] for t in AT]  # the first two are shown before it, and cannot be
+    assert lost_by_time(AT, late[2:], 0, leading=2) == []
+    assert lost_by_time(AT, [*late[2:6], *late[7:]], 0, leading=2) == [AT[6]]
+    assert lost_by_time(AT, late[2:-1], 0, leading=2) == [AT[-1]]
+    assert len(lost_by_time(AT, late[2:], 0)) == 2
+
+
 def test_stamps_may_begin_elsewhere():
     assert lost_by_time([t + 10**9 for t in AT], [t + 12 * MS for t in without(3)], 0) == [
         10**9 + AT[3]

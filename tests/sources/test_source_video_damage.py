@@ -13,7 +13,7 @@ from adv2e.sources.choice import Choice
 from adv2e.sources.colours import Colours
 
 pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
-from video_files import COUNT, written
+from video_files import COUNT, av, written
 
 FILES = {
     "clip.mp4": ("libx264", 2, {}),
@@ -145,3 +145,22 @@ def test_errors_that_a_decoder_of_pyav_meets_are_told(tmp_path, monkeypatch):
     assert told.endswith(f" of {COUNT} frames")
     list(source.frames())
     assert source.notes.count(told) == 1
+
+
+@pytest.mark.parametrize("name", ["clip.mkv", "clip.flv", "clip.mp4"])
+def test_pictures_before_the_first_that_stands_alone_are_no_damage(tmp_path, name):
+    path = written(tmp_path / "whole.mp4", "libx264", 30, reordered=2, codec_options={
+        "x264-params": "open-gop=1:keyint=12:min-keyint=12:scenecut=0:b-adapt=0"})  # fmt: skip
+    with av.open(str(path)) as whole, av.open(str(tmp_path / name), "w") as cut:
+        source = whole.streams.video[0]
+        stream = cut.add_stream_from_template(source)
+        packets = [packet for packet in whole.demux(source) if packet.size]
+        keys = [n for n, packet in enumerate(packets) if packet.is_keyframe]
+        for packet in packets[keys[1] :]:
+            packet.stream = stream
+            cut.mux(packet)
+    leading = sum(p.pts < packets[keys[1]].pts for p in packets[keys[1] :])
+    source, frames = read(tmp_path / name)
+    assert leading > 0
+    assert len(frames) in (len(packets) - keys[1] - leading, len(packets) - keys[1])
+    assert source.doubts == []

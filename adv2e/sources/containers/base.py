@@ -30,6 +30,8 @@ class Container:
         When the last picture ends, from the first, as the headers state it (ASF, AVI) [ns].
     whole : bool
         Checksums prove that nothing is missing (Ogg).
+    leading : int
+        How many of the pictures are shown before the first in the file.
     tiny : int
         How many of those that are listed are too small to hold a picture.
     faults : list of str
@@ -45,6 +47,7 @@ class Container:
     pictures: int | None = None
     end_ns: int | None = None
     whole: bool = False
+    leading: int = 0
     tiny: int = 0
     faults: list[str] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)

@@ -43,7 +43,10 @@ def examine(data: mmap.mmap) -> Container:
                 tiny += stop - after - 3 <= TINY_BYTES
     if not ticks:
         return Container()
-    return Container([tick * scale_ns for tick in sorted(ticks)], scale_ns, tiny=tiny)
+    leading = sum(tick < ticks[0] for tick in ticks)
+    return Container(
+        [tick * scale_ns for tick in sorted(ticks)], scale_ns, leading=leading, tiny=tiny
+    )
 
 
 def _elements(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:

@@ -46,7 +46,9 @@ def examine(data: mmap.mmap) -> Container:
         raise cut_short(end, len(data))
     if len(videos) != 1:  # which one FFmpeg takes is its own affair
         return Container()
-    return Container(stamps_ns=videos[0].stamps_ns(movie_scale), tiny=videos[0].tiny)
+    stamps_ns = videos[0].stamps_ns(movie_scale) or []
+    leading = sum(t < stamps_ns[0] for t in stamps_ns)
+    return Container(sorted(stamps_ns) or None, leading=leading, tiny=videos[0].tiny)
 
 
 def boxes(data: mmap.mmap, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:
@@ -140,7 +142,7 @@ class _Track:
         return int(np.count_nonzero(self._sizes() <= TINY_BYTES))
 
     def stamps_ns(self, movie_scale: int) -> list[int] | None:
-        """Return when its pictures are shown, sorted; None where more than a cut is made of it."""
+        """Return when its pictures are shown; None where more than a cut is made of it."""
         span = self._found.get(b"mdhd")
         if span is None:
             return None
@@ -163,7 +165,7 @@ class _Track:
             length, start = real[0]
             stop = start + (length * scale + movie_scale // 2) // movie_scale
             shown = shown[(shown >= start) & ((shown < stop) | (length == 0))]
-        return [int(t) * NS_PER_S // scale for t in np.sort(shown)]
+        return [int(t) * NS_PER_S // scale for t in shown]
 
     def _edits(self) -> list[tuple[int, int]]:
         span = self._found.get(b"elst")
