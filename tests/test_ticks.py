@@ -89,12 +89,13 @@ def test_stamps_of_images(tmp_path):
 @pytest.mark.parametrize("t_s", FAR)
 @pytest.mark.parametrize("kind", ["npy", "txt"])
 def test_times_of_frames(tmp_path, t_s, kind):
-    np.save(tmp_path / "a.npy", np.zeros((2, 3, 4), np.uint8))
+    np.save(tmp_path / "a.npy", np.zeros((5, 3, 4), np.uint8))
+    times = [0.0, 0.01, 0.02, 0.03, t_s]
     if kind == "npy":
-        np.save(tmp_path / "a_ts.npy", np.array([0.0, t_s]))
+        np.save(tmp_path / "a_ts.npy", np.array(times))
     else:
-        (tmp_path / "a.timestamps.txt").write_text(f"0.0\n{t_s:f}\n")
-    with pytest.raises(DataError, match=r"a_ts\.npy|timestamps\.txt line 2"):
+        (tmp_path / "a.timestamps.txt").write_text("".join(f"{t:f}\n" for t in times))
+    with pytest.raises(DataError, match=r"a_ts\.npy|timestamps\.txt line 5"):
         open_source(tmp_path / "a.npy")
 
 
