@@ -16,6 +16,12 @@ from adv2e.sources.stored import light_beside
 LISTS = ("images.txt", "timestamps.txt", "info.txt")
 """Lists of times that are looked for in the folder, then beside it."""
 
+_UNREAD = (
+    *(".heic", ".heif", ".avif", ".jxl", ".jp2", ".gif", ".tga", ".psd", ".dpx", ".cin"),
+    *(".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
+)
+"""Still images that are not read: they are not left out without a word."""
+
 
 def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
     """Return the frames of a folder of images.
@@ -34,6 +40,8 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     ]
     if not pictures:
         raise _no_images(path)
+    if len(pictures) == 1:
+        pictures[0].load()  # if it holds several, that is what is to be told
     found = _found_list(path)
     if given:
         timed = given_shots(given, pictures, path)
@@ -47,6 +55,10 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         raise DataError(
             f"{path}: when are the frames? give --fps F or --timestamps FILE, or put one of"
             f" {', '.join(LISTS)} there"
+        )
+    if unread := _unread(path):
+        timed.notes.append(
+            f"{path}: images that are not read are left out: {len(unread)}, such as {unread[0]}"
         )
     if given and found is not None:
         timed.notes.append(f"{given} replaces the times in {found}")
@@ -79,9 +91,17 @@ def _found_list(folder: Path) -> Path | None:
     return None
 
 
+def _unread(folder: Path) -> list[str]:
+    """Return the names of images that are not read."""
+    names = [e.name for e in folder.iterdir() if e.suffix.lower() in _UNREAD]
+    return sorted((name for name in names if not name.startswith(".")), key=natural_key)
+
+
 def _no_images(folder: Path) -> DataError:
     below = [entry for entry in sorted(folder.iterdir()) if entry.is_dir() and image_files(entry)]
     if below:
         return DataError(f"{folder}: no images in it; there are some in {below[0]}")
+    if unread := _unread(folder):
+        return DataError(f"{folder}: {unread[0]} is not read; convert its images, to PNG or TIFF")
     known = " ".join(suffix.lstrip(".") for suffix in IMAGE_SUFFIXES)
     return DataError(f"{folder}: no images in it ({known})")

@@ -141,6 +141,26 @@ def test_more_than_one_picture_in_a_file_is_an_error(kind):
         decode_image(data, "a.x")
 
 
+@pytest.mark.parametrize("times", [{"fps": 10}, {"timestamps": "t.txt"}])
+def test_a_stack_alone_in_its_folder_is_told_as_such(folder, tmp_path, times):
+    source = folder(("tif", TOO_MANY["tiff"][0]))
+    (tmp_path / "t.txt").write_text("0\n1\n2\n")
+    if "timestamps" in times:
+        times = {"timestamps": tmp_path / "t.txt"}
+    with pytest.raises(DataError, match=r"0\.tif: 3 pages in it; give each frame"):
+        open_source(source, **times)
+
+
+def test_images_that_are_not_read_are_told(folder):
+    source = folder(("heic", b"1"), ("heic", b"2"))
+    with pytest.raises(DataError, match=r"frames: 0\.heic is not read; convert its images"):
+        open_source(source, fps=10)
+    for name in ("a.png", "b.png"):
+        (source / name).write_bytes(made.png(RAMP, 0))
+    left_out = f"{source}: images that are not read are left out: 2, such as 0.heic"
+    assert left_out in open_source(source, fps=10).notes
+
+
 def test_thumbnails_are_no_pages():
     data = made.tiff(RAMP, pages=2)
     second = data.rindex(struct.pack("<H", 10))  # the entries of its last directory
