@@ -48,7 +48,12 @@ def examine(data: mmap.mmap) -> Container:
         return Container()
     stamps_ns = videos[0].stamps_ns(movie_scale) or []
     leading = sum(t < stamps_ns[0] for t in stamps_ns)
-    return Container(sorted(stamps_ns) or None, leading=leading, tiny=videos[0].tiny)
+    return Container(
+        sorted(stamps_ns) or None,
+        leading=leading,
+        tiny=videos[0].tiny,
+        doubts=videos[0].doubts,
+    )
 
 
 def boxes(data: mmap.mmap, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:
@@ -93,6 +98,22 @@ class _Track:
             return None
         place = span[0] + (20 if self._data[span[0]] else 12)
         return int(struct.unpack_from(">I", self._data, place)[0])
+
+    @property
+    def doubts(self) -> list[str]:
+        """What is to be told of how its pictures are to be shown: all but quarter turns."""
+        span = self._found.get(b"tkhd")
+        if span is None:
+            return []
+        place = span[0] + (52 if self._data[span[0]] else 40)
+        if place + 20 > span[1]:
+            return []
+        a, b, _, c, d = struct.unpack_from(">5i", self._data, place)
+        if a * d - b * c < 0:
+            return ["it is to be shown mirrored, which is not done; re-encode it upright"]
+        if (a or d) and (b or c):
+            return ["it is to be shown tilted, which is not done; re-encode it upright"]
+        return []
 
     def _table(self, kind: bytes, layout: str, skip: int = 4) -> NDArray[np.int64]:
         """Return the (entries, columns) of a table; `skip` bytes stand before their number."""
