@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from adv2e.errors import OutputError
+from adv2e.names import shown
 from adv2e.pipeline import Summary, convert
 from adv2e.reading import Reading
 from adv2e.recordings import read_recording
@@ -50,16 +51,16 @@ class Demo:
         pixels = done.width * done.height
         return "\n".join(
             (
-                f"clip     {self.clip}",
+                f"clip     {shown(self.clip)}",
                 f"         {done.frames} frames of {done.width}x{done.height} at {FPS:g} a second;"
                 " the scene moves, rests, moves and rests",
-                f"events   {self.events}",
+                f"events   {shown(self.events)}",
                 f"         {done.events:,} events, {share}; {rate / 1e6:.2f} million a second,"
                 f" {rate / pixels:.1f} a pixel a second",
                 f"         made in {done.seconds:.1f} s",
-                f"picture  {self.picture}",
+                f"picture  {shown(self.picture)}",
                 "         frames and, at their right, events: ON red, OFF blue",
-                f"film     {self.film}",
+                f"film     {shown(self.film)}",
                 "",
                 "Look at the picture first. Then try: adv2e convert VIDEO --preview events.mp4",
             )

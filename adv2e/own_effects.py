@@ -16,6 +16,7 @@ from adv2e.config.build import Key, keys_of
 from adv2e.effects import STAGES
 from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError
+from adv2e.names import shown
 from adv2e.parameters import Section
 from adv2e.regular import read_text_bytes
 
@@ -52,7 +53,7 @@ def load_effects(path: str | Path) -> list[type[Hooks]]:
         wrong = _complaint(effect)
         if wrong:
             raise ConfigError(f"{path}:{_line(effect, source)}: class {effect.__name__}: {wrong}")
-        effect.source = {"name": effect.name, "file": path.name, "sha256": digest}
+        effect.source = {"name": effect.name, "file": shown(path.name), "sha256": digest}
     return found
 
 

@@ -61,8 +61,8 @@ class Summary:
         share = f"{100 * self.on / self.events:.1f} % ON" if self.events else "no events"
         rate = self.events / self.duration_s / (self.width * self.height)
         return (
-            f"{self.output}: {self.events:,} events ({share}) of {self.width}x{self.height} pixels"
-            f" over {self.duration_s:.3f} s\n"
+            f"{shown(self.output)}: {self.events:,} events ({share}) of {self.width}x{self.height}"
+            f" pixels over {self.duration_s:.3f} s\n"
             f"{rate:.2f} events a pixel a second; {self.frames} frames in {self.seconds:.1f} s"
         )
 

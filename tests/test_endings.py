@@ -3,6 +3,7 @@
 import signal
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -51,6 +52,34 @@ def test_a_signal_ends_a_conversion_without_a_trace(long_stack, tmp_path, name, 
     assert process.returncode == status, err
     assert len(err.splitlines()) == 1
     assert list(target.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("name", ["out.h5", "out"])
+def test_what_a_killed_conversion_left_goes_with_the_next(adv2e, long_stack, tmp_path, name):
+    target = tmp_path / "results"
+    (target / "sub").mkdir(parents=True)
+    preview = ["--preview", target / "sub" / "a.gif"]
+    with started(long_stack, target / name, *preview) as process:
+        wait_until(lambda: is_written(target), seconds=60)
+        process.kill()
+        process.wait()
+    assert not (target / name).exists()
+    left = sorted(path.name for path in target.iterdir())
+    assert len(left) > 2
+    stack = tmp_path / "short.npy"
+    np.save(stack, np.array([picture(k) for k in range(4)]))
+    for place in (target, target / "sub"):
+        arguments = ["convert", stack, "--fps", "100", "-o", place / "other.h5"]
+        assert adv2e(*arguments).status == 0
+    left = sorted(path.relative_to(target).as_posix() for path in target.rglob("*"))
+    assert left == ["other.h5", "sub", "sub/other.h5"]
+
+
+def is_written(target):
+    """Tell whether something was written for each of two outputs."""
+    places = (target.glob(".out.*.part*"), (target / "sub").glob(".a.*.part*"))
+    return all(any(map(Path.exists, place)) for place in places)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")

@@ -17,8 +17,9 @@ import pytest
 from pictures import picture
 
 from adv2e import pipeline as conversion
-from adv2e.config import load_config
+from adv2e.config import load_config, names_of
 from adv2e.events import empty_events
+from adv2e.names import shown
 from adv2e.recordings import read_recording
 from adv2e.simulation import events_from_light
 
@@ -335,6 +336,74 @@ def test_events_and_preview_come_together_or_not_at_all(adv2e, video, tmp_path, 
         assert adv2e(*arguments, "--overwrite", "--seed", "2").status == 1
     assert (target.read_bytes(), preview.read_bytes()) == before
     assert sorted(path.name for path in target.parent.iterdir()) == ["a.gif", "a.h5"]
+
+
+ODD = {
+    "colon": "2024-05-01T12:30",
+    "bytes": "\udcff\udce9x",
+    "lines": "two\nlines",
+    "pattern": "100%d",
+    "long": "n" * 240,
+    "spaces": " a b ",
+    "marks": "e\u0301 \u00e9",
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file systems elsewhere refuse some names")
+@pytest.mark.parametrize("name", ODD.values(), ids=ODD)
+def test_any_name_that_the_system_takes(adv2e, video, tmp_path, name):
+    folder = tmp_path / name[:40]
+    folder.mkdir()
+    clip = shutil.move(video, folder / f"{name}.avi")
+    for suffix in ("", ".h5", ".zip", ".txt") if name == ODD["bytes"] else (".h5", ".txt"):
+        target, preview = folder / f"{name}{suffix}", folder / f"{name}{suffix}.gif"
+        outcome = adv2e("convert", clip, "-o", target, "--preview", preview)
+        assert (outcome.status, len(outcome.out.splitlines())) == (0, 2), outcome.err
+        recording = read_recording(target)
+        assert len(recording.events) > 300
+        told = recording.metadata["source"]["name"]
+        assert told == shown(clip.name)
+        told.encode()  # fit for UTF-8
+        beside = {f"{target.name}.json"} if suffix == ".txt" else set()
+        made = {path.name for path in folder.iterdir()}
+        assert made == {clip.name, target.name, preview.name} | beside
+        for one in made - {clip.name}:
+            shutil.rmtree(folder / one, ignore_errors=True)
+            (folder / one).unlink(missing_ok=True)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file systems elsewhere refuse some names")
+def test_names_of_effects_and_configurations_are_stored_as_text(adv2e, video, tmp_path):
+    effect, model = tmp_path / "\udcff.py", tmp_path / "\udcff\n.yaml"
+    effect.write_text(
+        "from adv2e.effects.hooks import Hooks\n"
+        "class Nothing(Hooks):\n    def events(self, chunks):\n        yield from chunks\n"
+    )
+    model.write_text("seed: 3\n")
+    arguments = ["convert", video, "--effect", effect, "-c", model]
+    assert adv2e(*arguments, "-o", tmp_path / "a.txt").status == 0
+    stored = json.loads((tmp_path / "a.txt.json").read_bytes().decode())
+    assert stored["effects"][0]["file"] == "\\xff.py"
+    assert names_of([model]) == "\\xff\\n.yaml"
+
+
+def test_a_name_that_begins_with_a_dash(adv2e, video, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    video.rename("-v.avi")
+    outcome = adv2e("convert", "-o", "-o.h5", "--preview", "-p.gif", "--", "-v.avi")
+    assert outcome.status == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["-o.h5", "-p.gif", "-v.avi"]
+
+
+@pytest.mark.parametrize(("suffix", "length"), [(".h5", 253), (".txt", 248)])
+def test_a_name_that_is_too_long_is_told_before_the_work(
+    adv2e, video, tmp_path, monkeypatch, suffix, length
+):
+    monkeypatch.setattr(conversion, "events_from_light", None)
+    outcome = adv2e("convert", video, "-o", tmp_path / ("n" * length + suffix))
+    assert outcome.status == 1
+    assert "name too long" in outcome.err
+    assert list(tmp_path.iterdir()) == [video]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="files of POSIX")

@@ -20,6 +20,7 @@ from adv2e.characterisation.table import Table
 from adv2e.config import to_dict
 from adv2e.config.paths import set_key
 from adv2e.errors import DataError
+from adv2e.names import shown
 from adv2e.reports.result import (
     Band,
     Curve,
@@ -93,7 +94,7 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
     return Diagnosis(
         verdict=cast(Verdict, chosen.verdict),
         sentence=_sentence(chosen, problem),
-        recording=table.name,
+        recording=shown(table.name),
         declared=declared.name,
         effects=_findings(chosen.after, draws, problem),
         alternatives=_alternatives(chosen),

@@ -93,6 +93,7 @@ def command(
     from adv2e.characterisation.declared import read_declared
     from adv2e.characterisation.report import summary, write_reports
     from adv2e.characterisation.table import read_table
+    from adv2e.names import shown
     from adv2e.reports.files import check_folder
     from adv2e.sinks.apart import check_apart
 
@@ -115,4 +116,4 @@ def command(
     if log.level >= 0:
         click.echo(summary(found))
         if output is not None:
-            click.echo(f"written: {Path(output) / 'report.html'}, report.json, model.yaml")
+            click.echo(shown(f"written: {Path(output) / 'report.html'}, report.json, model.yaml"))

@@ -98,7 +98,8 @@ def command(
             log=lambda text: log(text, 1),
         )
     write_reports(found, folder, overwrite=overwrite)
-    log(summary_text(found))
+    for line in summary_text(found).splitlines():
+        log(line)
 
 
 def check_names(without: Sequence[str], known: Sequence[str]) -> None:

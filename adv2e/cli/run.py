@@ -22,6 +22,7 @@ import sys
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import TextIO
 
 import click
 
@@ -134,8 +135,14 @@ def print_any_character() -> None:
 def flush_stdout(*, quiet: bool) -> None:
     """Write out what standard output still holds, with an exit status of its own if that fails.
 
-    `quiet`: an error has been told already, and is to stay the only line.
+    `quiet`: an error has been told already, and is to stay the only line.  What standard error
+    still holds makes no failure, as it does for Python.
     """
+    with suppress(ValueError, AttributeError):  # closed
+        try:
+            sys.stderr.flush()
+        except OSError:
+            _silence(sys.stderr)
     if sys.stdout is None or sys.stdout.closed:
         return
     try:
@@ -152,7 +159,11 @@ def flush_stdout(*, quiet: bool) -> None:
 
 def silence_stdout() -> None:
     """Point standard output at nothing, so that Python does not fail again when it closes it."""
+    _silence(sys.stdout)
+
+
+def _silence(stream: TextIO) -> None:
     with suppress(OSError, ValueError, AttributeError):
         nothing = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nothing, sys.stdout.fileno())
+        os.dup2(nothing, stream.fileno())
         os.close(nothing)

@@ -13,6 +13,7 @@ from adv2e.config.model import Config
 from adv2e.config.own import config_class
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
 from adv2e.config.yaml12 import Origin, Value, key_text
+from adv2e.names import shown
 
 if TYPE_CHECKING:
     from adv2e.effects.hooks import Hooks
@@ -69,7 +70,7 @@ def load_config(
 
 def names_of(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> str:
     """Return what a configuration was made from, for people: names without folders, and keys."""
-    return ", ".join([*(Path(name).name for name in files), *sets])
+    return shown(", ".join([*(Path(name).name for name in files), *sets]))
 
 
 def written_keys(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from adv2e.diagnosis.stream import Stream
 from adv2e.errors import DataError
 from adv2e.events import Events
+from adv2e.names import shown
 from adv2e.recordings import read_recording
 from adv2e.reports.result import Masked
 
@@ -177,7 +178,7 @@ def read_evidence(path: str | Path, time_unit: str | None = None) -> Evidence:
         )
     check_events(len(kept), path, "between its first and its last frame")
     whole = Evidence(
-        name=str(path),
+        name=shown(path),
         frames=frames,
         times_s=times_s,
         stream=Stream.of(kept, width, height),

@@ -154,8 +154,9 @@ def describe(metadata: dict[str, Any], width: int, height: int) -> dict[str, Any
 
 
 def to_json(description: dict[str, Any]) -> str:
-    """Return the description as text, the same for the same content."""
-    return json.dumps(description, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    """Return the description as text, the same for the same content, and fit for UTF-8."""
+    text = json.dumps(description, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def seconds_text(t_ns: int) -> str:

@@ -21,6 +21,7 @@ FILES = ["model.yaml", "report.html", "report.json"]
 TRIED = ("refractory", "leak", "event_loss")
 WITHOUT = [part for name in names() if name not in TRIED for part in ("--without", name)]
 SIZE, DEAD_US = (32, 24), 20_000.0
+SUMMARY = ["two lines of", "  summary"]
 
 
 @pytest.fixture(scope="module")
@@ -239,7 +240,7 @@ def made_up(monkeypatch, tmp_path):
     monkeypatch.setattr(evidence, "read_evidence", read)
     monkeypatch.setattr(whole, "diagnose", diagnose)
     monkeypatch.setattr(report, "write_reports", write)
-    monkeypatch.setattr(summary, "summary_text", lambda found: "the summary")
+    monkeypatch.setattr(summary, "summary_text", lambda found: "\n".join(SUMMARY))
     monkeypatch.chdir(tmp_path)
     return calls
 
@@ -259,7 +260,7 @@ def test_options_arrive(adv2e, made_up, tmp_path):
     assert call["config"].pixel.refractory.period_us == 7.0
     assert call["config"].seed == 4
     assert str(folder) == "a.diagnosis"
-    assert outcome.err.splitlines()[-1] == "the summary"
+    assert outcome.err.endswith("two lines of\n  summary\n")
 
 
 TWICE = """
@@ -309,7 +310,8 @@ def test_own_effects_need_names_of_their_own(adv2e, made_up):
 
 
 @pytest.mark.parametrize(
-    ("options", "lines"), [([], ["the summary"]), (["-v"], ["a step", "the summary"]), (["-q"], [])]
+    ("options", "lines"),
+    [([], SUMMARY), (["-v"], ["a step", *SUMMARY]), (["-q"], [])],
 )
 def test_what_is_said(adv2e, made_up, options, lines):
     outcome = adv2e("diagnose", "a.zip", *options)
