@@ -1,6 +1,7 @@
 """The command ``adv2e``, and the same as ``python -m adv2e``."""
 
 import os
+import signal
 import sys
 
 
@@ -23,10 +24,15 @@ def _fill_standard_streams() -> None:
 
 def main() -> None:
     """Run the command line; a signal that comes while it is imported ends it quietly, too."""
+    has_usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if has_usual:  # it has a traceback printed
+        signal.signal(signal.SIGINT, lambda number, frame: os._exit(128 + number))
     _fill_standard_streams()
     from adv2e.stopping import stop_on_signals  # noqa: PLC0415
     from adv2e.streams import keep_errors_for_ourselves  # noqa: PLC0415
 
+    if has_usual:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     stop_on_signals()
     keep_errors_for_ourselves()
     from adv2e.cli import main as command  # noqa: PLC0415
