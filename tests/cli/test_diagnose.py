@@ -225,7 +225,7 @@ def made_up(monkeypatch, tmp_path):
     """Stand in for reading and diagnosing; returns the calls, and what there was to tell."""
     calls = []
 
-    def read(path):
+    def read(path, time_unit):
         return path
 
     def write(found, folder, *, overwrite):
