@@ -7,7 +7,6 @@ told before the work.
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -68,14 +67,13 @@ class Packets:
 
 _REORDERED = 16
 """Pictures between which decoding may change the order."""
-_LONGEST_MS = 1e12
 _HALF_WRAP_NS = 2**32 * 10**9 // 90_000
 """Clocks of MPEG streams begin again after twice this; FFmpeg takes going back for that."""
 
 
 def list_packets(path: str) -> Packets:
     """Return the coded pictures of a video; none if it cannot be opened."""
-    stamps: list[int | None] = []
+    stamps: list[int] = []
     tiny = 0
     with quiet():
         with openable(path) as name:
@@ -94,29 +92,20 @@ def list_packets(path: str) -> Packets:
     return arranged(stamps, tiny)
 
 
-def stamp_of(capture: cv2.VideoCapture | PyavCapture) -> int | None:
-    """Return the stamp of the picture just grabbed [ns]; None where OpenCV says it has none.
-
-    Most that have none are at zero instead.
-    """
-    stamp_ms = capture.get(cv2.CAP_PROP_POS_MSEC)
-    # OpenCV 4.10 makes a number of FFmpeg's mark for no time
-    return round(stamp_ms * 1e6) if abs(stamp_ms) < _LONGEST_MS else None
+def stamp_of(capture: cv2.VideoCapture | PyavCapture) -> int:
+    """Return the stamp of the picture just grabbed [ns]; zero where it has none."""
+    return round(capture.get(cv2.CAP_PROP_POS_MSEC) * 1e6)
 
 
-def arranged(stamps_ns: list[int | None], tiny: int = 0) -> Packets:
-    """Return what stamps of coded pictures, as OpenCV gives them, say of their times.
-
-    Those that have none are None, or at zero: of the file's clock (OpenCV 4.10) or of its first
-    picture.
-    """
+def arranged(stamps_ns: list[int], tiny: int = 0) -> Packets:
+    """Return what stamps of coded pictures, as OpenCV gives them, say of their times."""
     count = len(stamps_ns)
-    usual = Counter(stamps_ns).most_common(1)
-    missing = usual[0][0] if usual and usual[0][1] > 2 else None
+    # two joined files have two pictures at zero that are there
+    none_at_zero = stamps_ns.count(0) > 2
     stamps = [
         (number, stamp)
         for number, stamp in enumerate(stamps_ns)
-        if stamp is not None and (stamp != missing or number == 0)
+        if stamp or number == 0 or not none_at_zero
     ]
     known = sorted({stamp for _, stamp in stamps})
     steps = sorted(after - before for before, after in pairwise(known))

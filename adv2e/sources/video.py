@@ -113,7 +113,7 @@ class VideoSource(Source):
 
     def _check_listed(self, listed: int) -> None:
         # pictures that cannot stand alone at the start are in the index and never shown
-        sure = self._times.exact and (self._first_ns or 0) <= self._container.tick_ns
+        sure = self._times.exact and self._first_ns <= self._container.tick_ns
         if sure and listed == self._times.expected:
             return
         with self._opened(self._decoders()) as capture:
@@ -216,7 +216,7 @@ class VideoSource(Source):
             self._keep_grey(capture)
             for number in self._grabbed(capture):
                 # of the frame just grabbed; before the first one it means nothing
-                stamp = stamp_of(capture)
+                stamp: int | None = stamp_of(capture)
                 if stamp == 0 and number and self._times.zero_means_none:
                     stamp = None
                 stamps.append(stamp)
