@@ -95,7 +95,7 @@ class PyavCapture:
         self._path, self._matrix = path, matrix
         try:
             with openable(path) as name:
-                self._file: Any = self._av.open(name)
+                self._file: Any = self._av.open(name, metadata_errors="replace")
             self._stream: Any = self._file.streams.best("video")
         except self._av.error.FFmpegError as error:
             raise DataError(f"{path}: not a video that can be read, or damaged") from error

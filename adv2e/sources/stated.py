@@ -1,6 +1,7 @@
 """What the container of a video states of its pictures: their colours, and whether they are fields.
 
-Nothing here raises for a file that is damaged: then nothing is stated.
+Nothing here raises for a file that is damaged: then it may state what cannot be read, as FFmpeg
+finds its way through much.
 
 References
 ----------
@@ -43,7 +44,7 @@ class Stated:
     alpha_apart : bool
         Transparency is stored beside the pictures (WebM), where decoders do not look for it.
     readable : bool
-        False where it may state more than is read here (MXF).
+        False where it may state more than is read here (MXF, or damaged).
     """
 
     colours: Colours = field(default_factory=Colours)
@@ -61,7 +62,7 @@ def stated_by(path: str | Path) -> Stated:
         ):
             return _read(data)
     except (OSError, ValueError, struct.error, IndexError):
-        return Stated()
+        return Stated(readable=False)
 
 
 def _read(data: mmap.mmap) -> Stated:
@@ -76,25 +77,27 @@ def _read(data: mmap.mmap) -> Stated:
 
 
 def _mp4(data: mmap.mmap) -> Stated:
-    colours, interlaced = Colours(), False
+    colours, interlaced, found = Colours(), False, False
     for kind, begin, end in _pictures(data, 0, len(data), is_video=False):
+        found = True
         if kind == b"colr" and data[begin : begin + 4] in (b"nclx", b"nclc"):
             colours = Colours(*struct.unpack_from(">HHH", data, begin + 4))
         elif kind == b"vpcC" and end - begin >= 10:
             colours = Colours(*data[begin + 7 : begin + 10]).completed(colours)
         elif kind == b"fiel":
             interlaced = data[begin] == 2
-    return Stated(colours, interlaced)
+    return Stated(colours, interlaced, readable=found)
 
 
 def _pictures(
     data: mmap.mmap, start: int, stop: int, *, is_video: bool
 ) -> Iterator[tuple[bytes, int, int]]:
-    """Yield kind, start and end of the boxes that describe the pictures of the first video."""
+    """Yield kind, start and end of the description of the first video, and of the boxes in it."""
     for kind, begin, end in _boxes(data, start, stop):
         if kind == b"hdlr" and data[begin + 4 : begin + 8] != b"dhlr":
             is_video = data[begin + 8 : begin + 12] == b"vide"
         elif kind == b"stsd" and is_video:
+            yield kind, begin, end
             yield from _boxes(data, begin + 8 + _SAMPLE_ENTRY, min(end, _entry_end(data, begin)))
             return
         elif kind in _WITHIN:
@@ -137,7 +140,7 @@ def _matroska(data: mmap.mmap) -> Stated:
             alpha = data[end - 1] == 1
         elif kind in colours and is_video:
             colours[kind] = data[end - 1]
-    return Stated(Colours(*colours.values()), interlaced, alpha)
+    return Stated(Colours(*colours.values()), interlaced, alpha, readable=is_video)
 
 
 def _elements(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:

@@ -174,7 +174,7 @@ class VideoSource(Source):
     def _choose_encoding(self) -> None:
         transfer = self._colours.transfer
         encoding, self.encoding_reason = encoding_of(transfer)
-        if self.dtype == np.uint16 and not self.colour and not is_stated(transfer):
+        if self._pixels in (_GREY_16, _GREY_16[::-1]) and not is_stated(transfer):
             encoding, self.encoding_reason = "linear", "16-bit grey video"
         self.encoding = encoding
 

@@ -107,6 +107,22 @@ def test_what_opencv_does_not_keep_is_refused_without_pyav(tmp_path, monkeypatch
         open_source(path)
 
 
+def test_titles_that_are_not_utf8_do_not_matter(tmp_path):
+    av = pytest.importorskip("av")
+    path = tmp_path / "clip.mkv"
+    with av.open(str(path), "w") as file:
+        file.metadata["title"] = "Zurich"
+        stream = file.add_stream("ffv1", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p10le"
+        for number in range(3):
+            frame = flat(av, 400 + number, "yuv420p10le", (64, 48))
+            frame.pts = number
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    path.write_bytes(path.read_bytes().replace(b"Zurich", b"Z\xfcrich"))
+    assert len(light(open_source(path))) == 3
+
+
 def test_pyav_that_takes_one_matrix_for_all_is_not_used(tmp_path, monkeypatch):
     av = pytest.importorskip("av")
     path = write(tmp_path / "clip.mp4", [60, 90, 120], tags=(9, 16, 9))
@@ -328,6 +344,17 @@ def gif(hole):
         data += b"\x2c" + struct.pack("<HHHHB", 0, 0, 1, 1, 0)
         data += b"\2\2" + (b"\x44\1" if number == 0 else b"\x4c\1") + b"\0"
     return data + b";"
+
+
+@pytest.mark.parametrize(
+    ("pixels", "encoding"), [("gray10le", "srgb"), ("gray16le", "linear"), ("gray12le", "srgb")]
+)
+def test_grey_has_one_light_whatever_reads_it(tmp_path, monkeypatch, pixels, encoding):
+    path = write(tmp_path / "clip.mkv", [100, 200, 300], "ffv1", pixels)
+    source = open_source(path)
+    assert (source.encoding, source.dtype, source.colour) == (encoding, np.uint16, False)
+    monkeypatch.setitem(sys.modules, "av", None)
+    assert open_source(path).encoding == encoding
 
 
 @pytest.mark.parametrize("turned", [0, 90, 180, 270])

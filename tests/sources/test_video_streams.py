@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from coded import write
 
 from adv2e.sources.colours import Colours
 from adv2e.sources.stated import Stated, stated_by
@@ -154,6 +155,17 @@ def test_containers_at_random_state_nothing_or_something(tmp_path):
                 body[place : place + 8] = struct.pack(">I", int(rng.integers(0, 400))) + kind
             path.write_bytes(magic + bytes(body))
             assert isinstance(stated_by(path), Stated)
+
+
+@pytest.mark.parametrize("suffix", ["mkv", "mp4"])
+def test_a_container_that_is_damaged_may_state_what_is_not_read(tmp_path, suffix):
+    path = write(tmp_path / f"clip.{suffix}", [60, 90, 120], "mpeg4", tags=(9, 16, 9))
+    assert stated_by(path).colours.transfer == 16
+    data = bytearray(path.read_bytes())
+    mark = b"\x16\x54\xae\x6b" if suffix == "mkv" else b"stsd"
+    data[data.rindex(mark)] ^= 0x40
+    path.write_bytes(data)
+    assert not stated_by(path).readable
 
 
 @pytest.mark.parametrize(
