@@ -1,7 +1,8 @@
 """Standard error for ourselves: what libraries print about a file is not for users.
 
 Decoders write there past Python, in lines that name no file and follow no setting; ours is the one
-line that people see.
+line that people see.  What they say is kept for a moment, as some say only there that a picture is
+not whole.
 """
 
 from __future__ import annotations
@@ -10,10 +11,13 @@ import faulthandler
 import io
 import os
 import sys
-from contextlib import suppress
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import BinaryIO, cast
 
 _descriptor = 2
+_heard = -1
 
 
 def errors_descriptor() -> int:
@@ -27,19 +31,49 @@ def keep_errors_for_ourselves() -> None:
     Nothing changes where there is no standard error, or where whoever looks for a fault wants to
     see all (``python -X faulthandler``, ``-X dev``).
     """
-    global _descriptor  # noqa: PLW0603 - a process has one
+    global _descriptor, _heard
     if sys.stderr is None or faulthandler.is_enabled():
         return
     with suppress(OSError, ValueError):
         sys.stderr.flush()
         kept = os.dup(sys.stderr.fileno())
-        nothing = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nothing, 2, inheritable=True)
-        os.close(nothing)
+        heard = _nameless_file()
+        os.dup2(heard, 2, inheritable=True)
         encoding = sys.stderr.encoding
         # nothing may stay in a buffer: where it cannot be written, the end would try again and fail
         unbuffered = open(kept, "wb", 0)  # noqa: PTH123, SIM115
         sys.stderr = io.TextIOWrapper(
             cast(BinaryIO, unbuffered), encoding, "backslashreplace", write_through=True
         )
-        _descriptor = kept
+        _descriptor, _heard = kept, heard
+
+
+def _nameless_file() -> int:
+    """Return a descriptor of a file that is gone when it is closed, or of none."""
+    with suppress(OSError), tempfile.TemporaryFile(buffering=0) as file:
+        return os.dup(file.fileno())
+    return os.open(os.devnull, os.O_RDWR)
+
+
+@contextmanager
+def overhearing() -> Iterator[Callable[[], bytes]]:
+    """Within the context, have a function that returns what libraries have said in it.
+
+    Nothing, where standard error is not kept for ourselves.
+    """
+    if _heard >= 0:
+        with suppress(OSError):  # it is no file
+            os.ftruncate(_heard, 0)
+            os.lseek(_heard, 0, os.SEEK_SET)
+    yield _said
+
+
+def _said() -> bytes:
+    if _heard < 0:
+        return b""
+    with suppress(OSError):
+        size = os.fstat(_heard).st_size
+        if size:
+            os.lseek(_heard, 0, os.SEEK_SET)
+            return os.read(_heard, min(size, 1 << 16))
+    return b""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -26,6 +27,7 @@ from adv2e.sources.alpha import Alpha, with_alpha
 from adv2e.sources.base import Image, Pixels
 from adv2e.sources.claims import check_claim
 from adv2e.sources.headers import read_header
+from adv2e.streams import overhearing
 
 IMAGE_SUFFIXES = (
     *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pbm", ".pam"),
@@ -180,12 +182,20 @@ def _decode_tiff(data: bytes, label: str) -> Pixels:
     return replace(with_alpha(colours, alpha, header.alpha, white or usual, label), white=white)
 
 
+_CUT = re.compile(
+    rb"[Pp]remature end|bad Huffman code|found marker|[Ii]nconsistent progression|bad arithmetic"
+)
+"""What libjpeg says, and fills the picture with grey.  Foreign bytes between parts do no harm."""
+
+
 def _decoded(data: bytes, label: str) -> Any:
     image: Any = None
     if data and _is_whole(data):
         try:
-            with quiet():
+            with quiet(), overhearing() as said:
                 image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+                if _CUT.search(said()):
+                    image = None
         except cv2.error as error:
             if error.code == cv2.Error.StsNoMem:
                 raise MemoryError(f"{label}: {error.err}") from error

@@ -34,7 +34,7 @@ def test_a_broken_picture_is_one_line(folder):
     found = run("info", folder, "--fps", "10")
     assert found.returncode == 1
     assert found.stderr.count("\n") == 1
-    assert found.stderr.startswith(f"adv2e: error: {folder / '1.png'}: ")
+    assert found.stderr.startswith(f"adv2e: error: {folder}{os.sep}")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="prints of C libraries are looked for")
@@ -69,3 +69,25 @@ def test_tracebacks_and_warnings_of_python_are_still_seen(tmp_path):
     found = run("info", tmp_path / "none.mp4", "-vv")
     assert found.returncode == 1
     assert "no such file" in found.stderr
+
+
+@pytest.mark.parametrize("subsampling", [0x111111, 0x221111])
+def test_a_jpeg_of_which_a_part_is_missing_is_not_filled_with_grey(tmp_path, subsampling):
+    how = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, subsampling)
+    noise = np.random.default_rng(0).integers(0, 255, (2, 60, 80, 3), np.uint8)
+    whole = [cv2.imencode(".jpg", frame, how)[1].tobytes() for frame in noise]
+    folder = tmp_path / "f"
+    folder.mkdir()
+    (folder / "0.jpg").write_bytes(whole[0])
+    (folder / "1.jpg").write_bytes(whole[1])
+    assert run("info", folder, "--fps", "10").returncode == 0
+    half = len(whole[1]) // 2
+    (folder / "1.jpg").write_bytes(whole[1][:half] + b"\xff\xd9")
+    found = run("info", folder, "--fps", "10")
+    assert found.returncode == 1
+    assert found.stderr == (
+        f"adv2e: error: {folder / '1.jpg'}: not an image that can be read, or damaged\n"
+    )
+    # a few foreign bytes before the end, as cameras leave them, take nothing away
+    (folder / "1.jpg").write_bytes(whole[1][:-2] + bytes(5) + b"\xff\xd9")
+    assert run("info", folder, "--fps", "10").returncode == 0
