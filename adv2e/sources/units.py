@@ -211,7 +211,8 @@ def event_unit(
     nearest = min(UNITS, key=lambda name: abs(np.log10(rates[name] / pixels)))
     if whole and _is_rate(rates["us"], pixels):
         nearest = "us"
-    sure = not whole and nearest == "s" and not _is_rate(1e3 * rates["s"], pixels)
+    # half of it, as the rate of few events is known to chance only
+    sure = not whole and nearest == "s" and not _is_rate(500 * rates["s"], pixels)
     return Unit(nearest, "" if sure else taken(nearest, rates[nearest]))
 
 

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -93,8 +94,6 @@ ELSEWHERE = [
     (dangling, "a link to nothing"),
     (through_a_link_outside, "a link to another file"),
     (raw_file, "keeps its numbers in another file"),
-    (virtual, "a virtual dataset"),
-    (virtual_of_itself, "a virtual dataset"),
 ]
 
 
@@ -109,9 +108,40 @@ def test_what_is_elsewhere_is_refused_by_name(tmp_path, name, make, message):
     assert message in str(caught.value)
 
 
+READ_VIRTUAL = """\
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import test_hostile_hdf5 as made
+from adv2e.errors import DataError
+from adv2e.recordings import read_recording
+
+folder = Path(sys.argv[2])
+secret = made.whole(folder / "secret.h5")
+for make in (made.virtual, made.virtual_of_itself):
+    for number, name in enumerate([*made.COLUMNS, "images/image000000000"]):
+        path = made.changed(folder / f"{make.__name__}{number}.h5", name, make(name, secret))
+        try:
+            list(read_recording(path).images())
+        except DataError as error:
+            said = str(error)
+            assert said.startswith(f"{path}: {name}: is a virtual dataset"), said
+            print("refused")
+"""
+
+
+def test_virtual_datasets_are_refused_by_name(tmp_path):
+    # apart: HDF5 may crash at the end of a process that has made one of itself
+    run = subprocess.run(
+        [sys.executable, "-c", READ_VIRTUAL, Path(__file__).parent, tmp_path],
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert run.stdout.split() == ["refused"] * 10, run.stderr
+
+
 @pytest.mark.parametrize("command", ["info", "compare", "render", "diagnose"])
 def test_commands_end_in_one_line(tmp_path, command):
-    path = changed(tmp_path / "a.h5", "events/xs", virtual_of_itself("events/xs", None))
+    path = changed(tmp_path / "a.h5", "events/xs", virtual("events/xs", whole(tmp_path / "b.h5")))
     more = {"compare": [path], "render": ["-o", tmp_path / "o.png"],
             "diagnose": ["-o", tmp_path / "report"]}  # fmt: skip
     run = subprocess.run(
