@@ -98,7 +98,7 @@ def command(
               twenty times as long to write
       .webm   film for browsers (VP8): Chrome, Edge, Firefox, Safari from 14.1 on, VLC
       .gif    film for everything that shows pictures, at most 50 pictures a second
-      .avi    film without any loss (FFV1): VLC, mpv, ffmpeg; no browser
+      .avi    film without any loss (HuffYUV): VLC, mpv, ffmpeg; no browser
       .png    sheet of one or several instants
 
     \b

@@ -3,7 +3,7 @@
 ========= ============================================== ========================================
 ``.mp4``  H.264 where PyAV is installed, else VP9        Chrome, Edge, Firefox; H.264: everywhere
 ``.webm`` VP8, in less than half the time of VP9         Chrome, Edge, Firefox, Safari
-``.avi``  FFV1, which loses nothing                      players that use FFmpeg, such as VLC
+``.avi``  HuffYUV, which loses nothing                   players that use FFmpeg, such as VLC
 ========= ============================================== ========================================
 
 FFmpeg goes on in silence when the disk is full.  So the index of what was written is read again.
@@ -14,7 +14,7 @@ from __future__ import annotations
 import importlib
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from fractions import Fraction
 from functools import lru_cache
@@ -32,11 +32,15 @@ from adv2e.sources.containers import examine
 from adv2e.sources.opencv import quiet
 from adv2e.sources.opening import openable
 
-CODES = {".mp4": "vp09", ".webm": "VP80", ".avi": "FFV1"}
-"""Coders of OpenCV; its VP8 and VP9 are set to lose next to nothing."""
+CODES = {".mp4": "vp09", ".webm": "VP80", ".avi": "HFYU"}
+"""Coders of OpenCV; its VP8 and VP9 are set to lose next to nothing.
 
-_H264 = {"preset": "veryfast", "crf": "14", "x264-params": "chroma-qp-offset=-6"}
-"""Colour is coded finer than usual, so that single pixels stay red and blue."""
+Its FFV1 is smaller than HuffYUV, but says that it is transparent.
+"""
+
+_H264 = {"preset": "veryfast", "crf": "12", "x264-params": "chroma-qp-offset=-6:mbtree=0"}
+"""Colour is finer than usual, so that single pixels stay red and blue; with mbtree, the same
+pictures do not always give the same film."""
 
 
 class _Coder(Protocol):
@@ -67,42 +71,73 @@ class _OpenCv:
             self._writer.release()
 
 
+class _Output:
+    """A file for PyAV, which prints what is raised within it or breaks down: errors are kept."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("wb")
+        self.error: OSError | None = None
+
+    def write(self, data: bytes) -> int:
+        self._do(self._file.write, data)
+        return len(data)
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        return self._do(self._file.seek, offset, whence)
+
+    def tell(self) -> int:
+        return self._do(self._file.tell)
+
+    def close(self) -> None:
+        self._do(self._file.flush)
+        with suppress(OSError):  # said already
+            self._file.close()
+
+    def _do(self, function: Callable[..., int | None], *arguments: Any) -> int:
+        if self.error is None:
+            try:
+                return function(*arguments) or 0
+            except OSError as error:
+                self.error = error
+        return 0
+
+
 class _PyAv:
     """Films in H.264 by PyAV."""
 
     def __init__(self, path: Path, fps: float, width: int, height: int) -> None:
         self._av: Any = importlib.import_module("av")
         try:
-            self._file = path.open("wb")  # by Python, whatever its name
+            self._output = _Output(path)  # by Python, whatever its name
         except OSError as error:
             raise NotWritten(f"a video cannot be written there: {error.strerror}") from error
-        self._container: Any = self._av.open(self._file, "w", format="mp4")
+        self._container: Any = self._av.open(self._output, "w", format="mp4")
         rate = Fraction(fps).limit_denominator(1_000_000)
         self._stream: Any = self._container.add_stream("libx264", rate=rate, options=_H264)
         self._stream.width, self._stream.height = width, height
         self._stream.pix_fmt = "yuv420p"
+        self._closed = False
 
     def add(self, picture: Picture) -> None:
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
-        with self._telling():
-            self._container.mux(self._stream.encode(frame))
+        self._container.mux(self._stream.encode(frame))
+        self._check()
 
     def close(self) -> None:
-        if self._file.closed:
+        if self._closed:
             return
-        with self._telling(), self._file:
-            try:
-                self._container.mux(self._stream.encode())
-            finally:
-                self._container.close()
-
-    @contextmanager
-    def _telling(self) -> Iterator[None]:
-        """Turn what cannot be written into an error that says so; PyAV may wrap the system's."""
+        self._closed = True
         try:
-            yield
-        except (OSError, self._av.FFmpegError) as error:
-            raise NotWritten("cannot be written to the end (is the disk full?)") from error
+            self._container.mux(self._stream.encode())
+            self._container.close()
+        finally:
+            self._output.close()
+        self._check()
+
+    def _check(self) -> None:
+        error = self._output.error
+        if error is not None:
+            raise NotWritten(f"cannot be written: {error.strerror}") from error
 
 
 @lru_cache(maxsize=1)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+import sys
 
 import cv2
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 
 from adv2e import demo as module
 from adv2e.recordings import read_recording
+from adv2e.synthetic import Scene
+from adv2e.synthetic.clips import write_video
 
 
 @pytest.fixture
@@ -43,6 +46,10 @@ def test_makes_clip_events_picture_and_film_and_says_what(adv2e, small, tmp_path
     assert moving > 10 * resting
     assert cv2.imread(str(folder / "clip.events.png")).shape[1] > 600
 
+    # the film is that of the file: nothing was drawn before it had come
+    assert adv2e("render", folder / "clip.events.h5", "-o", tmp_path / "film.mp4").status == 0
+    assert (folder / "clip.events.mp4").read_bytes() == (tmp_path / "film.mp4").read_bytes()
+
     # again: the same events, and what is not ours is kept
     (folder / "mine.txt").write_text("mine")
     outcome = adv2e("demo", "-o", folder, "-q", "--threads", 1)
@@ -51,6 +58,13 @@ def test_makes_clip_events_picture_and_film_and_says_what(adv2e, small, tmp_path
     assert adv2e("demo", "-o", folder, "-q", "--threads", 1, "--overwrite").out == ""
     assert np.array_equal(read_recording(folder / "clip.events.h5").events, events)
     assert sorted(path.name for path in folder.iterdir()) == [*FILES, "mine.txt"]
+
+
+def test_the_clip_is_read_without_any_extra(adv2e, tmp_path, monkeypatch):
+    write_video(Scene(), tmp_path / "clip.avi", width=64, height=48, duration_s=0.2)
+    monkeypatch.setitem(sys.modules, "av", None)
+    outcome = adv2e("convert", tmp_path / "clip.avi", "-o", tmp_path / "clip.txt", "--threads", 1)
+    assert outcome.status == 0, outcome.err
 
 
 def test_a_file_in_place_of_the_folder(adv2e, tmp_path):

@@ -9,7 +9,6 @@ import shutil
 import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -20,7 +19,7 @@ from adv2e.rendering import video
 from adv2e.rendering.video import VideoFile
 from adv2e.sources.opencv import quiet
 
-CODERS = {".mp4": "vp9", ".webm": "vp8", ".avi": "ffv1", "H.264": "h264"}
+CODERS = {".mp4": "vp9", ".webm": "vp8", ".avi": "huffyuv", "H.264": "h264"}
 
 
 @pytest.fixture(params=list(CODERS))
@@ -73,14 +72,14 @@ def test_the_coder_is_one_that_browsers_know(tmp_path, coder):
     suffix, name = coder
     path = tmp_path / f"film{suffix}"
     write(path, [noise(48, 64, k) for k in range(3)])
-    marks = {"vp9": b"vp09", "vp8": b"V_VP8", "ffv1": b"FFV1", "h264": b"avc1"}
+    marks = {"vp9": b"vp09", "vp8": b"V_VP8", "huffyuv": b"HFYU", "h264": b"avc1"}
     assert marks[name] in path.read_bytes()
     if shutil.which("ffprobe"):
         shown = ("-show_entries", "stream=codec_name,pix_fmt", "-of", "json")
         told = subprocess.check_output(["ffprobe", "-v", "error", *shown, path])
         (stream,) = json.loads(told)["streams"]
         assert stream["codec_name"] == name
-        if name != "ffv1":
+        if name != "huffyuv":
             assert stream["pix_fmt"] == "yuv420p"  # the only one that all browsers show
 
 
@@ -132,28 +131,6 @@ def test_a_film_may_have_any_name(tmp_path, coder, stem):
     write(path, [noise(16, 16)])
     assert path.stat().st_size > 200
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_disk_that_fills_is_no_error_of_ours(tmp_path, monkeypatch):
-    """PyAV hands on an error of its own where writing fails within FFmpeg."""
-    if not video.writes_h264():
-        pytest.skip("needs PyAV, the extra 'video'")
-
-    class Full:
-        closed = False
-
-        def write(self, data):
-            raise OSError(28, "No space left on device")
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            self.closed = True
-
-    monkeypatch.setattr(Path, "open", lambda path, mode: Full())
-    with pytest.raises(OutputError, match="cannot be written to the end"):
-        write(tmp_path / "film.mp4", [noise(480, 640, k) for k in range(9)])
 
 
 def test_a_video_that_came_out_short(tmp_path, coder):
