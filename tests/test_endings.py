@@ -60,6 +60,11 @@ def test_what_a_killed_conversion_left_goes_with_the_next(adv2e, long_stack, tmp
     target = tmp_path / "results"
     (target / "sub").mkdir(parents=True)
     preview = ["--preview", target / "sub" / "a.gif"]
+    stack = tmp_path / "short.npy"
+    np.save(stack, np.array([picture(k) for k in range(4)]))
+    short = ["convert", stack, "--fps", "100", "--set", "sampling.L=1"]
+    before = ["-o", tmp_path / name, "--preview", tmp_path / "a.gif"]
+    assert adv2e(*short, *before).status == 0  # and nothing is left to compile
     with started(long_stack, target / name, *preview) as process:
         wait_until(lambda: is_written(target), seconds=60)
         process.kill()
@@ -67,11 +72,8 @@ def test_what_a_killed_conversion_left_goes_with_the_next(adv2e, long_stack, tmp
     assert not (target / name).exists()
     left = sorted(path.name for path in target.iterdir())
     assert len(left) > 2
-    stack = tmp_path / "short.npy"
-    np.save(stack, np.array([picture(k) for k in range(4)]))
     for place in (target, target / "sub"):
-        arguments = ["convert", stack, "--fps", "100", "-o", place / "other.h5"]
-        assert adv2e(*arguments).status == 0
+        assert adv2e(*short, "-o", place / "other.h5").status == 0
     left = sorted(path.relative_to(target).as_posix() for path in target.rglob("*"))
     assert left == ["other.h5", "sub", "sub/other.h5"]
 
