@@ -93,6 +93,16 @@ def test_h264_whose_frames_are_said_to_be_fields(structure, scan, fields):
     assert found_by(H264(), parameters_of_h264(True, timing=True) + unit).interlaced is fields
 
 
+def test_h264_with_lengths_in_place_of_start_codes():
+    units = [parameters_of_h264(True, (1, 1, 1))[3:], b"\x65" + b"\0" * 358]
+    data = b"".join(struct.pack(">I", len(unit)) + unit for unit in units)
+    assert found_by(H264(), data).colours == [Colours(1, 1, 1)]
+    # a length that looks like a start code, and what follows it like parameters
+    data = struct.pack(">I", 0x167) + b"\x41" + b"\x42" * 0x166
+    assert found_by(H264(), data).colours == []
+    assert not found_by(H264(), data).interlaced
+
+
 def test_h264_whose_transfer_is_replaced():
     replaced = b"\0\0\1\x06" + bytes([147, 1, 18, 0x80])
     set_9_14 = parameters_of_h264(True, (9, 14, 9))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from adv2e.sources.colours import Colours, is_stated
 from adv2e.sources.streams.base import Findings
@@ -32,6 +33,22 @@ def units(data: bytes) -> Iterator[bytes]:
         unit = data[begin : after if after >= 0 else len(data)]
         if unit:
             yield unit
+
+
+def units_of_picture(data: bytes) -> Iterator[bytes]:
+    """Yield the units of H.264 or HEVC, between start codes or each after its length.
+
+    Copied from MP4 into another container they may keep lengths, which can look like start codes.
+    """
+    places = [0]
+    while places[-1] < len(data):
+        size = int.from_bytes(data[places[-1] : places[-1] + 4], "big")
+        if not size or places[-1] + 4 + size > len(data):
+            yield from units(data)
+            return
+        places.append(places[-1] + 4 + size)
+    for begin, end in pairwise(places):
+        yield data[begin + 4 : end]
 
 
 def unguarded(unit: bytes) -> bytes:
@@ -110,7 +127,7 @@ class H264:
 
     def picture(self, data: bytes, findings: Findings) -> None:
         """Read parameter sets and messages up to the first slice."""
-        for unit in units(data):
+        for unit in units_of_picture(data):
             kind = unit[0] & 31
             if kind == _SPS:
                 self._parameters(Bits(unguarded(unit)[1:]), findings)

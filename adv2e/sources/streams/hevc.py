@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from adv2e.sources.streams.base import Findings
 from adv2e.sources.streams.bits import Bits
-from adv2e.sources.streams.h264 import StatedColours, messages, signal, unguarded, units
+from adv2e.sources.streams.h264 import StatedColours, messages, signal, unguarded, units_of_picture
 
 _LAST_SLICE, _SPS, _SEI = 31, 33, 39
 _PICTURE_TIMING, _OTHER_TRANSFER = 1, 147
@@ -30,7 +30,7 @@ class Hevc:
 
     def picture(self, data: bytes, findings: Findings) -> None:
         """Read parameter sets and messages up to the first slice."""
-        for unit in units(data):
+        for unit in units_of_picture(data):
             kind = unit[0] >> 1 & 63
             if kind == _SPS:
                 self._parameters(Bits(unguarded(unit)[2:]), findings)
