@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from adv2e.config.model import Pixel
 from adv2e.effects.pixel.hot_pixels import fill_first_hot_times
-from adv2e.effects.pixel.initial_reference import RANDOM, fill_random_reference
-from adv2e.effects.pixel.leak import fill_first_factors
+from adv2e.effects.pixel.initial_reference import RANDOM, RUNNING, fill_random_reference
+from adv2e.effects.pixel.leak import fill_first_factors, fill_running
 from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
 from adv2e.effects.pixel.shot_noise import fill_first_candidates
 from adv2e.effects.pixel.thresholds import fill_levels
@@ -47,7 +47,7 @@ def initial_state(
     circuit: Circuit,
     first: NDArray[Any],
     start: float,
-    dense: bool,
+    stepping: Stepping | None,
     threads: int,
 ) -> NDArray[np.float64]:
     """Return the state of all pixels before the first frame, (rows of the state, pixels).
@@ -62,8 +62,8 @@ def initial_state(
         Light of the first frame [DN].
     start : float
         Its time [us].
-    dense : bool
-        Whether the circuit is solved in steps of time.
+    stepping : Stepping, optional
+        Of a circuit that is solved in steps of time.
     threads : int
     """
     fill = partial(_over_pixels, threads, first.size)
@@ -75,12 +75,12 @@ def initial_state(
         S_LEAK_DRAW: circuit.leak_jitter > 0,
         S_NOISE_DRAW: circuit.noise_rms > 0,
     }
-    if dense:
+    if stepping is not None:
         used[S_BEYOND] = True
     rows = 1 + max([S_OFF, *(row for row, on in used.items() if on)])
     state = np.zeros((rows, first.size))
-    light = np.ascontiguousarray(first).reshape(-1)
-    stepped.load_strip(light, circuit, np.empty(first.size), state[S_X])
+    light = np.empty(first.size)
+    stepped.load_strip(np.ascontiguousarray(first).reshape(-1), circuit, light, state[S_X])
     levels = pixel.thresholds
     on, off = state[S_ON], state[S_OFF]
     means, spare = (levels.on, levels.off), state[S_REFERENCE]
@@ -96,15 +96,22 @@ def initial_state(
     if pixel.hot_pixels and circuit.hot_rate > 0:
         share, times = pixel.hot_pixels.fraction, state[S_HOT_TIME]
         fill_first_hot_times(seed, share, circuit.hot_rate, start, times)
-    if circuit.leak_jitter > 0:
-        factors = state[S_LEAK_FACTOR]
-        fill_first_factors(seed, circuit.leak_jitter, factors)
     if circuit.noise_rms > 0:
         fill_first_noise(seed, circuit.noise_rms, state[S_NOISE])
+    if stepping is not None:
+        _rest_poles(state, circuit, stepping)
+    leaks = circuit.leak > 0 or circuit.photo_leak > 0
+    if leaks and pixel.initial_reference == RUNNING:
+        level = np.ones(first.size)
+        if stepping is not None:
+            light, level = stepping.first_light(light), level * stepping.first_level()
+        fill(fill_running, circuit, start, light, level, state)
+    elif circuit.leak_jitter > 0:
+        fill_first_factors(seed, circuit.leak_jitter, state[S_LEAK_FACTOR])
     return state
 
 
-def rest_poles(state: NDArray[np.float64], circuit: Circuit, stepping: Stepping) -> None:
+def _rest_poles(state: NDArray[np.float64], circuit: Circuit, stepping: Stepping) -> None:
     """Fill the rows of a state that only steps of time have; all poles are at rest."""
     driven = stepping.first_driven(state[S_X])
     state[S_FIRST] = driven

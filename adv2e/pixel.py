@@ -18,7 +18,7 @@ from adv2e.config.model import Pixel, Sampling
 from adv2e.cores import default_threads
 from adv2e.errors import DataError
 from adv2e.events import Events, empty_events
-from adv2e.initial_state import initial_state, rest_poles
+from adv2e.initial_state import initial_state
 from adv2e.intervals import Part
 from adv2e.kernel import order
 from adv2e.kernel.claims import nothing_claimed
@@ -122,13 +122,13 @@ class PixelArray:
         self.started = False
         self._driver = driver_of(pixel, self.circuit, additions, method)
         start, dense = self._relative(t_ns), self._driver == "run_dense"
-        self.state = initial_state(pixel, self.circuit, first, start, dense, self.threads)
         if dense:
             self._stepping = Stepping(
                 self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
                 self.origin_us, start, coarseness,
             )  # fmt: skip
-            rest_poles(self.state, self.circuit, self._stepping)
+        stepping = self._stepping if dense else None
+        self.state = initial_state(pixel, self.circuit, first, start, stepping, self.threads)
         strips = -(-self.pixels // STRIP)
         self._most = -(-(tile or _TILE) // STRIP)
         # full tiles, and one for each thread that finds the rest, or nothing

@@ -34,6 +34,8 @@ PHOTORECEPTOR_STEPS = 10
 DEAD_CHOICE = 11
 LOSS = 12
 REQUEST = 13
+LEAK_AGE = 14
+LEAK_RUNNING = 15
 
 LARGEST_SEED = (1 << 64) - 1
 """Seeds are the 64 bits of the generator's key."""

@@ -160,6 +160,16 @@ class Stepping:
             x = np.where(foot, below, np.log(np.where(foot, 1.0, light)))
         return np.asarray(x + _at_first(self._course("drive", at)))
 
+    def first_light(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what falls on the pixels at the first frame, whose light is `light` [DN]."""
+        gain = self._course("gain", np.array([self._start]))
+        return gain[0] * light if gain.size else light
+
+    def first_level(self) -> NDArray[Any]:
+        """Return the factor on the ON thresholds at the first frame, (1,) or (pixels,)."""
+        factors = self._factors("on", np.array([self._start]))
+        return factors[0] if factors.size else np.ones(1)
+
     def first_signal(self) -> NDArray[Any]:
         """Return what is added to the signal at the first frame, (1,) or (pixels,)."""
         return _at_first(self._course("signal", np.array([self._start])))

@@ -33,8 +33,8 @@ OPEN = 0.25
 SIDE = 50
 CHECK_S = 2.0
 CHECKED = (
-    ("leak 2 + 6 l", ("pixel.leak.rate_hz=2", "pixel.leak.photo_rate_hz=6")),
-    ("leak 3, shot noise 4", ("pixel.leak.rate_hz=3", "pixel.shot_noise.rate_hz=4")),
+    ("leak 2 + 6 l", ("pixel.leak={rate_hz: 2, photo_rate_hz: 6, jitter: 0}",)),
+    ("leak 3, shot noise 4", ("pixel.leak={rate_hz: 3, jitter: 0}", "pixel.shot_noise.rate_hz=4")),
     ("photoreceptor noise 0.06", ("pixel.photoreceptor_noise.rms=0.06",)),
 )
 
@@ -178,6 +178,7 @@ def closed_forms(measured: Table) -> str:
                 "pixel.leak=null",
                 "pixel.shot_noise=null",
                 "pixel.thresholds.mismatch=0",
+                "pixel.initial_reference=settled",
                 "sampling.L=1",
                 *sets,
             ],

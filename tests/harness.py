@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from reference.agreement import split_by_pixel
+from reference.circuit import Draws
 
 from adv2e.config.model import (
     HotPixels,
@@ -20,6 +21,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
+from adv2e.kernel.workspace import S_HOLD, S_LEAK_FACTOR, S_REFERENCE, S_X
 from adv2e.pixel import PixelArray
 
 QUIET = {"refractory": None, "leak": None, "shot_noise": None}
@@ -57,6 +59,7 @@ def quiet(**sections):
         **QUIET,
         "thresholds": Thresholds(mismatch=0.0),
         "log_response": LogResponse(linear_below=20.0, floor=0.1),
+        "initial_reference": "settled",
     }
     return Pixel(**{**base, **sections})
 
@@ -75,6 +78,23 @@ def start(light, times_ns, pixel, K=10, seed=0, printed=False, **options):
     last = "printed" if printed else "corrected"
     sampling = Sampling(K=K, last_interval=last)
     return PixelArray(pixel, sampling, seed, first, times_ns[0], **options)
+
+
+def first_draws(array, factors=None):
+    """Return where the pixels are in their leak cycles, for the reference.
+
+    `factors` : per pixel, leak speeds of the cycles, of which this one's is put in.
+    """
+    state = array.state
+    hold = state[S_HOLD]
+    release = np.where(hold < 0.0, -np.inf, (hold + array.origin_us) * 1e-6)
+    if factors is not None and array.circuit.leak_jitter > 0:
+        factors = [
+            np.append(now, later[1:])
+            for now, later in zip(state[S_LEAK_FACTOR], factors, strict=True)
+        ]
+    offset = state[S_REFERENCE] - state[S_X]
+    return Draws(reference_offset=offset, first_release=release, leak_factors=factors)
 
 
 def advance(array, light, times_ns, *, chunk=None, threads=1, L=1, printed=False):
@@ -100,12 +120,17 @@ def by_pixel(array, events, exact):
     return split_by_pixel(times, index, events["p"], array.pixels)
 
 
-def solve(light, times_s, pixel, **options):
-    """Return the events of `light` (knots, pixels) as one (events, 2) array a pixel."""
+def solve(light, times_s, pixel, *, begin=None, **options):
+    """Return the events of `light` (knots, pixels) as one (events, 2) array a pixel.
+
+    `begin` is called with the pixel array before the first frame.
+    """
     split = ("chunk", "threads", "L", "printed")
     run = {key: options.pop(key) for key in split if key in options}
     times_ns = [round(float(t) * 1e9) for t in times_s]
     printed = run.get("printed", False)
     array = start(light, times_ns, pixel, exact_times=True, printed=printed, **options)
+    if begin is not None:
+        begin(array)
     events, exact = advance(array, light, times_ns, **run)
     return by_pixel(array, events, exact)

@@ -102,3 +102,15 @@ def test_the_package_reads_what_the_camera_writes(tmp_path):
     config = load_config([str(tmp_path / "one.declared.yaml")], [])
     assert config.pixel.low_pass.dark_cutoff_hz == 20.0
     assert config.frames.full_scale == 65535
+
+
+@pytest.mark.parametrize("noise", [{}, {"photoreceptor_noise": {"rms": 0.02}}])
+def test_leak_goes_on_in_both_from_the_first_moment(noise, tmp_path):
+    given = {"leak": {"rate_hz": 15.0, "jitter": 0.2}, "shot_noise": {"rate_hz": 5.0}, **noise}
+    settings = merged(BENCH, {"pixel": {"initial_reference": "running", **given}})
+    camera = measured(Camera(SCENE, settings, size=SIZE, duration_s=DURATION_S, step_us=50.0))
+    package = simulated(settings, tmp_path / "running.yaml")
+    edges = np.array([0.0, 0.01, 0.02, 0.04, 0.08, DURATION_S]) * 1e6
+    a, b = (np.histogram(e["t"][e["p"] == 1], edges)[0] for e in (camera, package))
+    assert a.min() > 50
+    assert np.all(np.abs(a - b) < 4 * np.sqrt(a + b) + 0.03 * a)

@@ -13,7 +13,7 @@ from adv2e.effects.frames.flicker import Flicker
 from adv2e.effects.pixel.dark_current import DarkCurrent
 from adv2e.effects.pixel.dead_pixels import DeadPixels
 from adv2e.effects.pixel.hot_pixels import HotPixels
-from adv2e.effects.pixel.initial_reference import REFERENCES, SETTLED
+from adv2e.effects.pixel.initial_reference import REFERENCES, RUNNING
 from adv2e.effects.pixel.leak import Leak
 from adv2e.effects.pixel.log_response import LogResponse
 from adv2e.effects.pixel.low_pass import LowPass
@@ -141,10 +141,10 @@ class Pixel(Section):
     """The pixel, in signal order."""
 
     initial_reference: str = parameter(
-        SETTLED,
+        RUNNING,
         unit="-",
-        meaning="settled: reference = signal on the first frame; random: uniform between the"
-        " thresholds",
+        meaning="reference at the first frame; running: where leak has carried it, in a camera that"
+        " was on before; settled: the signal; random: uniform between the thresholds",
         choices=REFERENCES,
     )
     dark_current: DarkCurrent | None = subsection(

@@ -24,7 +24,7 @@ from adv2e.diagnosis.keys import known_keys
 from adv2e.diagnosis.lamps import Lamp
 from adv2e.diagnosis.pulses import WIDTH, has_pulse
 from adv2e.diagnosis.stamps import Service
-from adv2e.effects.pixel.initial_reference import REFERENCES
+from adv2e.effects.pixel.initial_reference import RANDOM, SETTLED
 from adv2e.parameters import Fit
 
 _DECLARED = known_keys(Config)
@@ -153,7 +153,7 @@ def _far_off(ratio: float) -> tuple[float, ...]:
 def _start(values: Any) -> Candidate:
     """Return the other way in which pixels may be when the recording begins."""
     key = "pixel.initial_reference"
-    (other,) = (one for one in REFERENCES if one != get_key(values, key))
+    other = SETTLED if get_key(values, key) == RANDOM else RANDOM
     return Candidate("initial_reference", (), ((),), ((key, other),), of_chance=True)
 
 

@@ -24,6 +24,9 @@ COLUMNS = ORDER_MAX + 2
 # codes of the update forms
 EXACT, FIRST_ORDER_HOLD, ZERO_ORDER_HOLD, EULER, PAPER = range(5)
 
+NEVER = 1e300
+"""Time of what does not happen [us]."""
+
 STRIP = 2048
 """Pixels that are screened together: their scratch rows fit the first two levels of cache."""
 

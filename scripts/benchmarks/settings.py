@@ -23,11 +23,12 @@ IDEAL = (
     "pixel.refractory=null",
     "pixel.leak=null",
     "pixel.shot_noise=null",
+    "pixel.initial_reference=settled",
 )
 """The pixel of every setting, without noise; the settings add to it."""
 
 MISMATCH = ("pixel.thresholds.mismatch=0.03",)
-LEAK = ("pixel.leak.rate_hz=0.1",)
+LEAK = ("pixel.leak={rate_hz: 0.1, jitter: 0}",)
 JITTER = ("pixel.leak.jitter=0.1",)
 DEAD_TIME = ("pixel.refractory.period_us=500",)
 SHOT = ("pixel.shot_noise.rate_hz=5",)

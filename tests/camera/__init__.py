@@ -13,6 +13,7 @@ photoreceptor       poles, slew limit, noise, disturbance by the readout of fram
 thresholds          levels of each pixel, and how they move
 injected            shot noise and hot pixels
 comparator          events, dead time, reference, leak
+running             leak before the recording
 readout             arbiter, losses, stamps
 shutter             frames: exposure, tone curve, clock
 recording           files

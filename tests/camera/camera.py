@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 
 from camera.comparator import Comparator, Moment, Rules
 from camera.drive import drive_stages
-from camera.injected import Candidates, dead_pixels, draw_candidates
+from camera.injected import FALL_AT_WHITE, Candidates, dead_pixels, draw_candidates
 from camera.light import flicker, light_stages
 from camera.photoreceptor import Photoreceptor, corner_of, frame_coupling, gain_of
 from camera.readout import Stream, read_out
 from camera.recording import members, write
+from camera.running import Running, run_before
 from camera.scene import AnyScene
 from camera.settings import BENCH, Settings, check, find, merged
 from camera.shutter import Frame, frames_of
@@ -139,6 +140,7 @@ class _Run:
             dead_pixels(share, pixels, camera.random("dead")),
             self._rules(),
             camera.random("leak"),
+            self._run_before(camera.random("before")),
         )
         self._noise = draw_candidates(truth, pixels, camera.duration_s, camera.random)
 
@@ -169,9 +171,27 @@ class _Run:
     def _first_reference(self, off: Array, rng: np.random.Generator) -> Array:
         """Return the signal; with ``random``, references about it, uniform between thresholds."""
         signal = self._poles.signal
-        if find(self._truth, "pixel.initial_reference", "settled") == "settled":
+        if find(self._truth, "pixel.initial_reference", "settled") != "random":
             return signal
         return signal - (rng.random(len(signal)) * (self._on + off) - off)
+
+    def _run_before(self, rng: np.random.Generator) -> Running | None:
+        """Return what leak has done before; only ``running`` knows."""
+        light = self._drive(np.zeros(1))[0]
+        leak = self._leak(light)
+        if leak is None or find(self._truth, "pixel.initial_reference", "settled") != "running":
+            return None
+        leak_hz = np.broadcast_to(leak[0], self._on.shape) / self._step_s
+        shot = find(self._truth, "pixel.shot_noise.rate_hz", 0.0)
+        noise_hz = shot * (1.0 - FALL_AT_WHITE * light[0] / 255.0)
+        # noise of the photoreceptor soon takes a pixel over the rest of the way
+        rms = find(self._truth, "pixel.photoreceptor_noise.rms", 0.0)
+        overshoot = self._rules().overshoot
+        way = np.maximum(1.0 + overshoot - 3.0 * rms / self._on, 0.05)
+        dead = find(self._truth, "pixel.refractory.period_us", 0.0) * 1e-6
+        jitter = find(self._truth, "pixel.leak.jitter", 0.0)
+        before = run_before(np.maximum(leak_hz, 1e-9), noise_hz, way, dead, jitter, rng)
+        return before._replace(fallen=before.fallen - overshoot)
 
     def _rules(self) -> Rules:
         dead = find(self._truth, "pixel.refractory.period_us", 0.0) * 1e-6 / self._step_s

@@ -24,6 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from camera.running import Running
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
@@ -80,6 +82,8 @@ class Comparator:
     rules : Rules
     rng : Generator
         Of the leak's jitter.
+    running : Running, optional
+        Where the pixels are in their leak cycles; None: where these begin.
     """
 
     def __init__(
@@ -90,6 +94,7 @@ class Comparator:
         dead: Index,
         rules: Rules,
         rng: np.random.Generator,
+        running: Running | None = None,
     ) -> None:
         self._on, self._off, self._rules, self._rng = on, off, rules, rng
         self._reference = signal.copy()
@@ -103,6 +108,9 @@ class Comparator:
         self._beyond = np.empty((2, len(on)), np.bool_)
         self._leak_speed = np.ones(len(on))
         self._draw_leak(np.arange(len(on)))
+        if running is not None:
+            self._reference -= running.fallen * on
+            self._leak_speed[:] = running.speed
         self._times: list[Array] = []
         self._pixels: list[Index] = []
         self._polarities: list[Index] = []

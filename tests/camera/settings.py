@@ -71,7 +71,7 @@ BENCH: dict[str, Any] = {
         "source_follower": None,
         "thresholds": {"on": 0.2, "off": 0.2, "mismatch": 0.02},
         "refractory": {"period_us": 500.0},
-        "leak": {"rate_hz": 0.2, "photo_rate_hz": 0.0},
+        "leak": {"rate_hz": 0.2, "photo_rate_hz": 0.0, "jitter": 0.0},
         "shot_noise": {"rate_hz": 1.0},
         "hot_pixels": None,
     },

@@ -122,6 +122,22 @@ def test_leak_fires_on_at_its_rate():
         np.testing.assert_allclose(of_pixel(stream, i)[0], np.arange(1, 8) / 37.0, atol=1e-9)
 
 
+@pytest.mark.parametrize("noise_hz", [0.0, 10.0])
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+def test_leak_has_gone_on_before_the_recording(noise_hz, jitter):
+    given = pixel(
+        leak={"rate_hz": 20.0, "jitter": jitter},
+        shot_noise={"rate_hz": noise_hz},
+        refractory={"period_us": 500.0},
+        initial_reference="running",
+    )
+    stream = seen(still(0.0), QUIET, hidden=given, size=(60, 50), duration_s=0.12)
+    counts = np.histogram(stream.time[stream.polarity == 1], 8, (0.0, 0.12))[0]
+    cycle = 0.0005 + (-np.expm1(-noise_hz / 20.0) / noise_hz if noise_hz else 1 / 20.0)
+    due = 3000 * 0.015 * (1 / cycle - 0.5 * noise_hz / (1 + noise_hz * 0.0005))
+    assert np.all(np.abs(counts - due) < 4 * np.sqrt(due) + 0.03 * due)
+
+
 def test_leak_through_the_switch_waits_for_the_dead_time():
     given = pixel(leak={"rate_hz": 50.0}, refractory={"period_us": 4321.0})
     apart = intervals(seen(still(80.0), QUIET, hidden=given))

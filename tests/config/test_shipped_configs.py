@@ -74,6 +74,14 @@ def test_v2e_has_the_defaults_of_its_command_line():
     assert pixel.low_pass.dark_cutoff_hz == pytest.approx(pixel.low_pass.cutoff_hz * 20 / 275, 1e-2)
 
 
+@pytest.mark.parametrize("name", ["adv2e", "davis240c", "davis346"])
+def test_cameras_have_run_before_in_good_light(name):
+    pixel = load_config([name]).pixel
+    assert pixel.initial_reference == "running"
+    assert pixel.leak.jitter == 0.1
+    assert pixel.shot_noise.rate_hz == 0.01
+
+
 @pytest.mark.parametrize("name", ["vid2e", "ideal"])
 def test_these_have_neither_filter_nor_noise(name):
     pixel = to_dict(load_config([name]).pixel)

@@ -153,10 +153,11 @@ def forms(name, sets, hints=HINTS):
     return declared, [one for one in library(declared, hints) if one.name == name]
 
 
-@pytest.mark.parametrize("way", ["settled", "random"])
-def test_pixels_may_have_begun_the_other_way(way):
+@pytest.mark.parametrize(
+    ("way", "other"), [("running", "random"), ("settled", "random"), ("random", "settled")]
+)
+def test_pixels_may_have_begun_the_other_way(way, other):
     declared, (one,) = forms("initial_reference", [f"pixel.initial_reference={way}"])
-    (other,) = {"settled", "random"} - {way}
     assert one.applied(declared, []).pixel.initial_reference == other
     assert one.of_chance
 

@@ -122,7 +122,7 @@ def test_converting_a_file_gives_what_simulating_its_frames_does(adv2e, tmp_path
     assert outcome == (0, "", "")
     config = load_config([], sets)
     found = np.concatenate(list(simulate(frames(), [k / 500 for k in range(COUNT)], config)))
-    lines = [f"{t // 10**6}.{t % 10**6:06d}000 {x} {y} {p}" for t, x, y, p in found.tolist()]
+    lines = [f"{t / 1e6:.6f}000 {x} {y} {p}" for t, x, y, p in found.tolist()]
     assert (tmp_path / "out.txt").read_text("ascii").splitlines() == lines
     assert len(lines) > 100
 

@@ -27,7 +27,9 @@ def sections_of(circuit):
     if circuit.dead_time_us is not None:
         sections["refractory"] = Refractory(period_us=circuit.dead_time_us)
     if circuit.leak_hz or circuit.photo_leak_hz:
-        sections["leak"] = Leak(rate_hz=circuit.leak_hz, photo_rate_hz=circuit.photo_leak_hz)
+        sections["leak"] = Leak(
+            rate_hz=circuit.leak_hz, photo_rate_hz=circuit.photo_leak_hz, jitter=0.0
+        )
     return sections
 
 

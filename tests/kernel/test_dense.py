@@ -35,7 +35,7 @@ WITH_EFFECTS = (
     {
         "source_follower": SourceFollower(cutoff_hz=1500.0),
         "refractory": Refractory(period_us=800.0),
-        "leak": Leak(rate_hz=3.0, photo_rate_hz=6.0),
+        "leak": Leak(rate_hz=3.0, photo_rate_hz=6.0, jitter=0.0),
     },
 )
 
@@ -82,7 +82,7 @@ def test_with_dead_time_and_leak(fps, effects):
         sections["refractory"] = Refractory(period_us=800.0)
     if "leak" in effects:
         circuit = replace(circuit, leak_hz=3.0, photo_leak_hz=6.0)
-        sections["leak"] = Leak(rate_hz=3.0, photo_rate_hz=6.0)
+        sections["leak"] = Leak(rate_hz=3.0, photo_rate_hz=6.0, jitter=0.0)
     stimulus = stimuli.standard(fps, L=10, pixels=24, frames=7)
     agreement, _ = compare(stimulus, circuit, sections)
     assert agreement.count_b > 40

@@ -63,7 +63,7 @@ def test_stepped_forms_against_the_twin(update, printed, follower_hz):
     pixel = quiet(
         low_pass=LowPass(update=update),
         refractory=Refractory(period_us=700),
-        leak=Leak(rate_hz=10.0),
+        leak=Leak(rate_hz=10.0, jitter=0.0),
         source_follower=SourceFollower(cutoff_hz=follower_hz) if follower_hz else None,
     )
     circuit = Circuit(

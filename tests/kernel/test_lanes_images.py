@@ -29,7 +29,7 @@ def repeated(light, pixels):
 
 def image(light, tile_size=None, **sections):
     levels = Thresholds(on=0.08, off=0.07, mismatch=0.0)
-    leak = Leak(photo_rate_hz=8.0)
+    leak = Leak(photo_rate_hz=8.0, jitter=0.0)
     pixel = quiet(refractory=Refractory(), leak=leak, thresholds=levels, **sections)
     array = start(light, CLIP_NS, pixel, tile=tile_size, exact_times=True)
     return by_pixel(array, *advance(array, light, CLIP_NS))

@@ -5,7 +5,19 @@ import pytest
 from harness import advance, quiet, start
 from scipy import stats
 
-from adv2e.config.model import HotPixels, Leak, PhotoreceptorNoise, Refractory, ShotNoise
+from adv2e.characterisation.noise import NoisySources, noise_rates
+from adv2e.config.model import (
+    HotPixels,
+    Leak,
+    LowPass,
+    PhotoreceptorNoise,
+    Pixel,
+    Refractory,
+    ResetOvershoot,
+    ShotNoise,
+    SourceFollower,
+    Thresholds,
+)
 from adv2e.kernel.workspace import S_NOISE, S_REFERENCE, S_X
 
 PIXELS = 3000
@@ -61,6 +73,105 @@ def test_leak(dn, photo, jitter):
     spread = 4 * max(jitter, 0.01) / np.sqrt(gaps.size)
     assert gaps.mean() == pytest.approx(1e6 / rate, rel=spread)
     assert gaps.std() / gaps.mean() == pytest.approx(jitter, abs=0.02)
+
+
+def per_second(events, seconds, bins=8):
+    """ON and OFF events a pixel and second in each of `bins` parts of the time."""
+    parts = [
+        np.histogram(events["t"][events["p"] == p], bins, (0, seconds * 1e6))[0] for p in (1, 0)
+    ]
+    return np.array(parts) * bins / (PIXELS * seconds)
+
+
+RUNNING = {"initial_reference": "running", "refractory": Refractory()}
+
+CIRCUITS = {
+    "lanes": {},
+    "no dead time": {"refractory": None},
+    "second pole": {"source_follower": SourceFollower(cutoff_hz=200.0)},
+    "euler": {"low_pass": LowPass(update="euler")},
+    "no filter": {"low_pass": None},
+}
+
+
+@pytest.mark.parametrize("noise_hz", [0.0, 2.0])
+@pytest.mark.parametrize("jitter", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("circuit", CIRCUITS)
+def test_leak_goes_on_from_the_first_moment_as_later(circuit, jitter, noise_hz):
+    """The camera has run before: no burst, no pause, and the rate that `characterise` expects."""
+    dead_s = 2e-3
+    sections = {
+        "refractory": Refractory(period_us=dead_s * 1e6),
+        "thresholds": Thresholds(mismatch=0.03),
+        "leak": Leak(rate_hz=1.0, photo_rate_hz=6.0, jitter=jitter),
+        "shot_noise": ShotNoise(rate_hz=noise_hz) if noise_hz else None,
+        "initial_reference": "running",
+        **CIRCUITS[circuit],
+    }
+    if sections["refractory"] is None:
+        dead_s = 0.0
+    dn, seconds, bins = 85.0, 1.0, 8
+    events, exact = still(dn, quiet(**sections), seconds)
+    sources = NoisySources(leak_hz=1.0, photo_leak_hz=6.0, shot_hz=noise_hz, dead_time_s=dead_s)
+    rates = noise_rates(sources, np.array([dn / 255]))
+    on, off = per_second(events, seconds, bins)
+    parts = PIXELS * seconds / bins
+    # jitter shortens some of the cycles beside noise, and none in the mean without
+    slack = 4 * np.sqrt(rates.on[0] / parts) + 0.5 * jitter**2 * (noise_hz > 0)
+    assert np.abs(on - rates.on[0]).max() < slack
+    assert np.abs(off - rates.off[0]).max() <= 4 * np.sqrt(rates.off[0] / parts)
+    # ON events of pixels at rest are spread evenly, not by the frame or by the cycle
+    assert stats.kstest(exact[events["p"] == 1] * 1e-6, stats.uniform(0, seconds).cdf).pvalue > 1e-3
+    assert np.unique(events["t"], return_counts=True)[1].max() <= 5
+
+
+@pytest.mark.parametrize("sections", [{}, {"shot_noise": None}])
+def test_a_camera_by_default_keeps_what_leak_promises(sections):
+    """Of 3000 pixels at rest some 300 events a second, and never all pixels at once."""
+    pixel = Pixel(**sections)
+    events, _ = still(128.0, pixel, 40.0)
+    shot = pixel.shot_noise.rate_hz if pixel.shot_noise else 0.0
+    sources = NoisySources(leak_hz=0.1, shot_hz=shot, dead_time_s=5e-4)
+    rates = noise_rates(sources, np.array([128 / 255]))
+    assert rates.leak[0] > 0.09
+    on, off = per_second(events, 40.0)
+    assert np.abs(on - rates.on[0]).max() < 4 * np.sqrt(rates.on[0] * 8 / (PIXELS * 40.0))
+    assert np.abs(off - rates.off[0]).max() <= 4 * np.sqrt(rates.off[0] * 8 / (PIXELS * 40.0))
+    assert np.unique(events["t"], return_counts=True)[1].max() <= 3
+
+
+def test_what_has_come_before_is_drawn_pixel_by_pixel():
+    """A pixel's place in its cycle does not depend on the pixels beside it, or on threads."""
+    pixel = quiet(leak=Leak(rate_hz=0.1), **RUNNING)
+    light = np.full((2, 1, PIXELS), 100, np.float32)
+    first, *others = (
+        start(light[:, :, :n], [0], pixel, threads=threads).state
+        for n, threads in ((PIXELS, 1), (PIXELS, 3), (700, 2))
+    )
+    for other in others:
+        assert np.array_equal(other, first[:, : other.shape[1]])
+    fallen = (first[S_X] - first[S_REFERENCE]) / 0.2
+    assert stats.kstest(fallen, "uniform").pvalue > 1e-3
+    steady = start(light, [0], quiet(leak=Leak(rate_hz=0.0), **RUNNING), threads=1).state
+    assert np.array_equal(steady[S_REFERENCE], steady[S_X])
+
+
+@pytest.mark.parametrize("overshoot", [-0.4, 0.4])
+def test_leak_before_the_recording_knows_the_overshoot_of_the_reset(overshoot):
+    sections = {"reset_overshoot": ResetOvershoot(fraction=overshoot), **RUNNING}
+    events, _ = still(80.0, quiet(leak=Leak(rate_hz=5.0), **sections), 1.0)
+    expected = 1 / (5e-4 + (1 + overshoot) / 5.0)
+    on, _ = per_second(events, 1.0)
+    assert np.abs(on - expected).max() < 4 * np.sqrt(expected * 8 / PIXELS)
+
+
+def test_leak_before_the_recording_leaves_room_for_photoreceptor_noise():
+    """Noise takes pixels over the last of their way: those beyond it must not fire at once."""
+    noise = PhotoreceptorNoise(rms=0.03)
+    pixel = quiet(leak=Leak(rate_hz=2.0), photoreceptor_noise=noise, **RUNNING)
+    events, _ = still(128.0, pixel, 0.5, pixels=600)
+    first = np.count_nonzero(events["t"] < 20_000)
+    assert first < 2 * len(events) * 0.04
 
 
 def test_hot_pixels():

@@ -1,8 +1,10 @@
 """The compiled pixel against the slow twin, which shares no code with it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from harness import quiet, solve
+from harness import first_draws, quiet, solve
 from reference.agreement import count_and_time_errors
 from reference.circuit import Circuit, Draws, merge_injected
 from reference.twin import simulate_twin
@@ -32,7 +34,14 @@ def moving_light(knots, pixels, seed=0, step=0.3):
 
 
 def check(light, times, pixel, circuit, draws=None, within_us=0.3, step_us=4.0, **options):
-    kernel = solve(light, times, pixel, **options)
+    draws = draws or Draws()
+
+    def begin(array):
+        nonlocal draws
+        first = first_draws(array, draws.leak_factors)
+        draws = replace(first, injected=draws.injected)
+
+    kernel = solve(light, times, pixel, begin=begin, **options)
     twin = simulate_twin(light, times, circuit, draws, step_us=step_us)
     found = count_and_time_errors(kernel, twin)
     assert found.count_b > 50
@@ -64,7 +73,7 @@ CASES = {
     ),
     "dead time": ({"refractory": Refractory(period_us=900)}, {"dead_time_us": 900.0}),
     "leak": (
-        {"leak": Leak(rate_hz=15, photo_rate_hz=40)},
+        {"leak": Leak(rate_hz=15, photo_rate_hz=40, jitter=0)},
         {"leak_hz": 15.0, "photo_leak_hz": 40.0},
     ),
     "asymmetric": (
@@ -75,7 +84,7 @@ CASES = {
         {
             "source_follower": SourceFollower(cutoff_hz=700),
             "refractory": Refractory(period_us=600),
-            "leak": Leak(rate_hz=15, photo_rate_hz=40),
+            "leak": Leak(rate_hz=15, photo_rate_hz=40, jitter=0),
             "thresholds": Thresholds(on=0.13, off=0.31, mismatch=0),
         },
         {
@@ -144,7 +153,8 @@ def hot_times(pixel, fraction, rate_hz, seed, end_s):
 
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
 @pytest.mark.parametrize("dead_time", [None, 800.0])
-def test_noise_events_and_leak_jitter(dead_time, jitter):
+@pytest.mark.parametrize("first", ["settled", "running"])
+def test_noise_events_and_leak_jitter(first, dead_time, jitter):
     """The same draws handed to both: thinning, order, dead time and references must agree."""
     knots, pixels, seed = 25, 24, 9
     light = moving_light(knots, pixels, seed=6, step=0.15)
@@ -154,6 +164,7 @@ def test_noise_events_and_leak_jitter(dead_time, jitter):
         leak=Leak(rate_hz=20, photo_rate_hz=10, jitter=jitter),
         shot_noise=ShotNoise(rate_hz=150),
         hot_pixels=HotPixels(fraction=0.3, rate_hz=200),
+        initial_reference=first,
     )
     shot = [shot_candidates(i, 150.0, seed, times[-1]) for i in range(pixels)]
     hot = [hot_times(i, 0.3, 200.0, seed, times[-1]) for i in range(pixels)]

@@ -81,6 +81,8 @@ class Draws:
         Must be long enough.
     reference_offset : (pixels,)
         Reference minus signal at the start [ln units].
+    first_release : (pixels,)
+        End of the dead time that is under way at the start [s]; -inf: none is (twin only).
     signal_noise : per pixel, (times [s], values [ln units])
         Noise on the output of the low-pass, linear between its knots (twin only).
     """
@@ -88,6 +90,7 @@ class Draws:
     injected: Sequence[Array] | None = None
     leak_factors: Sequence[Array] | None = None
     reference_offset: Array | None = None
+    first_release: Array | None = None
     signal_noise: Sequence[tuple[Array, Array]] | None = None
 
 

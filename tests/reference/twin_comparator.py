@@ -33,7 +33,8 @@ class Comparator:
         self.on, self.off = circuit.levels(pixels)
         offset = draws.reference_offset
         self.reference = first + (0.0 if offset is None else offset)
-        self.release = np.full(pixels, -np.inf)
+        release = draws.first_release
+        self.release = np.full(pixels, -np.inf) if release is None else release.copy()
         self.injected = draws.injected or [np.empty((0, 3))] * pixels
         self.used = [0] * pixels
         self.due = np.array([c[0, 0] if len(c) else np.inf for c in self.injected])

@@ -18,10 +18,8 @@ import numpy as np
 
 from adv2e import rng
 from adv2e.jit import entry, inlined
-from adv2e.kernel.workspace import S_HOT_DRAW, S_HOT_TIME, Array, Circuit
+from adv2e.kernel.workspace import NEVER, S_HOT_DRAW, S_HOT_TIME, Array, Circuit
 from adv2e.parameters import Fit, Section, parameter
-
-_NEVER = 1e300
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +55,6 @@ def fill_first_hot_times(
 ) -> None:
     """Choose the hot pixels and draw their first times [us]; the others never fire."""
     for i in range(times.shape[0]):
-        times[i] = _NEVER
+        times[i] = NEVER
         if rng.uniforms(seed, rng.HOT_CHOICE, i, 0)[0] < fraction:
             times[i] = start + rng.exponential(seed, rng.HOT_TIME, i, 0) / rate

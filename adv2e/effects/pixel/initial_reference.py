@@ -1,13 +1,16 @@
 r"""What each pixel remembers when the first frame comes.
 
-``settled``: the scene has rested, and every pixel remembers its first frame, so that none fires
-before the light has changed by a whole threshold.  ``random``: the scene moved before, as in a
-piece of a longer recording, and each pixel may be anywhere on its way to its next event:
+``running``: the scene has rested before a camera that was on.  Leak has gone on in it, and every
+pixel is somewhere in its leak cycle, of which :mod:`adv2e.effects.pixel.leak` tells; without leak
+this is ``settled``.  ``settled``: all pixels remember the first frame, as right after a reset of
+the whole sensor.  By leak alone, they fire together a whole period later.  ``random``: the scene
+moved before, as in a piece of a longer recording, and each pixel may be anywhere on its way to its
+next event:
 
 .. math:: x - x_{ref} \sim U(-\theta_{OFF},\ \theta_{ON})
 
-with x the log intensity of the first frame, and the pixel's own thresholds.  It shows in the first
-events of each pixel, and nowhere else.
+with x the log intensity of the first frame, and the pixel's own thresholds.  The choice shows
+in the first events of each pixel, and in the phases of its leak.
 
 References
 ----------
@@ -26,7 +29,7 @@ from adv2e.jit import entry
 
 Array = NDArray[np.float64]
 
-SETTLED, RANDOM = REFERENCES = ("settled", "random")
+RUNNING, SETTLED, RANDOM = REFERENCES = ("running", "settled", "random")
 
 
 @entry

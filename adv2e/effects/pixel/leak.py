@@ -5,9 +5,27 @@ The reset switch leaks, so the reference falls,
 .. math:: \dot r = -(R_0 + R_1\,DN / 255)\, C_{on}\, \xi
 
 with R_0 = ``rate_hz``, R_1 = ``photo_rate_hz``, DN the unfiltered light and C_on that pixel's own
-ON threshold, so that a pixel at rest fires at R_0 + R_1 DN/255.  ``jitter`` is the relative
+ON threshold, so that a pixel at rest fires at R = R_0 + R_1 DN/255.  ``jitter`` is the relative
 standard deviation of the time between two leak events: xi is drawn anew after each event of the
-pixel, as 1/(1 + jitter g) with g normal and cut symmetrically, so that the mean period stays.
+pixel, as 1/(1 + jitter g) with g normal and cut symmetrically, so that the mean period T = 1/R
+stays.
+
+Every event of the pixel takes the reference anew, so that beside noise events of rate N only the
+leak events come that had a whole period without any:
+
+.. math:: \frac{N}{e^{N/R} - 1}
+
+Of 0.1 Hz that is 0.04 Hz beside 0.16 Hz of noise, and next to nothing beside 1 Hz.
+
+A camera has run before it records (``initial_reference: running``).  A pixel has seen the light of
+the first frame for long, and is anywhere in its cycle, which is the dead time d and then the period
+T, unless a noise event ends it.  The age a of the cycle is drawn from
+
+.. math:: p(a, T) \propto p(T) \begin{cases} 1 & a < d \\ e^{-N(a - d)} & d < a < d + T \end{cases}
+
+in which long cycles are met more often than they begin; the reference lies (a - d)/T of a threshold
+below the signal.  Beside photoreceptor noise of standard deviation sigma and corner w, cycles end
+early, at the rate (Kramers) w z exp(-z^2/2)/sqrt(2 pi) at z sigma below the threshold.
 
 References
 ----------
@@ -15,10 +33,14 @@ References
    sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848.
 .. [2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
    CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (0.1 Hz, jitter 10 %).
+.. [3] D. R. Cox, "Renewal theory", Methuen, 1962, chapter 5 (age of the cycle that is under way).
+.. [4] H. A. Kramers, "Brownian motion in a field of force and the diffusion model of chemical
+   reactions", Physica 7(4), 1940, doi:10.1016/S0031-8914(40)90098-2.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,13 +50,25 @@ from adv2e.jit import entry, inlined, kernel
 from adv2e.kernel.workspace import (
     LEAK,
     LIGHT,
+    NEVER,
+    S_BEYOND,
+    S_HOLD,
+    S_HOT_TIME,
     S_LEAK_DRAW,
     S_LEAK_FACTOR,
+    S_NOISE,
     S_ON,
+    S_REFERENCE,
     Array,
     Circuit,
 )
 from adv2e.parameters import Fit, Section, parameter
+
+_MOST = 3.0
+"""Largest deviation of a period, in standard deviations."""
+
+_TRIES = 100
+"""Ages that are drawn for a pixel; none of them is left only where noise leaves leak no time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +78,7 @@ class Leak(Section):
     rate_hz: float = parameter(
         0.1,
         unit="Hz",
-        meaning="ON events a pixel a second from junction leakage",
+        meaning="ON events a pixel a second from junction leakage, where no noise comes between",
         at_least=0,
         source="v2e: 0.01-0.1 Hz",
         fit=Fit(1e-3, 500.0, 2.0, log=True),
@@ -57,7 +91,7 @@ class Leak(Section):
         fit=Fit(1e-2, 1000.0, 5.0, log=True),
     )
     jitter: float = parameter(
-        0.0,
+        0.1,
         unit="-",
         meaning="relative standard deviation of the time between two leak events",
         at_least=0,
@@ -97,8 +131,12 @@ def fill_falls(
 @kernel
 def _factor(seed: np.uint64, jitter: float, i: int, draw: float) -> float:
     """Leak speed of one cycle of pixel i, relative to the nominal one."""
-    g = rng.normal(seed, rng.LEAK_PERIOD, i, draw)
-    return 1.0 / (1.0 + jitter * min(max(g, -3.0), 3.0))
+    return 1.0 / (1.0 + jitter * _cut(rng.normal(seed, rng.LEAK_PERIOD, i, draw)))
+
+
+@kernel
+def _cut(g: float) -> float:
+    return min(max(g, -_MOST), _MOST)
 
 
 @kernel
@@ -115,3 +153,88 @@ def fill_first_factors(seed: np.uint64, jitter: float, factors: Array) -> None:
     """Draw the leak speed of every pixel's first cycle."""
     for i in range(factors.shape[0]):
         factors[i] = _factor(seed, jitter, i, 0)
+
+
+@kernel
+def _met(dead: float, noise: float, period: float) -> float:
+    """Return the mean time that a cycle of this period lasts beside noise of rate `noise` [us]."""
+    return dead + (-math.expm1(-noise * period) / noise if noise > 0.0 else period)
+
+
+@kernel
+def _crossed(to_level: float, left: float, noise: float, corner: float, speed: float) -> float:
+    """Return how often photoreceptor noise was expected to cross the threshold in this cycle.
+
+    to_level, left : distance of the threshold [ln] at the start of the cycle and now; speed : of
+    the reference [ln/us].
+    """
+    first, now = max(to_level / noise, 0.0), max(left / noise, 0.0)
+    passed = math.exp(-0.5 * now * now) - math.exp(-0.5 * first * first)
+    return corner * noise / speed * passed / math.sqrt(2.0 * math.pi)
+
+
+@entry
+def fill_running(
+    lo: int, hi: int, circuit: Circuit, start: float, light: Array, level: Array, state: Array
+) -> None:
+    """Put the pixels lo..hi somewhere in their leak cycles at `start` [us].
+
+    Their references are those right after an event, beside signals at rest.
+
+    Parameters
+    ----------
+    lo, hi : int
+    circuit : Circuit
+    start : float
+    light : (pixels,)
+        What they have seen [DN].
+    level : (pixels,)
+        Factor on the ON threshold.
+    state : (rows, pixels)
+    """
+    seed, jitter, dead = circuit.seed, circuit.leak_jitter, circuit.dead_time
+    for i in range(lo, hi):
+        rate = circuit.leak + circuit.photo_leak * light[i]
+        factor = _factor(seed, jitter, i, 0) if jitter > 0.0 else 1.0
+        way = level[i] + circuit.overshoot
+        fallen, hold = 0.0, -1.0
+        if rate > 0.0 and way > 0.0:
+            noise = circuit.shot_rate * max(1.0 - circuit.shot_fall * light[i], 0.0)
+            if circuit.hot_rate > 0.0 and state[S_HOT_TIME, i] < NEVER:
+                noise += circuit.hot_rate
+            longest = way / rate * (1.0 + jitter * _MOST)
+            most = _met(dead, noise, longest)
+            for draw in range(_TRIES):
+                slowness = 1.0
+                if jitter > 0.0:
+                    slowness += jitter * _cut(rng.normal(seed, rng.LEAK_RUNNING, i, draw))
+                period = way / rate * slowness
+                mean = _met(dead, noise, period)
+                u, v = rng.uniforms(seed, rng.LEAK_AGE, i, draw)
+                if u * most >= mean:
+                    continue
+                age = v * mean - dead
+                if age < 0.0:
+                    factor, fallen, hold = 1.0 / slowness, 0.0, start - age
+                    break
+                if noise > 0.0:
+                    age = -math.log1p(-noise * age) / noise
+                fallen = way * min(age / period, 1.0) - circuit.overshoot
+                if circuit.noise_rms > 0.0:
+                    on, now = state[S_ON, i], state[S_NOISE, i]
+                    corner = circuit.dark + circuit.per_dn * light[i]
+                    crossed = _crossed(
+                        on * way + now, on * (level[i] - fallen) + now, circuit.noise_rms, corner,
+                        on * way / period,
+                    )  # fmt: skip
+                    if u * most >= mean * math.exp(-crossed):
+                        fallen = 0.0
+                        continue
+                factor = 1.0 / slowness
+                break
+        state[S_REFERENCE, i] -= fallen * state[S_ON, i]
+        state[S_HOLD, i] = hold
+        if circuit.overshoot != 0.0:
+            state[S_BEYOND, i] = circuit.overshoot * state[S_ON, i]
+        if jitter > 0.0:
+            state[S_LEAK_FACTOR, i] = factor
