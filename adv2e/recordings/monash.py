@@ -44,6 +44,8 @@ def read_monash(path: Path, file: h5py.File, time_unit: str | None = None) -> Re
         text = str(file.attrs["adv2e"])
         description = parse_description(text, f"{path}: attribute adv2e", gatherer.problems)
     images = hdf5.find(file, "images")
+    if isinstance(images, h5py.Dataset):
+        raise DataError(f"{path}: images is a dataset, must be a group of images")
     names = [f"images/{name}" for name in sorted(images)] if images is not None else []
     found = [hdf5.dataset(file, name) for name in names]
     ours = "s" if description else None

@@ -186,6 +186,15 @@ def test_an_image_of_many_numbers_that_were_never_written(tmp_path):
         list(read_recording(path).images())
 
 
+def test_a_dataset_in_place_of_the_group_of_images(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(whole(path), "a") as file:
+        del file["images"]
+        file.create_dataset("images", (1 << 40,), "f8", chunks=(1 << 16,))
+    with pytest.raises(DataError, match="images is a dataset, must be a group"):
+        read_recording(path)
+
+
 @pytest.mark.parametrize("packed", [False, True])
 def test_events_of_which_nothing_is_there(tmp_path, packed):
     path = tmp_path / "a.h5"
