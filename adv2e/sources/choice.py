@@ -15,6 +15,7 @@ from adv2e.sources.stated import Stated, stated_by
 from adv2e.sources.streams import RAW, Stream, examine_stream
 
 _PACKED_ALPHA = (b"BGRA", b"RGBA", b"ARGB", b"ABGR", b"RBA@", b"BRA@")
+_MOST_BITS = bytes([32])
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,9 @@ def choose(path: str, height: int, pixels: bytes = b"") -> Choice:
 
 
 def _has_alpha(pixels: bytes) -> bool:
-    # planes are counted in the second letter, with the bits behind, or before for big endian
-    kinds = {pixels[:2], pixels[:1:-1]}
+    # planes are counted in the second letter, with the bits behind, or before for big endian; all
+    # letters are names, as Y42B is of three planes
+    kinds = {pixels[:2] for pixels in (pixels, pixels[::-1]) if pixels[3:] <= _MOST_BITS}
     return pixels in _PACKED_ALPHA or bool(kinds & {b"Y4", b"G4", b"Y2"})
 
 

@@ -90,19 +90,47 @@ def test_pictures_that_turn_into_fields_are_those_in_the_file(tmp_path, suffix, 
     assert_ramp(values(open_source(mixed)), RAMP)
 
 
-def test_frames_in_a_stream_that_could_hold_fields_are_not_called_fields(tmp_path):
+@pytest.mark.parametrize("suffix", ["mkv", "mp4", "ts"])
+def test_frames_in_a_stream_that_could_hold_fields_need_no_pyav(tmp_path, suffix, monkeypatch):
     options = {"x264-params": "fake-interlaced=1"}
-    source = open_source(write(tmp_path / "clip.mkv", RAMP, options=options))
-    assert_ramp(values(source), RAMP)
-    assert (source.packages, source.notes) == (("av",), [])
-
-
-@pytest.mark.parametrize("codec", ["libx264", "mpeg2video", "mpeg4", "ffv1"])
-def test_progressive_pictures_need_no_pyav(tmp_path, codec, monkeypatch):
-    path = write(tmp_path / "clip.mkv", RAMP, codec)
+    path = write(tmp_path / f"clip.{suffix}", RAMP, options=options)
     monkeypatch.setitem(sys.modules, "av", None)
     source = open_source(path)
     assert_ramp(values(source), RAMP)
+    assert (source.packages, source.notes) == ((), [])
+
+
+def test_frames_that_are_timed_as_fields_are_those_in_the_file(tmp_path, monkeypatch):
+    path = write(tmp_path / "clip.mp4", RAMP, options={"x264-params": "pic-struct=1"})
+    whole, halves = bytes.fromhex("06010104 80"), bytes.fromhex("06010132 80")
+    data = path.read_bytes()
+    assert data.count(whole) == len(RAMP)
+    path.write_bytes(data.replace(whole, halves))
+    source = open_source(path)
+    assert_ramp(values(source), RAMP)
+    assert source.packages == ("av",)
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(MissingExtraError, match="interlaced"):
+        open_source(path)
+
+
+@pytest.mark.parametrize(
+    ("codec", "pixels"),
+    [
+        *(("libx264", "yuv420p"), ("mpeg2video", "yuv420p"), ("mpeg4", "yuv420p")),
+        *(("ffv1", "yuv420p"), ("libx264", "yuv422p")),
+        *(("mjpeg", "yuvj422p"), ("huffyuv", "yuv422p")),
+    ],
+)
+def test_progressive_pictures_need_no_pyav(tmp_path, codec, pixels, monkeypatch):
+    full = pixels.startswith("yuvj")
+    path = write(tmp_path / "clip.avi", RAMP, codec, pixels, full=full)
+    monkeypatch.setitem(sys.modules, "av", None)
+    source = open_source(path)
+    if full:
+        assert [image.mean() for image in values(source)] == pytest.approx(RAMP, abs=1.5)
+    else:
+        assert_ramp(values(source), RAMP)
     assert source.packages == ()
 
 

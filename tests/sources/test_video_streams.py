@@ -48,7 +48,7 @@ def test_bits_that_are_missing(read, data):
         getattr(Bits(data), read)()
 
 
-def parameters_of_h264(frames_only, colours=None, timing=False):
+def parameters_of_h264(frames_only, colours=None, timing=False, fields_in_frames=False):
     """Return a sequence parameter set of baseline profile."""
     fields = [
         (7, 8),
@@ -60,7 +60,8 @@ def parameters_of_h264(frames_only, colours=None, timing=False):
         ue(3),
         ue(2),
     ]
-    fields += [(frames_only, 1), *([] if frames_only else [(1, 1)]), (1, 1), (0, 1)]
+    fields += [(frames_only, 1), *([] if frames_only else [(fields_in_frames, 1)])]
+    fields += [(1, 1), (0, 1)]
     if colours is None and not timing:
         return b"\0\0\1" + packed(*fields, (0, 1), (1, 1))
     fields += [(1, 1), (0, 1), (0, 1), (colours is not None, 1)]
@@ -78,19 +79,45 @@ def found_by(parser, *pictures, header=b""):
     return findings
 
 
-@pytest.mark.parametrize("frames_only", [True, False])
-def test_h264_that_can_hold_fields(frames_only):
-    found = found_by(H264(), parameters_of_h264(frames_only))
-    assert found.interlaced is not frames_only
+def slice_of_h264(*field):
+    """Return a picture parameter set, and a slice of it; `field` has the flag of a field if any."""
+    slice_ = packed((1, 8), *(ue(n) for n in (0, 7, 0)), (0, 4), *((bit, 1) for bit in field))
+    return b"\0\0\1\x68" + packed(ue(0), ue(0), (1, 1)) + b"\0\0\1" + slice_ + b"\xff"
 
 
 @pytest.mark.parametrize(
-    ("structure", "scan", "fields"), [(0, 0, False), (1, 0, True), (0, 1, True)]
+    ("frames_only", "field", "fields"),
+    [(True, (), False), (False, (0,), False), (False, (1,), True)],
 )
-def test_h264_whose_frames_are_said_to_be_fields(structure, scan, fields):
-    message = packed((structure, 4), (1, 1), (scan, 2), (0, 1))
+def test_h264_is_fields_where_its_slices_are(frames_only, field, fields):
+    parameters = parameters_of_h264(frames_only)
+    assert found_by(H264(), parameters).interlaced is False
+    assert found_by(H264(), parameters + slice_of_h264(*field)).interlaced is fields
+
+
+def test_h264_whose_frames_hold_fields():
+    parameters = parameters_of_h264(False, fields_in_frames=True)
+    assert found_by(H264(), parameters + slice_of_h264(0)).interlaced is True
+
+
+@pytest.mark.parametrize("frames_only", [True, False])
+@pytest.mark.parametrize(
+    ("structure", "scan", "fields"),
+    [
+        *((0, None, False), (1, None, True), (2, None, True), (3, None, True), (4, None, True)),
+        *((5, None, False), (6, None, False), (7, None, False), (8, None, False)),
+        *((0, 0, False), (0, 1, True), (0, 2, False), (1, 0, True), (3, 0, False), (3, 1, True)),
+        *((3, 2, True), (9, None, None)),
+    ],
+)
+def test_h264_whose_timing_tells_of_fields(frames_only, structure, scan, fields):
+    message = packed((structure, 4), *([(0, 1)] if scan is None else [(1, 1), (scan, 2)]), (1, 1))
     unit = b"\0\0\1\x06" + bytes([1, len(message)]) + message + b"\x80"
-    assert found_by(H264(), parameters_of_h264(True, timing=True) + unit).interlaced is fields
+    parameters = parameters_of_h264(frames_only, timing=True, fields_in_frames=True)
+    picture = slice_of_h264(*([] if frames_only else [0]))
+    if fields is None:  # no such structure: the coding decides
+        fields = not frames_only
+    assert found_by(H264(), parameters + unit + picture).interlaced is fields
 
 
 def test_h264_with_lengths_in_place_of_start_codes():
@@ -112,8 +139,8 @@ def test_h264_whose_transfer_is_replaced():
 
 
 def test_what_stands_behind_a_slice_is_not_read():
-    slice_ = b"\0\0\1\x65\x88"
-    assert found_by(H264(), slice_ + parameters_of_h264(False)).interlaced is False
+    parameters = parameters_of_h264(True, (1, 1, 1))
+    assert found_by(H264(), slice_of_h264() + parameters).colours == []
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,17 @@
-"""H.264: parameter sets and the supplemental information before pictures.
+"""H.264: parameter sets, the supplemental information before pictures, and headers of slices.
 
 References
 ----------
-.. [1] ITU-T H.264 (08/2021): 7.3.2.1.1 (sequence parameter set), D.1 (supplemental enhancement
-   information), E.1 (video usability information).
+.. [1] ITU-T H.264 (08/2021): 7.3.2.1.1 (sequence parameter set), 7.3.2.2 (picture parameter set),
+   7.3.3 (slice header), D.1 (supplemental enhancement information), E.1 (video usability
+   information).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from adv2e.sources.colours import Colours, is_stated
@@ -18,10 +20,13 @@ from adv2e.sources.streams.bits import Bits
 
 _START = b"\0\0\1"
 _CHROMA_PROFILES = (100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135)
-_SLICES, _SEI, _SPS = (1, 2, 5), 6, 7
+_SLICES, _SEI, _SPS, _PPS = (1, 2, 5), 6, 7, 8
+_HEADER_BYTES = 32
+"""Of a slice: more than what is read of its header takes."""
 _PICTURE_TIMING, _OTHER_TRANSFER = 1, 147
 _ANY_ASPECT = 255
-_ONE_FIELD, _LAST_OF_ONE_FRAME = (1, 2), 4
+_WHOLE_FRAME, _ONE_FIELD, _LAST_OF_ONE_FRAME, _LAST = 0, (1, 2), 4, 8
+_FRAME_SCAN, _FIELD_SCAN = 0, 1
 
 
 def units(data: bytes) -> Iterator[bytes]:
@@ -98,6 +103,17 @@ class _Timing:
     structure: bool = False
 
 
+@dataclass
+class _Sequence:
+    """What a sequence parameter set says of slices and timing."""
+
+    three_planes_apart: bool = False
+    frame_number_bits: int = 0
+    frames_only: bool = True
+    fields_in_frames: bool = False
+    timing: _Timing = field(default_factory=_Timing)
+
+
 def signal(bits: Bits) -> Colours | None:
     """Read the part of the usability information that H.264 and HEVC share; None: no colours."""
     if bits.flag() and bits.take(8) == _ANY_ASPECT:
@@ -119,31 +135,38 @@ class H264:
     """Parser of H.264 with start codes."""
 
     def __init__(self) -> None:
-        self._timing = _Timing()
+        self._sequences: dict[int, _Sequence] = {}
+        self._sequence_of: dict[int, int] = {}
         self._colours = StatedColours()
 
     def header(self, data: bytes, findings: Findings) -> None:
         """Nothing: OpenCV repeats in the pictures what stands there."""
 
     def picture(self, data: bytes, findings: Findings) -> None:
-        """Read parameter sets and messages up to the first slice."""
+        """Read parameter sets and messages up to the first slice, and how that is coded."""
+        timing = b""
         for unit in units_of_picture(data):
             kind = unit[0] & 31
             if kind == _SPS:
-                self._parameters(Bits(unguarded(unit)[1:]), findings)
+                self._parameters(Bits(unguarded(unit)[1:]))
+            elif kind == _PPS:
+                bits = Bits(unguarded(unit)[1:])
+                self._sequence_of[bits.ue()] = bits.ue()
             elif kind == _SEI:
-                self._messages(unguarded(unit)[1:], findings)
+                timing = self._messages(unguarded(unit)[1:]) or timing
             elif kind in _SLICES:
+                with suppress(IndexError):  # without a header it is no picture
+                    self._slice(Bits(unguarded(unit[:_HEADER_BYTES])[1:]), timing, findings)
                 break
         self._colours.tell(findings)
 
-    def _parameters(self, bits: Bits, findings: Findings) -> None:
+    def _parameters(self, bits: Bits) -> None:
         profile = bits.take(8)
         bits.skip(16)
-        bits.ue()
+        number, sequence = bits.ue(), _Sequence()
         if profile in _CHROMA_PROFILES:
-            _skip_chroma(bits)
-        bits.ue()
+            sequence.three_planes_apart = _read_chroma(bits)
+        sequence.frame_number_bits = bits.ue() + 4
         order = bits.ue()
         if order == 0:
             bits.ue()
@@ -157,19 +180,18 @@ class H264:
         bits.skip(1)
         bits.ue()
         bits.ue()
-        if not bits.flag():  # not frames alone
-            # which pictures are fields, their slices say: some or all, or none
-            findings.interlaced = True
-            return
+        sequence.frames_only = bits.flag()
+        if not sequence.frames_only:
+            sequence.fields_in_frames = bits.flag()
         bits.skip(1)
         if bits.flag():
             for _ in range(4):
                 bits.ue()
-        self._timing = _Timing()
+        self._sequences[number] = sequence
         if bits.flag():
-            self._usability(bits, findings)
+            sequence.timing = self._usability(bits)
 
-    def _usability(self, bits: Bits, findings: Findings) -> None:
+    def _usability(self, bits: Bits) -> _Timing:
         self._colours.usual = signal(bits)
         if bits.flag():
             bits.skip(65)
@@ -180,24 +202,53 @@ class H264:
                 delays, schedules = _delays(bits), schedules + 1
         if schedules:
             bits.skip(1)
-        self._timing = _Timing(delays, bits.flag())
+        return _Timing(delays, bits.flag())
 
-    def _messages(self, data: bytes, findings: Findings) -> None:
+    def _messages(self, data: bytes) -> bytes:
+        """Read messages, and return what is said of the timing of the picture."""
+        timing = b""
         for kind, content in messages(data):
             if kind == _OTHER_TRANSFER and content:
                 self._colours.other_transfer = content[0]
-            elif kind == _PICTURE_TIMING and self._timing.structure:
-                bits = Bits(content)
-                bits.skip(self._timing.skipped_bits)
-                structure = bits.take(4)
-                scan = bits.take(2) if structure <= _LAST_OF_ONE_FRAME and bits.flag() else 0
-                findings.interlaced |= structure in _ONE_FIELD or scan == 1
+            elif kind == _PICTURE_TIMING:
+                timing = content
+        return timing
+
+    def _slice(self, bits: Bits, timing: bytes, findings: Findings) -> None:
+        """Note fields as FFmpeg does, which goes by the timing of a picture before its coding."""
+        bits.ue()
+        bits.ue()
+        sequence = self._sequences.get(self._sequence_of.get(bits.ue(), -1))
+        if sequence is None:
+            return  # cannot be decoded, as at the start of a broadcast
+        bits.skip(2 * sequence.three_planes_apart + sequence.frame_number_bits)
+        a_field = not sequence.frames_only and bits.flag()
+        fields: bool | None = None
+        if timing and sequence.timing.structure:
+            fields = _timed_as_fields(Bits(timing), sequence.timing)
+        findings.interlaced |= a_field or (sequence.fields_in_frames if fields is None else fields)
 
 
-def _skip_chroma(bits: Bits) -> None:
+def _timed_as_fields(bits: Bits, timing: _Timing) -> bool | None:
+    """Whether a message of timing makes FFmpeg flag a picture as fields; None: it does not count.
+
+    What is one field after the other, be it of frames, is flagged as the picture before it, which
+    in FFmpeg may be any where several threads decode.
+    """
+    bits.skip(timing.skipped_bits)
+    structure = bits.take(4)
+    if structure > _LAST:
+        return None
+    scan = bits.take(2) if structure <= _LAST_OF_ONE_FRAME and bits.flag() else None
+    if structure not in _ONE_FIELD and scan in (_FRAME_SCAN, _FIELD_SCAN):
+        return scan == _FIELD_SCAN
+    return _WHOLE_FRAME < structure <= _LAST_OF_ONE_FRAME
+
+
+def _read_chroma(bits: Bits) -> bool:
+    """Read past the kind of chroma; return whether its planes are coded apart."""
     chroma = bits.ue()
-    if chroma == 3:
-        bits.skip(1)
+    apart = chroma == 3 and bits.flag()
     bits.ue()
     bits.ue()
     bits.skip(1)
@@ -205,6 +256,7 @@ def _skip_chroma(bits: Bits) -> None:
         for number in range(12 if chroma == 3 else 8):
             if bits.flag():
                 _skip_scaling(bits, 16 if number < 6 else 64)
+    return apart
 
 
 def _skip_scaling(bits: Bits, size: int) -> None:
