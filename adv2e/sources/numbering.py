@@ -8,8 +8,12 @@ from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import PurePath
+from statistics import median
 
 from adv2e.sources.times import FrameRate
+
+_NO_NUMBERS = 1000
+"""Steps from which on numbers are times: of nanoseconds, microseconds, or decimals of seconds."""
 
 
 def numbering_doubt(paths: Sequence[str], rate: FrameRate) -> str:
@@ -23,10 +27,18 @@ def numbering_doubt(paths: Sequence[str], rate: FrameRate) -> str:
         The rate that was given.
     """
     names = [PurePath(path).name for path in paths]
+    for before, after in pairwise(names):
+        if before != after and PurePath(before).stem == PurePath(after).stem:
+            return f"{before} and {after} differ in their endings alone, and are two frames"
     numbers = _numbers(names)
     if len(numbers) < 2:
         return ""
     steps = [after - before for before, after in pairwise(numbers)]
+    if median(steps) >= _NO_NUMBERS:
+        return (
+            f"the frames' names look like times ({names[0]}, {names[1]}), which --fps leaves"
+            " unread; --timestamps takes a list of them"
+        )
     usual = Counter(steps).most_common(1)[0][0]
     told = []
     if usual > 1:
@@ -61,7 +73,7 @@ def _numbers(names: Sequence[str]) -> list[int]:
         return []
     columns = list(zip(*split, strict=True))
     differ = [at for at, column in enumerate(columns) if len(set(column)) > 1]
-    if len(differ) != 1 or differ[0] % 2 == 0 or max(map(len, columns[differ[0]])) > 18:
+    if len(differ) != 1 or differ[0] % 2 == 0 or max(map(len, columns[differ[0]])) > 20:
         return []
     numbers = [int(text) for text in columns[differ[0]]]
     return numbers if all(before < after for before, after in pairwise(numbers)) else []

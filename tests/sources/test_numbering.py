@@ -40,6 +40,24 @@ def test_gaps_between_numbers_that_rise_by_more_than_one():
 @pytest.mark.parametrize(
     "names",
     [
+        ["1403636579763555584.png", "1403636579813555456.png", "1403636579863555584.png"],
+        ["33333.png", "66667.png", "100000.png"],
+        ["5.175304.png", "5.208604.png", "5.241904.png"],
+    ],
+)
+def test_times_are_not_called_numbers(names):
+    told = doubt(*names)
+    assert told.startswith(f"the frames' names look like times ({names[0]}, {names[1]})")
+    assert "give --fps" not in told
+
+
+def test_one_picture_in_two_formats_is_told():
+    assert doubt("1.jpg", "1.png", "2.jpg", "2.png").startswith("1.jpg and 1.png differ in their")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
         ["1.png", "2.png", "3.png"],
         ["frame_09.png", "frame_10.png", "frame_11.png"],
         ["a.png", "b.png"],
