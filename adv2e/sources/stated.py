@@ -16,12 +16,15 @@ import mmap
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 
 from adv2e.sources.colours import UNSTATED, Colours
+from adv2e.sources.containers.base import DamagedError
+from adv2e.sources.containers.matroska import MAGIC, variable
+from adv2e.sources.containers.mp4 import FIRST, boxes
 
-_MXF, _Y4M, _EBML = b"\x06\x0e\x2b\x34", b"YUV4MPEG2 ", b"\x1a\x45\xdf\xa3"
-_MP4 = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
+_MXF, _Y4M = b"\x06\x0e\x2b\x34", b"YUV4MPEG2 "
 _WITHIN = (b"moov", b"trak", b"mdia", b"minf", b"stbl")
 _SAMPLE_ENTRY = 86
 """Bytes of the description of pictures before the boxes in it, from its size on."""
@@ -61,14 +64,14 @@ def stated_by(path: str | Path) -> Stated:
             mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data,
         ):
             return _read(data)
-    except (OSError, ValueError, struct.error, IndexError):
+    except (DamagedError, OSError, ValueError, struct.error, IndexError):
         return Stated(readable=False)
 
 
 def _read(data: mmap.mmap) -> Stated:
-    if data[4:8] in _MP4:
+    if data[4:8] in FIRST:
         return _mp4(data)
-    if data[:4] == _EBML:
+    if data[:4] == MAGIC:
         return _matroska(data)
     if data[: len(_Y4M)] == _Y4M:
         fields = data[: max(data.find(b"\n", 0, 1000), 0)].split(b" ")
@@ -113,17 +116,8 @@ def _entry_end(data: mmap.mmap, begin: int) -> int:
 
 
 def _boxes(data: mmap.mmap, start: int, stop: int) -> Iterator[tuple[bytes, int, int]]:
-    while start + 8 <= stop:
-        size, kind = struct.unpack_from(">I4s", data, start)
-        head = 8
-        if size == 1:
-            (size,) = struct.unpack_from(">Q", data, start + 8)
-            head = 16
-        end = start + size if size else stop
-        if end < start + head or end > stop:
-            return
-        yield kind, start + head, end
-        start = end
+    """Yield the boxes that lie within as a whole."""
+    return takewhile(lambda box: box[2] <= stop, boxes(data, start, stop))
 
 
 def _matroska(data: mmap.mmap) -> Stated:
@@ -147,16 +141,10 @@ def _elements(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:
     """Yield kind, start and end of the contents of elements before the first cluster."""
     place = 0
     while place < len(data):
-        kind, place = _variable(data, place, keep_marker=True)
-        size, begin = _variable(data, place, keep_marker=False)
+        kind, place = variable(data, place, keep_marker=True)
+        size, begin = variable(data, place, keep_marker=False)
         if kind == _CLUSTER:
             return
         yield kind, begin, begin + size
         into = kind in (_SEGMENT, _TRACKS, _TRACK, _VIDEO, _COLOUR)
         place = begin if into else begin + size
-
-
-def _variable(data: mmap.mmap, place: int, *, keep_marker: bool) -> tuple[int, int]:
-    length = 9 - data[place].bit_length()
-    value = int.from_bytes(data[place : place + length], "big")
-    return value if keep_marker else value & ((1 << 7 * length) - 1), place + length

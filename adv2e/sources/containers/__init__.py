@@ -75,7 +75,7 @@ def examine(path: Path, *, allow_damaged: bool = False) -> Container:
 
 
 def _examine(data: mmap.mmap) -> Container:
-    if data[4:8] in (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot"):
+    if data[4:8] in mp4.FIRST:
         return mp4.examine(data)
     if data[:4] == b"RIFF" and data[8:12] == b"AVI ":
         return avi.examine(data)

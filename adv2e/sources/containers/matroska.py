@@ -36,7 +36,7 @@ def examine(data: mmap.mmap) -> Container:
         elif kind == _TIMESTAMP:
             cluster = _unsigned(data, start, stop)
         elif kind in (_SIMPLE_BLOCK, _BLOCK):
-            track, after = _variable(data, start, keep_marker=False)
+            track, after = variable(data, start, keep_marker=False)
             relative, flags = struct.unpack_from(">hB", data, after)
             if track == video and not flags & _INVISIBLE:
                 ticks.append(cluster + relative)
@@ -57,8 +57,8 @@ def _elements(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:
             ends.pop()
             if len(ends) == 1:
                 return  # past the segment: anything may follow
-        kind, after = _variable(data, place, keep_marker=True)
-        size, start = _variable(data, after, keep_marker=False)
+        kind, after = variable(data, place, keep_marker=True)
+        size, start = variable(data, after, keep_marker=False)
         unknown = size == (1 << 7 * (start - after)) - 1
         stop = ends[-1] if unknown else start + size
         if stop > ends[-1]:
@@ -74,7 +74,7 @@ def _elements(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:
             ends.append(stop)
 
 
-def _variable(data: mmap.mmap, place: int, *, keep_marker: bool) -> tuple[int, int]:
+def variable(data: mmap.mmap, place: int, *, keep_marker: bool) -> tuple[int, int]:
     """Return a number of variable length and the place after it."""
     if place >= len(data):
         raise cut_short(place + 1, len(data))

@@ -19,6 +19,9 @@ from adv2e.sources.containers import fragments
 from adv2e.sources.containers.base import TINY_BYTES, Container, DamagedError, cut_short
 from adv2e.sources.times import NS_PER_S
 
+FIRST = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
+"""Kinds of box that a file can begin with."""
+
 _Span = tuple[int, int]
 """Where the contents of a box begin and end."""
 
