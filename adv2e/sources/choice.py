@@ -14,7 +14,8 @@ from adv2e.sources.colours import HIGH_RANGE, Colours, encoding_of, is_stated
 from adv2e.sources.stated import Stated, stated_by
 from adv2e.sources.streams import RAW, Stream, examine_stream
 
-_PACKED_ALPHA = (b"BGRA", b"RGBA", b"ARGB", b"ABGR", b"RBA@", b"BRA@")
+_PACKED_ALPHA = (b"BGRA", b"RGBA", b"ARGB", b"ABGR", b"RBA@", b"BRA@", b"@RBA", b"@BRA")
+_COLOURS_TOGETHER, _MOST_TOGETHER = (b"RGB", b"BGR"), bytes([48])
 _MOST_BITS = bytes([32])
 
 
@@ -64,6 +65,16 @@ def choose(path: str, height: int, pixels: bytes = b"") -> Choice:
     if not why and stream.transparent and _has_alpha(pixels):
         why = "its pixels could be transparent"
     return Choice(why, colours[-1])
+
+
+def bits_of(pixels: bytes) -> int:
+    """Return the bits of each colour, 8 or more, by FFmpeg's tag of the kind of pixels."""
+    # the tag ends with the number, or begins with it (big endian)
+    for letters, number in ((pixels[:3], pixels[3:]), (pixels[1:], pixels[:1])):
+        if letters in _COLOURS_TOGETHER and number <= _MOST_TOGETHER:
+            return max(ord(number) // 3, 8)
+    ends = (pixels[-1:] + pixels[:1]) or b"\0"
+    return next((byte for byte in ends if 8 < byte <= 16), 8)
 
 
 def _has_alpha(pixels: bytes) -> bool:

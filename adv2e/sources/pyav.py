@@ -250,6 +250,7 @@ def _planes(frame: Any) -> list[NDArray[np.float32]]:
     # shared by interleaved samples, or not in the lowest bits: laid out anew, the same samples
     if len(frame.planes) < count or name.startswith(("p0", "p2", "p4")):
         frame = frame.reformat(format=_planar(frame, bits))
+        count = len(frame.format.components)
     sample = np.dtype(np.uint8 if bits <= 8 else (">u2" if frame.format.is_big_endian else "<u2"))
     planes = []
     for plane in frame.planes[:count]:

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from adv2e.errors import DataError
+from adv2e.errors import DataError, MissingExtraError
 from adv2e.sources import pyav
 from adv2e.sources.base import GivenTimes, Pixels, Selection, Shot, Source
-from adv2e.sources.choice import choose
+from adv2e.sources.choice import bits_of, choose
 from adv2e.sources.colours import Colours, encoding_of, is_stated
 from adv2e.sources.containers import examine
 from adv2e.sources.gaps import gap_doubts
@@ -36,6 +36,7 @@ _FIELDS = (
     "interlaced: each picture is taken whole, with the two fields that it has of different times;"
     " ffmpeg -vf bwdif makes pictures of them"
 )
+_NO_TAG = "OpenCV does not tell what kind of pixels it has"
 _GREY_8, _GREY_16 = b"Y800", b"Y1\x00\x10"
 _DECODER_PIXELS, _DECODERS = 1 << 20, 4
 """Pixels of a frame for which one thread decodes fast enough, and the most threads."""
@@ -76,6 +77,8 @@ class VideoSource(Source):
             self._keep_grey(capture)
             if not any(capture.grab() for _ in range(RETRIES)):
                 raise DataError(f"{path}: no frame in it can be decoded")
+            if not (self._pixels or self._why_pyav):  # one is of grey with alpha, of 16 bits
+                raise MissingExtraError(f"{path}: {_NO_TAG}; reading that", "video")
             self._describe(_load(capture, f"{path}: frame 0"), f"{path}: frame 0")
             self._first_ns = stamp_of(capture)
             if isinstance(capture, pyav.PyavCapture):
@@ -152,9 +155,9 @@ class VideoSource(Source):
             height = int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
         choice = choose(self.path, height, self._pixels)
         self._why_pyav, self._colours = choice.why_pyav, choice.colours
-        # FFmpeg's tags of deeper formats end with the number of bits, or begin with it (big endian)
-        ends = (self._pixels[-1:] + self._pixels[:1]) or b"\0"
-        bits = next((byte for byte in ends if 8 < byte <= 16), 8)
+        if not self._pixels and not self._why_pyav and pyav.is_installed():
+            self._why_pyav = _NO_TAG
+        bits = bits_of(self._pixels)
         if bits > 8 and not self._why_pyav and self._pixels != _GREY_16:
             if pyav.is_installed():
                 self._why_pyav = f"it has {bits} bits a pixel"

@@ -13,7 +13,7 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import ConfigError, DataError, MissingExtraError
 from adv2e.sources import open_source
 from adv2e.sources.base import OVER_BLACK
-from adv2e.sources.choice import choose
+from adv2e.sources.choice import bits_of, choose
 from adv2e.sources.pyav import codes_of
 
 ENCODINGS = {
@@ -263,6 +263,53 @@ def test_ten_bits_are_read_in_full_or_with_eight_and_a_word(tmp_path, monkeypatc
     source = open_source(path)
     assert len(set(light(source))) < 4
     assert [note for note in source.notes if "10 bits" in note and "adv2e[video]" in note]
+
+
+def test_sixteen_bits_of_colours_that_lie_together(tmp_path, monkeypatch):
+    path = packed(tmp_path / "clip.mov", "rgb48be", [(code,) * 3 for code in (30000, 30001)])
+    assert [frame.image.mean() for frame in open_source(path).frames()] == [30000, 30001]
+    monkeypatch.setitem(sys.modules, "av", None)
+    assert [n for n in open_source(path).notes if "16 bits" in n and "adv2e[video]" in n]
+
+
+def packed(path, pixels, colours):
+    """Write PNGs of one colour each, of 16 bits that lie together."""
+    av = pytest.importorskip("av", reason="PyAV writes the video")
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("png", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, pixels
+        for colour in colours:
+            frame = av.VideoFrame(64, 48, pixels)
+            data = np.array(colour, ">u2").tobytes()
+            frame.planes[0].update(data * (frame.planes[0].buffer_size // len(data)))
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    return path
+
+
+@pytest.mark.parametrize(("pixels", "colours"), [("rgba64be", 3), ("ya16be", 1)])
+def test_transparent_pixels_of_sixteen_bits(tmp_path, monkeypatch, pixels, colours):
+    white, half = (65535,) * colours, 32768
+    path = packed(tmp_path / "clip.mov", pixels, [(*white, 65535), (*white, half)])
+    first, second = open_source(path).frames()
+    assert first.alpha is None
+    assert np.allclose(second.alpha, 0.5, atol=0.01)
+    assert second.image.min() == 65535
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(MissingExtraError, match=r"adv2e\[video\]"):
+        open_source(path)
+
+
+@pytest.mark.parametrize(
+    ("tag", "bits"),
+    [
+        *((b"RGB\x0f", 8), (b"RGB\x10", 8), (b"RGB\x18", 8), (b"RGB0", 16), (b"0BGR", 16)),
+        *((b"BGRA", 8), (b"\0BGR", 8), (b"Y3\x0b\x0a", 10), (b"\x0a\x0b3Y", 10), (b"Y42B", 8)),
+        *((b"I420", 8), (b"", 8)),
+    ],
+)
+def test_bits_of_colours_by_the_tag_of_pixels(tag, bits):
+    assert bits_of(tag) == bits
 
 
 ALPHA = {
