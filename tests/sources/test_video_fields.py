@@ -100,6 +100,27 @@ def test_frames_in_a_stream_that_could_hold_fields_need_no_pyav(tmp_path, suffix
     assert (source.packages, source.notes) == ((), [])
 
 
+@pytest.mark.parametrize("suffix", ["mkv", "mp4", "flv"])
+def test_fields_cut_out_of_open_groups_of_pictures(tmp_path, suffix, monkeypatch):
+    av = pytest.importorskip("av")
+    options = {"x264-params": "tff=1:open-gop=1:keyint=10:min-keyint=10:scenecut=0:b-adapt=0"}
+    whole, path = write(tmp_path / "whole.mp4", RAMP, options=options), tmp_path / f"cut.{suffix}"
+    with av.open(str(whole)) as source, av.open(str(path), "w") as target:
+        copied = target.add_stream_from_template(source.streams.video[0])
+        keys = 0
+        for packet in source.demux(video=0):
+            keys += packet.is_keyframe
+            if keys > 1 and packet.dts is not None:
+                packet.stream = copied
+                target.mux(packet)
+    source = open_source(path, allow_damaged=True)  # pictures that need those cut off
+    assert_ramp(values(source)[-15:], RAMP[-15:])
+    assert source.packages == ("av",)
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(MissingExtraError, match="interlaced"):
+        open_source(path)
+
+
 def test_frames_that_are_timed_as_fields_are_those_in_the_file(tmp_path, monkeypatch):
     path = write(tmp_path / "clip.mp4", RAMP, options={"x264-params": "pic-struct=1"})
     whole, halves = bytes.fromhex("06010104 80"), bytes.fromhex("06010132 80")

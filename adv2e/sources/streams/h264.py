@@ -56,6 +56,21 @@ def units_of_picture(data: bytes) -> Iterator[bytes]:
         yield data[begin + 4 : end]
 
 
+def _units_of_header(data: bytes) -> Iterator[bytes]:
+    """Yield parameter sets, between start codes or as ISO/IEC 14496-15, 5.3.3.1 has them."""
+    if data[:1] != b"\1":
+        yield from units(data)
+        return
+    place = 5
+    for mask in (31, 255):
+        count, place = data[place] & mask, place + 1
+        for _ in range(count):
+            begin = place + 2
+            place = begin + int.from_bytes(data[place:begin], "big")
+            if place > begin:
+                yield data[begin:place]
+
+
 def unguarded(unit: bytes) -> bytes:
     """Return a unit without the bytes that guard against start codes."""
     return unit.replace(b"\0\0\3", b"\0\0")
@@ -140,18 +155,21 @@ class H264:
         self._colours = StatedColours()
 
     def header(self, data: bytes, findings: Findings) -> None:
-        """Nothing: OpenCV repeats in the pictures what stands there."""
+        """Read parameter sets: OpenCV repeats them in pictures that all can begin with, no others.
+
+        Videos cut from such as have open groups of pictures may have none of these.
+        """
+        with suppress(IndexError):  # what is damaged there FFmpeg cannot read either
+            for unit in _units_of_header(data):
+                self._parameter_set(unit)
 
     def picture(self, data: bytes, findings: Findings) -> None:
         """Read parameter sets and messages up to the first slice, and how that is coded."""
         timing = b""
         for unit in units_of_picture(data):
             kind = unit[0] & 31
-            if kind == _SPS:
-                self._parameters(Bits(unguarded(unit)[1:]))
-            elif kind == _PPS:
-                bits = Bits(unguarded(unit)[1:])
-                self._sequence_of[bits.ue()] = bits.ue()
+            if kind in (_SPS, _PPS):
+                self._parameter_set(unit)
             elif kind == _SEI:
                 timing = self._messages(unguarded(unit)[1:]) or timing
             elif kind in _SLICES:
@@ -159,6 +177,13 @@ class H264:
                     self._slice(Bits(unguarded(unit[:_HEADER_BYTES])[1:]), timing, findings)
                 break
         self._colours.tell(findings)
+
+    def _parameter_set(self, unit: bytes) -> None:
+        bits = Bits(unguarded(unit)[1:])
+        if unit[0] & 31 == _SPS:
+            self._parameters(bits)
+        elif unit[0] & 31 == _PPS:
+            self._sequence_of[bits.ue()] = bits.ue()
 
     def _parameters(self, bits: Bits) -> None:
         profile = bits.take(8)
