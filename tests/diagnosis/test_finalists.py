@@ -2,18 +2,20 @@
 
 from made_up_laboratory import RECORDING, MadeUpLaboratory, candidates
 
-from adv2e.config import Config, load_config
+from adv2e.config import load_config
 from adv2e.diagnosis.candidates import Candidate
 from adv2e.diagnosis.finalists import finalists
 from adv2e.diagnosis.search import Search
+
+NOISE = ["pixel.shot_noise.rate_hz=1"]  # of which there can be less, too
 
 
 def test_a_third_form_of_an_effect_keeps_no_other_effect_out():
     """All three forms of other thresholds do as well; shot noise is the best of the others."""
     alike = {"pixel.thresholds.off": "pixel.thresholds.on"}
     laboratory = MadeUpLaboratory(strength=4.0, alike=alike)
-    observed = laboratory.measure(load_config([], ["pixel.thresholds.on=0.3"]), RECORDING)
-    search = Search(laboratory, observed, Config(), candidates())
+    observed = laboratory.measure(load_config([], ["pixel.thresholds.on=0.3", *NOISE]), RECORDING)
+    search = Search(laboratory, observed, load_config([], NOISE), candidates())
     assert sum(one.name == "thresholds" for one in search.candidates) == 3
     names = [trial.name for trial in finalists(search.bench, search.declared, search.candidates)]
     assert names[:3] == ["thresholds", "thresholds", "shot_noise"]
@@ -23,10 +25,10 @@ def test_a_third_form_of_an_effect_keeps_no_other_effect_out():
 def test_what_changes_chance_alone_is_simulated_often_whatever_its_misfit():
     """A start at random moves no mean here, and six others lower the misfit."""
     laboratory = MadeUpLaboratory(strength=4.0)
-    observed = laboratory.measure(load_config([], ["pixel.thresholds.on=0.3"]), RECORDING)
+    observed = laboratory.measure(load_config([], ["pixel.thresholds.on=0.3", *NOISE]), RECORDING)
     extra = (("pixel.initial_reference", "random"),)
     for of_chance in (False, True):
         start = Candidate("initial_reference", (), ((),), extra, of_chance=of_chance)
-        search = Search(laboratory, observed, Config(), [*candidates(), start])
+        search = Search(laboratory, observed, load_config([], NOISE), [*candidates(), start])
         trials = finalists(search.bench, search.declared, search.candidates)
         assert ("initial_reference" in [trial.name for trial in trials]) == of_chance
