@@ -298,10 +298,12 @@ class Staging(unfinished.Unfinished):
             return False
         for output in self._outputs:
             if output.temporary.is_dir():
-                # under its new name nobody adds anything to it
+                # under its new name nobody adds anything to it, but for what was under way
                 gone = output.temporary.with_name(output.temporary.name + "-")
                 output.temporary.rename(gone)
-                shutil.rmtree(gone)
+                shutil.rmtree(gone, ignore_errors=True)
+                if gone.exists():
+                    shutil.rmtree(gone)
         self._is_shared = False
         self.discard()
         return not any(os.path.lexists(output.temporary) for output in self._outputs)

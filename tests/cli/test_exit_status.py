@@ -154,6 +154,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGTERM, signal.SIG_DFL)
 from adv2e.sinks.staging import Staging
 pipeline = types.ModuleType("adv2e.pipeline")
+def wait():
+    for _ in range(600):
+        time.sleep(0.05)  # a signal that comes just as it begins is met after it
 def convert(*args, **options):
     staging = Staging(overwrite=False)
     file = staging.file(pathlib.Path("made", "out.txt"))
@@ -172,7 +175,7 @@ from adv2e.cli import main
 main(["convert", "clip.mp4"])
 """
 
-SLEEPING = "print('ready', flush=True); time.sleep(30)"
+SLEEPING = "print('ready', flush=True); wait()"
 
 WANTED = """
         lock = threading.Lock()
@@ -195,7 +198,7 @@ ADDING = """
         threading.Thread(target=add, daemon=True).start()
         time.sleep(0.1)
         print('ready', flush=True)
-        time.sleep(30)
+        wait()
 """
 """A thread goes on making files in the folder."""
 
@@ -205,7 +208,7 @@ COMING_INTO_PLACE = """
             rename(path, target)
             pathlib.Path.rename = rename
             print('ready', flush=True)
-            time.sleep(30)
+            wait()
         pathlib.Path.rename = slowly
         staging.commit()
 """
@@ -213,7 +216,7 @@ COMING_INTO_PLACE = """
 NOT_REMOVED = """
         Staging.remove_now = lambda staging: False  # as where open files cannot be
         print('ready', flush=True)
-        time.sleep(30)
+        wait()
 """
 
 
