@@ -20,11 +20,11 @@ from itertools import takewhile
 from pathlib import Path
 
 from adv2e.sources.colours import UNSTATED, Colours
+from adv2e.sources.containers import matroska, mxf, y4m
 from adv2e.sources.containers.base import DamagedError
-from adv2e.sources.containers.matroska import MAGIC, variable
+from adv2e.sources.containers.matroska import variable
 from adv2e.sources.containers.mp4 import FIRST, boxes
 
-_MXF, _Y4M = b"\x06\x0e\x2b\x34", b"YUV4MPEG2 "
 _WITHIN = (b"moov", b"trak", b"mdia", b"minf", b"stbl")
 _SAMPLE_ENTRY = 86
 """Bytes of the description of pictures before the boxes in it, from its size on."""
@@ -71,12 +71,12 @@ def stated_by(path: str | Path) -> Stated:
 def _read(data: mmap.mmap) -> Stated:
     if data[4:8] in FIRST:
         return _mp4(data)
-    if data[:4] == MAGIC:
+    if data[:4] == matroska.MAGIC:
         return _matroska(data)
-    if data[: len(_Y4M)] == _Y4M:
+    if data[: len(y4m.MAGIC)] == y4m.MAGIC:
         fields = data[: max(data.find(b"\n", 0, 1000), 0)].split(b" ")
         return Stated(interlaced=any(field in (b"It", b"Ib", b"Im") for field in fields))
-    return Stated(readable=data[:4] != _MXF)
+    return Stated(readable=data[:4] != mxf.MAGIC)
 
 
 def _mp4(data: mmap.mmap) -> Stated:

@@ -13,7 +13,6 @@ from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.ticks import LARGEST_NS
 
@@ -64,13 +63,6 @@ def seconds(t_ns: int) -> str:
     sign = "-" if t_ns < 0 else ""
     whole, part = divmod(abs(t_ns), NS_PER_S)
     return sign + (f"{whole}.{part:09d}".rstrip("0").rstrip("."))
-
-
-def seconds_to_ns(times: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return float64 times [s] as integer nanoseconds, with no loss beyond that of the float."""
-    whole = np.floor(times)
-    # the fraction is exact in float64, while t * 1e9 would round a second time
-    return whole.astype(np.int64) * NS_PER_S + np.rint((times - whole) * NS_PER_S).astype(np.int64)
 
 
 def constant_rate(

@@ -12,8 +12,8 @@ from adv2e.sources.times import (
     constant_rate,
     parse_ns,
     seconds,
-    seconds_to_ns,
 )
+from adv2e.ticks import NS, S, to_ticks
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_frame_rate_does_not_drift():
 def test_float_seconds_of_the_epoch_keep_what_the_float_holds():
     t = np.array([1468941032.229165635, -0.25])
     exact = [round(Fraction(float(value)) * 10**9) for value in t]
-    assert seconds_to_ns(t).tolist() == exact
+    assert to_ticks(t, S, NS, "t").tolist() == exact
 
 
 def rounded(rate, count, tick=1_000_000):
