@@ -15,7 +15,7 @@ __all__ = ["Config", "__version__", "load_config", "simulate"]
 TYPE_CHECKING = False  # as in `typing`, which takes longer to import than all else here
 if TYPE_CHECKING:
     from adv2e.config import Config, load_config
-    from adv2e.simulation import simulate
+    from adv2e.conversion.simulation import simulate
 
 
 def __getattr__(name: str) -> object:
@@ -25,7 +25,7 @@ def __getattr__(name: str) -> object:
 
         return getattr(config, name)
     if name == "simulate":
-        from adv2e.simulation import simulate  # noqa: PLC0415
+        from adv2e.conversion.simulation import simulate  # noqa: PLC0415
 
         return simulate
     raise AttributeError(f"module 'adv2e' has no attribute {name!r}")

@@ -28,8 +28,8 @@ def main() -> None:
     if has_usual:  # it has a traceback printed
         signal.signal(signal.SIGINT, lambda number, frame: os._exit(128 + number))
     _fill_standard_streams()
-    from adv2e.stopping import stop_on_signals  # noqa: PLC0415
-    from adv2e.streams import keep_errors_for_ourselves  # noqa: PLC0415
+    from adv2e.process.signals import stop_on_signals  # noqa: PLC0415
+    from adv2e.process.standard_error import keep_errors_for_ourselves  # noqa: PLC0415
 
     if has_usual:
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -27,8 +27,8 @@ from benchmarks.report import peak_text, table
 from benchmarks.settings import ALL, IDEAL, Plan, stepped
 from writing.pyplot import load_pyplot
 
-from adv2e.cores import default_threads
 from adv2e.errors import Adv2eError
+from adv2e.process.cores import default_threads
 
 BASE = Clip(width=346, height=260, frames=97)
 QUICK_BASE = replace(BASE, frames=17)

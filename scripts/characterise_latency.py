@@ -19,10 +19,10 @@ import numpy as np
 from writing.markdown import table
 
 from adv2e import simulate
-from adv2e.characterisation.characterise import Settings, characterise
-from adv2e.characterisation.declared import read_declared
-from adv2e.characterisation.table import Table, parse_table
 from adv2e.config import Config, from_dict
+from adv2e.diagnosis.tables.characterise import Settings, characterise
+from adv2e.diagnosis.tables.declared import read_declared
+from adv2e.diagnosis.tables.table import Table, parse_table
 from adv2e.errors import Adv2eError, DataError
 from adv2e.reports.result import Diagnosis
 

@@ -19,11 +19,11 @@ from characterisation.iebcs import Level, read_levels
 from writing.markdown import table
 
 from adv2e import simulate
-from adv2e.characterisation.characterise import Settings, characterise, problem_of
-from adv2e.characterisation.declared import read_declared
-from adv2e.characterisation.noise_problem import NoiseProblem
-from adv2e.characterisation.table import Table, parse_table
 from adv2e.config import Config, load_config
+from adv2e.diagnosis.tables.characterise import Settings, characterise, problem_of
+from adv2e.diagnosis.tables.declared import read_declared
+from adv2e.diagnosis.tables.noise_problem import NoiseProblem
+from adv2e.diagnosis.tables.table import Table, parse_table
 from adv2e.errors import Adv2eError
 from adv2e.reports.result import Diagnosis
 

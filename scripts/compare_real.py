@@ -26,10 +26,10 @@ from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config, load_config
 from adv2e.config.model import INTERPOLATIONS
-from adv2e.diagnosis.nuisances import TOLERANCE, match_totals, totals, with_thresholds
+from adv2e.diagnosis.fitting.nuisances import TOLERANCE, match_totals, totals, with_thresholds
 from adv2e.errors import Adv2eError
 from adv2e.events import Events, empty_events
-from adv2e.sources.times import seconds
+from adv2e.sources.times.instants import seconds
 
 CONFIGS = "adv2e,paper,v2e,vid2e,ideal"
 

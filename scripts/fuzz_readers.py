@@ -38,10 +38,11 @@ def prepare() -> None:
     cv2.setNumThreads(1)
     for name in (
         *("cli.info", "cli.convert", "cli.render", "cli.compare", "cli.config", "cli.characterise"),
-        *("inspection.inspect", "inspection.report", "recordings.monash", "recordings.npz"),
-        *("recordings.text", "recordings.davis240c", "recordings.hdf5", "rendering", "pipeline"),
-        *("comparison.compare", "comparison.report", "sources.video", "sources.npy"),
-        *("sources.images", "sources.davis240c", "simulation", "characterisation.characterise"),
+        *("inspection.inspect", "inspection.report", "rendering", "comparison.compare"),
+        *("comparison.report", "diagnosis.tables.characterise"),
+        *(f"formats.{name}" for name in ("monash.reader", "npz", "hdf5", "text.reader")),
+        *("formats.davis240c.reader", "conversion.pipeline", "conversion.simulation"),
+        *(f"sources.{name}" for name in ("video.source", "images.source", "npy", "davis240c")),
     ):
         importlib.import_module(f"adv2e.{name}")
     from adv2e import load_config, simulate  # noqa: PLC0415

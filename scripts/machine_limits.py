@@ -32,10 +32,10 @@ from benchmarks.processes import number
 from numpy.typing import NDArray
 from writing.markdown import table
 
-from adv2e.cores import default_threads
 from adv2e.events import Events, make_events, sort_events
-from adv2e.sinks import open_sink
-from adv2e.sinks.text import text_blocks
+from adv2e.formats.text.writer import text_blocks
+from adv2e.formats.writing import open_sink
+from adv2e.process.cores import default_threads
 
 _compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
 

@@ -17,10 +17,10 @@ import click
 import numpy as np
 from writing.markdown import table
 
-from adv2e.diagnosis.pulses import Pulse, pulse_of
-from adv2e.diagnosis.stream import Stream
+from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.hints.pulses import Pulse, pulse_of
 from adv2e.errors import Adv2eError, DataError
-from adv2e.recordings import read_recording
+from adv2e.formats.reading import read_recording
 
 COLUMNS = (
     "recording", "events", "frames apart [ms]", "ON in bursts", "OFF in bursts",

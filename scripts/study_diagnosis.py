@@ -143,7 +143,7 @@ def run(
     from study_diagnosis_parts import run as running  # noqa: PLC0415 - it loads the simulator
     from study_diagnosis_parts.camera import catalogue  # noqa: PLC0415
 
-    from adv2e.diagnosis.library import names as library_names  # noqa: PLC0415
+    from adv2e.diagnosis.fitting.library import names as library_names  # noqa: PLC0415
 
     say = partial(click.echo, err=True)
     setup = _setup(**recording)

@@ -34,10 +34,10 @@ from writing.pyplot import load_pyplot
 from adv2e.comparison.grids import Grid, smoothed, voxel_grid
 from adv2e.comparison.windows import cut, frame_windows
 from adv2e.config.model import Config, Frames, Pixel, Sampling
+from adv2e.conversion.simulation import events_from_light
 from adv2e.errors import Adv2eError
 from adv2e.events import Events
-from adv2e.simulation import events_from_light
-from adv2e.upsampling import make_upsampler
+from adv2e.light.interpolation import make_upsampler
 
 RATES = (24.0, 30.0, 60.0)
 """Frames a second."""

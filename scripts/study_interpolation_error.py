@@ -29,17 +29,17 @@ from study_diagnosis_parts.options import Names, sampling
 from writing import markdown
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis.evidence import Evidence, read_evidence
-from adv2e.diagnosis.frame_error import FrameError
-from adv2e.diagnosis.interpolation import between_frames, every
-from adv2e.diagnosis.keys import with_keys
-from adv2e.diagnosis.light import scene_of
-from adv2e.diagnosis.markers import BOTH, Markers
-from adv2e.diagnosis.metric import compressed
-from adv2e.diagnosis.pilot import COUNT, Pilot
-from adv2e.diagnosis.scene import Placed
-from adv2e.diagnosis.simulations import Simulator
-from adv2e.diagnosis.stream import Stream
+from adv2e.diagnosis.data.evidence import Evidence, read_evidence
+from adv2e.diagnosis.data.light import scene_of
+from adv2e.diagnosis.data.scene import Placed
+from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.fitting.keys import with_keys
+from adv2e.diagnosis.fitting.simulations import Simulator
+from adv2e.diagnosis.statistics import BOTH, Markers
+from adv2e.diagnosis.statistics.frame_error import FrameError
+from adv2e.diagnosis.statistics.interpolation import between_frames, every
+from adv2e.diagnosis.statistics.metric import compressed
+from adv2e.diagnosis.statistics.pilot import COUNT, Pilot
 
 Array = NDArray[np.float64]
 

@@ -43,12 +43,12 @@ from adv2e.comparison.grids import Grid, voxel_grid
 from adv2e.comparison.smoothed_error import smoothed_errors
 from adv2e.comparison.windows import cut, frame_windows
 from adv2e.config.model import Config, Pixel, Sampling
+from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.pixel.log_response import LogResponse
 from adv2e.effects.pixel.thresholds import Thresholds
 from adv2e.errors import Adv2eError
 from adv2e.events import Events
-from adv2e.simulation import events_from_light
 from adv2e.synthetic import Scene
 from adv2e.synthetic.scene import GO_S, PERIOD_S, RAMP_S
 

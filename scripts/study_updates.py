@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from adv2e.config.model import LogResponse, LowPass, Pixel, Sampling, Thresholds
 from adv2e.kernel.workspace import S_LAG, S_REFERENCE, S_X
-from adv2e.pixel import PixelArray
+from adv2e.pixel.array import PixelArray
 
 INTERVAL_NS = round(1e9 / 240)
 FORMS = ("paper", "zero_order_hold", "euler", "first_order_hold", "exact")

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pytest
 
 from adv2e.cli import main
-from adv2e.garbage import collect_seldom
+from adv2e.process.garbage import collect_seldom
 
 collect_seldom()  # to search the compiler's objects for cycles took a fourteenth of the run
 
@@ -57,7 +57,7 @@ class Summary:
 @pytest.fixture
 def pipeline(monkeypatch):
     """Stand in for the conversion: remembers the call, and ends as `ending` says."""
-    module = ModuleType("adv2e.pipeline")
+    module = ModuleType("adv2e.conversion.pipeline")
     module.calls = []
     module.ending = Summary
 
@@ -66,5 +66,5 @@ def pipeline(monkeypatch):
         return module.ending()
 
     module.convert = convert
-    monkeypatch.setitem(sys.modules, "adv2e.pipeline", module)
+    monkeypatch.setitem(sys.modules, "adv2e.conversion.pipeline", module)
     return module

@@ -22,7 +22,7 @@ from adv2e.config.model import (
     Thresholds,
 )
 from adv2e.kernel.workspace import S_HOLD, S_LEAK_FACTOR, S_REFERENCE, S_X
-from adv2e.pixel import PixelArray
+from adv2e.pixel.array import PixelArray
 
 QUIET = {"refractory": None, "leak": None, "shot_noise": None}
 """Everything off that is on by default, but for the mismatch of thresholds."""

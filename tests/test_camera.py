@@ -11,7 +11,7 @@ from camera.settings import BENCH, merged
 from adv2e import load_config, simulate
 from adv2e.comparison.smoothed_error import smoothed_errors
 from adv2e.events import EVENT_DTYPE
-from adv2e.recordings import read_recording
+from adv2e.formats.reading import read_recording
 
 SIZE, DURATION_S, FAST_HZ = (24, 18), 0.3, 4000.0
 SCENE = patchwork(SIZE, seed=6, speed=1.5)

@@ -12,7 +12,7 @@ from camera.catalogue import cases
 
 from adv2e.cli import COMMANDS
 from adv2e.config import load_config
-from adv2e.diagnosis.library import names
+from adv2e.diagnosis.fitting.library import names
 
 TEXT = (Path(__file__).resolve().parents[1] / "README.md").read_text()
 

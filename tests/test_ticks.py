@@ -8,7 +8,7 @@ import pytest
 
 from adv2e import simulate
 from adv2e.errors import DataError
-from adv2e.recordings import read_recording
+from adv2e.formats.reading import read_recording
 from adv2e.sources import open_source
 from adv2e.ticks import LARGEST_NS, NS, US, S, to_ticks
 

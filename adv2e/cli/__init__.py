@@ -15,8 +15,8 @@ import click
 
 from adv2e import __version__
 from adv2e.cli.run import flush_stdout, print_any_character, reporting
-from adv2e.garbage import collect_seldom
-from adv2e.stopping import stopping_on_signals
+from adv2e.process.garbage import collect_seldom
+from adv2e.process.signals import stopping_on_signals
 
 COMMANDS = {
     "convert": "Turn a video or frames into events.",

@@ -89,13 +89,13 @@ def command(
       adv2e characterise latency.csv --where bias=0 --judge camera=CAM2 -o judged/
       adv2e characterise noise.csv -c v2e -o noise/
     """
-    from adv2e.characterisation.characterise import Settings, characterise
-    from adv2e.characterisation.declared import read_declared
-    from adv2e.characterisation.report import summary, write_reports
-    from adv2e.characterisation.table import read_table
-    from adv2e.names import shown
+    from adv2e.diagnosis.tables.characterise import Settings, characterise
+    from adv2e.diagnosis.tables.declared import read_declared
+    from adv2e.diagnosis.tables.report import summary, write_reports
+    from adv2e.diagnosis.tables.table import read_table
+    from adv2e.files.apart import check_apart
+    from adv2e.files.names import shown
     from adv2e.reports.files import check_folder
-    from adv2e.sinks.apart import check_apart
 
     if output is not None:
         check_folder(output, overwrite=overwrite)

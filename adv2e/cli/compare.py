@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from adv2e.cli.options import Log
     from adv2e.comparison.compare import Resimulation
     from adv2e.config import Config
-    from adv2e.recordings import Recording
+    from adv2e.formats.reading import Recording
     from adv2e.sources import Source
 
 
@@ -67,7 +67,7 @@ def command(
       adv2e compare measured.txt simulated.txt --window 0.02
     """
     from adv2e.comparison.compare import compare
-    from adv2e.recordings import read_recording
+    from adv2e.formats.reading import read_recording
     from adv2e.sources import open_source
 
     ours = read_recording(measured, time_unit=time_unit)
@@ -109,10 +109,10 @@ def _resimulation(
     """Return how to simulate the frames of `source`, or of `measured`, again."""
     from adv2e.comparison.compare import Resimulation
     from adv2e.comparison.resimulation import resimulator
+    from adv2e.compiled import announcement
+    from adv2e.conversion.simulation import is_compiled
     from adv2e.errors import DataError
-    from adv2e.jit import announcement
-    from adv2e.rng import LARGEST_SEED
-    from adv2e.simulation import is_compiled
+    from adv2e.kernel.rng import LARGEST_SEED
 
     if source is not None:
         frames, encoding = source.frames, source.encoding

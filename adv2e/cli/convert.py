@@ -99,7 +99,7 @@ def command(
         raise click.UsageError("--time-unit is for lists of times, which --fps replaces: keep one")
     if start is not None and stop is not None and stop <= start:
         raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
-    from adv2e.reading import Reading
+    from adv2e.conversion.reading import Reading
 
     reading = Reading(
         source,
@@ -114,7 +114,7 @@ def command(
         threads=threads,
     )
     with reading:  # it reads while all else that is needed is imported
-        from adv2e.pipeline import convert
+        from adv2e.conversion.pipeline import convert
 
         gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
         summary = convert(

@@ -46,7 +46,7 @@ def command(
       adv2e demo
       adv2e demo -o v2e-demo -c v2e
     """
-    from adv2e.demo import run_demo
+    from adv2e.conversion.demo import run_demo
 
     demo = run_demo(
         output, config, overwrite=overwrite, threads=threads, progress=progress, log=log

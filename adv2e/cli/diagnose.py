@@ -61,18 +61,18 @@ def command(
     """
     from pathlib import Path
 
+    from adv2e.compiled import announcement
     from adv2e.config import names_of, written_keys
     from adv2e.config.own import user_effects
+    from adv2e.diagnosis.data.evidence import read_evidence
     from adv2e.diagnosis.diagnose import diagnose
-    from adv2e.diagnosis.evidence import read_evidence
-    from adv2e.diagnosis.library import names
-    from adv2e.diagnosis.own_effects import without_user_effects
-    from adv2e.diagnosis.report import write_reports
-    from adv2e.jit import announcement
-    from adv2e.pixel import is_compiled
+    from adv2e.diagnosis.fitting.library import names
+    from adv2e.diagnosis.fitting.own_effects import without_user_effects
+    from adv2e.diagnosis.outcome.report import write_reports
+    from adv2e.files.apart import check_apart
+    from adv2e.pixel.array import is_compiled
     from adv2e.reports.files import check_folder
     from adv2e.reports.summary import summary_text
-    from adv2e.sinks.apart import check_apart
 
     check_names(without, names(config))
     _check_own_names(user_effects(config), names())

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from adv2e.cli.run import VERBOSITY
-from adv2e.names import shown
+from adv2e.files.names import shown
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Body = TypeVar("Body", bound=Callable[..., Any])
 
-# adv2e.rng.LARGEST_SEED, without the time that importing it takes
+# adv2e.kernel.rng.LARGEST_SEED, without the time that importing it takes
 SEED = click.IntRange(0, (1 << 64) - 1)
 
 
@@ -81,7 +81,7 @@ def allow_damaged_option(body: Body) -> Body:
 
 
 def _rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    from adv2e.sources.rates import parse_rate
+    from adv2e.sources.times.rates import parse_rate
 
     try:
         if value is not None:
@@ -107,7 +107,7 @@ def own_effects(files: tuple[str, ...]) -> list[type[Hooks]]:
     """Return the effects that files hold."""
     if not files:
         return []
-    from adv2e.own_effects import load_effects
+    from adv2e.config.own_effects import load_effects
 
     return [effect for name in files for effect in load_effects(name)]
 

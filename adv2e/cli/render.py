@@ -111,7 +111,7 @@ def command(
         raise click.UsageError("-o is missing: a .mp4, .webm, .avi, .gif or .png file")
     if stop is not None and stop <= start:
         raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
-    from adv2e.recordings import read_recording
+    from adv2e.formats.reading import read_recording
     from adv2e.rendering import Style, check_suffix, parse_colour, render_recording
 
     is_film = check_suffix(output) != ".png"

@@ -10,7 +10,8 @@
 143    told to stop (SIGTERM)
 ====== ===================================================================================
 
-A signal removes unfinished files and ends the program where it is; see :mod:`adv2e.stopping`.
+A signal removes unfinished files and ends the program where it is; see
+:mod:`adv2e.process.signals`.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ from typing import TextIO
 import click
 
 from adv2e.errors import Adv2eError
-from adv2e.machine import machine_complaint
-from adv2e.names import shown
-from adv2e.stopping import Terminated, last_words
+from adv2e.files.names import shown
+from adv2e.process.machine import machine_complaint
+from adv2e.process.signals import Terminated, last_words
 
 VERBOSITY = "adv2e.verbosity"
 """Key of ``click.Context.meta`` that holds how often -v was given."""

@@ -26,7 +26,7 @@ from adv2e.comparison.windows import (
 )
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.sources.times import seconds
+from adv2e.sources.times.instants import seconds
 
 DEFAULT_WINDOW_S = 0.05
 """Length of a window where there are no frames [s]."""

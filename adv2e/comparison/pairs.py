@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from adv2e.jit import entry
+from adv2e.compiled import entry
 
 
 @entry

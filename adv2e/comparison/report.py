@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from adv2e.sources.times import seconds
+from adv2e.sources.times.instants import seconds
 
 _WIDTH = 100
 

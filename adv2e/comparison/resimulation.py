@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config.model import Config
-from adv2e.decoding import decoder_for
+from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.simulation import events_from_light
+from adv2e.light.decoding import decoder_for
 from adv2e.sources.base import Frame
 
 

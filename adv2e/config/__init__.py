@@ -13,7 +13,7 @@ from adv2e.config.model import Config
 from adv2e.config.own import config_class
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
 from adv2e.config.yaml12 import Origin, Value, key_text
-from adv2e.names import shown
+from adv2e.files.names import shown
 
 if TYPE_CHECKING:
     from adv2e.effects.hooks import Hooks

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from adv2e.config.yaml12 import Origin, Value, parse
 from adv2e.errors import ConfigError
-from adv2e.regular import read_text_bytes
+from adv2e.files.regular import read_text_bytes
 
 
 def shipped_folder() -> Path:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from adv2e import rng
 from adv2e.effects.frames.encoding import check_encoding
 from adv2e.effects.frames.flicker import Flicker
 from adv2e.effects.pixel.dark_current import DarkCurrent
@@ -28,6 +27,7 @@ from adv2e.effects.readout.arbiter import Arbiter
 from adv2e.effects.readout.event_loss import EventLoss
 from adv2e.effects.readout.frame_coupling import FrameCoupling
 from adv2e.errors import ConfigError
+from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter, subsection
 
 INTERPOLATIONS = ("linear", "flow")

@@ -8,10 +8,14 @@ from contextlib import closing
 
 from adv2e import __version__
 from adv2e.config import Config
-from adv2e.cores import default_threads
-from adv2e.diagnosis import parts
-from adv2e.diagnosis.affordable import affordable
-from adv2e.diagnosis.conclusion import (
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data.affordable import affordable
+from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.fitting.library import names
+from adv2e.diagnosis.fitting.nuisances import thresholds_of
+from adv2e.diagnosis.fitting.own_effects import as_found, own_of
+from adv2e.diagnosis.fitting.simulations import Simulator
+from adv2e.diagnosis.outcome.conclusion import (
     DRAWS,
     about_drifts,
     about_frames,
@@ -20,15 +24,11 @@ from adv2e.diagnosis.conclusion import (
     rejected_of,
     signatures_of,
 )
-from adv2e.diagnosis.detectable import LIKELY, detectable
-from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.library import names
-from adv2e.diagnosis.nuisances import thresholds_of
-from adv2e.diagnosis.own_effects import as_found, own_of
-from adv2e.diagnosis.ready import make_ready
-from adv2e.diagnosis.search import Search
-from adv2e.diagnosis.simulations import Simulator
-from adv2e.diagnosis.verdict import sentence_of
+from adv2e.diagnosis.outcome.detectable import LIKELY, detectable
+from adv2e.diagnosis.outcome.verdict import sentence_of
+from adv2e.diagnosis.prepare import make_ready
+from adv2e.diagnosis.selection.search import Search
+from adv2e.process.cores import default_threads
 from adv2e.reports.result import Diagnosis
 
 
@@ -52,7 +52,7 @@ def diagnose(
     declared : Config
         What is known of the camera.  Effects of the user's own, for which it has sections, are
         candidates as the built-in ones are; those that are no knowledge of the camera are off
-        (:func:`adv2e.diagnosis.own_effects.without_user_effects`).
+        (:func:`adv2e.diagnosis.fitting.own_effects.without_user_effects`).
     declared_name : str
         Its file, for the report.
     without : sequence of str

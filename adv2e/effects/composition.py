@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.additions import Additions, StepLimit, injection_complaint
+from adv2e.effects.courses import Additions, StepLimit, injection_complaint
 from adv2e.effects.hooks import Frames, Hooks, Times, View
 from adv2e.errors import Adv2eError, DataError
 from adv2e.events import EVENT_DTYPE, Events, empty_events

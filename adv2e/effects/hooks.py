@@ -33,9 +33,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from adv2e import rng
-from adv2e.additions import INJECTED_DTYPE, LONGEST_US
+from adv2e.effects.courses import INJECTED_DTYPE, LONGEST_US
 from adv2e.events import Events
+from adv2e.kernel import rng
 from adv2e.parameters import Section
 
 Times = NDArray[np.float64]
@@ -178,8 +178,8 @@ class Hooks:
     def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
         """Yield the events, changed; sorted within and across chunks.
 
-        It may hold back as many as it needs (see :class:`adv2e.ordering.InOrder`), and must not
-        write into those it is given.
+        It may hold back as many as it needs (see :class:`adv2e.effects.reorder_buffer.InOrder`),
+        and must not write into those it is given.
         """
         yield from chunks
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import Events, pixels_of
-from adv2e.sources.times import seconds
+from adv2e.sources.times.instants import seconds
 
 GAP_STEPS = 100
 """A gap is longer than this many median steps between events, ..."""

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.decoding import light_text
 from adv2e.effects.frames.encoding import full_scale_of
+from adv2e.files.names import shown
+from adv2e.files.regular import check_ends
+from adv2e.files.zips import UNREADABLE
+from adv2e.formats.reading import Recording, read_recording
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.inspection.frames import describe_times
-from adv2e.names import shown
-from adv2e.recordings import Recording, read_recording
-from adv2e.regular import check_ends
+from adv2e.light.decoding import light_text
 from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
 from adv2e.sources.base import Light
-from adv2e.sources.rates import Rate
-from adv2e.zips import UNREADABLE
+from adv2e.sources.times.rates import Rate
 
 EVENTS = "events.txt"
 """The file of events in a DAVIS240C folder or zip."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from adv2e.names import shown
-from adv2e.sources.times import seconds
+from adv2e.files.names import shown
+from adv2e.sources.times.instants import seconds
 
 _WIDTH = 12
 

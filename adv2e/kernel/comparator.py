@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 
+from adv2e.compiled import inlined, kernel
 from adv2e.effects.pixel.hot_pixels import next_hot_time
 from adv2e.effects.pixel.leak import next_leak_factor
 from adv2e.effects.pixel.shot_noise import candidate_polarity, next_candidate_time
-from adv2e.jit import inlined, kernel
 from adv2e.kernel.polynomial import at_end, first_crossing, value
 from adv2e.kernel.workspace import (
     DISTANCE,

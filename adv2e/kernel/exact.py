@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from adv2e.compiled import entry, kernel
 from adv2e.effects.pixel.leak import fill_falls
-from adv2e.jit import entry, kernel
-from adv2e.kernel import batch, exchange, rest, screen, special
-from adv2e.kernel.claims import claim
+from adv2e.kernel import screen, special
+from adv2e.kernel import static_pixels as rest
+from adv2e.kernel.event_buffer import tell_where, with_room
+from adv2e.kernel.lanes import batch, exchange
 from adv2e.kernel.quadrature import Rule
-from adv2e.kernel.room import tell_where, with_room
 from adv2e.kernel.tile import load, solve_one
+from adv2e.kernel.work_queue import claim
 from adv2e.kernel.workspace import EXACT, S_LAG, S_REFERENCE, S_X, STRIP, Circuit
 
 _f = np.float32
@@ -267,7 +269,7 @@ def run_exact(
     Parameters
     ----------
     claimed : (1,)
-        See :mod:`adv2e.kernel.claims`.
+        See :mod:`adv2e.kernel.work_queue`.
     most : int
         Strips after which to return, though there may be more.
     frames : Frames
@@ -285,7 +287,7 @@ def run_exact(
         Quadrature for each interval.
 
     keys, times, places
-        Room for events; see :class:`adv2e.kernel.room.Room`.
+        Room for events; see :class:`adv2e.kernel.event_buffer.Room`.
 
     Returns
     -------

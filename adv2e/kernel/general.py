@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from adv2e.compiled import entry, kernel
 from adv2e.effects.pixel.leak import fill_falls
-from adv2e.jit import entry, kernel
-from adv2e.kernel import screen, special, stepped
-from adv2e.kernel.claims import claim
-from adv2e.kernel.room import tell_where
+from adv2e.kernel import general_screens as stepped
+from adv2e.kernel import screen, special
+from adv2e.kernel.event_buffer import tell_where
 from adv2e.kernel.tile import load, solve_one
+from adv2e.kernel.work_queue import claim
 from adv2e.kernel.workspace import EXACT, S_LAG, S_LAG2, S_OFF, S_ON, S_REFERENCE, S_X
 
 

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from adv2e.jit import kernel
+from adv2e.compiled import kernel
 from adv2e.kernel.workspace import BERNSTEIN, DISTANCE, LOCAL, ORDER_MAX
 
 TIE = 1e-9

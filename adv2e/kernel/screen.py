@@ -43,7 +43,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.jit import kernel
+from adv2e.compiled import kernel
 from adv2e.kernel import special
 from adv2e.kernel.quadrature import REACH
 from adv2e.kernel.workspace import STRIP

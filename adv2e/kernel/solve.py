@@ -24,9 +24,9 @@ from __future__ import annotations
 
 import math
 
+from adv2e.compiled import inlined, kernel
 from adv2e.effects.pixel.leak import leak_series
 from adv2e.effects.pixel.low_pass import lag_series, ramp_response, stepped
-from adv2e.jit import inlined, kernel
 from adv2e.kernel.comparator import events_of_series
 from adv2e.kernel.polynomial import at_end
 from adv2e.kernel.workspace import (

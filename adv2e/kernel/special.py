@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adv2e.jit import kernel
+from adv2e.compiled import kernel
 
 _LOG2E = 1.4426950408889634
 _LN2_HIGH = 0.693147180369123816490

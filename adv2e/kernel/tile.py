@@ -1,7 +1,7 @@
 """What the two drivers of a tile share: frames, scratch memory, and pixels solved one by one.
 
 A tile is some strips of pixels over several intervals, those that one call of a driver claims
-(:mod:`adv2e.kernel.claims`).  :mod:`adv2e.kernel.exact` advances the circuit
+(:mod:`adv2e.kernel.work_queue`).  :mod:`adv2e.kernel.exact` advances the circuit
 that :mod:`adv2e.kernel.screen` covers, :mod:`adv2e.kernel.general` what is left of those that are
 not solved in steps of time; both go strip by strip, and each strip through all of its intervals.
 """
@@ -13,10 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.jit import kernel
-from adv2e.kernel import dense_rows, lanes, screen
-from adv2e.kernel.room import with_room
+from adv2e.compiled import kernel
+from adv2e.kernel import screen
+from adv2e.kernel.event_buffer import with_room
+from adv2e.kernel.lanes import layout as lanes
 from adv2e.kernel.solve import solve_interval
+from adv2e.kernel.stepped import rows as dense_rows
 from adv2e.kernel.workspace import S_LAG, SAVED, STRIP, workspace
 
 _f = np.float32

@@ -14,8 +14,8 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.compiled import entry
 from adv2e.errors import UsageError
-from adv2e.jit import entry
 from adv2e.rendering.styles import Picture, Style
 
 MOST_FPS = 50.0

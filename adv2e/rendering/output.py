@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from adv2e.errors import OutputError
-from adv2e.sinks.staging import Staging
+from adv2e.files.staging import Staging
 
 _OF_WRITING = (errno.EFBIG, errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EACCES)
 

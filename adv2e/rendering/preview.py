@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from adv2e.errors import OutputError
 from adv2e.events import Events
+from adv2e.files.staging import Staging
 from adv2e.rendering.films import Album, Film, Sheet, check_suffix
 from adv2e.rendering.output import replacing
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Caption, Timeline, caption
-from adv2e.sinks.staging import Staging
 
 SHEET_STEP_US = 1000
 """Instants between which a sheet chooses, at first; later they are further apart."""

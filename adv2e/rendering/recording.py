@@ -11,15 +11,15 @@ import numpy as np
 from tqdm import tqdm
 
 from adv2e.errors import DataError
-from adv2e.pictures import drawn_frame
+from adv2e.files.apart import check_apart
+from adv2e.light.pictures import drawn_frame
 from adv2e.rendering.films import spread, stride_of
 from adv2e.rendering.preview import SHEET_STEP_US, Preview
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Caption, caption, microseconds
-from adv2e.sinks.apart import check_apart
 
 if TYPE_CHECKING:
-    from adv2e.recordings import Recording
+    from adv2e.formats.reading import Recording
 
 MOST_PICTURES = 400_000
 """Pictures of a film: 3.7 hours of the usual rate."""

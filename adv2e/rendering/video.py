@@ -28,9 +28,9 @@ import numpy as np
 from adv2e.errors import DataError
 from adv2e.rendering.output import NotWritten
 from adv2e.rendering.styles import Picture
-from adv2e.sources.containers import examine
 from adv2e.sources.opencv import quiet
-from adv2e.sources.opening import openable
+from adv2e.sources.video.containers import examine
+from adv2e.sources.video.opening import openable
 
 CODES = {".mp4": "vp09", ".webm": "VP80", ".avi": "HFYU"}
 """Coders of OpenCV; its VP8 and VP9 are set to lose next to nothing.

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from adv2e.errors import OutputError
+from adv2e.files.staging import Staging, nearest_there
 from adv2e.reports.model_file import model_text
 from adv2e.reports.record import record_text
 from adv2e.reports.result import Diagnosis
 from adv2e.reports.wording import Wording
-from adv2e.sinks.staging import Staging, nearest_there
 
 NAMES = ("report.html", "report.json", "model.yaml")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from adv2e.reports.error_chart import error_chart
+from adv2e.reports.charts.error_chart import error_chart
 from adv2e.reports.keys import meaning_of, summary_of, unit_of
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.quantities import (

@@ -6,9 +6,9 @@ import importlib
 from pathlib import Path
 
 from adv2e.errors import DataError
-from adv2e.regular import check_ends
+from adv2e.files.regular import check_ends
 from adv2e.sources.base import Frame, GivenTimes, Selection, Source
-from adv2e.sources.rates import Rate
+from adv2e.sources.times.rates import Rate
 
 __all__ = ["Frame", "Source", "open_source"]
 
@@ -19,7 +19,7 @@ VIDEO_SUFFIXES = (
 """Files that are opened as video."""
 
 OPENERS = {
-    **dict.fromkeys(VIDEO_SUFFIXES, "adv2e.sources.video"),
+    **dict.fromkeys(VIDEO_SUFFIXES, "adv2e.sources.video.source"),
     ".zip": "adv2e.sources.davis240c",
     ".npy": "adv2e.sources.npy",
 }
@@ -48,14 +48,14 @@ def open_source(
         Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
     timestamps : path, optional
         File with the time of each frame, ``t`` or ``t name`` a line; see
-        :mod:`adv2e.sources.columns`.
+        :mod:`adv2e.sources.times.columns`.
     start_s, stop_s : float, optional
         First and last time wanted, counted from the first frame [s]; both inclusive.
     t0 : {'auto', 'keep', 'zero'}
         auto, keep: times on the source's own clock where there is one, else from its first frame;
         zero: from the first frame wanted.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
-        Unit of the times in lists; default: see :mod:`adv2e.sources.units`.
+        Unit of the times in lists; default: see :mod:`adv2e.sources.times.units`.
     images_anywhere : bool
         The ``images.txt`` of a recording may name images outside its folder.
     allow_damaged : bool
@@ -104,7 +104,7 @@ def _opener(path: Path) -> str:
     if path.is_dir():
         from adv2e.sources import davis240c  # noqa: PLC0415  (needs OpenCV; most of us do not)
 
-        return f"adv2e.sources.{'davis240c' if davis240c.is_recording(path) else 'images'}"
+        return f"adv2e.sources.{'davis240c' if davis240c.is_recording(path) else 'images.source'}"
     if suffix in OPENERS:
         return OPENERS[suffix]
     known = " ".join(suffix.lstrip(".") for suffix in OPENERS)

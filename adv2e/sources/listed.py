@@ -18,10 +18,10 @@ from adv2e.sources.base import (
     as_pixels,
     check_values,
 )
-from adv2e.sources.gaps import gap_doubts
-from adv2e.sources.lists import FrameList, read_list
-from adv2e.sources.names import match
-from adv2e.sources.numbering import numbering_doubt
+from adv2e.sources.times.gaps import gap_doubts
+from adv2e.sources.times.lists import FrameList, read_list
+from adv2e.sources.times.names import match
+from adv2e.sources.times.numbering import numbering_doubt
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
-from adv2e.npy import Header, read_array, read_header
+from adv2e.files.npy import Header, read_array, read_header
 from adv2e.sources.base import GivenTimes, Image, Light, Selection
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
-from adv2e.sources.lists import FrameList, read_list
-from adv2e.sources.times import Stamp
-from adv2e.sources.units import frame_unit
+from adv2e.sources.times.instants import Stamp
+from adv2e.sources.times.lists import FrameList, read_list
+from adv2e.sources.times.units import frame_unit
 from adv2e.ticks import NS, to_ticks
 
 _BLOCK_BYTES = 16 << 20

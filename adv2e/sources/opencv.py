@@ -22,12 +22,12 @@ import numpy as np
 
 from adv2e.effects.frames.encoding import full_scale_of, is_light
 from adv2e.errors import DataError, MissingExtraError
-from adv2e.sources import netpbm, tiff
-from adv2e.sources.alpha import Alpha, with_alpha
+from adv2e.process.standard_error import overhearing
 from adv2e.sources.base import Image, Pixels
-from adv2e.sources.claims import check_claim
-from adv2e.sources.headers import read_header
-from adv2e.streams import overhearing
+from adv2e.sources.images import netpbm, tiff
+from adv2e.sources.images.alpha import Alpha, with_alpha
+from adv2e.sources.images.claims import check_claim
+from adv2e.sources.images.headers import read_header
 
 IMAGE_SUFFIXES = (
     *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pbm", ".pam"),

@@ -49,7 +49,8 @@ def run_command(spec: dict[str, Any]) -> dict[str, Any]:
 
 def start(spec: dict[str, Any]) -> dict[str, Any]:
     """Time a process that imports all that a conversion needs, and ends."""
-    imports = "import adv2e.cli.convert, adv2e.pipeline, adv2e.sinks.monash, adv2e.sources.video"
+    modules = "cli.convert conversion.pipeline formats.monash.writer sources.video.source"
+    imports = "; ".join(f"import adv2e.{name}" for name in modules.split())
     command = [sys.executable, "-c", imports]
     before = children_cpu_s()
     _, cost = measured(lambda: subprocess.run(command, env=_as_users(), check=True))
@@ -76,7 +77,7 @@ def decode(spec: dict[str, Any]) -> dict[str, Any]:
 
 def _events(options: dict[str, Any], light: list[Any]) -> list[Any]:
     from adv2e import load_config  # noqa: PLC0415
-    from adv2e.simulation import events_from_light  # noqa: PLC0415
+    from adv2e.conversion.simulation import events_from_light  # noqa: PLC0415
 
     config = load_config([], options["sets"])
     return list(events_from_light(light, config, threads=options["threads"]))
@@ -93,7 +94,7 @@ def pixel(spec: dict[str, Any]) -> dict[str, Any]:
 
 def write(spec: dict[str, Any]) -> dict[str, Any]:
     """Time writing events in memory to a file."""
-    from adv2e.sinks import open_sink  # noqa: PLC0415
+    from adv2e.formats.writing import open_sink  # noqa: PLC0415
 
     options = spec["options"]
     light = _light(options)

@@ -9,7 +9,7 @@ import numpy as np
 
 from adv2e.comparison.windows import Windows
 from adv2e.config import Config
-from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.candidates import Candidate, Knob
 from real.model import Bench
 from real.pattern import Place, pattern_search
 from real.tried import Added, label

@@ -14,13 +14,13 @@ from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
-from adv2e.decoding import decoder_for
-from adv2e.diagnosis.instants import Instants, Kept, events_of, is_made_once
-from adv2e.diagnosis.nuisances import match_totals, totals, with_thresholds
-from adv2e.diagnosis.pulses import Pulse, has_pulse, pulse_of
-from adv2e.diagnosis.stream import Stream
+from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.fitting.instants import Instants, Kept, events_of, is_made_once
+from adv2e.diagnosis.fitting.nuisances import match_totals, totals, with_thresholds
+from adv2e.diagnosis.hints.pulses import Pulse, has_pulse, pulse_of
 from adv2e.events import Events
-from adv2e.stepping import Coarseness
+from adv2e.light.decoding import decoder_for
+from adv2e.pixel.steps import Coarseness
 from real.recording import Real, halves, still_rate
 
 SCORE = "relative_5_bins_smoothed"
@@ -60,7 +60,7 @@ class Bench:
     """Simulates a recording with configurations.
 
     In-between frames along the motion take longer than all else, so they are made once for what
-    they depend on (:mod:`adv2e.diagnosis.instants`).
+    they depend on (:mod:`adv2e.diagnosis.fitting.instants`).
 
     Parameters
     ----------

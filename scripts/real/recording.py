@@ -17,7 +17,7 @@ from adv2e.config import Config
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.recordings import read_recording
+from adv2e.formats.reading import read_recording
 from adv2e.sources import Frame, Source, open_source
 
 STILL_DN = 2.0

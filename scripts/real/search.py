@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from adv2e.comparison.windows import Windows
 from adv2e.config import Config
-from adv2e.diagnosis.candidates import Candidate
+from adv2e.diagnosis.fitting.candidates import Candidate
 from real.fit import LEAST_GAIN, Fitter, Model, Probe, keys
 from real.model import Bench
 from real.tried import EXACT, OWN, Added, of_the_camera

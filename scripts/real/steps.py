@@ -10,7 +10,7 @@ from writing.markdown import table
 from adv2e.comparison.distances import distances
 from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows
-from adv2e.diagnosis.nuisances import totals
+from adv2e.diagnosis.fitting.nuisances import totals
 from adv2e.events import Events, empty_events
 from real.model import SCORE, Judged
 from real.table import COLUMNS as TITLES

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adv2e.config import Config
-from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.hints import Hints
-from adv2e.diagnosis.library import library
-from adv2e.diagnosis.pulses import Pulse
+from adv2e.diagnosis.fitting.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.library import library
+from adv2e.diagnosis.hints.collect import Hints
+from adv2e.diagnosis.hints.pulses import Pulse
 
 NOISE_HZ = 0.1
 NOISES = ("leak", "photo_leak", "shot_noise", "photoreceptor_noise", "hot_pixels")

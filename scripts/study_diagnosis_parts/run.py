@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.config import load_config
+from adv2e.diagnosis.data.evidence import read_evidence
 from adv2e.diagnosis.diagnose import diagnose
-from adv2e.diagnosis.evidence import read_evidence
 from adv2e.reports.result import Diagnosis
 from study_diagnosis_parts.camera import REPOSITORY, camera, settings
 from study_diagnosis_parts.cases import Case

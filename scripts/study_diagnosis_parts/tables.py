@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from writing.markdown import table
 
-from adv2e.diagnosis.search import LEVEL
+from adv2e.diagnosis.selection.search import LEVEL
 from study_diagnosis_parts import scoring
 from study_diagnosis_parts.camera import catalogue
 from study_diagnosis_parts.cases import (

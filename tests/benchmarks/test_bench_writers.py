@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from adv2e.events import make_events, sort_events
-from adv2e.sinks import open_sink
-from adv2e.sinks.text import text_blocks
+from adv2e.formats.text.writer import text_blocks
+from adv2e.formats.writing import open_sink
 
 COUNT = 300_000
 

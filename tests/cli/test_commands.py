@@ -15,9 +15,9 @@ from adv2e.cli.options import Log
 from adv2e.config import Config, all_keys, load_config, shipped
 from adv2e.config.files import find
 from adv2e.config.model import Pixel
-from adv2e.cores import default_threads
-from adv2e.diagnosis.library import names
+from adv2e.diagnosis.fitting.library import names
 from adv2e.effects import EFFECTS, STAGES
+from adv2e.process.cores import default_threads
 
 
 def test_version(adv2e):

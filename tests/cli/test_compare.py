@@ -7,7 +7,7 @@ import pytest
 
 from adv2e.comparison import resimulation
 from adv2e.events import make_events, sort_events
-from adv2e.sinks import open_sink
+from adv2e.formats.writing import open_sink
 
 WIDTH, HEIGHT = 10, 8
 

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from adv2e import demo as module
-from adv2e.recordings import read_recording
+from adv2e.conversion import demo as module
+from adv2e.formats.reading import read_recording
 from adv2e.synthetic import Scene
 from adv2e.synthetic.clips import write_video
 

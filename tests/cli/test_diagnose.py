@@ -11,11 +11,15 @@ from camera import Camera, patchwork
 from camera.settings import BENCH
 
 from adv2e import load_config, simulate
-from adv2e.diagnosis import bench, conclusion, evidence, finalists, pilot, report
 from adv2e.diagnosis import diagnose as whole
-from adv2e.diagnosis.library import names
+from adv2e.diagnosis.data import evidence
+from adv2e.diagnosis.fitting.library import names
+from adv2e.diagnosis.outcome import conclusion, report
+from adv2e.diagnosis.selection import reference as bench
+from adv2e.diagnosis.selection import shortlist as finalists
+from adv2e.diagnosis.statistics import pilot
+from adv2e.formats.writing import open_sink
 from adv2e.reports import summary
-from adv2e.sinks import open_sink
 
 FILES = ["model.yaml", "report.html", "report.json"]
 TRIED = ("refractory", "leak", "event_loss")

@@ -152,8 +152,8 @@ import pathlib, signal, sys, threading, time, types
 # as in a terminal: a test run in the background may have been started with signals ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGTERM, signal.SIG_DFL)
-from adv2e.sinks.staging import Staging
-pipeline = types.ModuleType("adv2e.pipeline")
+from adv2e.files.staging import Staging
+pipeline = types.ModuleType("adv2e.conversion.pipeline")
 def wait():
     for _ in range(600):
         time.sleep(0.05)  # a signal that comes just as it begins is met after it
@@ -170,7 +170,7 @@ def convert(*args, **options):
     finally:
         staging.discard()
 pipeline.convert = convert
-sys.modules["adv2e.pipeline"] = pipeline
+sys.modules["adv2e.conversion.pipeline"] = pipeline
 from adv2e.cli import main
 main(["convert", "clip.mp4"])
 """
@@ -332,7 +332,7 @@ def test_importing_what_a_conversion_needs_starts_no_threads():
 import os
 from adv2e.cli import main
 main.get_command(None, "convert")
-import adv2e.pipeline
+import adv2e.conversion.pipeline
 print(len(os.listdir("/proc/self/task")))
 """
     environment = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from adv2e.events import make_events
-from adv2e.sinks import open_sink
+from adv2e.formats.writing import open_sink
 
 KEYS = [
     "file",

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from adv2e.recordings import read_recording
+from adv2e.formats.reading import read_recording
 
 FRAMES = np.arange(6 * 24 * 32).reshape(6, 24, 32) % 251
 COLOUR = np.repeat(FRAMES[..., np.newaxis], 3, axis=-1)

@@ -9,7 +9,7 @@ import pytest
 
 from adv2e.comparison.floor import half_split
 from adv2e.comparison.windows import Windows, frame_windows, span_of
-from adv2e.recordings import read_recording
+from adv2e.formats.reading import read_recording
 
 FOLDER = os.environ.get("ADV2E_REAL_DATA")
 

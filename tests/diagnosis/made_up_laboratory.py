@@ -10,16 +10,16 @@ import numpy as np
 
 from adv2e.config import Config, load_config, to_dict
 from adv2e.config.paths import get_key
-from adv2e.diagnosis import parts
-from adv2e.diagnosis.bench import parted
-from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.fit import Fitted, Fitter
-from adv2e.diagnosis.hints import Hints
-from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.library import library
-from adv2e.diagnosis.markers import BOTH, VIEWS, Entry
-from adv2e.diagnosis.metric import Scale
-from adv2e.diagnosis.search import Search
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.fitting.candidates import Candidate
+from adv2e.diagnosis.fitting.fit import Fitted, Fitter
+from adv2e.diagnosis.fitting.library import library
+from adv2e.diagnosis.hints.collect import Hints
+from adv2e.diagnosis.hints.lamps import Lamp
+from adv2e.diagnosis.selection.reference import parted
+from adv2e.diagnosis.selection.search import Search
+from adv2e.diagnosis.statistics import BOTH, VIEWS, Entry
+from adv2e.diagnosis.statistics.metric import Scale
 from adv2e.reports.result import ErrorRow, Estimate
 
 STATISTICS = 40
@@ -65,7 +65,7 @@ def noise(seed: int):
 
 
 class MadeUpLaboratory:
-    """Stands in for :class:`adv2e.diagnosis.simulations.Laboratory`.
+    """Stands in for :class:`adv2e.diagnosis.fitting.simulations.Laboratory`.
 
     Parameters
     ----------

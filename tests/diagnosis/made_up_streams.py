@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
-from adv2e.diagnosis.scene import Placed, Scene
-from adv2e.diagnosis.stream import Stream
+from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.data.stream import Stream
 from adv2e.events import EVENT_DTYPE
 
 WIDTH, HEIGHT = 16, 12

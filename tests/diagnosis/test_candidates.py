@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from adv2e.config import Config, load_config, shipped, to_dict
 from adv2e.config.paths import flat, get_key, set_key
-from adv2e.diagnosis.candidates import Candidate, neutral_value
-from adv2e.diagnosis.hints import Hints
-from adv2e.diagnosis.keys import about_key
-from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.library import library, names
+from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
+from adv2e.diagnosis.fitting.keys import about_key
+from adv2e.diagnosis.fitting.library import library, names
+from adv2e.diagnosis.hints.collect import Hints
+from adv2e.diagnosis.hints.lamps import Lamp
 
 HINTS = Hints(0.3, (Lamp(100.0), Lamp(63.5, 1.2)), 10)
 CONFIGS = [None, *shipped()]

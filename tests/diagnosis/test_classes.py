@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_up_streams import HEIGHT, WIDTH, scene_of, some_scene, wandering_light
 
-from adv2e.diagnosis import classes
+from adv2e.diagnosis.statistics import classes
 
 
 @pytest.mark.parametrize("period_s", [0.04, 0.01, 0.003])

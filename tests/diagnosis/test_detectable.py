@@ -4,10 +4,10 @@ import numpy as np
 from made_up_laboratory import EFFECTS, STATISTICS, MadeUpLaboratory, candidates, searched
 
 from adv2e.config import Config
-from adv2e.diagnosis.detectable import detectable
-from adv2e.diagnosis.keys import with_keys
-from adv2e.diagnosis.markers import BOTH
-from adv2e.diagnosis.search import PER_LOOK
+from adv2e.diagnosis.fitting.keys import with_keys
+from adv2e.diagnosis.outcome.detectable import detectable
+from adv2e.diagnosis.selection.search import PER_LOOK
+from adv2e.diagnosis.statistics import BOTH
 
 
 def test_what_would_have_been_seen():

@@ -7,8 +7,9 @@ import pytest
 from made_up_streams import HEIGHT, WIDTH, random_stream, stream_of
 
 from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_errors, smoothed_norms
-from adv2e.diagnosis import parts
-from adv2e.diagnosis.error import (
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data.splits import Parts
+from adv2e.diagnosis.outcome.error import (
     NAME,
     OF_MEAN,
     PAIRS,
@@ -18,7 +19,6 @@ from adv2e.diagnosis.error import (
     of_interpolation,
     of_part,
 )
-from adv2e.diagnosis.parts import Parts
 
 MEASURED = random_stream(600, 1)
 BEFORE = [random_stream(600, seed) for seed in range(10, 16)]

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from adv2e.diagnosis.metric import Model, Scale, _gumbel, _log_normal, _tail, compressed
+from adv2e.diagnosis.statistics.metric import Model, Scale, _gumbel, _log_normal, _tail, compressed
 
 STATISTICS, SEEDS = 200, 160
 

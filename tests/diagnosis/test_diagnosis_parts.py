@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adv2e.diagnosis import parts
-from adv2e.diagnosis.parts import Parts
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data.splits import Parts
 
 SIZES = [(1, 1), (4, 4), (5, 3), (32, 24), (1280, 4), (2, 900), (240, 180), (346, 260)]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_up_streams import HEIGHT, WIDTH, placed, random_stream, scene_of, wandering_light
 
-from adv2e.diagnosis.scene import (
+from adv2e.diagnosis.data.scene import (
     BRIGHTNESSES,
     SPEEDS,
     STILL,
@@ -33,7 +33,7 @@ def test_slopes_are_of_the_logarithm():
 
 def test_unequal_frame_intervals():
     light = columns([10.0, 20.0, 40.0, 20.0])
-    from adv2e.diagnosis.scene import Scene
+    from adv2e.diagnosis.data.scene import Scene
 
     scene = Scene.of(light, np.array([0.0, 0.01, 0.05, 0.06]), 0.0)
     np.testing.assert_allclose(scene.slope[:, 0], np.log(2) * np.array([100, 25, -100]), rtol=1e-5)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_up_streams import PERIOD_S, scene_of, stream_of
 
-from adv2e.diagnosis.doubts import doubts_of
-from adv2e.diagnosis.scene import Placed
+from adv2e.diagnosis.data.input_checks import doubts_of
+from adv2e.diagnosis.data.scene import Placed
 
 ROWS, COLUMNS, FRAMES = 12, 20, 30
 

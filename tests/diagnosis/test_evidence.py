@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from adv2e.config import load_config
-from adv2e.diagnosis.evidence import LEAST_EVENTS, read_evidence
-from adv2e.diagnosis.light import light_of, quantum_dn
+from adv2e.diagnosis.data.evidence import LEAST_EVENTS, read_evidence
+from adv2e.diagnosis.data.light import light_of, quantum_dn
 
 WIDTH, HEIGHT = 12, 8
 
@@ -194,7 +194,7 @@ def test_frames_out_of_order(adv2e, tmp_path):
 
 
 def test_frames_of_another_size_than_the_events_say(adv2e, record, monkeypatch):
-    from adv2e.diagnosis import evidence
+    from adv2e.diagnosis.data import evidence
 
     read = evidence.read_recording
 

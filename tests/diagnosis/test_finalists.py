@@ -3,9 +3,9 @@
 from made_up_laboratory import RECORDING, MadeUpLaboratory, candidates
 
 from adv2e.config import load_config
-from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.finalists import finalists
-from adv2e.diagnosis.search import Search
+from adv2e.diagnosis.fitting.candidates import Candidate
+from adv2e.diagnosis.selection.search import Search
+from adv2e.diagnosis.selection.shortlist import finalists
 
 NOISE = ["pixel.shot_noise.rate_hz=1"]  # of which there can be less, too
 

@@ -14,10 +14,10 @@ from made_up_laboratory import (
 )
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis import parts
-from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.fit import Fitted
-from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.fitting.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.statistics import BOTH
 
 VIEW = parts.FIT
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from adv2e.diagnosis.frame_error import Change, FrameError
+from adv2e.diagnosis.statistics.frame_error import Change, FrameError
 
 GROUPS = ["a", "a", "a", "b", "b", "b"]
 LEAST = np.full(6, 1.0)

@@ -6,13 +6,13 @@ from made_up_streams import wandering_light
 from three_cameras import Apart, Recorded
 
 from adv2e import load_config
-from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.interpolation import between_frames, every, of_blended
-from adv2e.diagnosis.markers import BOTH, Markers
-from adv2e.diagnosis.pilot import Pilot
-from adv2e.diagnosis.scene import Scene
-from adv2e.diagnosis.simulations import Simulator
-from adv2e.diagnosis.stream import Stream
+from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.data.scene import Scene
+from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.fitting.simulations import Simulator
+from adv2e.diagnosis.statistics import BOTH, Markers
+from adv2e.diagnosis.statistics.interpolation import between_frames, every, of_blended
+from adv2e.diagnosis.statistics.pilot import Pilot
 from adv2e.events import empty_events
 
 DECLARED = load_config([], ["frames.encoding=linear"])

@@ -5,9 +5,9 @@ import pytest
 from made_up_laboratory import MadeUpLaboratory, searched
 
 from adv2e.config import Config
-from adv2e.diagnosis import parts
-from adv2e.diagnosis.judging import chance_gain, gain, loudness
-from adv2e.diagnosis.metric import Model, Scale
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.selection.acceptance import chance_gain, gain, loudness
+from adv2e.diagnosis.statistics.metric import Model, Scale
 
 
 def test_chance_alone_gains_less_than_it_may():

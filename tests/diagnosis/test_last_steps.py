@@ -13,10 +13,10 @@ from made_up_laboratory import (
 )
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis import parts
-from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.fit import Fitted, Fitter
-from adv2e.diagnosis.slope import Slope
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.fitting.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.fit import Fitted, Fitter
+from adv2e.diagnosis.fitting.slope import Slope
 
 VIEW = parts.FIT
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from three_cameras import Recorded
 
-from adv2e.diagnosis.evidence import Evidence, RunIn
-from adv2e.diagnosis.keys import with_keys
-from adv2e.diagnosis.levels import between_levels, coarser
-from adv2e.diagnosis.light import scene_of
-from adv2e.diagnosis.markers import BOTH, Markers
-from adv2e.diagnosis.pilot import Pilot
-from adv2e.diagnosis.scene import Placed
-from adv2e.diagnosis.simulations import Simulator
+from adv2e.diagnosis.data.evidence import Evidence, RunIn
+from adv2e.diagnosis.data.light import scene_of
+from adv2e.diagnosis.data.scene import Placed
+from adv2e.diagnosis.fitting.keys import with_keys
+from adv2e.diagnosis.fitting.simulations import Simulator
+from adv2e.diagnosis.statistics import BOTH, Markers
+from adv2e.diagnosis.statistics.levels import between_levels, coarser
+from adv2e.diagnosis.statistics.pilot import Pilot
 
 SEEDS = range(16)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_up_streams import random_stream, scene_of, some_scene, stream_of
 
-from adv2e.diagnosis.lines import strongest_lines
+from adv2e.diagnosis.hints.lines import strongest_lines
 
 
 def lit(hz, seconds, seed, depth=0.5, events=8000):

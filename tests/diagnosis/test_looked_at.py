@@ -7,12 +7,12 @@ import pytest
 
 from adv2e import simulate
 from adv2e.config import load_config
-from adv2e.diagnosis import parts
-from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.parts import Parts
-from adv2e.diagnosis.ready import make_ready
-from adv2e.diagnosis.simulations import Simulator
-from adv2e.diagnosis.stream import Stream
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.data.splits import Parts
+from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.fitting.simulations import Simulator
+from adv2e.diagnosis.prepare import make_ready
 
 WIDTH, HEIGHT, COUNT = 32, 24, 25
 TIMES_S = 0.02 * np.arange(COUNT)

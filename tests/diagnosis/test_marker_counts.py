@@ -7,13 +7,13 @@ import numpy as np
 from hypothesis import given, settings
 from made_up_streams import HEIGHT, STOP_US, WIDTH, placed, some_scene, streams
 
-from adv2e.diagnosis.markers.intervals import BORDERS_MS, Intervals, Runs
-from adv2e.diagnosis.markers.neighbours import Neighbours
-from adv2e.diagnosis.markers.pixels import Pixels
-from adv2e.diagnosis.markers.rates import Course, Load, Phase, Rates
-from adv2e.diagnosis.markers.spectrum import Spectrum
-from adv2e.diagnosis.markers.stamps import TICKS_US, Gaps, RowGaps, Ticks
-from adv2e.diagnosis.markers.timing import LAGS_MS, Drift, Lag, Shift, Slopes
+from adv2e.diagnosis.statistics.intervals import BORDERS_MS, Intervals, Runs
+from adv2e.diagnosis.statistics.neighbours import Neighbours
+from adv2e.diagnosis.statistics.pixels import Pixels
+from adv2e.diagnosis.statistics.rates import Course, Load, Phase, Rates
+from adv2e.diagnosis.statistics.spectrum import Spectrum
+from adv2e.diagnosis.statistics.stamps import TICKS_US, Gaps, RowGaps, Ticks
+from adv2e.diagnosis.statistics.timing import LAGS_MS, Drift, Lag, Shift, Slopes
 
 SCENE = some_scene(seed=5)
 PARTS = 3

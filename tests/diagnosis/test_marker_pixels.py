@@ -13,7 +13,7 @@ from made_up_streams import (
     stream_of,
 )
 
-from adv2e.diagnosis.markers.pixels import Pixels
+from adv2e.diagnosis.statistics.pixels import Pixels
 
 SCENE = some_scene(seed=5)
 PER_PIXEL = 12

@@ -20,17 +20,17 @@ from made_up_streams import (
     wandering_light,
 )
 
-from adv2e.diagnosis import parts
-from adv2e.diagnosis.lines import strongest_lines
-from adv2e.diagnosis.markers import BOTH, VIEWS, Markers
-from adv2e.diagnosis.markers.intervals import Runs
-from adv2e.diagnosis.markers.neighbours import Neighbours
-from adv2e.diagnosis.markers.pixels import Pixels
-from adv2e.diagnosis.markers.rates import Phase
-from adv2e.diagnosis.markers.spectrum import Spectrum
-from adv2e.diagnosis.markers.stamps import Gaps, RowGaps, Ticks
-from adv2e.diagnosis.markers.timing import Drift, Lag, Shift, Slopes
-from adv2e.diagnosis.parts import Parts
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data.splits import Parts
+from adv2e.diagnosis.hints.lines import strongest_lines
+from adv2e.diagnosis.statistics import BOTH, VIEWS, Markers
+from adv2e.diagnosis.statistics.intervals import Runs
+from adv2e.diagnosis.statistics.neighbours import Neighbours
+from adv2e.diagnosis.statistics.pixels import Pixels
+from adv2e.diagnosis.statistics.rates import Phase
+from adv2e.diagnosis.statistics.spectrum import Spectrum
+from adv2e.diagnosis.statistics.stamps import Gaps, RowGaps, Ticks
+from adv2e.diagnosis.statistics.timing import Drift, Lag, Shift, Slopes
 
 SCENE = some_scene(seed=5)
 PILOT = [placed(random_stream(400, seed), SCENE) for seed in range(3)]

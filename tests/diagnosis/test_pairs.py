@@ -5,13 +5,13 @@ import pytest
 from made_up_laboratory import GONE, RECORDING, MadeUpLaboratory, candidates, searched
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis import attempts as attempts_module
-from adv2e.diagnosis.bench import Bench
-from adv2e.diagnosis.finalists import finalists
-from adv2e.diagnosis.judging import BY_CHANCE
-from adv2e.diagnosis.judging import objections as real_objections
-from adv2e.diagnosis.pairs import likely_pairs
-from adv2e.diagnosis.verdict import verdict_of
+from adv2e.diagnosis.outcome.verdict import verdict_of
+from adv2e.diagnosis.selection import joint_fits as attempts_module
+from adv2e.diagnosis.selection.acceptance import BY_CHANCE
+from adv2e.diagnosis.selection.acceptance import objections as real_objections
+from adv2e.diagnosis.selection.pairs import likely_pairs
+from adv2e.diagnosis.selection.reference import Bench
+from adv2e.diagnosis.selection.shortlist import finalists
 
 BOTH_MISSING = ["pixel.refractory.period_us=3000", "readout.loss.fraction=0.2"]
 

@@ -13,8 +13,8 @@ from made_up_streams import (
     stream_of,
 )
 
-from adv2e.diagnosis.picture import Gallery
-from adv2e.diagnosis.scene import STILL
+from adv2e.diagnosis.data.scene import STILL
+from adv2e.diagnosis.outcome.picture import Gallery
 
 SCENE = some_scene(seed=5)
 MEASURED = placed(random_stream(800, 1), SCENE)

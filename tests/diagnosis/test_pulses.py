@@ -5,12 +5,12 @@ import pytest
 from made_up_laboratory import HINTS
 from made_up_streams import stream_of
 
-from adv2e.active_effects import active_hooks
 from adv2e.config import load_config
-from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.fit import Fitted
-from adv2e.diagnosis.library import library
-from adv2e.diagnosis.pulses import DELAY, Burst, Pulse, pulse_of
+from adv2e.config.active_effects import active_hooks
+from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.library import library
+from adv2e.diagnosis.hints.pulses import DELAY, Burst, Pulse, pulse_of
 from adv2e.effects.composition import begin
 from adv2e.effects.frames.clock_drift import ClockDriftHooks
 from adv2e.effects.frames.clock_offset import ClockOffsetHooks

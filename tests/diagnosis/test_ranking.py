@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from adv2e.diagnosis.bench import MANY, State
-from adv2e.diagnosis.markers import VIEWS
-from adv2e.diagnosis.metric import Model, Scale
-from adv2e.diagnosis.ranking import CLOSE, ranked
+from adv2e.diagnosis.selection.ranking import CLOSE, ranked
+from adv2e.diagnosis.selection.reference import MANY, State
+from adv2e.diagnosis.statistics import VIEWS
+from adv2e.diagnosis.statistics.metric import Model, Scale
 
 STATISTICS = 30
 AMISS = 6.0

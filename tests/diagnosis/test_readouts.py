@@ -6,12 +6,12 @@ from made_up_laboratory import HINTS, RECORDING, MadeUpLaboratory
 from made_up_streams import stream_of
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis.candidates import Candidate
-from adv2e.diagnosis.finalists import finalists
-from adv2e.diagnosis.fit import Fitted
-from adv2e.diagnosis.library import library
-from adv2e.diagnosis.readouts import Readouts, readouts_of
-from adv2e.diagnosis.search import Search
+from adv2e.diagnosis.fitting.candidates import Candidate
+from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.library import library
+from adv2e.diagnosis.hints.readouts import Readouts, readouts_of
+from adv2e.diagnosis.selection.search import Search
+from adv2e.diagnosis.selection.shortlist import finalists
 
 INTERVAL_US = 2000.0
 TIMES_S = 3.0 + 2e-3 * np.arange(200)

@@ -16,9 +16,9 @@ from made_up_laboratory import (
 )
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis import attempts as attempts_module
-from adv2e.diagnosis.search import LEVEL, Search
-from adv2e.diagnosis.verdict import verdict_of
+from adv2e.diagnosis.outcome.verdict import verdict_of
+from adv2e.diagnosis.selection import joint_fits as attempts_module
+from adv2e.diagnosis.selection.search import LEVEL, Search
 
 PAIR = ["pixel.refractory.period_us=3000", "pixel.leak.rate_hz=4"]
 """Of effects which another is like; see `laboratory_with_a_mixture`."""

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from three_cameras import Apart, Recorded
 
-from adv2e.diagnosis.keys import with_keys
-from adv2e.diagnosis.markers import BOTH, Markers
-from adv2e.diagnosis.resampling import Resampling
-from adv2e.diagnosis.simulations import Laboratory, Simulator
+from adv2e.diagnosis.fitting.keys import with_keys
+from adv2e.diagnosis.fitting.simulations import Laboratory, Simulator
+from adv2e.diagnosis.statistics import BOTH, Markers
+from adv2e.diagnosis.statistics.resampling import Resampling
 
 SHIFT = [0.4, 0.25]
 

@@ -19,18 +19,18 @@ from made_up_laboratory import (
 )
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis import attempts as attempts_module
-from adv2e.diagnosis.attempts import likely_of_a_round
-from adv2e.diagnosis.bench import MANY
-from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.conclusion import finding_of
-from adv2e.diagnosis.detectable import detectable
-from adv2e.diagnosis.fit import Fitted
-from adv2e.diagnosis.markers import BOTH
-from adv2e.diagnosis.nuisances import THRESHOLDS, thresholds_of
-from adv2e.diagnosis.rejections import Rejections
-from adv2e.diagnosis.search import LEVEL, Search
-from adv2e.diagnosis.verdict import verdict_of
+from adv2e.diagnosis.fitting.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.nuisances import THRESHOLDS, thresholds_of
+from adv2e.diagnosis.outcome.conclusion import finding_of
+from adv2e.diagnosis.outcome.detectable import detectable
+from adv2e.diagnosis.outcome.verdict import verdict_of
+from adv2e.diagnosis.selection import joint_fits as attempts_module
+from adv2e.diagnosis.selection.joint_fits import likely_of_a_round
+from adv2e.diagnosis.selection.reference import MANY
+from adv2e.diagnosis.selection.rejections import Rejections
+from adv2e.diagnosis.selection.search import LEVEL, Search
+from adv2e.diagnosis.statistics import BOTH
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

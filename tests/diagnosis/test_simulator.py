@@ -7,18 +7,18 @@ import pytest
 from made_up_streams import random_stream, wandering_light
 
 from adv2e import load_config
-from adv2e.active_effects import frame_hooks
-from adv2e.diagnosis.evidence import Evidence, RunIn
-from adv2e.diagnosis.keys import with_keys
-from adv2e.diagnosis.lamps import lamps_of
-from adv2e.diagnosis.light import light_of
-from adv2e.diagnosis.markers import Markers
-from adv2e.diagnosis.scene import Placed, Scene
-from adv2e.diagnosis.simulations import Laboratory, Simulator
+from adv2e.config.active_effects import frame_hooks
+from adv2e.conversion.simulation import events_from_light
+from adv2e.diagnosis.data.evidence import Evidence, RunIn
+from adv2e.diagnosis.data.light import light_of
+from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.fitting.keys import with_keys
+from adv2e.diagnosis.fitting.simulations import Laboratory, Simulator
+from adv2e.diagnosis.hints.lamps import lamps_of
+from adv2e.diagnosis.statistics import Markers
 from adv2e.effects.frames.misregistration import shifted
-from adv2e.simulation import events_from_light
-from adv2e.stepping import steps_of
-from adv2e.upsampling import make_upsampler
+from adv2e.light.interpolation import make_upsampler
+from adv2e.pixel.steps import steps_of
 
 FRAMES = [image.astype(np.uint8) for image in wandering_light(seed=1)]
 EVIDENCE = Evidence("made up", FRAMES, 0.01 * np.arange(21), random_stream(10), 16, 12)
@@ -71,7 +71,7 @@ def test_a_coupling_of_nothing_takes_no_steps_of_time(simulator, monkeypatch, se
     def none(*arguments):
         raise AssertionError("steps of time")
 
-    monkeypatch.setattr("adv2e.stepping.steps_of", none)
+    monkeypatch.setattr("adv2e.pixel.steps.steps_of", none)
     np.testing.assert_array_equal(simulator.stream(coupled, 1).t, plain.t)
 
 
@@ -125,7 +125,7 @@ def test_what_is_added_is_rougher_at_a_first_look_alone(simulator, monkeypatch, 
         planned.append(steps_of(*arguments))
         return planned[-1]
 
-    monkeypatch.setattr("adv2e.stepping.steps_of", noted)
+    monkeypatch.setattr("adv2e.pixel.steps.steps_of", noted)
     config = load_config([], [*LINEAR, *sets, "pixel.low_pass.cutoff_hz=900"])
     light = zip(EVIDENCE.times_ns, light_of(EVIDENCE, config), strict=True)
     alone = np.concatenate(list(events_from_light(light, replace(config, seed=3))))
@@ -176,7 +176,7 @@ def test_coarser_steps_of_time_make_the_same_events(simulator, monkeypatch):
         planned.append(steps_of(*arguments))
         return planned[-1]
 
-    monkeypatch.setattr("adv2e.stepping.steps_of", noted)
+    monkeypatch.setattr("adv2e.pixel.steps.steps_of", noted)
     config = load_config([], [*LINEAR, "pixel.slew_limit.per_s=80", "pixel.low_pass.cutoff_hz=60"])
     light = zip(EVIDENCE.times_ns, light_of(EVIDENCE, config), strict=True)
     fine = np.concatenate(list(events_from_light(light, replace(config, seed=3))))
@@ -208,7 +208,7 @@ COUPLED = ["readout.frame_coupling.amplitude=0.05", "readout.frame_coupling.tau_
 def test_frames_along_the_motion_are_made_once_and_the_same(monkeypatch, exposed):
     made = []
     monkeypatch.setattr(
-        "adv2e.diagnosis.instants.make_upsampler",
+        "adv2e.diagnosis.fitting.instants.make_upsampler",
         lambda *arguments: made.append(1) or make_upsampler(*arguments),
     )
     frames = [moving(k) for k in range(8)]
@@ -230,7 +230,7 @@ def test_frames_along_the_motion_are_made_once_and_the_same(monkeypatch, exposed
 def test_frames_are_made_sharp_once_and_the_same(monkeypatch):
     made = []
     monkeypatch.setattr(
-        "adv2e.diagnosis.instants.frame_hooks",
+        "adv2e.diagnosis.fitting.instants.frame_hooks",
         lambda frames, sampling: made.append(frames.exposure_us) or frame_hooks(frames, sampling),
     )
     simulator = Simulator(EVIDENCE, 2)
@@ -284,7 +284,7 @@ def test_frames_are_moved_once_and_the_same(monkeypatch, beside):
 
 
 def test_where_nothing_is_between_the_frames_they_are_the_recorded_ones(simulator, monkeypatch):
-    monkeypatch.setattr("adv2e.diagnosis.instants.made", None)
+    monkeypatch.setattr("adv2e.diagnosis.fitting.instants.made", None)
     assert len(simulator.stream(load_config([], [*FLOW, "sampling.L=1"]), 1)) > 0
 
 

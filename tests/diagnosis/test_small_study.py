@@ -9,8 +9,8 @@ from camera import Camera, patchwork
 from camera.catalogue import cases
 
 from adv2e.config import load_config
+from adv2e.diagnosis.data.evidence import read_evidence
 from adv2e.diagnosis.diagnose import diagnose
-from adv2e.diagnosis.evidence import read_evidence
 
 SIZE, SECONDS, FPS = (32, 24), 0.4, 800.0
 

@@ -5,11 +5,11 @@ import pytest
 from made_up_streams import stream_of
 
 from adv2e.config import Config
-from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.hints import Hints, hints_of
-from adv2e.diagnosis.lamps import Lamp
-from adv2e.diagnosis.library import library
-from adv2e.diagnosis.stamps import Service, service_times, tick_of
+from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.fitting.library import library
+from adv2e.diagnosis.hints.collect import Hints, hints_of
+from adv2e.diagnosis.hints.lamps import Lamp
+from adv2e.diagnosis.hints.stamps import Service, service_times, tick_of
 
 SIDE = 48
 

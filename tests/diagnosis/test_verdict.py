@@ -9,13 +9,13 @@ from made_up_streams import stream_of
 from scipy.stats import chi2
 
 from adv2e.config import Config, load_config
-from adv2e.diagnosis.candidates import Candidate, Knob
-from adv2e.diagnosis.conclusion import about_drifts, finding_of, rejected_of
-from adv2e.diagnosis.evidence import Evidence
-from adv2e.diagnosis.fit import Fitted
-from adv2e.diagnosis.library import library
-from adv2e.diagnosis.pulses import Burst, Pulse
-from adv2e.diagnosis.verdict import sentence_of, verdict_of
+from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.fitting.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.library import library
+from adv2e.diagnosis.hints.pulses import Burst, Pulse
+from adv2e.diagnosis.outcome.conclusion import about_drifts, finding_of, rejected_of
+from adv2e.diagnosis.outcome.verdict import sentence_of, verdict_of
 from adv2e.reports.quantities import interval_text
 
 DECLARED = Config()

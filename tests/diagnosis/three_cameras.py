@@ -6,10 +6,10 @@ import numpy as np
 from camera import SCENES, Camera
 
 from adv2e import load_config
-from adv2e.diagnosis.evidence import read_evidence
-from adv2e.diagnosis.light import light_of
-from adv2e.diagnosis.markers import BOTH
-from adv2e.diagnosis.scene import Placed, Scene
+from adv2e.diagnosis.data.evidence import read_evidence
+from adv2e.diagnosis.data.light import light_of
+from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.statistics import BOTH
 
 CAMERAS = 3
 

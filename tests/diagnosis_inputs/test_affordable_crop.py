@@ -7,12 +7,12 @@ import pytest
 
 from adv2e import simulate
 from adv2e.config import load_config
-from adv2e.diagnosis import affordable as affordable_module
-from adv2e.diagnosis import costs
-from adv2e.diagnosis import evidence as evidence_module
-from adv2e.diagnosis.affordable import affordable
-from adv2e.diagnosis.evidence import Evidence, RunIn
-from adv2e.diagnosis.stream import Stream
+from adv2e.diagnosis.data import affordable as affordable_module
+from adv2e.diagnosis.data import costs
+from adv2e.diagnosis.data import evidence as evidence_module
+from adv2e.diagnosis.data.affordable import affordable
+from adv2e.diagnosis.data.evidence import Evidence, RunIn
+from adv2e.diagnosis.data.stream import Stream
 from adv2e.errors import DataError
 
 WIDTH, HEIGHT = 96, 80

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from adv2e.config import load_config
-from adv2e.diagnosis.costs import steps_of_time
-from adv2e.diagnosis.evidence import Evidence, RunIn
-from adv2e.diagnosis.light import lights
-from adv2e.diagnosis.simulations import FINE
-from adv2e.diagnosis.stream import Stream
+from adv2e.conversion.simulation import events_from_light
+from adv2e.diagnosis.data.costs import steps_of_time
+from adv2e.diagnosis.data.evidence import Evidence, RunIn
+from adv2e.diagnosis.data.light import lights
+from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.fitting.simulations import FINE
 from adv2e.effects.hooks import Hooks
-from adv2e.simulation import events_from_light
 
 TIMES_S = 3.0 + np.cumsum([0.0, 0.004, 0.004, 0.02, 0.004, 0.013])
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from adv2e import load_config, simulate
-from adv2e.active_effects import active_hooks
-from adv2e.additions import INJECTED_DTYPE
-from adv2e.circuit import make_circuit
+from adv2e.config.active_effects import active_hooks
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.composition import additions_of, begin, map_events
+from adv2e.effects.courses import INJECTED_DTYPE
 from adv2e.effects.hooks import Hooks, View
+from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import ConfigError, DataError
 from adv2e.events import make_events
-from adv2e.ordering import InOrder
 from adv2e.parameters import Fit, Section, parameter
-from adv2e.stepping import Coarseness, steps_of
+from adv2e.pixel.circuit import make_circuit
+from adv2e.pixel.steps import Coarseness, steps_of
 
 ROWS, COLUMNS = 3, 4
 TIMES = np.array([0.1, 0.2, 0.3])

@@ -8,12 +8,13 @@ import re
 import numpy as np
 import pytest
 
-from adv2e import intervals, load_config, simulate
-from adv2e.active_effects import active_hooks
+from adv2e import load_config, simulate
 from adv2e.config import all_keys
+from adv2e.config.active_effects import active_hooks
 from adv2e.effects import EFFECTS
 from adv2e.effects.hooks import Hooks
 from adv2e.events import sort_events
+from adv2e.light import intervals
 
 # effect: (values that do something here, neutral ones)
 CASES = {

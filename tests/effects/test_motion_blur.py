@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adv2e.active_effects import active_hooks
+from adv2e.config.active_effects import active_hooks
 from adv2e.config.model import Config, Frames, Sampling
 from adv2e.effects.frames.exposure_blur import ExposureBlurHooks
 from adv2e.effects.frames.motion_blur import MotionBlurHooks, sharpened, smear, spread, velocity
 from adv2e.effects.hooks import View
-from adv2e.upsampling.kernels import ONE_SIDED, UNKNOWN
-from adv2e.upsampling.motion import Motion
+from adv2e.motion.estimate import Motion
+from adv2e.motion.warping import ONE_SIDED, UNKNOWN
 
 ROWS, COLUMNS = 64, 80
 

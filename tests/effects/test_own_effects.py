@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from adv2e import load_config, simulate
-from adv2e.active_effects import active_hooks
 from adv2e.config import Config, from_dict, to_annotated_yaml, to_dict, to_yaml
-from adv2e.diagnosis.hints import Hints
-from adv2e.diagnosis.library import library, names
-from adv2e.diagnosis.own_effects import as_found, own_of, without_user_effects
+from adv2e.config.active_effects import active_hooks
+from adv2e.config.own_effects import load_effects
+from adv2e.diagnosis.fitting.library import library, names
+from adv2e.diagnosis.fitting.own_effects import as_found, own_of, without_user_effects
+from adv2e.diagnosis.hints.collect import Hints
 from adv2e.errors import ConfigError
-from adv2e.own_effects import load_effects
 from adv2e.reports.keys import meaning_of, summary_of, unit_of
 
 HINTS = Hints(1.0, (), 1)

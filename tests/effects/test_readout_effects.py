@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference.agreement import count_and_time_errors, split_events
 
-from adv2e import intervals, load_config, rng, simulate
+from adv2e import load_config, simulate
+from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.hooks import Hooks, View
 from adv2e.effects.pixel.dead_pixels import DeadPixels, DeadPixelsHooks
 from adv2e.effects.readout.arbiter import Arbiter, ArbiterHooks
@@ -21,8 +22,9 @@ from adv2e.effects.readout.event_loss import EventLoss, EventLossHooks
 from adv2e.effects.readout.frame_coupling import FrameCoupling, FrameCouplingHooks
 from adv2e.effects.readout.timestamp_tick import TimestampTickHooks, ticked
 from adv2e.events import make_events, sort_events
-from adv2e.simulation import events_from_light
-from adv2e.stepping import steps_of
+from adv2e.kernel import rng
+from adv2e.light import intervals
+from adv2e.pixel.steps import steps_of
 
 ROWS, COLUMNS = 12, 10
 
@@ -315,7 +317,7 @@ def test_where_the_coupling_has_decayed_long_steps_make_the_same_events(monkeypa
         planned.append(steps_of(*arguments))
         return planned[-1]
 
-    monkeypatch.setattr("adv2e.stepping.steps_of", noted)
+    monkeypatch.setattr("adv2e.pixel.steps.steps_of", noted)
     y, x = np.mgrid[:24, :32]
     frames = [
         (110 + 90 * np.sin(0.5 * (x - 0.9 * k)) * np.cos(0.4 * y)).astype(np.uint8)

@@ -7,7 +7,6 @@ from harness import quiet, solve
 from reference.agreement import count_and_time_errors
 from reference.twin import light_of
 
-from adv2e.additions import INJECTED_DTYPE, Additions
 from adv2e.config.model import (
     LogResponse,
     LowPass,
@@ -17,6 +16,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
+from adv2e.effects.courses import INJECTED_DTYPE, Additions
 from adv2e.errors import ConfigError, DataError
 
 SPEEDS = 0.35
@@ -58,7 +58,7 @@ def test_slew_limit(per_s, follower_hz):
 
 
 def test_slew_limit_of_no_account_changes_nothing(monkeypatch):
-    monkeypatch.setattr("adv2e.stepping._BEND_US", np.inf)  # steps as without it
+    monkeypatch.setattr("adv2e.pixel.steps._BEND_US", np.inf)  # steps as without it
     found = solve(LIGHT, TIMES, pixel(slew_limit=SlewLimit(per_s=1e6)))
     plain = solve(LIGHT, TIMES, pixel(), method="dense")
     assert all(np.array_equal(a, b) for a, b in zip(found, plain, strict=True))

@@ -11,8 +11,6 @@ from harness import EVERYTHING, QUIET, advance, quiet, solve, start
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from adv2e import stepping
-from adv2e.additions import INJECTED_DTYPE, Additions
 from adv2e.config.model import (
     LowPass,
     Pixel,
@@ -21,6 +19,8 @@ from adv2e.config.model import (
     SlewLimit,
     Thresholds,
 )
+from adv2e.effects.courses import INJECTED_DTYPE, Additions
+from adv2e.pixel import steps as stepping
 
 FRAMES, ROWS, COLUMNS = 13, 40, 70
 NEW = {
@@ -109,7 +109,7 @@ import numpy as np, sys
 sys.path[:0] = [{tests!r}, {tests!r} + "/kernel"]
 from harness import EVERYTHING, advance, start
 from test_dense_invariance import NEW
-from adv2e.additions import Additions
+from adv2e.effects.courses import Additions
 from adv2e.config.model import Pixel, LowPass
 draw = np.random.default_rng(2)
 light = np.exp(draw.uniform(1, 5.5, (3, 3, 4))).astype(np.float32)

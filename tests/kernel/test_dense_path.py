@@ -14,8 +14,6 @@ from reference.dense_ode import as_lists, dense_truth
 from test_dense import CIRCUITS, WITH_EFFECTS
 from test_twin import CASES, check, clock, moving_light
 
-from adv2e import rng
-from adv2e.additions import Additions
 from adv2e.config.model import (
     HotPixels,
     Leak,
@@ -28,9 +26,11 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
+from adv2e.effects.courses import Additions
 from adv2e.errors import UsageError
-from adv2e.pixel import make_circuit
-from adv2e.stepping import steps_of
+from adv2e.kernel import rng
+from adv2e.pixel.array import make_circuit
+from adv2e.pixel.steps import steps_of
 
 
 @pytest.mark.parametrize("name", [*CIRCUITS, "effects"])

@@ -11,8 +11,8 @@ from reference.circuit import Circuit, Draws
 from reference.dense_ode import as_lists, find_events
 from reference.dense_signal import solve_signal
 
-from adv2e import rng
 from adv2e.config.model import ShotNoise
+from adv2e.kernel import rng
 
 
 def shot_candidates(pixels, rate_hz, seed, end_s):

@@ -7,7 +7,6 @@ import pytest
 from harness import advance, by_pixel, quiet, start
 from reference.agreement import count_and_time_errors
 
-from adv2e import circuit
 from adv2e.config.model import (
     HotPixels,
     Leak,
@@ -17,6 +16,7 @@ from adv2e.config.model import (
     ShotNoise,
     Thresholds,
 )
+from adv2e.pixel import circuit
 
 PIXELS = 96
 

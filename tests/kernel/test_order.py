@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from harness import advance, quiet, start
 
-from adv2e import sorting
 from adv2e.config.model import LowPass, Thresholds
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE
-from adv2e.kernel import order
+from adv2e.kernel import packing as order
 from adv2e.kernel.workspace import PIXEL_BITS, pack_limit_us
+from adv2e.pixel import merge as sorting
 
 LAST_PIXEL = (1 << PIXEL_BITS) - 1
 LONGEST_US = pack_limit_us() // 2 - 1

@@ -5,7 +5,6 @@ import pytest
 from harness import advance, quiet, start
 from scipy import stats
 
-from adv2e.characterisation.noise import NoisySources, noise_rates
 from adv2e.config.model import (
     HotPixels,
     Leak,
@@ -18,6 +17,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
+from adv2e.diagnosis.tables.noise import NoisySources, noise_rates
 from adv2e.kernel.workspace import S_NOISE, S_REFERENCE, S_X
 
 PIXELS = 3000

@@ -7,9 +7,11 @@ import pytest
 from harness import quiet
 
 from adv2e.config.model import Leak, LogResponse, LowPass, Sampling
-from adv2e.kernel import quadrature, rest, screen, stepped
+from adv2e.kernel import general_screens as stepped
+from adv2e.kernel import quadrature, screen
+from adv2e.kernel import static_pixels as rest
 from adv2e.kernel.quadrature import Rule
-from adv2e.pixel import make_circuit
+from adv2e.pixel.array import make_circuit
 
 PIXELS = screen.STRIP
 

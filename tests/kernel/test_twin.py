@@ -9,7 +9,6 @@ from reference.agreement import count_and_time_errors
 from reference.circuit import Circuit, Draws, merge_injected
 from reference.twin import simulate_twin
 
-from adv2e import rng
 from adv2e.config.model import (
     HotPixels,
     Leak,
@@ -20,6 +19,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
+from adv2e.kernel import rng
 
 
 def moving_light(knots, pixels, seed=0, step=0.3):

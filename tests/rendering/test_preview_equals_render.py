@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.config import load_config
+from adv2e.conversion.pipeline import convert
+from adv2e.conversion.reading import Reading
 from adv2e.errors import OutputError
 from adv2e.events import empty_events, make_events
-from adv2e.pipeline import convert
-from adv2e.reading import Reading
-from adv2e.recordings import Recording, read_recording
+from adv2e.formats.reading import Recording, read_recording
 from adv2e.rendering import Preview, Style, render_recording
 from adv2e.synthetic import Scene
 from adv2e.synthetic.clips import write_video

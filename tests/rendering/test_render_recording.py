@@ -6,7 +6,7 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.events import empty_events, make_events
-from adv2e.recordings import Recording
+from adv2e.formats.reading import Recording
 from adv2e.rendering import Style, render_recording
 
 EPOCH = 1_470_000_000_000_000  # us

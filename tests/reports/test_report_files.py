@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_up_diagnosis import MODEL, everything, nothing, strange
 
-from adv2e.characterisation import report as characterisation_report
 from adv2e.config import from_dict, load_config
 from adv2e.config.yaml12 import Origin, parse
-from adv2e.diagnosis.report import write_reports
-from adv2e.diagnosis.report.page import WORDING
+from adv2e.diagnosis.outcome.report import write_reports
+from adv2e.diagnosis.outcome.report.page import WORDING
+from adv2e.diagnosis.tables import report as characterisation_report
 from adv2e.errors import OutputError
 from adv2e.reports import files
 from adv2e.reports.files import check_folder

@@ -9,8 +9,8 @@ import pytest
 from camera.catalogue import LIBRARY
 from made_up_diagnosis import HOSTILE, everything, nothing, strange
 
-from adv2e.characterisation import report as characterisation_report
-from adv2e.diagnosis.report.page import page
+from adv2e.diagnosis.outcome.report.page import page
+from adv2e.diagnosis.tables import report as characterisation_report
 from adv2e.reports.findings import MARKS
 from adv2e.reports.result import ResidualMap, Signature
 from adv2e.reports.separation import SEPARATIONS

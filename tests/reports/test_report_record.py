@@ -6,8 +6,8 @@ import math
 import pytest
 from made_up_diagnosis import HOSTILE, everything, nothing, strange
 
-from adv2e.characterisation import report as characterisation_report
-from adv2e.diagnosis.report.page import WORDING
+from adv2e.diagnosis.outcome.report.page import WORDING
+from adv2e.diagnosis.tables import report as characterisation_report
 from adv2e.reports.record import record, record_text
 
 VERDICTS = ("consistent", "explained", "partly_explained", "not_identifiable", "unexplained")

@@ -12,7 +12,7 @@ from written_recordings import write_recording
 from adv2e import simulate
 from adv2e.comparison.distances import distances
 from adv2e.config import load_config
-from adv2e.diagnosis.nuisances import TOLERANCE, match_totals
+from adv2e.diagnosis.fitting.nuisances import TOLERANCE, match_totals
 from adv2e.events import make_events
 
 WIDTH, HEIGHT, FRAMES = 16, 12, 7

@@ -11,7 +11,7 @@ from real.tried import CLIPPED_BLACK, Added
 
 from adv2e.comparison.windows import Windows
 from adv2e.config import load_config
-from adv2e.diagnosis.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.candidates import Candidate, Knob
 
 OFFSET = Candidate("clock_offset", (Knob("frames.clock_offset_us", -1e6, 1e6, False, 1e3),), ())
 

@@ -5,8 +5,8 @@ import pytest
 import study_interpolation_error as study
 from click.testing import CliRunner
 
-from adv2e.diagnosis.frame_error import FrameError
-from adv2e.diagnosis.markers import BOTH
+from adv2e.diagnosis.statistics import BOTH
+from adv2e.diagnosis.statistics.frame_error import FrameError
 
 
 def simulations(mean, seed, count=400):

@@ -11,7 +11,7 @@ import pytest
 
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
-from adv2e.recordings import read_recording
+from adv2e.formats.reading import read_recording
 from adv2e.sources import open_source
 from adv2e.sources.base import OVER_BLACK
 from adv2e.sources.opencv import decode_image

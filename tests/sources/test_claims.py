@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.sources import claims
-from adv2e.sources.claims import check_claim
+from adv2e.sources.images import claims
+from adv2e.sources.images.claims import check_claim
 from adv2e.sources.opencv import decode_image
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from adv2e.errors import UsageError
 from adv2e.sources import open_source
-from adv2e.sources.rates import parse_rate
+from adv2e.sources.times.rates import parse_rate
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adv2e.sources import open_source
-from adv2e.sources.gaps import gap_doubts
+from adv2e.sources.times.gaps import gap_doubts
 
 MS = 10**6
 

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.sources.lists import parse_list, read_list
-from adv2e.sources.units import UNITS, Unit
+from adv2e.sources.times.lists import parse_list, read_list
+from adv2e.sources.times.units import UNITS, Unit
 
 
 def read(text, **evidence):

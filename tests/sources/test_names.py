@@ -8,8 +8,8 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
-from adv2e.sources.names import leads_out, match, member_of
-from adv2e.sources.times import Stamp
+from adv2e.sources.times.instants import Stamp
+from adv2e.sources.times.names import leads_out, match, member_of
 
 LEFT = ["/data/rec/left/0000.png", "/data/rec/left/0001.png"]
 

@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 
 from adv2e.sources import open_source
-from adv2e.sources.numbering import numbering_doubt
-from adv2e.sources.times import FrameRate
+from adv2e.sources.times.instants import FrameRate
+from adv2e.sources.times.numbering import numbering_doubt
 
 
 def doubt(*names, fps=240):

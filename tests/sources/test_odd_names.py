@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adv2e.names import shown
-from adv2e.recordings import read_recording
+from adv2e.files.names import shown
+from adv2e.formats.reading import read_recording
 from adv2e.rendering.gif import GifWriter, palette
 from adv2e.rendering.styles import Style
 from adv2e.sources import open_source
-from adv2e.sources.opening import openable
+from adv2e.sources.video.opening import openable
 
 NAMES = [
     "2024-05-01T12:30:00",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from adv2e.sources.packets import Jump, arranged, list_packets
+from adv2e.sources.video.packets import Jump, arranged, list_packets
 
 MS = 10**6
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.sources.containers import examine
+from adv2e.sources.video.containers import examine
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 from adv2e.errors import DataError
 from adv2e.rendering.gif import GifWriter, palette
 from adv2e.rendering.styles import Style
-from adv2e.sources.containers import examine
+from adv2e.sources.video.containers import examine
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adv2e.sources.times import (
+from adv2e.sources.times.instants import (
     FrameRate,
     constant_rate,
     parse_ns,

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.sources import open_source, video
+from adv2e.sources import open_source
+from adv2e.sources.video import source as video
 
 
 def times_of(source):

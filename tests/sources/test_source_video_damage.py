@@ -9,8 +9,8 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
-from adv2e.sources.choice import Choice
-from adv2e.sources.colours import Colours
+from adv2e.sources.video.choice import Choice
+from adv2e.sources.video.colours import Colours
 
 pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
 from video_files import COUNT, av, written
@@ -138,7 +138,7 @@ def test_errors_that_a_decoder_of_pyav_meets_are_told(tmp_path, monkeypatch):
     data[place : place + 60] = bytes(60)
     path.write_bytes(data)
     choice = Choice("for a test", Colours())
-    monkeypatch.setattr("adv2e.sources.video.choose", lambda *_: choice)
+    monkeypatch.setattr("adv2e.sources.video.source.choose", lambda *_: choice)
     source, frames = read(path)
     assert len(frames) == COUNT
     (told,) = [note for note in source.notes if "the decoder met errors in" in note]

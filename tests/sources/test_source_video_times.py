@@ -10,8 +10,8 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
-from adv2e.sources.choice import Choice
-from adv2e.sources.colours import Colours
+from adv2e.sources.video.choice import Choice
+from adv2e.sources.video.colours import Colours
 
 pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
 from video_files import COUNT, written
@@ -67,7 +67,7 @@ def test_every_frame_is_at_its_time_when_pyav_decodes(
     path = written(tmp_path / name, codec, Fraction(25), reordered=reordered)
     expected = times_of(path)
     choice = Choice("for a test", Colours())
-    monkeypatch.setattr("adv2e.sources.video.choose", lambda *_: choice)
+    monkeypatch.setattr("adv2e.sources.video.source.choose", lambda *_: choice)
     assert times_of(path) == expected
     assert len(expected) == COUNT
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError, UsageError
-from adv2e.recordings import read_recording
+from adv2e.formats.reading import read_recording
 from adv2e.sources import open_source
 
 PER_S = {"s": 1, "ms": 1000, "us": 10**6, "ns": 10**9}

@@ -13,8 +13,8 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import ConfigError, DataError, MissingExtraError
 from adv2e.sources import open_source
 from adv2e.sources.base import OVER_BLACK
-from adv2e.sources.choice import bits_of, choose
-from adv2e.sources.pyav import codes_of
+from adv2e.sources.video.choice import bits_of, choose
+from adv2e.sources.video.pyav import codes_of
 
 ENCODINGS = {
     **{1: "bt709", 6: "bt709", 11: "bt709", 14: "bt709", 15: "bt709", 4: "gamma:2.2"},
@@ -227,7 +227,7 @@ def test_codes_of_both_decoders_are_the_same(tmp_path, monkeypatch, pixels, full
     colours = [(60, 90, 160), (120, 200, 90), (220, 128, 128), (16, 128, 128)]
     path = write(tmp_path / "clip.mkv", colours, "ffv1", pixels, tags=(1, 1, 1), full=full)
     opencv = [frame.image for frame in open_source(path).frames()]
-    monkeypatch.setattr("adv2e.sources.choice._beyond_opencv", lambda *_: "it is asked for")
+    monkeypatch.setattr("adv2e.sources.video.choice._beyond_opencv", lambda *_: "it is asked for")
     source = open_source(path)
     assert source.packages == ("av",)
     assert np.array_equal(opencv, [frame.image for frame in source.frames()])
@@ -422,5 +422,5 @@ def test_pictures_are_turned_alike_by_both_decoders(tmp_path, monkeypatch, turne
     path.write_bytes(data[:place] + a + b + none + c + d + none + data[place + 24 :])
     opencv = [frame.image for frame in open_source(path).frames()]
     assert opencv[0].shape[:2] == ((64, 48) if turned % 180 else (48, 64))
-    monkeypatch.setattr("adv2e.sources.choice._beyond_opencv", lambda *_: "it is asked for")
+    monkeypatch.setattr("adv2e.sources.video.choice._beyond_opencv", lambda *_: "it is asked for")
     assert np.array_equal(opencv, [frame.image for frame in open_source(path).frames()])

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from coded import write
 
-from adv2e.sources.colours import Colours
-from adv2e.sources.stated import Stated, stated_by
-from adv2e.sources.streams.base import Findings
-from adv2e.sources.streams.bits import Bits
-from adv2e.sources.streams.ffv1 import Ffv1
-from adv2e.sources.streams.h264 import H264
-from adv2e.sources.streams.hevc import Hevc
-from adv2e.sources.streams.intra import DnxHd, Dv, MotionJpeg, ProRes, UtVideo
-from adv2e.sources.streams.mpeg import Mpeg2, Mpeg4
+from adv2e.sources.video.colours import Colours
+from adv2e.sources.video.stated import Stated, stated_by
+from adv2e.sources.video.streams.base import Findings
+from adv2e.sources.video.streams.bits import Bits
+from adv2e.sources.video.streams.ffv1 import Ffv1
+from adv2e.sources.video.streams.h264 import H264
+from adv2e.sources.video.streams.hevc import Hevc
+from adv2e.sources.video.streams.intra import DnxHd, Dv, MotionJpeg, ProRes, UtVideo
+from adv2e.sources.video.streams.mpeg import Mpeg2, Mpeg4
 
 PARSERS = [H264, Hevc, Mpeg2, Mpeg4, ProRes, DnxHd, Dv, UtVideo, Ffv1, lambda: MotionJpeg(480)]
 

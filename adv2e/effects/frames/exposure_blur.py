@@ -45,8 +45,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.compiled import entry
 from adv2e.effects.hooks import Frames, Hooks
-from adv2e.jit import entry
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from adv2e.jit import entry
+from adv2e.compiled import entry
 
 
 @entry

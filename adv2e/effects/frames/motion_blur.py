@@ -8,9 +8,9 @@ interpolated along the motion.  That module puts back what frames tell of change
 nothing where the exposure is shorter than the frame interval; this one what they tell of motion.
 
 Velocity comes from the optical flow to the frames before and after, as the slope of a path through
-all three (:mod:`adv2e.upsampling.acceleration`); from one of them where the other does not show the
-pixel; and from the slower where the two differ by more than half, as of what was hit meanwhile.  It
-holds for all pixels over which what moves was smeared, the longest smear first.
+all three (:mod:`adv2e.motion.acceleration`); from one of them where the other does not
+show the pixel; and from the slower where the two differ by more than half, as of what was hit
+meanwhile.  It holds for all pixels over which what moves was smeared, the longest smear first.
 
 With B the mean along the smear through each pixel, which is its own transpose but for changes of v
 from pixel to pixel, ten steps of the Richardson-Lucy iteration are taken from the frame itself,
@@ -40,10 +40,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.compiled import entry
 from adv2e.effects.hooks import Frames, Hooks
-from adv2e.jit import entry
-from adv2e.upsampling.kernels import ONE_SIDED, UNKNOWN, cubic
-from adv2e.upsampling.motion import Motion, estimate_motion
+from adv2e.motion.estimate import Motion, estimate_motion
+from adv2e.motion.warping import ONE_SIDED, UNKNOWN, cubic
 
 Image = NDArray[np.float32]
 

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e import rng
 from adv2e.effects.hooks import Hooks, View
 from adv2e.events import Events
+from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter
 
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e import rng
-from adv2e.jit import entry, inlined
+from adv2e.compiled import entry, inlined
+from adv2e.kernel import rng
 from adv2e.kernel.workspace import NEVER, S_HOT_DRAW, S_HOT_TIME, Array, Circuit
 from adv2e.parameters import Fit, Section, parameter
 

@@ -24,8 +24,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e import rng
-from adv2e.jit import entry
+from adv2e.compiled import entry
+from adv2e.kernel import rng
 
 Array = NDArray[np.float64]
 

@@ -45,8 +45,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e import rng
-from adv2e.jit import entry, inlined, kernel
+from adv2e.compiled import entry, inlined, kernel
+from adv2e.kernel import rng
 from adv2e.kernel.workspace import (
     LEAK,
     LIGHT,

@@ -35,7 +35,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from adv2e.jit import inlined, kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel.workspace import (
     EULER,
     FIRST_ORDER_HOLD,

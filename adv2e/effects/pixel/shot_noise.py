@@ -28,8 +28,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e import rng
-from adv2e.jit import entry, inlined
+from adv2e.compiled import entry, inlined
+from adv2e.kernel import rng
 from adv2e.kernel.workspace import S_SHOT_DRAW, S_SHOT_TIME, Array, Circuit
 from adv2e.parameters import Fit, Section, parameter
 

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e.jit import kernel
+from adv2e.compiled import kernel
 from adv2e.kernel import special
-from adv2e.kernel.dense_rows import (
+from adv2e.kernel.stepped.rows import (
     CANDIDATE,
     DRIVEN0,
     DRIVEN1,

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e import rng
-from adv2e.jit import entry, kernel
+from adv2e.compiled import entry, kernel
+from adv2e.kernel import rng
 from adv2e.kernel.workspace import Array
 from adv2e.parameters import Fit, Section, parameter
 

@@ -29,11 +29,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e import rng
+from adv2e.compiled import entry
 from adv2e.effects.hooks import Hooks, View
+from adv2e.effects.reorder_buffer import InOrder
 from adv2e.events import Events, make_events, pixels_of, sort_events
-from adv2e.jit import entry
-from adv2e.ordering import InOrder
+from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter
 
 _NOBODY = -1

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.effects.hooks import Hooks
+from adv2e.effects.reorder_buffer import InOrder
 from adv2e.events import Events, sort_events
-from adv2e.ordering import InOrder
 
 
 def ticked(times_us: NDArray[np.int64], tick_us: float) -> NDArray[np.int64]:

@@ -1,0 +1,1 @@
+"""From a source to a finished output: reading, simulating and writing at the same time."""

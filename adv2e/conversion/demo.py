@@ -1,0 +1,120 @@
+"""The demonstration: a sample clip, its events, a picture and a film of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from adv2e.conversion.pipeline import Summary, convert
+from adv2e.conversion.reading import Reading
+from adv2e.errors import OutputError
+from adv2e.files.names import shown
+from adv2e.files.staging import check_free
+from adv2e.formats.reading import read_recording
+from adv2e.rendering import Style, render_recording
+from adv2e.rendering.timeline import caption
+from adv2e.synthetic import Scene
+from adv2e.synthetic.clips import write_video
+
+if TYPE_CHECKING:
+    from adv2e.config import Config
+
+WIDTH, HEIGHT, FPS, DURATION_S = 346, 260, 30.0, 2.0
+"""The sample clip: size of a DAVIS346, frames a second, length [s]."""
+
+INSTANTS_S = (0.20, 0.45, 0.90, 1.20, 1.50, 1.90)
+"""Instants of the picture: in motion, but for the third and the last."""
+
+WINDOW_US = 10_000
+"""What each instant shows [us]."""
+
+_RESTS = 1e-6  # speed below which the scene rests
+
+
+@dataclass(frozen=True)
+class Demo:
+    """What was made, and where."""
+
+    clip: Path
+    events: Path
+    picture: Path
+    film: Path
+    summary: Summary
+
+    def text(self) -> str:
+        """Return the summary for people."""
+        done = self.summary
+        share = f"{100 * done.on / done.events:.1f} % of them ON" if done.events else "none"
+        rate = done.events / done.duration_s
+        pixels = done.width * done.height
+        return "\n".join(
+            (
+                f"clip     {shown(self.clip)}",
+                f"         {done.frames} frames of {done.width}x{done.height} at {FPS:g} a second;"
+                " the scene moves, rests, moves and rests",
+                f"events   {shown(self.events)}",
+                f"         {done.events:,} events, {share}; {rate / 1e6:.2f} million a second,"
+                f" {rate / pixels:.1f} a pixel a second",
+                f"         made in {done.seconds:.1f} s",
+                f"picture  {shown(self.picture)}",
+                "         frames and, at their right, events: ON red, OFF blue",
+                f"film     {shown(self.film)}",
+                "",
+                "Look at the picture first. Then try: adv2e convert VIDEO --preview events.mp4",
+            )
+        )
+
+
+def run_demo(
+    folder: Path,
+    config: Config,
+    *,
+    overwrite: bool = False,
+    threads: int | None = None,
+    progress: bool = False,
+    log: Callable[[str], None] = lambda text: None,
+) -> Demo:
+    """Make clip, events, picture and film in `folder`.
+
+    Raises
+    ------
+    OutputError
+        `folder` cannot be made or written to, or holds one of them and `overwrite` is false.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"{folder}: is not a folder")
+    clip, events = folder / "clip.avi", folder / "clip.events.h5"
+    picture, film = folder / "clip.events.png", folder / "clip.events.mp4"
+    check_free([clip, events, picture, film], overwrite)
+    scene = Scene()
+    size = {"width": WIDTH, "height": HEIGHT}
+    write_video(scene, clip, **size, fps=FPS, duration_s=DURATION_S, overwrite=overwrite)
+    with Reading(str(clip), threads=threads) as reading:
+        summary = convert(
+            reading,
+            str(events),
+            config=config,
+            with_frames=True,
+            overwrite=overwrite,
+            preview=str(film),
+            progress=progress,
+            compile_apart=True,
+            log=log,
+        )
+
+    def describe(since_us: int, count: int) -> str:
+        doing = "at rest" if scene.speed(since_us * 1e-6) < _RESTS else "moving"
+        return f"{caption(since_us, count)} in {WINDOW_US // 1000} ms, {doing}"
+
+    recording = read_recording(events)
+    render_recording(
+        recording,
+        picture,
+        style=Style(window_us=WINDOW_US),
+        at_s=INSTANTS_S,
+        caption=describe,
+        overwrite=overwrite,
+    )
+    return Demo(clip, events, picture, film, summary)

@@ -1,0 +1,366 @@
+"""One conversion: source -> light -> events -> sink, with a summary at the end.
+
+With more than one thread, frames are read and decoded in a thread ahead of the pixel and events
+written in another behind it; those two are seldom busy and come on top of the threads that compute.
+With one thread, that one does everything.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e import __version__
+from adv2e.background import WriteBehind
+from adv2e.compiled import announcement
+from adv2e.config import Config, to_dict
+from adv2e.config.active_effects import user_sources
+from adv2e.conversion.reading import Decoding, Reading, Still
+from adv2e.conversion.simulation import events_from_light, is_compiled
+from adv2e.conversion.versions import versions
+from adv2e.effects.frames.brightness import check_white
+from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.events import Events
+from adv2e.files.apart import check_apart
+from adv2e.files.names import shown
+from adv2e.files.staging import Staging
+from adv2e.formats.writing import Sink, format_name, open_sink
+from adv2e.light.decoding import decoder_for, light_text
+from adv2e.light.pictures import drawn, picture_white
+from adv2e.sources.base import Source
+
+if TYPE_CHECKING:
+    from adv2e.rendering import Preview
+
+BEHIND_BYTES = 16 << 20
+"""Memory for events and frames that were made and not written yet."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a conversion did."""
+
+    output: str
+    width: int
+    height: int
+    frames: int
+    duration_s: float
+    events: int
+    on: int
+    seconds: float
+
+    def text(self) -> str:
+        """Return the summary as two lines for people."""
+        share = f"{100 * self.on / self.events:.1f} % ON" if self.events else "no events"
+        rate = self.events / self.duration_s / (self.width * self.height)
+        return (
+            f"{shown(self.output)}: {self.events:,} events ({share}) of {self.width}x{self.height}"
+            f" pixels over {self.duration_s:.3f} s\n"
+            f"{rate:.2f} events a pixel a second; {self.frames} frames in {self.seconds:.1f} s"
+        )
+
+
+_Call = Callable[..., None]
+"""Takes a cost in bytes, a function and its arguments, and calls it now or later."""
+
+
+def _call_now(_: int, function: Callable[..., None], *arguments: Any) -> None:
+    function(*arguments)
+
+
+class _Output:
+    """What frames and events go to: the sink, the preview if there is one, and the counts."""
+
+    def __init__(self, sink: Sink, preview: Preview | None, white: float) -> None:
+        self._sink, self._preview, self._white = sink, preview, white
+        self.wants_frames = sink.wants_frames or preview is not None
+        self.events = 0
+        self.on = 0
+
+    def add_frame(self, t_ns: int, picture: NDArray[Any]) -> None:
+        self._sink.write_frame(t_ns, picture)
+        if self._preview is not None:
+            self._preview.add_frame(t_ns, drawn(picture, self._white))
+
+    def no_more_frames(self) -> None:
+        if self._preview is not None:
+            self._preview.no_more_frames()
+
+    def complete_until(self, t_us: int) -> None:
+        if self._preview is not None:
+            self._preview.complete_until(t_us)
+
+    def add_events(self, events: Events) -> None:
+        self.events += events.size
+        self.on += int(np.count_nonzero(events["p"]))
+        self._sink.write_events(events)
+        if self._preview is not None:
+            self._preview.add_events(events)
+
+
+class _Passing:
+    """Frames on their way to the pixel: counts them, and hands on what is kept of them."""
+
+    def __init__(self, stills: Iterable[Still], output: _Output, call: _Call) -> None:
+        self._stills, self._output, self._call = stills, output, call
+        self.count = 0
+        self.first_ns = 0
+        self.last_ns = 0
+
+    def light(self) -> Iterator[tuple[int, NDArray[Any]]]:
+        """Yield (t_ns, light), or grey values, of each frame."""
+        for still in self._stills:
+            self.first_ns = still.t_ns if not self.count else self.first_ns
+            self.last_ns = still.t_ns
+            self.count += 1
+            if still.picture is not None:
+                size = still.picture.nbytes
+                self._call(size, self._output.add_frame, still.t_ns, still.picture)
+            now = still.t_ns, still.light
+            del still  # with its picture
+            yield now
+        self._call(0, self._output.no_more_frames)
+
+
+def default_output(source: str) -> str:
+    """Return ``<stem>.events.h5`` in the current folder."""
+    path = Path(source)
+    name = path.resolve().name if path.name in ("", ".", "..") else path.name
+    return f"{name if path.is_dir() else Path(name).stem}.events.h5"
+
+
+def convert(
+    reading: Reading,
+    output: str | None,
+    *,
+    config: Config,
+    format: str | None = None,
+    layout: str | None = None,
+    with_frames: bool = False,
+    overwrite: bool = False,
+    preview: str | None = None,
+    progress: bool = False,
+    compile_apart: bool = False,
+    also_read: Iterable[str | Path] = (),
+    log: Callable[[str], None] = lambda text: None,
+) -> Summary:
+    """Convert one video, image sequence or recording to events.
+
+    Parameters
+    ----------
+    reading : Reading
+        Input, within its context.
+    output : str, optional
+        Output path ("-": text to stdout; None: see :func:`default_output`).
+    config : Config
+    format, layout, with_frames, overwrite
+        See :func:`adv2e.formats.writing.open_sink`; DAVIS240C folders and zips always hold the
+        frames.
+    preview : str, optional
+        Picture or film of the events to write beside.
+    progress : bool
+        Show a progress bar on stderr.
+    compile_apart : bool
+        Have what is not compiled yet compiled by a process of its own.
+    also_read : iterable of str or Path
+        Files that `config` is made of, which must not be written over.
+    log : callable
+        Takes lines for people.
+
+    Raises
+    ------
+    Adv2eError
+        For anything wrong with input or output; then no output file is left.
+    """
+    began = time.perf_counter()
+    recording, workers = reading.source, reading.threads
+    if recording.largest is not None and recording.dtype.kind == "f":
+        check_white(recording.largest, recording.path, config.frames.full_scale)
+    target = output or default_output(reading.path)
+    inputs = (*reading.inputs, *also_read)
+    for written in (target, preview):
+        if written not in (None, "-"):
+            check_apart(written, inputs)
+    keeps_all_bits = _holds_frames(target, format)
+    with_frames = with_frames or keeps_all_bits
+    decoder = decoder_for(
+        config.frames,
+        recording.dtype,
+        recording.colour,
+        auto=recording.encoding,
+        white=recording.full_scale,
+    )
+    white = picture_white(recording.dtype, decoder.full_scale, not keeps_all_bits)
+    # events and preview come into place together, when all is written
+    with Staging(overwrite) as staging, ExitStack() as stack:
+        sink = stack.enter_context(
+            open_sink(
+                target if target == "-" else Path(target),
+                width=recording.width,
+                height=recording.height,
+                format=format,
+                layout=layout,
+                metadata=_metadata(config, recording, decoder, white if with_frames else None),
+                with_frames=with_frames,
+                threads=workers,
+                staging=staging,
+            )
+        )
+        out = _Output(sink, _open_preview(preview, recording, staging, stack), white)
+        staging.keep_apart(inputs)
+        call: _Call = _call_now
+        # a write to standard output may block until the reader pleases, and only the main thread
+        # can be interrupted in it
+        if workers > 1 and target != "-":
+            call = stack.enter_context(WriteBehind(BEHIND_BYTES)).call
+        told = _doubt_of_white(recording, recording.largest, config)
+        for doubt in filter(None, (*recording.doubts, told)):
+            log(doubt)
+        table = _table_for_the_kernel(decoder, config)
+        if not is_compiled(config):
+            log(announcement())
+            if compile_apart and not user_sources(config):
+                name = "txt" if target == "-" else format_name(Path(target), format)
+                _compile_apart(recording, config, decoder.encoding, name, layout, workers)
+        stated = config.frames.full_scale
+        stills = reading.stills(
+            Decoding(decoder, table is not None, out.wants_frames, stated, not keeps_all_bits)
+        )
+        frames = _Passing(_progress(stills, recording.count, progress), out, call)
+        chunks = events_from_light(
+            frames.light(),
+            config,
+            threads=workers,
+            table=table,
+            complete=None if preview is None else lambda t_us: call(0, out.complete_until, t_us),
+        )
+        for events in chunks:
+            for piece in _pieces(events):
+                call(piece.nbytes, out.add_events, piece)
+            del events, piece  # or they would stay while the next ones are made
+    # at the end: an error is to be the only line
+    log(f"light: {light_text(recording.light, recording.full_scale, config.frames)}")
+    found = _doubt_of_white(recording, recording.largest_read, config)
+    if told:
+        largest = f"{recording.path}: whole numbers up to {recording.largest_read:g} came"
+        found = "" if found else f"{largest}: what was said of white does not hold"
+    for note in filter(None, (*recording.notes, found)):
+        log(note)
+    return Summary(
+        output=target,
+        width=recording.width,
+        height=recording.height,
+        frames=frames.count,
+        duration_s=(frames.last_ns - frames.first_ns) * 1e-9,
+        events=out.events,
+        on=out.on,
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _compile_apart(
+    recording: Source,
+    config: Config,
+    encoding: str,
+    format: str,
+    layout: str | None,
+    threads: int,
+) -> None:
+    from adv2e.conversion.compiling import compile_apart  # noqa: PLC0415 - once in the life of a release
+
+    compile_apart(
+        config,
+        dtype=recording.dtype,
+        colour=recording.colour,
+        encoding=encoding,
+        format=format,
+        layout=layout,
+        threads=threads,
+    )
+
+
+def _holds_frames(target: str, format: str | None) -> bool:
+    """Tell whether the output is a whole DAVIS240C recording, to which the frames belong."""
+    return target != "-" and format_name(Path(target), format) in ("folder", "zip")
+
+
+def _doubt_of_white(recording: Source, largest: float | None, config: Config) -> str:
+    return "" if config.frames.full_scale else recording.doubt_of_white(largest)
+
+
+def _metadata(
+    config: Config, recording: Source, decoder: LightDecoder, white: float | None
+) -> dict[str, Any]:
+    """Return what makes the file again, apart from the input itself, and what it holds.
+
+    `white` is that of the frames stored; None where there are none.
+    """
+    own = user_sources(config)
+    stored = {"encoding": decoder.encoding, "full_scale": white}
+    return {
+        "adv2e": __version__,
+        "versions": versions(recording.packages),
+        "config": to_dict(config),
+        "seed": config.seed,
+        **({"effects": own} if own else {}),
+        "source": {
+            "name": shown(Path(recording.path).name),
+            "kind": recording.kind,
+            "encoding": decoder.encoding,
+            "full_scale": decoder.full_scale,
+            "light": light_text(recording.light, recording.full_scale, config.frames),
+        },
+        **({"frames": stored} if white is not None else {}),
+    }
+
+
+def _open_preview(
+    preview: str | None, recording: Source, staging: Staging, stack: ExitStack
+) -> Preview | None:
+    if preview is None:
+        return None
+    from adv2e.rendering import Preview  # noqa: PLC0415 - most conversions draw nothing
+
+    return stack.enter_context(
+        Preview(Path(preview), recording.width, recording.height, frames=True, staging=staging)
+    )
+
+
+def _table_for_the_kernel(decoder: LightDecoder, config: Config) -> NDArray[np.float32] | None:
+    """Return the table with which the kernel is to decode grey frames itself; None: light it is.
+
+    A quarter of the memory traffic, but every instant looks its frames up again, and only linear
+    interpolation needs no light before.
+    """
+    sampling = config.sampling
+    once = sampling.L == 1 and sampling.interpolation == "linear"
+    return decoder.grey_table if once else None
+
+
+def _pieces(events: Events) -> Iterator[Events]:
+    """Yield the events, those of a burst in copies that are given back one by one.
+
+    Else all of them would stay until the last one is written, beside those made meanwhile.
+    """
+    if events.nbytes <= BEHIND_BYTES:
+        yield events
+        return
+    size = BEHIND_BYTES // 4 // events.itemsize
+    for begin in range(0, events.size, size):
+        yield events[begin : begin + size].copy()
+
+
+def _progress(stills: Iterator[Still], count: int | None, shown: bool) -> Iterable[Still]:
+    """Return the frames, with a progress bar on stderr if it is to be shown."""
+    if not shown:
+        return stills
+    from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and most runs in scripts need none
+
+    return tqdm(stills, total=count, unit="frame", leave=False)

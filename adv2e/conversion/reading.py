@@ -1,0 +1,209 @@
+"""The frames of a source on their way to the pixel, read ahead of it.
+
+Reading begins before anybody has said what the frames are to become: what a configuration needs
+takes as long to import as a short video to decode.  What was read until then waits as it is.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator, Iterator
+from concurrent.futures import Future
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from adv2e.background import ReadAhead
+from adv2e.effects.frames.brightness import check_floats, check_light
+from adv2e.errors import Adv2eError, DataError
+from adv2e.light.pictures import picture_of
+from adv2e.process.cores import default_threads
+from adv2e.process.heap import return_large_blocks
+from adv2e.sources import open_source
+from adv2e.sources.base import Frame, Source
+from adv2e.sources.times.rates import Rate
+
+if TYPE_CHECKING:
+    from adv2e.effects.frames.encoding import LightDecoder
+
+AHEAD_BYTES = 16 << 20
+"""Memory for frames that were decoded and not taken yet."""
+
+EARLY_BYTES = 32 << 20
+"""Memory for frames that were read before it was known what they are to become."""
+
+
+@dataclass(frozen=True)
+class Still:
+    """A frame: time [ns], light [DN] or grey values, and, where it is kept, what is seen of it."""
+
+    t_ns: int
+    light: NDArray[Any]
+    picture: NDArray[Any] | None
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes."""
+        return self.light.nbytes + (0 if self.picture is None else self.picture.nbytes)
+
+
+@dataclass(frozen=True)
+class Decoding:
+    """What frames are to become.
+
+    Parameters
+    ----------
+    decoder : LightDecoder
+    coded : bool
+        They stay as they were read: the kernel decodes them itself.
+    with_pictures : bool
+        What is seen of them is kept, too.
+    full_scale : float, optional
+        Number that somebody said to mean white.
+    eight_bit : bool
+        What is seen of them must be of 8 bits.
+    """
+
+    decoder: LightDecoder
+    coded: bool
+    with_pictures: bool
+    full_scale: float | None = None
+    eight_bit: bool = False
+
+    def still(self, frame: Frame) -> Still:
+        """Return a frame as the pixel wants it; DataError if white is not what was said."""
+        check_floats(frame.image, frame.label, self.full_scale)
+        if frame.odd_white and self.full_scale is None:
+            raise DataError(f"{frame.label}: {frame.odd_white}")
+        picture = None
+        if self.with_pictures:
+            picture = picture_of(frame.image, frame.alpha, self.decoder, self.eight_bit)
+        if not self.coded:
+            light = self.decoder.decode(frame.image, frame.alpha)
+        elif frame.alpha is None:
+            light = frame.image
+        else:
+            light = self.decoder.over_black(frame.image, frame.alpha)
+        if frame.image.dtype.kind == "f":  # here, where its name is known
+            check_light(light, frame.label)
+        return Still(frame.t_ns, light, picture)
+
+
+class Reading:
+    """A source, and the reading of its frames; to be used as a context, once.
+
+    With more than one thread, frames are read in a thread of their own from the beginning of the
+    context on; with one, when they are taken.
+
+    Parameters
+    ----------
+    path, fps, timestamps, start_s, stop_s, t0, time_unit, images_anywhere, allow_damaged
+        See :func:`adv2e.sources.open_source`.
+    threads : int, optional
+        Threads that the whole conversion may compute with; default: all cores.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        *,
+        fps: Rate | None = None,
+        timestamps: str | Path | None = None,
+        time_unit: str | None = None,
+        images_anywhere: bool = False,
+        start_s: float | None = None,
+        stop_s: float | None = None,
+        t0: str = "auto",
+        allow_damaged: bool = False,
+        threads: int | None = None,
+    ) -> None:
+        self.path = path
+        self.threads = threads or default_threads()
+        self.given: dict[str, Any] = {
+            "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
+            "time_unit": time_unit, "images_anywhere": images_anywhere,
+            "allow_damaged": allow_damaged,
+        }  # fmt: skip
+        self._opened: Source | Adv2eError | None = None
+        self._decoding: Future[Decoding] = Future()
+        self._stills: Iterator[Still] = iter(())
+        self._at_end = ExitStack()
+
+    @property
+    def source(self) -> Source:
+        """The source.
+
+        Raises
+        ------
+        Adv2eError
+            It could not be opened.
+        """
+        if isinstance(self._opened, Adv2eError):
+            raise self._opened
+        assert self._opened is not None, "not entered"
+        return self._opened
+
+    @property
+    def inputs(self) -> tuple[str | Path, ...]:
+        """What is read: the source, and the list of times if there is one."""
+        timestamps = self.given["timestamps"]
+        return (self.path,) if timestamps is None else (self.path, timestamps)
+
+    def stills(self, decoding: Decoding) -> Iterator[Still]:
+        """Return the frames, as `decoding` says; raises what goes wrong with them."""
+        self._decoding.set_result(decoding)
+        return self._stills
+
+    def __enter__(self) -> Reading:
+        return_large_blocks()
+        try:
+            source = self._opened = open_source(self.path, **self.given)
+        except Adv2eError as error:  # the other parts of the command may be wrong, too
+            self._opened = error
+            return self
+        source.threads = self.threads
+        self._stills = _stills(source.frames(), self._decoding)
+        if self.threads > 1:
+            ahead = ReadAhead(self._stills, cost=lambda still: still.nbytes, limit=AHEAD_BYTES)
+            self._stills = self._at_end.enter_context(ahead)
+            self._at_end.callback(self._decoding.cancel)  # its thread may wait for it
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._at_end.__exit__(kind, error, trace)
+
+
+def _stills(frames: Iterator[Frame], decoding: Future[Decoding]) -> Generator[Still, None, None]:
+    """Yield the frames once it is known what they are to become, some of them read before."""
+    waiting: deque[Frame] = deque()
+    room = EARLY_BYTES
+    wrong: Adv2eError | None = None
+    # large frames fill the memory: none stays longer than it is needed
+    try:
+        for frame in frames:
+            waiting.append(frame)
+            room -= frame.image.nbytes
+            del frame
+            if room <= 0 or decoding.done():
+                break
+    except Adv2eError as error:  # those before it come first
+        wrong = error
+    known = decoding.result()
+    while waiting:
+        yield known.still(waiting.popleft())
+    if wrong is not None:
+        raise wrong
+    for frame in frames:
+        still = known.still(frame)
+        del frame
+        yield still
+        del still

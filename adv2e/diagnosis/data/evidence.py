@@ -1,0 +1,257 @@
+"""The recording that is diagnosed: frames, events, and what was set aside before anything else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.data.stream import Stream
+from adv2e.errors import DataError
+from adv2e.events import Events
+from adv2e.files.names import shown
+from adv2e.formats.reading import read_recording
+from adv2e.reports.result import Masked
+
+LEAST_EVENTS = 1000
+"""Below that nothing can be told."""
+
+_UNCOVERED = 10.0
+"""A pause at an end that is longer than the longest within by this factor is no pause."""
+
+
+RUN_IN_S = 0.5
+"""Of what pixels saw before, this much is simulated [s]: by then most have fired, and forgotten."""
+_RUN_IN_SHARE = 0.5
+"""And no more than this share of what is looked at."""
+
+
+@dataclass(frozen=True)
+class RunIn:
+    """Frames before the first that is looked at: pixels saw them, and have left their first state.
+
+    Attributes
+    ----------
+    frames : list of (rows, columns[, 3]) arrays
+    times_s : (frames,)
+    """
+
+    frames: list[NDArray[Any]] = field(default_factory=list)
+    times_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def seconds(self) -> float:
+        """Time from its first frame to its last."""
+        return float(self.times_s[-1] - self.times_s[0]) if len(self.times_s) else 0.0
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Frames and events of one recording on one clock.
+
+    Attributes
+    ----------
+    name : str
+    frames : list of (rows, columns[, 3]) arrays
+        As stored.
+    times_s : (frames,)
+        Their stamps [s].
+    stream : Stream
+        Events between the first frame and the last.
+    width, height : int
+    encoding : str
+        What ``frames.encoding: auto`` means for the frames.
+    masked : list of Masked
+    notes : list of str
+    run_in : RunIn
+        What pixels saw before; events of that time are of no recording and no simulation.
+    white : float, optional
+        Number that means white in the frames; None: that of their data type.
+    """
+
+    name: str
+    frames: list[NDArray[Any]]
+    times_s: NDArray[np.float64]
+    stream: Stream
+    width: int
+    height: int
+    encoding: str = "linear"
+    masked: list[Masked] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    run_in: RunIn = field(default_factory=RunIn)
+    white: float | None = None
+
+    @property
+    def times_ns(self) -> list[int]:
+        """Stamps of the frames [ns]."""
+        return [round(t * 1e9) for t in self.times_s.tolist()]
+
+    @property
+    def seconds(self) -> float:
+        """Length of the recording [s]."""
+        return float(self.times_s[-1] - self.times_s[0])
+
+    @property
+    def before_s(self) -> float:
+        """Time from the first frame that is simulated to the first that is looked at [s]."""
+        before = self.run_in.times_s
+        return float(self.times_s[0] - before[0]) if len(before) else 0.0
+
+    @property
+    def simulated(self) -> Evidence:
+        """The same with the frames that are simulated: after those of the run-in."""
+        before = self.run_in
+        return replace(
+            self,
+            frames=[*before.frames, *self.frames],
+            times_s=np.concatenate([before.times_s, self.times_s]),
+            run_in=RunIn(),
+        )
+
+    def with_frames(self, changed: Callable[[NDArray[Any]], NDArray[Any]]) -> Evidence:
+        """Return the recording with all frames changed, those of the run-in as well."""
+        before = replace(self.run_in, frames=[changed(one) for one in self.run_in.frames])
+        return replace(self, frames=[changed(one) for one in self.frames], run_in=before)
+
+    def during(self, first: int, last: int) -> Evidence:
+        """Return the recording from frame `first` to frame `last`; pixels saw those before."""
+        whole = self.simulated
+        begin = first + len(self.run_in.frames)
+        looked_at_s = self.times_s[last] - self.times_s[first]
+        since_s = self.times_s[first] - min(RUN_IN_S, _RUN_IN_SHARE * looked_at_s)
+        since = int(np.searchsorted(whole.times_s, since_s))
+        return replace(
+            self,
+            frames=self.frames[first : last + 1],
+            times_s=self.times_s[first : last + 1],
+            stream=self.stream.between(self.times_s[first] * 1e6, self.times_s[last] * 1e6),
+            run_in=RunIn(whole.frames[since:begin], whole.times_s[since:begin]),
+        )
+
+
+def read_evidence(path: str | Path, time_unit: str | None = None) -> Evidence:
+    """Read a recording that holds frames and events; its unit as :func:`read_recording` has it.
+
+    Raises
+    ------
+    DataError
+        It cannot be read, has no frames, fewer than three, or too few events; frames and events do
+        not overlap in time; frames are out of order, not all alike, or of another size than the
+        events.
+    """
+    recording = read_recording(path, time_unit=time_unit)
+    if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
+        raise DataError(f"{path}: holds no frames, from which the events could be simulated")
+    frames, times = [], []
+    white = None
+    for frame in recording.frames():
+        if frame.odd_white or frame.alpha is not None:
+            raise DataError(
+                f"{frame.label}: {frame.odd_white or 'must have no transparent pixels'}"
+            )
+        white = frame.white
+        frames.append(np.asarray(frame.image))
+        times.append(frame.t_ns * 1e-9)
+    if len(frames) < 3:
+        raise DataError(f"{path}: holds {len(frames)} frames, at least 3 are needed")
+    times_s = np.array(times)
+    if np.any(np.diff(times_s) <= 0):
+        first = int(np.argmax(np.diff(times_s) <= 0)) + 1
+        raise DataError(f"{path}: frame {first} is not later than the one before it")
+    _check_alike(path, frames)
+    height, width = frames[0].shape[:2]
+    if (width, height) != (recording.width, recording.height):
+        raise DataError(
+            f"{path}: frames have {width}x{height} pixels, events {recording.width}x"
+            f"{recording.height}"
+        )
+    kept, masked = _between_frames(recording.events, times_s)
+    if len(recording.events) and not len(kept):
+        spans = (recording.events["t"][[0, -1]] * 1e-6).tolist(), times_s[[0, -1]].tolist()
+        events, pictures = (f"{first:.3f} to {last:.3f} s" for first, last in spans)
+        raise DataError(
+            f"{path}: events come from {events}, frames from {pictures}: they must be on one clock"
+        )
+    check_events(len(kept), path, "between its first and its last frame")
+    whole = Evidence(
+        name=shown(path),
+        frames=frames,
+        times_s=times_s,
+        stream=Stream.of(kept, width, height),
+        width=width,
+        height=height,
+        encoding=recording.encoding,
+        masked=masked,
+        notes=list(recording.problems),
+        white=white,
+    )
+    first, last = _covered(kept, times_s)
+    if (first, last) == (0, len(frames) - 1):
+        return whole
+    covered = whole.during(first, last)
+    return replace(covered, masked=[*masked, _uncovered(times_s, covered.times_s)])
+
+
+def _check_alike(path: str | Path, frames: list[NDArray[Any]]) -> None:
+    first = frames[0]
+    for number, frame in enumerate(frames):
+        if (frame.shape, frame.dtype) != (first.shape, first.dtype):
+            raise DataError(
+                f"{path}: frame {number} is {_form(frame)}, frame 0 is {_form(first)}; all must be"
+                " alike"
+            )
+        if frame.dtype.kind == "f" and not np.all(np.isfinite(frame)):
+            raise DataError(f"{path}: frame {number} has values that are no finite numbers")
+
+
+def _form(frame: NDArray[Any]) -> str:
+    height, width = frame.shape[:2]
+    return f"{width}x{height} {'colour' if frame.ndim == 3 else 'grey'} {frame.dtype}"
+
+
+def check_events(number: int, name: object, where: str) -> None:
+    """Refuse to diagnose fewer events than statistics can be made of.
+
+    Raises
+    ------
+    DataError
+    """
+    if number < LEAST_EVENTS:
+        raise DataError(f"{name}: {number} events {where}; at least {LEAST_EVENTS} are needed")
+
+
+def _between_frames(events: Events, times_s: NDArray[np.float64]) -> tuple[Events, list[Masked]]:
+    first, last = times_s[0] * 1e6, times_s[-1] * 1e6
+    inside = (events["t"] >= first) & (events["t"] < last)
+    lost = 1.0 - float(np.count_nonzero(inside)) / max(1, len(events))
+    masked = [Masked("events before the first frame or after the last", lost)] if lost else []
+    return events[inside], masked
+
+
+def _covered(events: Events, times_s: NDArray[np.float64]) -> tuple[int, int]:
+    """Return the first and the last frame of the time that the events cover.
+
+    Streams are often cut, or begin late; what no event was kept of did not happen without any.
+    """
+    everything = 0, len(times_s) - 1
+    if len(events) < 2:
+        return everything
+    t_s = events["t"] * 1e-6
+    usual = max(_UNCOVERED * float(np.diff(t_s).max()), 2.0 * float(np.diff(times_s).max()))
+    first, last = everything
+    if t_s[0] - times_s[0] > usual:
+        first = int(np.searchsorted(times_s, t_s[0], "right")) - 1
+    if times_s[-1] - t_s[-1] > usual:
+        last = int(np.searchsorted(times_s, t_s[-1]))
+    return (first, last) if last - first >= 2 else everything
+
+
+def _uncovered(whole_s: NDArray[np.float64], kept_s: NDArray[np.float64]) -> Masked:
+    before, after = kept_s[0] - whole_s[0], whole_s[-1] - kept_s[-1]
+    ends = ((before, "first"), (after, "last"))
+    which = " and ".join(f"{time:.3g} s at the {end} frames" for time, end in ends if time > 0.0)
+    return Masked(f"{which}, which the events do not cover", 0.0)

@@ -1,0 +1,110 @@
+"""What in a recording looks like a mistake: none of it is an effect of a camera."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.data.scene import Placed, Scene
+
+_DIM = 0.01
+"""Share of white that the brightest light of frames has at least."""
+_GAP = 5.0
+"""Factor on the usual interval between frames from which on some are missing."""
+_EMPTY = 0.2
+"""Share of the columns, or rows, without any event."""
+_LEAST_EVENTS = 200
+"""In motion, to tell what they go with."""
+_BACKWARD = -0.2
+"""How events go with the light where polarities are swapped: 1 if each follows its change."""
+_MIRRORED = 0.25
+"""By how much better they go with mirrored light."""
+
+
+def doubts_of(
+    measured: Placed, scene: Scene, light: NDArray[np.float32], white: float = 255.0
+) -> list[str]:
+    """Return what may be wrong with a recording, a line each.
+
+    Parameters
+    ----------
+    measured : Placed
+        Its events.
+    scene : Scene
+    light : (frames, rows, columns)
+        Of its frames [DN].
+    white : float
+        [DN]
+    """
+    found = [
+        _brightness(light, white), *_gaps(scene.times_us), *_unseen(measured, scene),
+        _direction(measured, scene),
+    ]  # fmt: skip
+    return [line for line in found if line]
+
+
+def _brightness(light: NDArray[np.float32], white: float) -> str:
+    brightest = float(light.max()) / white
+    if np.all(light == light[0]):
+        return "the frames are all the same: nothing that moves can be simulated from them"
+    if brightest < _DIM:
+        return (
+            f"the brightest light of the frames is {brightest:.2g} of white: is"
+            " frames.full_scale right?"
+        )
+    return ""
+
+
+def _gaps(times_us: NDArray[np.float64]) -> list[str]:
+    intervals = np.diff(times_us)
+    return [
+        f"no frames from {times_us[k] / 1e6:.3f} to {times_us[k + 1] / 1e6:.3f} s: what moves there"
+        " is made up"
+        for k in np.flatnonzero(intervals > _GAP * np.median(intervals))[:3]
+    ]
+
+
+def _unseen(measured: Placed, scene: Scene) -> list[str]:
+    """Return the sides of the sensor from which no event came."""
+    rows, columns = np.divmod(measured.stream.pixel, scene.width)
+    lines = []
+    for name, places, size in (("x", columns, scene.width), ("y", rows, scene.height)):
+        last = int(places.max())
+        if size - 1 - last >= max(2.0, _EMPTY * size):
+            lines.append(
+                f"no event has {name} above {last}, but the frames have {size} pixels there: do"
+                " they show the same?"
+            )
+    return lines
+
+
+def _direction(measured: Placed, scene: Scene) -> str:
+    """Return in which other way the events go with the light, if they do better than as they are.
+
+    Each way is told by the mean of the change of the light where and when events came, in their
+    direction, over its size.
+    """
+    stream = measured.stream
+    shape = scene.intervals, scene.height, scene.width
+    slope = scene.slope.reshape(shape)
+    row, column = np.divmod(stream.pixel, scene.width)
+    sign = 2.0 * stream.on - 1.0
+
+    def agreement(change: NDArray[np.float32]) -> float:
+        at = change[measured.interval, row, column]
+        size = float(np.abs(at).sum())
+        moving = int(np.count_nonzero(at))
+        return float((sign * at).sum()) / size if moving >= _LEAST_EVENTS else 0.0
+
+    as_is = agreement(slope)
+    if as_is <= _BACKWARD:
+        return "ON events come where the light falls: are polarities, or the frames, inverted?"
+    ways = {
+        "left to right": slope[:, :, ::-1],
+        "upside down": slope[:, ::-1],
+        "by half a turn": slope[:, ::-1, ::-1],
+    }
+    best = max(ways, key=lambda name: agreement(ways[name]))
+    if agreement(ways[best]) > as_is + _MIRRORED:
+        return f"the events go better with the frames turned {best}: is one of them mirrored?"
+    return ""

@@ -1,0 +1,170 @@
+"""What the frames say of each pixel in each frame interval: how bright it is, how it changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.data.splits import Parts
+from adv2e.diagnosis.data.stream import Stream
+
+STILL = 0
+SPEEDS = 4
+BRIGHTNESSES = 3
+STILL_PER_S = 0.3
+"""Change of log light below which a pixel counts as still [1/s]."""
+_MEMORY_S = 0.05
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Log light of the frames, and classes made of it; the same for every stream.
+
+    Attributes
+    ----------
+    times_us : (frames,)
+        Stamps of the frames.
+    slope : (frames - 1, pixels) float32
+        Change of log light [1/s] in each frame interval.
+    speed : (frames - 1, pixels) uint8
+        0: still for a while; 1 to 3: thirds of what moves.
+    brightness : (frames - 1, pixels) uint8
+        Thirds of what moves.
+    parts : Parts
+    width, height : int
+    """
+
+    times_us: NDArray[np.float64]
+    slope: NDArray[np.float32]
+    speed: NDArray[np.uint8]
+    brightness: NDArray[np.uint8]
+    parts: Parts
+    width: int
+    height: int
+
+    @classmethod
+    def of(
+        cls, light: NDArray[np.float32], times_s: NDArray[np.float64], quantum_dn: float
+    ) -> Scene:
+        """Return the scene of frames.
+
+        Parameters
+        ----------
+        light : (frames, rows, columns)
+            [DN]
+        times_s : (frames,)
+        quantum_dn : float
+            Step of the frames' numbers [DN], below which a change means nothing.
+        """
+        frames, height, width = light.shape
+        floor = max(quantum_dn, 0.1)
+        x = np.log(np.maximum(light, floor)).reshape(frames, -1).astype(np.float32)
+        seconds = np.diff(times_s).astype(np.float32)
+        slope = np.diff(x, axis=0) / seconds[:, None]
+        uncertain = 1.5 * quantum_dn * np.exp(-np.minimum(x[1:], x[:-1])) / seconds[:, None]
+        speed, weight = _speeds(slope, seconds, np.maximum(STILL_PER_S, uncertain))
+        edges = _weighted_quantiles(x[1:], weight, BRIGHTNESSES)
+        brightness = np.digitize(x[1:], edges).astype(np.uint8)
+        parts = Parts.of(width, height, times_s[0] * 1e6, times_s[-1] * 1e6)
+        return cls(times_s * 1e6, slope, speed, brightness, parts, width, height)
+
+    @property
+    def intervals(self) -> int:
+        """Number of frame intervals."""
+        return len(self.slope)
+
+    @cached_property
+    def seconds(self) -> NDArray[np.float64]:
+        """Length of each frame interval [s]."""
+        return np.diff(self.times_us) * 1e-6
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return self.width * self.height
+
+    def interval_of(self, t_us: NDArray[np.int64], late_us: float = 0.0) -> NDArray[np.int64]:
+        """Return the frame interval of sorted times [us], `late_us` before them."""
+        inner = np.searchsorted(t_us, self.times_us[1:-1] + late_us)
+        return np.repeat(np.arange(self.intervals), np.diff(np.r_[0, inner, len(t_us)]))
+
+    def phase_of(self, t_us: NDArray[np.int64], interval: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return where times [us] are in their frame intervals: 0 at one frame, 1 at the next."""
+        begin = self.times_us[interval]
+        return np.asarray((t_us - begin) / (self.times_us[interval + 1] - begin))
+
+
+def _speeds(
+    slope: NDArray[np.float32], seconds: NDArray[np.float32], still: NDArray[np.float32]
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Return the class of speed, and the weight of each place: how much changes there."""
+    change = np.abs(slope)
+    change[change < still] = 0.0
+    recent = change.copy()
+    for k in range(1, len(recent)):
+        fading = recent[k - 1] * np.float32(np.exp(-seconds[k] / _MEMORY_S))
+        # what rings down below the least speed is still
+        fading[fading < STILL_PER_S] = 0.0
+        np.maximum(recent[k], fading, out=recent[k])
+    weight = change * seconds[:, None]
+    edges = _weighted_quantiles(recent, weight, SPEEDS - 1)
+    speed = (1 + np.digitize(recent, edges)).astype(np.uint8)
+    speed[recent == 0.0] = STILL
+    return speed, weight
+
+
+def _weighted_quantiles(
+    values: NDArray[np.float32], weight: NDArray[np.float32], classes: int
+) -> NDArray[np.float64]:
+    """Return the borders of `classes` that have the same weight."""
+    stride = max(1, values.size // 200_000)
+    v, w = values.ravel()[::stride], weight.ravel()[::stride].astype(np.float64)
+    if not w.sum() > 0.0:
+        w = np.ones_like(w)
+    order = np.argsort(v)
+    total = np.cumsum(w[order])
+    places = np.searchsorted(total, total[-1] * np.arange(1, classes) / classes)
+    return np.asarray(v[order][np.minimum(places, len(v) - 1)], np.float64)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A stream, and where each of its events lies in the scene.
+
+    Attributes
+    ----------
+    stream : Stream
+    interval : (n,)
+        Frame interval.
+    segment : (n,)
+        Segment of time.
+    part : (n,)
+        Part of the data.
+    speed, brightness : (n,)
+        Classes.
+    """
+
+    stream: Stream
+    interval: NDArray[np.int64]
+    segment: NDArray[np.int64]
+    part: NDArray[np.int64]
+    speed: NDArray[np.int64]
+    brightness: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, stream: Stream, scene: Scene) -> Placed:
+        """Find the events of `stream` in `scene`."""
+        interval = scene.interval_of(stream.t)
+        segment = scene.parts.segment_of(stream.t)
+        pixel = stream.pixel
+        return cls(
+            stream=stream,
+            interval=interval,
+            segment=segment,
+            part=scene.parts.label[segment, pixel].astype(np.int64),
+            speed=scene.speed[interval, pixel].astype(np.int64),
+            brightness=scene.brightness[interval, pixel].astype(np.int64),
+        )

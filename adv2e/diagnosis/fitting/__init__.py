@@ -1,0 +1,1 @@
+"""Effects that may be missing, and the fits of their parameters by simulation."""

@@ -1,0 +1,1 @@
+"""What can be read off a recording, so that fits start near the truth."""

@@ -1,0 +1,348 @@
+"""Attribution: which effects, added to the declared model, make it agree with the recording.
+
+Forward: every effect of the library is fitted on one part of the data, the best are simulated many
+times, and the best of those is added if it holds on another part.  Where none holds alone, two
+strong effects may hide one another: a second is looked for on top of the best, on trial, and the
+likeliest pairs are fitted together.
+That goes on until chance can make what is left, or nothing holds.  What is small beside an effect
+may be due to its fit: another is added for it only if it explains most of it.  Then backward: what
+is no longer needed is dropped.  Where something is left beside two effects, others are tried in the
+place of the first, which was added while more was missing, before a third is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config import Config
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.fitting.candidates import FITTED, Candidate, Knob
+from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.simulations import Laboratory
+from adv2e.diagnosis.selection.joint_fits import (
+    CATCHES_UP,
+    Attempt,
+    Attempts,
+    knobs_of,
+    likely_of_a_round,
+)
+from adv2e.diagnosis.selection.pairs import likely_pairs
+from adv2e.diagnosis.selection.ranking import CLOSE
+from adv2e.diagnosis.selection.reference import MANY, Bench, State
+from adv2e.diagnosis.selection.shortlist import Trial, scored
+from adv2e.diagnosis.statistics import BOTH
+from adv2e.diagnosis.statistics.frame_error import FrameError
+from adv2e.reports.result import Rejected
+
+Array = NDArray[np.float64]
+
+LEVEL = 0.01
+"""Probability below which chance is not believed to make a residual."""
+
+PER_LOOK = LEVEL / 2.0
+"""The same of each look: at the data for fitting and judging, and at those looked at last."""
+
+MOST_EFFECTS = 4
+_MOST_WITH_TWO = 3
+"""Effects of a model to which two were added that hold only together: beside two others, they would
+take as long to look for as all before."""
+_LEAST_OF_THE_LEFT = 0.5 / MOST_EFFECTS
+"""Least share of what is left that an effect must take away for the search to go on."""
+_OF_FITS = 1e-6
+"""Probability of what is left below which it is looked into, though it may be the fit's."""
+_MOST_OF_THE_FIT = 0.5
+"""Least share of that which an effect must take away."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Where the search ended.
+
+    Attributes
+    ----------
+    state : State
+    probability, last : float
+        Of the residual left, where the search looked, and in the data looked at last.
+    explained : float
+        Share of the declared model's residual that is gone.
+    complete : bool
+        Nothing is left for another effect, in either: chance can make it, or it is put down to the
+        fit.
+    rejected : dict
+        Last reason for each effect that was not added.
+    """
+
+    state: State
+    probability: float
+    last: float
+    explained: float
+    complete: bool
+    rejected: dict[str, Rejected]
+
+    @property
+    def alternatives(self) -> list[str]:
+        """Effects that cannot be told from one of those that were added."""
+        alike = frozenset().union(*self.state.alternatives.values())
+        return sorted(alike - set(self.state.names))
+
+
+def _put_down_to_the_fit(state: State) -> float:
+    """Return the share of the residual that is put down to the fit of a model's effects."""
+    return max((fit.candidate.left for fit in state.fits), default=0.0)
+
+
+def _is_undone(state: State) -> bool:
+    """Tell whether a model's effects can all be undone in full: more is not put down to them."""
+    return _put_down_to_the_fit(state) <= FITTED
+
+
+class Search:
+    """Looks for effects that a declared model lacks.
+
+    Parameters
+    ----------
+    laboratory : Laboratory
+    observed : (views, statistics)
+        Of the recording.
+    declared : Config
+    candidates : sequence of Candidate
+    error : FrameError, optional
+        Of the statistics.
+    log : callable
+        Told of each step.
+    free : tuple of Knob
+        Keys that are not known: fitted with all effects, and no effect themselves.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        Those that compete.
+    bench : Bench
+    attempts : Attempts
+    declared : State
+    """
+
+    def __init__(
+        self,
+        laboratory: Laboratory,
+        observed: Array,
+        declared: Config,
+        candidates: Sequence[Candidate],
+        error: FrameError | None = None,
+        log: Callable[[str], None] = lambda text: None,
+        free: tuple[Knob, ...] = (),
+    ) -> None:
+        unknown = {knob.key for knob in free}
+        self.candidates = [
+            one for one in candidates if not unknown & {knob.key for knob in one.knobs}
+        ]
+        laboratory.simulator.expect(2 * MANY + likely_of_a_round(self.candidates, ()))
+        self.bench = Bench.of(laboratory, observed, declared, error, log, free)
+        self.attempts = Attempts(self.bench, self.candidates)
+        self.declared = self.bench.state(declared, ())
+
+    def probability(self, state: State, view: int = BOTH) -> float:
+        """Return how often chance makes a residual as large as the recording's."""
+        return state.models[view].probability(self.bench.observed[view])
+
+    def explained(self, state: State, view: int = BOTH) -> float:
+        """Return the share of the declared model's residual that is gone."""
+        return self._taken_away(self.declared, state, state.models[view].floor, view)
+
+    def run(self) -> Outcome:
+        """Search forward and backward."""
+        state = self.declared
+        self.bench.log(f"declared model: probability of the residual {self.probability(state):.2g}")
+        state = self._backward(self._forward(state))
+        held = self.bench.rejections.held
+        rejected = {name: why for name, why in held.items() if name not in state.names}
+        return Outcome(
+            state,
+            self.probability(state),
+            self.probability(state, parts.LAST),
+            self.explained(state),
+            not any(self._is_something_left(state, view) for view in (BOTH, parts.LAST)),
+            rejected,
+        )
+
+    def _forward(self, state: State) -> State:
+        """Return the model with effects more, until nothing is left or nothing holds.
+
+        What explains more with as many effects goes before what does with one more.
+        """
+        while True:
+            other = self._with_another(state) if self._may_be_wrong(state) else None
+            if other is not None:
+                state = other
+                continue
+            if not self._is_open(state):
+                break
+            if len(state.fits) >= MOST_EFFECTS:
+                self.bench.log(
+                    f"something is left beside {MOST_EFFECTS} effects: no more are tried"
+                )
+                break
+            grown = self._grown(state)
+            if grown is None or not self._is_worth_it(state, grown):
+                break
+            state = grown
+            self.bench.log(
+                f"added {', '.join(state.names)}: probability {self.probability(state):.2g}"
+            )
+        return state
+
+    def _is_something_left(self, state: State, view: int = BOTH) -> bool:
+        if self.probability(state, view) >= PER_LOOK:
+            return False
+        return self.explained(state, view) < 1.0 - _put_down_to_the_fit(state)
+
+    def _is_open(self, state: State) -> bool:
+        """Tell whether another effect is looked for.
+
+        What is small beside an effect may be its fit's, or another effect, which chance makes far
+        less often.  Of an effect that cannot be undone in full it is the former all the same.
+        """
+        if self._is_something_left(state):
+            return True
+        return _is_undone(state) and self.probability(state) < _OF_FITS
+
+    def _may_be_wrong(self, state: State) -> bool:
+        """Tell whether another is tried in the place of the first of two effects.
+
+        Of more, each takes as long as the whole search for another effect.
+        """
+        if len(state.fits) != 2 or self.probability(state) >= PER_LOOK:
+            return False
+        return self._is_something_left(state) or _is_undone(state)
+
+    def _is_worth_it(self, state: State, grown: State) -> bool:
+        """Tell whether an addition that holds takes away enough of what is left.
+
+        Of what may be the fit's, it must be most.  Of more, the few effects that may be added must
+        be able to explain it with others as large: it is no patch then.  Single statistics that
+        stand out, and the last to be found, have no share to speak of.
+        """
+        if self._is_something_left(state):
+            least = _LEAST_OF_THE_LEFT
+            stands_out = self.bench.misfit(state) < state.models[BOTH].limits(PER_LOOK)[0]
+            if stands_out or not self._is_something_left(grown):
+                return True
+        else:
+            least = _MOST_OF_THE_FIT
+        share = self._taken_away(state, grown)
+        if share >= least:
+            return True
+        added = " and ".join(fit.candidate.name for fit in grown.beyond(state))
+        self.bench.log(f"  {added} takes away {share:.0%} of what is left: too little")
+        why = f"takes away no more than {max(share, 0.0):.0%} of what is left"
+        for fit in grown.beyond(state):
+            self.bench.rejections.add(fit, why, final=True)
+        return False
+
+    def _taken_away(
+        self, state: State, other: State, floor: float | None = None, view: int = BOTH
+    ) -> float:
+        """Return the share of what a model leaves above a floor that another does not.
+
+        The floor is the model's own unless it is given.  Below it, nothing is left to take away.
+        """
+        before, after = self.bench.misfit(state, view), self.bench.misfit(other, view)
+        above = before - (state.models[view].floor if floor is None else floor)
+        return float((before - after) / above) if above > 0.0 else 0.0
+
+    def _grown(self, state: State) -> State | None:
+        """Return the model with one effect more, or two that hold only together.
+
+        Where one holds but another that does not explains far more, the one is no name for what is
+        missing: it stands in for a part of the other.
+        """
+        trials = self.attempts.trials(state)
+        # with one of two effects, something still stands out; but the one gains, and is physical
+        made = self.attempts.of_one(state, trials, [state])
+        physical = [one for one in made if one.physical]
+        most = max((one.judged for one in physical), default=-np.inf)
+        holding = [one for one in physical if not one.objections]
+        if any(one.judged > most - CATCHES_UP for one in holding):
+            return self.attempts.best(made, state)
+        grown = None
+        if len(state.fits) + 2 <= _MOST_WITH_TWO:
+            grown = self.attempts.best(self._of_two(state, trials, physical), state)
+        if grown is None and holding:
+            first = max(physical, key=lambda one: one.judged)
+            why = f"holds, but {first.state.names[-1]}, which does not, explains far more"
+            for one in holding:
+                self.bench.rejections.add(one.state.fits[-1], why, final=True)
+        return grown
+
+    def _of_two(
+        self, state: State, trials: Sequence[Trial], physical: Sequence[Attempt]
+    ) -> list[Attempt]:
+        """Return models with two effects more, of which none need hold alone.
+
+        Others on top of the best that is physical, and the likeliest pairs.
+        """
+        made: list[Attempt] = []
+        if physical:
+            first = max(physical, key=lambda one: one.judged).state
+            self.bench.log(f"on trial: {', '.join(first.names)}")
+            made += self.attempts.of_one(first, self.attempts.trials(first), [first, state])
+        had = {frozenset(one.state.names) for one in made}
+        for pair in likely_pairs(self.bench, state, trials):
+            if frozenset((*state.names, *(one.name for one in pair))) not in had:
+                made.append(self.attempts.of(state, pair, [state]))
+        return made
+
+    def _backward(self, state: State) -> State:
+        """Drop effects without which the others, fitted again, do as well, one after another."""
+        for fit in state.fits[:-1]:
+            without = self._without(state, fit)
+            loss = self.bench.likelihood(state) - self.bench.likelihood(without)
+            if loss < CLOSE:
+                self.bench.log(f"dropped {fit.candidate.name}: the others do without it")
+                self.bench.rejections.add(fit, "not needed beside the others", final=True)
+                return self._backward(without)
+        return state
+
+    def _with_another(self, state: State) -> State | None:
+        """Return the model with another effect in the place of the one that was added first.
+
+        That was chosen while others were missing, whose part it may have taken.  Another has to
+        hold on top of the rest, and instead of the one.
+        """
+        reasons, first = self.bench.rejections, state.fits[0]
+        held, name = dict(reasons.held), first.candidate.name
+        rest = self._without(state, first)
+        self.bench.log(f"in the place of {name}:")
+        trials = self.attempts.trials(rest, besides=[name])
+        other = self.attempts.best(self.attempts.of_one(rest, trials, [rest, state]), rest)
+        if other is not None and self._is_better(other, state):
+            reasons.add(first, f"does less than {other.names[-1]} in its place", final=True)
+            self.bench.log(f"replaced {name} by {other.names[-1]}")
+            return other
+        reasons.held = held  # of what does not go on top of the model that is kept
+        return None
+
+    def _is_better(self, other: State, state: State) -> bool:
+        """Tell whether a model is taken for another with as many effects.
+
+        Of what may be the fit's, it must take away most.
+        """
+        better, worse = (
+            scored(self.bench, one.models, knobs_of(one.fits)) for one in (other, state)
+        )
+        if better <= worse + CLOSE:
+            return False
+        share = self._taken_away(state, other)
+        return self._is_something_left(state) or share >= _MOST_OF_THE_FIT
+
+    def _without(self, state: State, fit: Fitted) -> State:
+        """Return the model without one of its effects, the others fitted again."""
+        rest = tuple(other for other in state.fits if other is not fit)
+        without = self.bench.settled(rest, state.models[BOTH].sd)
+        alike = {name: of for name, of in state.alternatives.items() if name in without.names}
+        return dataclasses.replace(without, alternatives=alike)

@@ -1,0 +1,143 @@
+"""Sums over the events of a stream, compiled: they run beside simulations without the lock."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from adv2e.compiled import entry, kernel
+
+
+@kernel
+def _interval(t: int, lag: float, times: Any, k: int) -> int:
+    """Return the frame interval that lies `lag` before a time [us], the k-th or a later one."""
+    while k < times.shape[0] - 2 and t >= times[k + 1] + lag:
+        k += 1
+    return k
+
+
+@entry
+def sum_slopes(
+    t: Any, pixel: Any, on: Any, cell: Any, times: Any, lags: Any, slope: Any, at: Any, sums: Any
+) -> None:
+    """Add up the change of light some time before each event, in the event's direction.
+
+    Parameters
+    ----------
+    t, pixel, on, cell : (events,)
+        Time [us], pixel, polarity, and the column of `sums` that the event counts for.
+    times : (frames,)
+        [us]
+    lags : (lags,)
+        [us]
+    slope : (pixels, frames - 1)
+        All of a pixel side by side, as the lags of an event lie close to one another.
+    at : (lags,)
+        Zeros: room for where in `times` each lag is.
+    sums : (lags, cells)
+    """
+    for i in range(t.shape[0]):
+        n, c = pixel[i], cell[i]
+        sign = 1.0 if on[i] else -1.0
+        for j in range(lags.shape[0]):
+            k = _interval(t[i], lags[j], times, at[j])
+            at[j] = k
+            sums[j, c] += sign * slope[n, k]
+
+
+@entry
+def sum_slopes_beside(
+    t: Any,
+    pixel: Any,
+    on: Any,
+    part: Any,
+    width: int,
+    height: int,
+    times: Any,
+    lags: Any,
+    slope: Any,
+    at: Any,
+    sums: Any,
+) -> None:
+    """Add up the change of light right of each event less that left of it, and below less above.
+
+    Parameters are those of :func:`sum_slopes`; `sums`: (2 lags, parts), right and below in turn.
+    Events of the border do not count.
+    """
+    for i in range(t.shape[0]):
+        n = pixel[i]
+        x, y = n % width, n // width
+        inside = x > 0 and y > 0 and x < width - 1 and y < height - 1
+        sign = 1.0 if on[i] else -1.0
+        for j in range(lags.shape[0]):
+            k = _interval(t[i], lags[j], times, at[j])
+            at[j] = k
+            if inside:
+                sums[2 * j, part[i]] += sign * (slope[n + 1, k] - slope[n - 1, k])
+                sums[2 * j + 1, part[i]] += sign * (slope[n + width, k] - slope[n - width, k])
+
+
+@entry
+def count_gaps(
+    t: Any, pixel: Any, part: Any, width: int, borders: Any, near: Any, gaps: Any, rows: Any
+) -> None:
+    """Count the times between neighbouring events of the stream.
+
+    Parameters
+    ----------
+    t, pixel, part : (events,)
+    width : int
+    borders : (gaps - 1,)
+        Of the gaps counted [us].
+    near : (kinds,)
+        Largest gap of each kind of closeness [us].
+    gaps : (parts, gaps)
+    rows : (parts, kinds, 2)
+        How many are close, and how many of those share a row.
+    """
+    for i in range(1, t.shape[0]):
+        gap = t[i] - t[i - 1]
+        k = np.int64(0)
+        while k < borders.shape[0] and gap >= borders[k]:
+            k += 1
+        gaps[part[i], k] += 1.0
+        if gap < near[near.shape[0] - 1]:
+            same = pixel[i] // width == pixel[i - 1] // width
+            for m in range(near.shape[0]):
+                if gap < near[m]:
+                    rows[part[i], m, 0] += 1.0
+                    if same:
+                        rows[part[i], m, 1] += 1.0
+
+
+@entry
+def since_neighbours(t: Any, pixel: Any, on: Any, width: int, last: Any, since: Any) -> None:
+    """Find how long ago the latest event of the four neighbouring pixels was.
+
+    Parameters
+    ----------
+    t, pixel, on : (events,)
+    width : int
+    last : (pixels, 2)
+        Time of the latest event of each pixel and polarity [us], long ago at first.
+    since : (events, 2)
+        Time since the latest event of the other, and of the same, polarity [us].
+    """
+    pixels = last.shape[0]
+    for k in range(t.shape[0]):
+        i = pixel[k]
+        column = i % width
+        for same in range(2):
+            p = on[k] if same else 1 - on[k]
+            latest = np.int64(-(1 << 60))
+            if column > 0:
+                latest = max(latest, last[i - 1, p])
+            if column < width - 1:
+                latest = max(latest, last[i + 1, p])
+            if i >= width:
+                latest = max(latest, last[i - width, p])
+            if i + width < pixels:
+                latest = max(latest, last[i + width, p])
+            since[k, same] = t[k] - latest
+        last[i, on[k]] = t[k]

@@ -1,0 +1,140 @@
+"""Stamps of neighbouring events in the stream: what a readout does to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data.scene import Placed
+from adv2e.diagnosis.statistics.base import Entry, Raw, counts, share, stabilised
+from adv2e.diagnosis.statistics.counting import count_gaps
+
+TICKS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
+_ON_TICK = np.array([[t % tick == 0 for tick in TICKS_US] for t in range(TICKS_US[-1])], float)
+_GAPS_US = (1, 2, 3, 5, 8, 12, 20, 40, 80, 160)
+_NEAR_US = (3, 12, 40, 160)
+_QUANTILES = (0.1, 0.25, 0.5, 0.75)
+_BIN_BORDERS_US = np.r_[
+    np.arange(-0.5, 100.0), np.unique(np.rint(np.geomspace(100.0, 1e5, 100)))[1:] + 0.5
+]
+"""Of the gaps counted: each of whole microseconds by itself, longer ones within 7 %, up to 0.1 s.
+
+No readout takes as long; what is longer counts as that.
+"""
+_BIN_OF = np.searchsorted(_BIN_BORDERS_US[1:-1], np.arange(int(_BIN_BORDERS_US[-1]) + 1))
+
+
+class Ticks:
+    """Shares of stamps that are whole multiples of a time."""
+
+    title = "ticks of the stamps"
+    least = 0.001
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        return [
+            Entry(f"stamps on {tick} us", f"share of stamps that are multiples of {tick} us")
+            for tick in TICKS_US
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        # all ticks divide the largest one
+        rest = placed.stream.t % TICKS_US[-1]
+        number = counts(placed.part, rest, TICKS_US[-1])
+        return np.concatenate([number.sum(axis=1)[:, None], number @ _ON_TICK], axis=1)
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics."""
+        return share(raw[1:], raw[0])
+
+
+class Gaps:
+    """Times between neighbouring events of the whole stream, and how often they share a row."""
+
+    title = "neighbours in the stream"
+    least = 0.002
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        gaps = [f"{a}-{b} us" for a, b in zip((0, *_GAPS_US), _GAPS_US, strict=False)]
+        gaps.append(f">= {_GAPS_US[-1]} us")
+        return [
+            *(
+                Entry(
+                    f"next after {gap}", f"number of events {gap} after any other", is_number=True
+                )
+                for gap in gaps
+            ),
+            *(
+                Entry(
+                    f"same row within {n} us",
+                    f"share of events that are less than {n} us after one of their own row, of"
+                    " those so soon after any",
+                )
+                for n in _NEAR_US
+            ),
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        stream = placed.stream
+        gaps = np.zeros((parts.COUNT, len(_GAPS_US) + 1))
+        rows = np.zeros((parts.COUNT, len(_NEAR_US), 2))
+        count_gaps(
+            stream.t, stream.pixel, placed.part, stream.width,
+            np.array(_GAPS_US), np.array(_NEAR_US), gaps, rows,
+        )  # fmt: skip
+        return np.concatenate([gaps, rows.reshape(parts.COUNT, -1)], axis=1)
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics."""
+        gaps, near = raw[: len(_GAPS_US) + 1], raw[len(_GAPS_US) + 1 :]
+        return np.concatenate([stabilised(gaps), (near[1::2] + 0.5) / (near[::2] + 1.0)])
+
+
+class RowGaps:
+    """Quantiles of the times between neighbouring events of the stream that are of two rows.
+
+    A busy readout gives all of them the time that it takes for a row, however it differs.
+    """
+
+    title = "gaps between rows"
+    least = 0.02
+
+    @cached_property
+    def entries(self) -> Sequence[Entry]:
+        """The statistics, in order."""
+        return [
+            Entry(
+                f"{100 * q:g} % of gaps between rows",
+                f"logarithm of the time in us that {100 * q:g} % of events follow the one before"
+                " in the stream sooner than, of those that follow one of another row",
+            )
+            for q in _QUANTILES
+        ]
+
+    def count(self, placed: Placed) -> Raw:
+        """Return the sums of a stream, (parts, numbers)."""
+        stream = placed.stream
+        row = stream.pixel // stream.width
+        other = np.flatnonzero(np.diff(row)) + 1
+        gap = np.minimum(stream.t[other] - stream.t[other - 1], len(_BIN_OF) - 1)
+        return counts(placed.part[other], _BIN_OF[gap], len(_BIN_BORDERS_US) - 1)
+
+    def values(self, raw: Raw) -> NDArray[np.float64]:
+        """Return the statistics."""
+        up_to = np.cumsum(raw)
+        if up_to[-1] == 0.0:
+            return np.zeros(len(_QUANTILES))
+        wanted = np.array(_QUANTILES) * up_to[-1]
+        k = np.searchsorted(up_to, wanted)
+        in_bin = 1.0 - (up_to[k] - wanted) / raw[k]
+        gap = _BIN_BORDERS_US[k] + in_bin * np.diff(_BIN_BORDERS_US)[k]
+        return np.asarray(np.log(np.maximum(gap, 0.5)))

@@ -1,0 +1,224 @@
+"""What a table holds: latencies against light, or noise event rates against light.
+
+Columns are known by their names; all others are labels, for ``--where`` and ``--judge``.
+
+Light (one of them): ``irradiance_W_m2``, ``illuminance_lux``, ``light_dn``.
+
+Latency tables
+
+=============================== ==================================================================
+``latency_us`` (``_ms``, ``_s`` time from a step of the light to the first event; the light is that
+)                               of the brighter side of the step
+``latency_error_us``            its standard error
+``latency_sd_us``, ``number``   instead: spread of single latencies, and how many there were
+``latency_q25_us``, ``_q75_us`` instead of the spread
+``contrast_ln``                 size of the step, ln of the ratio of the two lights
+``polarity``                    1, ON, 0, OFF
+``bias``                        rows with another bias have thresholds of their own
+=============================== ==================================================================
+
+Noise tables
+
+=============================== ==================================================================
+``on_rate_hz``, ``off_rate_hz`` events a pixel a second, mean over the pixels
+``on_median_hz``, ``off_...``   median over the pixels
+``on_share``, ``off_share``     share of the pixels with at least one event
+``pixels``, ``duration_s``      how many pixels were watched, and how long
+``least_hz``                    least rate that would have shown; default: 1/(pixels duration)
+=============================== ==================================================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.tables.table import Table
+from adv2e.errors import DataError
+
+Array = NDArray[np.float64]
+
+LIGHTS = {"irradiance_W_m2": "W/m²", "illuminance_lux": "lux", "light_dn": "DN"}
+"""Columns that may give the light, each with its unit."""
+
+TIMES = {"us": 1.0, "ms": 1e3, "s": 1e6}
+"""Units of time, each in us."""
+
+POLARITIES = {"1": 1, "on": 1, "+": 1, "0": 0, "off": 0, "-": 0, "-1": 0}
+
+LEAST_LEVELS = 3
+
+
+@dataclass(frozen=True)
+class Latencies:
+    """Latencies, a row each.
+
+    Attributes
+    ----------
+    light : (rows,)
+        In `unit`; that of the brighter side of the step.
+    unit : str
+    latency_us : (rows,)
+    error : (rows,)
+        Standard error relative to the latency, NaN where the table gives none.
+    contrast : (rows,) or None
+        Size of the step [ln].
+    polarity : (rows,) of int
+        1 ON, 0 OFF.
+    bias : tuple of str
+        Label of the biases, empty where there is no such column.
+    """
+
+    light: Array
+    unit: str
+    latency_us: Array
+    error: Array
+    contrast: Array | None
+    polarity: NDArray[np.int64]
+    bias: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Rates of noise events, a row each; NaN where a cell is empty.
+
+    Attributes
+    ----------
+    light : (rows,)
+        In `unit`.
+    unit : str
+    rates : mapping of str to (rows,)
+        By column: ``on_rate_hz`` and so on.
+    pixels, duration_s, least_hz : (rows,)
+        NaN where the table gives none.
+    """
+
+    light: Array
+    unit: str
+    rates: dict[str, Array]
+    pixels: Array
+    duration_s: Array
+    least_hz: Array
+
+
+def measurements_of(table: Table) -> Latencies | Noise:
+    """Return what the table holds, by its columns.
+
+    Raises
+    ------
+    DataError
+        No light, neither latency nor rate, both, or a wrong cell; file, line and column are named.
+    """
+    times = [f"latency_{unit}" for unit in TIMES if f"latency_{unit}" in table.columns]
+    rates = [name for name in ("on_rate_hz", "off_rate_hz") if name in table.columns]
+    if bool(times) == bool(rates):
+        raise DataError(
+            f"{table.name}: must have either a column latency_us (or _ms, _s) or columns"
+            f" on_rate_hz and off_rate_hz (there: {', '.join(table.columns)})"
+        )
+    if len(times) > 1:
+        raise DataError(f"{table.name}: has {' and '.join(times)}, must have one of them")
+    column = light_column(table)
+    light = table.numbers(column, above=0.0)
+    table.require(column, "a number")
+    _check_levels(table, light, f"{column}: has")
+    if times:
+        return _latencies(table, times[0], light, LIGHTS[column])
+    return _noise(table, light, LIGHTS[column])
+
+
+def _check_levels(table: Table, light: Array, has: str) -> None:
+    levels = np.unique(light).size
+    if levels < LEAST_LEVELS:
+        raise DataError(
+            f"{table.name}: {has} {levels} different values of light, at least {LEAST_LEVELS} are"
+            " needed to hold one out"
+        )
+
+
+def light_column(table: Table) -> str:
+    """Return the name of the column that gives the light.
+
+    Raises
+    ------
+    DataError
+        There is none, or more than one.
+    """
+    found = [name for name in LIGHTS if name in table.columns]
+    if len(found) != 1:
+        raise DataError(
+            f"{table.name}: must have one of the columns {', '.join(LIGHTS)}, has"
+            f" {' and '.join(found) or 'none'} (there: {', '.join(table.columns)})"
+        )
+    return found[0]
+
+
+def _latencies(table: Table, column: str, light: Array, unit: str) -> Latencies:
+    factor = TIMES[column.removeprefix("latency_")]
+    table.require(column, "a number")
+    latency = table.numbers(column, above=0.0)
+    contrast = None
+    if "contrast_ln" in table.columns:
+        table.require("contrast_ln", "a number")
+        contrast = table.numbers("contrast_ln", above=0.0)
+    polarity = np.ones(len(table), dtype=np.int64)
+    if "polarity" in table.columns:
+        for k, text in enumerate(table.texts("polarity")):
+            if text.lower() not in POLARITIES:
+                raise table.wrong(k, "polarity", "must be 1 or ON, 0 or OFF")
+            polarity[k] = POLARITIES[text.lower()]
+    bias = table.texts("bias") if "bias" in table.columns else [""] * len(table)
+    error = _standard_error(table, column) / latency
+    return Latencies(light, unit, factor * latency, error, contrast, polarity, tuple(bias))
+
+
+def _standard_error(table: Table, column: str) -> Array:
+    """Return the standard error of each latency in the unit of its column; NaN: not given."""
+    unit = TIMES[column.removeprefix("latency_")]
+    nothing = np.full(len(table), np.nan)
+
+    def column_of(what: str) -> tuple[str, Array] | None:
+        for other, factor in TIMES.items():
+            name = f"latency_{what}_{other}"
+            if name in table.columns:
+                return name, table.numbers(name, at_least=0.0) * (factor / unit)
+        return None
+
+    if (error := column_of("error")) is not None:
+        return error[1]
+    lower, upper = column_of("q25"), column_of("q75")
+    if (sd := column_of("sd")) is not None:
+        spread = sd[1]
+    elif lower is not None and upper is not None:
+        (lower_name, low), (upper_name, high) = lower, upper
+        for k in np.flatnonzero(high < low):
+            raise table.wrong(int(k), upper_name, f"must be at least {lower_name}")
+        spread = (high - low) / 1.349  # of a normal distribution
+    else:
+        return nothing
+    if "number" not in table.columns:
+        return nothing
+    return spread / np.sqrt(table.numbers("number", at_least=1.0))
+
+
+def _noise(table: Table, light: Array, unit: str) -> Noise:
+    names = [f"{p}_{kind}" for p in ("on", "off") for kind in ("rate_hz", "median_hz", "share")]
+    rates = {}
+    for name in names:
+        if name not in table.columns:
+            continue
+        rates[name] = table.numbers(name, at_least=0.0)
+        if name.endswith("_share"):
+            for k in np.flatnonzero(rates[name] > 1.0):
+                raise table.wrong(int(k), name, "must be a share from 0 to 1")
+    nothing = np.full(len(table), np.nan)
+    pixels = table.numbers("pixels", at_least=1.0) if "pixels" in table.columns else nothing
+    duration = table.numbers("duration_s", above=0.0) if "duration_s" in table.columns else nothing
+    if any(name.endswith("_share") for name in rates) and np.isnan(duration).any():
+        raise DataError(f"{table.name}: a share needs the column duration_s, in every row")
+    least = table.numbers("least_hz", above=0.0) if "least_hz" in table.columns else nothing
+    told = ~np.all(np.isnan(list(rates.values())), axis=0)
+    _check_levels(table, light[told], f"{' and '.join(rates)}: rows with a number have")
+    return Noise(light, unit, rates, pixels, duration, least)

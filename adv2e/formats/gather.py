@@ -1,0 +1,165 @@
+"""From columns as a file holds them to a sorted event array, with a list of what was wrong."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.compiled import entry
+from adv2e.events import EVENT_DTYPE, Events, empty_events, sort_events
+
+_LARGEST = np.iinfo(np.uint16).max
+
+Column = NDArray[Any]
+
+
+class Gatherer:
+    """Collects events part by part, then sorts and judges them.
+
+    Attributes
+    ----------
+    problems : list of str
+        What is doubtful and what was done about it.
+    """
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+        self._parts: list[Events] = []
+        self._unstorable = 0
+        self._values: set[int] = set()
+        self._odd_polarities = 0
+
+    def add(self, t: Column, x: Column, y: Column, p: Column) -> None:
+        """Append events, in the order of the file.
+
+        Parameters
+        ----------
+        t, x, y, p : integer arrays, (events,)
+            Time [us], column, row, and polarity, ON above 0 (0/1 and -1/+1 are both usual).
+        """
+        self._note_polarities(p)
+        fits = (x >= 0) & (x <= _LARGEST) & (y >= 0) & (y <= _LARGEST)
+        count = int(np.count_nonzero(fits))
+        if count < fits.size:
+            self._unstorable += fits.size - count
+            t, x, y, p = t[fits], x[fits], y[fits], p[fits]
+        part = np.empty(count, EVENT_DTYPE)
+        part["t"], part["x"], part["y"], part["p"] = t, x, y, p > 0
+        self._parts.append(part)
+
+    def _note_polarities(self, p: Column) -> None:
+        usual = 0
+        for value in (-1, 0, 1):
+            found = int(np.count_nonzero(p == value))
+            usual += found
+            if found:
+                self._values.add(value)
+        self._odd_polarities += p.size - usual
+
+    def finish(self, geometry: tuple[int, int] | None, whence: str = "") -> tuple[Events, int, int]:
+        """Return (events, width, height), the events sorted.
+
+        Parameters
+        ----------
+        geometry : (int, int), optional
+            Width and height [pixels] that the file states; else the largest coordinates tell.
+        whence : str
+            What states it, for messages.
+        """
+        events = np.concatenate(self._parts) if self._parts else empty_events()
+        self._parts.clear()
+        if self._unstorable:
+            self._say(
+                f"{self._unstorable} events with a coordinate below 0 or above 65535: left out"
+            )
+        self._judge_polarities()
+        events, width, height = self._fit(events, geometry, whence)
+        return self._in_order(events), width, height
+
+    def _say(self, text: str) -> None:
+        self.problems.append(text)
+
+    def _judge_polarities(self) -> None:
+        if self._odd_polarities:
+            self._say(
+                f"{self._odd_polarities} events with a polarity other than -1, 0 and 1:"
+                " taken as ON above 0, else OFF"
+            )
+        if {-1, 0} <= self._values:
+            self._say("polarities -1 and 0 both occur: both taken as OFF")
+
+    def _fit(
+        self, events: Events, geometry: tuple[int, int] | None, whence: str
+    ) -> tuple[Events, int, int]:
+        """Settle the geometry, and leave out what lies outside."""
+        if not events.size:
+            self._say("no events")
+            return events, *(geometry or (0, 0))
+        needed = int(events["x"].max()) + 1, int(events["y"].max()) + 1
+        if geometry is None:
+            self._say(f"no geometry stated: {needed[0]}x{needed[1]} from the largest coordinates")
+            return events, *needed
+        width, height = geometry
+        if needed[0] <= width and needed[1] <= height:
+            return events, width, height
+        if needed[0] <= width + 1 and needed[1] <= height + 1:
+            # a known fault of writers: the largest coordinate in place of the size
+            wider = max(width, needed[0]), max(height, needed[1])
+            self._say(
+                f"{whence} states {width}x{height}, one less than the largest coordinates need:"
+                f" {wider[0]}x{wider[1]} taken"
+            )
+            return events, *wider
+        inside = (events["x"] < width) & (events["y"] < height)
+        self._say(
+            f"{inside.size - np.count_nonzero(inside)} events outside {width}x{height}, which"
+            f" {whence} states: left out"
+        )
+        return events[inside], width, height
+
+    def _in_order(self, events: Events) -> Events:
+        back, untidy, repeated = _examine(events["t"], events["x"], events["y"], events["p"])
+        if back:
+            self._say(f"events are not in the order of time ({back} steps back): sorted")
+            events = sort_events(events)
+        elif untidy:
+            _sort_ties(events)
+        if back or untidy:
+            repeated = _examine(events["t"], events["x"], events["y"], events["p"])[2]
+        if events.size and events["t"][0] < 0:
+            self._say(f"times begin below zero, at {events['t'][0] / 1e6:.6f} s")
+        if repeated:
+            self._say(f"{repeated} events repeat another one exactly: kept")
+        return events
+
+
+@entry
+def _examine(t: Any, x: Any, y: Any, p: Any) -> Any:
+    """Count steps back in time, ties out of (y, x, p) order, and neighbours that are equal."""
+    back = 0
+    untidy = 0
+    equal = 0
+    for i in range(1, t.shape[0]):
+        if t[i] < t[i - 1]:
+            back += 1
+        elif t[i] == t[i - 1]:
+            if y[i] != y[i - 1]:
+                untidy += y[i] < y[i - 1]
+            elif x[i] != x[i - 1]:
+                untidy += x[i] < x[i - 1]
+            elif p[i] != p[i - 1]:
+                untidy += p[i] < p[i - 1]
+            else:
+                equal += 1
+    return back, untidy, equal
+
+
+def _sort_ties(events: Events) -> None:
+    """Sort events that share a time by (y, x, p), in place; times are in order already."""
+    t = events["t"]
+    tied = np.zeros(events.size, np.bool_)
+    np.equal(t[1:], t[:-1], out=tied[1:])
+    tied[:-1] |= tied[1:]
+    events[tied] = sort_events(events[tied])

@@ -1,0 +1,192 @@
+"""HDF5 recordings in the layout of ``event_utils`` and ``event_cnn_minimal``.
+
+See :mod:`adv2e.formats.monash.writer`.  Polarity may be bool, 0/1 or -1/+1; times are seconds,
+unless they tell another unit (:mod:`adv2e.sources.times.units`); frames come in the order of their
+names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.errors import DataError
+from adv2e.formats import hdf5
+from adv2e.formats.clock import Beside, Clock, disagreement
+from adv2e.formats.gather import Gatherer
+from adv2e.formats.recording import MOST_COLUMNS, Recording, described_geometry, parse_description
+from adv2e.sources.base import Image
+from adv2e.sources.times.units import Unit, frame_unit
+from adv2e.ticks import NS, US, to_ticks
+
+COLUMNS = ("events/ts", "events/xs", "events/ys", "events/ps")
+
+_PART = 1 << 20  # events read at once
+
+
+def read_monash(path: Path, file: h5py.File, time_unit: str | None = None) -> Recording:
+    """Return the recording in an open file of this layout.
+
+    Raises
+    ------
+    DataError
+        Columns of different lengths or kinds, times that are not finite or beyond 146 years, a
+        broken image, or something that is not in the file itself.
+    """
+    gatherer = Gatherer()
+    description: dict[str, Any] = {}
+    if "adv2e" in file.attrs:
+        text = str(file.attrs["adv2e"])
+        description = parse_description(text, f"{path}: attribute adv2e", gatherer.problems)
+    images = hdf5.find(file, "images")
+    if isinstance(images, h5py.Dataset):
+        raise DataError(f"{path}: images is a dataset, must be a group of images")
+    names = [f"images/{name}" for name in sorted(images)] if images is not None else []
+    found = [hdf5.dataset(file, name) for name in names]
+    ours = "s" if description else None
+    frames = _Stamps(path, found)
+    clock = Clock(time_unit, ours, frames.beside(ours))
+    geometry, whence = _geometry(path, file, found), "sensor_resolution"
+    if described_geometry(description):
+        geometry, whence = described_geometry(description), "the attribute adv2e"
+    whole = _gather_events(path, file, gatherer, geometry, clock)
+    given = clock.given_for_frames(whole=frames.whole, events_whole=whole)
+    times, doubt = frames.times_ns(given, ours)
+    if doubt:
+        gatherer.problems.append(f"images: {doubt}")
+    events, width, height = gatherer.finish(geometry, whence)
+    gatherer.problems += disagreement(events, times)
+    return Recording(
+        str(path),
+        "monash",
+        width,
+        height,
+        events,
+        times,
+        description,
+        gatherer.problems,
+        lambda: _images(path, names),
+    )
+
+
+def _gather_events(
+    path: Path,
+    file: h5py.File,
+    gatherer: Gatherer,
+    size: tuple[int, int] | None,
+    clock: Clock,
+) -> bool:
+    """Read all events into `gatherer`; return whether their times are whole numbers."""
+    columns = [hdf5.dataset(file, name) for name in COLUMNS]
+    if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
+        shapes = ", ".join(
+            f"{name} {column.shape}" for name, column in zip(COLUMNS, columns, strict=True)
+        )
+        raise DataError(f"{path}: columns must be of one length, got {shapes}")
+    for name, column, kinds in zip(COLUMNS, columns, ("fiu", "iu", "iu", "biuf"), strict=True):
+        if column.dtype.kind not in kinds:
+            raise DataError(f"{path}: {name} must hold numbers, not {column.dtype}")
+    hdf5.check_stored(columns, f"{path}: events")
+    whole = columns[0].dtype.kind in "iu"
+    t, x, y = (column[:_PART] for column in columns[:3])
+    unit = clock.of_events(t, x, y, size, whole=whole)
+    for begin in range(0, columns[0].size, _PART):
+        t, x, y, p = (column[begin : begin + _PART] for column in columns)
+        gatherer.add(to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, _signs(p))
+    if columns[0].size and unit.doubt:
+        gatherer.problems.append(unit.doubt)
+    return whole
+
+
+def _signs(p: NDArray[Any]) -> NDArray[np.int8]:
+    """Return polarities in 8 bits; those that do not fit keep their sign, and stay odd."""
+    if p.dtype.kind == "b":
+        return p.astype(np.int8)
+    if p.dtype.kind == "u":  # -1 without a sign
+        p = p.view(p.dtype.str.replace("u", "i"))
+    signs: NDArray[np.int8] = np.clip(np.nan_to_num(p, nan=-2.0), -2, 2).astype(np.int8)
+    return signs
+
+
+def _geometry(path: Path, file: h5py.File, images: list[h5py.Dataset]) -> tuple[int, int] | None:
+    """Return (width, height) as the attribute or the first image has it."""
+    stated = np.atleast_1d(file.attrs.get("sensor_resolution", ()))
+    if stated.size >= 2 and stated.dtype.kind in "iuf" and np.all(stated[:2] > 0):
+        if not np.all(stated[:2] <= MOST_COLUMNS):
+            raise DataError(f"{path}: sensor_resolution is {stated[:2]}, must be rows and columns")
+        return int(stated[1]), int(stated[0])
+    if images:
+        rows, columns = _pixels(path, images[0])[:2]
+        return columns, rows
+    return None
+
+
+def _pixels(path: Path, image: h5py.Dataset) -> tuple[int, ...]:
+    """Return the shape of an image; DataError if it is none."""
+    shape = tuple(image.shape)
+    if len(shape) not in (2, 3) or (len(shape) == 3 and shape[2] not in (1, 3)) or 0 in shape:
+        raise DataError(f"{path}: {image.name[1:]} is no image, but of shape {shape}")
+    if image.dtype.kind not in "uif":
+        raise DataError(f"{path}: {image.name[1:]} is no image, but of {image.dtype}")
+    return shape
+
+
+class _Stamps:
+    """When the images were taken, as their attributes say."""
+
+    def __init__(self, path: Path, images: list[h5py.Dataset]) -> None:
+        self._labels = [f"{path}: {image.name}" for image in images]
+        exact = all("timestamp_ns" in image.attrs for image in images)
+        self._name = "timestamp_ns" if exact else "timestamp"
+        pairs = zip(self._labels, images, strict=True)
+        self._stamps = [_stamp(label, image, self._name) for label, image in pairs]
+        self.whole = all(stamp.dtype.kind != "f" for stamp in self._stamps)
+
+    def beside(self, stated: str | None) -> Beside | None:
+        """Return what tells the unit of the events, if it does."""
+        if self._name == "timestamp_ns" or len(self._stamps) < 2:
+            return None
+        return Beside(self._unit(None, stated), self.whole)
+
+    def times_ns(
+        self, given: str | None, stated: str | None
+    ) -> tuple[NDArray[np.int64] | None, str]:
+        """Return the times [ns], None without images, and what is to be told of their unit."""
+        unit = self._unit(given, stated)
+        pairs = zip(self._labels, self._stamps, strict=True)
+        ticks = [to_ticks(stamp, unit.ns, NS, f"{label}: {self._name}") for label, stamp in pairs]
+        return (np.concatenate(ticks), unit.doubt) if ticks else (None, "")
+
+    def _unit(self, given: str | None, stated: str | None) -> Unit:
+        if self._name == "timestamp_ns":
+            return Unit("ns")
+        values = [Decimal(stamp.item()) for stamp in self._stamps]
+        return frame_unit(values, given=given, stated=stated)
+
+
+def _stamp(label: str, image: h5py.Dataset, name: str) -> NDArray[Any]:
+    """Return an array of the one number in an attribute."""
+    if name in image.attrs:
+        stamp = np.asarray(image.attrs[name])
+        if stamp.size == 1 and stamp.dtype.kind in "iuf":
+            if not np.all(np.isfinite(stamp)):
+                raise DataError(f"{label}: {name} holds NaN or infinite times")
+            return stamp.reshape(1)
+    raise DataError(f"{label} has no attribute timestamp [s]")
+
+
+def _images(path: Path, names: list[str]) -> Iterator[Image]:
+    with hdf5.opened(path) as file:
+        for name in names:
+            found = hdf5.dataset(file, name)
+            shape = _pixels(path, found)
+            image = hdf5.read_all(found, f"{path}: {name}")
+            if len(shape) == 3:
+                image = image[..., 0] if shape[2] == 1 else image[..., ::-1]
+            yield np.ascontiguousarray(image)

@@ -1,0 +1,125 @@
+"""Events in NumPy archives: one structured array, or an array for each column.
+
+========== ======================= =================================================
+column     names                   meaning
+========== ======================= =================================================
+time       t_s, t_ms, t_us, t_ns   as they say
+           t, ts, time(stamp)(s)   told from the times: :mod:`adv2e.sources.times.units`
+column     x, xs                   from the left
+row        y, ys                   from the top
+polarity   p, ps, pol(arity)       ON above 0
+========== ======================= =================================================
+
+``width`` and ``height`` tell the geometry [pixels], ``adv2e`` (JSON) what wrote the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.errors import DataError
+from adv2e.files.npy import read_array
+from adv2e.files.zips import open_member, zip_archive
+from adv2e.formats.clock import Clock
+from adv2e.formats.gather import Gatherer
+from adv2e.formats.recording import Recording, described_geometry, parse_description
+from adv2e.ticks import US, to_ticks
+
+_NAMES = {
+    "time": ("t_us", "t_ns", "t_ms", "t_s", "t", "ts", "time", "times", "timestamp", "timestamps"),
+    "x": ("x", "xs"),
+    "y": ("y", "ys"),
+    "polarity": ("p", "ps", "pol", "polarity"),
+}
+
+_BEYOND = 1 << 31
+
+
+def read_npz(path: Path, time_unit: str | None = None) -> Recording:
+    """Return the recording in a NumPy archive.
+
+    Raises
+    ------
+    DataError
+        Not such an archive, a column is missing, or columns differ in length.
+    """
+    arrays = _load(path)
+    gatherer = Gatherer()
+    description: dict[str, Any] = {}
+    if "adv2e" in arrays:
+        text = str(arrays["adv2e"])
+        description = parse_description(text, f"{path}: adv2e", gatherer.problems)
+    columns = _columns(path, arrays)
+    x, y, p = (_whole(path, *columns[name]) for name in ("x", "y", "polarity"))
+    sizes: dict[str, Any] = {
+        name: arrays[name].item()
+        for name in ("width", "height")
+        if name in arrays and arrays[name].size == 1
+    }
+    geometry = described_geometry(description) or described_geometry(sizes)
+    name, t = columns["time"]
+    if t.dtype.kind not in "iuf":
+        raise DataError(f"{path}: {name} must hold numbers, not {t.dtype}")
+    stated = name[2:] if name.startswith("t_") else None
+    unit = Clock(time_unit or stated).of_events(t, x, y, geometry, whole=t.dtype.kind != "f")
+    if unit.doubt:
+        gatherer.problems.append(unit.doubt)
+    gatherer.add(to_ticks(t, unit.ns, US, f"{path}: {name}"), x, y, p)
+    events, width, height = gatherer.finish(geometry, "the file")
+    return Recording(
+        str(path),
+        "npz",
+        width,
+        height,
+        events,
+        metadata=description,
+        problems=gatherer.problems,
+    )
+
+
+def _load(path: Path) -> dict[str, NDArray[Any]]:
+    arrays = {}
+    with zip_archive(path, "a NumPy archive") as archive:
+        for member in archive.infolist():
+            name, suffix = member.filename[:-4], member.filename[-4:]
+            if suffix == ".npy":
+                with open_member(archive, member) as file:
+                    arrays[name] = read_array(file, member.file_size, f"{path}: {name}")
+    return arrays
+
+
+def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[str, NDArray[Any]]]:
+    """Return (name in the file, array) of each column."""
+    structured = [array for array in arrays.values() if array.dtype.names is not None]
+    if len(structured) == 1:
+        table = structured[0]
+        arrays = {name: table[name] for name in table.dtype.names or ()}
+    found = {}
+    for column, names in _NAMES.items():
+        name = next((name for name in names if name in arrays), None)
+        if name is None:
+            raise DataError(
+                f"{path}: no column for {column} ({', '.join(names)}); it has"
+                f" {', '.join(arrays) or 'nothing'}"
+            )
+        found[column] = (name, arrays[name])
+    shapes = {array.shape for _, array in found.values()}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 1:
+        raise DataError(f"{path}: columns must be of one length, got {sorted(shapes)}")
+    return found
+
+
+def _whole(path: Path, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
+    """Return a column of whole numbers, whatever their type."""
+    if column.dtype.kind not in "biuf":
+        raise DataError(f"{path}: {name} must hold numbers, not {column.dtype}")
+    if column.dtype.kind == "f" and not np.array_equal(np.floor(column), column):
+        raise DataError(f"{path}: {name} must hold whole numbers")
+    # beyond any sensor, and within 64 bits whatever the type
+    whole: NDArray[np.int64] = np.clip(column, -_BEYOND, _BEYOND).astype(np.int64)
+    return whole

@@ -1,0 +1,117 @@
+"""Event files of several formats, read into one kind of recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from adv2e.errors import DataError
+from adv2e.files.regular import check_ends
+from adv2e.formats.recording import Recording
+from adv2e.process.machine import machine_complaint
+
+__all__ = ["Recording", "read_recording"]
+
+MOST_PIXELS = 1 << 25
+"""Pixels of the largest sensor: 8192x4096."""
+
+_SUFFIXES = (".txt", ".zip", ".h5", ".hdf5", ".npz")
+
+
+def read_recording(
+    path: str | Path, *, time_unit: str | None = None, images_anywhere: bool = False
+) -> Recording:
+    """Read an event file, or a folder in the DAVIS240C layout.
+
+    Parameters
+    ----------
+    path : str or Path
+        The suffix tells the format: .txt, .zip (DAVIS240C, or a single text file), .h5 or .hdf5
+        (layout ``monash``), .npz.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times; default: see :mod:`adv2e.sources.times.units`.
+    images_anywhere : bool
+        The ``images.txt`` of a folder may name images outside of it.
+
+    Returns
+    -------
+    Recording
+        Its `problems` tell what is doubtful.
+
+    Raises
+    ------
+    DataError
+        No such file, an unknown format, or content that cannot be read; the text names the file,
+        and the line where there are lines.
+    """
+    path = Path(path)
+    try:
+        check_ends(path)
+        recording = _read(path, time_unit, images_anywhere)
+    except OSError as error:
+        if machine_complaint(error):
+            raise
+        raise DataError(f"{path}: cannot be read: {error.strerror or error}") from error
+    _check_size(recording)
+    return recording
+
+
+def _check_size(recording: Recording) -> None:
+    """Refuse sensors too large to make a picture of, as one stray coordinate makes them."""
+    width, height, events = recording.width, recording.height, recording.events
+    if width * height <= MOST_PIXELS:
+        return
+    why = "is stated"
+    if events.size and (int(events["x"].max()) + 1, int(events["y"].max()) + 1) == (width, height):
+        far = events[int(np.argmax(np.maximum(events["x"], events["y"])))]
+        why = (
+            f"the event at {far['t'] / 1e6:.6f} s, x {far['x']}, y {far['y']} needs; if it is"
+            " wrong, state the size, and what lies outside is left out"
+        )
+    raise DataError(
+        f"{recording.path}: a sensor of {width}x{height} pixels, over {MOST_PIXELS:,}, {why}"
+    )
+
+
+def _read(path: Path, time_unit: str | None, images_anywhere: bool) -> Recording:
+    suffix = path.suffix.lower()
+    if path.is_dir() or suffix == ".zip":
+        from adv2e.formats.davis240c import reader as davis240c  # noqa: PLC0415
+
+        _check_there(path)
+        if path.is_dir():
+            return davis240c.read_folder(path, time_unit, images_anywhere=images_anywhere)
+        return davis240c.read_zip(path, time_unit)
+    _check_there(path)
+    if suffix == ".txt":
+        from adv2e.formats.text.reader import read_text  # noqa: PLC0415
+
+        return read_text(path, time_unit)
+    if suffix in (".h5", ".hdf5"):
+        return _read_hdf5(path, time_unit)
+    if suffix == ".npz":
+        from adv2e.formats.npz import read_npz  # noqa: PLC0415
+
+        return read_npz(path, time_unit)
+    raise DataError(
+        f"{path}: unknown suffix '{suffix}', must be one of {', '.join(_SUFFIXES)}"
+        " or a DAVIS240C folder"
+    )
+
+
+def _check_there(path: Path) -> None:
+    if not path.exists():
+        raise DataError(f"{path}: no such file or folder")
+
+
+def _read_hdf5(path: Path, time_unit: str | None) -> Recording:
+    from adv2e.formats import hdf5  # noqa: PLC0415
+    from adv2e.formats.monash import reader as monash  # noqa: PLC0415
+
+    with hdf5.opened(path) as file:
+        if all(hdf5.find(file, name) is not None for name in monash.COLUMNS):
+            return monash.read_monash(path, file, time_unit)
+    raise DataError(
+        f"{path}: unknown HDF5 layout, must be monash (datasets {', '.join(monash.COLUMNS)})"
+    )

@@ -1,0 +1,204 @@
+"""Where events go: files of several formats, and standard output.
+
+>>> from adv2e.events import make_events
+>>> from adv2e.formats.writing import open_sink
+>>> events = make_events(t=[10, 20], x=[0, 3], y=[0, 2], p=[1, 0])
+>>> with open_sink("-", width=4, height=3, metadata={}) as sink:  # doctest: +SKIP
+...     sink.write_events(events)
+0.000010000 0 0 1
+0.000020000 3 2 0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from adv2e.errors import UsageError
+from adv2e.files.staging import Staging
+from adv2e.formats.sink import Sink, describe
+from adv2e.process.cores import default_threads
+
+__all__ = ["FORMATS", "LAYOUTS", "Sink", "format_name", "open_sink"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Request:
+    """What was asked for."""
+
+    path: Path
+    width: int
+    height: int
+    description: dict[str, Any]
+    staging: Staging
+    with_frames: bool
+    threads: int
+
+
+def _text(request: _Request) -> Sink:
+    from adv2e.formats.text.writer import TextSink  # noqa: PLC0415
+
+    return TextSink(request.path, request.description, request.staging)
+
+
+def _folder(request: _Request) -> Sink:
+    from adv2e.formats.davis240c.writer import FolderSink  # noqa: PLC0415
+
+    return FolderSink(
+        request.path,
+        request.description,
+        staging=request.staging,
+        with_frames=request.with_frames,
+        threads=request.threads,
+    )
+
+
+def _zip(request: _Request) -> Sink:
+    from adv2e.formats.davis240c.writer import ZipSink  # noqa: PLC0415
+
+    return ZipSink(
+        request.path,
+        request.description,
+        staging=request.staging,
+        with_frames=request.with_frames,
+        threads=request.threads,
+    )
+
+
+def _monash(request: _Request) -> Sink:
+    from adv2e.formats.monash.writer import MonashSink  # noqa: PLC0415
+
+    return MonashSink(
+        request.path,
+        width=request.width,
+        height=request.height,
+        description=request.description,
+        staging=request.staging,
+        with_frames=request.with_frames,
+        threads=request.threads,
+    )
+
+
+@dataclass(frozen=True)
+class _Format:
+    """A format: the suffixes that stand for it, and what opens it."""
+
+    suffixes: tuple[str, ...]
+    open: Callable[[_Request], Sink]
+
+
+FORMATS: dict[str, _Format] = {
+    "txt": _Format((".txt",), _text),
+    "zip": _Format((".zip",), _zip),
+    "folder": _Format(("",), _folder),
+    "h5": _Format((".h5", ".hdf5"), _monash),
+}
+"""Formats by name."""
+
+LAYOUTS: dict[str, Callable[[_Request], Sink]] = {"monash": _monash}
+"""Layouts of HDF5 files by name; the first is the default."""
+
+
+def open_sink(
+    path: str | Path,
+    *,
+    width: int,
+    height: int,
+    metadata: dict[str, Any],
+    format: str | None = None,
+    layout: str | None = None,
+    overwrite: bool = False,
+    with_frames: bool = False,
+    threads: int | None = None,
+    staging: Staging | None = None,
+) -> Sink:
+    """Return a sink for `path`, to be used in a ``with`` block.
+
+    Nothing is written before the block is entered, and nothing is left if it is left by an
+    exception; folders missing above `path` are made.
+
+    Parameters
+    ----------
+    path : str or Path
+        Output; "-": text to standard output.
+    width, height : int
+        Geometry [pixels].
+    metadata : dict
+        What JSON can hold; stored inside, or in ``<path>.json`` beside a text file.
+    format : str, optional
+        One of :data:`FORMATS`; default: by the suffix, a path without one is a folder.
+    layout : str, optional
+        One of :data:`LAYOUTS`, for HDF5.
+    overwrite : bool
+        Replace, at the end, what exists.
+    with_frames : bool
+        Store frames, where the format can.
+    threads : int, optional
+        Threads that compress; default: all cores.  The bytes do not depend on it.
+    staging : Staging, optional
+        Takes the output together with others; it says whether what exists is replaced.
+
+    Raises
+    ------
+    UsageError
+        Unknown `format` or `layout`, or they do not fit together.
+    OutputError
+        Unknown suffix; the output exists already, or cannot be made.
+    """
+    if str(path) == "-":
+        return _standard_output(format, layout)
+    path = Path(path)
+    name = format_name(path, format)
+    opening = FORMATS[name].open
+    if layout is not None:
+        if name != "h5":
+            raise UsageError(f"--layout {layout}: only HDF5 files (.h5) have layouts")
+        if layout not in LAYOUTS:
+            raise UsageError(f"--layout {layout}: unknown, must be one of {', '.join(LAYOUTS)}")
+        opening = LAYOUTS[layout]
+    return opening(
+        _Request(
+            path=path,
+            width=width,
+            height=height,
+            description=describe(metadata, width, height),
+            staging=staging or Staging(overwrite),
+            with_frames=with_frames,
+            threads=threads or default_threads(),
+        )
+    )
+
+
+def _standard_output(format: str | None, layout: str | None) -> Sink:
+    from adv2e.formats.text.writer import StandardOutput  # noqa: PLC0415
+
+    if layout is not None:
+        raise UsageError(f"--layout {layout}: standard output takes text only")
+    if format not in (None, "txt"):
+        raise UsageError(f"--format {format}: standard output takes txt only")
+    return StandardOutput()
+
+
+def format_name(path: Path, format: str | None) -> str:
+    """Return the format that was asked for by name, or by the path's suffix.
+
+    Raises
+    ------
+    UsageError
+        There is no such format.
+    """
+    if format is not None:
+        if format not in FORMATS:
+            raise UsageError(f"--format {format}: unknown, must be one of {', '.join(FORMATS)}")
+        return format
+    suffix = path.suffix.lower()
+    for name, about in FORMATS.items():
+        if suffix in about.suffixes:
+            return name
+    known = [suffix for about in FORMATS.values() for suffix in about.suffixes if suffix]
+    raise UsageError(
+        f"{path}: unknown suffix '{suffix}', must be one of {', '.join(known)},"
+        f" none (a DAVIS240C folder), or choose with --format: {', '.join(FORMATS)}"
+    )

@@ -1,0 +1,1 @@
+"""Pixels that may fire, solved side by side from event to event."""

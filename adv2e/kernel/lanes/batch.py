@@ -1,0 +1,95 @@
+"""The pixels of a strip that may fire, one a lane, from event to event through one interval.
+
+A lane goes from place to place: the next threshold, the turn of the signal where it may cross a
+threshold before turning, the end of a dead time, the next noise event, and at last the end of its
+piece of the interval.  In each round all lanes look for one place each
+(:mod:`adv2e.kernel.lanes.roots`), take what they found (:mod:`adv2e.kernel.lanes.apply_events`),
+and then decide what comes next: most of them together (:mod:`adv2e.kernel.lanes.next_target`), the
+others one by one (:mod:`adv2e.kernel.lanes.slow_path`).  Pixels get into lanes, and out, by
+:mod:`adv2e.kernel.lanes.exchange`, and from piece to piece by :mod:`adv2e.kernel.lanes.pieces`.
+"""
+
+from __future__ import annotations
+
+from adv2e.compiled import kernel
+from adv2e.kernel.lanes.apply_events import fire_found, land, release
+from adv2e.kernel.lanes.exchange import sort_out
+from adv2e.kernel.lanes.layout import (
+    DONE,
+    DOUBTFUL,
+    END,
+    ERROR,
+    INJECTED,
+    OPEN,
+    RELEASE,
+    SEEKS,
+    TOLERANCE,
+    TURN,
+    whole,
+)
+from adv2e.kernel.lanes.next_target import plan
+from adv2e.kernel.lanes.pieces import next_piece, open_piece
+from adv2e.kernel.lanes.roots import evaluate, guess, refine
+from adv2e.kernel.lanes.slow_path import found_stop, go_on
+
+
+@kernel
+def _waiting(m, lanes):
+    """Return how many lanes have to be looked through for those that wait: all, or none."""
+    waiting = 0
+    for j in range(m):
+        waiting += lanes[SEEKS + j] == RELEASE
+    return m if waiting > 0 else 0
+
+
+@kernel
+def decide(
+    lo, m, waiting, give_up, start, ta, length, t_base, circuit, rule, state, rows, pixels, lanes,
+    alone, left_alone, keys, times, n,
+):  # fmt: skip
+    """Decide what each of m lanes looks for next; none of them then waits for a dead time to end.
+
+    Of those that wait now, all are among the first `waiting` ones.
+
+    Returns (lanes that look for something, pixels left alone so far, events so far); at most one
+    event a lane is written.  With `give_up`, no lane goes on.
+    """
+    while True:
+        if waiting > 0:
+            release(whole(waiting), length, circuit, rule, lanes)
+        plan(whole(m), ta, length, circuit, lanes)
+        for j in range(m):
+            seeks = lanes[SEEKS + j]
+            if seeks == DOUBTFUL:
+                i = lo + pixels[j]
+                n = go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n)
+                seeks = lanes[SEEKS + j]
+            if seeks == DONE and lanes[END + j] < 1.0:
+                next_piece(j, circuit, lanes)
+        m, left_alone = sort_out(
+            lo, m, give_up, start, state, rows, pixels, lanes, alone, left_alone
+        )
+        waiting = _waiting(m, lanes)
+        if waiting == 0:
+            return m, left_alone, n
+
+
+@kernel
+def search(lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys, times, n):
+    """Every lane finds one place; returns the number of events, and of lanes to look through.
+
+    At most one event a lane is written.  See `decide` for the latter.
+    """
+    count = whole(m)
+    guess(lanes, count)
+    evaluate(lanes, count, length, circuit, rule)
+    refine(lanes, count, length, circuit)
+    land(count, ta, length, circuit, lanes)
+    n = fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n)
+    for j in range(m):
+        seeks = lanes[SEEKS + j]
+        if seeks == INJECTED or (seeks == TURN and lanes[ERROR + j] <= TOLERANCE):
+            found_stop(lo + pixels[j], j, circuit, state, lanes)
+        elif seeks == OPEN:
+            open_piece(j, ta, length, lanes)
+    return n, _waiting(m, lanes)

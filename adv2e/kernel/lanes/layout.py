@@ -1,0 +1,120 @@
+"""Lanes: pixels that are solved side by side, one flat array with a row for each of their numbers.
+
+A lane holds a pixel over an interval, or over a piece of one: its light stays on one branch of the
+log map and moves by less than an e-fold.  Most pixels take one piece, from 0 to 1; one that passes
+the knee takes one before and one after, and larger steps are cut in more.
+
+Places s are shares of the interval; x, signal and reference are counted from x at its start.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.compiled import kernel
+from adv2e.kernel.workspace import STRIP
+
+TOLERANCE = 0.002
+"""Largest remainder of the Taylor polynomial that is accepted [us]."""
+
+WIDTH = 16
+"""Lanes are computed this many at a time, so that every loop is whole vectors."""
+
+_STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
+(
+    # what holds over the whole interval
+    X0,  # log intensity at its start
+    DX,  # change of log intensity
+    FALL,  # fall of the reference over the interval at the present leak speed, constant part
+    FALL_DN,  # the same for each DN
+    ON,  # thresholds
+    OFF,
+    REFERENCE,  # at its start, and moved by the events since
+    HOLD,  # end of the dead time [us], -1: not in it
+    NOISE,  # next noise event [us]
+    # what holds over the present piece
+    BASE,  # its start, and its end
+    END,
+    U0,  # lag at its start, and at its end
+    U1,
+    I0,  # light at its start, and at its end
+    I1,
+    LOG,  # 1: on the logarithmic branch
+    FALLEN_B,  # fall of the reference until its start and end, as if always at that speed
+    TAIL,
+    # where the lane is, and the next place that is known
+    S,
+    LAG_S,  # lag, light, fall of the reference and distance of the signal from it
+    LIGHT_S,
+    FALLEN_S,
+    AWAY_S,
+    STOP,
+    LAG_P,
+    LIGHT_P,
+    FALLEN_P,
+    AWAY_P,
+    KNOWN,  # 1: STOP is the turn, or the time of a noise event
+    KIND,  # of the noise event at STOP
+    # what it looks for
+    SEEKS,
+    TRIED,  # how often
+    FRESH,  # 1: the place is to be guessed, 0: it is given
+    MOVES,  # 1: the place is to be refined
+    ROOT,  # 1: towards a threshold, 0: towards the turn of the signal
+    GOAL,  # value to be reached
+    F_LO,  # distance from the goal at S, and its slope
+    G_LO,
+    F_HI,  # the same at STOP
+    G_HI,
+    # what was found
+    PLACE,
+    LAG_E,  # lag and light there, integral of the light since the start of the piece
+    LIGHT_E,
+    SUM_E,
+    ERROR,  # what the place may still be off [us]
+    EVENT,  # 1: an event ON, -1: OFF, 0: none
+    WHEN,  # its time [us]
+    # scratch of the quadrature
+    A1,
+    KAPPA,
+    Z,
+    UPTO,
+    TOTAL,
+) = (row * _STRIDE for row in range(52))
+SIZE = 52 * _STRIDE
+
+# what a lane is looking for; READY: to be decided; DOUBTFUL: to be decided lane by lane;
+# OPEN: the signal at the end of its piece
+DONE, ALONE, SEEK_ON, SEEK_OFF, TURN, INJECTED, RELEASE, READY, DOUBTFUL, OPEN = (
+    float(code) for code in range(10)
+)
+
+
+def pixel_numbers() -> NDArray[np.int64]:
+    """Return room for the numbers, within the strip, of the lanes' pixels."""
+    return np.zeros(STRIP + WIDTH, np.int64)
+
+
+def scratch() -> NDArray[np.float64]:
+    """Return the flat array of rows; lanes that fill up a vector must be harmless."""
+    rows = np.zeros(SIZE)
+    for row in (I0, I1, END, STOP, F_LO, DX, U0):
+        rows[row : row + _STRIDE] = 1.0
+    rows[F_HI : F_HI + _STRIDE] = -1.0
+    for row in (G_LO, G_HI):
+        rows[row : row + _STRIDE] = -2.0
+    return rows
+
+
+@kernel
+def move(lanes, source, target):
+    """Move what a lane keeps from round to round to another one."""
+    for row in range(X0, PLACE + 1, _STRIDE):
+        lanes[row + target] = lanes[row + source]
+
+
+@kernel
+def whole(count):
+    """Round a number of lanes up to whole vectors."""
+    return (count + WIDTH - 1) // WIDTH * WIDTH

@@ -1,0 +1,126 @@
+"""What lanes look for next, decided for all of them together, without branches.
+
+Between two known places the signal is monotone, or it turns where it cannot cross, so the distance
+at both tells whether a threshold is crossed, and that it is crossed once.  Turns, noise events and
+whatever leak makes doubtful are left to :mod:`adv2e.kernel.lanes.slow_path`.
+"""
+
+from __future__ import annotations
+
+from adv2e.compiled import kernel
+from adv2e.kernel.lanes.layout import (
+    AWAY_P,
+    AWAY_S,
+    DONE,
+    DOUBTFUL,
+    DX,
+    END,
+    F_HI,
+    F_LO,
+    FALL,
+    FALL_DN,
+    FALLEN_P,
+    FALLEN_S,
+    FRESH,
+    G_HI,
+    G_LO,
+    GOAL,
+    KNOWN,
+    LAG_P,
+    LAG_S,
+    LIGHT_P,
+    LIGHT_S,
+    MOVES,
+    NOISE,
+    OFF,
+    ON,
+    READY,
+    REFERENCE,
+    ROOT,
+    SEEK_OFF,
+    SEEK_ON,
+    SEEKS,
+    TRIED,
+    X0,
+)
+from adv2e.kernel.polynomial import TIE
+
+
+@kernel
+def sure_of_leak(away_s, away_p, lag_s, lag_p, drift, dx, rate_s, rate_p, leak, on, off):
+    """Tell whether a falling signal crosses just what the distances at S and STOP say.
+
+    Its distance from the falling reference moves by leak - z, z = w u being the fall of the signal.
+
+    * Where z stays above the leak, the distance is monotone.  While u keeps its sign, it gets
+      no smaller than at the ends or, where x runs away from y, than |dx/ds| / w.
+    * dz/ds = w (p - z (1 + q)) with p = -dx/ds and q = |dw/ds| / w^2, which is at most p / w where
+      x falls.  So where p exceeds the leak by the share q, z passes the leak only upwards: the
+      distance rises at first, if at all.
+    * Where x rises or rests, dz/ds <= z (dx/ds - w) - w dx/ds: with w > dx/ds, z only falls, and
+      the distance rises at last, if at all.  Then it may only dip below the lower level and return.
+
+    The first and the last two lines hold for all three: far from both levels nothing is crossed.
+    """
+    slowest = min(rate_s, rate_p)
+    least = min(abs(lag_s), abs(lag_p))
+    follows = -dx / (max(rate_s, rate_p) + 1e-300) if dx < 0.0 else least
+    outruns = slowest * min(least, follows) > leak
+    driven = (dx < 0.0) & (-dx > leak * (1.0 - dx / (slowest + 1e-300)))
+    settling = (dx >= 0.0) & (slowest > dx)
+    may_rise = away_s + drift >= on
+    may_dip = away_p - drift <= -off
+    dips = may_dip & (away_p > -off)
+    return (
+        outruns
+        | (driven & (not may_rise))
+        | (settling & (not dips))
+        | ((not may_rise) & (not may_dip))
+    )
+
+
+@kernel
+def plan(count, ta, length, circuit, lanes):
+    """Choose the threshold that comes first for the lanes that are ready, or tell the doubtful."""
+    dark, per_dn = circuit.dark * length, circuit.per_dn * length
+    for j in range(count):
+        seeks = lanes[SEEKS + j]
+        ready = seeks == READY
+        on, off = lanes[ON + j] + TIE, lanes[OFF + j] + TIE
+        away_s, away_p = lanes[AWAY_S + j], lanes[AWAY_P + j]
+        lag_s, lag_p = lanes[LAG_S + j], lanes[LAG_P + j]
+        drift = lanes[FALLEN_P + j] - lanes[FALLEN_S + j]
+        light_s, light_p = lanes[LIGHT_S + j], lanes[LIGHT_P + j]
+        fall, fall_dn = lanes[FALL + j], lanes[FALL_DN + j]
+        rate_s, rate_p = dark + per_dn * light_s, dark + per_dn * light_p
+        dx = lanes[DX + j]
+        leak = 1.01 * (fall + fall_dn * max(light_s, light_p))
+        sure = sure_of_leak(away_s, away_p, lag_s, lag_p, drift, dx, rate_s, rate_p, leak, on, off)
+        doubtful = (
+            (lag_s * lag_p < 0.0)
+            | (lanes[NOISE + j] < ta + lanes[END + j] * length)
+            | (lanes[KNOWN + j] > 0.5)
+            | (away_s >= on)
+            | (away_s <= -off)
+            | ((drift > 0.0) & (lag_s + lag_p > 0.0) & (not sure))
+        )
+        what = SEEK_ON if away_p >= on else (SEEK_OFF if away_p <= -off else DONE)
+        what = DOUBTFUL if doubtful else what
+        what = what if ready else seeks
+        lanes[SEEKS + j] = what
+        crosses = ready & ((what == SEEK_ON) | (what == SEEK_OFF))
+        level = on if away_p >= on else -off
+        goal = lanes[REFERENCE + j] - lanes[X0 + j] + level
+        lanes[GOAL + j] = goal if crosses else lanes[GOAL + j]
+        f_lo = away_s - level
+        lanes[F_LO + j] = f_lo if crosses else lanes[F_LO + j]
+        f_hi = away_p - level
+        lanes[F_HI + j] = f_hi if crosses else lanes[F_HI + j]
+        g_lo = fall + fall_dn * light_s - rate_s * lag_s
+        lanes[G_LO + j] = g_lo if crosses else lanes[G_LO + j]
+        g_hi = fall + fall_dn * light_p - rate_p * lag_p
+        lanes[G_HI + j] = g_hi if crosses else lanes[G_HI + j]
+        lanes[ROOT + j] = 1.0 if crosses else lanes[ROOT + j]
+        lanes[FRESH + j] = 1.0 if crosses else lanes[FRESH + j]
+        lanes[MOVES + j] = 1.0 if crosses else lanes[MOVES + j]
+        lanes[TRIED + j] = 0.0 if crosses else lanes[TRIED + j]

@@ -1,0 +1,224 @@
+r"""Places within an interval, found for many pixels at a time: one pixel a lane.
+
+Three vectorised steps serve all lanes, whatever each is looking for (a threshold, the turn of the
+signal, or just the signal at a given time):
+
+1. `guess`: the root of the cubic through values and slopes at both ends of the search;
+2. `evaluate`: the lag there, by the quadrature of :mod:`adv2e.kernel.screen` in double precision;
+3. `refine`: the root of the Taylor polynomial of order 6 about that place.
+
+The polynomial's remainder says how far off the root can be; a lane over the tolerance goes round
+again from the better place, by itself: what its neighbours do does not count.
+
+The end of a dead time is a given place close to one that is known, so `evaluate_release` starts
+from there: over so short a time fewer nodes do.
+"""
+
+from __future__ import annotations
+
+from adv2e.compiled import inlined, kernel
+from adv2e.kernel import special
+from adv2e.kernel.lanes.layout import (
+    A1,
+    BASE,
+    DX,
+    ERROR,
+    F_HI,
+    F_LO,
+    FALL,
+    FALL_DN,
+    FALLEN_B,
+    FRESH,
+    G_HI,
+    G_LO,
+    GOAL,
+    I0,
+    KAPPA,
+    LAG_E,
+    LAG_S,
+    LIGHT_E,
+    LIGHT_S,
+    LOG,
+    MOVES,
+    PLACE,
+    ROOT,
+    STOP,
+    SUM_E,
+    TOTAL,
+    U0,
+    UPTO,
+    S,
+    Z,
+)
+from adv2e.kernel.quadrature import REACH
+
+
+@kernel
+def guess(lanes, count):
+    """First place: root of the cubic through both ends, by guarded Newton steps."""
+    for k in range(count):
+        w = lanes[STOP + k] - lanes[S + k]
+        f0, f1 = lanes[F_LO + k], lanes[F_HI + k]
+        g0, g1 = lanes[G_LO + k] * w, lanes[G_HI + k] * w
+        c2 = 3.0 * (f1 - f0) - 2.0 * g0 - g1
+        c3 = g0 + g1 - 2.0 * (f1 - f0)
+        t = f0 / (f0 - f1 if f0 != f1 else 1.0)
+        for _ in range(3):
+            v = f0 + t * (g0 + t * (c2 + t * c3))
+            dv = g0 + t * (2.0 * c2 + 3.0 * t * c3)
+            q = t - v / (dv if dv != 0.0 else 1.0)
+            t = q if (q > 0.0) & (q < 1.0) else t
+        fresh = lanes[FRESH + k] > 0.5
+        lanes[PLACE + k] = lanes[S + k] + w * t if fresh else lanes[PLACE + k]
+
+
+@inlined
+def _light_after(i0, d, on_log, slope):
+    """Light once x has moved by d, its mean until then, and z of the quadrature."""
+    grown = i0 * special.exp(d)
+    light = grown if on_log else i0 + slope * d
+    z = -d if on_log else 0.0
+    mean = light * (1.0 - d * special.psi(z)) if on_log else 0.5 * (i0 + light)
+    return light, mean, z
+
+
+@inlined
+def _exponent(light, span, d, z, on_log, dark, per_dn, slope):
+    """Parameters of the quadrature over `span`: a1, kappa, z, and how far back it reaches."""
+    a = (dark + per_dn * light) * span
+    up = d if d > 0.0 else 0.0
+    v = REACH * (1.0 + 0.6 * up) / (a + 1e-30)
+    v = v if v < 1.0 else 1.0
+    moving = light if on_log else slope
+    return a * v, d * span * per_dn * moving * v * v, z * v, v
+
+
+@inlined
+def _set_up(began, light_began, lanes, count, dark, per_dn, slope):
+    """Light and its integral at each place, and the parameters of the quadrature."""
+    for k in range(count):
+        span = lanes[PLACE + k] - lanes[began + k]
+        d = lanes[DX + k] * span
+        on_log = lanes[LOG + k] > 0.5
+        light, mean, z = _light_after(lanes[light_began + k], d, on_log, slope)
+        lanes[LIGHT_E + k] = light
+        lanes[SUM_E + k] = span * mean
+        a1, kappa, z, v = _exponent(light, span, d, z, on_log, dark, per_dn, slope)
+        lanes[A1 + k] = a1
+        lanes[KAPPA + k] = kappa
+        lanes[Z + k] = z
+        lanes[UPTO + k] = v
+        lanes[TOTAL + k] = 0.0
+
+
+@kernel
+def _node(lanes, count, node, weight):
+    """Add one node of the quadrature."""
+    square = node * node
+    for k in range(count):
+        t = lanes[A1 + k] * node - lanes[KAPPA + k] * square * special.psi(lanes[Z + k] * node)
+        lanes[TOTAL + k] += weight * special.exp(-t)
+
+
+@inlined
+def _evaluate_from(
+    began, light_began, lag_began, lanes, count, length, circuit, nodes, weights
+):  # fmt: skip
+    """Lag, light and integral of the light of each lane at its place.
+
+    The integral begins at the place in row `began`, where light and lag are in `light_began` and
+    `lag_began`.
+    """
+    dark = circuit.dark * length
+    per_dn = circuit.per_dn * length
+    _set_up(began, light_began, lanes, count, dark, per_dn, circuit.slope)
+    for c in range(nodes.shape[0]):
+        _node(lanes, count, nodes[c], weights[c])
+    for k in range(count):
+        span = lanes[PLACE + k] - lanes[began + k]
+        t = dark * span + per_dn * lanes[SUM_E + k]
+        gone = lanes[DX + k] * span * lanes[UPTO + k] * lanes[TOTAL + k]
+        lanes[LAG_E + k] = special.exp(-t) * lanes[lag_began + k] - gone
+
+
+@kernel
+def evaluate(lanes, count, length, circuit, rule):
+    """From the start of the piece on."""
+    _evaluate_from(BASE, I0, U0, lanes, count, length, circuit, rule.nodes, rule.weights)
+
+
+@kernel
+def evaluate_release(lanes, count, length, circuit, rule):
+    """From the last known place on, which is at most a dead time before."""
+    _evaluate_from(
+        S, LIGHT_S, LAG_S, lanes, count, length, circuit, rule.nodes_dead, rule.weights_dead
+    )
+
+
+@kernel
+def refine(lanes, count, length, circuit):
+    """Move each place to the root of the Taylor polynomial there; note what may be left.
+
+    Light and its integral move along.
+    """
+    dark = circuit.dark * length
+    per_dn = circuit.per_dn * length
+    slope = circuit.slope
+    for k in range(count):
+        s = lanes[PLACE + k]
+        d = lanes[DX + k]
+        on_log = lanes[LOG + k] > 0.5
+        i0 = lanes[LIGHT_E + k]
+        i1 = d * i0 if on_log else slope * d
+        e = d if on_log else 0.0
+        i2 = i1 * e / 2.0
+        i3 = i2 * e / 3.0
+        i4 = i3 * e / 4.0
+        w0 = dark + per_dn * i0
+        w1, w2, w3 = per_dn * i1, per_dn * i2, per_dn * i3
+        w4, w5 = per_dn * i4, per_dn * i4 * e / 5.0
+        u0 = lanes[LAG_E + k]
+        u1 = -w0 * u0 - d
+        u2 = -(w0 * u1 + w1 * u0) / 2.0
+        u3 = -(w0 * u2 + w1 * u1 + w2 * u0) / 3.0
+        u4 = -(w0 * u3 + w1 * u2 + w2 * u1 + w3 * u0) / 4.0
+        u5 = -(w0 * u4 + w1 * u3 + w2 * u2 + w3 * u1 + w4 * u0) / 5.0
+        u6 = -(w0 * u5 + w1 * u4 + w2 * u3 + w3 * u2 + w4 * u1 + w5 * u0) / 6.0
+        root = lanes[ROOT + k]
+        fall = root * lanes[FALL + k]
+        q = root * lanes[FALL_DN + k]
+        fallen = root * lanes[FALLEN_B + k] + fall * (s - lanes[BASE + k]) + q * lanes[SUM_E + k]
+        f0 = root * d * s + u0 + fallen - lanes[GOAL + k]
+        f1 = root * d + u1 + fall + q * i0
+        f2 = u2 + q * i1 / 2.0
+        f3 = u3 + q * i2 / 3.0
+        f4 = u4 + q * i3 / 4.0
+        f5 = u5 + q * i4 / 5.0
+        t = -f0 / (f1 if f1 != 0.0 else 1.0)
+        dv = f1
+        last = t
+        for _ in range(3):
+            v = f0 + t * (f1 + t * (f2 + t * (f3 + t * (f4 + t * (f5 + t * u6)))))
+            dv = f1 + t * (
+                2.0 * f2 + t * (3.0 * f3 + t * (4.0 * f4 + t * (5.0 * f5 + t * 6.0 * u6)))
+            )
+            dv = dv if dv != 0.0 else 1.0
+            last = v / dv
+            t = t - last
+        t = t if lanes[MOVES + k] > 0.5 else 0.0
+        place = s + t
+        lo, hi = lanes[S + k], lanes[STOP + k]
+        # the end values are single precision: a root beyond them by that is a root at the end
+        inside = (place >= lo - 1e-6) & (place <= hi + 1e-6)
+        place = place if place > lo else lo
+        place = place if place < hi else hi
+        reach = (w0 * (1.0 + abs(t * e)) + abs(d)) * abs(t)
+        r2 = reach * reach
+        remainder = (abs(u0) + abs(d)) * r2 * r2 * r2 * reach / 5040.0 / abs(dv)
+        # close to a turn the steps only halve what is left: the next one tells how much
+        left = (remainder + last * last * (abs(f2) + abs(f3)) / abs(dv)) * length
+        lanes[ERROR + k] = left if inside & (reach < 0.8) else 1e30
+        moves = (lanes[MOVES + k] > 0.5) & (abs(t) < 10.0)
+        lanes[PLACE + k] = place if moves else s
+        lanes[SUM_E + k] += t * (i0 + t * (i1 / 2.0 + t * (i2 / 3.0 + t * i3 / 4.0)))
+        lanes[LIGHT_E + k] = i0 + t * (i1 + t * (i2 + t * (i3 + t * i4)))

@@ -1,0 +1,254 @@
+"""Random numbers as functions of (seed, effect, pixel, draw).
+
+Philox4x32-10, a counter-based generator: the key is the seed, the counter names the effect, the
+pixel and the number of the draw.  No state, so nothing depends on threads, tiles or chunks, and an
+effect that is switched on does not change the draws of another.
+
+References
+----------
+.. [1] J. K. Salmon, M. A. Moraes, R. O. Dror, D. E. Shaw, "Parallel random numbers: as easy as
+   1, 2, 3", SC'11, doi:10.1145/2063384.2063405.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from adv2e.compiled import inlined, kernel
+from adv2e.kernel import special
+
+# Streams: one for each kind of draw; never renumber, or old seeds give other events.
+ON_THRESHOLD = 1
+OFF_THRESHOLD = 2
+INITIAL_REFERENCE = 3
+SHOT_TIME = 4
+SHOT_KIND = 5
+HOT_CHOICE = 6
+HOT_TIME = 7
+LEAK_PERIOD = 8
+PHOTORECEPTOR = 9
+PHOTORECEPTOR_STEPS = 10
+DEAD_CHOICE = 11
+LOSS = 12
+REQUEST = 13
+LEAK_AGE = 14
+LEAK_RUNNING = 15
+
+LARGEST_SEED = (1 << 64) - 1
+"""Seeds are the 64 bits of the generator's key."""
+
+_LOW = np.uint64(0xFFFFFFFF)
+_M0 = np.uint64(0xD2511F53)
+_M1 = np.uint64(0xCD9E8D57)
+_W0 = np.uint64(0x9E3779B9)
+_W1 = np.uint64(0xBB67AE85)
+_32 = np.uint64(32)
+_2, _3, _4, _5, _6, _7, _8, _9 = (np.uint64(k) for k in range(2, 10))
+
+
+def key_of(seed: int) -> np.uint64:
+    """Return `seed` as compiled code takes it: of one type, so that none is compiled anew."""
+    return np.uint64(seed)
+
+
+@kernel
+def philox(
+    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64
+) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
+    """Philox4x32-10: four 32-bit words (in uint64) from a counter and a key of 32-bit words."""
+    for _ in range(10):
+        p0 = _M0 * c0
+        p1 = _M1 * c2
+        c0 = (p1 >> _32) ^ c1 ^ k0
+        c1 = p1 & _LOW
+        c2 = (p0 >> _32) ^ c3 ^ k1
+        c3 = p0 & _LOW
+        k0 = (k0 + _W0) & _LOW
+        k1 = (k1 + _W1) & _LOW
+    return c0, c1, c2, c3
+
+
+@kernel
+def _round(
+    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64
+) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
+    p0 = np.uint64(_M0 * c0)
+    p1 = np.uint64(_M1 * c2)
+    return (p1 >> _32) ^ c1 ^ k0, p1 & _LOW, (p0 >> _32) ^ c3 ^ k1, p0 & _LOW
+
+
+@inlined
+def _philox_unrolled(
+    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64
+) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
+    """As philox, written out so that a loop over pixels vectorises."""
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 & _LOW, k1 + _W1 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _2 & _LOW, k1 + _W1 * _2 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _3 & _LOW, k1 + _W1 * _3 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _4 & _LOW, k1 + _W1 * _4 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _5 & _LOW, k1 + _W1 * _5 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _6 & _LOW, k1 + _W1 * _6 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _7 & _LOW, k1 + _W1 * _7 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _8 & _LOW, k1 + _W1 * _8 & _LOW)
+    return _round(c0, c1, c2, c3, k0 + _W0 * _9 & _LOW, k1 + _W1 * _9 & _LOW)
+
+
+@kernel
+def uniforms(seed: np.uint64, stream: int, pixel: int, draw: float) -> tuple[float, float]:
+    """Return two independent uniform numbers in (0, 1), 53 bits each."""
+    s = np.uint64(seed)
+    d = np.uint64(draw)
+    a, b, c, e = philox(
+        np.uint64(pixel) & _LOW, np.uint64(stream), d & _LOW, d >> _32, s & _LOW, s >> _32
+    )
+    scale = 1.0 / 9007199254740992.0
+    u = (np.float64(a >> _5) * 67108864.0 + np.float64(b >> _6) + 0.5) * scale
+    v = (np.float64(c >> _5) * 67108864.0 + np.float64(e >> _6) + 0.5) * scale
+    return u, v
+
+
+@kernel
+def normal_of(u: float, v: float) -> float:
+    """Return the standard normal number of two uniform ones (Box and Muller)."""
+    return math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)
+
+
+@kernel
+def normal(seed: np.uint64, stream: int, pixel: int, draw: float) -> float:
+    """Return a standard normal number (Box and Muller)."""
+    u, v = uniforms(seed, stream, pixel, draw)
+    return normal_of(u, v)
+
+
+@kernel
+def exponential(seed: np.uint64, stream: int, pixel: int, draw: float) -> float:
+    """Return an exponential number of mean 1."""
+    return -math.log(uniforms(seed, stream, pixel, draw)[0])
+
+
+@kernel
+def uniforms_of_pixels(
+    seed: np.uint64, stream: int, first: int, u: NDArray[np.float64], v: NDArray[np.float64]
+) -> None:
+    """Draw what `uniforms` gives for draw 0 of the pixels first.. into `u` and `v`.
+
+    Vectorises, which a loop that goes on to call a logarithm of the C library does not.
+    """
+    s = np.uint64(seed)
+    low, high = s & _LOW, s >> _32
+    none = np.uint64(0)
+    scale = 1.0 / 9007199254740992.0
+    for k in range(u.shape[0]):
+        a, b, c, e = _philox_unrolled(
+            np.uint64(first + k) & _LOW, np.uint64(stream), none, none, low, high
+        )
+        u[k] = (np.float64(a >> _5) * 67108864.0 + np.float64(b >> _6) + 0.5) * scale
+        v[k] = (np.float64(c >> _5) * 67108864.0 + np.float64(e >> _6) + 0.5) * scale
+
+
+@kernel
+def _fill_uniforms(
+    seed: np.uint64,
+    stream: int,
+    pixels: NDArray[np.int64],
+    draws: NDArray[np.int64],
+    out: NDArray[np.float64],
+) -> None:
+    for k in range(out.shape[0]):
+        out[k] = uniforms(seed, stream, pixels[k], draws[k])[0]
+
+
+def uniform_array(
+    seed: int, stream: int, pixels: ArrayLike, draws: ArrayLike
+) -> NDArray[np.float64]:
+    """Return uniform numbers in (0, 1) for arrays of pixels and draws, broadcast to one shape."""
+    both = np.broadcast_arrays(np.asarray(pixels, np.int64), np.asarray(draws, np.int64))
+    out = np.empty(both[0].shape)
+    # writable, too: one type for the compiled code
+    flat = [np.require(part, requirements=["C", "W"]).reshape(-1) for part in both]
+    _fill_uniforms(key_of(seed), stream, flat[0], flat[1], out.reshape(-1))
+    return out
+
+
+@kernel
+def _fill_next(
+    seed: np.uint64,
+    stream: int,
+    pixels: NDArray[np.int64],
+    numbers: NDArray[np.int64],
+    out: NDArray[np.float64],
+) -> None:
+    for k in range(out.shape[0]):
+        pixel = pixels[k]
+        out[k] = uniforms(seed, stream, pixel, numbers[pixel])[0]
+        numbers[pixel] += 1
+
+
+def next_uniforms(
+    seed: int, stream: int, pixels: NDArray[np.int64], numbers: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the next uniform number in (0, 1) of each of `pixels`, in turn.
+
+    Parameters
+    ----------
+    pixels : (n,) int64
+        Pixels, as often as they draw.
+    numbers : (pixels,) int64
+        How often each pixel has drawn before; counted on.
+    """
+    out = np.empty(pixels.size)
+    _fill_next(key_of(seed), stream, np.ascontiguousarray(pixels), numbers, out)
+    return out
+
+
+_SIN = (1.0, -1 / 6, 1 / 120, -1 / 5040, 1 / 362880, -1 / 39916800)
+_COS = (1.0, -1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800, 1 / 479001600)
+_HALF_PI = 0.5 * math.pi
+
+
+@kernel
+def _cos_sin(turns: float) -> tuple[float, float]:
+    """Cosine and sine of 2 pi turns, 0 <= turns <= 1, good to 1e-11, for loops over pixels."""
+    quarter = np.floor(4.0 * turns + 0.5)
+    t = (4.0 * turns - quarter) * _HALF_PI
+    g = t * t
+    s = _SIN[2] + g * (_SIN[3] + g * (_SIN[4] + g * _SIN[5]))
+    s = t * (_SIN[0] + g * (_SIN[1] + g * s))
+    c = _COS[3] + g * (_COS[4] + g * (_COS[5] + g * _COS[6]))
+    c = _COS[0] + g * (_COS[1] + g * (_COS[2] + g * c))
+    odd = (quarter == 1.0) | (quarter == 3.0)
+    x, y = (s, c) if odd else (c, s)
+    x = -x if (quarter == 1.0) | (quarter == 2.0) else x
+    y = -y if (quarter == 2.0) | (quarter == 3.0) else y
+    return x, y
+
+
+@kernel
+def normals_of_four(
+    seed: np.uint64, stream: int, first: int, count: int, block: int, out: NDArray[np.float64]
+) -> None:
+    """Draw four standard normal numbers for each of the pixels first.. into `out`, (4, count..).
+
+    One block of Philox and two pairs of Box and Muller a pixel, from uniforms of 32 bits: tails
+    end at 6.8.
+    """
+    s, d = np.uint64(seed), np.uint64(block)
+    low, high, k0, k1 = d & _LOW, d >> _32, s & _LOW, s >> _32
+    scale = 1.0 / 4294967296.0
+    a, b, c, e = out[0], out[1], out[2], out[3]
+    for k in range(count):
+        w0, w1, w2, w3 = _philox_unrolled(
+            np.uint64(first + k) & _LOW, np.uint64(stream), low, high, k0, k1
+        )
+        r = math.sqrt(-2.0 * special.log((np.float64(w0) + 0.5) * scale))
+        x, y = _cos_sin((np.float64(w1) + 0.5) * scale)
+        a[k] = r * x
+        b[k] = r * y
+        r = math.sqrt(-2.0 * special.log((np.float64(w2) + 0.5) * scale))
+        x, y = _cos_sin((np.float64(w3) + 0.5) * scale)
+        c[k] = r * x
+        e[k] = r * y

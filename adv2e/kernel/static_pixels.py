@@ -1,0 +1,298 @@
+"""Pixels at rest: constant light, no lag left, so that only leak and noise events move anything.
+
+The distance of the signal from the falling reference is a straight line: no place has to be
+searched for, and when a pixel is to be looked at next is known as soon as it is at rest.  So a
+strip goes block by block, not interval by interval: each from one interval in which something is
+due in it to the next.  What leak takes from the references in between is taken afterwards, interval
+by interval all the same, as the sum must round as it would if the strip were not at rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adv2e.compiled import kernel
+from adv2e.effects.pixel.leak import fill_falls, next_leak_factor
+from adv2e.kernel import screen
+from adv2e.kernel.comparator import (
+    SIGNAL_EVENT,
+    emit,
+    injected_polarity,
+    next_injected,
+    use_up,
+)
+from adv2e.kernel.lanes.exchange import EARLY, log_of, next_noise, watch
+from adv2e.kernel.polynomial import TIE
+from adv2e.kernel.workspace import S_HOLD, S_OFF, S_ON, S_REFERENCE, STRIP
+
+BLOCK = 64
+"""Pixels that are looked through together where something is due."""
+
+DONE = -1.0
+"""Place of a pixel that is at the end of its interval."""
+
+_f = np.float32
+_ZERO, _TINY = _f(0.0), _f(1e-30)
+_EARLY, _NEVER = _f(EARLY), _f(screen.NEVER)
+
+
+@kernel
+def _when(k, now, rows):
+    """When pixel k of the strip is to be looked at, its distance being that at `now`."""
+    away = rows[screen.AWAY_0 + k]
+    left = rows[screen.ON + k] - away
+    leaked = (now + left / (rows[screen.FALL + k] + _TINY)) * _EARLY
+    beyond = (left <= _ZERO) | (-away >= rows[screen.OFF + k])
+    return -_NEVER if beyond else min(rows[screen.DUE + k], leaked)
+
+
+@kernel
+def _note_soonest(b, rows):
+    """Row SOONEST of the block that begins at pixel b."""
+    # by halves, as a minimum over a row does not vectorise; the quadrature's row is free at rest
+    half = BLOCK // 2
+    for k in range(half):
+        rows[screen.TOTAL + k] = min(rows[screen.WHEN + b + k], rows[screen.WHEN + b + half + k])
+    for k in range(half // 2):
+        rows[screen.TOTAL + k] = min(rows[screen.TOTAL + k], rows[screen.TOTAL + half // 2 + k])
+    soonest = rows[screen.TOTAL]
+    for k in range(1, half // 2):
+        soonest = min(soonest, rows[screen.TOTAL + k])
+    rows[screen.SOONEST + b // BLOCK] = soonest
+
+
+@kernel
+def begin_rest(now, rows):
+    """Find out when the pixels of a strip are to be looked at that comes to rest at `now`.
+
+    Row FALL holds the fall of the references in a microsecond.
+    """
+    for k in range(STRIP):
+        rows[screen.WHEN + k] = _when(k, now, rows)
+    for b in range(0, STRIP, BLOCK):
+        _note_soonest(b, rows)
+
+
+@kernel
+def end_rest(lo, count, circuit, state, rows):
+    """Row AWAY_0 of a strip that is at rest no longer: leak has gone on."""
+    for k in range(count):
+        x = log_of(np.float64(rows[screen.LIGHT_0 + k]), circuit)
+        rows[screen.AWAY_0 + k] = x - state[S_REFERENCE, lo + k]
+
+
+@kernel
+def fall_of_block(i, b, size, length, circuit, state, falls, means):
+    """Fall of the references of a block, which begins at pixel b of its strip, i of all."""
+    fill_falls(i, size, length, means[b : b + size], circuit, state, falls[b : b + size])
+
+
+@kernel
+def _lower_block(i, b, size, state, falls):
+    """Take the falls from the references of a block."""
+    reference, fall = state[S_REFERENCE, i : i + size], falls[b : b + size]
+    for k in range(size):
+        reference[k] -= fall[k]
+
+
+@kernel
+def _lower_unflagged(i, b, size, state, rows, falls):
+    """Take the falls from the references of the pixels of a block that are not looked at."""
+    reference, fall = state[S_REFERENCE, i : i + size], falls[b : b + size]
+    for k in range(size):
+        reference[k] -= fall[k] if rows[screen.HIT + b + k] == _ZERO else 0.0
+
+
+@kernel
+def next_due(b, first, last, starts, rows):
+    """Return the first of the intervals first..last in which a pixel of the block is due."""
+    soonest = rows[screen.SOONEST + b // BLOCK]
+    f = first
+    while f < last and soonest >= _f(starts[f + 1] - starts[0]):
+        f += 1
+    return f
+
+
+@kernel
+def flag_block(b, size, end, rows, index):
+    """Flag the pixels of a block that are due before `end`, and fill `index` with them.
+
+    Returns their number.
+    """
+    for k in range(BLOCK):
+        rows[screen.HIT + b + k] = _f(1.0) if rows[screen.WHEN + b + k] < end else _ZERO
+    m = 0
+    for k in range(size):
+        index[m] = b + k
+        m += 1 if rows[screen.HIT + b + k] > _ZERO else 0
+    return m
+
+
+@kernel
+def _go_on(b, m, end, rows, index):
+    """Make the end of an interval the start of the next, for the m pixels that were flagged."""
+    for j in range(m):
+        k = index[j]
+        rows[screen.AWAY_0 + k] = rows[screen.AWAY_1 + k]
+        rows[screen.LAG_0 + k] = rows[screen.LAG_1 + k]
+        rows[screen.WHEN + k] = _when(k, end, rows)
+    _note_soonest(b, rows)
+
+
+@kernel
+def _begin_leak_cycle(k, i, length, circuit, state, rows, falls, means):
+    """Draw the leak speed of pixel k of the strip, i of all, from its event on."""
+    next_leak_factor(i, circuit, state)
+    fall_of_block(i, k, 1, 1.0, circuit, state, falls, means)
+    rows[screen.FALL + k] = falls[k]
+    fall_of_block(i, k, 1, length, circuit, state, falls, means)
+
+
+@kernel
+def _solve(
+    k, i, s, start, ta, length, t_base, circuit, state, rows, falls, means, keys, times, n
+):  # fmt: skip
+    """Events of one pixel, number k of its strip and i of all, over an interval at rest.
+
+    Returns the number of events and DONE, or, where there is no room left for them, the place from
+    which to go on.  Leaves the pixel's rows of the screen as they are at the end of the interval.
+    """
+    light = np.float64(rows[screen.LIGHT_1 + k])
+    x, fall = log_of(light, circuit), falls[k]
+    on, off = state[S_ON, i] + TIE, state[S_OFF, i] + TIE
+    reference = state[S_REFERENCE, i]
+    noise = next_noise(i, circuit, state)
+    while True:
+        if n == keys.shape[0]:
+            state[S_REFERENCE, i] = reference
+            return n, s
+        hold = state[S_HOLD, i]
+        if hold >= 0.0:
+            s = max(s, (hold - ta) / length)
+            if s >= 1.0:
+                break
+            reference = x + fall * s
+            state[S_HOLD, i] = -1.0
+        kind, t_end, s_end = SIGNAL_EVENT, ta + length, 1.0
+        if noise < ta + length:
+            kind, t_end = next_injected(i, ta + s * length, ta + length, circuit, state)
+            noise = next_noise(i, circuit, state)
+            if kind != SIGNAL_EVENT:
+                s_end = max(s, (t_end - ta) / length)
+        away = x - reference
+        polarity, level = 0, 0.0
+        if away + fall * s_end >= on:
+            polarity, level = 1, state[S_ON, i]
+            s = max(s, min(s_end, (on - away) / fall if fall > 0.0 else 0.0))
+        elif away + fall * s <= -off:
+            polarity, level = -1, -state[S_OFF, i]
+        elif kind == SIGNAL_EVENT:
+            break
+        else:
+            s = s_end
+            polarity = injected_polarity(i, kind, light, circuit, state)
+            use_up(i, kind, circuit, state)
+            noise = next_noise(i, circuit, state)
+            if polarity == 0:
+                continue
+            level = away + fall * s
+        when = ta + s * length
+        n = emit(keys, times, n, when, t_base, i, 1 if polarity > 0 else 0)
+        if circuit.leak_jitter > 0.0:
+            _begin_leak_cycle(k, i, length, circuit, state, rows, falls, means)
+            reference += (falls[k] - fall) * s
+            fall = falls[k]
+        if circuit.dead_time > 0.0:
+            state[S_HOLD, i] = when + circuit.dead_time
+        else:
+            reference += level
+    state[S_REFERENCE, i] = reference - fall
+    rows[screen.LAG_1 + k] = 0.0
+    watch(k, i, x, start, circuit, state, rows)
+    return n, DONE
+
+
+@kernel
+def _solve_block(
+    lo, j, m, s, start, ta, length, t_base, circuit, state, rows, falls, means, index, keys,
+    times, n,
+):  # fmt: skip
+    """Events of the flagged pixels, from the j-th of m on, which is solved from place s on.
+
+    Returns the number of events, and j and s where it stopped: j = m, or there was no room left.
+    """
+    while j < m:
+        k = index[j]
+        n, s = _solve(
+            k,
+            lo + k,
+            s,
+            start,
+            ta,
+            length,
+            t_base,
+            circuit,
+            state,
+            rows,
+            falls,
+            means,
+            keys,
+            times,
+            n,
+        )
+        if s != DONE:
+            return n, j, s
+        j, s = j + 1, 0.0
+    return n, j, s
+
+
+@kernel
+def go_through(
+    lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, rows, falls, means,
+    index, keys, times, n,
+):  # fmt: skip
+    """Advance a strip at rest over the intervals first..last, from where the last call stopped.
+
+    It stops where there is no room left for events.  A function that makes arrays counts references
+    to all that it is given, which costs more than most blocks do.
+
+    Parameters
+    ----------
+    b, f, j, m, s
+        First pixel of the block, its interval, how many of its m flagged pixels are solved, and the
+        place from which to go on with the next one; 0, first, 0, 0, 0 at the start.
+
+    Returns
+    -------
+    number of events, b, f, j, m, s: b >= count at the end; else j < m
+    """
+    start = starts[0]
+    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
+    while b < count:
+        i, size = lo + b, min(BLOCK, count - b)
+        if m == 0:
+            due = next_due(b, f, last, starts, rows)
+            if leaks:
+                for c in range(f, due):
+                    length = starts[c + 1] - starts[c]
+                    fall_of_block(i, b, size, length, circuit, state, falls, means)
+                    _lower_block(i, b, size, state, falls)
+            if due == last:
+                b, f = b + BLOCK, first
+                continue
+            f, j, s = due, 0, 0.0
+        ta, length, end = starts[f], starts[f + 1] - starts[f], _f(starts[f + 1] - start)
+        if m == 0:
+            m = flag_block(b, size, end, rows, index)
+            if leaks:
+                fall_of_block(i, b, size, length, circuit, state, falls, means)
+                _lower_unflagged(i, b, size, state, rows, falls)
+        n, j, s = _solve_block(
+            lo, j, m, s, start, ta, length, t_base, circuit, state, rows, falls, means, index,
+            keys, times, n,
+        )  # fmt: skip
+        if j < m:
+            break
+        _go_on(b, m, end, rows, index)
+        f, m = f + 1, 0
+    return n, b, f, j, m, s

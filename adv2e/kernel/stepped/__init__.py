@@ -1,0 +1,1 @@
+"""The stepping solver: a strip of pixels over one step of time after another."""

@@ -1,0 +1,330 @@
+"""Any circuit over a tile in steps of time, a strip of pixels at a time.
+
+All pixels of a strip make each step together, in loops without branches; only those that may fire
+in a step are looked at by themselves.  The cost follows from pixels and steps and hardly from what
+is switched on, so this is the way for what :mod:`adv2e.kernel.exact` does not cover.
+
+An interval is cut into continuity samples (one piece, with ``exact``, unless its last one is as
+printed), each piece into equal steps, and these into blocks of at most BLOCK.  A block computes
+light and log intensity anew, so that a run may begin at any of them and still give the same bits.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.compiled import entry, kernel
+from adv2e.effects.pixel.photoreceptor_noise import fill_normals
+from adv2e.effects.pixel.slew_limit import keep_first, limit_slew
+from adv2e.kernel.event_buffer import tell_where, with_room
+from adv2e.kernel.general import load_light, samples
+from adv2e.kernel.stepped import events, signal
+from adv2e.kernel.stepped.rows import (
+    ADDED,
+    AHEAD,
+    BASE,
+    DRIVEN1,
+    DUE,
+    FIRST,
+    INPUT1,
+    LEAK_ON,
+    MOVE,
+    NEVER,
+    NOISE,
+    NORMAL,
+    OFF,
+    OFF_STEP,
+    ON,
+    ON_STEP,
+    PIECE,
+    REFERENCE,
+    SECOND,
+    SIGNAL1,
+    STEP,
+    WIDTH,
+    XA,
+    XB,
+)
+from adv2e.kernel.work_queue import claim
+from adv2e.kernel.workspace import (
+    EXACT,
+    S_FIRST,
+    S_LEAK_FACTOR,
+    S_NOISE,
+    S_NOISE_DRAW,
+    S_ON,
+    S_REFERENCE,
+    S_SECOND,
+    S_X,
+)
+
+BLOCK = 16
+"""Steps after which light and log intensity are computed anew."""
+
+_ROOM = 64
+
+
+class Run(NamedTuple):
+    """Steps that one call takes: from one block's start to another's end.
+
+    A course has one row for the start of the run and one for the end of each of its steps, and
+    one column or one a pixel; without rows it adds nothing.
+    """
+
+    first: int  # interval, and step of it, at which the run begins
+    first_step: int
+    last: int  # interval, and step of it, before which it ends
+    last_step: int
+    pieces: int  # of an interval
+    steps: NDArray[np.int64]  # of a piece of each interval
+    gain: NDArray[np.float64]
+    drive: NDArray[np.float64]
+    signal: NDArray[np.float64]
+    on: NDArray[np.float64]
+    off: NDArray[np.float64]
+
+
+@kernel
+def _open(lo, count, n, circuit, run, injected, state, rows):
+    """Rows of a strip at the start of a run."""
+    noisy, jitter = circuit.noise_rms > 0.0, circuit.leak_jitter > 0.0
+    for k in range(n):
+        rows[ON + k] = NEVER
+        rows[OFF + k] = NEVER
+        rows[ON_STEP + k] = NEVER
+        rows[OFF_STEP + k] = NEVER
+        rows[DUE + k] = NEVER
+        rows[ADDED + k] = 0.0
+    for k in range(count):
+        i = lo + k
+        rows[FIRST + k] = state[S_FIRST, i]
+        rows[INPUT1 + k] = state[S_FIRST, i]
+        if noisy:
+            rows[NOISE + k] = state[S_NOISE, i]
+            rows[INPUT1 + k] += state[S_NOISE, i]
+        rows[SECOND + k] = state[S_SECOND, i]
+        rows[SIGNAL1 + k] = rows[SECOND + k] if circuit.follower > 0.0 else rows[INPUT1 + k]
+        rows[REFERENCE + k] = state[S_REFERENCE, i]
+        rows[LEAK_ON + k] = state[S_ON, i] * (state[S_LEAK_FACTOR, i] if jitter else 1.0)
+        events.watch(k, i, circuit, injected, state, rows)
+    if run.signal.shape[0] > 0:
+        signal.add_course(n, lo, count, run.signal, 0, ADDED, rows)
+        for k in range(n):
+            rows[SIGNAL1 + k] += rows[ADDED + k]
+
+
+@kernel
+def _close(lo, count, draw, circuit, state, rows):
+    """State of a strip at the end of a run."""
+    for k in range(count):
+        i = lo + k
+        state[S_X, i] = rows[XB + k]
+        state[S_FIRST, i] = rows[FIRST + k]
+        state[S_SECOND, i] = rows[SECOND + k]
+        state[S_REFERENCE, i] = rows[REFERENCE + k]
+        if circuit.noise_rms > 0.0:
+            state[S_NOISE, i] = rows[NOISE + k]
+            state[S_NOISE_DRAW, i] = draw
+
+
+@kernel
+def _take_samples(count, begins, is_last, next_is_last, rows):
+    """Continuity samples of an interval: the first in row XA, the last in AHEAD."""
+    for k in range(count):
+        start, base, step, end = samples(
+            rows[XA + k], rows[XB + k], rows[AHEAD + k], begins, is_last, next_is_last
+        )
+        rows[XA + k] = start
+        rows[BASE + k] = base
+        rows[STEP + k] = step
+        rows[AHEAD + k] = end
+
+
+@kernel
+def _take_piece(n, p, pieces, rows):
+    """Rows PIECE and MOVE: from sample p to the next."""
+    start, end = p / pieces, (p + 1) / pieces
+    for k in range(n):
+        a = rows[BASE + k] + rows[STEP + k] * start
+        b = rows[BASE + k] + rows[STEP + k] * end
+        a = rows[XA + k] if p == 0 else a
+        b = rows[AHEAD + k] if p == pieces - 1 else b
+        rows[PIECE + k] = a
+        rows[MOVE + k] = b - a
+
+
+@kernel
+def _next_instant(n, rows):
+    for k in range(n):
+        rows[XA + k] = rows[XB + k]
+
+
+@kernel
+def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, normals, rows):
+    """Signal of a strip over step m of a run, of h us, that ends at `share` of its piece."""
+    signal.advance_light(n, share, half, circuit, rows)
+    if run.gain.shape[0] > 0:
+        signal.change_middle(lo, count, run.gain, m, rows)
+        signal.change_light(lo, count, run.gain, m + 1, circuit, rows)
+    if run.drive.shape[0] > 0:
+        signal.add_course(n, lo, count, run.drive, m + 1, DRIVEN1, rows)
+    if circuit.slew > 0.0:
+        keep_first(n, rows)
+    if not circuit.filtered:
+        signal.no_pole(n, rows)
+    elif circuit.update == EXACT:
+        signal.first_pole_exact(n, h, circuit, rows)
+    else:
+        signal.first_pole_stepped(n, h, circuit, rows)
+    if circuit.slew > 0.0:
+        limit_slew(n, h, circuit, rows)
+    if circuit.noise_rms > 0.0:
+        if draw % 4 == 0 or m == 0:
+            fill_normals(circuit.seed, lo, n, draw // 4, normals)
+        lane = normals[draw % 4]
+        for k in range(n):
+            rows[NORMAL + k] = lane[k]
+        signal.add_noise(n, circuit.noise_rms, rows)
+    else:
+        signal.no_noise(n, rows)
+    if circuit.follower > 0.0:
+        signal.second_pole(n, circuit.follower * h, circuit.update, rows)
+        signal.take_signal(n, SECOND, rows)
+    else:
+        signal.take_signal(n, INPUT1, rows)
+    if run.signal.shape[0] > 0:
+        signal.add_to_signal(n, lo, count, run.signal, m + 1, rows)
+
+
+@kernel
+def _level(course, m, i):
+    """Factor on a threshold of pixel i at instant m."""
+    if course.shape[0] == 0:
+        return 1.0
+    return course[m, i] if course.shape[1] > 1 else course[m, 0]
+
+
+@kernel
+def _screen_step(lo, count, n, m, end, h, circuit, run, rows):
+    """Return how many pixels may fire in step m of a run; marks them."""
+    on, off = 1.0, 1.0
+    if run.on.shape[1] > 1:
+        events.step_thresholds(count, lo, run.on, m + 1, ON, ON_STEP, rows)
+    elif run.on.shape[0] > 0:
+        on = min(run.on[m, 0], run.on[m + 1, 0])
+    if run.off.shape[1] > 1:
+        events.step_thresholds(count, lo, run.off, m + 1, OFF, OFF_STEP, rows)
+    elif run.off.shape[0] > 0:
+        off = min(run.off[m, 0], run.off[m + 1, 0])
+    return events.screen(n, end, circuit.leak * h, circuit.photo_leak * h, on, off, rows)
+
+
+@kernel
+def _fire_step(
+    lo, n, m, ta, h, share, t_base, circuit, run, injected, state, scratch, keys, times, number
+):  # fmt: skip
+    """Fire the events of step m of a run, which begins at ta us."""
+    rows, pixels = scratch.dense, scratch.pixels
+    for c in range(events.gather(n, rows, pixels)):
+        k = pixels[c]
+        i = lo + k
+        levels = (
+            _level(run.on, m, i), _level(run.on, m + 1, i),
+            _level(run.off, m, i), _level(run.off, m + 1, i),
+        )  # fmt: skip
+        whole = False
+        while not whole:
+            if number + _ROOM > keys.shape[0]:
+                keys, times = with_room(keys, times, number, number + _ROOM)
+            number, whole = events.fire(
+                k, i, ta, h, levels, share, t_base, circuit, injected, state, rows, keys, times,
+                number,
+            )  # fmt: skip
+    return number, keys, times
+
+
+@kernel
+def _strip(
+    lo, count, frames, before, share, starts, begins, last, circuit, run, injected, t_base, state,
+    scratch, keys, times, number,
+):  # fmt: skip
+    """Advance one strip over a run."""
+    rows, light = scratch.dense, scratch.means
+    n = -(-count // 16) * 16
+    _open(lo, count, n, circuit, run, injected, state, rows)
+    draw = np.int64(0)
+    if circuit.noise_rms > 0.0:
+        draw = np.int64(state[S_NOISE_DRAW, lo])
+    load_light(
+        frames, before[run.first], share[run.first], lo, count, circuit, scratch.rows,
+        light[:count], rows[XA : XA + count],
+    )  # fmt: skip
+    m = np.int64(0)
+    for f in range(run.first, run.last):
+        length, steps = starts[f + 1] - starts[f], run.steps[f]
+        total = run.pieces * steps
+        load_light(
+            frames, before[f + 1], share[f + 1], lo, count, circuit, scratch.rows, light[:count],
+            rows[XB : XB + count],
+        )  # fmt: skip
+        if last[f + 1]:
+            load_light(
+                frames, before[f + 2], share[f + 2], lo, count, circuit, scratch.rows,
+                light[:count], rows[AHEAD : AHEAD + count],
+            )  # fmt: skip
+        _take_samples(count, begins and f == 0, last[f], last[f + 1], rows)
+        h, half = length / total, 0.5 / steps
+        first = run.first_step if f == run.first else 0
+        stop = run.last_step if f == run.last - 1 else total
+        for j in range(first, stop):
+            r = j % steps
+            if r == 0 or j == first:
+                _take_piece(n, j // steps, run.pieces, rows)
+            if r % BLOCK == 0:
+                signal.begin_block(n, r / steps, half, circuit, rows)
+                if run.gain.shape[0] > 0:
+                    signal.change_light(lo, count, run.gain, m, circuit, rows)
+                if run.drive.shape[0] > 0:
+                    signal.add_course(n, lo, count, run.drive, m, DRIVEN1, rows)
+            _make_step(
+                lo, count, n, m, h, (r + 1) / steps, half, draw, circuit, run, scratch.normals,
+                rows,
+            )  # fmt: skip
+            ta = starts[f] + length * (j / total)
+            draw += 1
+            if _screen_step(lo, count, n, m, ta + h, h, circuit, run, rows) > 0:
+                number, keys, times = _fire_step(
+                    lo, n, m, ta, h, 2.0 * half, t_base, circuit, run, injected, state, scratch,
+                    keys, times, number,
+                )  # fmt: skip
+            m += 1
+        _next_instant(n, rows)
+    _close(lo, count, draw, circuit, state, rows)
+    return number, keys, times
+
+
+@entry
+def run_dense(
+    claimed, most, frames, before, share, starts, begins, last, circuit, run, injected, t_base,
+    state, scratch, keys, times, places,
+):  # fmt: skip
+    """Advance strips that nobody else works on over a run.
+
+    The other arguments, and what is returned, are those of :func:`adv2e.kernel.exact.run_exact`.
+    """
+    number = np.int64(0)
+    for _ in range(most):
+        lo, hi = claim(claimed, state.shape[1])
+        if lo == hi:
+            break
+        for s in range(lo, hi, WIDTH):
+            count = min(WIDTH, hi - s)
+            number, keys, times = _strip(
+                s, count, frames, before, share, starts, begins, last, circuit, run, injected,
+                t_base, state, scratch, keys, times, number,
+            )  # fmt: skip
+    tell_where(keys, times, places)
+    return number

@@ -1,0 +1,315 @@
+"""Events of a strip over one step: all pixels are screened, those that may fire go one by one.
+
+Within the step the signal is the cubic through its values and slopes at both ends, and so is what
+the leak makes of the reference.  Thresholds are lines.  A pixel whose Bezier points stay within its
+thresholds cannot fire by its signal; the rest is as :mod:`adv2e.kernel.comparator` has it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.compiled import inlined, kernel
+from adv2e.effects.pixel.leak import next_leak_factor
+from adv2e.kernel.comparator import SIGNAL_EVENT, emit, injected_polarity, next_injected, use_up
+from adv2e.kernel.polynomial import TIE
+from adv2e.kernel.solve import light_of
+from adv2e.kernel.stepped.rows import (
+    DUE,
+    FROM,
+    HIT,
+    LEAK_ON,
+    LIGHT0,
+    LIGHT1,
+    LIGHTM,
+    MOVE,
+    NEVER,
+    OFF,
+    OFF_STEP,
+    ON,
+    ON_STEP,
+    REFERENCE,
+    SIGNAL0,
+    SIGNAL1,
+    SLOPE0,
+    SLOPE1,
+    X1,
+)
+from adv2e.kernel.workspace import (
+    EXACT,
+    S_BEYOND,
+    S_HOLD,
+    S_HOT_TIME,
+    S_LEAK_FACTOR,
+    S_OFF,
+    S_ON,
+    S_SHOT_TIME,
+)
+
+_THIRD = 1.0 / 3.0
+_SIXTH = 1.0 / 6.0
+_NEWTON = 50
+_NOWHERE = 2.0
+ADDED_EVENT = 3
+
+
+class Injected(NamedTuple):
+    """Events from outside, pixel by pixel: those of pixel i from next[i] to stop[i]."""
+
+    times: NDArray[np.float64]  # [us]
+    on: NDArray[np.bool_]
+    next: NDArray[np.int64]
+    stop: NDArray[np.int64]
+
+
+def injected_of(
+    times: NDArray[Any], pixel: NDArray[Any], on: NDArray[Any], pixels: int
+) -> Injected:
+    """Return events (n,) sorted by time, in us, as the kernel takes them."""
+    order = np.argsort(pixel, kind="stable")
+    ends = np.searchsorted(pixel[order], np.arange(pixels + 1)).astype(np.int64)
+    return Injected(
+        np.ascontiguousarray(times[order], np.float64),
+        np.ascontiguousarray(on[order], np.bool_),
+        ends[:-1].copy(),
+        ends[1:].copy(),
+    )
+
+
+@kernel
+def watch(k, i, circuit, injected, state, rows):
+    """Rows of the screen for pixel k of a strip, i of the state."""
+    hold = state[S_HOLD, i]
+    if hold >= 0.0:
+        on, off, due = NEVER, NEVER, hold
+    else:
+        on, off, due = state[S_ON, i], state[S_OFF, i], NEVER
+        if circuit.shot_rate > 0.0:
+            due = min(due, state[S_SHOT_TIME, i])
+        if circuit.hot_rate > 0.0:
+            due = min(due, state[S_HOT_TIME, i])
+        if injected.next.shape[0] > 0 and injected.next[i] < injected.stop[i]:
+            due = min(due, injected.times[injected.next[i]])
+    rows[ON + k] = on
+    rows[OFF + k] = off
+    rows[ON_STEP + k] = on
+    rows[OFF_STEP + k] = off
+    rows[DUE + k] = due
+    rows[FROM + k] = 0.0
+
+
+@kernel
+def step_thresholds(count, lo, course, m, row, step_row, rows):
+    """Least threshold of each pixel over the step that instant m of a course ends."""
+    before, after = course[m - 1, lo : lo + count], course[m, lo : lo + count]
+    for k in range(count):
+        least = before[k] if before[k] < after[k] else after[k]
+        rows[step_row + k] = rows[row + k] * least
+
+
+@kernel
+def screen(n, end, leak, photo, on, off, rows):
+    """Row HIT: who may fire before `end` [us]; REFERENCE: at the end of the step.
+
+    leak, photo: leak events over the step, constant part and a DN; on, off: factors on the rows of
+    thresholds.  Returns the number of those who may.
+    """
+    hits = np.int64(0)
+    for k in range(n):
+        weight = rows[LEAK_ON + k]
+        i0, im, i1 = rows[LIGHT0 + k], rows[LIGHTM + k], rows[LIGHT1 + k]
+        fall = weight * (leak + photo * ((i0 + 4.0 * im + i1) * _SIXTH))
+        reference = rows[REFERENCE + k]
+        d0, d3 = rows[SIGNAL0 + k] - reference, rows[SIGNAL1 + k] - reference + fall
+        d1 = d0 + (rows[SLOPE0 + k] + weight * (leak + photo * i0)) * _THIRD
+        d2 = d3 - (rows[SLOPE1 + k] + weight * (leak + photo * i1)) * _THIRD
+        high = d1 if d1 > d2 else d2
+        high = high if high > d3 else d3
+        low = d1 if d1 < d2 else d2
+        low = low if low < d3 else d3
+        hit = (high >= rows[ON_STEP + k] * on) | (-low >= rows[OFF_STEP + k] * off)
+        hit |= rows[DUE + k] < end
+        rows[REFERENCE + k] = reference - fall
+        rows[HIT + k] = 1.0 if hit else 0.0
+        hits += np.int64(hit)
+    return hits
+
+
+@kernel
+def gather(n, rows, pixels):
+    """Numbers of the pixels that may fire."""
+    m = np.int64(0)
+    for k in range(n):
+        pixels[m] = k
+        m += np.int64(rows[HIT + k] != 0.0)
+    return m
+
+
+@kernel
+def _cubic(v0, v1, slope0, slope1):
+    """Coefficients of the cubic through values and slopes at both ends of 0..1."""
+    rise = v1 - v0
+    return v0, slope0, 3.0 * rise - 2.0 * slope0 - slope1, slope0 + slope1 - 2.0 * rise
+
+
+@kernel
+def _at(p0, p1, p2, p3, s):
+    return p0 + s * (p1 + s * (p2 + s * p3))
+
+
+@kernel
+def _root(p0, p1, p2, p3, a, b):
+    """Where a cubic that rises through zero once in [a, b] does so: Newton, else halving."""
+    s = 0.5 * (a + b)
+    for _ in range(_NEWTON):
+        v = _at(p0, p1, p2, p3, s)
+        if v >= 0.0:
+            b = s
+        else:
+            a = s
+        slope = p1 + s * (2.0 * p2 + s * (3.0 * p3))
+        next_s = s - v / slope if slope != 0.0 else -1.0
+        if not a <= next_s <= b:
+            next_s = 0.5 * (a + b)
+        if abs(next_s - s) < 1e-13:
+            return next_s
+        s = next_s
+    return s
+
+
+@kernel
+def first_reach(p0, p1, p2, p3, start, end):
+    """Where a cubic is first at or above zero in [start, end]; beyond 1: nowhere."""
+    if _at(p0, p1, p2, p3, start) >= 0.0:
+        return start
+    first, second = end, end
+    inner = p2 * p2 - 3.0 * p1 * p3
+    if inner > 0.0:
+        q = -(p2 + math.copysign(math.sqrt(inner), p2))
+        r1 = q / (3.0 * p3) if p3 != 0.0 else end
+        r2 = p1 / q if q != 0.0 else end
+        first, second = min(r1, r2), max(r1, r2)
+    a = start
+    for j in range(3):
+        b = first if j == 0 else second if j == 1 else end
+        if a < b <= end:
+            if _at(p0, p1, p2, p3, b) >= 0.0:
+                return _root(p0, p1, p2, p3, a, b)
+            a = b
+    return _NOWHERE
+
+
+@inlined
+def _next_noise(i, now, t_end, circuit, injected, state):
+    """Kind and time of the next noise event of pixel i in [now, t_end); those before are lost."""
+    kind, t = next_injected(i, now, t_end, circuit, state)
+    if injected.next.shape[0] > 0:
+        while injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < now:
+            injected.next[i] += 1
+        if injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < t:
+            kind, t = ADDED_EVENT, injected.times[injected.next[i]]
+    return kind, t
+
+
+@inlined
+def _noise_polarity(i, kind, light, circuit, injected, state):
+    """Polarity of the present noise event of pixel i, 0 where it is none; goes on to the next."""
+    if kind == ADDED_EVENT:
+        polarity = 1 if injected.on[injected.next[i]] else -1
+        injected.next[i] += 1
+    else:
+        polarity = injected_polarity(i, kind, light, circuit, state)
+        use_up(i, kind, circuit, state)
+    return polarity
+
+
+@kernel
+def fire(
+    k, i, ta, h, levels, share, t_base, circuit, injected, state, rows, keys, times, n
+):  # fmt: skip
+    """Fire the events of pixel k of a strip, i of the state, in the step [ta, ta + h] us.
+
+    levels: factors on the ON threshold at both ends of the step, on OFF likewise; share: of its
+    piece that the step takes.  Returns the number of events so far, and whether there was room for
+    all; if not, the next call goes on.
+    """
+    on0, on1, off0, off1 = levels
+    tb = ta + h
+    s = rows[FROM + k]
+    on_level, off_level = state[S_ON, i], state[S_OFF, i]
+    jitter = circuit.leak_jitter > 0.0
+    factor = state[S_LEAK_FACTOR, i] if jitter else 1.0
+    c0, c1, c2, c3 = _cubic(
+        rows[SIGNAL0 + k], rows[SIGNAL1 + k], rows[SLOPE0 + k], rows[SLOPE1 + k]
+    )
+    i0, im, i1 = rows[LIGHT0 + k], rows[LIGHTM + k], rows[LIGHT1 + k]
+    leak, photo = on_level * circuit.leak * h, on_level * circuit.photo_leak * h
+    fallen = leak + photo * ((i0 + 4.0 * im + i1) * _SIXTH)
+    _, l1, l2, l3 = _cubic(0.0, fallen, leak + photo * i0, leak + photo * i1)
+    reference = rows[REFERENCE + k] + factor * fallen
+    if state[S_HOLD, i] >= 0.0:
+        s = max(s, (state[S_HOLD, i] - ta) / h)
+        reference = _at(c0, c1, c2, c3, s) + factor * _at(0.0, l1, l2, l3, s)
+        reference += state[S_BEYOND, i]
+        state[S_HOLD, i] = -1.0
+    whole = True
+    while True:
+        if n == keys.shape[0]:
+            whole = False
+            break
+        kind, t_end = _next_noise(i, ta + s * h, tb, circuit, injected, state)
+        s_end = 1.0 if kind == SIGNAL_EVENT else max(s, (t_end - ta) / h)
+        d0 = c0 - reference
+        d1, d2, d3 = c1 + factor * l1, c2 + factor * l2, c3 + factor * l3
+        up = first_reach(d0 - on_level * on0 - TIE, d1 - on_level * (on1 - on0), d2, d3, s, s_end)
+        down = first_reach(
+            -d0 - off_level * off0 - TIE, -d1 - off_level * (off1 - off0), -d2, -d3, s, s_end
+        )
+        s_event = min(up, down)
+        signal_event = s_event <= 1.0
+        polarity = 1 if up <= down else -1
+        if not signal_event:
+            if kind == SIGNAL_EVENT:
+                break
+            s_event = s_end
+            light = i0 + (i1 - i0) * s_end
+            if circuit.update == EXACT:
+                x = rows[X1 + k] - rows[MOVE + k] * share * (1.0 - s_end)
+                light = light_of(x, circuit)
+            polarity = _noise_polarity(i, kind, light, circuit, injected, state)
+            if polarity == 0:
+                s = s_end
+                continue
+        t = ta + s_event * h
+        n = emit(keys, times, n, t, t_base, i, 1 if polarity > 0 else 0)
+        before = factor
+        if jitter:
+            factor = next_leak_factor(i, circuit, state)
+        s = s_event
+        level = on_level if polarity > 0 else -off_level
+        beyond = circuit.overshoot * level
+        if circuit.dead_time > 0.0:
+            hold = t + circuit.dead_time
+            if hold >= tb:
+                state[S_HOLD, i] = hold
+                state[S_BEYOND, i] = beyond
+                break
+            s = (hold - ta) / h
+            reference = _at(c0, c1, c2, c3, s) + factor * _at(0.0, l1, l2, l3, s) + beyond
+        elif signal_event:
+            level *= on0 + (on1 - on0) * s if polarity > 0 else off0 + (off1 - off0) * s
+            reference += level * (1.0 + circuit.overshoot)
+            reference += (factor - before) * _at(0.0, l1, l2, l3, s)
+        else:
+            reference = _at(c0, c1, c2, c3, s) + factor * _at(0.0, l1, l2, l3, s) + beyond
+    rows[REFERENCE + k] = reference - factor * fallen
+    rows[LEAK_ON + k] = factor * on_level
+    if whole:
+        watch(k, i, circuit, injected, state, rows)
+    else:
+        rows[FROM + k] = s
+    return n, whole

@@ -1,0 +1,1 @@
+"""The pixel array: its state, what moves it, and its events in order."""

@@ -1,0 +1,264 @@
+"""The pixel array: state, thresholds and noise of every pixel, advanced from frame to frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from queue import SimpleQueue
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e import compiled as jit
+from adv2e.config.model import Pixel, Sampling
+from adv2e.effects.courses import Additions
+from adv2e.errors import DataError
+from adv2e.events import Events, empty_events
+from adv2e.kernel import packing as order
+from adv2e.kernel.event_buffer import Room
+from adv2e.kernel.exact import run_exact
+from adv2e.kernel.general import run_general
+from adv2e.kernel.quadrature import rules_for
+from adv2e.kernel.stepped.driver import run_dense
+from adv2e.kernel.tile import Frames, frames_of, scratch
+from adv2e.kernel.work_queue import nothing_claimed
+from adv2e.kernel.workspace import (
+    PIXEL_BITS,
+    STRIP,
+    pack_limit_us,
+)
+from adv2e.light.intervals import Part
+from adv2e.pixel.circuit import driver_of, make_circuit
+from adv2e.pixel.merge import Parted, in_order
+from adv2e.pixel.state import initial_state
+from adv2e.pixel.steps import PRECISE, Coarseness, Stepping
+from adv2e.process.cores import default_threads
+
+_LARGEST_SIDE = 1 << 16
+_TILE = 16 * STRIP
+"""Pixels of the largest tiles; their events are held twice for a moment."""
+
+
+def thread_count(threads: int | None) -> int:
+    """Return `threads`, or the number of cores this process may use."""
+    return default_threads() if threads is None else max(1, threads)
+
+
+def is_compiled(pixel: Pixel, sampling: Sampling, additions: Additions | None = None) -> bool:
+    """Tell whether the kernel that this pixel needs has been compiled before."""
+    circuit = make_circuit(pixel, sampling, 0)
+    return jit.is_cached(driver_of(pixel, circuit, additions, "auto"))
+
+
+class _Worker:
+    """Memory that one thread works with."""
+
+    def __init__(self, exact_times: bool) -> None:
+        self.scratch = scratch()
+        self.room = Room(exact_times)
+
+
+class PixelArray:
+    """All pixels of a camera.
+
+    Parameters
+    ----------
+    pixel, sampling
+        The configuration's sections.
+    seed : int
+    first : (rows, columns) float
+        Light of the first frame [DN].
+    t_ns : int
+        Its time.
+    threads : int, optional
+    tile : int, optional
+        Most pixels that one call of the kernel advances; the events do not depend on it.
+    exact_times : bool
+        Keep unrounded times (`last_times`), for tests.
+    additions : Additions, optional
+        What effects outside the kernel add to the pixels.
+    method : {"auto", "dense"}
+        How the circuit is solved: the fastest way that covers it, or in steps of time.
+    coarseness : Coarseness
+        Of those steps, where some us of precision may go for speed.
+
+    Raises
+    ------
+    DataError
+        More than 2^27 pixels, or more than 2^16 columns or rows.
+    """
+
+    def __init__(
+        self,
+        pixel: Pixel,
+        sampling: Sampling,
+        seed: int,
+        first: NDArray[Any],
+        t_ns: int,
+        *,
+        threads: int | None = None,
+        tile: int | None = None,
+        exact_times: bool = False,
+        additions: Additions | None = None,
+        method: str = "auto",
+        coarseness: Coarseness = PRECISE,
+    ) -> None:
+        self.rows, self.columns = first.shape
+        self.pixels = self.rows * self.columns
+        if max(self.rows, self.columns) > _LARGEST_SIDE:
+            raise DataError(
+                f"{self.columns}x{self.rows} pixels: events hold columns and rows below"
+                f" {_LARGEST_SIDE}"
+            )
+        if self.pixels >= 1 << PIXEL_BITS:
+            raise DataError(
+                f"{self.columns}x{self.rows} pixels: at most {1 << PIXEL_BITS} are supported"
+            )
+        self.origin_us = t_ns // 1000
+        self.circuit = make_circuit(pixel, sampling, seed)
+        self.threads = thread_count(threads)
+        self.started = False
+        self._driver = driver_of(pixel, self.circuit, additions, method)
+        start, dense = self._relative(t_ns), self._driver == "run_dense"
+        if dense:
+            self._stepping = Stepping(
+                self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
+                self.origin_us, start, coarseness,
+            )  # fmt: skip
+        stepping = self._stepping if dense else None
+        self.state = initial_state(pixel, self.circuit, first, start, stepping, self.threads)
+        strips = -(-self.pixels // STRIP)
+        self._most = -(-(tile or _TILE) // STRIP)
+        # full tiles, and one for each thread that finds the rest, or nothing
+        self._tiles = strips // self._most + self.threads
+        self._workers: SimpleQueue[_Worker] = SimpleQueue()
+        for _ in range(self.threads):
+            self._workers.put(_Worker(exact_times))
+        self.last_times = np.empty(0)
+
+    def _relative(self, t_ns: int) -> float:
+        return (t_ns - self.origin_us * 1000) * 1e-3
+
+    def advance(
+        self,
+        frames: NDArray[Any],
+        times_ns: list[int],
+        last: NDArray[np.bool_],
+        pool: ThreadPoolExecutor | None = None,
+    ) -> Events:
+        """Return the sorted events of the intervals between neighbouring frames.
+
+        Parameters
+        ----------
+        frames : (intervals + 1, rows, columns) float32 or float64
+            Light [DN], the first as at the end of the last call; with the printed last interval
+            one more, for the look-ahead.
+        times_ns : (intervals + 1)
+        last : (intervals + 1,) bool
+            See :func:`adv2e.kernel.exact.run_exact`.
+        pool : ThreadPoolExecutor, optional
+            Threads to work in; none: the calling one.
+        """
+        before = np.arange(-1, frames.shape[0] - 1)
+        part = Part(frames, before, np.ones(before.size, np.float32), times_ns, last)
+        return np.concatenate([empty_events(), *self.advance_part(part, None, pool)])
+
+    def advance_part(
+        self, part: Part, table: NDArray[np.float32] | None, pool: ThreadPoolExecutor | None
+    ) -> Iterator[Events]:
+        """Yield the sorted events of a part, not too many at a time.
+
+        Parameters
+        ----------
+        part : Part
+            Frames of light [DN], or of uint8 grey values.
+        table : (256,) float32, optional
+            Light of each grey value [DN].
+        pool : ThreadPoolExecutor, optional
+            Threads to work in; none: the calling one.
+        """
+        starts = np.array([self._relative(t) for t in part.times_ns])
+        span = starts[-1] - starts[0]
+        t_base = math.floor(starts[0]) - 1
+        if span >= pack_limit_us() // 2:
+            raise DataError(
+                f"{span / 1e6:.0f} s between frames: too long; are their times in another unit?"
+            )
+        frames = frames_of(part.frames, table)
+        per_us = order.SLICES / (span + 2.0)
+        advance = self._advance_dense if self._driver == "run_dense" else self._advance_whole
+        parted = advance(part, frames, starts, t_base, per_us, pool)
+        self.started = True
+        self._keep_times(parted)
+        yield from in_order(parted, self.columns, self.origin_us + t_base, pool)
+
+    def _advance_whole(
+        self,
+        part: Part,
+        frames: Frames,
+        starts: NDArray[Any],
+        t_base: int,
+        per_us: float,
+        pool: ThreadPoolExecutor | None,
+    ) -> list[Parted]:
+        """Return the events of all tiles, solved interval by interval."""
+        fastest = max(self.circuit.dark + 255.0 * self.circuit.per_dn, self.circuit.dark)
+        rules = rules_for(np.diff(starts), fastest, self.circuit.dead_time)
+        advance = run_exact if self._driver == "run_exact" else run_general
+
+        return self._by_tiles(
+            advance,
+            (
+                frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
+                rules, t_base, self.state,
+            ),
+            per_us,
+            pool,
+        )  # fmt: skip
+
+    def _advance_dense(
+        self,
+        part: Part,
+        frames: Frames,
+        starts: NDArray[Any],
+        t_base: int,
+        per_us: float,
+        pool: ThreadPoolExecutor | None,
+    ) -> list[Parted]:
+        """Return the events of all tiles, in steps of time."""
+        parted = []
+        for steps, injected in self._stepping.runs(part, frames, starts):
+            arguments = (
+                frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
+                steps, injected, t_base, self.state,
+            )  # fmt: skip
+            parted += self._by_tiles(run_dense, arguments, per_us, pool)
+        return parted
+
+    def _by_tiles(
+        self,
+        advance: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        per_us: float,
+        pool: ThreadPoolExecutor | None,
+    ) -> list[Parted]:
+        """Return the events of all tiles; `advance` is a driver, which finds its tile itself."""
+        claimed = nothing_claimed()
+
+        def run(_: int) -> Parted:
+            worker = self._workers.get()
+            try:
+                room = worker.room
+                n = advance(claimed, self._most, *arguments, worker.scratch, *room.lend())
+                return Parted(room.keys, room.times, n, per_us)
+            finally:
+                self._workers.put(worker)
+
+        return list((pool.map if pool else map)(run, range(self._tiles)))
+
+    def _keep_times(self, parted: list[Parted]) -> None:
+        times = np.concatenate([tile.times for tile in parted])
+        keys = np.concatenate([tile.raw for tile in parted])
+        self.last_times = times[np.argsort(keys, kind="stable")]

@@ -1,0 +1,71 @@
+"""From the configuration of the pixel to what the compiled code takes, and which code that is."""
+
+from __future__ import annotations
+
+import math
+
+from adv2e.config.model import Pixel, Sampling
+from adv2e.effects.courses import Additions
+from adv2e.effects.pixel.low_pass import UPDATES
+from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
+from adv2e.errors import UsageError
+from adv2e.kernel import rng
+from adv2e.kernel.exact import covers
+from adv2e.kernel.workspace import EXACT, Circuit
+
+_NO_KNEE = 1e300
+_PER_US = 1e-6
+
+METHODS = ("auto", "dense")
+"""How the circuit is solved: by the fastest way that covers it, or in steps of time."""
+
+
+def make_circuit(pixel: Pixel, sampling: Sampling, seed: int) -> Circuit:
+    """Return what the compiled code needs of the configuration; rates a us, corners in rad a us."""
+    low_pass, follower, leak = pixel.low_pass, pixel.source_follower, pixel.leak
+    knee_dn = pixel.log_response.linear_below
+    corner = 2.0 * math.pi * _PER_US
+    dark = low_pass.dark_cutoff_hz if low_pass else 0.0
+    white = low_pass.cutoff_hz if low_pass else 0.0
+    noise = pixel.photoreceptor_noise
+    return Circuit(
+        update=UPDATES.index(low_pass.update) if low_pass else 0,
+        steps=sampling.K,
+        printed=sampling.last_interval == "printed",
+        filtered=low_pass is not None,
+        dark=corner * dark,
+        per_dn=corner * (white - dark) / 255.0,
+        slew=pixel.slew_limit.per_s * _PER_US if pixel.slew_limit else 0.0,
+        follower=corner * follower.cutoff_hz if follower else 0.0,
+        knee=math.log(knee_dn) if knee_dn > 0 else -_NO_KNEE,
+        slope=knee_dn / math.log(knee_dn) if knee_dn > 0 else 0.0,
+        floor=pixel.log_response.floor,
+        dead_time=pixel.refractory.period_us if pixel.refractory else 0.0,
+        overshoot=pixel.reset_overshoot.fraction if pixel.reset_overshoot else 0.0,
+        leak=leak.rate_hz * _PER_US if leak else 0.0,
+        photo_leak=leak.photo_rate_hz * _PER_US / 255.0 if leak else 0.0,
+        leak_jitter=leak.jitter if leak else 0.0,
+        shot_rate=pixel.shot_noise.rate_hz * _PER_US if pixel.shot_noise else 0.0,
+        shot_fall=FALL_AT_WHITE / 255.0,
+        hot_rate=(
+            pixel.hot_pixels.rate_hz * _PER_US
+            if pixel.hot_pixels and pixel.hot_pixels.fraction > 0
+            else 0.0
+        ),
+        noise_rms=noise.rms if noise else 0.0,
+        noise_step=noise.step if noise else 0.1,
+        seed=rng.key_of(seed),
+    )
+
+
+def driver_of(pixel: Pixel, circuit: Circuit, additions: Additions | None, method: str) -> str:
+    """Return the name of the compiled function that advances these pixels."""
+    if method not in METHODS:
+        raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
+    drifts = pixel.thresholds.drift_per_s != 0
+    # what the other two know nothing of
+    new = circuit.slew > 0 or circuit.overshoot != 0 or drifts or circuit.noise_rms > 0
+    second = circuit.follower > 0 and (circuit.update == EXACT or not circuit.filtered)
+    if method == "dense" or additions is not None or new or second:
+        return "run_dense"
+    return "run_exact" if covers(circuit) else "run_general"

@@ -1,0 +1,99 @@
+"""Events of all tiles into order: slice of time by slice, in threads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.events import EVENT_DTYPE, Events
+from adv2e.kernel import packing as order
+
+_SORTED = 1 << 15
+"""Events that are sorted at a time."""
+
+_YIELDED = 1 << 20
+"""Events that are yielded at a time, or one slice of time's."""
+
+
+class Parted:
+    """Events of a tile, slice of time by slice.
+
+    Parameters
+    ----------
+    keys : (count or more,)
+        Packed events, in any order.
+    times : (0 or as many,)
+        Their unrounded times [us], where these are kept.
+    count : int
+    per_us : float
+        Slices a microsecond.
+    """
+
+    def __init__(
+        self, keys: NDArray[np.int64], times: NDArray[np.float64], count: int, per_us: float
+    ) -> None:
+        self.keys = np.empty(count, np.int64)
+        self.ends = np.empty(order.SLICES + 1, np.int64)
+        order.part_by_time(keys, count, per_us, self.ends, self.keys)
+        self.times = times[:count].copy()
+        # as they came, for the unrounded times that go with them
+        self.raw = keys[: self.times.size].copy()
+
+    def of(self, first: int, last: int) -> NDArray[np.int64]:
+        """Return the events of the slices first..last, the last one not counted."""
+        return self.keys[self.ends[first] : self.ends[last]]
+
+
+def in_order(
+    parted: Sequence[Parted], columns: int, t0_us: int, pool: ThreadPoolExecutor | None
+) -> Iterator[Events]:
+    """Yield the events of all tiles, sorted, not many more than a million at a time.
+
+    Parameters
+    ----------
+    parted : sequence of Parted
+    columns : int
+        Of the sensor.
+    t0_us : int
+        What packed times count from.
+    pool : ThreadPoolExecutor, optional
+        Threads to work in; none: the calling one.
+    """
+    ends = np.sum([tile.ends for tile in parted], axis=0)
+    first = 0
+    while first < order.SLICES:
+        last = first + 1
+        while last < order.SLICES and ends[last + 1] - ends[first] <= _YIELDED:
+            last += 1
+        yield _sorted_slices(parted, columns, t0_us, ends, first, last, pool)
+        first = last
+
+
+def _sorted_slices(
+    parted: Sequence[Parted],
+    columns: int,
+    t0_us: int,
+    ends: NDArray[np.int64],
+    first: int,
+    last: int,
+    pool: ThreadPoolExecutor | None,
+) -> Events:
+    """Return the sorted events of the slices first..last."""
+    begin = ends[first]
+    events = np.empty(int(ends[last] - begin), EVENT_DTYPE)
+    # as many slices at a time as sort in cache
+    borders = [first]
+    for s in range(first + 1, last + 1):
+        if s == last or ends[s + 1] - ends[borders[-1]] > _SORTED:
+            borders.append(s)
+
+    def sort(lo: int, hi: int) -> None:
+        keys = np.concatenate([tile.of(lo, hi) for tile in parted])
+        keys.sort()
+        order.unpack(keys, columns, t0_us, events[ends[lo] - begin : ends[hi] - begin])
+
+    list((pool.map if pool else map)(sort, borders[:-1], borders[1:]))
+    return events

@@ -1,0 +1,137 @@
+"""The state of all pixels before the first frame: thresholds, references, first noise events."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config.model import Pixel
+from adv2e.effects.pixel.hot_pixels import fill_first_hot_times
+from adv2e.effects.pixel.initial_reference import RANDOM, RUNNING, fill_random_reference
+from adv2e.effects.pixel.leak import fill_first_factors, fill_running
+from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
+from adv2e.effects.pixel.shot_noise import fill_first_candidates
+from adv2e.effects.pixel.thresholds import fill_levels
+from adv2e.kernel import general_screens as stepped
+from adv2e.kernel.workspace import (
+    S_BEYOND,
+    S_FIRST,
+    S_HOLD,
+    S_HOT_DRAW,
+    S_HOT_TIME,
+    S_LAG2,
+    S_LEAK_DRAW,
+    S_LEAK_FACTOR,
+    S_NOISE,
+    S_NOISE_DRAW,
+    S_OFF,
+    S_ON,
+    S_REFERENCE,
+    S_SECOND,
+    S_SHOT_DRAW,
+    S_SHOT_TIME,
+    S_X,
+    Circuit,
+)
+from adv2e.pixel.steps import Stepping
+
+
+def initial_state(
+    pixel: Pixel,
+    circuit: Circuit,
+    first: NDArray[Any],
+    start: float,
+    stepping: Stepping | None,
+    threads: int,
+) -> NDArray[np.float64]:
+    """Return the state of all pixels before the first frame, (rows of the state, pixels).
+
+    Parameters
+    ----------
+    pixel : Pixel
+        The configuration's section.
+    circuit : Circuit
+        What it makes.
+    first : (rows, columns)
+        Light of the first frame [DN].
+    start : float
+        Its time [us].
+    stepping : Stepping, optional
+        Of a circuit that is solved in steps of time.
+    threads : int
+    """
+    fill = partial(_over_pixels, threads, first.size)
+    seed = circuit.seed
+    used = {
+        S_SHOT_DRAW: circuit.shot_rate > 0,
+        S_HOT_DRAW: circuit.hot_rate > 0,
+        S_LAG2: circuit.follower > 0,
+        S_LEAK_DRAW: circuit.leak_jitter > 0,
+        S_NOISE_DRAW: circuit.noise_rms > 0,
+    }
+    if stepping is not None:
+        used[S_BEYOND] = True
+    rows = 1 + max([S_OFF, *(row for row, on in used.items() if on)])
+    state = np.zeros((rows, first.size))
+    light = np.empty(first.size)
+    stepped.load_strip(np.ascontiguousarray(first).reshape(-1), circuit, light, state[S_X])
+    levels = pixel.thresholds
+    on, off = state[S_ON], state[S_OFF]
+    means, spare = (levels.on, levels.off), state[S_REFERENCE]
+    fill(fill_levels, seed, *means, levels.mismatch, on, off, spare)
+    state[S_REFERENCE] = state[S_X]
+    state[S_HOLD] = -1.0
+    if pixel.initial_reference == RANDOM:
+        fill_random_reference(seed, on, off, state[S_X], state[S_REFERENCE])
+    if circuit.shot_rate > 0:
+        times = state[S_SHOT_TIME]
+        draws = state[S_SHOT_DRAW]
+        fill(fill_first_candidates, seed, circuit.shot_rate, start, times, draws)
+    if pixel.hot_pixels and circuit.hot_rate > 0:
+        share, times = pixel.hot_pixels.fraction, state[S_HOT_TIME]
+        fill_first_hot_times(seed, share, circuit.hot_rate, start, times)
+    if circuit.noise_rms > 0:
+        fill_first_noise(seed, circuit.noise_rms, state[S_NOISE])
+    if stepping is not None:
+        _rest_poles(state, circuit, stepping)
+    leaks = circuit.leak > 0 or circuit.photo_leak > 0
+    if leaks and pixel.initial_reference == RUNNING:
+        level = np.ones(first.size)
+        if stepping is not None:
+            light, level = stepping.first_light(light), level * stepping.first_level()
+        fill(fill_running, circuit, start, light, level, state)
+    elif circuit.leak_jitter > 0:
+        fill_first_factors(seed, circuit.leak_jitter, state[S_LEAK_FACTOR])
+    return state
+
+
+def _rest_poles(state: NDArray[np.float64], circuit: Circuit, stepping: Stepping) -> None:
+    """Fill the rows of a state that only steps of time have; all poles are at rest."""
+    driven = stepping.first_driven(state[S_X])
+    state[S_FIRST] = driven
+    state[S_SECOND] = driven
+    state[S_REFERENCE] += driven - state[S_X] + stepping.first_signal()
+    if circuit.noise_rms > 0:
+        # the noise was there before the first frame: a second pole without it, and references
+        # in the middle of its course, would take seconds to forget that
+        state[S_SECOND] += state[S_NOISE]
+        state[S_REFERENCE] += state[S_NOISE]
+
+
+def _over_pixels(threads: int, pixels: int, fill: Callable[..., None], *arguments: Any) -> None:
+    """Call `fill` for ranges of pixels, in threads: drawing for all of them takes its time."""
+    if threads == 1:
+        fill(0, pixels, *arguments)
+        return
+    borders = np.linspace(0, pixels, threads + 1).astype(int).tolist()
+    with ThreadPoolExecutor(threads) as pool:
+        for done in [
+            pool.submit(fill, lo, hi, *arguments) for lo, hi in itertools.pairwise(borders)
+        ]:
+            done.result()

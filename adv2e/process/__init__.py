@@ -1,0 +1,1 @@
+"""What belongs to the command as a process: signals, standard streams, memory."""

@@ -1,0 +1,159 @@
+"""Axes: from values to places in a picture, and how they are drawn."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.reports.charts.ticks import linear_ticks, log_ticks, tick_labels
+from adv2e.reports.markup import Markup, join, tag
+
+Floats = NDArray[np.float64]
+
+_LARGEST = 1e250
+"""Larger numbers are not drawn, and smaller ones than its inverse are zero: sums stay finite."""
+LINE_HEIGHT = 14
+"""Distance of lines of text in a picture."""
+_CHARACTER = 5.9
+"""Mean width of a character of the labels."""
+
+
+def drawable(values: Floats) -> Floats:
+    """Return `values` as floats, those that cannot be drawn as NaN."""
+    values = np.asarray(values, dtype=np.float64)
+    sizes = np.abs(values)
+    kept = np.where(sizes < 1 / _LARGEST, 0.0, values)
+    return np.where(sizes <= _LARGEST, kept, np.nan)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis from `low` to `high`, which lie at `start` and `end` in the picture."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+    log: bool = False
+
+    def place(self, values: Floats) -> Floats:
+        """Return where `values` lie; NaN for NaN and for what a logarithm does not have."""
+        low, high = (self._scaled(np.float64(end)) for end in (self.low, self.high))
+        share = (self._scaled(values) - low) / (high - low)
+        places: Floats = self.start + share * (self.end - self.start)
+        return places
+
+    def at(self, value: float) -> float:
+        """Return where one value lies."""
+        return float(self.place(np.asarray(value, dtype=np.float64)))
+
+    def ticks(self) -> list[tuple[float, str]]:
+        """Return places in the picture and labels."""
+        ticks = log_ticks(self.low, self.high) if self.log else linear_ticks(self.low, self.high)
+        return [
+            (self.at(tick), label)
+            for tick, label in zip(ticks, tick_labels(ticks, self.log), strict=True)
+        ]
+
+    def _scaled(self, values: Floats | np.float64) -> Floats:
+        if not self.log:
+            return np.asarray(values, dtype=np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logarithm = np.log10(values)
+        return np.where(np.isfinite(logarithm), logarithm, np.nan)
+
+
+def axis_over(
+    values: Iterable[Floats], start: float, end: float, *, log: bool, tight: bool = False
+) -> Axis | None:
+    """Return an axis that shows all `values`, or None if there is nothing to show.
+
+    Parameters
+    ----------
+    values : iterable of arrays
+        As :func:`drawable` returns them.
+    start, end : float
+        Where its ends lie in the picture.
+    log : bool
+        Logarithmic; values that are not positive are then not shown.
+    tight : bool
+        No room beyond the values, nor down to a zero near them.
+    """
+    shown = np.concatenate([np.ravel(part) for part in values] or [np.empty(0)])
+    shown = shown[np.isfinite(shown) & ((shown > 0) | (not log))]
+    if not len(shown):
+        return None
+    low, high = float(shown.min()), float(shown.max())
+    if log:
+        return _log_axis(low, high, start, end, tight)
+    if not tight and 0 < low <= 0.3 * high:
+        low = 0.0
+    room = 0.0 if tight else 0.05 * (high - low)
+    size = max(abs(low), abs(high))
+    if high - low <= 1e-6 * size:  # neighbouring numbers are no axis
+        room = 0.5 * size or 0.5
+    return Axis(low if low == 0 < high else low - room, high + room, start, end)
+
+
+def _log_axis(low: float, high: float, start: float, end: float, tight: bool) -> Axis:
+    decades = math.log10(high) - math.log10(low)
+    if decades < 1e-3:
+        return Axis(low / 2, high * 2, start, end, log=True)
+    room = 1.0 if tight else 10.0 ** (0.05 * decades)
+    return Axis(low / room, high * room, start, end, log=True)
+
+
+def wrapped(text: str, width: float) -> list[str]:
+    """Return `text` in lines of about `width`."""
+    return textwrap.wrap(text, max(8, int(width / _CHARACTER))) or [""]
+
+
+def place_text(x: float, y: float, content: str, **attributes: object) -> Markup:
+    """Return `content` with its base line at (x, y)."""
+    return tag("text", content, x=f"{x:.1f}", y=f"{y:.1f}", **attributes)
+
+
+def rule(x0: float, y0: float, x1: float, y1: float, class_: str) -> Markup:
+    """Return a straight line."""
+    return tag(
+        "line", x1=f"{x0:.1f}", y1=f"{y0:.1f}", x2=f"{x1:.1f}", y2=f"{y1:.1f}", class_=class_
+    )
+
+
+def draw_axes(across: Axis, up: Axis, x_label: list[str], y_label: list[str]) -> Markup:
+    """Return grid, ticks and labels; `up` starts at the bottom of the picture.
+
+    The label of the vertical axis stands above it, where it can be read without turning the head.
+    """
+    left, right, bottom, top = across.start, across.end, up.start, up.end
+    parts = []
+    for y, label in up.ticks():
+        parts.append(rule(left, y, right, y, "grid"))
+        parts.append(place_text(left - 6, y + 4, label, text_anchor="end"))
+    for x, label in _apart(across.ticks()):
+        parts.append(rule(x, bottom, x, bottom + 4, "axis"))
+        parts.append(place_text(x, bottom + 17, label, text_anchor="middle"))
+    parts.append(rule(left, bottom, right, bottom, "axis"))
+    for number, line in enumerate(x_label):
+        y = bottom + 34 + number * LINE_HEIGHT
+        parts.append(place_text((left + right) / 2, y, line, text_anchor="middle", class_="label"))
+    for number, line in enumerate(reversed(y_label)):
+        parts.append(place_text(4, top - 10 - number * LINE_HEIGHT, line, class_="label"))
+    return join(*parts)
+
+
+def _apart(ticks: list[tuple[float, str]]) -> list[tuple[float, str]]:
+    """Return those ticks whose labels do not touch the ones before."""
+    kept: list[tuple[float, str]] = []
+    free = -math.inf
+    for x, label in ticks:
+        half = len(label) * _CHARACTER / 2
+        if x - half >= free:
+            kept.append((x, label))
+            free = x + half + 6
+    return kept

@@ -1,0 +1,151 @@
+"""A curve of the recording with the two models around it, as a picture (SVG)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from adv2e.reports.charts import paths
+from adv2e.reports.charts.axes import (
+    LINE_HEIGHT,
+    Axis,
+    Floats,
+    axis_over,
+    draw_axes,
+    drawable,
+    place_text,
+    wrapped,
+)
+from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.result import Band, Curve
+from adv2e.reports.wording import Wording
+
+WIDTH, _PLOT_HEIGHT = 460, 200
+_LEFT, _RIGHT, _LEGEND = 58, 14, 22
+_FEW_POINTS, _MANY_POINTS = 40, 250
+"""Up to the one number, points of a line are marked; from the other on, the line is thin."""
+
+_LEGENDS = (
+    ("measured", "measured", 4),
+    ("before", "before (declared model)", 104),
+    ("after", "after (model found)", 290),
+)
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The axes and the places of the points across."""
+
+    across: Axis
+    up: Axis
+    x: Floats
+
+    def line(self, values: Floats) -> str:
+        """Return the path of a curve."""
+        xs, ys = paths.points_of(self.x, self.up.place(values))
+        return paths.line(xs, ys)
+
+    def band(self, band: Band) -> str:
+        """Return the path around a band; ends beyond every number are at the picture's border."""
+        low = np.where(np.isneginf(band.low), self.up.low, drawable(band.low))
+        high = np.where(np.isposinf(band.high), self.up.high, drawable(band.high))
+        if self.up.log:
+            low = np.where(low <= 0, self.up.low, low)
+        xs, lows = paths.points_of(self.x, self.up.place(low))
+        _, highs = paths.points_of(self.x, self.up.place(high))
+        return paths.band(xs, lows, highs)
+
+
+def curves(given: Sequence[Curve], wording: Wording) -> Markup:
+    """Return the curves, side by side where there is room, and what their bands are."""
+    if not given:
+        return Markup()
+    figures = [tag("figure", tag("figcaption", curve.title), curve_chart(curve)) for curve in given]
+    note = tag("p", f"Bands: {wording.bands}.", class_="note")
+    return join(tag("div", *figures, class_="side"), note)
+
+
+def curve_chart(curve: Curve) -> Markup:
+    """Return the picture of `curve`: measured, and median and 95 % band of either model.
+
+    Borders of bins are drawn as steps; values at the same place are points without a line.  What
+    cannot be drawn (no number, or none that the logarithm has) leaves a gap.
+    """
+    x_label = wrapped(curve.x_label, WIDTH - _LEFT)
+    y_label = wrapped(curve.y_label, WIDTH)
+    top = _LEGEND + 14 + len(y_label) * LINE_HEIGHT
+    bottom = top + _PLOT_HEIGHT
+    frame = _frame_of(curve, top, bottom)
+    if frame is None:
+        return tag("p", "There is nothing to draw: no value is known.", class_="note")
+    measured = drawable(curve.measured)
+    joined = bool((np.diff(curve.x) > 0).all())
+    dots = len(frame.x) == len(measured) and (len(measured) <= _FEW_POINTS or not joined)
+    content = [
+        tag("title", _description(curve)),
+        _legend(joined, dots),
+        draw_axes(frame.across, frame.up, x_label, y_label),
+    ]
+    for name, band in (("before", curve.before), ("after", curve.after)):
+        content.append(tag("path", d=frame.band(band), class_=f"band {name}"))
+    if joined:
+        width = " dense" if len(measured) > _MANY_POINTS else ""
+        content.append(tag("path", d=frame.line(measured), class_=f"curve measured{width}"))
+    if dots:
+        ys = frame.up.place(measured)
+        content += [_dot(x, y, joined) for x, y in zip(frame.x, ys, strict=True)]
+    for name, band in (("after", curve.after), ("before", curve.before)):
+        content.append(tag("path", d=frame.line(drawable(band.middle)), class_=f"curve {name}"))
+    height = bottom + 26 + len(x_label) * LINE_HEIGHT
+    return tag("svg", *content, viewBox=f"0 0 {WIDTH} {height}", role="img")
+
+
+def _description(curve: Curve) -> str:
+    """Return what the picture shows, for those who do not see it."""
+    known = np.isfinite(curve.measured)
+    inside = [
+        int(np.sum(known & (curve.measured >= band.low) & (curve.measured <= band.high)))
+        for band in (curve.before, curve.after)
+    ]
+    return (
+        f"{curve.title}: {curve.y_label} against {curve.x_label}. Of {known.sum()} measured values"
+        f" {inside[0]} lie in the band of the declared model, {inside[1]} in that of the model"
+        " found."
+    )
+
+
+def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
+    x = drawable(curve.x)
+    if curve.x_log and len(x) > len(curve.measured) and len(x) > 2 and x[0] <= 0 < x[1]:
+        # bins that begin at zero: the first is drawn as wide as the second
+        x = np.r_[x[1] ** 2 / x[2], x[1:]]
+    rows = [curve.measured]
+    for band in (curve.before, curve.after):
+        rows += [band.middle, band.low, band.high]
+    across = axis_over([x], _LEFT, WIDTH - _RIGHT, log=curve.x_log, tight=True)
+    up = axis_over([drawable(row) for row in rows], bottom, top, log=curve.y_log)
+    if across is None or up is None:
+        return None
+    return _Frame(across, up, across.place(x))
+
+
+def _dot(x: float, y: float, joined: bool) -> Markup:
+    if not (np.isfinite(x) and np.isfinite(y)):
+        return Markup()
+    r = 2.5 if joined else 3.5
+    return tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=r, class_="dot measured")
+
+
+def _legend(joined: bool, dots: bool) -> Markup:
+    parts = []
+    for name, text, x in _LEGENDS:
+        if name != "measured":
+            parts.append(tag("rect", x=x, y=4, width=22, height=12, class_=f"band {name}"))
+        elif dots:
+            parts.append(_dot(x + 11, 10, joined))
+        if joined or name != "measured":
+            parts.append(tag("path", d=f"M{x} 10L{x + 22} 10", class_=f"curve {name}"))
+        parts.append(place_text(x + 27, 14, text, class_="label"))
+    return join(*parts)

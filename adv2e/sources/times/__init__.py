@@ -1,0 +1,1 @@
+"""When frames are taken: lists, names, rates, units and gaps."""

@@ -1,0 +1,1 @@
+"""Video files: pictures, times and what the file states of its light."""

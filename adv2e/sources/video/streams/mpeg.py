@@ -1,0 +1,108 @@
+"""MPEG-2 and MPEG-4 part 2: the headers before pictures.
+
+References
+----------
+.. [1] ITU-T H.262 (02/2012): 6.2.2.3 (sequence extension), 6.2.2.4 (sequence display extension),
+   6.2.3.1 (picture coding extension).
+.. [2] ISO/IEC 14496-2:2004: 6.2.2 (visual object), 6.2.3 (video object layer).
+"""
+
+from __future__ import annotations
+
+from adv2e.sources.video.colours import Colours
+from adv2e.sources.video.streams.base import Findings
+from adv2e.sources.video.streams.bits import Bits
+from adv2e.sources.video.streams.h264 import units
+
+_SLICES, _EXTENSION = range(0x01, 0xB0), 0xB5
+_SEQUENCE, _DISPLAY, _CODING = 1, 2, 8
+_WHOLE_FRAME = 3
+
+_LAYERS, _VISUAL_OBJECT, _PICTURE = range(0x20, 0x30), 0xB5, 0xB6
+_ANY_ASPECT = 15
+
+
+class Mpeg2:
+    """Parser of MPEG-2."""
+
+    def __init__(self) -> None:
+        self._progressive = True
+
+    def header(self, data: bytes, findings: Findings) -> None:
+        """Read what MP4 and Matroska keep apart."""
+        self.picture(data, findings)
+
+    def picture(self, data: bytes, findings: Findings) -> None:
+        """Read extensions up to the first slice of each picture."""
+        for unit in units(data):
+            if unit[0] in _SLICES:
+                return
+            if unit[0] != _EXTENSION:
+                continue
+            bits = Bits(unit[1:])
+            kind = bits.take(4)
+            if kind == _SEQUENCE:
+                bits.skip(8)
+                self._progressive = bits.flag()
+            elif kind == _DISPLAY:
+                bits.skip(3)
+                if bits.flag():
+                    findings.state(Colours(bits.take(8), bits.take(8), bits.take(8)))
+            elif kind == _CODING and not self._progressive:
+                bits.skip(18)
+                structure = bits.take(2)
+                bits.skip(8)
+                findings.interlaced |= structure != _WHOLE_FRAME or not bits.flag()
+
+
+class Mpeg4:
+    """Parser of MPEG-4 part 2."""
+
+    def header(self, data: bytes, findings: Findings) -> None:
+        """Read what stands before all pictures."""
+        self.picture(data, findings)
+
+    def picture(self, data: bytes, findings: Findings) -> None:
+        """Read headers up to the picture."""
+        for unit in units(data):
+            if unit[0] == _PICTURE:
+                return
+            if unit[0] == _VISUAL_OBJECT:
+                _read_object(Bits(unit[1:]), findings)
+            elif unit[0] in _LAYERS:
+                _read_layer(Bits(unit[1:]), findings)
+
+
+def _read_object(bits: Bits, findings: Findings) -> None:
+    if bits.flag():
+        bits.skip(7)
+    if bits.take(4) != 1 or not bits.flag():
+        return
+    bits.skip(4)
+    if bits.flag():
+        findings.state(Colours(bits.take(8), bits.take(8), bits.take(8)))
+
+
+def _read_layer(bits: Bits, findings: Findings) -> None:
+    bits.skip(9)
+    version = 1
+    if bits.flag():
+        version = bits.take(4)
+        bits.skip(3)
+    if bits.take(4) == _ANY_ASPECT:
+        bits.skip(16)
+    if bits.flag():
+        bits.skip(3)
+        if bits.flag():
+            bits.skip(79)
+    shape = bits.take(2)
+    if shape == 3 and version != 1:
+        bits.skip(4)
+    bits.skip(1)
+    ticks = bits.take(16)
+    bits.skip(1)
+    if bits.flag():
+        bits.skip(max((ticks - 1).bit_length(), 1))
+    if shape == 0:
+        bits.skip(29)
+    findings.interlaced |= bits.flag()

@@ -1,0 +1,241 @@
+"""When the pictures of a video are shown.
+
+Containers differ in what they say.  MP4, Matroska, MPEG-TS and others state when each picture is
+shown.  AVI knows nothing but a rate, and when pictures are decoded; ASF and MXF state times of
+decoding; MPEG-PS states a time for some pictures.  FFmpeg passes on what there is, and has nothing
+for the last pictures of those, as they leave the decoder after its last packet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from itertools import pairwise
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.sources.times.instants import NS_PER_S, FrameRate, constant_rate, rates_near, seconds
+from adv2e.sources.video.completeness import lost_by_count, lost_by_time
+from adv2e.sources.video.containers import Container
+from adv2e.sources.video.packets import Packets
+
+Clock = Callable[[int, int | None], int]
+"""Time [ns] of a frame, from its number and its own stamp since the first [ns], if it has one.
+
+It is asked for all frames in their order, once.
+"""
+
+_MOVED = 4.5
+"""Intervals by which FFmpeg's guesses are off where times are those of decoding."""
+_ROUNDED = 0.02
+"""Intervals by which times are off that FFmpeg fills in, in whole ticks."""
+_CLEAR_SHARE = 0.5
+"""Share of the pictures whose times are known from which on their mean tells the rate."""
+
+
+class VideoTimes:
+    """What is known of the times of a video's pictures, before any is decoded.
+
+    Parameters
+    ----------
+    container : Container
+        What the headers say.
+    packets : Packets or None
+        The coded pictures, where the headers do not list them.
+    fps : float
+        Rate that FFmpeg found [Hz]; 0 if it found none.
+
+    Attributes
+    ----------
+    shown_ns : list of int
+        When the pictures are shown as far as that is known, sorted [ns].
+    expected : int or None
+        How many pictures there are; None where nothing tells.
+    exact : bool
+        An index says so.
+    rate : FrameRate or None
+        The rate at which all pictures are, where there is one.
+    back : Jump or None
+        Where times begin again, as in files that were joined.
+    doubts : list of str
+        What is guessed, and what may be wrong.
+    """
+
+    def __init__(self, container: Container, packets: Packets | None, fps: float) -> None:
+        self._container, self._packets = container, packets
+        self._snaps_within_ns = container.tick_ns
+        self.rate: FrameRate | None = None
+        self.doubts: list[str] = []
+        self._grid: Fraction | None = None
+        if packets is None:
+            self.shown_ns = sorted(set(container.stamps_ns or []))
+            if container.rate is not None:
+                self.rate = FrameRate(container.rate)
+            elif container.tick_ns:
+                self.rate = _behind(container.stamps_ns or [], container.tick_ns, fps)
+        else:
+            self.shown_ns = packets.known_ns
+            if container.decoding_times or packets.unstamped:
+                self._grid = container.rate
+                self._find_rate(container, packets, fps)
+        steps = [after - before for before, after in pairwise(self.shown_ns)]
+        nominal = round(NS_PER_S / fps) if fps > 0 else NS_PER_S
+        self.usual_ns = round(median(steps)) if steps else nominal
+        if self.rate is not None:
+            self.usual_ns = self.rate.time_ns(1)
+        elif packets is not None and not (container.pictures or container.whole or packets.back):
+            self._look_for_holes(packets, container.tick_ns or 1000)
+        self._compare_end(container.end_ns)
+        counted = len(self.shown_ns) if packets is None else packets.count
+        self.back = None if packets is None else packets.back
+        self.exact = packets is None or container.pictures == counted
+        self.expected = max(counted, container.pictures or 0) or None
+
+    def _find_rate(self, container: Container, packets: Packets, fps: float) -> None:
+        known, count = packets.known_ns, packets.count
+        tick_ns = container.tick_ns or 1000
+        missing = count - len(known)
+        hz = None if packets.back else _standing(known, count, container.rate, fps, tick_ns)
+        hz = None if packets.tiny else hz
+        if hz is not None:
+            self.rate, self._snaps_within_ns = FrameRate(hz), round(_MOVED * NS_PER_S / hz)
+        if missing > 0:
+            rest = "the others follow"
+            if hz is not None:
+                rest = f"taken at {float(hz):.6g} frames a second"
+            told = f"it states times for {len(known)} of its {count} frames: {rest}"
+            self.doubts.append(told)
+
+    def _look_for_holes(self, packets: Packets, tick_ns: int) -> None:
+        """Doubt times that leave some of those at a constant rate out."""
+        steps = np.diff(np.array(self.shown_ns, dtype=np.float64))
+        if steps.size < 2:
+            return
+        usual = steps[np.abs(steps - np.median(steps)) <= max(0.1 * np.median(steps), tick_ns)]
+        if not usual.size:
+            return
+        hz = NS_PER_S / float(usual.mean())
+        for rate in [*map(float, rates_near(hz)), hz]:
+            numbers = _numbers(self.shown_ns, rate, tick_ns)
+            missing = 0 if numbers is None else int(numbers[-1]) + 1 - packets.count
+            if 0 < missing <= packets.count:  # more are a gap
+                self.doubts.append(
+                    f"at {rate:.6g} frames a second {missing} are missing among its"
+                    f" {packets.count}: left out when it was recorded, or damaged"
+                )
+                return
+
+    def _compare_end(self, end_ns: int | None) -> None:
+        if end_ns is None or not self.shown_ns:
+            return
+        last_ns = self.shown_ns[-1] - self.shown_ns[0]
+        moved = _MOVED if self._container.rate is None else 1.5
+        if last_ns + moved * self.usual_ns < end_ns:
+            self.doubts.append(
+                f"it states a length of {seconds(end_ns)} s, and its last picture is at"
+                f" {seconds(last_ns)} s: cut short or damaged"
+            )
+
+    @property
+    def zero_means_none(self) -> bool:
+        """Whether a frame beyond the first whose stamp is zero has none."""
+        return self._packets is not None
+
+    def lost(self, stamps_ns: Sequence[int | None]) -> int:
+        """Return how many pictures are missing, from the stamps of those that came [ns].
+
+        Stamps are as FFmpeg counts them, not from the first that came.
+        """
+        container, packets = self._container, self._packets
+        if self.expected is None:
+            return 0
+        if packets is None or (packets.complete and not container.decoding_times):
+            known = [stamp for stamp in stamps_ns if stamp is not None]
+            leading = container.leading if packets is None else packets.leading
+            lost = len(lost_by_time(self.shown_ns, known, container.tick_ns, leading))
+            lost += self.expected - (len(self.shown_ns) if packets is None else packets.count)
+        else:
+            lost = lost_by_count(self.expected, stamps_ns, packets.known_ns)
+        tiny = container.tiny if packets is None else packets.tiny
+        return max(lost - tiny, 0)
+
+    def clock(self, *, in_order: bool = True) -> Clock:
+        """Return a clock for one pass over the frames.
+
+        Parameters
+        ----------
+        in_order : bool
+            Where times are those of decoding, stamps are brought into the order of showing, as
+            OpenCV does.
+        """
+        previous = -self.usual_ns
+        packets = self._packets
+        listed = not in_order and self._container.decoding_times
+        listed &= packets is not None and packets.complete
+
+        def time_ns(number: int, own_ns: int | None) -> int:
+            nonlocal previous
+            if self.rate is not None:
+                previous = self._at_rate(self.rate, number, own_ns if in_order else None)
+            elif listed and number < len(self.shown_ns):
+                previous = self.shown_ns[number] - self.shown_ns[0]
+            elif own_ns is not None:
+                previous = own_ns if self._grid is None else _snapped(own_ns, self._grid)
+            else:
+                previous += self.usual_ns
+            return previous
+
+        return time_ns
+
+    def _at_rate(self, rate: FrameRate, number: int, own_ns: int | None) -> int:
+        at_number = rate.time_ns(number)
+        if own_ns is None or abs(at_number - own_ns) <= self._snaps_within_ns:
+            return at_number
+        # frames that could not be shown are missing before this one
+        return _snapped(own_ns, rate.hz)
+
+
+def _snapped(own_ns: int, hz: Fraction) -> int:
+    return FrameRate(hz).time_ns(round(own_ns * hz / NS_PER_S))
+
+
+def _behind(stamps_ns: Sequence[int], tick_ns: int, fps: float) -> FrameRate | None:
+    """Return the rate behind stamps of a coarse clock."""
+    # VP8 has blocks that are never shown, at the time of the block after them
+    for times_ns in (stamps_ns, sorted(set(stamps_ns))):
+        rate = constant_rate(times_ns, stated_hz=fps, tolerance_ns=tick_ns)
+        if rate is not None:
+            return rate
+    return None
+
+
+def _standing(
+    known_ns: Sequence[int], count: int, stated: Fraction | None, fps: float, tick_ns: int
+) -> Fraction | None:
+    """Return the rate at which `count` pictures are if some of them are at the times known."""
+    if not known_ns or count < 2:
+        return None
+    span_ns = known_ns[-1] - known_ns[0]
+    clear = len(known_ns) > _CLEAR_SHARE * count
+    tried = [stated] if stated is not None else []
+    for about in (fps, (len(known_ns) - 1) * NS_PER_S / span_ns if clear and span_ns else 0):
+        tried += rates_near(about)
+    if clear and fps > 0:
+        tried.append(Fraction(fps).limit_denominator(1001))
+    for hz in tried:
+        numbers = _numbers(known_ns, float(hz), tick_ns)
+        if numbers is not None and numbers[-1] < count:
+            return hz
+    return None
+
+
+def _numbers(times_ns: Sequence[int], hz: float, tick_ns: int) -> NDArray[np.float64] | None:
+    """Return which pictures at a rate are at these times; None if some are at none."""
+    since_first = np.array(times_ns, dtype=np.int64) - times_ns[0]
+    places = since_first * (hz / NS_PER_S)
+    numbers: NDArray[np.float64] = np.rint(places)
+    within = max(2 * tick_ns * hz / NS_PER_S, _ROUNDED)
+    near = np.all(np.abs(places - numbers) <= within) and np.all(np.diff(numbers) > 0)
+    return numbers if near else None

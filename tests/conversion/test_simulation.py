@@ -1,0 +1,144 @@
+"""The Python entry point, and the stages between source and kernel."""
+
+import doctest
+import tracemalloc
+
+import numpy as np
+import pytest
+from harness import quiet
+
+import adv2e
+from adv2e.config import Config
+from adv2e.config.model import Frames, Sampling
+from adv2e.conversion import simulation
+from adv2e.errors import ConfigError, DataError
+from adv2e.events import is_sorted, sort_events
+from adv2e.light import intervals
+
+
+def frames(count=7, shape=(20, 30), dtype=np.uint8):
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    scale = 1 if dtype == np.uint8 else 257
+    return [
+        ((120 + 100 * np.sin(0.4 * (x - 2 * k)) * np.cos(0.3 * y)) * scale).astype(dtype)
+        for k in range(count)
+    ]
+
+
+def times(count=7, start=0.0):
+    return [start + k / 30 for k in range(count)]
+
+
+def run(images, at, config=None, **options):
+    return np.concatenate(list(adv2e.simulate(images, at, config or Config(), **options)))
+
+
+def test_example_in_the_documentation():
+    result = doctest.testmod(simulation)
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+def test_sorted_and_the_same_for_any_chunk_and_thread_count(monkeypatch):
+    whole = run(frames(), times(), threads=1)
+    assert len(whole) > 500
+    assert whole.tobytes() == sort_events(whole).tobytes()
+    for size in (1, 3):
+        monkeypatch.setattr(intervals, "_MOST", size)
+        assert run(frames(), times(), threads=2).tobytes() == whole.tobytes()
+
+
+@pytest.mark.parametrize("L", [1, 4])
+def test_printed_last_interval_for_any_chunk(monkeypatch, L):
+    config = Config(
+        sampling=Sampling(L=L, K=3, last_interval="printed"), pixel=quiet(low_pass=None)
+    )
+    whole = run(frames(), times(), config)
+    corrected = run(frames(), times(), Config(sampling=Sampling(L=L, K=3), pixel=config.pixel))
+    assert whole.tobytes() != corrected.tobytes()
+    for size in (1, 2, 5):
+        monkeypatch.setattr(intervals, "_MOST", size)
+        assert run(frames(), times(), config).tobytes() == whole.tobytes()
+
+
+def test_epoch_times_shift_events_exactly():
+    config = Config(pixel=quiet())
+    early = run(frames(), [k * 0.04 for k in range(7)], config)
+    late = run(frames(), [1_468_941_032 + k * 0.04 for k in range(7)], config)
+    early["t"] += 1_468_941_032_000_000
+    # float64 seconds hold an epoch time to 0.2 us only
+    assert np.abs(early["t"] - late["t"]).max() <= 1
+
+
+def test_sixteen_bit_and_float_are_not_cut_to_eight():
+    config = Config(pixel=quiet())
+    deep = run(frames(dtype=np.uint16), times(), config)
+    light = [f.astype(np.float64) / 65535 for f in frames(dtype=np.uint16)]
+    assert np.abs(deep["t"] - run(light, times(), config)["t"]).max() <= 1
+    shallow = [(f // 257).astype(np.uint8) for f in frames(dtype=np.uint16)]
+    assert run(shallow, times(), config).tobytes() != deep.tobytes()
+
+
+def test_colour_is_srgb_and_grey_is_linear_unless_told():
+    colour = [np.repeat(f[:, :, None], 3, axis=2) for f in frames()]
+    by_default = Config(pixel=quiet())
+    told = Config(pixel=quiet(), frames=Frames(encoding="srgb"))
+    assert run(colour, times(), by_default).tobytes() == run(colour, times(), told).tobytes()
+    assert run(frames(), times(), by_default).tobytes() != run(frames(), times(), told).tobytes()
+    # luma is weighed in light: equal channels give what the grey picture gives, but for rounding
+    assert len(run(colour, times(), told)) == len(run(frames(), times(), told))
+
+
+@pytest.mark.parametrize(
+    ("images", "at", "text"),
+    [
+        ([], [], "no frames"),
+        (frames(1), times(1), "single frame"),
+        (frames(3), iter([0.0, 0.1]), "frame 2: has no time"),
+        (frames(3), [0.0, 0.1], "2 times for 3 frames"),
+        (frames(3), times(4), "4 times for 3 frames"),
+        (frames(3), [0.0, np.nan, 0.2], "frame 1: its time is nan"),
+        ([255.0 * np.ones((4, 4))] * 2, times(2), "floats up to 255, where 1 is white"),
+        (frames(3), [0.0, 0.1, 0.1], "frame 2"),
+        (frames(3), [0.0, 0.1, 0.05], "not after"),
+        ([*frames(2), frames(1, (5, 5))[0]], times(3), "frame 2"),
+        ([np.zeros((4, 4), np.int32)] * 2, times(2), "int32"),
+        ([np.zeros((4, 4, 2), np.uint8)] * 2, times(2), "shape"),
+        ([np.full((4, 4), np.nan)] * 2, times(2), "frame 0"),
+    ],
+)
+def test_bad_input_is_one_clear_line(images, at, text):
+    with pytest.raises(DataError, match=text) as caught:
+        run(images, at)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_configuration_must_be_one():
+    with pytest.raises(ConfigError, match=r"must be a Config, as adv2e\.load_config .* got dict"):
+        run(frames(), times(), {"pixel": None})
+
+
+def test_memory_does_not_grow_with_length():
+    """A hundred frames take no more than twenty."""
+
+    def peak(count):
+        stream = (np.full((200, 300), 100 + k % 2, np.uint8) for k in range(count))
+        tracemalloc.start()
+        try:
+            total = sum(len(e) for e in adv2e.simulate(stream, times(count), threads=1))
+            return total, tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    peak(5)
+    short, long = peak(20), peak(100)
+    assert long[1] < 1.1 * short[1]
+
+
+def test_every_chunk_is_sorted_and_follows_the_one_before():
+    last = -1
+    for events in adv2e.simulate(frames(), times()):
+        assert is_sorted(events)
+        if events.size:
+            assert events["t"][0] >= last
+            last = events["t"][-1]
