@@ -37,7 +37,7 @@ from adv2e.light.pictures import drawn, picture_white
 from adv2e.sources.base import Source
 
 if TYPE_CHECKING:
-    from adv2e.rendering import Preview
+    from adv2e.rendering.timeline import Timeline
 
 BEHIND_BYTES = 16 << 20
 """Memory for events and frames that were made and not written yet."""
@@ -78,7 +78,7 @@ def _call_now(_: int, function: Callable[..., None], *arguments: Any) -> None:
 class _Output:
     """What frames and events go to: the sink, the preview if there is one, and the counts."""
 
-    def __init__(self, sink: Sink, preview: Preview | None, white: float) -> None:
+    def __init__(self, sink: Sink, preview: Timeline | None, white: float) -> None:
         self._sink, self._preview, self._white = sink, preview, white
         self.wants_frames = sink.wants_frames or preview is not None
         self.events = 0
@@ -323,13 +323,13 @@ def _metadata(
 
 def _open_preview(
     preview: str | None, recording: Source, staging: Staging, stack: ExitStack
-) -> Preview | None:
+) -> Timeline | None:
     if preview is None:
         return None
-    from adv2e.rendering import Preview  # noqa: PLC0415 - most conversions draw nothing
+    from adv2e.rendering import open_preview  # noqa: PLC0415 - most conversions draw nothing
 
     return stack.enter_context(
-        Preview(Path(preview), recording.width, recording.height, frames=True, staging=staging)
+        open_preview(Path(preview), recording.width, recording.height, frames=True, staging=staging)
     )
 
 

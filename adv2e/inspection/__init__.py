@@ -1,1 +1,1 @@
-"""What a file holds: ``events.py`` for events, ``frames.py`` for frames, ``report.py`` for both."""
+"""What a file holds, as one dictionary and as text for people."""

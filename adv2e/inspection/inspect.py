@@ -15,7 +15,6 @@ from adv2e.files.regular import check_ends
 from adv2e.files.zips import UNREADABLE
 from adv2e.formats.reading import Recording, read_recording
 from adv2e.inspection.events import describe_events, oddities_of
-from adv2e.inspection.frames import describe_times
 from adv2e.light.decoding import light_text
 from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
 from adv2e.sources.base import Light
@@ -148,3 +147,25 @@ def _of_source(source: Source) -> dict[str, Any]:
 
 def _times_ns(source: Source) -> NDArray[np.int64]:
     return np.array([frame.t_ns for frame in source.frames()], dtype=np.int64)
+
+
+def describe_times(times_ns: NDArray[np.int64]) -> dict[str, Any]:
+    """Return count, span, rate and intervals of frames; None for what one frame cannot tell.
+
+    Parameters
+    ----------
+    times_ns : array of int64, (frames,)
+        Times of the frames [ns], increasing.
+    """
+    steps_ms = np.diff(times_ns) / 1e6
+    count = len(times_ns)
+    duration_s = (int(times_ns[-1]) - int(times_ns[0])) / 1e9 if count else None
+    return {
+        "count": count,
+        "first_ns": int(times_ns[0]) if count else None,
+        "last_ns": int(times_ns[-1]) if count else None,
+        "duration_s": duration_s,
+        "rate_hz": (count - 1) / duration_s if duration_s else None,
+        "shortest_interval_ms": float(steps_ms.min()) if len(steps_ms) else None,
+        "longest_interval_ms": float(steps_ms.max()) if len(steps_ms) else None,
+    }

@@ -14,9 +14,9 @@ from adv2e.errors import DataError
 from adv2e.files.apart import check_apart
 from adv2e.light.pictures import drawn_frame
 from adv2e.rendering.films import spread, stride_of
-from adv2e.rendering.preview import SHEET_STEP_US, Preview
+from adv2e.rendering.preview import SHEET_STEP_US, open_preview
 from adv2e.rendering.styles import Style
-from adv2e.rendering.timeline import Caption, caption, microseconds
+from adv2e.rendering.timeline import Caption, Timeline, caption, microseconds
 
 if TYPE_CHECKING:
     from adv2e.formats.reading import Recording
@@ -53,11 +53,11 @@ def render_recording(
         Output.
     at_s : sequence of float
         Instants of a sheet [s after the first event or frame]; none: up to `count`, about evenly
-        spaced, the same as a :class:`Preview` takes from a stream.
+        spaced, the same as :func:`open_preview` takes from a stream.
     start_s, stop_s : float
         Part to show [s after the first event or frame].
     style, fps, speed, frames, scale, caption, overwrite
-        See :class:`Preview`.
+        See :func:`open_preview`.
     progress : bool
         Show a progress bar on stderr.
 
@@ -66,7 +66,7 @@ def render_recording(
     DataError
         The recording holds no events and no frames, or none in the part to show.
     OutputError, UsageError
-        See :class:`Preview`.
+        See :func:`open_preview`.
     """
     check_apart(path, [recording.path])
     begin_us, until_us = _span_us(recording)
@@ -93,7 +93,7 @@ def render_recording(
             f"{lasts}, of which a film has over {MOST_PICTURES:,} pictures; 'adv2e info' tells gaps"
             " that a wrong time makes; else choose a part with --start and --stop, or --speed"
         )
-    with Preview(
+    with open_preview(
         path,
         recording.width,
         recording.height,
@@ -129,7 +129,7 @@ def _span_us(recording: Recording) -> tuple[int, int]:
 
 
 def _feed(
-    preview: Preview,
+    preview: Timeline,
     recording: Recording,
     first_us: int,
     until_us: int,

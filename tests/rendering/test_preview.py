@@ -10,7 +10,7 @@ from processes import running_python
 
 from adv2e.errors import OutputError, UsageError
 from adv2e.events import empty_events, make_events
-from adv2e.rendering import Preview, Style
+from adv2e.rendering import Style, open_preview
 from adv2e.rendering.layout import GAP
 from adv2e.rendering.video import writes_h264
 
@@ -18,7 +18,7 @@ EVENTS = make_events(np.arange(0, 1_000_000, 500), np.arange(2000) % 32, [0] * 2
 
 
 def make(path, *, frames=True, **more):
-    with Preview(path, 32, 24, **more) as preview:
+    with open_preview(path, 32, 24, **more) as preview:
         for k in range(10):
             if frames:
                 preview.add_frame(k * 100_000_000, np.full((24, 32), 20 * k, np.uint8))
@@ -102,7 +102,7 @@ def test_styles_reach_the_file(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".mp4", ".gif", ".png"])
 def test_an_error_leaves_nothing(tmp_path, suffix):
-    with pytest.raises(ZeroDivisionError), Preview(tmp_path / f"v{suffix}", 32, 24) as preview:
+    with pytest.raises(ZeroDivisionError), open_preview(tmp_path / f"v{suffix}", 32, 24) as preview:
         preview.add_events(EVENTS)
         raise ZeroDivisionError
     assert list(tmp_path.iterdir()) == []
@@ -112,14 +112,14 @@ def test_an_error_leaves_nothing(tmp_path, suffix):
 def test_nothing_to_draw_leaves_nothing(tmp_path, suffix):
     with (
         pytest.raises(OutputError, match="no events or frames to draw"),
-        Preview(tmp_path / f"view{suffix}", 32, 24) as preview,
+        open_preview(tmp_path / f"view{suffix}", 32, 24) as preview,
     ):
         preview.add_events(empty_events())
     assert list(tmp_path.iterdir()) == []
 
 
 def test_frames_without_any_event(tmp_path):
-    with Preview(tmp_path / "view.avi", 32, 24, fps=10) as preview:
+    with open_preview(tmp_path / "view.avi", 32, 24, fps=10) as preview:
         for k in range(10):
             preview.add_frame(k * 100_000_000, np.zeros((24, 32), np.uint8))
             preview.add_events(empty_events())
@@ -141,7 +141,7 @@ def test_an_existing_file_is_kept_unless_asked(tmp_path):
 def test_an_error_keeps_the_old_file(tmp_path):
     path = tmp_path / "view.mp4"
     path.write_text("old")
-    with pytest.raises(ZeroDivisionError), Preview(path, 32, 24, overwrite=True) as preview:
+    with pytest.raises(ZeroDivisionError), open_preview(path, 32, 24, overwrite=True) as preview:
         preview.add_events(EVENTS)
         raise ZeroDivisionError
     assert path.read_text() == "old"
@@ -149,7 +149,7 @@ def test_an_error_keeps_the_old_file(tmp_path):
 
 def test_wrong_suffix_and_rate_are_found_at_once(tmp_path):
     with pytest.raises(UsageError, match="a film ends in"):
-        Preview(tmp_path / "view.mov", 32, 24)
-    with pytest.raises(UsageError, match="at most 50"), Preview(tmp_path / "v.gif", 4, 4, fps=60):
-        pass
+        open_preview(tmp_path / "view.mov", 32, 24).__enter__()
+    with pytest.raises(UsageError, match="at most 50"):
+        open_preview(tmp_path / "v.gif", 4, 4, fps=60).__enter__()
     assert list(tmp_path.iterdir()) == []

@@ -16,7 +16,8 @@ from adv2e.conversion.reading import Reading
 from adv2e.errors import OutputError
 from adv2e.events import empty_events, make_events
 from adv2e.formats.reading import Recording, read_recording
-from adv2e.rendering import Preview, Style, render_recording
+from adv2e.rendering import Style, open_preview, render_recording
+from adv2e.rendering.timeline import Timeline
 from adv2e.synthetic import Scene
 from adv2e.synthetic.clips import write_video
 
@@ -70,7 +71,7 @@ def test_pieces_in_any_order(made, name, with_frames, window_us, told):
         feed = iter(zip(frames, film(events, frames).frames(), strict=True)) if frames else iter([])
         rest = iter(parts)
         try:
-            with Preview(one, WIDTH, HEIGHT, frames=with_frames, **shown) as preview:
+            with open_preview(one, WIDTH, HEIGHT, frames=with_frames, **shown) as preview:
                 for kind in order:
                     if kind:
                         t_ns, frame = next(feed)
@@ -126,13 +127,13 @@ def test_preview_of_a_conversion_is_what_render_makes_of_its_file(clip, tmp_path
 def test_a_scene_at_rest_is_drawn_while_it_lasts(tmp_path, monkeypatch):
     """No event comes for long, and yet no frame waits for one."""
     waiting = []
-    original = Preview.complete_until
+    original = Timeline.complete_until
 
     def complete_until(self, t_us):
         original(self, t_us)
-        waiting.append(len(self._timeline._frames))
+        waiting.append(len(self._frames))
 
-    monkeypatch.setattr(Preview, "complete_until", complete_until)
+    monkeypatch.setattr(Timeline, "complete_until", complete_until)
     np.save(tmp_path / "still.npy", np.full((500, 6, 8), 90, np.uint8))
     times = np.arange(500) / 1000
     np.save(tmp_path / "still_ts.npy", times)
@@ -150,7 +151,7 @@ def test_a_scene_at_rest_is_drawn_while_it_lasts(tmp_path, monkeypatch):
 def test_nothing_but_empty_pieces(tmp_path):
     with (
         pytest.raises(OutputError, match="no events or frames"),
-        Preview(tmp_path / "film.avi", WIDTH, HEIGHT) as preview,
+        open_preview(tmp_path / "film.avi", WIDTH, HEIGHT) as preview,
     ):
         preview.add_events(empty_events())
         preview.complete_until(1000)
