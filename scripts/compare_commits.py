@@ -19,16 +19,15 @@ import tarfile
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 
 import click
-from benchmarks.clips import default_folder
-from benchmarks.machine import busy_line, machine_line, versions_line
+from benchmarks.machine import about
+from benchmarks.options import of_a_plan
 from benchmarks.processes import REPOSITORY, Job, JobError, Log, Measured, run_rounds
 from benchmarks.settings import OFF_NAME, Plan
-from writing.markdown import table
+from writing import output_option, table, write_report
 
 USUAL = (f"346x260: {OFF_NAME}", "346x260: all effects, shot 5 Hz")
 """Settings compared unless others are named."""
@@ -42,38 +41,24 @@ USUAL = (f"346x260: {OFF_NAME}", "346x260: all effects, shot 5 Hz")
     "globs",
     multiple=True,
     metavar="GLOB",
-    help="Settings of benchmark.py by name; repeatable.  [default: noise off and all effects]",
+    help="Settings of benchmarks/speed.py by name; repeatable.  [default: noise off and all"
+    " effects]",
 )
-@click.option("--rounds", type=click.IntRange(min=1), default=7, show_default=True)
-@click.option("--quick", is_flag=True, help="Short clips.")
-@click.option("--threads", type=click.IntRange(min=1), help="[default: all cores]")
-@click.option("--clips", "folder", type=click.Path(file_okay=False, path_type=Path))
+@of_a_plan(rounds=7, quick_rounds=7)
+@output_option
 def main(
-    before: str,
-    after: str,
-    globs: tuple[str, ...],
-    rounds: int,
-    quick: bool,
-    threads: int | None,
-    folder: Path | None,
+    before: str, after: str, globs: tuple[str, ...], plan: Plan, log: Log, output: Path | None
 ) -> None:
     """Compare commit BEFORE with commit AFTER."""
-    plan = Plan(folder or default_folder(), quick, threads)
-    log = Log(partial(click.echo, err=True))
-    try:
-        with tempfile.TemporaryDirectory(prefix="adv2e-commits-") as scratch:
-            packages = [
-                checked_out(name, Path(scratch) / side)
-                for name, side in ((before, "before"), (after, "after"))
-            ]
-            jobs = pairs_of_jobs(plan, globs or USUAL, packages)
-            warm = [replace(job, package=str(p)) for job in plan.warm() for p in packages]
-            found = run_rounds(jobs, rounds, log, warm=warm)
-    except JobError as error:
-        raise click.ClickException(str(error)) from None
-    click.echo(report(found, before, after))
-    if log.failures:
-        raise click.ClickException("; ".join(log.failures))
+    with tempfile.TemporaryDirectory(prefix="adv2e-commits-") as scratch:
+        packages = [
+            checked_out(name, Path(scratch) / side)
+            for name, side in ((before, "before"), (after, "after"))
+        ]
+        jobs = pairs_of_jobs(plan, globs or USUAL, packages)
+        warm = [replace(job, package=str(p)) for job in plan.warm() for p in packages]
+        found = run_rounds(jobs, plan.rounds, log, warm=warm)
+    write_report(report(found, before, after), output)
 
 
 def checked_out(commit: str, folder: Path, repository: Path = REPOSITORY) -> Path:
@@ -120,9 +105,8 @@ def report(found: Sequence[Measured], before: str, after: str) -> str:
         "events",
     )  # fmt: skip
     rows = [_row(a, b) for a, b in pairs(found)]
-    about = f"{machine_line()}. {versions_line(found)}. {busy_line(found)}"
     note = "Medians (least..most); ratios are paired by round: below 1, AFTER is faster."
-    return "\n\n".join([about, note, table(header, rows)])
+    return "\n\n".join([about(found), note, table(header, rows)])
 
 
 def pairs(found: Sequence[Measured]) -> list[tuple[Measured, Measured]]:

@@ -97,9 +97,7 @@ def test_commands_exist():
 
 def test_scripts_and_pictures_exist():
     root = Path(__file__).resolve().parents[1]
-    for name in re.findall(r"`?(scripts/\w+(?:\.py)?)", TEXT) + re.findall(
-        r"\]\((\S+\.png)\)", TEXT
-    ):
+    for name in re.findall(r"`?(scripts/[\w/.]*\w)", TEXT) + re.findall(r"\]\((\S+\.png)\)", TEXT):
         assert (root / name).exists(), name
 
 

@@ -28,8 +28,8 @@
 
 Where the time goes
 -------------------
-One core, nanoseconds a pixel and frame unless it says otherwise, by ``scripts/machine_limits.py``,
-``scripts/benchmark.py`` and ``perf``; the parts are of an AMD EPYC (Zen 5), in brackets what an
+One core, nanoseconds a pixel and frame unless it says otherwise, by ``scripts/benchmarks/limits.py``,
+``scripts/benchmarks/speed.py`` and ``perf``; the parts are of an AMD EPYC (Zen 5), in brackets what an
 Intel Xeon of half that speed takes.
 
 ==================================== ===========================================================

@@ -7,11 +7,10 @@ video that is interpolated already, so that no interpolation takes part in a com
 
 from __future__ import annotations
 
-import json
 import os
 import tempfile
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -74,26 +73,25 @@ class Clip:
                 parts.append(f"{field}{value:g}")
         return "_".join(parts)
 
+    def render(self) -> Iterator[NDArray[np.uint8]]:
+        """Yield the frames, uint8 (rows, columns)."""
+        rng = np.random.default_rng(self.seed)
+        texture = _texture(rng, self.contrast)
+        disks = _Disks.draw(rng, self)
+        rows, columns = np.mgrid[: self.height, : self.width].astype(np.float32)
+        u, v = columns - self.width / 2, rows - self.height / 2
+        still: NDArray[np.uint8] | None = None
+        for time in self.times:
+            image = _panned(texture, u, v, self.speed, float(time))
+            disks.paint(image, float(time))
+            frame = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+            if self.moving < 1.0:
+                still = frame if still is None else still
+                frame = _moving_rows(still, frame, self.moving)
+            yield frame
+
 
 _USUAL: dict[str, float] = {"seed": 20260, "speed": 1.0, "contrast": 0.75, "moving": 1.0}
-
-
-def render(clip: Clip) -> Iterator[NDArray[np.uint8]]:
-    """Yield the frames, uint8 (rows, columns)."""
-    rng = np.random.default_rng(clip.seed)
-    texture = _texture(rng, clip.contrast)
-    disks = _Disks.draw(rng, clip)
-    rows, columns = np.mgrid[: clip.height, : clip.width].astype(np.float32)
-    u, v = columns - clip.width / 2, rows - clip.height / 2
-    still: NDArray[np.uint8] | None = None
-    for time in clip.times:
-        image = _panned(texture, u, v, clip.speed, float(time))
-        disks.paint(image, float(time))
-        frame = np.clip(np.rint(image), 0, 255).astype(np.uint8)
-        if clip.moving < 1.0:
-            still = frame if still is None else still
-            frame = _moving_rows(still, frame, clip.moving)
-        yield frame
 
 
 def _texture(rng: np.random.Generator, contrast: float) -> NDArray[np.float32]:
@@ -173,21 +171,65 @@ def _moving_rows(
     return mixed
 
 
+MIDDLE = 60.0
+"""Grey value that the flicker swings around."""
+
+FLIPPED = 0.1
+"""Share of the pixels that flicker against the rest, drawn anew for each frame."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Burst:
+    """Recipe of a clip in which the whole field flickers, with noise.
+
+    Attributes
+    ----------
+    width, height, frames : int
+    fps : float
+        Frames a second; one bright, one dark in turn.
+    swing : float
+        Between dark and bright [ln units].
+    seed : int
+        Of the noise.
+    """
+
+    width: int
+    height: int
+    frames: int
+    fps: float
+    swing: float
+    seed: int = 20260
+
+    @property
+    def name(self) -> str:
+        """A file name that tells every recipe from every other."""
+        size = f"{self.width}x{self.height}x{self.frames}"
+        return f"burst_{size}_{self.fps:g}fps_swing{self.swing:g}_seed{self.seed}"
+
+    def render(self) -> Iterator[NDArray[np.uint8]]:
+        """Yield the frames, uint8 (rows, columns)."""
+        rng = np.random.default_rng(self.seed)
+        levels = MIDDLE * np.exp(0.5 * self.swing * np.array([-1.0, 1.0]))
+        dark, bright = np.clip(np.rint(levels), 0, 255).astype(np.uint8)
+        for k in range(self.frames):
+            flipped = rng.random((self.height, self.width), np.float32) < FLIPPED
+            yield np.where(flipped ^ (k % 2 == 1), bright, dark)
+
+
 def default_folder() -> Path:
     """Return the folder for clips: in the user's cache folder."""
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "adv2e-benchmarks"
 
 
-def stored(clip: Clip, folder: Path) -> Path:
+def stored(clip: Clip | Burst, folder: Path) -> Path:
     """Return the ``.npy`` file of the clip, (frames, rows, columns); make it if need be."""
     path = folder / f"{clip.name}.npy"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=folder, suffix=".part", delete=False) as part:
-            np.save(part, np.stack(list(render(clip))))
+            np.save(part, np.stack(list(clip.render())))
         Path(part.name).replace(path)  # whole, or not there
-        path.with_suffix(".json").write_text(json.dumps(asdict(clip), indent=1))
     return path
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 from collections.abc import Sequence
@@ -43,25 +42,11 @@ _MODULE = "benchmarks.conversion"
 
 
 def end_to_end(
-    plan: Plan,
-    peers: Peers | None,
-    rounds: int,
-    scratch: Path,
-    notes: list[str],
-    log: Log,
+    plan: Plan, peers: Peers, scratch: Path, notes: list[str], log: Log
 ) -> list[Measured]:
-    """Measure whole conversions, and their parts.
+    """Measure whole conversions, and their parts; what could not be measured is added to `notes`.
 
-    Parameters
-    ----------
-    plan : Plan
-    peers : Peers, optional
-    rounds : int
-    scratch : Path
-        Folder for the outputs.
-    notes : list of str
-        Takes what could not be measured.
-    log : Log
+    Outputs go to the folder `scratch`.
     """
     camera = CAMERAS["346x260"]
     # what both tools take video for: the same light then as of the frames in memory
@@ -69,26 +54,17 @@ def end_to_end(
     video = str(encoded(clip, camera.fps))
     jobs = list(_conversions(plan, video, scratch))
     warm = [*plan.warm(), *jobs]
-    jobs += _peer_conversions(plan, peers, video, scratch, notes) if peers else []
+    jobs += _peer_conversions(plan, peers, video, scratch, notes)
     jobs += _parts(plan, video, scratch)
-    return run_rounds(jobs, rounds, log, warm=warm)
+    return run_rounds(jobs, plan.rounds, log, warm=warm)
 
 
 def _conversions(plan: Plan, video: str, scratch: Path) -> list[Job]:
     jobs = []
     for number_, (name, (suffix, sets)) in enumerate(_CASES.items()):
         target = str(scratch / f"out{number_}{suffix}")
-        command = [
-            sys.executable,
-            "-m",
-            "adv2e",
-            "convert",
-            video,
-            "-o",
-            target,
-            "--overwrite",
-            "-q",
-        ]
+        command = [sys.executable, "-m", "adv2e", "convert", video, "-o", target]
+        command += ["--overwrite", "-q"]
         for one in sets:
             command += ["--set", one]
         command += ["--threads", str(plan.threads)] if plan.threads else []
@@ -108,37 +84,21 @@ def _peer_conversions(
     """Return the conversions by EventCV, if it is there."""
     if "eventcv" not in peers.tools:
         return []
-    programs = bool(shutil.which("ffmpeg") and shutil.which("ffprobe"))
-    if not programs:
-        notes.append(
-            "EventCV reads files through ffmpeg and ffprobe, which are not on PATH; OpenCV decodes"
-            " for it instead, and it gets the frames as an array."
-        )
+    if not (shutil.which("ffmpeg") and shutil.which("ffprobe")):
+        notes.append("EventCV reads files through ffmpeg and ffprobe, which are not on PATH.")
+        return []
     jobs = []
     for steps in ("off", "10", "adaptive"):
         target = str(scratch / f"eventcv_{steps}.h5")
-        make = _eventcv_program if programs else _eventcv_array
+        command = [
+            peers.python, "-m", "eventcv", "simulate", video, target, "--quiet",
+            "--threshold", str(THRESHOLD), "--cutoff-hz", str(CUTOFF_HZ), "--sigma-thres", "0",
+            "--leak-rate-hz", "0", "--shot-noise-rate-hz", "0", "--refractory-us", "0",
+            "--upsample", steps,
+        ]  # fmt: skip
         name = f"EventCV to HDF5, sub-steps {steps}, noise off"
-        jobs.append(_whole(name, make(peers.python, video, target, steps), target, plan.threads))
+        jobs.append(_whole(name, command, target, plan.threads))
     return jobs
-
-
-def _eventcv_program(python: str, video: str, target: str, steps: str) -> list[str]:
-    return [
-        python, "-m", "eventcv", "simulate", video, target, "--quiet",
-        "--threshold", str(THRESHOLD), "--cutoff-hz", str(CUTOFF_HZ), "--sigma-thres", "0",
-        "--leak-rate-hz", "0", "--shot-noise-rate-hz", "0", "--refractory-us", "0",
-        "--upsample", steps,
-    ]  # fmt: skip
-
-
-def _eventcv_array(python: str, video: str, target: str, steps: str) -> list[str]:
-    given = {
-        "pos_thres": THRESHOLD, "neg_thres": THRESHOLD, "cutoff_hz": CUTOFF_HZ,
-        "sigma_thres": 0.0, "leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0, "refractory_us": 0,
-        "upsample": steps,
-    }  # fmt: skip
-    return [python, "-m", "benchmarks.eventcv_file", video, target, json.dumps(given)]
 
 
 def _parts(plan: Plan, video: str, scratch: Path) -> list[Job]:

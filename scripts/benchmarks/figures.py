@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from writing.pyplot import load_pyplot
+from writing import load_pyplot, save_figure
 
 from benchmarks.frontier import Point
 
@@ -57,8 +57,7 @@ def draw_frontier(points: Sequence[Point], path: Path) -> None:
         " of events off by more than 1 %",
         fontsize=9.5,
     )
-    figure.savefig(path, dpi=150)
-    pyplot.close(figure)
+    save_figure(figure, path)
 
 
 def _draw(axis: Any, points: Sequence[Point], part: str) -> None:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from benchmarks.accuracy import TimeError, Truth, chosen_pixels, time_error
-from benchmarks.clips import as_srgb, stored
+from benchmarks.clips import Clip, as_srgb, stored
 from benchmarks.processes import Job, Log, Measured, run_rounds
-from benchmarks.settings import CAMERAS, IDEAL, Peers, Plan, peer_arguments, stepped
+from benchmarks.settings import CAMERAS, Peers, Plan, peer_arguments, stepped
 
 FORMS = ("first_order_hold", "zero_order_hold", "euler", "paper")
 STEPS = (1, 2, 5, 10, 20, 50, 100)
@@ -51,29 +51,25 @@ class Point:
         return {"curve": self.curve, "steps": self.steps, "cpu_ns": self.cpu_ns, "error": error}
 
 
-def frontier(plan: Plan, peers: Peers | None, rounds: int, scratch: Path, log: Log) -> list[Point]:
+def frontier(plan: Plan, peers: Peers, scratch: Path, log: Log) -> list[Point]:
     """Measure all points on the same frames, noise off.
 
-    Parameters
-    ----------
-    plan : Plan
-    peers : Peers, optional
-    rounds : int
-    scratch : Path
-        Folder for the events of the pixels that are compared.
-    log : Log
+    The events of the pixels that are compared go to the folder `scratch`.
     """
     count = 13 if plan.quick else 49
     camera = replace(CAMERAS["346x260"], frames=count)
     clip = stored(camera, plan.folder)
     pixels = chosen_pixels(camera.width * camera.height, 150 if plan.quick else 600)
-    named = {
-        job.name: (curve, K, job) for curve, K, job in _jobs(plan, peers, clip, pixels, scratch)
-    }
+    named = {}
+    every = [*_own_jobs(plan, camera), *_peer_jobs(plan, peers, clip)]
+    for number, (curve, steps, job) in enumerate(every):
+        probe = {"pixels": list(pixels), "path": str(scratch / f"probe{number}.npz")}
+        named[job.name] = (curve, steps, replace(job, probe=probe, threads=plan.threads))
     jobs = [job for _, _, job in named.values()]
     truth = Truth(str(clip), count, camera.fps, pixels)
     points = []
-    for measured in run_rounds(jobs, rounds, log, warm=plan.warm()):
+    # its costs lie on a logarithmic axis: two rounds are enough
+    for measured in run_rounds(jobs, min(plan.rounds, 2), log, warm=plan.warm()):
         curve, steps, job = named[measured.job.name]
         assert job.probe is not None
         error = time_error(Path(job.probe["path"]), truth.of(job.tool))
@@ -81,22 +77,12 @@ def frontier(plan: Plan, peers: Peers | None, rounds: int, scratch: Path, log: L
     return points
 
 
-def _jobs(
-    plan: Plan, peers: Peers | None, clip: Path, pixels: Sequence[int], scratch: Path
-) -> Iterator[tuple[str, str, Job]]:
+def _own_jobs(plan: Plan, camera: Clip) -> Iterator[tuple[str, str, Job]]:
     """Yield (curve, sub-steps, job)."""
-    ours: list[tuple[str, str, tuple[str, ...]]] = [("exact", "", ())]
-    steps = QUICK_STEPS if plan.quick else STEPS
-    ours += [(form, str(K), stepped(form, K)) for form in FORMS for K in steps]
-    number = 0
-    for curve, K, sets in ours:
-        options = {"config": [], "sets": [*IDEAL, *sets], "threads": plan.threads}
-        job = Job(name=f"{curve} {K}".strip(), clip=str(clip), options=options)
-        yield curve, K, _probed(job, pixels, scratch, number, plan.threads)
-        number += 1
-    for curve, K, job in _peer_jobs(plan, peers, clip) if peers else ():
-        yield curve, K, _probed(job, pixels, scratch, number, plan.threads)
-        number += 1
+    yield "exact", "", plan.job("exact", camera, ())
+    for form in FORMS:
+        for K in QUICK_STEPS if plan.quick else STEPS:
+            yield form, str(K), plan.job(f"{form} {K}", camera, stepped(form, K))
 
 
 def _peer_jobs(plan: Plan, peers: Peers, clip: Path) -> Iterator[tuple[str, str, Job]]:
@@ -119,10 +105,3 @@ def _peer_jobs(plan: Plan, peers: Peers, clip: Path) -> Iterator[tuple[str, str,
                         options={"arguments": given},
                     ),
                 )
-
-
-def _probed(
-    job: Job, pixels: Sequence[int], scratch: Path, number: int, threads: int | None
-) -> Job:
-    probe = {"pixels": list(pixels), "path": str(scratch / f"probe{number}.npz")}
-    return replace(job, probe=probe, threads=threads)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from adv2e.process.cores import default_threads
@@ -55,3 +55,9 @@ def busy_line(measured: Iterable[Measured]) -> str:
     mean, most = sum(others) / len(others), max(others)
     warning = " The machine was not idle: do not quote." if mean > 0.1 else ""
     return f"Other programs took {number(mean)} cores in the mean, {number(most)} at most.{warning}"
+
+
+def about(measured: Sequence[Measured]) -> str:
+    """Return what ran on what, and how busy it was."""
+    lines = (machine_line(), versions_line(measured), busy_line(measured))
+    return " ".join(f"{line.rstrip('.')}." for line in lines if line)

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from adv2e.errors import Adv2eError
 from benchmarks.measuring import children_cpu_s
 
 SCRIPTS = Path(__file__).resolve().parents[1]
@@ -22,7 +23,7 @@ SIMULATE = "benchmarks.worker:simulate"
 """The action that most jobs run."""
 
 
-class JobError(Exception):
+class JobError(Adv2eError):
     """A measurement failed; the message is one line."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from writing.markdown import table
+from writing import table
 
 from benchmarks.frontier import Point
 from benchmarks.processes import Measured, Spread, number

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,6 @@ ALL = (*MISMATCH, *LEAK, *DEAD_TIME, *SHOT)
 ALL_WEAK = (*MISMATCH, *LEAK, *DEAD_TIME, *SHOT_WEAK)
 
 EVERYTHING = (
-    *(one for one in IDEAL if one.startswith("sampling") or "low_pass" in one),
     *ALL,
     "pixel.initial_reference=random",
     "pixel.leak={rate_hz: 0.1, photo_rate_hz: 0.1, jitter: 0.1}",
@@ -161,11 +160,19 @@ def peer_arguments(peers: Peers, threads: int | None) -> Iterator[tuple[str, str
 
 @dataclass(frozen=True)
 class Plan:
-    """How jobs are made: folder of the clips, length, threads."""
+    """How jobs are made: folder of the clips, length, threads, rounds."""
 
     folder: Path
     quick: bool
     threads: int | None
+    rounds: int = 1
+
+    def job(self, name: str, clip: Clip, sets: Sequence[str], **more: Any) -> Job:
+        """Return the job of a clip and of what is added to the ideal pixel."""
+        threads = more.setdefault("threads", self.threads)
+        options = {"sets": [*IDEAL, *sets], "threads": threads}
+        path = str(stored(clip, self.folder))
+        return Job(name=name, clip=path, fps=clip.fps, options=options, **more)
 
     def clip(self, name: str) -> Clip:
         """Return the clip of that name, in quick mode a short one."""
@@ -174,34 +181,17 @@ class Plan:
 
     def warm(self) -> list[Job]:
         """Return short jobs that compile all there is."""
-        clip = stored(Clip(width=64, height=48, frames=8), self.folder)
-        pixels = {"every effect": EVERYTHING, "the exact circuit": (*IDEAL, *ALL)}
-        return [
-            Job(
-                name=name,
-                clip=str(clip),
-                options={"config": [], "sets": list(sets), "threads": self.threads},
-            )
-            for name, sets in pixels.items()
-        ]
+        clip = Clip(width=64, height=48, frames=8)
+        pixels = {"every effect": EVERYTHING, "the exact circuit": ALL}
+        return [self.job(name, clip, sets) for name, sets in pixels.items()]
 
     def jobs(self) -> Iterator[Job]:
         """Yield the jobs of adv2e."""
         for setting in settings():
             clip = self.clip(setting.clip)
             frames = max(8, round(setting.share * clip.frames / setting.stride))
-            yield Job(
-                name=f"{setting.clip}: {setting.name}",
-                clip=str(stored(clip, self.folder)),
-                frames=frames,
-                stride=setting.stride,
-                options={
-                    "config": [],
-                    "sets": [*IDEAL, *setting.sets],
-                    "threads": self.threads,
-                },
-                threads=self.threads,
-            )
+            name = f"{setting.clip}: {setting.name}"
+            yield self.job(name, clip, setting.sets, frames=frames, stride=setting.stride)
 
     def peer_jobs(self, peers: Peers) -> Iterator[Job]:
         """Yield the jobs of the other tools, on frames in memory."""

@@ -1,1 +1,1 @@
-"""Parts of ``scripts/compare_real.py`` and ``scripts/diagnose_real.py``."""
+"""Parts of ``scripts/real/compare.py`` and ``scripts/real/diagnose.py``."""

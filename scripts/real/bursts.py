@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from writing.markdown import table
+from writing import table
 
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config

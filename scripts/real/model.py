@@ -36,13 +36,35 @@ BEYOND_US = 100_000
 
 
 @dataclass(frozen=True)
+class Counts:
+    """What is told of streams by themselves, means: None where it is not defined."""
+
+    events: float
+    on_share: float | None
+    still_hz: float | None
+
+    @classmethod
+    def of(cls, streams: Sequence[Events], real: Real, windows: Windows) -> Counts:
+        """Return counts, shares and rates of streams that are cut to the windows."""
+        shares = [totals(one)[0] / len(one) if len(one) else None for one in streams]
+        rates = [still_rate(one, real.still, windows.duration_s) for one in streams]
+        count = float(np.mean([len(one) for one in streams]))
+        return cls(count, pooled(shares, "mean"), pooled(rates, "mean"))
+
+
+@dataclass(frozen=True)
 class Judged:
     """A configuration against the measured events: means over seeds."""
 
     values: Floor
     floor: Floor
-    events_ratio: float
-    on_share: float | None
+    made: Counts
+    measured: Counts
+
+    @property
+    def events_ratio(self) -> float | None:
+        """Events over those measured."""
+        return self.made.events / self.measured.events if self.measured.events else None
 
     def without_chance(self, name: str) -> float | None:
         """Return how far the mean of many simulations would be: theirs apart is twice their chance.
@@ -200,9 +222,8 @@ class Bench:
             distances(*pair, windows, *real.size, whole=measured).values
             for pair in itertools.combinations(streams, 2)
         ]
-        shares = [totals(one)[0] / len(one) if len(one) else None for one in streams]
-        ratio = float(np.mean([len(one) for one in streams])) / len(measured)
-        return Judged(means(found), means(apart), ratio, pooled(shares, "mean"))
+        made_of, measured_of = (Counts.of(one, real, windows) for one in (streams, [measured]))
+        return Judged(means(found), means(apart), made_of, measured_of)
 
 
 def means(found: Sequence[Floor]) -> Floor:

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from writing.markdown import table
+from writing import table
 
-from adv2e.comparison.distances import distances
-from adv2e.comparison.floor import Floor, half_split
+from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows
-from adv2e.diagnosis.fitting.nuisances import totals
-from adv2e.events import Events, empty_events
+from adv2e.events import Events
 from real.model import SCORE, Judged
 from real.table import COLUMNS as TITLES
-from real.table import number
+from real.table import marks, number, with_floors
 from real.tried import Added
 
 COLUMNS = {
@@ -39,22 +37,19 @@ def steps_table(
     rows = []
     for step in steps:
         levels = step.added.config.pixel.thresholds
-        judged = judged_cells(step.judged, measured)
-        rows.append([step.added.text(), f"{levels.on:.3f} / {levels.off:.3f}", *judged])
-    split = half_split(measured, windows, *size)
-    nothing = distances(measured, empty_events(), windows, *size).values
-    for label, values in (("half split (Poisson)", split), ("no events at all", nothing)):
+        thresholds = f"{levels.on:.3f} / {levels.off:.3f}"
+        rows.append([step.added.text(), thresholds, *judged_cells(step.judged)])
+    for label, values in marks(measured, windows, size).items():
         rows.append([label, "", "", "", *cells(values), ""])
     return table(["added", "ON / OFF threshold [ln]", *JUDGED], rows)
 
 
-def judged_cells(judged: Judged, measured: Events) -> list[str]:
+def judged_cells(judged: Judged) -> list[str]:
     """Return totals, distances and floors, and what counts without the simulation's own chance."""
-    share = totals(measured)[0] / len(measured)
     return [
-        f"{judged.events_ratio:.2f}",
-        f"{number(judged.on_share)} / {share:.2f}",
-        *(f"{number(judged.values[n])} ({number(judged.floor[n])})" for n in COLUMNS),
+        number(judged.events_ratio),
+        f"{number(judged.made.on_share)} / {number(judged.measured.on_share)}",
+        *with_floors(judged, COLUMNS),
         number(judged.without_chance(SCORE)),
     ]
 

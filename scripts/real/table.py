@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 
-from writing.markdown import table
+from writing import table
 
-from adv2e.comparison.distances import MEASURES
-from adv2e.comparison.floor import Floor
+from adv2e.comparison.distances import MEASURES, distances
+from adv2e.comparison.floor import Floor, half_split
+from adv2e.comparison.windows import Windows
+from adv2e.events import Events, empty_events
+from real.model import Judged
 
 HEADER = (
     "Configurations named after a tool are that tool's parameters in the pixel of adv2e, not the"
@@ -40,25 +42,6 @@ HALF_SPLIT = (
 )
 
 
-@dataclass(frozen=True)
-class Stream:
-    """What is told of a stream by itself: None where it is not defined."""
-
-    events: float
-    on_share: float | None
-    still_hz: float | None
-
-
-@dataclass(frozen=True)
-class Row:
-    """A line of the table."""
-
-    label: str
-    values: Floor
-    floor: Floor | None = None
-    stream: Stream | None = None
-
-
 def preamble() -> str:
     """Return what must be known to read the tables."""
     return "\n\n".join([HEADER, f"{PAIRS} {FLOORS} {STILL} {HALF_SPLIT}"])
@@ -70,29 +53,39 @@ def definitions() -> str:
     return "\n".join(["## Distances", "", *lines])
 
 
-def markdown(rows: Sequence[Row], measured: Stream) -> str:
-    """Return the table."""
+def marks(events: Events, windows: Windows, size: tuple[int, int]) -> dict[str, Floor]:
+    """Return what to go by: the distances of a half of the measured events, and of none at all."""
+    return {
+        "half split (Poisson)": half_split(events, windows, *size),
+        "no events at all": distances(events, empty_events(), windows, *size).values,
+    }
+
+
+def markdown(judged: Mapping[str, Judged], others: Mapping[str, Floor]) -> str:
+    """Return the table of configurations, and of the marks to go by."""
     names = ["configuration", "events", "ON share", *COLUMNS.values(), "still"]
-    return table(names, (_cells(row, measured) for row in rows))
+    rows = [[label, *_cells(one)] for label, one in judged.items()]
+    rows += [[label, "", "", *map(number, _values(one)), ""] for label, one in others.items()]
+    return table(names, rows)
 
 
-def _cells(row: Row, measured: Stream) -> list[str]:
-    apart = [_distance(row, name) for name in COLUMNS]
-    if row.stream is None:
-        return [row.label, "", "", *apart, ""]
-    ratio = row.stream.events / measured.events if measured.events else None
+def _cells(judged: Judged) -> list[str]:
+    made, measured = judged.made, judged.measured
     return [
-        row.label,
-        f"{row.stream.events:,.0f} / {measured.events:,.0f} ({number(ratio)})",
-        f"{number(row.stream.on_share)} / {number(measured.on_share)}",
-        *apart,
-        f"{number(row.stream.still_hz)} / {number(measured.still_hz)}",
+        f"{made.events:,.0f} / {measured.events:,.0f} ({number(judged.events_ratio)})",
+        f"{number(made.on_share)} / {number(measured.on_share)}",
+        *with_floors(judged, COLUMNS),
+        f"{number(made.still_hz)} / {number(measured.still_hz)}",
     ]
 
 
-def _distance(row: Row, name: str) -> str:
-    value = number(row.values[name])
-    return value if row.floor is None else f"{value} ({number(row.floor[name])})"
+def _values(found: Floor) -> list[float | None]:
+    return [found[name] for name in COLUMNS]
+
+
+def with_floors(judged: Judged, names: Iterable[str]) -> list[str]:
+    """Return distances of these names, in brackets those between seeds."""
+    return [f"{number(judged.values[name])} ({number(judged.floor[name])})" for name in names]
 
 
 def number(value: float | None) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-from writing.markdown import table
+from writing import table
 
 from adv2e.comparison.floor import half_split
 from adv2e.comparison.windows import Windows, cut
@@ -76,7 +76,7 @@ def _by_line(bench: Bench, stability: Stability, converted: Sequence[Events]) ->
             [
                 "any" if np.isinf(line) else f"{line:.0%}",
                 f"{len(measured) / everything:.0%}",
-                *judged_cells(bench.against(converted, windows, of=within), measured),
+                *judged_cells(bench.against(converted, windows, of=within)),
                 number(half_split(measured, windows, *real.size)[SCORE]),
             ]
         )

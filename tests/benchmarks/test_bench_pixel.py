@@ -2,7 +2,7 @@
 
     python -m pytest tests/benchmarks -o addopts= --benchmark-only
 
-For figures to quote see scripts/benchmark.py, which uses fresh processes and longer clips.
+For figures to quote see scripts/benchmarks/speed.py, which uses fresh processes and longer clips.
 """
 
 import numpy as np

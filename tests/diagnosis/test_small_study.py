@@ -1,7 +1,7 @@
 """The whole diagnosis of small recordings by the brute-force camera, which shares no code with it.
 
 Effects are so large that only one verdict is right; how often smaller ones are found is measured by
-``scripts/study_diagnosis.py``.
+``scripts/studies/diagnosis.py``.
 """
 
 import pytest

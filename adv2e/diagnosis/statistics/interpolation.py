@@ -17,7 +17,7 @@ So the ratio r of the two tells what to expect, :math:`f = (1.2 / r)^{1.8}`, fro
 that are moved along their optical flow are wrong where that is, whatever the time between them: e
 hardly goes with d, nor f with r, and f = 0.7, as where frames are too few to tell r.
 
-``scripts/study_interpolation_error.py`` measures e, and what is left of it beside its doubt, on
+``scripts/studies/interpolation_error.py`` measures e, and what is left of it beside its doubt, on
 scenes seen at 2000 frames a second of which a 4th to 64th is taken; numbers here were chosen on
 others like them.
 

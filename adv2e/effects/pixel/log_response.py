@@ -32,7 +32,7 @@ class LogResponse(Section):
         unit="DN",
         meaning="linear below this value, logarithmic above; 0: logarithm everywhere",
         at_least=0,
-        source="e: no kink at the knee; least distance in scripts/study_knee.py",
+        source="e: no kink at the knee; least distance in scripts/studies/knee.py",
     )
     floor: float = parameter(
         0.1,

@@ -14,8 +14,8 @@ import adv2e
 
 
 def simulator(options: dict[str, Any]) -> Callable[[Any, float], Any]:
-    """Return a function of (frames, fps); options: ``config``, ``sets``, ``threads``."""
-    config = adv2e.load_config(options["config"], options["sets"])
+    """Return a function of (frames, fps); options: ``sets``, ``threads``."""
+    config = adv2e.load_config([], options["sets"])
     threads = options["threads"]
 
     def run(frames: Any, fps: float) -> Any:

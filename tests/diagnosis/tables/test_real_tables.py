@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import characterise_latency
 import pytest
-from characterisation.iebcs import read_levels
+from real import latency
+from real.iebcs import read_levels
 
 FOLDER = os.environ.get("ADV2E_REAL_DATA")
 
@@ -17,8 +17,8 @@ pytestmark = pytest.mark.skipif(
 
 
 def test_latencies_depart_from_one_over_light_by_a_floor():
-    measured = characterise_latency.read(Path(FOLDER) / "latency-nist" / "latency_summary.csv")
-    found = characterise_latency.one(measured, "CAM2", "CAM1", 1.0, seed=0)
+    measured = latency.read(Path(FOLDER) / "latency-nist" / "latency_summary.csv")
+    found = latency.one(measured, "CAM2", "CAM1", 1.0, seed=0)
     assert [effect.name for effect in found.effects] == ["source_follower"]
     assert found.errors[0].before.value > 0.3
     assert found.errors[0].after.value < 0.1

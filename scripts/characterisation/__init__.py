@@ -1,1 +1,0 @@
-"""Reading published measurements, for the scripts that characterise them."""

@@ -1,0 +1,1 @@
+"""Studies of the simulator and of the diagnosis, on made-up scenes."""

@@ -1,1 +1,0 @@
-"""What scripts write: tables, figures, files."""

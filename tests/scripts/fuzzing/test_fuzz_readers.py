@@ -1,0 +1,97 @@
+"""Damaged files of every kind end in one right line, and the fuzzer sees it when they do not."""
+
+import ctypes
+import os
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+if sys.platform != "linux":
+    pytest.skip("the fuzzer needs fork and /proc", allow_module_level=True)
+
+from fuzzing import running
+from fuzzing.mutations import mutated
+from fuzzing.running import Limits, judged
+from fuzzing.seeds import all_seeds
+
+SCRIPT = Path(__file__).parents[3] / "scripts" / "fuzzing" / "fuzz_readers.py"
+
+
+def test_some_damaged_files_of_every_kind():
+    found = subprocess.run(
+        [sys.executable, SCRIPT, "--count", "60", "--seed", "20"],
+        capture_output=True, text=True, timeout=200, check=False,
+    )  # fmt: skip
+    assert found.returncode == 0, found.stdout + found.stderr
+    assert "60 files: " in found.stdout
+    assert "nothing wrong" in found.stdout
+
+
+def _allocate():
+    held = bytearray(400 << 20)
+    for place in range(0, len(held), 4096):
+        held[place] = 1
+
+
+def _error(text):
+    def say():
+        os.write(2, text)
+        raise SystemExit(1)
+
+    return say
+
+
+LINE = b"adv2e: error: a.png: damaged\n"
+
+
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")  # fork beside threads
+@pytest.mark.parametrize(
+    ("action", "wrong"),
+    [
+        (_error(LINE), ""),
+        (lambda: None, ""),
+        (_error(b""), "0 lines of error"),
+        (_error(LINE + LINE), "2 lines of error"),
+        (_error(LINE + b"and more\n"), "1 lines of error"),
+        (_error(b"libpng error: bad\n" + LINE), "a library speaks"),
+        (_error(b"adv2e: error: internal error: KeyError: 3\n"), "internal error"),
+        (_error(b"adv2e: error: not enough memory: 8 GiB\n"), "too much memory"),
+        (lambda: ctypes.string_at(0), "ended by SIGSEGV"),
+        (os.abort, "ended by SIGABRT"),
+        (lambda: sys.exit(2), "exit status 2"),
+        (lambda: time.sleep(30), "too slow"),
+        (lambda: [None for _ in iter(int, 1)], "too slow"),
+        (_allocate, "MiB"),
+    ],
+)
+def test_what_ends_badly_is_seen(tmp_path, monkeypatch, action, wrong):
+    monkeypatch.setattr(running, "_command", lambda _: action())
+    monkeypatch.setattr(running, "_virtual_bytes", lambda: 1 << 46)  # this process holds much
+    wall_s = 3.0 if wrong == "too slow" else 60.0
+    found = running.run([], tmp_path, Limits(cpu_s=0.5, wall_s=wall_s, mib=200))
+    assert wrong in found.wrong if wrong else not found.wrong, found
+
+
+def test_an_exit_status_of_success_with_an_error_is_wrong():
+    assert judged(0, LINE.decode()) == "1 lines of error with exit status 0"
+
+
+def test_the_same_number_makes_the_same_file(tmp_path):
+    data = bytes(range(256)) * 4
+    for n in range(200):
+        first, again = (mutated(data, random.Random(n), text=n % 2 == 0) for _ in range(2))
+        assert first == again
+    kinds = [seed.name for seed in all_seeds(tmp_path)]
+    assert {"npz", "recording zip", "hdf5", "video mp4", "video y4m", "config"} <= set(kinds)
+    for seed in all_seeds(tmp_path):
+        made = []
+        for name in ("one", "two"):
+            seed.write(tmp_path / name, random.Random(5)) if seed.content else None
+            made.append(
+                [f.read_bytes() for f in sorted((tmp_path / name).rglob("*")) if f.is_file()]
+            )
+        assert made[0] == made[1]
