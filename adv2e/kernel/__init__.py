@@ -28,9 +28,9 @@
 
 Where the time goes
 -------------------
-One core, nanoseconds a pixel and frame unless it says otherwise, by ``scripts/benchmarks/limits.py``,
-``scripts/benchmarks/speed.py`` and ``perf``; the parts are of an AMD EPYC (Zen 5), in brackets what an
-Intel Xeon of half that speed takes.
+One core, nanoseconds a pixel and frame unless it says otherwise, by
+``scripts/benchmarks/limits.py``, ``scripts/benchmarks/speed.py`` and ``perf``; the parts are of an
+AMD EPYC (Zen 5), in brackets what an Intel Xeon of half that speed takes.
 
 ==================================== ===========================================================
 what the machine allows              memory 35 (15) GB/s, so that a float32 frame is read in 0.1
