@@ -158,7 +158,64 @@ BUSY = (
 )  # fmt: skip
 """The exact circuit with leak, noise and mismatch that show in a short clip."""
 
-FRAME_STEPS = ("zero_order_hold", "first_order_hold", "euler", "paper")
+QUIET_CASES = """
+plain
+no refractory: pixel.refractory=null
+long refractory: pixel.refractory.period_us=20000
+unequal thresholds: pixel.thresholds.on=0.12; pixel.thresholds.off=0.31
+slow: pixel.low_pass.cutoff_hz=30
+fast and dark: pixel.low_pass.cutoff_hz=3000; pixel.low_pass.dark_cutoff_hz=0
+pure logarithm: pixel.log_response.linear_below=0
+knee 20: pixel.log_response.linear_below=20
+no low pass: pixel.low_pass=null
+no low pass nor refractory: pixel.low_pass=null; pixel.refractory=null
+linear L: sampling.L=7
+flow L: sampling.L=4; sampling.interpolation=flow
+printed: sampling.L=5; sampling.last_interval=printed
+running reference: pixel.initial_reference=running
+random reference: pixel.initial_reference=random
+tick: readout.tick_us=100
+"""
+"""Added to NOISELESS."""
+
+BUSY_CASES = """
+plain
+seed: seed=18446744073709551615
+no refractory: pixel.refractory=null
+leak alone: pixel.shot_noise=null; pixel.leak.jitter=0
+shot noise alone: pixel.leak=null
+mismatch: pixel.thresholds.mismatch=0.1
+jitter: pixel.leak.jitter=0.3
+L 10: sampling.L=10
+no low pass: pixel.low_pass=null
+printed: sampling.L=5; sampling.last_interval=printed
+hot pixels: pixel.hot_pixels={fraction: 0.05, rate_hz: 300}
+dead pixels: pixel.dead_pixels.fraction=0.1
+dark current: pixel.dark_current.dn=10
+photoreceptor noise: pixel.photoreceptor_noise.rms=0.05
+source follower: pixel.source_follower.cutoff_hz=200
+fast source follower: pixel.source_follower.cutoff_hz=5000
+slew limit: pixel.slew_limit.per_s=20
+reset overshoot: pixel.reset_overshoot.fraction=0.3
+threshold drift: pixel.thresholds.drift_per_s=0.5
+all poles: pixel.source_follower.cutoff_hz=300; pixel.slew_limit.per_s=40; \
+pixel.reset_overshoot.fraction=-0.2; pixel.photoreceptor_noise.rms=0.03; \
+pixel.thresholds.drift_per_s=-0.5; pixel.hot_pixels={fraction: 0.02, rate_hz: 100}
+flicker: frames.flicker={frequency_hz: 100, depth: 0.3}
+exposure: frames.exposure_us=6000
+black level: frames.black_level_dn=5
+black depth: frames.black_depth_dn=8
+clock: frames.clock_offset_us=-1234; frames.clock_drift_ppm=900
+shift: frames.shift_px=[1.5,-0.25]
+encoding srgb: frames.encoding=srgb
+encoding gamma: frames.encoding=gamma:2.4; frames.full_scale=200
+encoding hlg L: frames.encoding=hlg; sampling.L=3
+arbiter: readout.arbiter={event_ns: 3000, row_ns: 8000}
+event loss: readout.loss.fraction=0.3
+frame coupling: readout.frame_coupling={amplitude: 0.3, tau_us: 500}
+readout: readout.arbiter={event_ns: 500, row_ns: 0}; readout.loss.fraction=0.1; readout.tick_us=10
+"""
+"""Added to BUSY."""
 
 
 @dataclass(frozen=True)
@@ -175,87 +232,26 @@ def cases() -> dict[str, Case]:
     """Return all simulations through `adv2e.simulate`, by name."""
     shipped = ("adv2e", "paper", "v2e", "vid2e", "ideal", "davis240c", "davis346")
     found = {f"config {name}": Case(files=[name]) for name in shipped}
-
-    def add(prefix: str, base: Sequence[str], **sets: str | Sequence[str]) -> None:
-        for name, some in sets.items():
-            more = [some] if isinstance(some, str) else some
-            found[f"{prefix}, {name.replace('_', ' ')}"] = Case([*base, *more])
-
-    add(
-        "noiseless",
-        NOISELESS,
-        plain=(),
-        no_refractory="pixel.refractory=null",
-        long_refractory="pixel.refractory.period_us=20000",
-        unequal_thresholds=("pixel.thresholds.on=0.12", "pixel.thresholds.off=0.31"),
-        slow="pixel.low_pass.cutoff_hz=30",
-        fast_and_dark=("pixel.low_pass.cutoff_hz=3000", "pixel.low_pass.dark_cutoff_hz=0"),
-        pure_logarithm="pixel.log_response.linear_below=0",
-        knee_20="pixel.log_response.linear_below=20",
-        no_low_pass="pixel.low_pass=null",
-        no_low_pass_nor_refractory=("pixel.low_pass=null", "pixel.refractory=null"),
-        linear_L=("sampling.L=7",),
-        flow_L=("sampling.L=4", "sampling.interpolation=flow"),
-        printed=("sampling.L=5", "sampling.last_interval=printed"),
-        running_reference="pixel.initial_reference=running",
-        random_reference="pixel.initial_reference=random",
-        tick="readout.tick_us=100",
-    )
-    add(
-        "noise",
-        BUSY,
-        plain=(),
-        seed="seed=18446744073709551615",
-        no_refractory="pixel.refractory=null",
-        leak_alone=("pixel.shot_noise=null", "pixel.leak.jitter=0"),
-        shot_noise_alone="pixel.leak=null",
-        mismatch="pixel.thresholds.mismatch=0.1",
-        jitter="pixel.leak.jitter=0.3",
-        L_10="sampling.L=10",
-        no_low_pass="pixel.low_pass=null",
-        printed=("sampling.L=5", "sampling.last_interval=printed"),
-        hot_pixels=("pixel.hot_pixels.fraction=0.05", "pixel.hot_pixels.rate_hz=300"),
-        dead_pixels="pixel.dead_pixels.fraction=0.1",
-        dark_current="pixel.dark_current.dn=10",
-        photoreceptor_noise="pixel.photoreceptor_noise.rms=0.05",
-        source_follower="pixel.source_follower.cutoff_hz=200",
-        fast_source_follower="pixel.source_follower.cutoff_hz=5000",
-        slew_limit="pixel.slew_limit.per_s=20",
-        reset_overshoot="pixel.reset_overshoot.fraction=0.3",
-        threshold_drift="pixel.thresholds.drift_per_s=0.5",
-        all_poles=("pixel.source_follower.cutoff_hz=300", "pixel.slew_limit.per_s=40",
-                   "pixel.reset_overshoot.fraction=-0.2", "pixel.photoreceptor_noise.rms=0.03",
-                   "pixel.thresholds.drift_per_s=-0.5", "pixel.hot_pixels.fraction=0.02",
-                   "pixel.hot_pixels.rate_hz=100"),
-        flicker=("frames.flicker.frequency_hz=100", "frames.flicker.depth=0.3"),
-        exposure="frames.exposure_us=6000",
-        black_level="frames.black_level_dn=5",
-        black_depth="frames.black_depth_dn=8",
-        clock=("frames.clock_offset_us=-1234", "frames.clock_drift_ppm=900"),
-        shift="frames.shift_px=[1.5, -0.25]",
-        encoding_srgb="frames.encoding=srgb",
-        encoding_gamma=("frames.encoding=gamma:2.4", "frames.full_scale=200"),
-        encoding_hlg_L=("frames.encoding=hlg", "sampling.L=3"),
-        arbiter=("readout.arbiter.event_ns=3000", "readout.arbiter.row_ns=8000"),
-        event_loss="readout.loss.fraction=0.3",
-        frame_coupling=("readout.frame_coupling.amplitude=0.3",
-                        "readout.frame_coupling.tau_us=500"),
-        readout=("readout.arbiter.event_ns=500", "readout.arbiter.row_ns=0",
-                 "readout.loss.fraction=0.1", "readout.tick_us=10"),
-    )  # fmt: skip
-    for update in FRAME_STEPS:
+    for title, base, table in (
+        ("noiseless", NOISELESS, QUIET_CASES), ("noise", BUSY, BUSY_CASES),
+    ):  # fmt: skip
+        for line in table.strip().splitlines():
+            name, _, sets = line.partition(": ")
+            found[f"{title}, {name}"] = Case([*base, *filter(None, sets.split("; "))])
+    for update in ("zero_order_hold", "first_order_hold", "euler", "paper"):
         sets = [f"pixel.low_pass.update={update}", "sampling.L=2", "sampling.K=5"]
         found[f"{update}, noiseless"] = Case([*NOISELESS, *sets])
         found[f"{update}, noise"] = Case([*BUSY, *sets])
-    found["first_order_hold, printed"] = Case(
-        [*NOISELESS, "pixel.low_pass.update=first_order_hold", "sampling.L=3", "sampling.K=10",
-         "sampling.last_interval=printed", "pixel.refractory=null"],
-    )  # fmt: skip
-    found["paper, jitter and hot pixels"] = Case(
-        ["pixel.leak.jitter=0.3", "pixel.leak.rate_hz=8", "pixel.hot_pixels.fraction=0.05",
-         "pixel.hot_pixels.rate_hz=300"],
-        files=["paper"],
-    )  # fmt: skip
+    sets = [
+        "pixel.low_pass.update=first_order_hold", "sampling.L=3", "sampling.K=10",
+        "sampling.last_interval=printed", "pixel.refractory=null",
+    ]  # fmt: skip
+    found["first_order_hold, printed"] = Case([*NOISELESS, *sets])
+    sets = [
+        "pixel.leak.jitter=0.3", "pixel.leak.rate_hz=8", "pixel.hot_pixels.fraction=0.05",
+        "pixel.hot_pixels.rate_hz=300",
+    ]  # fmt: skip
+    found["paper, jitter and hot pixels"] = Case(sets, files=["paper"])
     for clip in CLIPS:
         found[f"clip {clip}, noiseless"] = Case(NOISELESS, clip)
         found[f"clip {clip}, noise"] = Case(BUSY, clip)

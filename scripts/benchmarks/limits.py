@@ -46,8 +46,6 @@ _DEGREE = 6
 _C = np.polynomial.Chebyshev.interpolate(np.exp, _DEGREE, domain=[-1, 0]).convert(
     kind=np.polynomial.Polynomial
 )
-_C64 = tuple(float(c) for c in _C.coef)
-_C32 = tuple(np.float32(c) for c in _C.coef)
 
 
 @_compiled
@@ -64,22 +62,22 @@ def exp_library(x: Any, y: Any) -> None:
         y[i] = math.exp(x[i])
 
 
-@_compiled
-def exp_polynomial32(x: Any, y: Any) -> None:
-    """Write exp(x) to y for x in [-1, 0]: a polynomial of degree 6, float32."""
-    c0, c1, c2, c3, c4, c5, c6 = _C32
-    for i in range(x.shape[0]):
-        z = x[i]
-        y[i] = c0 + z * (c1 + z * (c2 + z * (c3 + z * (c4 + z * (c5 + z * c6)))))
+def _polynomial(coefficients: tuple[Any, ...]) -> Any:
+    c0, c1, c2, c3, c4, c5, c6 = coefficients
+
+    @_compiled
+    def polynomial(x: Any, y: Any) -> None:
+        for i in range(x.shape[0]):
+            z = x[i]
+            y[i] = c0 + z * (c1 + z * (c2 + z * (c3 + z * (c4 + z * (c5 + z * c6)))))
+
+    return polynomial
 
 
-@_compiled
-def exp_polynomial64(x: Any, y: Any) -> None:
-    """Write exp(x) to y for x in [-1, 0]: a polynomial of degree 6, float64."""
-    c0, c1, c2, c3, c4, c5, c6 = _C64
-    for i in range(x.shape[0]):
-        z = x[i]
-        y[i] = c0 + z * (c1 + z * (c2 + z * (c3 + z * (c4 + z * (c5 + z * c6)))))
+exp_polynomial32, exp_polynomial64 = (
+    _polynomial(tuple(kind(c) for c in _C.coef)) for kind in (np.float32, float)
+)
+"""Write exp(x) to y for x in [-1, 0]: a polynomial of degree 6, in the precision of its numbers."""
 
 
 @dataclass(frozen=True)

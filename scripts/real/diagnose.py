@@ -39,7 +39,7 @@ from real.model import SCORE, Bench
 from real.peers import peer_rows
 from real.recording import Real, halves, read
 from real.search import Search
-from real.steps import COLUMNS, Step, cells, steps_table
+from real.table import SHORT, Step, cells, steps_table
 from real.tried import UNSEEN, Added, tried_names
 from real.where_stable import where_stable
 
@@ -104,7 +104,7 @@ def _preamble(declared: str, only: Sequence[str]) -> str:
         f"Declared: {declared}. Distances relative to the measured grid, median over frame"
         " intervals, means over two seeds, on the second half of the intervals, which nothing was"
         " fitted to; 1 is as far as no events. In brackets: the distance between the two seeds."
-        f" 'mean': '{COLUMNS[SCORE]}' without the simulation's own chance, as of a mean of many."
+        f" 'mean': '{SHORT[SCORE]}' without the simulation's own chance, as of a mean of many."
         " 'over time' is the error of `adv2e compare`. Events and ON share: simulated over"
         f" measured. Camera effects tried: {tried}."
     )
@@ -194,7 +194,7 @@ def _beside_peers(real: Real, last: Step) -> str:
     rows = peer_rows(real.name)
     if not rows:
         return "No other tools were run on this recording."
-    names = ["simulator", *list(COLUMNS.values())[:3]]
+    names = ["simulator", *list(SHORT.values())[:3]]
     own = ["adv2e, model found", *cells(last.judged.values)[:3]]
     return table(names, [own, *rows])
 

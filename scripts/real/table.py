@@ -1,8 +1,9 @@
-"""The comparison as Markdown."""
+"""Tables of comparisons, and of what a search found step by step."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from writing import table
 
@@ -10,7 +11,8 @@ from adv2e.comparison.distances import MEASURES, distances
 from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows
 from adv2e.events import Events, empty_events
-from real.model import Judged
+from real.model import SCORE, Judged
+from real.tried import Added
 
 HEADER = (
     "Configurations named after a tool are that tool's parameters in the pixel of adv2e, not the"
@@ -26,6 +28,13 @@ COLUMNS = {
     "error": "over time",
 }
 """Measures and what the table calls them."""
+
+SHORT = {
+    name: COLUMNS[name] for name in ("relative_5_bins", SCORE, "relative_1_bin_smoothed", "error")
+}
+"""Measures of the tables of a search."""
+JUDGED = ("events", "ON share", *SHORT.values(), "mean")
+"""Titles of the columns of `judged_cells`."""
 
 PAIRS = "Pairs are simulated / measured; events and ON share are those of the intervals compared."
 FLOORS = (
@@ -65,7 +74,7 @@ def markdown(judged: Mapping[str, Judged], others: Mapping[str, Floor]) -> str:
     """Return the table of configurations, and of the marks to go by."""
     names = ["configuration", "events", "ON share", *COLUMNS.values(), "still"]
     rows = [[label, *_cells(one)] for label, one in judged.items()]
-    rows += [[label, "", "", *map(number, _values(one)), ""] for label, one in others.items()]
+    rows += [[label, "", "", *cells(one, COLUMNS), ""] for label, one in others.items()]
     return table(names, rows)
 
 
@@ -79,10 +88,6 @@ def _cells(judged: Judged) -> list[str]:
     ]
 
 
-def _values(found: Floor) -> list[float | None]:
-    return [found[name] for name in COLUMNS]
-
-
 def with_floors(judged: Judged, names: Iterable[str]) -> list[str]:
     """Return distances of these names, in brackets those between seeds."""
     return [f"{number(judged.values[name])} ({number(judged.floor[name])})" for name in names]
@@ -93,3 +98,40 @@ def number(value: float | None) -> str:
     if value is None:
         return "-"
     return f"{value:.2f}" if value < 100 else f"{value:.0f}"
+
+
+@dataclass(frozen=True)
+class Step:
+    """A model on the way, as judged on data that it was not fitted to."""
+
+    added: Added
+    judged: Judged
+
+
+def steps_table(
+    size: tuple[int, int], measured: Events, steps: Sequence[Step], windows: Windows
+) -> str:
+    """Return a row a step, and what chance and no events come to; `measured`: what it is of."""
+    rows = []
+    for step in steps:
+        levels = step.added.config.pixel.thresholds
+        thresholds = f"{levels.on:.3f} / {levels.off:.3f}"
+        rows.append([step.added.text(), thresholds, *judged_cells(step.judged)])
+    for label, values in marks(measured, windows, size).items():
+        rows.append([label, "", "", "", *cells(values), ""])
+    return table(["added", "ON / OFF threshold [ln]", *JUDGED], rows)
+
+
+def judged_cells(judged: Judged) -> list[str]:
+    """Return totals, distances and floors, and what counts without the simulation's own chance."""
+    return [
+        number(judged.events_ratio),
+        f"{number(judged.made.on_share)} / {number(judged.measured.on_share)}",
+        *with_floors(judged, SHORT),
+        number(judged.without_chance(SCORE)),
+    ]
+
+
+def cells(found: Floor, names: Iterable[str] = tuple(SHORT)) -> list[str]:
+    """Return distances of these names."""
+    return [number(found[name]) for name in names]

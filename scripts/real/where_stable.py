@@ -15,8 +15,7 @@ from adv2e.diagnosis.hints.readouts import without_coupling
 from adv2e.events import Events
 from real.model import SCORE, Bench
 from real.stability import LINES, MOST, Stability, compare_halved
-from real.steps import COLUMNS, JUDGED, Step, judged_cells, steps_table
-from real.table import number
+from real.table import JUDGED, SHORT, Step, judged_cells, number, steps_table
 
 
 def where_stable(
@@ -80,7 +79,7 @@ def _by_line(bench: Bench, stability: Stability, converted: Sequence[Events]) ->
                 number(half_split(measured, windows, *real.size)[SCORE]),
             ]
         )
-    last = f"half split, {COLUMNS[SCORE]}"
+    last = f"half split, {SHORT[SCORE]}"
     return table(["change below", "measured events", *JUDGED, last], rows)
 
 
