@@ -93,13 +93,11 @@ def command(
     from adv2e.diagnosis.tables.declared import read_declared
     from adv2e.diagnosis.tables.report import summary, write_reports
     from adv2e.diagnosis.tables.table import read_table
-    from adv2e.files.apart import check_apart
     from adv2e.files.names import shown
     from adv2e.reports.files import check_folder
 
     if output is not None:
-        check_folder(output, overwrite=overwrite)
-        check_apart(output, [table, *options.files_given()])
+        check_folder(output, overwrite=overwrite, inputs=[table, *options.files_given()])
     declared = read_declared(config_files, sets, seed)
     settings = Settings(
         where=where,

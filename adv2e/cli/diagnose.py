@@ -69,7 +69,6 @@ def command(
     from adv2e.diagnosis.fitting.library import names
     from adv2e.diagnosis.fitting.own_effects import without_user_effects
     from adv2e.diagnosis.outcome.report import write_reports
-    from adv2e.files.apart import check_apart
     from adv2e.pixel.array import is_compiled
     from adv2e.reports.files import check_folder
     from adv2e.reports.summary import summary_text
@@ -81,8 +80,7 @@ def command(
     written = written_keys(*given)
     config = without_user_effects(config, written)
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
-    check_folder(folder, overwrite=overwrite)
-    check_apart(folder, [recording, *options.files_given()])
+    check_folder(folder, overwrite=overwrite, inputs=[recording, *options.files_given()])
     evidence = read_evidence(recording, time_unit)
     if not is_compiled(config.pixel, config.sampling):
         log(announcement())

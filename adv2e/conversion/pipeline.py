@@ -28,7 +28,6 @@ from adv2e.conversion.versions import versions
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
-from adv2e.files.apart import check_apart
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
 from adv2e.formats.writing import Sink, format_name, open_sink
@@ -184,10 +183,6 @@ def convert(
     if recording.largest is not None and recording.dtype.kind == "f":
         check_white(recording.largest, recording.path, config.frames.full_scale)
     target = output or default_output(reading.path)
-    inputs = (*reading.inputs, *also_read)
-    for written in (target, preview):
-        if written not in (None, "-"):
-            check_apart(written, inputs)
     keeps_all_bits = _holds_frames(target, format)
     with_frames = with_frames or keeps_all_bits
     decoder = decoder_for(
@@ -199,7 +194,8 @@ def convert(
     )
     white = picture_white(recording.dtype, decoder.full_scale, not keeps_all_bits)
     # events and preview come into place together, when all is written
-    with Staging(overwrite) as staging, ExitStack() as stack:
+    inputs = (*reading.inputs, *also_read)
+    with Staging(overwrite, inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
                 target if target == "-" else Path(target),
@@ -214,7 +210,6 @@ def convert(
             )
         )
         out = _Output(sink, _open_preview(preview, recording, staging, stack), white)
-        staging.keep_apart(inputs)
         call: _Call = _call_now
         # a write to standard output may block until the reader pleases, and only the main thread
         # can be interrupted in it

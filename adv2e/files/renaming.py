@@ -40,7 +40,7 @@ def move_to_free(path: Path, name: Path) -> None:
 
 
 def exchange(one: Path, other: Path) -> bool:
-    """Give two folders each other's name in one step; False where the system does not do that."""
+    """Exchange two names in one step; return False where the system does not do that."""
     names = os.fsencode(one), os.fsencode(other)
     with suppress(OSError, AttributeError, TypeError):  # TypeError: Windows
         system = ctypes.CDLL(None)
@@ -61,16 +61,14 @@ def sync(path: Path) -> None:
     if path.is_dir():
         for entry in path.iterdir():
             sync(entry)
-    elif os.name == "nt":
-        _sync(path, os.O_RDWR)
-        return
-    _sync(path, os.O_RDONLY)
+    sync_one(path)
 
 
-def _sync(path: Path, flags: int) -> None:
+def sync_one(path: Path) -> None:
+    """Have the disk hold a file, or the names in a folder."""
     if os.name == "nt" and path.is_dir():
         return
-    descriptor = os.open(path, flags)
+    descriptor = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
     try:
         os.fsync(descriptor)
     except OSError as error:
@@ -78,9 +76,3 @@ def _sync(path: Path, flags: int) -> None:
             raise
     finally:
         os.close(descriptor)
-
-
-def sync_names(folder: Path) -> None:
-    """Have the disk hold the names in a folder, where that can be asked for."""
-    with suppress(OSError):
-        _sync(folder, os.O_RDONLY)

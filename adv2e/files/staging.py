@@ -1,66 +1,53 @@
 """Writing under temporary names, so that a final name only ever holds finished work.
 
-Temporary names lie in the folder of the final one, where a rename is a single step.  An output
-may be several files (events and the metadata beside them) or a folder: they come into place
-together or not at all, and what they replace stays until then.
+Outputs are written in a hidden folder beside their final names, where a rename is a single step.
+An output may be several files (events and the metadata beside them) or a folder: they come into
+place together or not at all, and what they replace stays until then.
 
-Killed at any instant, a run leaves what was there before or what it made, whole.  Of two files, one
-that tells about the other is moved aside first and comes into place last: for an instant it is
-missing, but never tells about another file than the one beside it.  What is left otherwise, the
-next run in that folder removes (:mod:`adv2e.files.leavings`).
+Killed at any instant, a run leaves what was there before or what it made, whole.  Of several
+outputs those after the first may be missing then, but never tell about another file than the one
+beside them; the next run in that folder puts them in place, or back, and removes the rest
+(:mod:`adv2e.files.workspace`).
 """
 
 from __future__ import annotations
 
-import errno
 import os
 import re
-import secrets
-import shutil
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from types import TracebackType
 
 from adv2e.errors import OutputError
-from adv2e.files.apart import check_apart
-from adv2e.files.leavings import Claim, Names, clear, remove
-from adv2e.files.renaming import exchange, move_to_free, sync, sync_names
-from adv2e.process import cleanup as unfinished
+from adv2e.files.distinct import check_distinct
+from adv2e.files.renaming import exchange, move_to_free, sync, sync_one
+from adv2e.files.workspace import Identity, Workspace, identity_of, remove_abandoned
+from adv2e.process import cleanup
 
 
 @dataclass(eq=False)
 class _Output:
-    """One file or folder to be: as the user named it, where it will lie, where it is written.
+    """One file or folder: as the user named it, where it will lie, where it is written.
 
-    `aside` is where what it replaces lies meanwhile; `about` is the output that it tells about;
-    `identity` is that of the finished file or folder, and `replaces` whether there is another.
+    `aside` is where what it replaces may lie meanwhile; `identity` is that of what was written.
     """
 
     named: Path
     final: Path
     temporary: Path
     aside: Path
-    about: _Output | None = None
-    identity: tuple[int, int] | None = None
-    replaces: bool = False
+    identity: Identity | None = None
 
     @property
     def is_placed(self) -> bool:
-        """Whether what was made has the final name."""
-        return self.identity is not None and _identity(self.final) == self.identity
-
-    def names(self) -> Names:
-        """Return all but the folder."""
-        waits_for = None
-        if self.about is not None:
-            is_beside = self.about.final.parent == self.final.parent
-            waits_for = self.about.temporary.name if is_beside else ""
-        return Names(self.temporary.name, self.aside.name, self.final.name, waits_for)
+        """Whether what was written has the final name."""
+        return self.identity is not None and identity_of(self.final) == self.identity
 
 
-class Staging(unfinished.Unfinished):
+class Staging(cleanup.Unfinished):
     """Files and folders on their way to their final names.
 
     First all are named with :meth:`file` and :meth:`folder`, which check and touch nothing; then
@@ -73,14 +60,16 @@ class Staging(unfinished.Unfinished):
     ----------
     overwrite : bool
         Outputs that exist are replaced, at the end.
+    inputs : iterable of str or Path
+        What is read, where nothing may be written; see :func:`check_distinct`.
     """
 
-    def __init__(self, overwrite: bool) -> None:
+    def __init__(self, overwrite: bool, inputs: Iterable[str | Path] = ()) -> None:
         self._overwrite = overwrite
+        self._inputs = list(inputs)
         self._outputs: list[_Output] = []
+        self._workspaces: dict[Path, Workspace] = {}
         self._made: list[Path] = []
-        self._claims: list[Claim] = []
-        self._claimed = 0
         self._committing = False
         self._is_shared = False
 
@@ -101,27 +90,20 @@ class Staging(unfinished.Unfinished):
         finally:
             self.discard()
 
-    def file(self, path: Path, about: Path | None = None) -> Path:
-        """Return the temporary name of the file `path`.
-
-        Parameters
-        ----------
-        path : Path
-        about : Path, optional
-            Temporary name of the file that it tells about.
+    def file(self, path: Path) -> Path:
+        """Return the temporary name of the file `path`, with its suffix.
 
         Raises
         ------
         OutputError
-            `path` exists and is not to be replaced, is not a file, or is below a file.
+            `path` exists and is not to be replaced, is not a file, is below a file, or is read.
         """
-        output = _output(path)
-        output.about = next((one for one in self._outputs if one.temporary == about), None)
-        if output.final.is_dir():
+        final = self._final(path)
+        if final.is_dir():
             raise OutputError(f"{path}: is a folder, and a file is to be written")
-        if os.path.lexists(output.final) and not output.final.is_file():
+        if os.path.lexists(final) and not final.is_file():
             raise OutputError(f"{path}: is not a regular file")
-        return self._add(output)
+        return self._add(path, final)
 
     def folder(self, path: Path, foreign: Callable[[Path], str | None]) -> Path:
         """Return the temporary name of the folder `path`.
@@ -136,61 +118,68 @@ class Staging(unfinished.Unfinished):
         ------
         OutputError
             `path` exists and is not to be replaced, is a file, holds other things than such
-            outputs do, or is below a file.
+            outputs do, is below a file, or is read.
         """
-        output = _output(path)
-        if os.path.lexists(output.final):
-            if not output.final.is_dir():
+        final = self._final(path)
+        if os.path.lexists(final):
+            if not final.is_dir():
                 raise OutputError(f"{path}: is a file, and a folder is to be written")
-            other = foreign(output.final) if self._overwrite else None
+            other = foreign(final) if self._overwrite else None
             if other is not None:
                 raise OutputError(
                     f"{path}: holds {other}, which would be lost: choose another folder"
                 )
-        return self._add(output)
+        return self._add(path, final)
 
-    def _add(self, output: _Output) -> Path:
-        self._check_free(output)
-        above = nearest_there(output.final)
+    def _final(self, path: Path) -> Path:
+        """Return where `path` leads: a symbolic link stays, and what it points to is replaced."""
+        check_distinct(path, self._inputs)
+        final = Path(os.path.realpath(path))
+        if not final.name:
+            raise OutputError(f"{path}: cannot be replaced, choose a name below it")
+        try:
+            final.lstat()
+        except (FileNotFoundError, NotADirectoryError):
+            pass
+        except OSError as error:  # its name is too long, or nothing may be seen there
+            raise OutputError(f"{path}: {error.strerror}") from None
+        return final
+
+    def _add(self, path: Path, final: Path) -> Path:
+        self._check_free(path, final)
+        above = nearest_there(final)
         if not above.is_dir():
-            raise OutputError(f"{output.named}: {above} is not a folder")
+            raise OutputError(f"{path}: {above} is not a folder")
         for other in self._outputs:
-            if _are_one(output.final, other.final):
-                raise OutputError(f"{output.named}: is to be two outputs; choose another name")
-            if other.final in output.final.parents or output.final in other.final.parents:
+            if _are_one(final, other.final):
+                raise OutputError(f"{path}: is to be two outputs; choose another name")
+            if other.final in final.parents or final in other.final.parents:
                 raise OutputError(
-                    f"{output.named} and {other.named}: one lies in the other; choose another name"
+                    f"{path} and {other.named}: one lies in the other; choose another name"
                 )
+        workspace = self._workspaces.setdefault(final.parent, Workspace(final.parent)).path
+        # OpenCV and others choose the format by the suffix
+        name = f"{len(self._outputs)}{re.sub(r'[^A-Za-z0-9._-]', '_', final.suffix)[:20]}"
+        output = _Output(path, final, workspace / f"new{name}", workspace / f"old{name}")
         self._outputs.append(output)
         return output.temporary
 
-    def _check_free(self, output: _Output) -> None:
-        if os.path.lexists(output.final) and not self._overwrite:
-            raise OutputError(f"{output.named}: exists already; --overwrite replaces it")
-
-    def keep_apart(self, inputs: Iterable[str | Path]) -> None:
-        """Refuse to write where something is read from; see :func:`check_apart`."""
-        for output in self._outputs:
-            check_apart(output.named, inputs)
+    def _check_free(self, path: Path, final: Path) -> None:
+        if os.path.lexists(final) and not self._overwrite:
+            raise OutputError(f"{path}: exists already; --overwrite replaces it")
 
     def prepare(self) -> None:
         """Make the folders that the outputs are to lie in, and clear them of what runs left."""
-        unfinished.add(self)
-        new = self._outputs[self._claimed :]
-        self._claimed = len(self._outputs)
-        for output in new:
-            missing = []
-            above = output.final.parent
-            while not above.exists():
-                missing.append(above)
-                above = above.parent
-            for folder in reversed(missing):
-                self._made.append(folder)
-                folder.mkdir(exist_ok=True)
-        for folder in dict.fromkeys(output.final.parent for output in new):
-            clear(folder)
-            here = (output.names() for output in new if output.final.parent == folder)
-            self._claims.append(Claim(folder, here))
+        cleanup.add(self)
+        for folder, workspace in self._workspaces.items():
+            if workspace.is_made:
+                continue
+            missing = takewhile(lambda above: not above.exists(), (folder, *folder.parents))
+            for above in reversed(list(missing)):
+                self._made.append(above)
+                above.mkdir(exist_ok=True)
+            remove_abandoned(folder)
+            workspace.make()
 
     def commit(self) -> None:
         """Give all outputs their final names; if that fails, everything is as it was.
@@ -203,71 +192,67 @@ class Staging(unfinished.Unfinished):
         if self._is_shared or not self._outputs:
             return
         self._committing = True
-        at_work = self._outputs[0]
+        at_work = first = self._outputs[0]
         try:
             for at_work in self._outputs:
-                self._check_free(at_work)
+                self._check_free(at_work.named, at_work.final)
                 sync(at_work.temporary)
-                at_work.identity = _identity(at_work.temporary)
-                at_work.replaces = os.path.lexists(at_work.final)
-            for claim in self._claims:
-                claim.note_placing()
+                at_work.identity = identity_of(at_work.temporary)
+            self._note_placing()
+            # the others may tell about the first, and must not tell about the one that it replaces
+            for at_work in self._outputs[1:]:
+                if os.path.lexists(at_work.final):
+                    at_work.final.rename(at_work.aside)
             for at_work in self._outputs:
-                self._keep(at_work)
-            for at_work in self._outputs:
-                self._place(at_work)
+                self._place(at_work, replaces=self._overwrite and at_work is first)
         except BaseException as error:
             self._roll_back()
             if isinstance(error, FileExistsError):
-                self._check_free(at_work)
+                self._check_free(at_work.named, at_work.final)
             if isinstance(error, OSError):
                 raise OutputError(
                     f"{at_work.named}: cannot be written: {error.strerror or error}"
                 ) from error
             raise
-        for folder in dict.fromkeys(output.final.parent for output in self._outputs):
-            sync_names(folder)
+        for folder in self._workspaces:
+            with suppress(OSError):
+                sync_one(folder)
         self._end()
 
-    def _keep(self, output: _Output) -> None:
-        """See to it that what is replaced can be brought back, if that needs a name of its own."""
-        if not os.path.lexists(output.final) or output.temporary.is_dir():
-            return
-        if output.about is not None:
-            output.final.rename(output.aside)  # it must not tell about what is there next
-        elif len(self._outputs) > 1:
-            with suppress(OSError):  # not where there are no hard links
-                os.link(output.final, output.aside)
+    def _note_placing(self) -> None:
+        first = self._outputs[0]
+        assert first.identity is not None
+        for folder, workspace in self._workspaces.items():
+            here = (output for output in self._outputs if output.final.parent == folder)
+            names = ((one.temporary.name, one.aside.name, one.final.name) for one in here)
+            workspace.note_placing((first.final, first.identity), names)
 
-    def _place(self, output: _Output) -> None:
+    def _place(self, output: _Output, *, replaces: bool) -> None:
         final, temporary = output.final, output.temporary
-        if not self._overwrite:
+        if not replaces or not os.path.lexists(final):
             move_to_free(temporary, final)
-        elif not temporary.is_dir():
-            if any(_are_one(final, other.final) for other in self._outputs if other.is_placed):
-                raise FileExistsError(errno.EEXIST, "it is another output, too")
+        elif exchange(temporary, final):
+            pass
+        elif len(self._outputs) == 1 and not temporary.is_dir():
             temporary.replace(final)
-        elif not os.path.lexists(final):
-            move_to_free(temporary, final)
-        elif not exchange(temporary, final):
+        else:
             final.rename(output.aside)
             temporary.rename(final)
 
     def _roll_back(self) -> None:
+        """Take back what came into place; what lies aside is put back when the rest is removed."""
+        if all(output.is_placed for output in self._outputs):
+            return
         for output in reversed(self._outputs):
-            final, temporary, aside = output.final, output.temporary, output.aside
-            # should any of this fail, the old output stays under its other name
-            with suppress(OSError):
-                if not output.is_placed:
-                    pass
-                elif temporary.is_dir():  # which was there before
-                    exchange(temporary, final)
-                elif os.path.lexists(temporary):
-                    final.unlink()
-                elif not output.replaces or os.path.lexists(aside):
-                    final.rename(temporary)
-                if os.path.lexists(aside) and not os.path.lexists(final):
-                    aside.rename(final)
+            if output.is_placed:
+                there = identity_of(output.temporary)
+                with suppress(OSError):
+                    if there is None:
+                        output.final.rename(output.temporary)
+                    elif there == output.identity:
+                        output.final.unlink()  # it has both names
+                    else:
+                        exchange(output.temporary, output.final)
 
     def discard(self) -> None:
         """Remove everything temporary, and the folders made for it."""
@@ -279,14 +264,9 @@ class Staging(unfinished.Unfinished):
                 folder.rmdir()
 
     def _end(self) -> None:
-        for output in self._outputs:
-            remove(output.temporary)
-            if os.path.lexists(output.final):
-                remove(output.aside)
-        for claim in self._claims:
-            claim.drop()
-        self._claims.clear()
-        unfinished.drop(self)
+        for workspace in self._workspaces.values():
+            workspace.remove()
+        cleanup.drop(self)
 
     def remove_now(self) -> bool:
         """Remove everything temporary although it may be written to at this moment.
@@ -296,17 +276,12 @@ class Staging(unfinished.Unfinished):
         """
         if self._committing:
             return False
-        for output in self._outputs:
-            if output.temporary.is_dir():
-                # under its new name nobody adds anything to it, but for what was under way
-                gone = output.temporary.with_name(output.temporary.name + "-")
-                output.temporary.rename(gone)
-                shutil.rmtree(gone, ignore_errors=True)
-                if gone.exists():
-                    shutil.rmtree(gone)
+        made = [workspace for workspace in self._workspaces.values() if workspace.is_made]
+        for workspace in made:
+            workspace.hide()
         self._is_shared = False
         self.discard()
-        return not any(os.path.lexists(output.temporary) for output in self._outputs)
+        return not any(workspace.path.exists() for workspace in made)
 
 
 def check_free(outputs: Iterable[Path], overwrite: bool) -> None:
@@ -318,43 +293,7 @@ def check_free(outputs: Iterable[Path], overwrite: bool) -> None:
 
 def nearest_there(path: Path) -> Path:
     """Return what a file or folder would be made in: the nearest above it that exists."""
-    above = path.parent
-    while not os.path.lexists(above):
-        above = above.parent
-    return above
-
-
-def _output(path: Path) -> _Output:
-    """Return where `path` leads: a symbolic link stays, and what it points to is replaced."""
-    final = Path(os.path.realpath(path))
-    if not final.name:
-        raise OutputError(f"{path}: cannot be replaced, choose a name below it")
-    try:
-        final.lstat()
-    except (FileNotFoundError, NotADirectoryError):
-        pass
-    except OSError as error:  # its name is too long, or nothing may be seen there
-        raise OutputError(f"{path}: {error.strerror}") from None
-    return _Output(path, final, _beside(final), _beside(final))
-
-
-def _beside(path: Path) -> Path:
-    """Return a free, hidden name in the folder of `path`, which any program can open.
-
-    It is short, whatever the length of its own, and of plain characters; and has the suffix of
-    `path`, by which OpenCV and others choose the format.
-    """
-    stem, suffix = (re.sub(r"[^A-Za-z0-9._-]", "_", part) for part in (path.stem, path.suffix))
-    return path.with_name(f".{stem[:40]}.{secrets.token_hex(4)}.part{suffix[:20]}")
-
-
-def _identity(path: Path) -> tuple[int, int] | None:
-    """Return what tells a file or folder from all others by any name; None: it is not there."""
-    try:
-        status = path.lstat()
-    except OSError:
-        return None
-    return status.st_dev, status.st_ino
+    return next(above for above in path.parents if os.path.lexists(above))
 
 
 def _are_one(one: Path, other: Path) -> bool:

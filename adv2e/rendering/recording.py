@@ -11,7 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from adv2e.errors import DataError
-from adv2e.files.apart import check_apart
+from adv2e.files.distinct import check_distinct
 from adv2e.light.pictures import drawn_frame
 from adv2e.rendering.films import spread, stride_of
 from adv2e.rendering.preview import SHEET_STEP_US, open_preview
@@ -68,7 +68,7 @@ def render_recording(
     OutputError, UsageError
         See :func:`open_preview`.
     """
-    check_apart(path, [recording.path])
+    check_distinct(path, [recording.path])
     begin_us, until_us = _span_us(recording)
     lasts = f"{recording.path}: lasts {(until_us - begin_us) * 1e-6:.3f} s"
     frames = frames and recording.frame_times_ns is not None and recording.frame_times_ns.size > 0

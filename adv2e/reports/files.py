@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from adv2e.errors import OutputError
@@ -16,7 +16,9 @@ from adv2e.reports.wording import Wording
 NAMES = ("report.html", "report.json", "model.yaml")
 
 
-def check_folder(folder: str | Path, *, overwrite: bool = False) -> None:
+def check_folder(
+    folder: str | Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
+) -> None:
     """Check before long work that :func:`write_reports` will take `folder`.
 
     What is there is not touched; a nameless file is made for a moment where the folder would be
@@ -25,9 +27,9 @@ def check_folder(folder: str | Path, *, overwrite: bool = False) -> None:
     Raises
     ------
     OutputError
-        As :func:`write_reports` raises it.
+        As :func:`write_reports` raises it; or one of the `inputs` would be lost.
     """
-    Staging(overwrite).folder(Path(folder), _foreign)
+    Staging(overwrite, inputs).folder(Path(folder), _foreign)
     above = nearest_there(Path(folder).absolute())
     try:
         with tempfile.TemporaryFile(dir=above):

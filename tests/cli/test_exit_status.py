@@ -203,13 +203,13 @@ ADDING = """
 """A thread goes on making files in the folder."""
 
 COMING_INTO_PLACE = """
-        rename = pathlib.Path.rename
-        def slowly(path, target):
-            rename(path, target)
-            pathlib.Path.rename = rename
+        unlink = pathlib.Path.unlink
+        def slowly(path, *args):
+            unlink(path, *args)
+            pathlib.Path.unlink = unlink
             print('ready', flush=True)
             wait()
-        pathlib.Path.rename = slowly
+        pathlib.Path.unlink = slowly  # of the first of two outputs, which has its final name
         staging.commit()
 """
 

@@ -132,7 +132,7 @@ class TextSink(FileSink):
 
     def __init__(self, path: Path, description: dict[str, Any], staging: Staging) -> None:
         self._temporary = staging.file(path)
-        self._beside = staging.file(path.with_name(path.name + ".json"), about=self._temporary)
+        self._beside = staging.file(path.with_name(path.name + ".json"))
         self._description = to_json(description)
         self._file: BinaryIO | None = None
         super().__init__(path, staging)

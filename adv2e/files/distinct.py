@@ -16,7 +16,7 @@ _PICTURES = (
 )
 
 
-def check_apart(output: str | Path, inputs: Iterable[str | Path]) -> None:
+def check_distinct(output: str | Path, inputs: Iterable[str | Path]) -> None:
     """Refuse to write where something is read from, whether it may be replaced or not.
 
     Parameters
