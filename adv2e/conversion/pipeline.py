@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e import __version__
-from adv2e.background import WriteBehind
+from adv2e.background import OrderedWork
 from adv2e.compiled import announcement
 from adv2e.config import Config, to_dict
 from adv2e.config.active_effects import user_sources
@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 BEHIND_BYTES = 16 << 20
 """Memory for events and frames that were made and not written yet."""
+
+BEHIND_TASKS = 1000
+"""How many pieces of them there may be."""
 
 
 @dataclass(frozen=True)
@@ -67,10 +70,10 @@ class Summary:
 
 
 _Call = Callable[..., None]
-"""Takes a cost in bytes, a function and its arguments, and calls it now or later."""
+"""Takes a function and its arguments, and calls it now or later."""
 
 
-def _call_now(_: int, function: Callable[..., None], *arguments: Any) -> None:
+def _call_now(function: Callable[..., None], *arguments: Any) -> None:
     function(*arguments)
 
 
@@ -120,12 +123,11 @@ class _Passing:
             self.last_ns = still.t_ns
             self.count += 1
             if still.picture is not None:
-                size = still.picture.nbytes
-                self._call(size, self._output.add_frame, still.t_ns, still.picture)
+                self._call(self._output.add_frame, still.t_ns, still.picture)
             now = still.t_ns, still.light
             del still  # with its picture
             yield now
-        self._call(0, self._output.no_more_frames)
+        self._call(self._output.no_more_frames)
 
 
 def default_output(source: str) -> str:
@@ -214,7 +216,9 @@ def convert(
         # a write to standard output may block until the reader pleases, and only the main thread
         # can be interrupted in it
         if workers > 1 and target != "-":
-            call = stack.enter_context(WriteBehind(BEHIND_BYTES)).call
+            call = stack.enter_context(
+                OrderedWork(1, limit=BEHIND_BYTES, count=BEHIND_TASKS)
+            ).submit
         told = _doubt_of_white(recording, recording.largest, config)
         for doubt in filter(None, (*recording.doubts, told)):
             log(doubt)
@@ -234,11 +238,11 @@ def convert(
             config,
             threads=workers,
             table=table,
-            complete=None if preview is None else lambda t_us: call(0, out.complete_until, t_us),
+            complete=None if preview is None else lambda t_us: call(out.complete_until, t_us),
         )
         for events in chunks:
             for piece in _pieces(events):
-                call(piece.nbytes, out.add_events, piece)
+                call(out.add_events, piece)
             del events, piece  # or they would stay while the next ones are made
     # at the end: an error is to be the only line
     log(f"light: {light_text(recording.light, recording.full_scale, config.frames)}")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from adv2e.background import ReadAhead
+from adv2e.background import read_ahead
 from adv2e.effects.frames.brightness import check_floats, check_light
 from adv2e.errors import Adv2eError, DataError
 from adv2e.light.pictures import picture_of
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from adv2e.effects.frames.encoding import LightDecoder
 
 AHEAD_BYTES = 16 << 20
-"""Memory for frames that were decoded and not taken yet."""
+"""Memory for frames that were decoded and not taken yet, light and what is seen of them."""
 
 EARLY_BYTES = 32 << 20
 """Memory for frames that were read before it was known what they are to become."""
@@ -44,11 +44,6 @@ class Still:
     t_ns: int
     light: NDArray[Any]
     picture: NDArray[Any] | None
-
-    @property
-    def nbytes(self) -> int:
-        """Memory that it takes."""
-        return self.light.nbytes + (0 if self.picture is None else self.picture.nbytes)
 
 
 @dataclass(frozen=True)
@@ -168,8 +163,8 @@ class Reading:
         source.threads = self.threads
         self._stills = _stills(source.frames(), self._decoding)
         if self.threads > 1:
-            ahead = ReadAhead(self._stills, cost=lambda still: still.nbytes, limit=AHEAD_BYTES)
-            self._stills = self._at_end.enter_context(ahead)
+            count = max(1, AHEAD_BYTES // (8 * source.width * source.height))
+            self._stills = self._at_end.enter_context(read_ahead(self._stills, count))
             self._at_end.callback(self._decoding.cancel)  # its thread may wait for it
         return self
 

@@ -16,8 +16,8 @@ import h5py
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from adv2e.background import OrderedWork
 from adv2e.formats.deflate import deflate_shuffled, deflate_words
-from adv2e.formats.work import OrderedWork
 
 CHUNK = 1 << 16
 """Rows of a chunk."""

@@ -27,12 +27,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.background import OrderedWork
 from adv2e.events import Events
 from adv2e.files.staging import Staging
 from adv2e.formats.sink import FileSink, seconds_text, to_json
 from adv2e.formats.spool import FrameSpool
 from adv2e.formats.text.writer import text_blocks
-from adv2e.formats.work import OrderedWork
 
 _BLOCK = 1 << 20  # bytes of text deflated at once: the archive must not depend on who calls how
 _LEVEL = 4  # of deflate: a fifth more bytes than level 6, in a third of its time

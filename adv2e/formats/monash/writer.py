@@ -30,12 +30,12 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.background import OrderedWork
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.staging import Staging
 from adv2e.formats.columns import FILTERS, ChunkedColumns, Column, encode_image
 from adv2e.formats.sink import FileSink, to_json
 from adv2e.formats.spool import FrameSpool, StoredFrame
-from adv2e.formats.work import OrderedWork
 
 _CACHE_BYTES = 512 << 10
 """Memory for the index of chunks and images, as HDF5 counts it, a tenth of what it takes.

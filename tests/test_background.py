@@ -4,11 +4,12 @@ import threading
 import time
 import weakref
 
+import numpy as np
 import pytest
 from processes import running_python
 from threads import own_threads, wait_until
 
-from adv2e.background import ReadAhead, WriteBehind, worker_pool
+from adv2e.background import OrderedWork, read_ahead, worker_pool
 
 
 @pytest.fixture(autouse=True)
@@ -43,8 +44,8 @@ class Made:
         self.closed_by = threading.get_ident()
 
 
-def ahead(items, limit=3):
-    return ReadAhead(items, cost=lambda item: 1, limit=limit)
+def ahead(items, count=3):
+    return read_ahead(items, count)
 
 
 class TestReadAhead:
@@ -62,22 +63,13 @@ class TestReadAhead:
 
     def test_what_is_ahead_is_bounded(self):
         source = Made()
-        with ahead(source, limit=3) as items:
-            wait_until(lambda: source.made == 4)  # three that wait and one in the hand
+        with ahead(source) as items:
+            wait_until(lambda: source.made == 3)
             for number in range(5):
                 assert next(items) == number
-            wait_until(lambda: source.made == 8)  # the one taken last still counts
+            wait_until(lambda: source.made == 7)
             time.sleep(0.02)
-            assert source.made == 8
-
-    def test_an_item_dearer_than_the_limit_passes_alone(self):
-        source = Made(5)
-        with ReadAhead(source, cost=lambda item: 100, limit=3) as items:
-            assert next(items) == 0
-            wait_until(lambda: source.made == 2)
-            time.sleep(0.02)
-            assert source.made == 2
-            assert list(items) == [1, 2, 3, 4]
+            assert source.made == 7
 
     def test_an_error_comes_after_the_items_before_it(self):
         seen = []
@@ -96,7 +88,7 @@ class TestReadAhead:
     def test_leaving_by_an_error_while_the_source_waits_for_room(self):
         source = Made()
         with pytest.raises(KeyError), ahead(source):
-            wait_until(lambda: source.made == 4)
+            wait_until(lambda: source.made == 3)
             raise KeyError
         assert source.closed_by in source.threads
 
@@ -111,101 +103,135 @@ class TestReadAhead:
 
         with ahead(numbers()) as items:
             next(items)
-        assert ended == ["adv2e-read"]
+        assert ended == ["adv2e-read_0"]
 
 
-class TestWriteBehind:
-    def test_calls_are_made_in_order_by_another_thread(self):
-        made = []
-        with WriteBehind(5) as behind:
-            for number in range(1000):
-                behind.call(1, lambda n: made.append((n, threading.get_ident())), number)
-        assert [number for number, _ in made] == list(range(1000))
-        assert threading.get_ident() not in {thread for _, thread in made}
+def test_results_are_taken_in_the_order_of_submission():
+    taken = []
+    work = OrderedWork(4)
 
-    def test_calls_that_wait_are_bounded(self):
-        gate = threading.Event()
-        accepted = []
+    def slow_when_even(number):
+        time.sleep(0.002 * (number % 2 == 0))
+        return number
 
-        def submit():
-            for number in range(10):
-                behind.call(1, gate.wait)
-                accepted.append(number)
+    for number in range(50):
+        work.submit(slow_when_even, number, take=taken.append)
+    work.finish()
 
-        with WriteBehind(3) as behind:
-            submitting = threading.Thread(target=submit)
-            submitting.start()
-            wait_until(lambda: len(accepted) == 3)  # the one at work counts
-            time.sleep(0.02)
-            assert len(accepted) == 3
-            gate.set()
-            submitting.join()
-        assert len(accepted) == 10
+    assert taken == list(range(50))
 
-    def test_a_failure_ends_the_next_call_and_drops_those_that_wait(self):
-        done = []
-        gate = threading.Event()
 
-        def fail():
-            gate.wait()
-            raise OSError("disk full")
+def test_results_are_taken_by_the_submitting_thread():
+    takers = set()
+    work = OrderedWork(2)
+    for _ in range(30):
+        work.submit(threading.get_ident, take=lambda _: takers.add(threading.get_ident()))
+    work.finish()
 
-        with pytest.raises(OSError, match="disk full"), WriteBehind(100) as behind:
-            behind.call(1, done.append, 1)
-            behind.call(1, fail)
-            behind.call(1, done.append, 2)
-            gate.set()
-            wait_until(lambda: not own_threads())
-            behind.call(1, done.append, 3)
-            raise AssertionError("not reached")
-        assert done == [1]
+    assert takers == {threading.get_ident()}
 
-    def test_a_failure_frees_who_waits_for_room(self):
-        def fail():
-            time.sleep(0.02)
-            raise BrokenPipeError
 
-        with pytest.raises(BrokenPipeError), WriteBehind(1) as behind:
-            for _ in range(3):
-                behind.call(1, fail)
+def test_work_ahead_is_bounded():
+    work = OrderedWork(1)
+    running = threading.Event()
+    submitted = []
 
-    def test_a_failure_of_the_last_call_ends_the_block(self):
-        with pytest.raises(ValueError, match="last"), WriteBehind(10) as behind:
-            behind.call(1, int, "last")
+    def submit_all():
+        for number in range(100):
+            work.submit(running.wait, take=lambda _: None)
+            submitted.append(number)
 
-    def test_an_error_of_the_block_drops_what_waits_and_is_what_is_raised(self):
-        gate = threading.Event()
-        done = []
+    thread = threading.Thread(target=submit_all)
+    thread.start()
+    time.sleep(0.05)
+    assert len(submitted) < 20
+    running.set()
+    thread.join()
+    work.finish()
+    assert len(submitted) == 100
 
-        def slow():
-            gate.wait()
-            raise OSError("not the first")
 
-        with pytest.raises(KeyError, match="mine"), WriteBehind(10) as behind:
-            behind.call(1, slow)
-            behind.call(1, done.append, 1)
-            threading.Timer(0.02, gate.set).start()
-            raise KeyError("mine")
-        assert done == []
+def test_memory_of_work_ahead_is_bounded():
+    work = OrderedWork(4, limit=250)
+    begun, taken = [], []
+    for _ in range(20):
+        work.submit(len, np.zeros(100, np.uint8), take=taken.append)
+        begun.append(1)
+        assert len(begun) - len(taken) <= 2
+    work.submit(len, np.zeros(1000, np.uint8), take=taken.append)  # too large, so by itself
+    assert len(taken) == 20
+    work.finish()
+    assert taken == [100] * 20 + [1000]
 
-    def test_what_was_called_is_not_held(self):
-        class Big:
-            pass
 
-        with WriteBehind(10) as behind:
-            done = threading.Event()
-            big = Big()
-            held = weakref.ref(big)
-            behind.call(1, lambda big: None, big)
-            del big
-            behind.call(1, done.set)
-            done.wait()
-            wait_until(lambda: held() is None)
+def test_without_threads_the_one_that_submits_works():
+    work = OrderedWork(0)
+    taken = []
+    work.submit(threading.get_ident, take=taken.append)
+    assert taken == [threading.get_ident()]
+    with pytest.raises(ValueError, match="no number"):
+        work.submit(int, "no number", take=taken.append)
+    work.finish()
+    work.abandon()
+
+
+def test_a_failure_ends_the_next_call_and_drops_those_that_wait():
+    done = []
+    gate = threading.Event()
+
+    def fail():
+        gate.wait()
+        raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"), OrderedWork(1) as work:
+        work.submit(done.append, 1)
+        work.submit(fail)
+        work.submit(done.append, 2)
+        gate.set()
+        while True:
+            work.submit(done.append, 3)
+    assert done == [1]
+
+
+def test_a_failure_of_the_last_task_ends_the_block():
+    with pytest.raises(ValueError, match="no number"), OrderedWork(1) as work:
+        work.submit(int, "no number")
+
+
+def test_an_error_of_the_block_drops_what_waits_and_is_what_is_raised():
+    gate = threading.Event()
+    done = []
+
+    def slow():
+        gate.wait()
+        raise OSError("not the first")
+
+    with pytest.raises(KeyError, match="mine"), OrderedWork(1) as work:
+        work.submit(slow)
+        work.submit(done.append, 1)
+        threading.Timer(0.02, gate.set).start()
+        raise KeyError("mine")
+    assert done == []
+
+
+def test_what_was_handed_out_is_not_held():
+    class Big:
+        pass
+
+    with OrderedWork(1) as work:
+        done = threading.Event()
+        big = Big()
+        held = weakref.ref(big)
+        work.submit(lambda big: None, big)
+        del big
+        work.submit(done.set)
+        done.wait()
+        wait_until(lambda: held() is None)
 
 
 INTERRUPTED = """
 import signal, threading, time
-from adv2e.background import ReadAhead, WriteBehind, worker_pool
+from adv2e.background import OrderedWork, read_ahead
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def numbers():
@@ -216,10 +242,10 @@ def numbers():
         print("source closed", flush=True)
 
 try:
-    with WriteBehind(2) as behind, ReadAhead(numbers(), cost=int, limit=1) as items:
+    with OrderedWork(1, count=2) as work, read_ahead(numbers(), 1) as items:
         print("ready", flush=True)
         for item in items:
-            behind.call(1, time.sleep, 0.05)
+            work.submit(time.sleep, 0.05)
 except KeyboardInterrupt:
     print("interrupted", [thread.name for thread in threading.enumerate()], flush=True)
 """
