@@ -31,7 +31,7 @@ from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
 from adv2e.formats.writing import Sink, format_name, open_sink
-from adv2e.light.decoding import decoder_for, light_text
+from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.pictures import drawn, picture_white
 from adv2e.sources.base import Source
 
@@ -222,7 +222,7 @@ def convert(
         told = _doubt_of_white(recording, recording.largest, config)
         for doubt in filter(None, (*recording.doubts, told)):
             log(doubt)
-        table = _table_for_the_kernel(decoder, config)
+        table = kernel_table(decoder, config.sampling)
         if not is_compiled(config):
             log(announcement())
             if compile_apart and not user_sources(config):
@@ -330,17 +330,6 @@ def _open_preview(
     return stack.enter_context(
         open_preview(Path(preview), recording.width, recording.height, frames=True, staging=staging)
     )
-
-
-def _table_for_the_kernel(decoder: LightDecoder, config: Config) -> NDArray[np.float32] | None:
-    """Return the table with which the kernel is to decode grey frames itself; None: light it is.
-
-    A quarter of the memory traffic, but every instant looks its frames up again, and only linear
-    interpolation needs no light before.
-    """
-    sampling = config.sampling
-    once = sampling.L == 1 and sampling.interpolation == "linear"
-    return decoder.grey_table if once else None
 
 
 def _pieces(events: Events) -> Iterator[Events]:

@@ -31,7 +31,7 @@ from adv2e.effects.hooks import Frames, Hooks
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import ConfigError, DataError
 from adv2e.events import Events
-from adv2e.light.decoding import decoder_for
+from adv2e.light.decoding import decoder_for, kernel_table
 from adv2e.light.intervals import Intervals
 from adv2e.pixel import array as pixel
 from adv2e.pixel.array import PixelArray, thread_count
@@ -110,8 +110,7 @@ class _Raw:
         self._first = np.asarray(image)
         self._stated = config.frames.full_scale
         self._decoder = _decoder_for(self._first, config)
-        # decoded by the kernel, unless many instants are made of each frame
-        self.table = self._decoder.grey_table if config.sampling.L == 1 else None
+        self.table = kernel_table(self._decoder, config.sampling)
 
     def light(self) -> Iterator[tuple[int, NDArray[Any]]]:
         """Yield (t_ns, light), or grey values for the table where there is one."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from numpy.typing import DTypeLike
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
-from adv2e.config.model import Frames
+from adv2e.config.model import Frames, Sampling
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.sources.base import Light
 
@@ -32,6 +33,16 @@ def decoder_for(
     """
     full_scale = frames.full_scale or white or full_scale_of(dtype)
     return LightDecoder(encoding_for(frames, auto), full_scale, dtype, colour)
+
+
+def kernel_table(decoder: LightDecoder, sampling: Sampling) -> NDArray[np.float32] | None:
+    """Return the table with which the kernel decodes grey frames itself; None: it takes light.
+
+    A quarter of the memory traffic, but every instant looks its frames up again, and only linear
+    interpolation needs no light before.
+    """
+    once = sampling.L == 1 and sampling.interpolation == "linear"
+    return decoder.grey_table if once else None
 
 
 def light_text(light: Light, white: float, frames: Frames | None = None) -> str:
