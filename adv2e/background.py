@@ -14,6 +14,7 @@ block for as long as others please, such as a pipe, belongs in the main thread.
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -24,6 +25,13 @@ from typing import Any, TypeVar
 Item = TypeVar("Item")
 
 _END: Any = object()
+
+
+def default_threads() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return max(1, len(os.sched_getaffinity(0)))
+    return os.cpu_count() or 1
 
 
 @contextmanager

@@ -24,19 +24,19 @@ import os
 import sys
 import threading
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import cached_property, lru_cache, update_wrapper
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
-from adv2e.compilation.kept import place_for
+from adv2e.compilation.kept import Place, place_for
 from adv2e.compilation.machine_code import file_of, lay_out, load, read_code, write_code
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent
 _PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-_LOADING = threading.Lock()
+_LOADING, _PLACING = threading.Lock(), threading.Lock()
 
 
 def sources() -> list[Path]:
@@ -66,27 +66,34 @@ def _digest() -> str:
     return digest.hexdigest()[:16]
 
 
-_PLACE = place_for(f"kernels-{_digest()}")
-_FOLDER = _PLACE.folder
+def _place() -> Place:
+    """Return where code is kept; found, and made, when code is first wanted."""
+    with _PLACING:
+        return _placed()
+
+
+@lru_cache(maxsize=1)
+def _placed() -> Place:
+    return place_for(f"kernels-{_digest()}")
 
 
 def announcement() -> str:
     """Return what is said before the pixel is compiled."""
-    lost = _PLACE.why_lost or _PLACE.why_full
+    lost = _place().why_lost or _place().why_full
     when = f"in every run, as it cannot be kept: {lost}" if lost else "once"
     return f"compiling the pixel's kernel ({when}; about half a minute)"
 
 
 def others_find_code() -> bool:
     """Tell whether other processes find what is compiled in this one, and it what they compile."""
-    return not _PLACE.why_full
+    return not _place().why_full
 
 
 def environment() -> dict[str, str]:
     """Return the environment in which another process keeps its code where this one does."""
-    if not _PLACE.why_lost:
+    if not _place().why_lost:
         return dict(os.environ)
-    return {**os.environ, "NUMBA_CACHE_DIR": str(_FOLDER.parent.parent)}
+    return {**os.environ, "NUMBA_CACHE_DIR": str(_place().folder.parent.parent)}
 
 
 def _numba() -> Any:
@@ -112,7 +119,7 @@ class _Compiled:
         if name == "dispatcher":
             # without a lock: whoever compiles another function may ask for it, and wait for Numba's
             options = {**self._options, "cached": self._options["cached"] and self._is_of_package()}
-            made = _numba().make_dispatcher(self._function, _FOLDER, **options)
+            made = _numba().make_dispatcher(self._function, _place().folder, **options)
             return self.__dict__.setdefault(name, made)
         if name.startswith("__"):  # asked of all objects, by whoever copies or inspects
             raise AttributeError(name)
@@ -146,7 +153,7 @@ class _Entry(_Compiled):
         if not self._is_of_package():
             return load(_numba().translate(self.dispatcher, arguments), kind)
         name = f"{self._function.__module__}.{self._function.__qualname__}"
-        path = file_of(_FOLDER, name, kind)
+        path = file_of(_place().folder, name, kind)
         code = read_code(path)
         if code is None:
             code = _numba().translate(self.dispatcher, arguments)
@@ -205,4 +212,5 @@ def _wrapped(how: type[_Compiled], function: Function, **options: Any) -> Functi
 
 def is_cached(name: str) -> bool:
     """Tell whether there is compiled code of the function `name`, of these sources."""
-    return any(_FOLDER.glob(f"*.{name}-*.code")) or any(_FOLDER.rglob(f"*.{name}-*.nbc"))
+    folder = _place().folder
+    return any(folder.glob(f"*.{name}-*.code")) or any(folder.rglob(f"*.{name}-*.nbc"))

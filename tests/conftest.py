@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pytest
 
 from adv2e.cli import main
-from adv2e.process.garbage import collect_seldom
+from adv2e.process.memory import collect_seldom
 
 collect_seldom()  # to search the compiler's objects for cycles took a fourteenth of the run
 

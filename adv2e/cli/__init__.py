@@ -15,7 +15,7 @@ import click
 
 from adv2e import __version__
 from adv2e.cli.run import flush_stdout, print_any_character, reporting
-from adv2e.process.garbage import collect_seldom
+from adv2e.process.memory import collect_seldom, return_large_blocks
 from adv2e.process.signals import stopping_on_signals
 
 COMMANDS = {
@@ -86,7 +86,7 @@ class Program(click.Group):
         if len(args) < 2:
             kwargs["prog_name"] = kwargs.get("prog_name") or "adv2e"
         print_any_character()
-        with stopping_on_signals(), _rare_collection():
+        with stopping_on_signals(), _memory_of_a_command():
             try:
                 return super().main(*args, **kwargs)
             except SystemExit as end:
@@ -95,11 +95,12 @@ class Program(click.Group):
 
 
 @contextmanager
-def _rare_collection() -> Iterator[None]:
-    """Let the body make many objects before Python looks for cycles among them.
+def _memory_of_a_command() -> Iterator[None]:
+    """Give large blocks back at once; let many objects be made before Python looks for cycles.
 
     At the end of the program it does not look at all.
     """
+    return_large_blocks()
     before = collect_seldom()
     atexit.register(gc.freeze)
     try:

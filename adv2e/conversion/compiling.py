@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import environment, others_find_code
 from adv2e.config import Config, from_dict, to_dict
-from adv2e.process.garbage import collect_seldom
+from adv2e.process.memory import collect_seldom
 
 _ROWS, _COLUMNS = 40, 64
 """Of the small frames; large enough for motion to be looked for."""

@@ -17,12 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from adv2e.background import read_ahead
+from adv2e.background import default_threads, read_ahead
 from adv2e.effects.frames.brightness import check_floats, check_light
 from adv2e.errors import Adv2eError, DataError
 from adv2e.light.pictures import picture_of
-from adv2e.process.cores import default_threads
-from adv2e.process.heap import return_large_blocks
 from adv2e.sources import open_source
 from adv2e.sources.base import Frame, Source
 from adv2e.sources.times.rates import Rate
@@ -154,7 +152,6 @@ class Reading:
         return self._stills
 
     def __enter__(self) -> Reading:
-        return_large_blocks()
         try:
             source = self._opened = open_source(self.path, **self.given)
         except Adv2eError as error:  # the other parts of the command may be wrong, too

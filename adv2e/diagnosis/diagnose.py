@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 
 from adv2e import __version__
+from adv2e.background import default_threads
 from adv2e.config import Config
 from adv2e.diagnosis.data import splits as parts
 from adv2e.diagnosis.data.affordable import affordable
@@ -28,7 +29,6 @@ from adv2e.diagnosis.outcome.detectable import LIKELY, detectable
 from adv2e.diagnosis.outcome.verdict import sentence_of
 from adv2e.diagnosis.prepare import make_ready
 from adv2e.diagnosis.selection.search import Search
-from adv2e.process.cores import default_threads
 from adv2e.reports.result import Diagnosis
 
 

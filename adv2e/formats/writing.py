@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from adv2e.background import default_threads
 from adv2e.errors import UsageError
 from adv2e.files.staging import Staging
 from adv2e.formats.sink import Sink, describe
-from adv2e.process.cores import default_threads
 
 __all__ = ["FORMATS", "LAYOUTS", "Sink", "format_name", "open_sink"]
 

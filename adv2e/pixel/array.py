@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e import compiled as jit
+from adv2e.background import default_threads
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.courses import Additions
 from adv2e.errors import DataError
@@ -34,7 +35,6 @@ from adv2e.pixel.circuit import driver_of, make_circuit
 from adv2e.pixel.merge import Parted, in_order
 from adv2e.pixel.state import initial_state
 from adv2e.pixel.steps import PRECISE, Coarseness, Stepping
-from adv2e.process.cores import default_threads
 
 _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP

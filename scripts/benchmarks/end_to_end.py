@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from adv2e.process.cores import default_threads
+from adv2e.background import default_threads
 from benchmarks.clips import as_srgb, encoded, stored
 from benchmarks.processes import Job, Log, Measured, number, run_rounds
 from benchmarks.report import peak_text, table

@@ -33,10 +33,10 @@ import numpy as np
 from numpy.typing import NDArray
 from writing import table
 
+from adv2e.background import default_threads
 from adv2e.events import Events, make_events, sort_events
 from adv2e.formats.text.writer import text_blocks
 from adv2e.formats.writing import open_sink
-from adv2e.process.cores import default_threads
 from benchmarks.machine import machine_line
 from benchmarks.processes import number
 

@@ -7,7 +7,7 @@ import platform
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from adv2e.process.cores import default_threads
+from adv2e.background import default_threads
 from benchmarks.processes import Measured, number
 
 

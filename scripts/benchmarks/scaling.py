@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 from writing import load_pyplot, output_option, save_figure, table, write_report
 
-from adv2e.process.cores import default_threads
+from adv2e.background import default_threads
 from benchmarks.clips import Clip
 from benchmarks.machine import about
 from benchmarks.options import of_a_plan

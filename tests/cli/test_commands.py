@@ -10,6 +10,7 @@ import click
 import pytest
 
 import adv2e as package
+from adv2e.background import default_threads
 from adv2e.cli import COMMANDS, main
 from adv2e.cli.options import Log
 from adv2e.config import Config, all_keys, load_config, shipped
@@ -17,7 +18,6 @@ from adv2e.config.files import find
 from adv2e.config.model import Pixel
 from adv2e.diagnosis.fitting.library import names
 from adv2e.effects import EFFECTS, STAGES
-from adv2e.process.cores import default_threads
 
 
 def test_version(adv2e):

@@ -98,7 +98,9 @@ def test_without_a_folder_the_temporary_one_has_a_name_that_nobody_knew(caches):
 
 def test_the_fresh_folder_goes_with_the_process(caches):
     (caches / "cache").write_text("in the way")
-    code = "from adv2e import compiled as jit; print(jit._FOLDER); print(jit.announcement())"
+    code = (
+        "from adv2e import compiled as jit; print(jit._place().folder); print(jit.announcement())"
+    )
     environment = {**os.environ, "TMPDIR": tempfile.gettempdir(), "TEMP": tempfile.gettempdir()}
     done = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
@@ -129,10 +131,10 @@ def test_a_full_disk_is_noticed_before_anything_is_compiled(tmp_path, monkeypatc
         assert place.why_full == f"{tmp_path}: File too large"
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    monkeypatch.setattr(jit, "_PLACE", place)
+    monkeypatch.setattr(jit, "_place", lambda: place)
     assert not jit.others_find_code()
     assert "in every run, as it cannot be kept: " in jit.announcement()
-    monkeypatch.setattr(jit, "_PLACE", Place(tmp_path))
+    monkeypatch.setattr(jit, "_place", lambda: Place(tmp_path))
     assert jit.others_find_code()
     assert jit.announcement() == "compiling the pixel's kernel (once; about half a minute)"
 

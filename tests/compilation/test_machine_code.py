@@ -124,7 +124,7 @@ def test_what_machine_code_cannot_take_is_refused(value):
 
 
 def test_code_of_functions_outside_the_package_is_not_kept():
-    folder = jit._FOLDER
+    folder = jit._place().folder
     before = set(folder.iterdir())
 
     @jit.entry

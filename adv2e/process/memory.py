@@ -1,4 +1,4 @@
-"""Memory that is no longer used goes back to the system.
+"""Memory of the whole process: what a command sets, and a library never.
 
 The allocator of glibc learns: once a large array has been freed, arrays of that size, up to 32 MB,
 come from its heaps, where they leave holes that nothing else fills.  A process that makes large
@@ -12,6 +12,7 @@ References
 from __future__ import annotations
 
 import ctypes
+import gc
 from contextlib import suppress
 
 LARGE_BYTES = 1 << 20
@@ -27,3 +28,14 @@ def return_large_blocks() -> None:
     """
     with suppress(OSError, AttributeError, TypeError):  # TypeError: Windows knows no nameless one
         ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, LARGE_BYTES)
+
+
+def collect_seldom() -> tuple[int, int, int]:
+    """Look for cycles among many objects at a time only; return the thresholds that were.
+
+    Imports make tens of thousands of objects that stay, and compiling a million; looking through
+    them again and again takes longer than a short run may.
+    """
+    before = gc.get_threshold()
+    gc.set_threshold(200_000, 20, 20)
+    return before
