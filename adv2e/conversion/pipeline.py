@@ -30,7 +30,9 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
-from adv2e.formats.writing import Sink, format_name, open_sink
+from adv2e.formats import compression
+from adv2e.formats.sink import Sink
+from adv2e.formats.writing import format_name, open_sink
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.pictures import drawn, picture_white
 from adv2e.sources.base import Source
@@ -305,7 +307,7 @@ def _metadata(
     stored = {"encoding": decoder.encoding, "full_scale": white}
     return {
         "adv2e": __version__,
-        "versions": versions(recording.packages),
+        "versions": versions((*recording.packages, *compression.PACKAGES)),
         "config": to_dict(config),
         "seed": config.seed,
         **({"effects": own} if own else {}),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import zlib
 from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, version
 
@@ -27,6 +28,7 @@ def versions(optional: Iterable[str] = ()) -> dict[str, str | None]:
         "numpy": _version("numpy"),
         "numba": _version("numba"),
         "opencv": opencv,
+        "zlib": zlib.ZLIB_RUNTIME_VERSION,
         **{name: _version(name) for name in optional},
     }
 

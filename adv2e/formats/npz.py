@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.files.npy import read_array
 from adv2e.files.zips import open_member, zip_archive
+from adv2e.formats.builder import RecordingBuilder
 from adv2e.formats.clock import Clock
-from adv2e.formats.gather import Gatherer
-from adv2e.formats.recording import Recording, described_geometry, parse_description
+from adv2e.formats.recording import Recording, described_geometry
 from adv2e.ticks import US, to_ticks
 
 _NAMES = {
@@ -49,11 +49,9 @@ def read_npz(path: Path, time_unit: str | None = None) -> Recording:
         Not such an archive, a column is missing, or columns differ in length.
     """
     arrays = _load(path)
-    gatherer = Gatherer()
-    description: dict[str, Any] = {}
+    builder = RecordingBuilder(path)
     if "adv2e" in arrays:
-        text = str(arrays["adv2e"])
-        description = parse_description(text, f"{path}: adv2e", gatherer.problems)
+        builder.describe(str(arrays["adv2e"]), f"{path}: adv2e", "the file")
     columns = _columns(path, arrays)
     x, y, p = (_whole(path, *columns[name]) for name in ("x", "y", "polarity"))
     sizes: dict[str, Any] = {
@@ -61,25 +59,17 @@ def read_npz(path: Path, time_unit: str | None = None) -> Recording:
         for name in ("width", "height")
         if name in arrays and arrays[name].size == 1
     }
-    geometry = described_geometry(description) or described_geometry(sizes)
+    builder.state(described_geometry(sizes), "the file")
     name, t = columns["time"]
     if t.dtype.kind not in "iuf":
         raise DataError(f"{path}: {name} must hold numbers, not {t.dtype}")
     stated = name[2:] if name.startswith("t_") else None
-    unit = Clock(time_unit or stated).of_events(t, x, y, geometry, whole=t.dtype.kind != "f")
+    clock = Clock(time_unit or stated)
+    unit = clock.of_events(t, x, y, builder.geometry, whole=t.dtype.kind != "f")
     if unit.doubt:
-        gatherer.problems.append(unit.doubt)
-    gatherer.add(to_ticks(t, unit.ns, US, f"{path}: {name}"), x, y, p)
-    events, width, height = gatherer.finish(geometry, "the file")
-    return Recording(
-        str(path),
-        "npz",
-        width,
-        height,
-        events,
-        metadata=description,
-        problems=gatherer.problems,
-    )
+        builder.problems.append(unit.doubt)
+    builder.add(to_ticks(t, unit.ns, US, f"{path}: {name}"), x, y, p)
+    return builder.finish("npz")
 
 
 def _load(path: Path) -> dict[str, NDArray[Any]]:

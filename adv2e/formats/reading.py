@@ -48,6 +48,8 @@ def read_recording(
     path = Path(path)
     try:
         check_ends(path)
+        if not path.exists():
+            raise DataError(f"{path}: no such file or folder")
         recording = _read(path, time_unit, images_anywhere)
     except OSError as error:
         if machine_complaint(error):
@@ -75,21 +77,24 @@ def _check_size(recording: Recording) -> None:
 
 
 def _read(path: Path, time_unit: str | None, images_anywhere: bool) -> Recording:
+    """Read a file or folder by what is imported late, as each needs other libraries."""
     suffix = path.suffix.lower()
-    if path.is_dir() or suffix == ".zip":
-        from adv2e.formats.davis240c import reader as davis240c  # noqa: PLC0415
+    if path.is_dir():
+        from adv2e.formats.davis240c.reader import read_folder  # noqa: PLC0415
 
-        _check_there(path)
-        if path.is_dir():
-            return davis240c.read_folder(path, time_unit, images_anywhere=images_anywhere)
-        return davis240c.read_zip(path, time_unit)
-    _check_there(path)
+        return read_folder(path, time_unit, images_anywhere=images_anywhere)
+    if suffix == ".zip":
+        from adv2e.formats.davis240c.reader import read_zip  # noqa: PLC0415
+
+        return read_zip(path, time_unit)
     if suffix == ".txt":
         from adv2e.formats.text.reader import read_text  # noqa: PLC0415
 
         return read_text(path, time_unit)
     if suffix in (".h5", ".hdf5"):
-        return _read_hdf5(path, time_unit)
+        from adv2e.formats.monash.reader import read_hdf5  # noqa: PLC0415
+
+        return read_hdf5(path, time_unit)
     if suffix == ".npz":
         from adv2e.formats.npz import read_npz  # noqa: PLC0415
 
@@ -97,21 +102,4 @@ def _read(path: Path, time_unit: str | None, images_anywhere: bool) -> Recording
     raise DataError(
         f"{path}: unknown suffix '{suffix}', must be one of {', '.join(_SUFFIXES)}"
         " or a DAVIS240C folder"
-    )
-
-
-def _check_there(path: Path) -> None:
-    if not path.exists():
-        raise DataError(f"{path}: no such file or folder")
-
-
-def _read_hdf5(path: Path, time_unit: str | None) -> Recording:
-    from adv2e.formats import hdf5  # noqa: PLC0415
-    from adv2e.formats.monash import reader as monash  # noqa: PLC0415
-
-    with hdf5.opened(path) as file:
-        if all(hdf5.find(file, name) is not None for name in monash.COLUMNS):
-            return monash.read_monash(path, file, time_unit)
-    raise DataError(
-        f"{path}: unknown HDF5 layout, must be monash (datasets {', '.join(monash.COLUMNS)})"
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -92,18 +91,6 @@ class Recording:
             odd = "" if stored is not None else odd_white(pixels, first)
             label = f"{self.path}: frame {number}"
             yield Frame(t_ns, pixels.image, label, pixels.alpha, stored or first, odd)
-
-
-def parse_description(text: str, label: str, problems: list[str]) -> dict[str, Any]:
-    """Return what a file of ours says of itself; if that is broken, {} and a problem."""
-    try:
-        description = json.loads(text)
-    except (ValueError, RecursionError):
-        description = None
-    if isinstance(description, dict):
-        return description
-    problems.append(f"{label}: not a JSON mapping, ignored")
-    return {}
 
 
 def described_geometry(description: dict[str, Any]) -> tuple[int, int] | None:

@@ -6,10 +6,11 @@ import json
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, TypeVar
+from typing import Any, ClassVar
 
 from numpy.typing import NDArray
 
@@ -17,76 +18,136 @@ from adv2e.errors import OutputError
 from adv2e.events import Events
 from adv2e.files.staging import Staging
 
-Self = TypeVar("Self")
 
-
-class Sink(Protocol):
+class Sink(ABC):
     """Takes the events and frames of one recording, inside a ``with`` block.
 
     Leaving the block normally finishes the output; an exception leaves no trace of it.
+
+    Attributes
+    ----------
+    wants_frames : bool
+        Whether frames are stored; if not, they are ignored.
     """
 
-    @property
-    def wants_frames(self) -> bool:
-        """Whether frames are stored; if not, they are ignored."""
+    wants_frames = False
 
+    @abstractmethod
     def write_events(self, events: Events) -> None:
         """Append events; over all calls they are sorted by time."""
 
-    def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
+    def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:  # noqa: B027
         """Append a frame taken at `t_ns` [ns]; over all calls sorted by time.
 
         `image` is uint8 or uint16, (rows, columns) or (rows, columns, 3) in RGB.  It may come
         long before the events around it.
         """
 
-    def __enter__(self: Self) -> Self: ...
+    def __enter__(self) -> Sink:
+        return self
 
-    def __exit__(
+    def __exit__(  # noqa: B027
         self,
         kind: type[BaseException] | None,
         error: BaseException | None,
         trace: TracebackType | None,
-    ) -> None: ...
+    ) -> None:
+        pass
 
 
-class FileSink(ABC):
-    """A sink that writes files; derived classes say how.
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What is to be written.
+
+    Attributes
+    ----------
+    path : Path
+        The output as the user named it.
+    width, height : int
+        Geometry [pixels].
+    description : dict
+        What the output says of itself.
+    with_frames : bool
+        Store frames, where the format can.
+    threads : int
+        Threads that compress.
+    """
+
+    path: Path
+    width: int
+    height: int
+    description: dict[str, Any]
+    with_frames: bool
+    threads: int
+
+
+class Writer(ABC):
+    """Writes files of a format under their temporary names.
 
     Parameters
     ----------
-    path : Path
-        The output as the user named it, for messages.
-    staging : Staging
-        Its files and folders.
+    request : Request
+    stack : ExitStack
+        Takes what is to be closed, however writing ends.
+    *temporary : Path
+        What :meth:`stage` returned.
     """
 
-    wants_frames = False
+    takes_frames: ClassVar[bool] = False
 
-    def __init__(self, path: Path, staging: Staging) -> None:
-        self.path = path
-        self._staging = staging
+    @staticmethod
+    def stage(path: Path, staging: Staging) -> list[Path]:
+        """Return the temporary names of the files that make the output `path`."""
+        return [staging.file(path)]
+
+    @abstractmethod
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None: ...
+
+    @abstractmethod
+    def write_events(self, events: Events) -> None:
+        """Append events."""
+
+    def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
+        """Append a frame."""
+        raise NotImplementedError  # a format that takes frames says how
+
+    def finish(self) -> None:  # noqa: B027
+        """Write what is left."""
+
+
+class FileSink(Sink):
+    """A sink that writes files.
+
+    Parameters
+    ----------
+    writer : type
+        Says how.
+    request : Request
+    staging : Staging
+        Takes the files.
+    """
+
+    def __init__(self, writer: type[Writer], request: Request, staging: Staging) -> None:
+        self.wants_frames = request.with_frames and writer.takes_frames
+        self._type, self._request, self._staging = writer, request, staging
+        self._temporary = writer.stage(request.path, staging)
+        self._stack = ExitStack()
 
     def write_events(self, events: Events) -> None:
         """Append events; over all calls they are sorted by time."""
         with self._naming():
-            self._write_events(events)
+            self._writer.write_events(events)
 
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         """Append a frame taken at `t_ns` [ns], if frames are wanted."""
         if self.wants_frames:
             with self._naming():
-                self._write_frame(t_ns, image)
+                self._writer.write_frame(t_ns, image)
 
-    def __enter__(self: Self) -> Self:
-        assert isinstance(self, FileSink)
-        try:
-            with self._naming():
-                self._staging.prepare()
-                self._open()
-        except BaseException:
-            self._leave()
-            raise
+    def __enter__(self) -> FileSink:
+        with self._discarding():
+            self._staging.prepare()
+            self._writer = self._type(self._request, self._stack, *self._temporary)
         return self
 
     def __exit__(
@@ -96,20 +157,27 @@ class FileSink(ABC):
         trace: TracebackType | None,
     ) -> None:
         if kind is not None:
-            self._leave()
+            self._discard()
             return
+        with self._discarding():
+            self._writer.finish()
+            self._stack.close()
+            self._staging.commit()
+
+    @contextmanager
+    def _discarding(self) -> Iterator[None]:
+        """Leave nothing of the output if the body raises."""
         try:
             with self._naming():
-                self._finish()
-                self._staging.commit()
+                yield
         except BaseException:
-            self._leave()
+            self._discard()
             raise
 
-    def _leave(self) -> None:
+    def _discard(self) -> None:
         try:
-            with suppress(Exception):  # the file is incomplete and goes away, whatever close says
-                self._abandon()
+            with suppress(Exception):  # the file is incomplete, whatever closing it says
+                self._stack.close()
         finally:
             self._staging.discard()
 
@@ -119,25 +187,9 @@ class FileSink(ABC):
         try:
             yield
         except OSError as error:
-            raise OutputError(f"{self.path}: cannot be written: {_reason(error)}") from error
-
-    @abstractmethod
-    def _open(self) -> None:
-        """Open the files under their temporary names."""
-
-    @abstractmethod
-    def _write_events(self, events: Events) -> None: ...
-
-    def _write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
-        raise NotImplementedError  # a sink that wants frames says how
-
-    @abstractmethod
-    def _finish(self) -> None:
-        """Write what is left and close the files."""
-
-    @abstractmethod
-    def _abandon(self) -> None:
-        """Close what is open; the files are incomplete and will be removed."""
+            raise OutputError(
+                f"{self._request.path}: cannot be written: {_reason(error)}"
+            ) from error
 
 
 def _reason(error: OSError) -> str:
@@ -145,12 +197,6 @@ def _reason(error: OSError) -> str:
     text = error.strerror or str(error)
     inner = re.search(r"error message = '([^']*)'", text)
     return inner[1] if inner else text
-
-
-def describe(metadata: dict[str, Any], width: int, height: int) -> dict[str, Any]:
-    """Return what a file says of itself: the metadata and the geometry [pixels]."""
-    version = {"adv2e": metadata["adv2e"]} if "adv2e" in metadata else {}
-    return {**version, "width": width, "height": height, **metadata}
 
 
 def to_json(description: dict[str, Any]) -> str:

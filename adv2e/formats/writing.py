@@ -11,94 +11,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from adv2e.background import default_threads
 from adv2e.errors import UsageError
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import Sink, describe
+from adv2e.formats.sink import FileSink, Request, Sink, Writer
 
-__all__ = ["FORMATS", "LAYOUTS", "Sink", "format_name", "open_sink"]
+FORMATS = {"txt": (".txt",), "zip": (".zip",), "folder": ("",), "h5": (".h5", ".hdf5")}
+"""Formats by name, and the suffixes that stand for them."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class _Request:
-    """What was asked for."""
-
-    path: Path
-    width: int
-    height: int
-    description: dict[str, Any]
-    staging: Staging
-    with_frames: bool
-    threads: int
-
-
-def _text(request: _Request) -> Sink:
-    from adv2e.formats.text.writer import TextSink  # noqa: PLC0415
-
-    return TextSink(request.path, request.description, request.staging)
-
-
-def _folder(request: _Request) -> Sink:
-    from adv2e.formats.davis240c.writer import FolderSink  # noqa: PLC0415
-
-    return FolderSink(
-        request.path,
-        request.description,
-        staging=request.staging,
-        with_frames=request.with_frames,
-        threads=request.threads,
-    )
-
-
-def _zip(request: _Request) -> Sink:
-    from adv2e.formats.davis240c.writer import ZipSink  # noqa: PLC0415
-
-    return ZipSink(
-        request.path,
-        request.description,
-        staging=request.staging,
-        with_frames=request.with_frames,
-        threads=request.threads,
-    )
-
-
-def _monash(request: _Request) -> Sink:
-    from adv2e.formats.monash.writer import MonashSink  # noqa: PLC0415
-
-    return MonashSink(
-        request.path,
-        width=request.width,
-        height=request.height,
-        description=request.description,
-        staging=request.staging,
-        with_frames=request.with_frames,
-        threads=request.threads,
-    )
-
-
-@dataclass(frozen=True)
-class _Format:
-    """A format: the suffixes that stand for it, and what opens it."""
-
-    suffixes: tuple[str, ...]
-    open: Callable[[_Request], Sink]
-
-
-FORMATS: dict[str, _Format] = {
-    "txt": _Format((".txt",), _text),
-    "zip": _Format((".zip",), _zip),
-    "folder": _Format(("",), _folder),
-    "h5": _Format((".h5", ".hdf5"), _monash),
-}
-"""Formats by name."""
-
-LAYOUTS: dict[str, Callable[[_Request], Sink]] = {"monash": _monash}
-"""Layouts of HDF5 files by name; the first is the default."""
+LAYOUTS = ("monash",)
+"""Layouts of HDF5 files; the first is the default."""
 
 
 def open_sink(
@@ -151,24 +76,21 @@ def open_sink(
         return _standard_output(format, layout)
     path = Path(path)
     name = format_name(path, format)
-    opening = FORMATS[name].open
     if layout is not None:
         if name != "h5":
             raise UsageError(f"--layout {layout}: only HDF5 files (.h5) have layouts")
         if layout not in LAYOUTS:
             raise UsageError(f"--layout {layout}: unknown, must be one of {', '.join(LAYOUTS)}")
-        opening = LAYOUTS[layout]
-    return opening(
-        _Request(
-            path=path,
-            width=width,
-            height=height,
-            description=describe(metadata, width, height),
-            staging=staging or Staging(overwrite),
-            with_frames=with_frames,
-            threads=threads or default_threads(),
-        )
+    version = {"adv2e": metadata["adv2e"]} if "adv2e" in metadata else {}
+    request = Request(
+        path=path,
+        width=width,
+        height=height,
+        description={**version, "width": width, "height": height, **metadata},
+        with_frames=with_frames,
+        threads=threads or default_threads(),
     )
+    return FileSink(_writer(name), request, staging or Staging(overwrite))
 
 
 def _standard_output(format: str | None, layout: str | None) -> Sink:
@@ -179,6 +101,21 @@ def _standard_output(format: str | None, layout: str | None) -> Sink:
     if format not in (None, "txt"):
         raise UsageError(f"--format {format}: standard output takes txt only")
     return StandardOutput()
+
+
+def _writer(name: str) -> type[Writer]:
+    """Return what writes a format; imported late, as each needs other libraries."""
+    if name == "h5":
+        from adv2e.formats.monash.writer import MonashWriter  # noqa: PLC0415
+
+        return MonashWriter
+    if name == "txt":
+        from adv2e.formats.text.writer import TextWriter  # noqa: PLC0415
+
+        return TextWriter
+    from adv2e.formats.davis240c.writer import FolderWriter, ZipWriter  # noqa: PLC0415
+
+    return ZipWriter if name == "zip" else FolderWriter
 
 
 def format_name(path: Path, format: str | None) -> str:
@@ -194,10 +131,10 @@ def format_name(path: Path, format: str | None) -> str:
             raise UsageError(f"--format {format}: unknown, must be one of {', '.join(FORMATS)}")
         return format
     suffix = path.suffix.lower()
-    for name, about in FORMATS.items():
-        if suffix in about.suffixes:
+    for name, suffixes in FORMATS.items():
+        if suffix in suffixes:
             return name
-    known = [suffix for about in FORMATS.values() for suffix in about.suffixes if suffix]
+    known = [suffix for suffixes in FORMATS.values() for suffix in suffixes if suffix]
     raise UsageError(
         f"{path}: unknown suffix '{suffix}', must be one of {', '.join(known)},"
         f" none (a DAVIS240C folder), or choose with --format: {', '.join(FORMATS)}"

@@ -14,17 +14,18 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import IO, Any, Protocol
+from typing import IO, Any
 
 import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.files.zips import open_member, zip_archive
-from adv2e.formats.clock import Beside, Clock, disagreement
-from adv2e.formats.gather import Gatherer
-from adv2e.formats.recording import Recording, described_geometry, parse_description
-from adv2e.formats.text.reader import Lines, gather_lines
+from adv2e.formats.builder import RecordingBuilder
+from adv2e.formats.clock import Beside, Clock
+from adv2e.formats.recording import Recording
+from adv2e.formats.text.reader import Lines, read_lines
 from adv2e.sources.base import Pixels
 from adv2e.sources.opencv import decode_image
 from adv2e.sources.times.columns import has_lines
@@ -34,47 +35,34 @@ from adv2e.sources.times.names import found_outside, members_of, nowhere
 EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
 
 
-class _Files(Protocol):
-    """The files of a recording, wherever they lie."""
+@dataclass(frozen=True)
+class _Files:
+    """The files of a recording, by their names in it, wherever they lie."""
 
-    def has(self, name: str) -> bool: ...
-
-    def label(self, name: str) -> str: ...
-
-    def open(self, name: str) -> IO[bytes]: ...
-
-
-class _Folder:
-    """Files in a folder."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def has(self, name: str) -> bool:
-        return (self._path / name).is_file()
-
-    def label(self, name: str) -> str:
-        return str(self._path / name)
-
-    def open(self, name: str) -> IO[bytes]:
-        return (self._path / name).open("rb")
+    path: Path
+    has: Callable[[str], bool]
+    label: Callable[[str], str]
+    open: Callable[[str], IO[bytes]]
 
 
-class _Archive:
-    """Members of an open zip, below its one folder if there is one."""
+def _in_folder(path: Path) -> _Files:
+    return _Files(
+        path,
+        lambda name: (path / name).is_file(),
+        lambda name: str(path / name),
+        lambda name: (path / name).open("rb"),
+    )
 
-    def __init__(self, path: Path, archive: zipfile.ZipFile, top: str) -> None:
-        self._path, self._archive, self._top = path, archive, top
-        self._names = set(archive.namelist())
 
-    def has(self, name: str) -> bool:
-        return self._top + name in self._names
-
-    def label(self, name: str) -> str:
-        return f"{self._path}: {self._top}{name}"
-
-    def open(self, name: str) -> IO[bytes]:
-        return open_member(self._archive, self._top + name)
+def _in_archive(path: Path, archive: zipfile.ZipFile, top: str) -> _Files:
+    """Return the members of an open zip, below its one folder if there is one."""
+    names = set(archive.namelist())
+    return _Files(
+        path,
+        lambda name: top + name in names,
+        lambda name: f"{path}: {top}{name}",
+        lambda name: open_member(archive, top + name),
+    )
 
 
 def read_folder(
@@ -89,9 +77,9 @@ def read_folder(
     """
     if not (path / EVENTS).is_file():
         raise DataError(f"{path}: no {EVENTS} in it; a folder must be a DAVIS240C recording")
-    files = _Folder(path)
+    files = _in_folder(path)
     outside = found_outside(path) if images_anywhere else nowhere
-    return _read(files, path, EVENTS, lambda names: _images(files, names), time_unit, outside)
+    return _read(files, EVENTS, lambda names: _images(files, names), time_unit, outside)
 
 
 def read_zip(path: Path, time_unit: str | None = None) -> Recording:
@@ -107,9 +95,9 @@ def read_zip(path: Path, time_unit: str | None = None) -> Recording:
 
         def images(names: list[str]) -> Iterator[Pixels]:
             with zip_archive(path) as again:
-                yield from _images(_Archive(path, again, top), names)
+                yield from _images(_in_archive(path, again, top), names)
 
-        return _read(_Archive(path, archive, top), path, name, images, time_unit, nowhere)
+        return _read(_in_archive(path, archive, top), name, images, time_unit, nowhere)
 
 
 def _events_member(path: Path, archive: zipfile.ZipFile) -> tuple[str, str]:
@@ -129,56 +117,35 @@ def _events_member(path: Path, archive: zipfile.ZipFile) -> tuple[str, str]:
 
 def _read(
     files: _Files,
-    path: Path,
     name: str,
-    images: Any,
+    images: Callable[[list[str]], Iterator[Pixels]],
     time_unit: str | None,
     outside: Callable[[str], str | None],
 ) -> Recording:
-    gatherer = Gatherer()
-    description: dict[str, Any] = {}
+    builder = RecordingBuilder(files.path)
     if files.has(DESCRIPTION):
-        text = _text(files, DESCRIPTION, "replace")
-        description = parse_description(text, files.label(DESCRIPTION), gatherer.problems)
-    stated = "s" if description else None
-    found = _listed(files, stated=stated)
+        with files.open(DESCRIPTION) as file:
+            text = file.read().decode("utf-8-sig", "replace")
+        builder.describe(text, files.label(DESCRIPTION), DESCRIPTION)
+    found = _listed(files, stated=builder.unit)
     frames = None
     if found is not None and len(found.stamps) > 1:
         frames = Beside(found.unit, found.whole)
     with files.open(name) as file:
-        clock = Clock(time_unit, stated, frames)
-        lines = gather_lines(file, files.label(name), gatherer, clock)
+        clock = Clock(time_unit, builder.unit, frames)
+        lines = read_lines(file, files.label(name), builder, clock)
     times, names = None, []
     if found is not None:
         if unit := _unit_beside(lines, found, clock):
             found = _listed(files, time_unit=unit) or found
-        gatherer.problems += [f"{LIST}: {line}" for line in (found.unit.doubt, found.order) if line]
+        builder.problems += [f"{LIST}: {line}" for line in (found.unit.doubt, found.order) if line]
         names = members_of(found.stamps, files.label(LIST), files.has, outside=outside)
         times = np.array([stamp.t_ns for stamp in found.stamps], np.int64)
-    geometry, whence = described_geometry(description), DESCRIPTION
-    if geometry is None and names:
-        first = next(iter(images(names[:1]))).image
-        geometry, whence = (first.shape[1], first.shape[0]), names[0]
-    if geometry is None:
-        geometry, whence = lines.geometry, f"the first line of {name}"
-    events, width, height = gatherer.finish(geometry, whence)
-    gatherer.problems += disagreement(events, times)
-    return Recording(
-        str(path),
-        "davis240c" if name == EVENTS else "text",
-        width,
-        height,
-        events,
-        times,
-        description,
-        gatherer.problems,
-        lambda: images(names),
-    )
-
-
-def _text(files: _Files, name: str, errors: str) -> str:
-    with files.open(name) as file:
-        return file.read().decode("utf-8-sig", errors)
+    if builder.geometry is None and names:
+        rows, columns = next(images(names[:1])).image.shape[:2]
+        builder.state((columns, rows), names[0])
+    builder.state(lines.geometry, f"the first line of {name}")
+    return builder.finish("davis240c" if name == EVENTS else "text", times, lambda: images(names))
 
 
 def _listed(files: _Files, **evidence: Any) -> FrameList | None:

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 import zipfile
 from abc import abstractmethod
-from contextlib import suppress
+from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import Any
 
 import cv2
 import numpy as np
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from adv2e.background import OrderedWork
 from adv2e.events import Events
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import FileSink, seconds_text, to_json
+from adv2e.formats.sink import Request, Writer, seconds_text, to_json
 from adv2e.formats.spool import FrameSpool
 from adv2e.formats.text.writer import text_blocks
 
@@ -44,109 +44,58 @@ def _png(image: NDArray[Any]) -> bytes:
     return data.tobytes()
 
 
-def _in_file_order(image: NDArray[Any]) -> NDArray[Any]:
-    """Return a copy, in the order of colours that OpenCV writes."""
-    ordered = image[..., ::-1] if image.ndim == 3 else image
-    return np.array(ordered)
-
-
-class _Davis240cSink(FileSink):
+class _Davis240cWriter(Writer):
     """What folder and archive share: the frames' names and list."""
 
-    def __init__(
-        self,
-        path: Path,
-        staging: Staging,
-        description: dict[str, Any],
-        with_frames: bool,
-        threads: int,
-    ) -> None:
-        super().__init__(path, staging)
-        self.wants_frames = with_frames
-        self._description = to_json(description)
-        self._threads = threads
-        self._frames: OrderedWork | None = None
+    takes_frames = True
+
+    def __init__(self, request: Request, stack: ExitStack) -> None:
+        self._description = to_json(request.description)
+        self._work = OrderedWork(request.threads - 1)
+        stack.callback(self._work.abandon)
         self._lines: list[str] = []
 
-    def _open(self) -> None:
-        self._frames = OrderedWork(self._threads - 1)
-
-    def _write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
-        assert self._frames is not None
+    def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
+        """Append a frame."""
         name = f"images/frame_{len(self._lines):08d}.png"
         self._lines.append(f"{seconds_text(t_ns)} {name}\n")
-        self._frames.submit(
-            _png, _in_file_order(image), take=lambda data: self._store_frame(name, t_ns, data)
-        )
+        ordered = image[..., ::-1] if image.ndim == 3 else image  # the colours of OpenCV
+        self._store_frame(name, t_ns, np.array(ordered))
 
     @abstractmethod
-    def _store_frame(self, name: str, t_ns: int, data: bytes) -> None: ...
-
-    def _finish(self) -> None:
-        assert self._frames is not None
-        self._frames.finish()
-
-    def _abandon(self) -> None:
-        if self._frames is not None:
-            self._frames.abandon()
+    def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
+        """Have an image encoded and stored, which nobody else changes."""
 
 
-class FolderSink(_Davis240cSink):
-    """A DAVIS240C folder.
+class FolderWriter(_Davis240cWriter):
+    """Writes a DAVIS240C folder; one that exists is replaced if it holds nothing else."""
 
-    Parameters
-    ----------
-    path : Path
-        The folder; one that exists is replaced as a whole, if it holds nothing else.
-    description : dict
-        Content of ``adv2e.json``.
-    staging : Staging
-        Takes it.
-    with_frames : bool
-        Store frames.
-    threads : int
-        Threads that compress frames.
-    """
+    @staticmethod
+    def stage(path: Path, staging: Staging) -> list[Path]:
+        """Return the temporary name of the folder."""
+        return [staging.folder(path, _foreign)]
 
-    def __init__(
-        self,
-        path: Path,
-        description: dict[str, Any],
-        *,
-        staging: Staging,
-        with_frames: bool,
-        threads: int,
-    ) -> None:
-        self._folder = staging.folder(path, _foreign)
-        self._events: BinaryIO | None = None
-        super().__init__(path, staging, description, with_frames, threads)
-
-    def _open(self) -> None:
-        super()._open()
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+        super().__init__(request, stack)
+        (self._folder,) = temporary
         self._folder.mkdir()
-        if self.wants_frames:
+        if request.with_frames:
             (self._folder / "images").mkdir()
-        self._events = (self._folder / "events.txt").open("wb")
+        self._events = stack.enter_context((self._folder / "events.txt").open("wb"))
 
-    def _write_events(self, events: Events) -> None:
-        assert self._events is not None
+    def write_events(self, events: Events) -> None:
+        """Append events."""
         for block in text_blocks(events):
             self._events.write(block)
 
-    def _store_frame(self, name: str, t_ns: int, data: bytes) -> None:
-        (self._folder / name).write_bytes(data)
+    def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
+        self._work.submit(_png, image, take=(self._folder / name).write_bytes)
 
-    def _finish(self) -> None:
-        assert self._events is not None
-        super()._finish()
-        self._events.close()
+    def finish(self) -> None:
+        """Write what is left, the list and the description."""
+        self._work.finish()
         (self._folder / "images.txt").write_text("".join(self._lines), "ascii", newline="\n")
         (self._folder / "adv2e.json").write_text(self._description, "utf-8", newline="\n")
-
-    def _abandon(self) -> None:
-        super()._abandon()
-        if self._events is not None:
-            self._events.close()
 
 
 def _foreign(folder: Path) -> str | None:
@@ -161,97 +110,51 @@ def _foreign(folder: Path) -> str | None:
     return None
 
 
-class ZipSink(_Davis240cSink):
-    """A zip archive of the DAVIS240C files, at its root; its bytes follow from its content.
+class ZipWriter(_Davis240cWriter):
+    """Writes the DAVIS240C files to a zip archive, whose bytes follow from its content."""
 
-    Parameters
-    ----------
-    path : Path
-        The archive.
-    description : dict
-        Content of ``adv2e.json``.
-    staging : Staging
-        Takes it.
-    with_frames : bool
-        Store frames.
-    threads : int
-        Threads that compress frames.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        description: dict[str, Any],
-        *,
-        staging: Staging,
-        with_frames: bool,
-        threads: int,
-    ) -> None:
-        self._temporary = staging.file(path)
-        self._archive: zipfile.ZipFile | None = None
-        self._events: IO[bytes] | None = None
-        self._spool: FrameSpool | None = None
-        self._deflating: OrderedWork | None = None
-        self._text = bytearray()
-        super().__init__(path, staging, description, with_frames, threads)
-
-    def _open(self) -> None:
-        super()._open()
-        self._archive = zipfile.ZipFile(
-            self._temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+        super().__init__(request, stack)
+        (path,) = temporary
+        self._archive = stack.enter_context(
+            zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)
         )
         # an archive takes one member at a time: events go straight in, frames wait
-        self._events = self._archive.open("events.txt", "w", force_zip64=True)
-        self._deflating = OrderedWork(min(1, self._threads - 1))
-        if self.wants_frames:
-            self._spool = FrameSpool(self._temporary.parent)
+        self._events = stack.enter_context(self._archive.open("events.txt", "w", force_zip64=True))
+        self._deflating = OrderedWork(min(1, request.threads - 1))
+        stack.callback(self._deflating.abandon)
+        self._text = bytearray()
+        self._spool = stack.enter_context(closing(FrameSpool(path.parent, self._work)))
 
-    def _write_events(self, events: Events) -> None:
+    def write_events(self, events: Events) -> None:
+        """Append events."""
         for block in text_blocks(events):
             self._text += block
             while len(self._text) >= _BLOCK:
-                self._deflate(bytes(self._text[:_BLOCK]))
+                self._deflate(self._text[:_BLOCK])
                 del self._text[:_BLOCK]
 
-    def _deflate(self, text: bytes) -> None:
-        assert self._deflating is not None
-        assert self._events is not None
-        self._deflating.submit(self._events.write, text, take=lambda size: None)
+    def _deflate(self, text: bytearray) -> None:
+        self._deflating.submit(self._events.write, text)
 
-    def _store_frame(self, name: str, t_ns: int, data: bytes) -> None:
-        assert self._spool is not None
-        self._spool.add(t_ns, (), data)
+    def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
+        self._spool.add(t_ns, _png, image)
 
-    def _finish(self) -> None:
-        assert self._archive is not None
-        assert self._events is not None
-        assert self._deflating is not None
-        super()._finish()
-        self._deflate(bytes(self._text))
+    def finish(self) -> None:
+        """Write what is left, the list, the frames and the description."""
+        self._deflate(self._text)
         self._deflating.finish()
         self._events.close()
         self._archive.getinfo("events.txt").external_attr = 0o644 << 16
+        self._work.finish()
         self._add("images.txt", "".join(self._lines).encode("ascii"))
-        for number, frame in enumerate(self._spool or ()):
+        for number, frame in enumerate(self._spool):
             self._add(f"images/frame_{number:08d}.png", frame.data, zipfile.ZIP_STORED)
         self._add("adv2e.json", self._description.encode())
-        self._archive.close()
-        if self._spool is not None:
-            self._spool.close()
 
     def _add(self, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
         """Add a member with the time that zip counts from."""
-        assert self._archive is not None
         info = zipfile.ZipInfo(name)
         info.compress_type = method
         info.external_attr = 0o644 << 16
         self._archive.writestr(info, data)
-
-    def _abandon(self) -> None:
-        super()._abandon()
-        if self._deflating is not None:
-            self._deflating.abandon()
-        for part in (self._events, self._archive, self._spool):
-            if part is not None:
-                with suppress(Exception):  # each must be closed, whatever became of the others
-                    part.close()

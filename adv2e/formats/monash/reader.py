@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.formats import hdf5
-from adv2e.formats.clock import Beside, Clock, disagreement
-from adv2e.formats.gather import Gatherer
-from adv2e.formats.recording import MOST_COLUMNS, Recording, described_geometry, parse_description
+from adv2e.formats.builder import RecordingBuilder
+from adv2e.formats.clock import Beside, Clock
+from adv2e.formats.recording import MOST_COLUMNS, Recording
 from adv2e.sources.base import Image
 from adv2e.sources.times.units import Unit, frame_unit
 from adv2e.ticks import NS, US, to_ticks
@@ -30,59 +30,44 @@ COLUMNS = ("events/ts", "events/xs", "events/ys", "events/ps")
 _PART = 1 << 20  # events read at once
 
 
-def read_monash(path: Path, file: h5py.File, time_unit: str | None = None) -> Recording:
-    """Return the recording in an open file of this layout.
+def read_hdf5(path: Path, time_unit: str | None = None) -> Recording:
+    """Return the recording in a file of this layout.
 
     Raises
     ------
     DataError
-        Columns of different lengths or kinds, times that are not finite or beyond 146 years, a
-        broken image, or something that is not in the file itself.
+        Another layout, columns of different lengths or kinds, times that are not finite or beyond
+        146 years, a broken image, or something that is not in the file itself.
     """
-    gatherer = Gatherer()
-    description: dict[str, Any] = {}
+    with hdf5.opened(path) as file:
+        if all(hdf5.find(file, name) is not None for name in COLUMNS):
+            return _read(path, file, time_unit)
+    raise DataError(f"{path}: unknown HDF5 layout, must be monash (datasets {', '.join(COLUMNS)})")
+
+
+def _read(path: Path, file: h5py.File, time_unit: str | None) -> Recording:
+    builder = RecordingBuilder(path)
     if "adv2e" in file.attrs:
         text = str(file.attrs["adv2e"])
-        description = parse_description(text, f"{path}: attribute adv2e", gatherer.problems)
+        builder.describe(text, f"{path}: attribute adv2e", "the attribute adv2e")
     images = hdf5.find(file, "images")
     if isinstance(images, h5py.Dataset):
         raise DataError(f"{path}: images is a dataset, must be a group of images")
     names = [f"images/{name}" for name in sorted(images)] if images is not None else []
     found = [hdf5.dataset(file, name) for name in names]
-    ours = "s" if description else None
+    builder.state(_geometry(path, file, found), "sensor_resolution")
     frames = _Stamps(path, found)
-    clock = Clock(time_unit, ours, frames.beside(ours))
-    geometry, whence = _geometry(path, file, found), "sensor_resolution"
-    if described_geometry(description):
-        geometry, whence = described_geometry(description), "the attribute adv2e"
-    whole = _gather_events(path, file, gatherer, geometry, clock)
+    clock = Clock(time_unit, builder.unit, frames.beside(builder.unit))
+    whole = _read_events(path, file, builder, clock)
     given = clock.given_for_frames(whole=frames.whole, events_whole=whole)
-    times, doubt = frames.times_ns(given, ours)
+    times, doubt = frames.times_ns(given, builder.unit)
     if doubt:
-        gatherer.problems.append(f"images: {doubt}")
-    events, width, height = gatherer.finish(geometry, whence)
-    gatherer.problems += disagreement(events, times)
-    return Recording(
-        str(path),
-        "monash",
-        width,
-        height,
-        events,
-        times,
-        description,
-        gatherer.problems,
-        lambda: _images(path, names),
-    )
+        builder.problems.append(f"images: {doubt}")
+    return builder.finish("monash", times, lambda: _images(path, names))
 
 
-def _gather_events(
-    path: Path,
-    file: h5py.File,
-    gatherer: Gatherer,
-    size: tuple[int, int] | None,
-    clock: Clock,
-) -> bool:
-    """Read all events into `gatherer`; return whether their times are whole numbers."""
+def _read_events(path: Path, file: h5py.File, builder: RecordingBuilder, clock: Clock) -> bool:
+    """Read all events into `builder`; return whether their times are whole numbers."""
     columns = [hdf5.dataset(file, name) for name in COLUMNS]
     if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
         shapes = ", ".join(
@@ -95,12 +80,12 @@ def _gather_events(
     hdf5.check_stored(columns, f"{path}: events")
     whole = columns[0].dtype.kind in "iu"
     t, x, y = (column[:_PART] for column in columns[:3])
-    unit = clock.of_events(t, x, y, size, whole=whole)
+    unit = clock.of_events(t, x, y, builder.geometry, whole=whole)
     for begin in range(0, columns[0].size, _PART):
         t, x, y, p = (column[begin : begin + _PART] for column in columns)
-        gatherer.add(to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, _signs(p))
+        builder.add(to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, _signs(p))
     if columns[0].size and unit.doubt:
-        gatherer.problems.append(unit.doubt)
+        builder.problems.append(unit.doubt)
     return whole
 
 

@@ -22,9 +22,9 @@ References
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections import deque
+from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -32,9 +32,9 @@ from numpy.typing import NDArray
 
 from adv2e.background import OrderedWork
 from adv2e.events import EVENT_DTYPE, Events
-from adv2e.files.staging import Staging
-from adv2e.formats.columns import FILTERS, ChunkedColumns, Column, encode_image
-from adv2e.formats.sink import FileSink, to_json
+from adv2e.formats.columns import FILTERS, ChunkedColumns, Column
+from adv2e.formats.compression import compress
+from adv2e.formats.sink import Request, Writer, to_json
 from adv2e.formats.spool import FrameSpool, StoredFrame
 
 _CACHE_BYTES = 512 << 10
@@ -44,115 +44,77 @@ Only the end of the index grows; but below this, storing many images takes longe
 """
 
 
-class MonashSink(FileSink):
-    """An HDF5 file in the layout ``monash``; its bytes follow from its content.
+class MonashWriter(Writer):
+    """Writes an HDF5 file in the layout ``monash``; its bytes follow from its content."""
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    width, height : int
-        Geometry [pixels].
-    description : dict
-        Content of the attribute ``adv2e``.
-    staging : Staging
-        Takes it.
-    with_frames : bool
-        Store frames.
-    threads : int
-        Threads that compress.
-    """
+    takes_frames = True
 
-    def __init__(
-        self,
-        path: Path,
-        *,
-        width: int,
-        height: int,
-        description: dict[str, Any],
-        staging: Staging,
-        with_frames: bool,
-        threads: int,
-    ) -> None:
-        self._temporary = staging.file(path)
-        super().__init__(path, staging)
-        self.wants_frames = with_frames
-        self._shape = (height, width)
-        self._description = to_json(description)
-        self._threads = threads
-        self._totals = _Totals()
-        self._indices = _EventIndices()
-        self._file: h5py.File | None = None
-        self._work: OrderedWork | None = None
-        self._spool: FrameSpool | None = None
-        self._columns: ChunkedColumns | None = None
-
-    def _open(self) -> None:
-        self._work = OrderedWork(self._threads - 1)
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+        (path,) = temporary
+        self._request = request
         # fixed: the oldest structures, which every reader knows and which hold no times
-        self._file = h5py.File(self._temporary, "w", libver=("earliest", "v108"))
-        pixel = np.dtype(np.int16 if max(self._shape) <= 32767 else np.uint16)
+        self._file = stack.enter_context(h5py.File(path, "w", libver=("earliest", "v108")))
         _bound_cache(self._file)
-        columns = {
-            "xs": Column(pixel, lambda events: events["x"]),
-            "ys": Column(pixel, lambda events: events["y"]),
-            "ts": Column(np.dtype(np.float64), lambda events: events["t"] / 1e6),
-            "ps": Column(np.dtype(np.bool_), lambda events: events["p"]),
+        self._work = OrderedWork(request.threads - 1)
+        stack.callback(self._work.abandon)
+        self._spool = stack.enter_context(closing(FrameSpool(path.parent, self._work)))
+        pixel = np.dtype(np.int16 if max(request.width, request.height) <= 32767 else np.uint16)
+        columns: dict[str, Column] = {
+            "xs": (pixel, lambda events: events["x"]),
+            "ys": (pixel, lambda events: events["y"]),
+            "ts": (np.dtype(np.float64), lambda events: events["t"] / 1e6),
+            "ps": (np.dtype(np.bool_), lambda events: events["p"]),
         }
-        group = self._file.create_group("events")
-        self._columns = ChunkedColumns(group, columns, EVENT_DTYPE, self._work)
-        self._file.create_group("images")
-        if self.wants_frames:
-            self._spool = FrameSpool(self._temporary.parent)
+        self._events = self._file.create_group("events")
+        self._columns = ChunkedColumns(self._events, columns, EVENT_DTYPE, self._work)
+        self._images = self._file.create_group("images")
+        self._indices = _EventIndices()
+        self._on = 0
 
-    def _write_events(self, events: Events) -> None:
-        assert self._columns is not None
+    def write_events(self, events: Events) -> None:
+        """Append events."""
         if events.size:
             self._columns.append(events)
-            if self.wants_frames:
-                self._indices.add_events(events["t"])
-            self._totals.add(events)
+            self._on += int(np.count_nonzero(events["p"]))
+            if self._request.with_frames:
+                self._indices.add_events(events["t"] / 1e6)
 
-    def _write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
-        assert self._work is not None
-        assert self._spool is not None
+    def write_frame(self, t_ns: int, image: NDArray[np.uint8 | np.uint16]) -> None:
+        """Append a frame."""
         picture = _eight_bit(image)
         picture = picture[..., ::-1].copy() if picture.ndim == 3 else picture.copy()
+        self._spool.add(t_ns, compress, picture)
         self._indices.add_frame(t_ns / 1e9)
-        spool, shape = self._spool, picture.shape
-        self._work.submit(encode_image, picture, take=lambda data: spool.add(t_ns, shape, data))
 
-    def _finish(self) -> None:
-        assert self._file is not None
-        assert self._columns is not None
-        assert self._work is not None
+    def finish(self) -> None:
+        """Write what is left, the frames and the attributes."""
         self._columns.finish()
         self._work.finish()
         indices = self._indices.finish()
-        for number, frame in enumerate(self._spool or ()):
-            _add_image(self._file["images"], number, frame, indices[number])
-        self._file["images"].attrs["num_images"] = np.int64(len(indices))
-        attributes = self._file.attrs
-        for name, value in self._totals.attributes().items():
-            attributes[name] = value
-        attributes["num_imgs"] = np.int64(len(indices))
-        attributes["num_flow"] = np.int64(0)
-        attributes["sensor_resolution"] = np.array(self._shape, np.int64)
-        attributes["source"] = "unknown"
-        attributes["layout"] = "monash"
-        attributes["layout_version"] = "1"
-        attributes["adv2e"] = self._description
-        self._file.close()
-        if self._spool is not None:
-            self._spool.close()
-
-    def _abandon(self) -> None:
-        if self._work is not None:
-            self._work.abandon()
-        for part in (self._spool, self._file):
-            if part is not None:
-                with suppress(Exception):  # each must be closed, whatever became of the other
-                    part.close()
+        for number, (frame, index) in enumerate(zip(self._spool, indices, strict=True)):
+            _add_image(self._images, f"image{number:09d}", frame, index)
+        self._images.attrs["num_images"] = np.int64(len(indices))
+        times = self._events["ts"]
+        first, last = (times[0], times[-1]) if times.size else (0.0, 0.0)
+        self._file.attrs.update(
+            {
+                "num_events": np.int64(times.size),
+                "num_pos": np.int64(self._on),
+                "num_neg": np.int64(times.size - self._on),
+                "duration": np.float64(last - first),
+                "t0": np.float64(first),
+                "tk": np.float64(last),
+                "num_imgs": np.int64(len(indices)),
+                "num_flow": np.int64(0),
+                "sensor_resolution": np.array(
+                    [self._request.height, self._request.width], np.int64
+                ),
+                "source": "unknown",
+                "layout": "monash",
+                "layout_version": "1",
+                "adv2e": to_json(self._request.description),
+            }
+        )
 
 
 def _bound_cache(file: h5py.File) -> None:
@@ -166,22 +128,15 @@ def _bound_cache(file: h5py.File) -> None:
     file.id.set_mdc_config(cache)
 
 
-def _eight_bit(image: NDArray[Any]) -> NDArray[np.uint8]:
+def _eight_bit(image: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:
     """Return the image as the 8 bit that this layout holds; 16 bit are rounded."""
     if image.dtype == np.uint8:
-        return image
+        return image.astype(np.uint8, copy=False)
     return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
 
 
-def _add_image(group: h5py.Group, number: int, frame: StoredFrame, event_index: int) -> None:
-    image = group.create_dataset(
-        f"image{number:09d}",
-        frame.shape,
-        np.uint8,
-        chunks=frame.shape,
-        track_times=False,
-        **FILTERS,
-    )
+def _add_image(group: h5py.Group, name: str, frame: StoredFrame, event_index: int) -> None:
+    image = group.create_dataset(name, frame.shape, np.uint8, chunks=frame.shape, **FILTERS)
     image.id.write_direct_chunk((0,) * len(frame.shape), frame.data)
     image.attrs["size"] = np.array(frame.shape, np.int64)
     image.attrs["timestamp"] = np.float64(frame.t_ns / 1e9)
@@ -190,69 +145,34 @@ def _add_image(group: h5py.Group, number: int, frame: StoredFrame, event_index: 
     image.attrs["event_idx"] = np.int64(event_index)
 
 
-class _Totals:
-    """Counts and span of the events."""
-
-    def __init__(self) -> None:
-        self._count = 0
-        self._on = 0
-        self._first = 0.0
-        self._last = 0.0
-
-    def add(self, events: Events) -> None:
-        """Count some events, one at least."""
-        if not self._count:
-            self._first = float(events["t"][0]) / 1e6
-        self._last = float(events["t"][-1]) / 1e6
-        self._count += events.size
-        self._on += int(np.count_nonzero(events["p"]))
-
-    def attributes(self) -> dict[str, Any]:
-        return {
-            "num_events": np.int64(self._count),
-            "num_pos": np.int64(self._on),
-            "num_neg": np.int64(self._count - self._on),
-            "duration": np.float64(self._last - self._first),
-            "t0": np.float64(self._first),
-            "tk": np.float64(self._last),
-        }
-
-
 class _EventIndices:
     """Finds the last event before each frame; either may come before the other."""
 
     def __init__(self) -> None:
-        self._count = 0
-        self._last = -np.inf
-        self._waiting: list[float] = []
-        self._late: list[NDArray[np.float64]] = []  # times of events that a frame may yet precede
+        self._frames: deque[float] = deque()  # times of those not settled
         self._found: list[int] = []
+        self._blocks: deque[NDArray[np.float64]] = deque()  # of times that a frame may yet precede
+        self._before = 0  # events before these
 
     def add_frame(self, seconds: float) -> None:
-        """Note a frame; it is settled once an event at or after its time has come."""
-        if seconds > self._last:
-            self._waiting.append(seconds)
-            self._late.clear()
-            return
-        times = np.concatenate(self._late)
-        before = int(np.searchsorted(times, seconds, side="left"))
-        self._found.append(max(self._count - times.size + before - 1, 0))
-        self._late = [times[before:]]
+        self._frames.append(seconds)
+        self._settle()
 
-    def add_events(self, t_us: NDArray[np.int64]) -> None:
-        """Settle the frames that come before the last of these events, one at least."""
-        self._last = float(t_us[-1]) / 1e6
-        seconds = t_us / 1e6
-        if self._waiting:
-            settled = int(np.searchsorted(self._waiting, self._last, side="right"))
-            before = np.searchsorted(seconds, self._waiting[:settled], side="left")
-            self._found.extend(max(self._count + int(n) - 1, 0) for n in before)
-            del self._waiting[:settled]
-            self._late.clear()
-        if not self._waiting:
-            self._late.append(seconds)
-        self._count += t_us.size
+    def add_events(self, seconds: NDArray[np.float64]) -> None:
+        self._blocks.append(seconds)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Settle the frames after which an event has come, and forget events before the others."""
+        while self._frames and self._blocks:
+            block = self._blocks[0]
+            if block[-1] < self._frames[0]:
+                self._before += block.size
+                self._blocks.popleft()
+            else:
+                index = int(np.searchsorted(block, self._frames.popleft(), side="left"))
+                self._found.append(max(self._before + index - 1, 0))
 
     def finish(self) -> list[int]:
         """Return the index for each frame."""
-        return self._found + [max(self._count - 1, 0)] * len(self._waiting)
+        return self._found + [max(self._before - 1, 0)] * len(self._frames)

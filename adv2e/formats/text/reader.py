@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import entry, kernel
 from adv2e.errors import DataError
+from adv2e.formats.builder import RecordingBuilder
 from adv2e.formats.clock import Clock
-from adv2e.formats.gather import Gatherer
-from adv2e.formats.recording import Recording, described_geometry, parse_description
+from adv2e.formats.recording import Recording
 from adv2e.sources.times.units import Unit
 from adv2e.ticks import LARGEST_NS, US, check_us
 
@@ -32,6 +32,7 @@ _DECIMALS = {"s": 6, "ms": 3, "us": 0, "ns": -3}  # that make a microsecond
 
 _SIZE = re.compile(rb"0{0,9}[1-9][0-9]{0,4}")
 _HOLDS = re.compile(rb"[\x00-\x20]*[^\x00-\x20#]")
+_DECIMAL_TIME = re.compile(rb"^[\x00-\x09\x0b-\x20]*(?!#)[^\x00-\x20.eE]*[.eE]", re.M)
 
 _MALFORMED, _WHOLE, _ROUNDED = -1, 0, 1
 
@@ -144,26 +145,6 @@ def parse_lines(data: Any, decimals: int, t: Any, x: Any, y: Any, p: Any) -> Any
     return count, line, 0
 
 
-@entry
-def has_decimal_times(data: Any) -> bool:
-    """Tell whether the first field of any line has a point or an exponent."""
-    inside = True  # the first field, or what is before it
-    begun = False
-    comment = False
-    for k in range(data.shape[0]):
-        byte = data[k]
-        if byte == 10:
-            inside, begun, comment = True, False, False
-        elif byte <= 32:
-            inside = inside and not begun
-        elif inside and not comment:
-            comment = byte == 35
-            begun = True
-            if byte in (46, 101, 69):  # point, e, E
-                return True
-    return False
-
-
 def read_text(path: Path, time_unit: str | None = None) -> Recording:
     """Return the recording in a text file of events.
 
@@ -174,30 +155,18 @@ def read_text(path: Path, time_unit: str | None = None) -> Recording:
     DataError
         A line that cannot be read.
     """
-    gatherer = Gatherer()
-    description: dict[str, Any] = {}
+    builder = RecordingBuilder(path)
     beside = [path.with_name(path.name + ".json")]
     if path.name == "events.txt":
         beside.append(path.with_name("adv2e.json"))
-    whence = next((file for file in beside if file.is_file()), None)
-    if whence is not None:
-        text = whence.read_text("utf-8", errors="replace")
-        description = parse_description(text, str(whence), gatherer.problems)
+    description = next((file for file in beside if file.is_file()), None)
+    if description is not None:
+        text = description.read_text("utf-8", errors="replace")
+        builder.describe(text, str(description), description.name)
     with path.open("rb") as file:
-        told = "s" if description else None
-        lines = gather_lines(file, str(path), gatherer, Clock(time_unit, told))
-    stated = described_geometry(description)
-    source = whence.name if stated and whence else "the first line"
-    events, width, height = gatherer.finish(stated or lines.geometry, source)
-    return Recording(
-        str(path),
-        "text",
-        width,
-        height,
-        events,
-        metadata=description,
-        problems=gatherer.problems,
-    )
+        lines = read_lines(file, str(path), builder, Clock(time_unit, builder.unit))
+    builder.state(lines.geometry, "the first line")
+    return builder.finish("text")
 
 
 @dataclass(frozen=True)
@@ -219,8 +188,8 @@ class Lines:
     unit: str
 
 
-def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer, clock: Clock) -> Lines:
-    """Read all lines of `file` into `gatherer`.
+def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder, clock: Clock) -> Lines:
+    """Read all lines of `file` into `builder`.
 
     Parameters
     ----------
@@ -239,12 +208,11 @@ def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer, clock: Clock) 
     geometry, whole, unit = None, False, Unit("s")
     before = 0  # lines in earlier blocks
     for number, block in enumerate(_blocks(file)):
-        begin = 0
+        data = np.frombuffer(block, np.uint8)
         if number == 0:
             geometry, begin, before = _header(block)
-        data = np.frombuffer(block, np.uint8)[begin:]
-        if number == 0:
-            whole = not has_decimal_times(data)
+            data = data[begin:]
+            whole = not _DECIMAL_TIME.search(block[begin:])
             t, x, y, *_ = _columns(data, whole, "us" if whole else "s")
             unit = clock.of_events(t if whole else t / 1e6, x, y, geometry, whole=whole)
         t, x, y, p, lines, wrong = _columns(data, whole, unit.name)
@@ -254,10 +222,10 @@ def gather_lines(file: IO[bytes], label: str, gatherer: Gatherer, clock: Clock) 
         if late.size:
             line = before + _line_of(data.tobytes(), int(late[0]))
             check_us(t[late[:1]], f"{label} line {line}")
-        gatherer.add(t, x, y, p)
+        builder.add(t, x, y, p)
         before += lines
     if unit.doubt:
-        gatherer.problems.append(unit.doubt)
+        builder.problems.append(unit.doubt)
     return Lines(geometry, whole, unit.name)
 
 

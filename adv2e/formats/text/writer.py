@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
-from types import TracebackType
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from adv2e.compiled import entry, kernel
 from adv2e.errors import OutputError
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import FileSink, to_json
+from adv2e.formats.sink import Request, Sink, Writer, to_json
 
 _BLOCK = 1 << 15  # events formatted at once
 _LONGEST = 48  # bytes of the longest line, and what the kernel may write beyond its end
@@ -117,47 +117,27 @@ def text_blocks(events: Events) -> Iterator[memoryview]:
         yield out[:size].data
 
 
-class TextSink(FileSink):
-    """A text file of events, and ``<name>.json`` beside it.
+class TextWriter(Writer):
+    """Writes a text file of events, and ``<name>.json`` beside it."""
 
-    Parameters
-    ----------
-    path : Path
-        The text file.
-    description : dict
-        What the file beside it says.
-    staging : Staging
-        Takes both.
-    """
+    @staticmethod
+    def stage(path: Path, staging: Staging) -> list[Path]:
+        """Return the temporary names of both files."""
+        return [staging.file(path), staging.file(path.with_name(path.name + ".json"))]
 
-    def __init__(self, path: Path, description: dict[str, Any], staging: Staging) -> None:
-        self._temporary = staging.file(path)
-        self._beside = staging.file(path.with_name(path.name + ".json"))
-        self._description = to_json(description)
-        self._file: BinaryIO | None = None
-        super().__init__(path, staging)
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+        text, beside = temporary
+        beside.write_text(to_json(request.description), encoding="utf-8", newline="\n")
+        self._file = stack.enter_context(text.open("wb"))
 
-    def _open(self) -> None:
-        self._beside.write_text(self._description, encoding="utf-8", newline="\n")
-        self._file = self._temporary.open("wb")
-
-    def _write_events(self, events: Events) -> None:
-        assert self._file is not None
+    def write_events(self, events: Events) -> None:
+        """Append events."""
         for block in text_blocks(events):
             self._file.write(block)
 
-    def _finish(self) -> None:
-        self._abandon()
 
-    def _abandon(self) -> None:
-        if self._file is not None:
-            self._file.close()
-
-
-class StandardOutput:
+class StandardOutput(Sink):
     """Events as text on standard output, flushed with every write."""
-
-    wants_frames = False
 
     def write_events(self, events: Events) -> None:
         """Write the lines of `events`.
@@ -178,18 +158,7 @@ class StandardOutput:
         except OSError as error:
             raise OutputError(f"standard output: cannot be written: {error.strerror}") from error
 
-    def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
-        """Do nothing: text holds no frames."""
-
     def __enter__(self) -> StandardOutput:
         if sys.stdout is None:  # closed before the program began: nobody reads
             raise BrokenPipeError
         return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        pass

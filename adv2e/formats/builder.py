@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,27 +12,73 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import entry
 from adv2e.events import EVENT_DTYPE, Events, empty_events, sort_events
+from adv2e.formats.clock import disagreement
+from adv2e.formats.recording import Recording, described_geometry
+from adv2e.sources.base import Image, Pixels
 
 _LARGEST = np.iinfo(np.uint16).max
 
 Column = NDArray[Any]
 
 
-class Gatherer:
-    """Collects events part by part, then sorts and judges them.
+class RecordingBuilder:
+    """Collects what a file holds, then sorts and judges it.
+
+    Parameters
+    ----------
+    path : Path
+        The file, or folder.
 
     Attributes
     ----------
     problems : list of str
         What is doubtful and what was done about it.
+    description : dict
+        What the file says of itself, if this program wrote it.
+    geometry : (int, int) or None
+        Width and height [pixels] that the file states.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, path: Path) -> None:
         self.problems: list[str] = []
+        self.description: dict[str, Any] = {}
+        self.geometry: tuple[int, int] | None = None
+        self._path = path
+        self._stated_by = ""
         self._parts: list[Events] = []
         self._unstorable = 0
         self._values: set[int] = set()
         self._odd_polarities = 0
+
+    @property
+    def unit(self) -> str | None:
+        """Unit of the times that we wrote; None: another program wrote them."""
+        return "s" if self.description else None
+
+    def describe(self, text: str, label: str, name: str) -> None:
+        """Take what the file says of itself; if that is broken, note a problem.
+
+        Parameters
+        ----------
+        text : str
+            JSON.
+        label, name : str
+            Where it stands, for messages: in full, and in short.
+        """
+        try:
+            description = json.loads(text)
+        except (ValueError, RecursionError):
+            description = None
+        if isinstance(description, dict):
+            self.description = description
+            self.state(described_geometry(description), name)
+        else:
+            self.problems.append(f"{label}: not a JSON mapping, ignored")
+
+    def state(self, geometry: tuple[int, int] | None, by: str) -> None:
+        """Take (width, height) [pixels] that something states, unless something before it did."""
+        if self.geometry is None:
+            self.geometry, self._stated_by = geometry, by
 
     def add(self, t: Column, x: Column, y: Column, p: Column) -> None:
         """Append events, in the order of the file.
@@ -58,15 +107,18 @@ class Gatherer:
                 self._values.add(value)
         self._odd_polarities += p.size - usual
 
-    def finish(self, geometry: tuple[int, int] | None, whence: str = "") -> tuple[Events, int, int]:
-        """Return (events, width, height), the events sorted.
+    def finish(
+        self,
+        layout: str,
+        frame_times_ns: NDArray[np.int64] | None = None,
+        images: Callable[[], Iterator[Image | Pixels]] = lambda: iter(()),
+    ) -> Recording:
+        """Return the recording, its events sorted and inside its geometry.
 
         Parameters
         ----------
-        geometry : (int, int), optional
-            Width and height [pixels] that the file states; else the largest coordinates tell.
-        whence : str
-            What states it, for messages.
+        layout, frame_times_ns, images
+            See :class:`Recording`.
         """
         events = np.concatenate(self._parts) if self._parts else empty_events()
         self._parts.clear()
@@ -75,8 +127,20 @@ class Gatherer:
                 f"{self._unstorable} events with a coordinate below 0 or above 65535: left out"
             )
         self._judge_polarities()
-        events, width, height = self._fit(events, geometry, whence)
-        return self._in_order(events), width, height
+        events, width, height = self._fit(events)
+        events = self._in_order(events)
+        self.problems += disagreement(events, frame_times_ns)
+        return Recording(
+            str(self._path),
+            layout,
+            width,
+            height,
+            events,
+            frame_times_ns,
+            self.description,
+            self.problems,
+            images,
+        )
 
     def _say(self, text: str) -> None:
         self.problems.append(text)
@@ -90,10 +154,9 @@ class Gatherer:
         if {-1, 0} <= self._values:
             self._say("polarities -1 and 0 both occur: both taken as OFF")
 
-    def _fit(
-        self, events: Events, geometry: tuple[int, int] | None, whence: str
-    ) -> tuple[Events, int, int]:
+    def _fit(self, events: Events) -> tuple[Events, int, int]:
         """Settle the geometry, and leave out what lies outside."""
+        geometry, by = self.geometry, self._stated_by
         if not events.size:
             self._say("no events")
             return events, *(geometry or (0, 0))
@@ -108,14 +171,14 @@ class Gatherer:
             # a known fault of writers: the largest coordinate in place of the size
             wider = max(width, needed[0]), max(height, needed[1])
             self._say(
-                f"{whence} states {width}x{height}, one less than the largest coordinates need:"
+                f"{by} states {width}x{height}, one less than the largest coordinates need:"
                 f" {wider[0]}x{wider[1]} taken"
             )
             return events, *wider
         inside = (events["x"] < width) & (events["y"] < height)
         self._say(
             f"{inside.size - np.count_nonzero(inside)} events outside {width}x{height}, which"
-            f" {whence} states: left out"
+            f" {by} states: left out"
         )
         return events[inside], width, height
 

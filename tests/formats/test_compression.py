@@ -1,0 +1,51 @@
+import zlib
+
+import h5py
+import numpy as np
+import pytest
+
+from adv2e.events import make_events
+from adv2e.formats import compression
+from adv2e.formats.compression import compress, compress_shuffled
+from adv2e.formats.writing import open_sink
+
+
+@pytest.fixture(params=["isal", "zlib"])
+def packages(request, monkeypatch):
+    monkeypatch.setattr(compression, "PACKAGES", ("isal",) if request.param == "isal" else ())
+
+
+@pytest.mark.parametrize("dtype", [np.bool_, np.int16, np.float64])
+def test_inflate_returns_the_bytes_by_rank(packages, dtype):
+    column = np.random.default_rng(7).integers(0, 346, 3000).astype(dtype)[::3]
+    ranks = column.copy().view(np.uint8).reshape(1000, -1)
+    assert zlib.decompress(compress_shuffled(column)) == ranks.T.tobytes()
+
+
+def test_inflate_returns_the_bytes(packages):
+    image = np.arange(600, dtype=np.uint8).reshape(20, 30)[:, ::-1]
+    assert zlib.decompress(compress(image)) == image.tobytes()
+
+
+def test_datasets_do_not_depend_on_what_compresses(tmp_path, monkeypatch):
+    count = 100_000
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.integers(0, 4, count))
+    x, y = rng.integers(0, 346, count), rng.integers(0, 260, count)
+    events = make_events(t, x, y, rng.integers(0, 2, count))
+    image = rng.integers(0, 256, (260, 346), dtype=np.uint8)
+
+    def written(name):
+        options = {"width": 346, "height": 260, "metadata": {}, "with_frames": True}
+        with open_sink(tmp_path / name, **options) as sink:
+            sink.write_frame(0, image)
+            sink.write_events(events)
+        with h5py.File(tmp_path / name) as file:
+            sets = {**file["events"], **file["images"]}
+            return {name: sets[name][()].tobytes() for name in sets}
+
+    assert compression.PACKAGES == ("isal",)  # of the extra `test`
+    fast = written("fast.h5")
+    monkeypatch.setattr(compression, "PACKAGES", ())
+    assert written("standard.h5") == fast
+    assert len(fast) == 5
