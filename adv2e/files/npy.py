@@ -10,20 +10,23 @@ References
 
 from __future__ import annotations
 
-import ast
 import math
 import struct
+import tokenize
 from dataclasses import dataclass
 from typing import IO, Any
 
 import numpy as np
-from numpy.lib.format import MAGIC_PREFIX, descr_to_dtype
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 
-_LONGEST_HEADER = 10_000
-_LENGTHS = {b"\1\0": ("<H", "latin1"), b"\2\0": ("<I", "latin1"), b"\3\0": ("<I", "utf-8")}
+_READERS = {
+    (1, 0): npy.read_array_header_1_0,
+    (2, 0): npy.read_array_header_2_0,
+    (3, 0): npy.read_array_header_2_0,  # differs where names of fields are not ASCII
+}
 
 
 @dataclass(frozen=True)
@@ -67,22 +70,16 @@ def read_header(file: IO[bytes], available: int, label: str) -> Header:
     DataError
         No such array, one of Python objects, or one of which a part is missing.
     """
-    begin = file.read(len(MAGIC_PREFIX) + 2)
-    layout = _LENGTHS.get(begin[-2:])
-    if not begin.startswith(MAGIC_PREFIX) or layout is None:
-        raise DataError(f"{label}: not a .npy array that can be read")
     try:
-        (length,) = struct.unpack(layout[0], file.read(struct.calcsize(layout[0])))
-        if length > _LONGEST_HEADER:
+        shape, fortran, dtype = _READERS[npy.read_magic(file)](file)
+        if dtype.itemsize == 0 or not all(type(n) is int and n >= 0 for n in shape):
             raise ValueError
-        header = _parse(file.read(length).decode(layout[1]), begin=file.tell())
     except (
         *(ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError),
-        *(SyntaxError, RecursionError, MemoryError, struct.error),
+        *(SyntaxError, RecursionError, MemoryError, struct.error, tokenize.TokenError),
     ) as error:
-        raise DataError(
-            f"{label}: not a .npy array that can be read: its header is wrong"
-        ) from error
+        raise DataError(f"{label}: not a .npy array that can be read") from error
+    header = Header(dtype, shape, fortran, file.tell())
     if header.dtype.hasobject:
         raise DataError(f"{label}: an array of Python objects, must be one of numbers")
     if header.begin + header.nbytes > available:
@@ -91,17 +88,6 @@ def read_header(file: IO[bytes], available: int, label: str) -> Header:
             f" of {header.nbytes:,}"
         )
     return header
-
-
-def _parse(text: str, begin: int) -> Header:
-    stated = ast.literal_eval(text.strip())
-    shape = stated["shape"]
-    if not isinstance(shape, tuple) or not all(type(n) is int and n >= 0 for n in shape):
-        raise ValueError
-    dtype = descr_to_dtype(stated["descr"])
-    if dtype.itemsize == 0 or type(stated["fortran_order"]) is not bool:
-        raise ValueError
-    return Header(dtype, shape, stated["fortran_order"], begin)
 
 
 def read_array(file: IO[bytes], available: int, label: str) -> NDArray[Any]:

@@ -12,13 +12,6 @@ from pathlib import Path
 
 from adv2e.errors import Adv2eError, DataError
 
-_KINDS = (
-    (stat.S_ISFIFO, "a pipe"),
-    (stat.S_ISCHR, "a device"),
-    (stat.S_ISBLK, "a device"),
-    (stat.S_ISSOCK, "a socket"),
-)
-
 _LONGEST = 64 << 20
 """Text that comes through a descriptor is no longer [bytes]."""
 
@@ -37,9 +30,8 @@ def check_ends(path: Path, kind: type[Adv2eError] = DataError) -> None:
         mode = path.stat().st_mode
     except FileNotFoundError:
         return
-    for is_kind, name in _KINDS:
-        if is_kind(mode):
-            raise kind(f"{path}: is {name}, must be a file")
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise kind(f"{path}: is a pipe, a device or a socket, must be a file")
 
 
 def read_text_bytes(path: Path, kind: type[Adv2eError] = DataError) -> bytes:

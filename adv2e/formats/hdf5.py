@@ -20,7 +20,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5l, h5o
+from h5py import h5d
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
@@ -63,27 +63,25 @@ def find(file: h5py.File, name: str) -> h5py.Group | h5py.Dataset | None:
     parts = name.split("/")
     followed = 0
     while parts:
-        part = parts.pop(0)
+        part, *parts = parts
         if part in ("", "."):
             continue
-        if not isinstance(here, h5py.Group) or not here.id.links.exists(part.encode()):
-            if followed:
-                raise DataError(f"{label}: is a link to nothing")
-            return None
-        kind = here.id.links.get_info(part.encode()).type
-        if kind == h5l.TYPE_SOFT:
+        link = here.get(part, getlink=True) if isinstance(here, h5py.Group) else None
+        if isinstance(link, h5py.HardLink):
+            here = here[part]
+        elif isinstance(link, h5py.SoftLink):
             followed += 1
             if followed > _LINKS:
                 raise DataError(f"{label}: is a link that leads to itself")
-            target = here.id.links.get_val(part.encode()).decode("utf-8", "surrogateescape")
-            if target.startswith("/"):
+            if link.path.startswith("/"):
                 here = file["/"]
-            parts = target.split("/") + parts
-        elif kind == h5l.TYPE_HARD:
-            here = _object(h5o.open(here.id, part.encode()))
+            parts = link.path.split("/") + parts
+        elif link is not None:
+            raise DataError(f"{label}: is a link to another file, which is not followed")
+        elif followed:
+            raise DataError(f"{label}: is a link to nothing")
         else:
-            leads = "to another file" if kind == h5l.TYPE_EXTERNAL else "of an unknown kind"
-            raise DataError(f"{label}: is a link {leads}, which is not followed")
+            return None
     if isinstance(here, h5py.Dataset):
         _check_own(here, label)
     return here if isinstance(here, (h5py.Group, h5py.Dataset)) else None
@@ -107,12 +105,6 @@ def check_stored(columns: list[h5py.Dataset], label: str) -> None:
     """Raise DataError if datasets together state far more than the file holds of them."""
     stated = sum(math.prod(column.shape or ()) * column.dtype.itemsize for column in columns)
     check_expansion(stated, sum(column.id.get_storage_size() for column in columns), label)
-
-
-def _object(identifier: Any) -> Any:
-    if isinstance(identifier, h5d.DatasetID):
-        return h5py.Dataset(identifier)
-    return h5py.Group(identifier) if isinstance(identifier, h5py.h5g.GroupID) else None
 
 
 def _check_own(found: h5py.Dataset, label: str) -> None:

@@ -57,21 +57,7 @@ class Sink(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What is to be written.
-
-    Attributes
-    ----------
-    path : Path
-        The output as the user named it.
-    width, height : int
-        Geometry [pixels].
-    description : dict
-        What the output says of itself.
-    with_frames : bool
-        Store frames, where the format can.
-    threads : int
-        Threads that compress.
-    """
+    """What is to be written, as :func:`adv2e.formats.writing.open_sink` was told."""
 
     path: Path
     width: int
