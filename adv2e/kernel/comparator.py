@@ -1,8 +1,4 @@
-"""Events of one pixel on one power series: thresholds, dead time, leak, injected noise.
-
-Row SIGNAL holds the filtered log intensity on s = 0..1, LEAK the fall of the reference since s = 0
-at the nominal leak rate, LIGHT the unfiltered light.
-"""
+"""What both solvers share of a pixel's comparator: ties, noise events, packed events."""
 
 from __future__ import annotations
 
@@ -10,25 +6,17 @@ import math
 
 from adv2e.compiled import inlined, kernel
 from adv2e.effects.pixel.hot_pixels import next_hot_time
-from adv2e.effects.pixel.leak import next_leak_factor
 from adv2e.effects.pixel.shot_noise import candidate_polarity, next_candidate_time
-from adv2e.kernel.polynomial import at_end, first_crossing, value
-from adv2e.kernel.workspace import (
-    DISTANCE,
-    LEAK,
-    LIGHT,
-    PIXEL_BITS,
-    S_HOLD,
-    S_HOT_TIME,
-    S_LEAK_FACTOR,
-    S_OFF,
-    S_ON,
-    S_REFERENCE,
-    S_SHOT_TIME,
-    SIGNAL,
-)
+from adv2e.kernel.workspace import PIXEL_BITS, S_HOT_TIME, S_SHOT_TIME
 
 SIGNAL_EVENT, SHOT, HOT = 0, 1, 2
+
+TIE = 1e-9
+"""A level counts as reached when it is passed by this much [ln units].
+
+A pixel that returns to an earlier brightness approaches levels a whole number of thresholds away
+without ever arriving; rounding alone would decide whether it fires.
+"""
 
 
 @kernel
@@ -72,92 +60,3 @@ def use_up(i, kind, circuit, state):
         next_hot_time(i, circuit, state)
     else:
         next_candidate_time(i, circuit, state)
-
-
-@inlined
-def events_of_series(
-    i, ta, h, order, low, high, monotone, t_base, circuit, state, ws, keys, times, n
-):  # fmt: skip
-    """Fire the events of pixel i on the series that spans [ta, ta + h] us.
-
-    The signal is known to stay between `low` and `high`, and perhaps to be monotone.  Returns the
-    number of events so far.
-    The reference kept in the state is the one at ta + h.
-    """
-    tb = ta + h
-    if state[S_HOLD, i] >= tb:
-        return n
-    jitter = circuit.leak_jitter > 0.0
-    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
-    injected = circuit.shot_rate > 0.0 or circuit.hot_rate > 0.0
-    factor = state[S_LEAK_FACTOR, i] if jitter else 1.0
-    reference = state[S_REFERENCE, i]
-    fall = 0.0
-    if leaks:
-        fall = factor * at_end(ws, LEAK, order)
-    if (
-        not injected
-        and state[S_HOLD, i] < 0.0
-        and high + fall - reference < state[S_ON, i]
-        and reference - low < state[S_OFF, i]
-    ):
-        state[S_REFERENCE, i] = reference - fall
-        return n
-    s = 0.0
-    if state[S_HOLD, i] >= 0.0:
-        s = max(0.0, (state[S_HOLD, i] - ta) / h)
-        reference = value(ws, SIGNAL, order, s)
-        if leaks:
-            reference += factor * value(ws, LEAK, order, s)
-        state[S_HOLD, i] = -1.0
-    while True:
-        kind, t_end, s_end = SIGNAL_EVENT, tb, 1.0
-        if injected:
-            kind, t_end = next_injected(i, ta + s * h, tb, circuit, state)
-            if kind != SIGNAL_EVENT:
-                s_end = max(s, (t_end - ta) / h)
-        for k in range(order + 1):
-            ws[DISTANCE, k] = ws[SIGNAL, k]
-        if leaks:
-            for k in range(order + 1):
-                ws[DISTANCE, k] += factor * ws[LEAK, k]
-        ws[DISTANCE, 0] -= reference
-        polarity, s_event = first_crossing(
-            ws, order, s, s_end, state[S_ON, i], state[S_OFF, i], monotone
-        )
-        signal_event = polarity != 0
-        if not signal_event:
-            if kind == SIGNAL_EVENT:
-                break
-            s_event = s_end
-            light = value(ws, LIGHT, order, s_end)
-            polarity = injected_polarity(i, kind, light, circuit, state)
-            use_up(i, kind, circuit, state)
-            if polarity == 0:
-                s = s_end
-                continue
-        t = ta + s_event * h
-        n = emit(keys, times, n, t, t_base, i, 1 if polarity > 0 else 0)
-        fallen = value(ws, LEAK, order, s_event) if leaks else 0.0
-        before = factor
-        if jitter:
-            factor = next_leak_factor(i, circuit, state)
-        s = s_event
-        if circuit.dead_time > 0.0:
-            hold = t + circuit.dead_time
-            if hold >= tb:
-                state[S_HOLD, i] = hold
-                break
-            s = (hold - ta) / h
-            reference = value(ws, SIGNAL, order, s)
-            if leaks:
-                reference += factor * value(ws, LEAK, order, s)
-        elif signal_event:
-            level = state[S_ON, i] if polarity > 0 else -state[S_OFF, i]
-            reference += level + (factor - before) * fallen
-        else:
-            reference = value(ws, SIGNAL, order, s) + factor * fallen
-    if leaks:
-        reference -= factor * at_end(ws, LEAK, order)
-    state[S_REFERENCE, i] = reference
-    return n

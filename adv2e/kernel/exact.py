@@ -15,20 +15,19 @@ from adv2e.kernel import static_pixels as rest
 from adv2e.kernel.event_buffer import tell_where, with_room
 from adv2e.kernel.lanes import batch, exchange
 from adv2e.kernel.quadrature import Rule
-from adv2e.kernel.tile import load, solve_one
+from adv2e.kernel.tile import load
 from adv2e.kernel.work_queue import claim
 from adv2e.kernel.workspace import EXACT, S_LAG, S_REFERENCE, S_X, STRIP, Circuit
 
 _f = np.float32
 _BLOCK = 256
-_ROUNDS = 100
-"""Places in one interval after which a pixel is solved by itself instead: a batch thins out."""
 
 
 def covers(circuit: Circuit) -> bool:
-    """Tell whether this module advances the circuit; if not, :mod:`adv2e.kernel.general` does."""
+    """Tell whether this module advances the circuit; if not, it is solved in steps of time."""
     one_pole = circuit.filtered and circuit.follower == 0.0
-    return circuit.update == EXACT and one_pole and not circuit.printed
+    plain = circuit.slew == 0.0 and circuit.overshoot == 0.0 and circuit.noise_rms == 0.0
+    return circuit.update == EXACT and one_pole and plain and not circuit.printed
 
 
 @kernel
@@ -125,44 +124,24 @@ def _screen(rows, end, length, circuit, rule):
 
 
 @kernel
-def _return(k, i, start, circuit, state, rows):
-    """Rows of a pixel that was solved by itself."""
-    rows[screen.LAG_1 + k] = state[S_LAG, i]
-    x1 = exchange.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
-    exchange.watch(k, i, x1, start, circuit, state, rows)
-
-
-@kernel
 def _solve_flagged(
     lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
 ):  # fmt: skip
-    """Solve the m pixels whose numbers are in scratch.pixels, in lanes and by themselves."""
-    rows, pixels, lanes, alone = scratch.rows, scratch.pixels, scratch.lanes, scratch.alone
-    left = 0
-    rounds = 0
+    """Solve the m pixels whose numbers are in scratch.pixels, in lanes."""
+    rows, pixels, lanes = scratch.rows, scratch.pixels, scratch.lanes
     waiting = exchange.held_first(m, rows, pixels)
     exchange.load(lo, m, ta, length, circuit, state, rows, scratch.falls, pixels, lanes)
     while True:
         keys, times = with_room(keys, times, n, n + 2 * m)
-        m, left, n = batch.decide(
-            lo, m, waiting, rounds == _ROUNDS, start, ta, length, t_base, circuit, rule, state,
-            rows, pixels, lanes, alone, left, keys, times, n,
+        m, n = batch.decide(
+            lo, m, waiting, start, ta, length, t_base, circuit, rule, state, rows, pixels, lanes,
+            keys, times, n,
         )  # fmt: skip
         if m == 0:
-            break
-        rounds += 1
+            return n, keys, times
         n, waiting = batch.search(
             lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys, times, n
         )
-    for c in range(left):
-        k, s, x = int(alone[0, c]), alone[1, c], alone[2, c]
-        end = exchange.log_of(np.float64(rows[screen.LIGHT_1 + k]), circuit)
-        n, keys, times = solve_one(
-            lo + k, x, x, end - x, end, ta + s * length, (1.0 - s) * length, t_base, circuit,
-            state, scratch.ws, keys, times, n,
-        )  # fmt: skip
-        _return(k, lo + k, start, circuit, state, rows)
-    return n, keys, times
 
 
 @kernel

@@ -16,13 +16,13 @@ from adv2e.effects.pixel.leak import fill_falls, next_leak_factor
 from adv2e.kernel import screen
 from adv2e.kernel.comparator import (
     SIGNAL_EVENT,
+    TIE,
     emit,
     injected_polarity,
     next_injected,
     use_up,
 )
 from adv2e.kernel.lanes.exchange import EARLY, log_of, next_noise, watch
-from adv2e.kernel.polynomial import TIE
 from adv2e.kernel.workspace import S_HOLD, S_OFF, S_ON, S_REFERENCE, STRIP
 
 BLOCK = 64

@@ -1,9 +1,9 @@
-"""What the two drivers of a tile share: frames, scratch memory, and pixels solved one by one.
+"""What the two drivers of a tile share: frames and scratch memory.
 
 A tile is some strips of pixels over several intervals, those that one call of a driver claims
 (:mod:`adv2e.kernel.work_queue`).  :mod:`adv2e.kernel.exact` advances the circuit
-that :mod:`adv2e.kernel.screen` covers, :mod:`adv2e.kernel.general` what is left of those that are
-not solved in steps of time; both go strip by strip, and each strip through all of its intervals.
+that :mod:`adv2e.kernel.screen` covers, :mod:`adv2e.kernel.stepped` all others; both go strip by
+strip, and each strip through all of its intervals.
 """
 
 from __future__ import annotations
@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import kernel
 from adv2e.kernel import screen
-from adv2e.kernel.event_buffer import with_room
 from adv2e.kernel.lanes import layout as lanes
-from adv2e.kernel.solve import solve_interval
 from adv2e.kernel.stepped import rows as dense_rows
-from adv2e.kernel.workspace import S_LAG, SAVED, STRIP, workspace
+from adv2e.kernel.workspace import STRIP
 
 _f = np.float32
 
@@ -27,13 +25,9 @@ _f = np.float32
 class Scratch(NamedTuple):
     """Memory of whoever works on a tile."""
 
-    ws: NDArray[np.float64]  # power series of one pixel
     rows: NDArray[np.float32]  # of the screen
     lanes: NDArray[np.float64]
     pixels: NDArray[np.int64]  # numbers of the lanes' pixels
-    alone: NDArray[np.float64]  # pixels to be solved by themselves: number, place, x there
-    columns: NDArray[np.float64]  # of the circuits that are not screened in single precision
-    flags: NDArray[np.bool_]
     falls: NDArray[np.float64]
     means: NDArray[np.float64]
     dense: NDArray[np.float64]  # of the stepping path
@@ -62,48 +56,15 @@ def frames_of(frames: NDArray[Any], table: NDArray[np.float32] | None) -> Frames
 
 def scratch() -> Scratch:
     """Return fresh scratch memory."""
-    padded = STRIP + 24  # rows must not share cache sets
     return Scratch(
-        ws=workspace(),
         rows=screen.scratch(),
         lanes=lanes.scratch(),
         pixels=lanes.pixel_numbers(),
-        alone=np.zeros((3, padded)),
-        columns=np.zeros((14, padded)),
-        flags=np.zeros(STRIP, np.bool_),
         falls=np.zeros(STRIP),
         means=np.zeros(STRIP),
         dense=dense_rows.scratch(),
         normals=dense_rows.normals(),
     )
-
-
-@kernel
-def _save(i, state, ws):
-    for row in range(S_LAG, state.shape[0]):
-        ws[SAVED, row] = state[row, i]
-
-
-@kernel
-def _restore(i, state, ws):
-    for row in range(S_LAG, state.shape[0]):
-        state[row, i] = ws[SAVED, row]
-
-
-@kernel
-def solve_one(
-    i, start, base, step, end, ta, length, t_base, circuit, state, ws, keys, times, n
-):  # fmt: skip
-    """Events of one pixel over one interval by itself; the arrays grow as they must."""
-    _save(i, state, ws)
-    while True:
-        m = solve_interval(
-            i, start, base, step, end, ta, length, t_base, circuit, state, ws, keys, times, n
-        )
-        if m <= keys.shape[0]:
-            return m, keys, times
-        keys, times = with_room(keys, times, n, m)
-        _restore(i, state, ws)
 
 
 @kernel

@@ -13,14 +13,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-ORDER_MAX = 16
-"""Highest order of a power series."""
-
-# rows of the scratch array of one tile, each ORDER_MAX + 2 long
-LIGHT, LAG, LAG2, SIGNAL, LEAK, DISTANCE, LOCAL, BERNSTEIN, SAVED = range(9)
-ROWS = 9
-COLUMNS = ORDER_MAX + 2
-
 # codes of the update forms
 EXACT, FIRST_ORDER_HOLD, ZERO_ORDER_HOLD, EULER, PAPER = range(5)
 
@@ -58,7 +50,9 @@ class Circuit(NamedTuple):
     seed: np.uint64
 
 
-# rows of the state: one column a pixel; those of effects that are off, at the end, are left out
+STATE_ROWS = 17
+
+# rows of the state: one column a pixel
 (
     S_X,  # log intensity at the last frame
     S_LAG,  # filtered signal minus x
@@ -70,7 +64,6 @@ class Circuit(NamedTuple):
     S_SHOT_DRAW,
     S_HOT_TIME,
     S_HOT_DRAW,
-    S_LAG2,  # signal behind the second pole minus x
     S_LEAK_FACTOR,  # leak speed of this cycle
     S_LEAK_DRAW,
     S_NOISE,
@@ -78,7 +71,7 @@ class Circuit(NamedTuple):
     S_FIRST,  # signal behind the first pole, as the stepping path keeps it
     S_SECOND,  # the same behind the second pole
     S_BEYOND,  # where the reference goes beyond the signal at the end of the dead time
-) = range(18)
+) = range(STATE_ROWS)
 
 
 PIXEL_BITS = 27
@@ -88,8 +81,3 @@ PIXEL_BITS = 27
 def pack_limit_us() -> int:
     """Longest time span of packed events [us]."""
     return 1 << (63 - PIXEL_BITS - 1)
-
-
-def workspace() -> Array:
-    """Return the scratch array of one tile."""
-    return np.zeros((ROWS, COLUMNS))

@@ -20,7 +20,6 @@ from adv2e.events import Events, empty_events
 from adv2e.kernel import packing as order
 from adv2e.kernel.event_buffer import Room
 from adv2e.kernel.exact import run_exact
-from adv2e.kernel.general import run_general
 from adv2e.kernel.quadrature import rules_for
 from adv2e.kernel.stepped.driver import run_dense
 from adv2e.kernel.tile import Frames, frames_of, scratch
@@ -206,10 +205,8 @@ class PixelArray:
         """Return the events of all tiles, solved interval by interval."""
         fastest = max(self.circuit.dark + 255.0 * self.circuit.per_dn, self.circuit.dark)
         rules = rules_for(np.diff(starts), fastest, self.circuit.dead_time)
-        advance = run_exact if self._driver == "run_exact" else run_general
-
         return self._by_tiles(
-            advance,
+            run_exact,
             (
                 frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
                 rules, t_base, self.state,

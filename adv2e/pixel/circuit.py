@@ -11,7 +11,7 @@ from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.errors import UsageError
 from adv2e.kernel import rng
 from adv2e.kernel.exact import covers
-from adv2e.kernel.workspace import EXACT, Circuit
+from adv2e.kernel.workspace import Circuit
 
 _NO_KNEE = 1e300
 _PER_US = 1e-6
@@ -63,9 +63,5 @@ def driver_of(pixel: Pixel, circuit: Circuit, additions: Additions | None, metho
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
     drifts = pixel.thresholds.drift_per_s != 0
-    # what the other two know nothing of
-    new = circuit.slew > 0 or circuit.overshoot != 0 or drifts or circuit.noise_rms > 0
-    second = circuit.follower > 0 and (circuit.update == EXACT or not circuit.filtered)
-    if method == "dense" or additions is not None or new or second:
-        return "run_dense"
-    return "run_exact" if covers(circuit) else "run_general"
+    steps = method == "dense" or additions is not None or drifts or not covers(circuit)
+    return "run_dense" if steps else "run_exact"

@@ -18,18 +18,13 @@ from adv2e.effects.pixel.leak import fill_first_factors, fill_running
 from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
 from adv2e.effects.pixel.shot_noise import fill_first_candidates
 from adv2e.effects.pixel.thresholds import fill_levels
-from adv2e.kernel import general_screens as stepped
+from adv2e.kernel.stepped.signal import log_of_light
 from adv2e.kernel.workspace import (
-    S_BEYOND,
     S_FIRST,
     S_HOLD,
-    S_HOT_DRAW,
     S_HOT_TIME,
-    S_LAG2,
-    S_LEAK_DRAW,
     S_LEAK_FACTOR,
     S_NOISE,
-    S_NOISE_DRAW,
     S_OFF,
     S_ON,
     S_REFERENCE,
@@ -37,6 +32,7 @@ from adv2e.kernel.workspace import (
     S_SHOT_DRAW,
     S_SHOT_TIME,
     S_X,
+    STATE_ROWS,
     Circuit,
 )
 from adv2e.pixel.steps import Stepping
@@ -68,19 +64,11 @@ def initial_state(
     """
     fill = partial(_over_pixels, threads, first.size)
     seed = circuit.seed
-    used = {
-        S_SHOT_DRAW: circuit.shot_rate > 0,
-        S_HOT_DRAW: circuit.hot_rate > 0,
-        S_LAG2: circuit.follower > 0,
-        S_LEAK_DRAW: circuit.leak_jitter > 0,
-        S_NOISE_DRAW: circuit.noise_rms > 0,
-    }
-    if stepping is not None:
-        used[S_BEYOND] = True
-    rows = 1 + max([S_OFF, *(row for row, on in used.items() if on)])
-    state = np.zeros((rows, first.size))
-    light = np.empty(first.size)
-    stepped.load_strip(np.ascontiguousarray(first).reshape(-1), circuit, light, state[S_X])
+    # rows that nothing writes to take no memory
+    state = np.zeros((STATE_ROWS, first.size))
+    least = 0.0 if circuit.slope > 0.0 else circuit.floor
+    light = np.maximum(first.reshape(-1), least, dtype=float)
+    log_of_light(light, circuit, state[S_X])
     levels = pixel.thresholds
     on, off = state[S_ON], state[S_OFF]
     means, spare = (levels.on, levels.off), state[S_REFERENCE]

@@ -104,6 +104,10 @@ def steps_of(
     coarseness : Coarseness
     """
     solved, added = coarseness
+    # without a pole the signal is a line, and so is a leak that does not follow the light
+    curved = circuit.filtered or max(circuit.follower, circuit.slew, circuit.photo_leak) > 0.0
+    if not curved and step_us == math.inf:
+        return 1
     limit = min(solved * LONGEST_US, added * step_us)
     fastest = max(circuit.dark + max(brightest, _WHITE) * circuit.per_dn, circuit.dark)
     share = min(_SHARE, solved * _SHARE_OF_TWO) if circuit.follower > 0.0 else _SHARE

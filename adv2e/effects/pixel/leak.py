@@ -45,11 +45,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e.compiled import entry, inlined, kernel
+from adv2e.compiled import entry, kernel
 from adv2e.kernel import rng
 from adv2e.kernel.workspace import (
-    LEAK,
-    LIGHT,
     NEVER,
     S_BEYOND,
     S_HOLD,
@@ -98,15 +96,6 @@ class Leak(Section):
         at_most=0.3,
         source="v2e: 0.1",
     )
-
-
-@inlined
-def leak_series(ws: Array, order: int, h: float, on: float, circuit: Circuit) -> None:
-    """Row LEAK: fall of the reference since the start of a sub-step of h us, before jitter."""
-    ws[LEAK, 0] = 0.0
-    for k in range(order):
-        ws[LEAK, k + 1] = on * h * circuit.photo_leak * ws[LIGHT, k] / (k + 1)
-    ws[LEAK, 1] += on * h * circuit.leak
 
 
 @kernel

@@ -32,20 +32,8 @@ References
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from adv2e.compiled import inlined, kernel
-from adv2e.kernel.workspace import (
-    EULER,
-    FIRST_ORDER_HOLD,
-    LAG,
-    LIGHT,
-    PAPER,
-    ZERO_ORDER_HOLD,
-    Array,
-    Circuit,
-)
 from adv2e.parameters import Fit, Section, parameter
 
 UPDATES = ("exact", "first_order_hold", "zero_order_hold", "euler", "paper")
@@ -74,49 +62,3 @@ class LowPass(Section):
     update: str = parameter(
         "exact", unit="-", meaning="how the filter's equation is solved", choices=UPDATES
     )
-
-
-@inlined
-def lag_series(ws: Array, order: int, lag: float, dx: float, h: float, circuit: Circuit) -> None:
-    """Row LAG: power series of u = y - x over a sub-step of h us in which x moves by dx.
-
-    From du/dt = -(A + B I) u - dx/dt with the series of the light I in row LIGHT.
-    """
-    ws[LAG, 0] = lag
-    # the light's series ends where it no longer counts
-    last = order
-    smallest = 1e-15 * abs(ws[LIGHT, 0])
-    while last > 0 and abs(ws[LIGHT, last]) <= smallest:
-        last -= 1
-    dark = circuit.dark * h
-    per_dn = circuit.per_dn * h
-    for k in range(order):
-        product = 0.0
-        for j in range(min(k, last) + 1):
-            product += ws[LIGHT, j] * ws[LAG, k - j]
-        slope = -(dark * ws[LAG, k] + per_dn * product)
-        if k == 0:
-            slope -= dx
-        ws[LAG, k + 1] = slope / (k + 1)
-
-
-@kernel
-def stepped(y: float, x0: float, x1: float, a0: float, a1: float, update: int) -> float:
-    """Return the signal after a step from x0 to x1; a0, a1: corner [rad] times its length."""
-    if update == PAPER:
-        return math.exp(-a1) * y + a1 * x1
-    if update == EULER:
-        share = min(1.0, a1)
-        return (1.0 - share) * y + share * x1
-    if update == ZERO_ORDER_HOLD:
-        return math.exp(-a1) * y - math.expm1(-a1) * x1
-    assert update == FIRST_ORDER_HOLD
-    return ramp_response(y, x0, x1, 0.5 * (a0 + a1))
-
-
-@kernel
-def ramp_response(y: float, x0: float, x1: float, a: float) -> float:
-    """Return the first-order response to a ramp x0..x1; a: corner times its length."""
-    decay = math.exp(-a)
-    mean = 1.0 - a / 2.0 + a * a / 6.0 if a < 1e-4 else -math.expm1(-a) / a
-    return decay * y + (mean - decay) * x0 + (1.0 - mean) * x1

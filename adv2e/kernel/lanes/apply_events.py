@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from adv2e.compiled import inlined, kernel
 from adv2e.effects.pixel.leak import next_leak_factor
-from adv2e.kernel.comparator import emit
+from adv2e.kernel.comparator import TIE, emit
 from adv2e.kernel.lanes.layout import (
-    ALONE,
     AWAY_P,
     AWAY_S,
     DONE,
@@ -41,6 +40,7 @@ from adv2e.kernel.lanes.layout import (
     SEEK_ON,
     SEEKS,
     STOP,
+    STUCK,
     SUM_E,
     TAIL,
     TOLERANCE,
@@ -52,10 +52,9 @@ from adv2e.kernel.lanes.layout import (
 )
 from adv2e.kernel.lanes.pieces import fallen_at_place
 from adv2e.kernel.lanes.roots import evaluate_release
-from adv2e.kernel.polynomial import TIE
 from adv2e.kernel.workspace import S_LEAK_FACTOR
 
-_TRIES = 4
+_TRIES = 3
 
 
 @kernel
@@ -68,7 +67,7 @@ def land(count, ta, length, circuit, lanes):
         found = (lanes[MOVES + j] < 0.5) | (lanes[ERROR + j] <= TOLERANCE)
         tried = lanes[TRIED + j] + 1.0
         lanes[TRIED + j] = tried
-        failed = ALONE if tried >= _TRIES else seeks
+        failed = STUCK if tried >= _TRIES else seeks
         crossed = found & ((seeks == SEEK_ON) | (seeks == SEEK_OFF))
         place = lanes[PLACE + j]
         fallen = fallen_at_place(j, lanes)

@@ -19,10 +19,12 @@ from adv2e.kernel.lanes.layout import (
     DOUBTFUL,
     END,
     ERROR,
+    HALF,
     INJECTED,
     OPEN,
     RELEASE,
     SEEKS,
+    STUCK,
     TOLERANCE,
     TURN,
     whole,
@@ -44,15 +46,14 @@ def _waiting(m, lanes):
 
 @kernel
 def decide(
-    lo, m, waiting, give_up, start, ta, length, t_base, circuit, rule, state, rows, pixels, lanes,
-    alone, left_alone, keys, times, n,
+    lo, m, waiting, start, ta, length, t_base, circuit, rule, state, rows, pixels, lanes, keys,
+    times, n,
 ):  # fmt: skip
     """Decide what each of m lanes looks for next; none of them then waits for a dead time to end.
 
     Of those that wait now, all are among the first `waiting` ones.
 
-    Returns (lanes that look for something, pixels left alone so far, events so far); at most one
-    event a lane is written.  With `give_up`, no lane goes on.
+    Returns (lanes that look for something, events so far); at most one event a lane is written.
     """
     while True:
         if waiting > 0:
@@ -60,18 +61,16 @@ def decide(
         plan(whole(m), ta, length, circuit, lanes)
         for j in range(m):
             seeks = lanes[SEEKS + j]
-            if seeks == DOUBTFUL:
+            if seeks in (DOUBTFUL, STUCK):
                 i = lo + pixels[j]
                 n = go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n)
                 seeks = lanes[SEEKS + j]
             if seeks == DONE and lanes[END + j] < 1.0:
                 next_piece(j, circuit, lanes)
-        m, left_alone = sort_out(
-            lo, m, give_up, start, state, rows, pixels, lanes, alone, left_alone
-        )
+        m = sort_out(lo, m, start, state, rows, pixels, lanes)
         waiting = _waiting(m, lanes)
         if waiting == 0:
-            return m, left_alone, n
+            return m, n
 
 
 @kernel
@@ -88,7 +87,7 @@ def search(lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys,
     n = fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n)
     for j in range(m):
         seeks = lanes[SEEKS + j]
-        if seeks == INJECTED or (seeks == TURN and lanes[ERROR + j] <= TOLERANCE):
+        if seeks in (INJECTED, HALF) or (seeks == TURN and lanes[ERROR + j] <= TOLERANCE):
             found_stop(lo + pixels[j], j, circuit, state, lanes)
         elif seeks == OPEN:
             open_piece(j, ta, length, lanes)

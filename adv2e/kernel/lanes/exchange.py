@@ -7,7 +7,6 @@ from adv2e.kernel import special
 from adv2e.kernel.comparator import HOT, SHOT
 from adv2e.kernel.lanes.layout import (
     A1,
-    ALONE,
     AWAY_P,
     AWAY_S,
     BASE,
@@ -65,7 +64,6 @@ from adv2e.kernel.screen import ON as SCREEN_ON
 from adv2e.kernel.workspace import (
     S_HOLD,
     S_HOT_TIME,
-    S_LAG,
     S_LEAK_FACTOR,
     S_OFF,
     S_ON,
@@ -171,8 +169,10 @@ def load(lo, m, ta, length, circuit, state, rows, falls, pixels, lanes):
         x1 = log_of(i1, circuit)
         dx = x1 - x0
         mixed = (i0 < knee_dn) != (i1 < knee_dn)
-        in_pieces = mixed | (abs(dx) > LARGEST_STEP)
-        end, on_log = end_of_piece(0.0, x0, dx, knee, mixed)
+        bright = i1 > LARGEST_LIGHT
+        in_pieces = mixed | (abs(dx) > LARGEST_STEP) | bright
+        brightest = max(i0, i1) if in_pieces else 0.0
+        end, on_log = end_of_piece(0.0, x0, dx, knee, mixed, brightest)
         on_log = on_log if mixed else min(i0, i1) >= knee_dn
         lanes[X0 + j] = x0
         lanes[DX + j] = dx
@@ -196,8 +196,6 @@ def load(lo, m, ta, length, circuit, state, rows, falls, pixels, lanes):
         seeks, place = first_place(j, ta, length, lanes)
         seeks = OPEN if in_pieces else seeks
         place = end if in_pieces else place
-        bright = (i1 > LARGEST_LIGHT) | (in_pieces & (i0 > LARGEST_LIGHT))
-        seeks = ALONE if bright else seeks
         lanes[SEEKS + j] = seeks
         lanes[PLACE + j] = place
         lanes[FRESH + j] = 0.0
@@ -227,35 +225,17 @@ def _finish(j, lo, start, state, rows, pixels, lanes):
 
 
 @kernel
-def _leave(j, lo, state, pixels, lanes, alone, count):
-    """Hand a lane on to be solved by itself: its pixel, where it is, and x there."""
-    k = pixels[j]
-    i = lo + k
-    state[S_LAG, i] = lanes[LAG_S + j]
-    state[S_REFERENCE, i] = lanes[REFERENCE + j] - lanes[FALLEN_S + j]
-    state[S_HOLD, i] = lanes[HOLD + j]
-    alone[0, count] = k
-    alone[1, count] = lanes[S + j]
-    alone[2, count] = lanes[X0 + j] + lanes[DX + j] * lanes[S + j]
-    return count + 1
-
-
-@kernel
-def sort_out(lo, m, give_up, start, state, rows, pixels, lanes, alone, left_alone):
-    """Take out the lanes that are done or left alone; returns how many stay, how many are alone."""
+def sort_out(lo, m, start, state, rows, pixels, lanes):
+    """Take out the lanes that are done; returns how many stay."""
     leaving, staying = 0, 0
     for j in range(m):
-        seeks = lanes[SEEKS + j]
-        if seeks == DONE:
+        if lanes[SEEKS + j] == DONE:
             _finish(j, lo, start, state, rows, pixels, lanes)
-        elif seeks == ALONE or give_up:
-            left_alone = _leave(j, lo, state, pixels, lanes, alone, left_alone)
+            lanes[_LEAVING + leaving] = j
+            leaving += 1
         else:
             lanes[_STAYING + staying] = j
             staying += 1
-            continue
-        lanes[_LEAVING + leaving] = j
-        leaving += 1
     # the last lanes that stay fill the gaps among the first ones, so that few have to move
     gaps = 0
     while gaps < leaving and lanes[_LEAVING + gaps] < staying:
@@ -264,4 +244,4 @@ def sort_out(lo, m, give_up, start, state, rows, pixels, lanes, alone, left_alon
         gap, last = int(lanes[_LEAVING + c]), int(lanes[_STAYING + staying - gaps + c])
         move(lanes, last, gap)
         pixels[gap] = pixels[last]
-    return staying, left_alone
+    return staying

@@ -84,10 +84,10 @@ _STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
 ) = (row * _STRIDE for row in range(52))
 SIZE = 52 * _STRIDE
 
-# what a lane is looking for; READY: to be decided; DOUBTFUL: to be decided lane by lane;
-# OPEN: the signal at the end of its piece
-DONE, ALONE, SEEK_ON, SEEK_OFF, TURN, INJECTED, RELEASE, READY, DOUBTFUL, OPEN = (
-    float(code) for code in range(10)
+# what a lane is looking for; READY: to be decided; DOUBTFUL: to be decided lane by lane, STUCK:
+# because its search failed; HALF: the signal half-way to STOP; OPEN: at the end of its piece
+DONE, STUCK, SEEK_ON, SEEK_OFF, TURN, INJECTED, RELEASE, READY, DOUBTFUL, OPEN, HALF = (
+    float(code) for code in range(11)
 )
 
 

@@ -8,6 +8,7 @@ whatever leak makes doubtful are left to :mod:`adv2e.kernel.lanes.slow_path`.
 from __future__ import annotations
 
 from adv2e.compiled import kernel
+from adv2e.kernel.comparator import TIE
 from adv2e.kernel.lanes.layout import (
     AWAY_P,
     AWAY_S,
@@ -19,8 +20,6 @@ from adv2e.kernel.lanes.layout import (
     F_LO,
     FALL,
     FALL_DN,
-    FALLEN_P,
-    FALLEN_S,
     FRESH,
     G_HI,
     G_LO,
@@ -40,20 +39,22 @@ from adv2e.kernel.lanes.layout import (
     SEEK_OFF,
     SEEK_ON,
     SEEKS,
+    STOP,
     TRIED,
     X0,
+    S,
 )
-from adv2e.kernel.polynomial import TIE
 
 
 @kernel
-def sure_of_leak(away_s, away_p, lag_s, lag_p, drift, dx, rate_s, rate_p, leak, on, off):
+def sure_of_leak(away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, on, off):
     """Tell whether a falling signal crosses just what the distances at S and STOP say.
 
     Its distance from the falling reference moves by leak - z, z = w u being the fall of the signal.
 
     * Where z stays above the leak, the distance is monotone.  While u keeps its sign, it gets
-      no smaller than at the ends or, where x runs away from y, than |dx/ds| / w.
+      no smaller than at the ends or, where x runs away from y, than |dx/ds| / w.  What the leak
+      exceeds that least z by, times the span, is the most that the distance can rise.
     * dz/ds = w (p - z (1 + q)) with p = -dx/ds and q = |dw/ds| / w^2, which is at most p / w where
       x falls.  So where p exceeds the leak by the share q, z passes the leak only upwards: the
       distance rises at first, if at all.
@@ -65,14 +66,14 @@ def sure_of_leak(away_s, away_p, lag_s, lag_p, drift, dx, rate_s, rate_p, leak, 
     slowest = min(rate_s, rate_p)
     least = min(abs(lag_s), abs(lag_p))
     follows = -dx / (max(rate_s, rate_p) + 1e-300) if dx < 0.0 else least
-    outruns = slowest * min(least, follows) > leak
+    rise = span * (leak - slowest * min(least, follows))
     driven = (dx < 0.0) & (-dx > leak * (1.0 - dx / (slowest + 1e-300)))
     settling = (dx >= 0.0) & (slowest > dx)
-    may_rise = away_s + drift >= on
-    may_dip = away_p - drift <= -off
+    may_rise = away_s + rise >= on
+    may_dip = away_p - rise <= -off
     dips = may_dip & (away_p > -off)
     return (
-        outruns
+        (rise < 0.0)
         | (driven & (not may_rise))
         | (settling & (not dips))
         | ((not may_rise) & (not may_dip))
@@ -89,20 +90,20 @@ def plan(count, ta, length, circuit, lanes):
         on, off = lanes[ON + j] + TIE, lanes[OFF + j] + TIE
         away_s, away_p = lanes[AWAY_S + j], lanes[AWAY_P + j]
         lag_s, lag_p = lanes[LAG_S + j], lanes[LAG_P + j]
-        drift = lanes[FALLEN_P + j] - lanes[FALLEN_S + j]
+        span = lanes[STOP + j] - lanes[S + j]
         light_s, light_p = lanes[LIGHT_S + j], lanes[LIGHT_P + j]
         fall, fall_dn = lanes[FALL + j], lanes[FALL_DN + j]
         rate_s, rate_p = dark + per_dn * light_s, dark + per_dn * light_p
         dx = lanes[DX + j]
         leak = 1.01 * (fall + fall_dn * max(light_s, light_p))
-        sure = sure_of_leak(away_s, away_p, lag_s, lag_p, drift, dx, rate_s, rate_p, leak, on, off)
+        sure = sure_of_leak(away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, on, off)
         doubtful = (
             (lag_s * lag_p < 0.0)
             | (lanes[NOISE + j] < ta + lanes[END + j] * length)
             | (lanes[KNOWN + j] > 0.5)
             | (away_s >= on)
             | (away_s <= -off)
-            | ((drift > 0.0) & (lag_s + lag_p > 0.0) & (not sure))
+            | ((leak > 0.0) & (lag_s + lag_p > 0.0) & (not sure))
         )
         what = SEEK_ON if away_p >= on else (SEEK_OFF if away_p <= -off else DONE)
         what = DOUBTFUL if doubtful else what

@@ -1,5 +1,8 @@
 """Pieces of an interval over which the light stays on one branch and moves by less than an e-fold.
 
+Above the light that the quadrature is chosen for, they are shorter by as much as the corner is
+faster.
+
 The screen knows the signal at the end of an interval that is one piece.  For any other, the end of
 each piece is a place like those that lanes look for, before the piece is gone through.
 """
@@ -7,6 +10,7 @@ each piece is a place like those that lanes look for, before the piece is gone t
 from __future__ import annotations
 
 from adv2e.compiled import kernel
+from adv2e.kernel import special
 from adv2e.kernel.lanes.layout import (
     AWAY_P,
     AWAY_S,
@@ -48,7 +52,7 @@ from adv2e.kernel.lanes.layout import (
     X0,
     S,
 )
-from adv2e.kernel.screen import AT_REST, LARGEST_STEP
+from adv2e.kernel.screen import AT_REST, LARGEST_LIGHT, LARGEST_STEP
 
 BEFORE_END = 1.0 - 2.0**-53
 """The last place before 1."""
@@ -75,10 +79,11 @@ def fallen_at_place(j, lanes):
 
 
 @kernel
-def end_of_piece(base, x0, dx, knee, mixed):
+def end_of_piece(base, x0, dx, knee, mixed, brightest):
     """Where the piece that begins at `base` ends: at the knee, after about an e-fold, or at 1.
 
-    Also tells whether it is on the logarithmic branch, as far as the knee decides that.
+    brightest: light at its start or at 1 [DN], whichever is more.  Also tells whether the piece is
+    on the logarithmic branch, as far as the knee decides that.
     """
     at_knee = (knee - x0) / (dx if dx != 0.0 else 1.0)
     at_knee = at_knee if at_knee > 0.0 else 0.0
@@ -87,6 +92,8 @@ def end_of_piece(base, x0, dx, knee, mixed):
     step = abs(dx)
     longest = _PIECE / (step if step > _PIECE else 1.0)
     end = base + longest if step * (end - base) > LARGEST_STEP else end
+    longest = LARGEST_LIGHT / (brightest if brightest > LARGEST_LIGHT else LARGEST_LIGHT)
+    end = base + longest if end - base > longest else end
     return end, x0 + dx * 0.5 * (base + end) >= knee
 
 
@@ -129,7 +136,8 @@ def next_piece(j, circuit, lanes):
     light = lanes[I1 + j]
     x1 = x0 + dx
     mixed = (x0 < circuit.knee) != (x1 < circuit.knee)
-    end, on_log = end_of_piece(base, x0, dx, circuit.knee, mixed)
+    brightest = max(light, special.exp(x1) if x1 >= circuit.knee else 0.0)
+    end, on_log = end_of_piece(base, x0, dx, circuit.knee, mixed, brightest)
     lanes[LOG + j] = 1.0 if on_log or circuit.slope == 0.0 else 0.0
     lanes[BASE + j] = base
     lanes[END + j] = end

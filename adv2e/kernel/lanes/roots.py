@@ -208,8 +208,10 @@ def refine(lanes, count, length, circuit):
         t = t if lanes[MOVES + k] > 0.5 else 0.0
         place = s + t
         lo, hi = lanes[S + k], lanes[STOP + k]
-        # the end values are single precision: a root beyond them by that is a root at the end
+        # the end values are single precision: a root beyond them by that is a root at the end, if
+        # the slope there is not that of a second one close by
         inside = (place >= lo - 1e-6) & (place <= hi + 1e-6)
+        inside &= (dv > 0.0) == (lanes[F_HI + k] > lanes[F_LO + k])
         place = place if place > lo else lo
         place = place if place < hi else hi
         reach = (w0 * (1.0 + abs(t * e)) + abs(d)) * abs(t)

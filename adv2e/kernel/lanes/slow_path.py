@@ -1,7 +1,8 @@
 """What a lane looks for next, decided by itself: turns, noise events, and what leak makes doubtful.
 
-What does not fit a lane at all (a falling signal that leak may outrun, and the rare place that does
-not come out) is left to :mod:`adv2e.kernel.solve`, from where the lane is.
+Where a falling signal may be outrun by leak, or a search has failed, the lane looks at the place
+half-way to the next known one, and decides up to there; down to `TOLERANCE`, if it must.  From a
+place so passed it goes on by twice the step.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel.comparator import (
     SIGNAL_EVENT,
+    TIE,
     injected_polarity,
     next_injected,
     use_up,
@@ -16,7 +18,6 @@ from adv2e.kernel.comparator import (
 from adv2e.kernel.lanes.apply_events import fire
 from adv2e.kernel.lanes.exchange import kind_of_next_noise, next_noise
 from adv2e.kernel.lanes.layout import (
-    ALONE,
     AWAY_P,
     AWAY_S,
     DONE,
@@ -33,6 +34,7 @@ from adv2e.kernel.lanes.layout import (
     G_HI,
     G_LO,
     GOAL,
+    HALF,
     HOLD,
     I1,
     INJECTED,
@@ -57,7 +59,9 @@ from adv2e.kernel.lanes.layout import (
     SEEK_ON,
     SEEKS,
     STOP,
+    STUCK,
     TAIL,
+    TOLERANCE,
     TRIED,
     TURN,
     U1,
@@ -66,9 +70,10 @@ from adv2e.kernel.lanes.layout import (
 )
 from adv2e.kernel.lanes.next_target import sure_of_leak
 from adv2e.kernel.lanes.pieces import BEFORE_END, fallen_at_place, set_stop
-from adv2e.kernel.polynomial import TIE
+from adv2e.kernel.workspace import NEVER
 
 _STRAIGHT = 0.9
+_HALF_WAY = -1
 
 
 @kernel
@@ -82,19 +87,26 @@ def _seek_given(j, what, place, lanes):
 
 @kernel
 def _seek_root(j, what, length, circuit, lanes):
-    """Look for a threshold, or for the turn, between S and STOP next."""
+    """Look for a threshold, or for the turn, between S and STOP next.
+
+    A place at S, and one up to a STOP that is near, is known without a search.
+    """
     turn = what == TURN
     level = lanes[ON + j] + TIE if what == SEEK_ON else -lanes[OFF + j] - TIE
     drift = -lanes[DX + j] if turn else 0.0
     root = 0.0 if turn else 1.0
     lanes[SEEKS + j] = what
     lanes[TRIED + j] = 0.0
-    lanes[FRESH + j] = 1.0
-    lanes[MOVES + j] = 1.0
     lanes[ROOT + j] = root
     lanes[GOAL + j] = 0.0 if turn else lanes[REFERENCE + j] - lanes[X0 + j] + level
     lanes[F_LO + j] = lanes[LAG_S + j] if turn else lanes[AWAY_S + j] - level
     lanes[F_HI + j] = lanes[LAG_P + j] if turn else lanes[AWAY_P + j] - level
+    away = lanes[F_LO + j]
+    beyond = (what == SEEK_ON and away >= 0.0) or (what == SEEK_OFF and away <= 0.0)
+    near = (lanes[STOP + j] - lanes[S + j]) * length <= TOLERANCE
+    lanes[FRESH + j] = 0.0 if beyond or near else 1.0
+    lanes[MOVES + j] = lanes[FRESH + j]
+    lanes[PLACE + j] = lanes[S + j] if beyond else lanes[STOP + j]
     # the slope of the lag is -w u - dx, that of the distance -w u plus the leak
     rate_s = (circuit.dark + circuit.per_dn * lanes[LIGHT_S + j]) * length
     rate_p = (circuit.dark + circuit.per_dn * lanes[LIGHT_P + j]) * length
@@ -117,57 +129,52 @@ def _moves_before_turn(j, length, circuit, lanes):
 
 @inlined
 def _choose(j, length, circuit, lanes):
-    """Tell what comes first between S and STOP: a threshold, TURN, DONE (nothing) or ALONE."""
+    """Tell what comes first between S and STOP: a threshold, TURN, DONE (nothing), or try HALF."""
     on, off = lanes[ON + j] + TIE, lanes[OFF + j] + TIE
     away_s, away_p = lanes[AWAY_S + j], lanes[AWAY_P + j]
     lag_s, lag_p = lanes[LAG_S + j], lanes[LAG_P + j]
     drift = lanes[FALLEN_P + j] - lanes[FALLEN_S + j]
+    span = lanes[STOP + j] - lanes[S + j]
     rate_s = (circuit.dark + circuit.per_dn * lanes[LIGHT_S + j]) * length
     rate_p = (circuit.dark + circuit.per_dn * lanes[LIGHT_P + j]) * length
     light = max(lanes[LIGHT_S + j], lanes[LIGHT_P + j])
     leak = 1.01 * (lanes[FALL + j] + lanes[FALL_DN + j] * light)
     dx = lanes[DX + j]
-    if away_s >= on or away_s <= -off:
-        return ALONE
+    if away_s >= on or away_s <= -off:  # by rounding
+        return SEEK_ON if away_s >= on else SEEK_OFF
+    by_end = SEEK_ON if away_p >= on else (SEEK_OFF if away_p <= -off else DONE)
+    if span * length <= TOLERANCE:
+        return by_end
+    if lanes[SEEKS + j] == STUCK:
+        return HALF
     if lag_s * lag_p < 0.0:
         reach = away_s + _moves_before_turn(j, length, circuit, lanes)
         if lag_s > 0.0:  # falls, then rises
-            if reach <= -off:
-                return TURN
-            if away_s + drift >= on:
-                return ALONE
-            return SEEK_ON if away_p >= on else DONE
-        if reach + drift >= on:
-            return TURN
+            return TURN if reach <= -off or away_s + drift >= on else by_end
         # rises, then falls: what holds from the turn on, where u = 0, decides
         sure = drift == 0.0 or sure_of_leak(
-            on - 2.0 * drift, away_p, 0.0, lag_p, drift, dx, rate_s, rate_p, leak, on, off
+            -NEVER, away_p, 0.0, lag_p, span, dx, rate_s, rate_p, leak, on, off
         )
-        if not sure:
-            return ALONE
-        return SEEK_OFF if away_p <= -off else DONE
+        return by_end if sure and reach + drift < on else TURN
     falls = drift > 0.0 and lag_s + lag_p > 0.0
     if falls and not sure_of_leak(
-        away_s, away_p, lag_s, lag_p, drift, dx, rate_s, rate_p, leak, on, off
+        away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, on, off
     ):
-        return ALONE
-    if away_p >= on:
-        return SEEK_ON
-    return SEEK_OFF if away_p <= -off else DONE
+        return HALF
+    return by_end
 
 
 @inlined
 def found_stop(i, j, circuit, state, lanes):
-    """Make the turn, or the time of a noise event, that was looked at the next known place."""
+    """Make the place that was looked at, a turn, a half or that of a noise event, the next stop."""
     seeks = lanes[SEEKS + j]
-    place = lanes[PLACE + j]
-    lag = lanes[LAG_E + j]
-    if seeks == TURN:
-        lag = 0.0
-        lanes[KIND + j] = SIGNAL_EVENT
-    else:
+    lanes[KIND + j] = SIGNAL_EVENT
+    if seeks == INJECTED:
         lanes[KIND + j] = kind_of_next_noise(i, circuit, state)
-    set_stop(j, place, lag, lanes[LIGHT_E + j], fallen_at_place(j, lanes), lanes)
+    elif seeks == HALF:
+        lanes[KIND + j] = _HALF_WAY
+    lag = 0.0 if seeks == TURN else lanes[LAG_E + j]
+    set_stop(j, lanes[PLACE + j], lag, lanes[LIGHT_E + j], fallen_at_place(j, lanes), lanes)
     lanes[KNOWN + j] = 1.0
     lanes[SEEKS + j] = DOUBTFUL
 
@@ -202,7 +209,7 @@ def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
     lanes[FALLEN_S + j] = lanes[FALLEN_P + j]
     lanes[AWAY_S + j] = lanes[AWAY_P + j]
     kind = int(lanes[KIND + j])
-    if kind == SIGNAL_EVENT:  # a turn
+    if kind in (SIGNAL_EVENT, _HALF_WAY):
         return n, False
     polarity = injected_polarity(i, kind, lanes[LIGHT_S + j], circuit, state)
     use_up(i, kind, circuit, state)
@@ -223,8 +230,8 @@ def go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
         if lanes[KNOWN + j] < 0.5 and _find_stop(i, j, ta, length, circuit, state, lanes):
             return n
         what = _choose(j, length, circuit, lanes)
-        if what == ALONE:
-            lanes[SEEKS + j] = ALONE
+        if what == HALF:
+            _seek_given(j, HALF, 0.5 * (lanes[S + j] + lanes[STOP + j]), lanes)
             return n
         if what != DONE:
             _seek_root(j, what, length, circuit, lanes)
@@ -232,9 +239,16 @@ def go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
         if lanes[KNOWN + j] < 0.5:
             lanes[SEEKS + j] = DONE
             return n
+        lanes[SEEKS + j] = DOUBTFUL
+        span = lanes[STOP + j] - lanes[S + j]
         n, fired = _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n)
         if fired and circuit.dead_time > 0.0:
             release = lanes[S + j] + circuit.dead_time / length
             lanes[HOLD + j] = ta + release * length
             _seek_given(j, RELEASE if release < lanes[END + j] else DONE, release, lanes)
+            return n
+        place = lanes[S + j] + 2.0 * span
+        until = min(lanes[END + j], (lanes[NOISE + j] - ta) / length)
+        if lanes[KIND + j] == _HALF_WAY and span * length > TOLERANCE and place < until:
+            _seek_given(j, HALF, place, lanes)
             return n

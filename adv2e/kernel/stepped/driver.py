@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from adv2e.compiled import entry, kernel
 from adv2e.effects.pixel.photoreceptor_noise import fill_normals
 from adv2e.effects.pixel.slew_limit import keep_first, limit_slew
+from adv2e.kernel import screen
 from adv2e.kernel.event_buffer import tell_where, with_room
-from adv2e.kernel.general import load_light, samples
 from adv2e.kernel.stepped import events, signal
 from adv2e.kernel.stepped.rows import (
     ADDED,
@@ -48,6 +48,7 @@ from adv2e.kernel.stepped.rows import (
     XA,
     XB,
 )
+from adv2e.kernel.tile import load
 from adv2e.kernel.work_queue import claim
 from adv2e.kernel.workspace import (
     EXACT,
@@ -131,16 +132,27 @@ def _close(lo, count, draw, circuit, state, rows):
 
 
 @kernel
+def _load_x(frames, before, share, lo, count, circuit, scratch, row):
+    """Log intensity of a strip, `share` of the way from frame `before` to the next."""
+    load(frames, before, share, lo, count, 0.0, scratch.rows)
+    light = scratch.rows[screen.LIGHT_1 : screen.LIGHT_1 + count]
+    signal.log_of_light(light, circuit, scratch.dense[row : row + count])
+
+
+@kernel
 def _take_samples(count, begins, is_last, next_is_last, rows):
-    """Continuity samples of an interval: the first in row XA, the last in AHEAD."""
+    """Continuity samples of an interval: base + step k/K, but for the first and the last.
+
+    With the paper's last interval as printed, the samples of a last one start from its end, but
+    for the one at which the recording begins, and the interval before leads there.
+    """
     for k in range(count):
-        start, base, step, end = samples(
-            rows[XA + k], rows[XB + k], rows[AHEAD + k], begins, is_last, next_is_last
-        )
-        rows[XA + k] = start
+        xa, xb, ahead = rows[XA + k], rows[XB + k], rows[AHEAD + k]
+        base = xb if is_last else xa
+        rows[XA + k] = base if not begins else xa
         rows[BASE + k] = base
-        rows[STEP + k] = step
-        rows[AHEAD + k] = end
+        rows[STEP + k] = xb - xa
+        rows[AHEAD + k] = ahead if next_is_last else xb
 
 
 @kernel
@@ -252,29 +264,20 @@ def _strip(
     scratch, keys, times, number,
 ):  # fmt: skip
     """Advance one strip over a run."""
-    rows, light = scratch.dense, scratch.means
+    rows = scratch.dense
     n = -(-count // 16) * 16
     _open(lo, count, n, circuit, run, injected, state, rows)
     draw = np.int64(0)
     if circuit.noise_rms > 0.0:
         draw = np.int64(state[S_NOISE_DRAW, lo])
-    load_light(
-        frames, before[run.first], share[run.first], lo, count, circuit, scratch.rows,
-        light[:count], rows[XA : XA + count],
-    )  # fmt: skip
+    _load_x(frames, before[run.first], share[run.first], lo, count, circuit, scratch, XA)
     m = np.int64(0)
     for f in range(run.first, run.last):
         length, steps = starts[f + 1] - starts[f], run.steps[f]
         total = run.pieces * steps
-        load_light(
-            frames, before[f + 1], share[f + 1], lo, count, circuit, scratch.rows, light[:count],
-            rows[XB : XB + count],
-        )  # fmt: skip
+        _load_x(frames, before[f + 1], share[f + 1], lo, count, circuit, scratch, XB)
         if last[f + 1]:
-            load_light(
-                frames, before[f + 2], share[f + 2], lo, count, circuit, scratch.rows,
-                light[:count], rows[AHEAD : AHEAD + count],
-            )  # fmt: skip
+            _load_x(frames, before[f + 2], share[f + 2], lo, count, circuit, scratch, AHEAD)
         _take_samples(count, begins and f == 0, last[f], last[f + 1], rows)
         h, half = length / total, 0.5 / steps
         first = run.first_step if f == run.first else 0

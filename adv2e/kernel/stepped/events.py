@@ -15,9 +15,14 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import inlined, kernel
 from adv2e.effects.pixel.leak import next_leak_factor
-from adv2e.kernel.comparator import SIGNAL_EVENT, emit, injected_polarity, next_injected, use_up
-from adv2e.kernel.polynomial import TIE
-from adv2e.kernel.solve import light_of
+from adv2e.kernel.comparator import (
+    SIGNAL_EVENT,
+    TIE,
+    emit,
+    injected_polarity,
+    next_injected,
+    use_up,
+)
 from adv2e.kernel.stepped.rows import (
     DUE,
     FROM,
@@ -150,6 +155,14 @@ def gather(n, rows, pixels):
 
 
 @kernel
+def _light_of(x, circuit):
+    """Light [DN] that log intensity x stands for."""
+    if circuit.slope > 0.0 and x < circuit.knee:
+        return x * circuit.slope
+    return math.exp(x)
+
+
+@kernel
 def _cubic(v0, v1, slope0, slope1):
     """Coefficients of the cubic through values and slopes at both ends of 0..1."""
     rise = v1 - v0
@@ -279,7 +292,7 @@ def fire(
             light = i0 + (i1 - i0) * s_end
             if circuit.update == EXACT:
                 x = rows[X1 + k] - rows[MOVE + k] * share * (1.0 - s_end)
-                light = light_of(x, circuit)
+                light = _light_of(x, circuit)
             polarity = _noise_polarity(i, kind, light, circuit, injected, state)
             if polarity == 0:
                 s = s_end

@@ -19,7 +19,7 @@ NEVER = 1e300
     XA,  # log intensity at the start and at the end of an interval
     XB,
     AHEAD,  # and at the end of the next, for the printed last interval
-    BASE,  # continuity samples of the interval, see general.samples
+    BASE,  # continuity samples of the interval, see driver._take_samples
     STEP,
     PIECE,  # x at the start of a straight piece, and how far it goes
     MOVE,

@@ -11,7 +11,7 @@ the signal is the cubic (Hermite) through its values and slopes at both ends; th
 solved exactly for such a cubic at its input, as the weights of value and slope are the same for
 all pixels.
 
-The K-step forms draw one line a step, as in :mod:`adv2e.kernel.general_screens`.
+The K-step forms draw one line a step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from adv2e.compiled import inlined, kernel
+from adv2e.compiled import entry, inlined, kernel
 from adv2e.kernel import special
 from adv2e.kernel.stepped.rows import (
     ADDED,
@@ -51,6 +51,21 @@ from adv2e.kernel.workspace import EULER, EXACT, PAPER, ZERO_ORDER_HOLD
 _SIXTH = 1.0 / 6.0
 _NODES, _WEIGHTS = (0.5 * v for v in np.polynomial.legendre.leggauss(12))
 _NODES = _NODES + 0.5
+
+
+@entry
+def log_of_light(frame, circuit, x):
+    """Log intensity of light [DN], (pixels,)."""
+    knee_dn = circuit.slope * circuit.knee
+    least = knee_dn if circuit.slope > 0.0 else circuit.floor
+    for k in range(frame.shape[0]):
+        v = np.float64(frame[k])
+        x[k] = special.log(v if v > least else least)
+    if circuit.slope > 0.0:
+        for k in range(frame.shape[0]):
+            v = np.float64(frame[k])
+            v = v if v > 0.0 else 0.0
+            x[k] = x[k] if v >= knee_dn else v / circuit.slope
 
 
 @kernel
@@ -149,7 +164,7 @@ def first_pole_exact(n, h, circuit, rows):
 
 @kernel
 def first_pole_stepped(n, h, circuit, rows):
-    """Advance row FIRST by one of the K steps, as low_pass.stepped; its slope is the line's."""
+    """Advance row FIRST by one of the K steps of low_pass; its slope is the line's."""
     constant, per_dn, update = circuit.dark * h, circuit.per_dn * h, circuit.update
     for k in range(n):
         a1 = constant + per_dn * rows[LIGHT1 + k]
