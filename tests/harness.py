@@ -45,12 +45,12 @@ IN_LANES = {
 }
 """Of these what is not solved in steps of time."""
 
-ONE_BY_ONE = {
+STEPPED_FORM = {
     **IN_LANES,
     "low_pass": LowPass(update="first_order_hold"),
     "source_follower": SourceFollower(cutoff_hz=900.0),
 }
-"""What has every pixel that may fire solved by itself."""
+"""A form of the low-pass in K steps, and a second pole."""
 
 
 def quiet(**sections):

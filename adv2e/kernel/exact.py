@@ -10,8 +10,7 @@ import numpy as np
 
 from adv2e.compiled import entry, kernel
 from adv2e.effects.pixel.leak import fill_falls
-from adv2e.kernel import screen, special
-from adv2e.kernel import static_pixels as rest
+from adv2e.kernel import screen, special, static_pixels
 from adv2e.kernel.event_buffer import tell_where, with_room
 from adv2e.kernel.lanes import batch, exchange
 from adv2e.kernel.quadrature import Rule
@@ -57,68 +56,68 @@ def _rests(frames, f, before, share, first, count):
 
 
 @kernel
-def _open_strip(lo, count, start, circuit, state, rows):
+def _open_strip(lo, count, start, circuit, state, strip):
     """Rows of a strip at the start of a call, its light being in LIGHT_1."""
     for k in range(count):
-        rows[screen.LIGHT_0 + k] = rows[screen.LIGHT_1 + k]
-        rows[screen.LAG_0 + k] = state[S_LAG, lo + k]
+        strip[screen.LIGHT_0 + k] = strip[screen.LIGHT_1 + k]
+        strip[screen.LAG_0 + k] = state[S_LAG, lo + k]
     for k in range(count):
         i = lo + k
-        exchange.watch(k, i, state[S_X, i], start, circuit, state, rows)
-        rows[screen.AWAY_0 + k] = rows[screen.AWAY_1 + k]
+        exchange.watch(k, i, state[S_X, i], start, circuit, state, strip)
+        strip[screen.AWAY_0 + k] = strip[screen.AWAY_1 + k]
     # the rest of the last strip must be harmless
     for k in range(count, STRIP):
-        rows[screen.LIGHT_0 + k] = 1.0
-        rows[screen.LIGHT_1 + k] = 1.0
-        rows[screen.LAG_0 + k] = 0.0
-        rows[screen.AWAY_0 + k] = 0.0
-        rows[screen.FALL + k] = 0.0
-        rows[screen.ON + k] = screen.NEVER
-        rows[screen.OFF + k] = screen.NEVER
-        rows[screen.DUE + k] = screen.NEVER
+        strip[screen.LIGHT_0 + k] = 1.0
+        strip[screen.LIGHT_1 + k] = 1.0
+        strip[screen.LAG_0 + k] = 0.0
+        strip[screen.AWAY_0 + k] = 0.0
+        strip[screen.FALL + k] = 0.0
+        strip[screen.ON + k] = screen.NEVER
+        strip[screen.OFF + k] = screen.NEVER
+        strip[screen.DUE + k] = screen.NEVER
 
 
 @kernel
-def _close_strip(lo, count, circuit, state, rows):
+def _close_strip(lo, count, circuit, state, strip):
     """State of a strip at the end of a call."""
     for k in range(count):
-        state[S_LAG, lo + k] = rows[screen.LAG_0 + k]
-        state[S_X, lo + k] = exchange.log_of(np.float64(rows[screen.LIGHT_0 + k]), circuit)
+        state[S_LAG, lo + k] = strip[screen.LAG_0 + k]
+        state[S_X, lo + k] = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
 
 
 @kernel
-def _mean_lights(rows, knee_dn, means):
+def _mean_lights(strip, knee_dn, means):
     """Mean light of each pixel over the interval [DN]."""
     for k in range(STRIP):
-        i0, i1 = rows[screen.LIGHT_0 + k], rows[screen.LIGHT_1 + k]
+        i0, i1 = strip[screen.LIGHT_0 + k], strip[screen.LIGHT_1 + k]
         dx = special.log_ratio32((i1 - i0) / (i1 + i0 + _f(1e-30)))
         grown = i1 * (_f(1.0) - dx * special.psi32(-dx))
         means[k] = grown if min(i0, i1) >= knee_dn else _f(0.5) * (i0 + i1)
 
 
 @kernel
-def _leak_strip(lo, count, length, circuit, state, rows, falls, means):
+def _leak_strip(lo, count, length, circuit, state, strip, falls, means):
     """Fall of the reference of a strip over the interval."""
     if circuit.photo_leak > 0.0:
-        _mean_lights(rows, _f(circuit.slope * circuit.knee), means)
+        _mean_lights(strip, _f(circuit.slope * circuit.knee), means)
     fill_falls(lo, count, length, means, circuit, state, falls)
     for k in range(count):
-        rows[screen.FALL + k] = falls[k]
+        strip[screen.FALL + k] = falls[k]
 
 
 @kernel
-def _lower_references(lo, count, state, rows, falls):
+def _lower_references(lo, count, state, strip, falls):
     """Take the fall from the references of the pixels that are done."""
     reference = state[S_REFERENCE, lo : lo + count]
     for k in range(count):
-        fall = falls[k] if rows[screen.HIT + k] == 0.0 else 0.0
+        fall = falls[k] if strip[screen.HIT + k] == 0.0 else 0.0
         reference[k] -= fall
 
 
 @kernel
-def _screen(rows, end, length, circuit, rule):
+def _screen(strip, end, length, circuit, rule):
     screen.screen(
-        rows, end, _f(circuit.dark * length), _f(circuit.per_dn * length),
+        strip, end, _f(circuit.dark * length), _f(circuit.per_dn * length),
         _f(circuit.slope * circuit.knee), _f(circuit.slope), rule,
     )  # fmt: skip
 
@@ -128,13 +127,13 @@ def _solve_flagged(
     lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
 ):  # fmt: skip
     """Solve the m pixels whose numbers are in scratch.pixels, in lanes."""
-    rows, pixels, lanes = scratch.rows, scratch.pixels, scratch.lanes
-    waiting = exchange.held_first(m, rows, pixels)
-    exchange.load(lo, m, ta, length, circuit, state, rows, scratch.falls, pixels, lanes)
+    strip, pixels, lanes = scratch.rows, scratch.pixels, scratch.lanes
+    waiting = exchange.held_first(m, strip, pixels)
+    exchange.load(lo, m, ta, length, circuit, state, strip, scratch.falls, pixels, lanes)
     while True:
         keys, times = with_room(keys, times, n, n + 2 * m)
         m, n = batch.decide(
-            lo, m, waiting, start, ta, length, t_base, circuit, rule, state, rows, pixels, lanes,
+            lo, m, waiting, start, ta, length, t_base, circuit, rule, state, strip, pixels, lanes,
             keys, times, n,
         )  # fmt: skip
         if m == 0:
@@ -149,19 +148,19 @@ def _advance_strip(
     lo, count, start, ta, length, circuit, rule, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
     """Advance one strip over one interval, whose light is in LIGHT_0 and LIGHT_1."""
-    rows, falls = scratch.rows, scratch.falls
+    strip, falls = scratch.rows, scratch.falls
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     if leaks:
-        _leak_strip(lo, count, length, circuit, state, rows, falls, scratch.means)
-    _screen(rows, _f(ta + length - start), length, circuit, rule)
-    m = screen.flagged(rows, scratch.pixels)
+        _leak_strip(lo, count, length, circuit, state, strip, falls, scratch.means)
+    _screen(strip, _f(ta + length - start), length, circuit, rule)
+    m = screen.flagged(strip, scratch.pixels)
     if m > 0:
         n, keys, times = _solve_flagged(
             lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
         )
     if leaks:
-        _lower_references(lo, count, state, rows, falls)
-    screen.step_on(rows)
+        _lower_references(lo, count, state, strip, falls)
+    screen.step_on(strip)
     return n, keys, times
 
 
@@ -182,7 +181,7 @@ def _rest_strip(
     """Advance one strip over the intervals first..last: no light changes, no lag is left."""
     b, f, j, m, s = 0, first, 0, 0, 0.0
     while b < count:
-        n, b, f, j, m, s = rest.go_through(
+        n, b, f, j, m, s = static_pixels.go_through(
             lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, scratch.rows,
             scratch.falls, scratch.means, scratch.pixels, keys, times, n,
         )  # fmt: skip
@@ -197,25 +196,25 @@ def _strip(
     state, scratch, keys, times, n,
 ):  # fmt: skip
     """Advance one strip of the exact circuit over all intervals."""
-    rows = scratch.rows
+    strip = scratch.rows
     floor = 0.0 if circuit.slope > 0.0 else circuit.floor
     start = starts[0]
-    load(frames, before[0], share[0], lo, count, floor, rows)
-    _open_strip(lo, count, start, circuit, state, rows)
+    load(frames, before[0], share[0], lo, count, floor, strip)
+    _open_strip(lo, count, start, circuit, state, strip)
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     intervals = starts.shape[0] - 1
-    settled, resting = screen.is_settled(rows), False
+    settled, resting = screen.is_settled(strip), False
     f = 0
     while f < intervals:
         still = _rests(frames, f, before, share, lo, count)
         if not still:
-            load(frames, before[f + 1], share[f + 1], lo, count, floor, rows)
-            still = screen.is_still(rows)
+            load(frames, before[f + 1], share[f + 1], lo, count, floor, strip)
+            still = screen.is_still(strip)
         if still and settled:
             if not resting:
                 if leaks:
-                    _leak_strip(lo, count, 1.0, circuit, state, rows, scratch.falls, scratch.means)
-                rest.begin_rest(_f(starts[f] - start), rows)
+                    _leak_strip(lo, count, 1.0, circuit, state, strip, scratch.falls, scratch.means)
+                static_pixels.begin_rest(_f(starts[f] - start), strip)
                 resting = True
             last = f + 1
             while last < intervals and _rests(frames, last, before, share, lo, count):
@@ -226,15 +225,15 @@ def _strip(
             f = last
             continue
         if resting and leaks:
-            rest.end_rest(lo, count, circuit, state, rows)
+            static_pixels.end_rest(lo, count, circuit, state, strip)
         resting = False
         n, keys, times = _advance_strip(
             lo, count, start, starts[f], starts[f + 1] - starts[f], circuit, _rule(rules, f),
             t_base, state, scratch, keys, times, n,
         )  # fmt: skip
-        settled = still and (settled or screen.is_settled(rows))
+        settled = still and (settled or screen.is_settled(strip))
         f += 1
-    _close_strip(lo, count, circuit, state, rows)
+    _close_strip(lo, count, circuit, state, strip)
     return n, keys, times
 
 

@@ -99,39 +99,39 @@ _LARGEST_LIGHT = _f(LARGEST_LIGHT)
 
 def scratch() -> NDArray[np.float32]:
     """Return the flat array of rows of one strip; padding beyond its pixels must be harmless."""
-    rows = np.zeros(SIZE, np.float32)
-    rows[LIGHT_0 : LIGHT_0 + STRIDE] = 1.0
-    rows[LIGHT_1 : LIGHT_1 + STRIDE] = 1.0
+    strip = np.zeros(SIZE, np.float32)
+    strip[LIGHT_0 : LIGHT_0 + STRIDE] = 1.0
+    strip[LIGHT_1 : LIGHT_1 + STRIDE] = 1.0
     for row in (ON, OFF, DUE):
-        rows[row : row + STRIDE] = NEVER
-    return rows
+        strip[row : row + STRIDE] = NEVER
+    return strip
 
 
 @kernel
-def is_still(rows):
+def is_still(strip):
     """Tell whether no pixel's light changes over the interval."""
     moves = 0
     for k in range(STRIP):
-        moves += rows[LIGHT_0 + k] != rows[LIGHT_1 + k]
+        moves += strip[LIGHT_0 + k] != strip[LIGHT_1 + k]
     return moves == 0
 
 
 @kernel
-def is_settled(rows):
+def is_settled(strip):
     """Tell whether every pixel's lag is gone."""
     lags = 0
     for k in range(STRIP):
-        lags += rows[LAG_0 + k] != _ZERO
+        lags += strip[LAG_0 + k] != _ZERO
     return lags == 0
 
 
 @kernel
-def _prepare(rows, dark, per_dn, knee_dn, slope, inverse_slope):
+def _prepare(strip, dark, per_dn, knee_dn, slope, inverse_slope):
     """Change of log intensity, and the parameters of the quadrature."""
     foot = slope * per_dn
     for k in range(STRIP):
-        i0 = rows[LIGHT_0 + k]
-        i1 = rows[LIGHT_1 + k]
+        i0 = strip[LIGHT_0 + k]
+        i1 = strip[LIGHT_1 + k]
         change = i1 - i0
         on_log = min(i0, i1) >= knee_dn
         straight = change * inverse_slope
@@ -143,46 +143,46 @@ def _prepare(rows, dark, per_dn, knee_dn, slope, inverse_slope):
         v = _REACH * (_ONE + _MORE * up) / (rate + _TINY)
         v = v if v < _ONE else _ONE
         z = dx * v
-        rows[DX + k] = dx
-        rows[A1 + k] = rate * v
-        rows[KAPPA + k] = z * v * moving
-        rows[Z + k] = -z if on_log else _ZERO
-        rows[UPTO + k] = v
-        rows[TOTAL + k] = _ZERO
+        strip[DX + k] = dx
+        strip[A1 + k] = rate * v
+        strip[KAPPA + k] = z * v * moving
+        strip[Z + k] = -z if on_log else _ZERO
+        strip[UPTO + k] = v
+        strip[TOTAL + k] = _ZERO
 
 
 @kernel
-def _node(rows, node, weight):
+def _node(strip, node, weight):
     """Add one node of the quadrature."""
     square = node * node
     for k in range(STRIP):
-        t = rows[KAPPA + k] * square * special.psi32(rows[Z + k] * node) - rows[A1 + k] * node
-        rows[TOTAL + k] += weight * special.exp32(t)
+        t = strip[KAPPA + k] * square * special.psi32(strip[Z + k] * node) - strip[A1 + k] * node
+        strip[TOTAL + k] += weight * special.exp32(t)
 
 
 @kernel
-def _end_lags(rows):
+def _end_lags(strip):
     """Row LAG_1, once the integral is known."""
     for k in range(STRIP):
-        v = rows[UPTO + k]
+        v = strip[UPTO + k]
         # tau over the whole interval from that over [0, V]: equal where V = 1, else beyond reach
-        t = rows[KAPPA + k] * special.psi32(rows[Z + k]) - rows[A1 + k]
+        t = strip[KAPPA + k] * special.psi32(strip[Z + k]) - strip[A1 + k]
         decay = special.exp32(t)
         decay = decay if v >= _ONE else _ZERO
-        u = decay * rows[LAG_0 + k] - rows[DX + k] * (v * rows[TOTAL + k])
-        rows[LAG_1 + k] = u if abs(u) > _AT_REST else _ZERO
+        u = decay * strip[LAG_0 + k] - strip[DX + k] * (v * strip[TOTAL + k])
+        strip[LAG_1 + k] = u if abs(u) > _AT_REST else _ZERO
 
 
 @kernel
-def _flag(rows, end, dark, per_dn, knee_dn):
+def _flag(strip, end, dark, per_dn, knee_dn):
     """Rows AWAY_1 and HIT: distance at the end, and which pixels are to be looked at."""
     for k in range(STRIP):
-        i0, i1 = rows[LIGHT_0 + k], rows[LIGHT_1 + k]
-        u0, u1 = rows[LAG_0 + k], rows[LAG_1 + k]
-        dx, fall = rows[DX + k], rows[FALL + k]
-        d0 = rows[AWAY_0 + k]
+        i0, i1 = strip[LIGHT_0 + k], strip[LIGHT_1 + k]
+        u0, u1 = strip[LAG_0 + k], strip[LAG_1 + k]
+        dx, fall = strip[DX + k], strip[FALL + k]
+        d0 = strip[AWAY_0 + k]
         d1 = d0 + dx
-        rows[AWAY_1 + k] = d1 + fall
+        strip[AWAY_1 + k] = d1 + fall
         y0, y1 = d0 + u0, d1 + u1
         low, high = min(y0, y1), max(y0, y1)
         size = abs(u0)
@@ -193,15 +193,15 @@ def _flag(rows, end, dark, per_dn, knee_dn):
         turns = u0 * u1 < _ZERO
         low = min(low, turn) if turns else low
         high = max(high, turn) if turns else high
-        hit = (high + fall >= rows[ON + k]) | (-low >= rows[OFF + k]) | (rows[DUE + k] < end)
+        hit = (high + fall >= strip[ON + k]) | (-low >= strip[OFF + k]) | (strip[DUE + k] < end)
         mixed = (i0 < knee_dn) != (i1 < knee_dn)
         steep = (min(i0, i1) >= knee_dn) & (abs(i1 - i0) > _LARGEST_RATIO * (i0 + i1))
         far = steep | (abs(dx) > _ONE) | (i1 > _LARGEST_LIGHT)
-        rows[HIT + k] = _ONE if hit | mixed | far else _ZERO
+        strip[HIT + k] = _ONE if hit | mixed | far else _ZERO
 
 
 @kernel
-def screen(rows, end, dark, per_dn, knee_dn, slope, rule):
+def screen(strip, end, dark, per_dn, knee_dn, slope, rule):
     """Move every pixel of the strip to the end of the interval and flag those that may fire.
 
     Parameters
@@ -216,27 +216,27 @@ def screen(rows, end, dark, per_dn, knee_dn, slope, rule):
     rule : Rule
     """
     inverse_slope = _ONE / slope if slope > _ZERO else _ZERO
-    _prepare(rows, dark, per_dn, knee_dn, slope, inverse_slope)
+    _prepare(strip, dark, per_dn, knee_dn, slope, inverse_slope)
     for c in range(rule.nodes.shape[0]):
-        _node(rows, _f(rule.nodes[c]), _f(rule.weights[c]))
-    _end_lags(rows)
-    _flag(rows, end, dark, per_dn, knee_dn)
+        _node(strip, _f(rule.nodes[c]), _f(rule.weights[c]))
+    _end_lags(strip)
+    _flag(strip, end, dark, per_dn, knee_dn)
 
 
 @kernel
-def flagged(rows, index):
+def flagged(strip, index):
     """Fill `index` with the flagged pixels; returns their number."""
     m = 0
     for k in range(STRIP):
         index[m] = k
-        m += 1 if rows[HIT + k] > _ZERO else 0
+        m += 1 if strip[HIT + k] > _ZERO else 0
     return m
 
 
 @kernel
-def step_on(rows):
+def step_on(strip):
     """Make the end of this interval the start of the next."""
     for k in range(STRIP):
-        rows[LIGHT_0 + k] = rows[LIGHT_1 + k]
-        rows[LAG_0 + k] = rows[LAG_1 + k]
-        rows[AWAY_0 + k] = rows[AWAY_1 + k]
+        strip[LIGHT_0 + k] = strip[LIGHT_1 + k]
+        strip[LAG_0 + k] = strip[LAG_1 + k]
+        strip[AWAY_0 + k] = strip[AWAY_1 + k]

@@ -37,48 +37,48 @@ _EARLY, _NEVER = _f(EARLY), _f(screen.NEVER)
 
 
 @kernel
-def _when(k, now, rows):
+def _when(k, now, strip):
     """When pixel k of the strip is to be looked at, its distance being that at `now`."""
-    away = rows[screen.AWAY_0 + k]
-    left = rows[screen.ON + k] - away
-    leaked = (now + left / (rows[screen.FALL + k] + _TINY)) * _EARLY
-    beyond = (left <= _ZERO) | (-away >= rows[screen.OFF + k])
-    return -_NEVER if beyond else min(rows[screen.DUE + k], leaked)
+    away = strip[screen.AWAY_0 + k]
+    left = strip[screen.ON + k] - away
+    leaked = (now + left / (strip[screen.FALL + k] + _TINY)) * _EARLY
+    beyond = (left <= _ZERO) | (-away >= strip[screen.OFF + k])
+    return -_NEVER if beyond else min(strip[screen.DUE + k], leaked)
 
 
 @kernel
-def _note_soonest(b, rows):
+def _note_soonest(b, strip):
     """Row SOONEST of the block that begins at pixel b."""
     # by halves, as a minimum over a row does not vectorise; the quadrature's row is free at rest
     half = BLOCK // 2
     for k in range(half):
-        rows[screen.TOTAL + k] = min(rows[screen.WHEN + b + k], rows[screen.WHEN + b + half + k])
+        strip[screen.TOTAL + k] = min(strip[screen.WHEN + b + k], strip[screen.WHEN + b + half + k])
     for k in range(half // 2):
-        rows[screen.TOTAL + k] = min(rows[screen.TOTAL + k], rows[screen.TOTAL + half // 2 + k])
-    soonest = rows[screen.TOTAL]
+        strip[screen.TOTAL + k] = min(strip[screen.TOTAL + k], strip[screen.TOTAL + half // 2 + k])
+    soonest = strip[screen.TOTAL]
     for k in range(1, half // 2):
-        soonest = min(soonest, rows[screen.TOTAL + k])
-    rows[screen.SOONEST + b // BLOCK] = soonest
+        soonest = min(soonest, strip[screen.TOTAL + k])
+    strip[screen.SOONEST + b // BLOCK] = soonest
 
 
 @kernel
-def begin_rest(now, rows):
+def begin_rest(now, strip):
     """Find out when the pixels of a strip are to be looked at that comes to rest at `now`.
 
     Row FALL holds the fall of the references in a microsecond.
     """
     for k in range(STRIP):
-        rows[screen.WHEN + k] = _when(k, now, rows)
+        strip[screen.WHEN + k] = _when(k, now, strip)
     for b in range(0, STRIP, BLOCK):
-        _note_soonest(b, rows)
+        _note_soonest(b, strip)
 
 
 @kernel
-def end_rest(lo, count, circuit, state, rows):
+def end_rest(lo, count, circuit, state, strip):
     """Row AWAY_0 of a strip that is at rest no longer: leak has gone on."""
     for k in range(count):
-        x = log_of(np.float64(rows[screen.LIGHT_0 + k]), circuit)
-        rows[screen.AWAY_0 + k] = x - state[S_REFERENCE, lo + k]
+        x = log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
+        strip[screen.AWAY_0 + k] = x - state[S_REFERENCE, lo + k]
 
 
 @kernel
@@ -96,17 +96,17 @@ def _lower_block(i, b, size, state, falls):
 
 
 @kernel
-def _lower_unflagged(i, b, size, state, rows, falls):
+def _lower_unflagged(i, b, size, state, strip, falls):
     """Take the falls from the references of the pixels of a block that are not looked at."""
     reference, fall = state[S_REFERENCE, i : i + size], falls[b : b + size]
     for k in range(size):
-        reference[k] -= fall[k] if rows[screen.HIT + b + k] == _ZERO else 0.0
+        reference[k] -= fall[k] if strip[screen.HIT + b + k] == _ZERO else 0.0
 
 
 @kernel
-def next_due(b, first, last, starts, rows):
+def next_due(b, first, last, starts, strip):
     """Return the first of the intervals first..last in which a pixel of the block is due."""
-    soonest = rows[screen.SOONEST + b // BLOCK]
+    soonest = strip[screen.SOONEST + b // BLOCK]
     f = first
     while f < last and soonest >= _f(starts[f + 1] - starts[0]):
         f += 1
@@ -114,50 +114,50 @@ def next_due(b, first, last, starts, rows):
 
 
 @kernel
-def flag_block(b, size, end, rows, index):
+def flag_block(b, size, end, strip, index):
     """Flag the pixels of a block that are due before `end`, and fill `index` with them.
 
     Returns their number.
     """
     for k in range(BLOCK):
-        rows[screen.HIT + b + k] = _f(1.0) if rows[screen.WHEN + b + k] < end else _ZERO
+        strip[screen.HIT + b + k] = _f(1.0) if strip[screen.WHEN + b + k] < end else _ZERO
     m = 0
     for k in range(size):
         index[m] = b + k
-        m += 1 if rows[screen.HIT + b + k] > _ZERO else 0
+        m += 1 if strip[screen.HIT + b + k] > _ZERO else 0
     return m
 
 
 @kernel
-def _go_on(b, m, end, rows, index):
+def _go_on(b, m, end, strip, index):
     """Make the end of an interval the start of the next, for the m pixels that were flagged."""
     for j in range(m):
         k = index[j]
-        rows[screen.AWAY_0 + k] = rows[screen.AWAY_1 + k]
-        rows[screen.LAG_0 + k] = rows[screen.LAG_1 + k]
-        rows[screen.WHEN + k] = _when(k, end, rows)
-    _note_soonest(b, rows)
+        strip[screen.AWAY_0 + k] = strip[screen.AWAY_1 + k]
+        strip[screen.LAG_0 + k] = strip[screen.LAG_1 + k]
+        strip[screen.WHEN + k] = _when(k, end, strip)
+    _note_soonest(b, strip)
 
 
 @kernel
-def _begin_leak_cycle(k, i, length, circuit, state, rows, falls, means):
+def _begin_leak_cycle(k, i, length, circuit, state, strip, falls, means):
     """Draw the leak speed of pixel k of the strip, i of all, from its event on."""
     next_leak_factor(i, circuit, state)
     fall_of_block(i, k, 1, 1.0, circuit, state, falls, means)
-    rows[screen.FALL + k] = falls[k]
+    strip[screen.FALL + k] = falls[k]
     fall_of_block(i, k, 1, length, circuit, state, falls, means)
 
 
 @kernel
 def _solve(
-    k, i, s, start, ta, length, t_base, circuit, state, rows, falls, means, keys, times, n
+    k, i, s, start, ta, length, t_base, circuit, state, strip, falls, means, keys, times, n
 ):  # fmt: skip
     """Events of one pixel, number k of its strip and i of all, over an interval at rest.
 
     Returns the number of events and DONE, or, where there is no room left for them, the place from
     which to go on.  Leaves the pixel's rows of the screen as they are at the end of the interval.
     """
-    light = np.float64(rows[screen.LIGHT_1 + k])
+    light = np.float64(strip[screen.LIGHT_1 + k])
     x, fall = log_of(light, circuit), falls[k]
     on, off = state[S_ON, i] + TIE, state[S_OFF, i] + TIE
     reference = state[S_REFERENCE, i]
@@ -199,7 +199,7 @@ def _solve(
         when = ta + s * length
         n = emit(keys, times, n, when, t_base, i, 1 if polarity > 0 else 0)
         if circuit.leak_jitter > 0.0:
-            _begin_leak_cycle(k, i, length, circuit, state, rows, falls, means)
+            _begin_leak_cycle(k, i, length, circuit, state, strip, falls, means)
             reference += (falls[k] - fall) * s
             fall = falls[k]
         if circuit.dead_time > 0.0:
@@ -207,14 +207,14 @@ def _solve(
         else:
             reference += level
     state[S_REFERENCE, i] = reference - fall
-    rows[screen.LAG_1 + k] = 0.0
-    watch(k, i, x, start, circuit, state, rows)
+    strip[screen.LAG_1 + k] = 0.0
+    watch(k, i, x, start, circuit, state, strip)
     return n, DONE
 
 
 @kernel
 def _solve_block(
-    lo, j, m, s, start, ta, length, t_base, circuit, state, rows, falls, means, index, keys,
+    lo, j, m, s, start, ta, length, t_base, circuit, state, strip, falls, means, index, keys,
     times, n,
 ):  # fmt: skip
     """Events of the flagged pixels, from the j-th of m on, which is solved from place s on.
@@ -233,7 +233,7 @@ def _solve_block(
             t_base,
             circuit,
             state,
-            rows,
+            strip,
             falls,
             means,
             keys,
@@ -248,7 +248,7 @@ def _solve_block(
 
 @kernel
 def go_through(
-    lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, rows, falls, means,
+    lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, strip, falls, means,
     index, keys, times, n,
 ):  # fmt: skip
     """Advance a strip at rest over the intervals first..last, from where the last call stopped.
@@ -271,7 +271,7 @@ def go_through(
     while b < count:
         i, size = lo + b, min(BLOCK, count - b)
         if m == 0:
-            due = next_due(b, f, last, starts, rows)
+            due = next_due(b, f, last, starts, strip)
             if leaks:
                 for c in range(f, due):
                     length = starts[c + 1] - starts[c]
@@ -283,16 +283,16 @@ def go_through(
             f, j, s = due, 0, 0.0
         ta, length, end = starts[f], starts[f + 1] - starts[f], _f(starts[f + 1] - start)
         if m == 0:
-            m = flag_block(b, size, end, rows, index)
+            m = flag_block(b, size, end, strip, index)
             if leaks:
                 fall_of_block(i, b, size, length, circuit, state, falls, means)
-                _lower_unflagged(i, b, size, state, rows, falls)
+                _lower_unflagged(i, b, size, state, strip, falls)
         n, j, s = _solve_block(
-            lo, j, m, s, start, ta, length, t_base, circuit, state, rows, falls, means, index,
+            lo, j, m, s, start, ta, length, t_base, circuit, state, strip, falls, means, index,
             keys, times, n,
         )  # fmt: skip
         if j < m:
             break
-        _go_on(b, m, end, rows, index)
+        _go_on(b, m, end, strip, index)
         f, m = f + 1, 0
     return n, b, f, j, m, s

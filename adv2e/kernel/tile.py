@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import kernel
 from adv2e.kernel import screen
-from adv2e.kernel.lanes import layout as lanes
-from adv2e.kernel.stepped import rows as dense_rows
+from adv2e.kernel.lanes import rows as lane_rows
+from adv2e.kernel.stepped import rows as step_rows
 from adv2e.kernel.workspace import STRIP
 
 _f = np.float32
@@ -30,7 +30,7 @@ class Scratch(NamedTuple):
     pixels: NDArray[np.int64]  # numbers of the lanes' pixels
     falls: NDArray[np.float64]
     means: NDArray[np.float64]
-    dense: NDArray[np.float64]  # of the stepping path
+    stepped: NDArray[np.float64]  # of the stepping path
     normals: NDArray[np.float64]
 
 
@@ -58,17 +58,17 @@ def scratch() -> Scratch:
     """Return fresh scratch memory."""
     return Scratch(
         rows=screen.scratch(),
-        lanes=lanes.scratch(),
-        pixels=lanes.pixel_numbers(),
+        lanes=lane_rows.scratch(),
+        pixels=lane_rows.pixel_numbers(),
         falls=np.zeros(STRIP),
         means=np.zeros(STRIP),
-        dense=dense_rows.scratch(),
-        normals=dense_rows.normals(),
+        stepped=step_rows.scratch(),
+        normals=step_rows.normals(),
     )
 
 
 @kernel
-def load(frames, before, share, first, count, floor, rows):
+def load(frames, before, share, first, count, floor, strip):
     """Row LIGHT_1: `share` of the way from frame `before` to the next, for a strip."""
     low, row = _f(floor), screen.LIGHT_1
     now, last = before + 1, first + count
@@ -76,23 +76,23 @@ def load(frames, before, share, first, count, floor, rows):
     if frames.coded and frames.plain and share == _f(1.0):
         codes = frames.codes[now, first:last]
         for k in range(count):
-            rows[row + k] = max(_f(codes[k]), low)
+            strip[row + k] = max(_f(codes[k]), low)
     elif frames.coded and share == _f(1.0):
         codes = frames.codes[now, first:last]
         for k in range(count):
-            rows[row + k] = max(frames.table[codes[k]], low)
+            strip[row + k] = max(frames.table[codes[k]], low)
     elif frames.coded:
         codes = frames.codes[now, first:last]
         codes_before = frames.codes[max(before, 0), first:last]
         for k in range(count):
             a = frames.table[codes_before[k]]
-            rows[row + k] = max(a + (frames.table[codes[k]] - a) * share, low)
+            strip[row + k] = max(a + (frames.table[codes[k]] - a) * share, low)
     elif share == _f(1.0):
         light = frames.light[now, first:last]
         for k in range(count):
-            rows[row + k] = max(light[k], low)
+            strip[row + k] = max(light[k], low)
     else:
         light, light_before = frames.light[now, first:last], frames.light[before, first:last]
         for k in range(count):
             a = light_before[k]
-            rows[row + k] = max(a + (light[k] - a) * share, low)
+            strip[row + k] = max(a + (light[k] - a) * share, low)

@@ -21,7 +21,7 @@ from adv2e.kernel import packing as order
 from adv2e.kernel.event_buffer import Room
 from adv2e.kernel.exact import run_exact
 from adv2e.kernel.quadrature import rules_for
-from adv2e.kernel.stepped.driver import run_dense
+from adv2e.kernel.stepped.driver import run_stepped
 from adv2e.kernel.tile import Frames, frames_of, scratch
 from adv2e.kernel.work_queue import nothing_claimed
 from adv2e.kernel.workspace import (
@@ -78,7 +78,7 @@ class PixelArray:
         Keep unrounded times (`last_times`), for tests.
     additions : Additions, optional
         What effects outside the kernel add to the pixels.
-    method : {"auto", "dense"}
+    method : {"auto", "stepped"}
         How the circuit is solved: the fastest way that covers it, or in steps of time.
     coarseness : Coarseness
         Of those steps, where some us of precision may go for speed.
@@ -120,13 +120,13 @@ class PixelArray:
         self.threads = thread_count(threads)
         self.started = False
         self._driver = driver_of(pixel, self.circuit, additions, method)
-        start, dense = self._relative(t_ns), self._driver == "run_dense"
-        if dense:
+        start, stepped = self._relative(t_ns), self._driver == "run_stepped"
+        if stepped:
             self._stepping = Stepping(
                 self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
                 self.origin_us, start, coarseness,
             )  # fmt: skip
-        stepping = self._stepping if dense else None
+        stepping = self._stepping if stepped else None
         self.state = initial_state(pixel, self.circuit, first, start, stepping, self.threads)
         strips = -(-self.pixels // STRIP)
         self._most = -(-(tile or _TILE) // STRIP)
@@ -187,7 +187,7 @@ class PixelArray:
             )
         frames = frames_of(part.frames, table)
         per_us = order.SLICES / (span + 2.0)
-        advance = self._advance_dense if self._driver == "run_dense" else self._advance_whole
+        advance = self._advance_stepped if self._driver == "run_stepped" else self._advance_whole
         parted = advance(part, frames, starts, t_base, per_us, pool)
         self.started = True
         self._keep_times(parted)
@@ -215,7 +215,7 @@ class PixelArray:
             pool,
         )  # fmt: skip
 
-    def _advance_dense(
+    def _advance_stepped(
         self,
         part: Part,
         frames: Frames,
@@ -231,7 +231,7 @@ class PixelArray:
                 frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
                 steps, injected, t_base, self.state,
             )  # fmt: skip
-            parted += self._by_tiles(run_dense, arguments, per_us, pool)
+            parted += self._by_tiles(run_stepped, arguments, per_us, pool)
         return parted
 
     def _by_tiles(

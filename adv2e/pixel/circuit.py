@@ -16,7 +16,7 @@ from adv2e.kernel.workspace import Circuit
 _NO_KNEE = 1e300
 _PER_US = 1e-6
 
-METHODS = ("auto", "dense")
+METHODS = ("auto", "stepped")
 """How the circuit is solved: by the fastest way that covers it, or in steps of time."""
 
 
@@ -63,5 +63,5 @@ def driver_of(pixel: Pixel, circuit: Circuit, additions: Additions | None, metho
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
     drifts = pixel.thresholds.drift_per_s != 0
-    steps = method == "dense" or additions is not None or drifts or not covers(circuit)
-    return "run_dense" if steps else "run_exact"
+    steps = method == "stepped" or additions is not None or drifts or not covers(circuit)
+    return "run_stepped" if steps else "run_exact"

@@ -208,6 +208,8 @@ class Stepping:
                 steps[f] = steps_of(
                     length / pieces, circuit, step_us, brightest[f], self._coarseness
                 )
+            if circuit.printed:  # where the light overshoots, up to 4 us were found
+                steps *= 2
         for first, first_step, stop, stop_step in self._cuts(pieces, steps):
             times = _instants(starts, pieces * steps, first, first_step, stop, stop_step)
             run = Run(

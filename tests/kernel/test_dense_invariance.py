@@ -70,7 +70,7 @@ CASES = {
 def run(pixel, light, printed=False, **options):
     split = {k: options.pop(k) for k in ("chunk", "threads") if k in options}
     times = [k * 4_166_667 + (k % 3) * 1_000 for k in range(len(light))]
-    array = start(light, times, pixel, seed=5, printed=printed, method="dense", **options)
+    array = start(light, times, pixel, seed=5, printed=printed, method="stepped", **options)
     events = advance(array, light, times, L=3, printed=printed, **split)[0]
     return np.sort(events, order=("t", "y", "x", "p"))
 
@@ -121,7 +121,7 @@ for sections, additions in (
     ({{**NEW, "low_pass": LowPass(update="paper")}}, added),
 ):
     array = start(
-        light, times, Pixel(**sections), exact_times=True, method="dense", additions=additions
+        light, times, Pixel(**sections), exact_times=True, method="stepped", additions=additions
     )
     events, exact = advance(array, light, times)
     print(len(events), *(f"{{t:.4f}}" for t in exact), *events["p"], *events["x"], *events["y"])
@@ -198,7 +198,7 @@ def test_slew_limit_keeps_events_apart(light, slew, threshold):
 def test_a_constant_added_to_the_signal_changes_nothing(light, offset):
     times = np.arange(len(light)) * 0.01
     added = Additions(step_us=1e3, signal=lambda t: np.full(t.shape, offset))
-    plain = solve(np.array(light), times, quiet(), method="dense")
+    plain = solve(np.array(light), times, quiet(), method="stepped")
     found = solve(np.array(light), times, quiet(), additions=added)
     for a, b in zip(found, plain, strict=True):
         assert np.array_equal(a[:, 1], b[:, 1])

@@ -39,7 +39,7 @@ def test_edges_ramps_and_textures_against_the_dense_ode(name, fps, L):
     circuit, sections = CIRCUITS.get(name, WITH_EFFECTS)
     stimulus = stimuli.standard(fps, L=L, pixels=24, frames=7)
     truth, until = as_lists(dense_truth(*stimulus, circuit))
-    found = solve(stimulus.light, stimulus.times, quiet(**sections), method="dense")
+    found = solve(stimulus.light, stimulus.times, quiet(**sections), method="stepped")
     agreement = count_and_time_errors(found, truth, until)
     assert agreement.count_b > 40
     assert not agreement.differing
@@ -51,7 +51,7 @@ def test_edges_ramps_and_textures_against_the_dense_ode(name, fps, L):
 def test_all_circuits_against_the_twin(name):
     sections, circuit = CASES[name]
     light = moving_light(14, 32, seed=len(name))
-    options = {"method": "dense", "within_us": 1.0}
+    options = {"method": "stepped", "within_us": 1.0}
     check(light, clock(14, 1 / 240), quiet(**sections), Circuit(**circuit), **options)
 
 
@@ -75,15 +75,8 @@ def test_stepped_forms_against_the_twin(update, printed, follower_hz):
         leak_hz=10.0,
         follower_hz=follower_hz,
     )
-    options = {"K": 5, "L": 10, "printed": printed, "method": "dense", "within_us": 0.01}
+    options = {"K": 5, "L": 10, "printed": printed, "method": "stepped", "within_us": 0.01}
     check(light, clock(31, 1 / 240), pixel, circuit, **options)
-
-
-def test_exact_with_the_printed_last_interval():
-    light = moving_light(21, 8, seed=4, step=0.1)
-    circuit = Circuit(K=4, L=10, printed_last_interval=True)
-    options = {"K": 4, "L": 10, "printed": True, "method": "dense", "within_us": 1.0}
-    check(light, clock(21, 1 / 240), quiet(), circuit, **options)
 
 
 NOISY = {
@@ -106,7 +99,7 @@ def test_noise_events_and_leak_are_those_of_the_solved_path(name):
     )
     light, times = moving_light(25, 200, seed=6, step=0.15), clock(25, 1 / 240)
     solved = solve(light, times, pixel, seed=9)
-    stepped = solve(light, times, pixel, seed=9, method="dense")
+    stepped = solve(light, times, pixel, seed=9, method="stepped")
     found = count_and_time_errors(stepped, solved)
     assert found.count_b > 3000
     assert not found.differing
@@ -188,7 +181,7 @@ def test_many_events_of_a_pixel_in_one_step_all_come():
     light = np.array([[10.0, 200.0], [10.0, 200.0], [200.0, 10.0], [200.0, 10.0]])
     times = np.array([0.0, 0.001, 0.00108, 0.002])
     pixel = quiet(low_pass=None, log_response=LogResponse(linear_below=0))
-    pixel_events = solve(light, times, pixel, method="dense", K=1)
+    pixel_events = solve(light, times, pixel, method="stepped", K=1)
     for events, sign in zip(pixel_events, (1, -1), strict=True):
         expected = 0.001 + 0.00008 * 0.2 * np.arange(1, 15) / np.log(20)
         np.testing.assert_allclose(events[:, 0], expected, atol=1e-9)
@@ -211,7 +204,7 @@ def test_a_peak_between_the_ends_of_a_step_is_seen():
     assert np.diff(fine[y - y[0] > peak])[[0, -1]].sum() == pytest.approx(2e-6)  # one stretch
     assert np.count_nonzero(y - y[0] > peak) < 30  # shorter than a step
     pixel = quiet(thresholds=Thresholds(on=peak, off=1.0, mismatch=0))
-    for method in ("auto", "dense"):
+    for method in ("auto", "stepped"):
         events = solve(light, times, pixel, method=method)[0]
         assert events[:, 1].tolist() == [1]
         assert events[0, 0] == pytest.approx(fine[y.argmax()], abs=15e-6)
@@ -227,7 +220,7 @@ def test_additions_of_nothing_change_nothing():
     times_ns = [round(t * 1e9) for t in times]
     arrays = [
         start(light, times_ns, quiet(), exact_times=True, **options)
-        for options in ({"method": "dense"}, {"additions": Additions(step_us=math.inf)})
+        for options in ({"method": "stepped"}, {"additions": Additions(step_us=math.inf)})
     ]
     one, two = (by_pixel(array, *advance(array, light, times_ns)) for array in arrays)
     assert sum(map(len, one)) > 100
@@ -239,7 +232,7 @@ def test_light_beyond_white_is_followed_as_fast():
     light = np.exp(np.random.default_rng(0).uniform(0, 9, (12, 40))).astype(np.float32)
     times = clock(12, 1e-3)
     found = count_and_time_errors(
-        solve(light, times, quiet(), method="dense"), solve(light, times, quiet())
+        solve(light, times, quiet(), method="stepped"), solve(light, times, quiet())
     )
     assert found.count_b > 1000
     assert not found.differing

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness import EVERYTHING, IN_LANES, ONE_BY_ONE, advance, quiet, start
+from harness import EVERYTHING, IN_LANES, STEPPED_FORM, advance, quiet, start
 
 from adv2e.config.model import LowPass, Pixel, Thresholds
 
@@ -37,7 +37,7 @@ def run(pixel, light, K=10, printed=False, **options):
 
 
 @pytest.mark.parametrize(
-    "sections", [{}, IN_LANES, ONE_BY_ONE, EVERYTHING, {"low_pass": LowPass(update="euler")}]
+    "sections", [{}, IN_LANES, STEPPED_FORM, EVERYTHING, {"low_pass": LowPass(update="euler")}]
 )
 @pytest.mark.parametrize("printed", [False, True])
 def test_tiles_chunks_and_threads_change_nothing(sections, printed):
@@ -84,13 +84,13 @@ def test_events_do_not_run_out_of_room():
 _PLAIN = """
 import numpy as np, sys
 sys.path.insert(0, {tests!r})
-from harness import EVERYTHING, IN_LANES, ONE_BY_ONE, advance, start
+from harness import EVERYTHING, IN_LANES, STEPPED_FORM, advance, start
 from adv2e.config.model import Pixel, LowPass
 draw = np.random.default_rng(2)
 light = np.exp(draw.uniform(1, 5.5, (3, 3, 4))).astype(np.float32)
 times = [0, 2_000_000, 4_000_000]
 steps = {{"low_pass": LowPass(update="paper")}}
-for sections in ({{}}, IN_LANES, ONE_BY_ONE, EVERYTHING, steps):
+for sections in ({{}}, IN_LANES, STEPPED_FORM, EVERYTHING, steps):
     events, exact = advance(start(light, times, Pixel(**sections), exact_times=True), light, times)
     print(len(events), *(f"{{t:.4f}}" for t in exact), *events["p"], *events["x"], *events["y"])
 """

@@ -11,8 +11,6 @@ from reference.circuit import PURE, Circuit
 from reference.dense_ode import find_events
 from reference.dense_signal import solve_signal
 
-from adv2e.kernel import exact
-
 FAR = 50.0
 """A threshold that nothing reaches [ln units]."""
 
@@ -100,7 +98,7 @@ def test_leak_overtakes_a_slow_signal_while_the_light_rises(leak_hz):
 
 
 @pytest.mark.parametrize("leak_hz", [0.0, 50.0])
-def test_more_crossings_in_one_interval_than_rounds(leak_hz):
+def test_hundreds_of_crossings_in_one_interval(leak_hz):
     x = np.log([[6.0, 30.0, 250.0, 21.0]])
     moved = np.log([[250.0, 250.0, 6.0, 22.0]])
     last = np.log([[240.0, 255.0, 9.0, 55.0]])
@@ -108,7 +106,7 @@ def test_more_crossings_in_one_interval_than_rounds(leak_hz):
     circuit = Circuit(linear_below=2.72, on=0.01, off=0.011, leak_hz=leak_hz)
     truth = check(light, times, circuit, at_least=600)
     inside = [np.count_nonzero(events[:, 0] > times[1]) for events in truth]
-    assert sum(count > exact._ROUNDS for count in inside) >= 3
+    assert sum(count > 100 for count in inside) >= 3
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -199,7 +197,7 @@ def test_leak_that_outruns_the_signal(dead_time_us, leaks):
     check(light, clock([33.0, 4.0, 1.0, 33.0, 8.0, 100.0]), circuit, at_least=150)
 
 
-# --- what the lanes leave alone ------------------------------------------------------------------
+# --- what takes pieces, or the slow path ----------------------------------------------------------
 
 BEYOND = {
     "knee inside": (Circuit(on=0.1, off=0.07), {"lo": 3.0, "hi": 60.0, "steps": (0.1, 0.5)}),
@@ -222,7 +220,7 @@ BEYOND = {
 
 
 @pytest.mark.parametrize("name", BEYOND)
-def test_light_that_lanes_do_not_take(name):
+def test_light_that_takes_pieces(name):
     circuit, options = BEYOND[name]
     light = walks(len(name), 8, 24, **options)
     check(light, clock([4.0, 1.0, 12.0, 33.0, 4.0, 4.0, 12.0]), circuit, at_least=25)

@@ -1,4 +1,4 @@
-"""Random circuits and light: the pixels in lanes, and each of them solved by itself."""
+"""Random circuits and light: the pixels in lanes, and in fine steps of time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from adv2e.config.model import (
     ShotNoise,
     Thresholds,
 )
-from adv2e.pixel import circuit
+from adv2e.pixel import steps
+from adv2e.pixel.steps import steps_of
 
 PIXELS = 96
 
@@ -61,23 +62,24 @@ def random_sections(draw):
     return sections
 
 
-def events(light, times, pixel, seed):
-    array = start(light, times, pixel, seed=seed, exact_times=True)
+def events(light, times, pixel, seed, **options):
+    array = start(light, times, pixel, seed=seed, exact_times=True, **options)
     return by_pixel(array, *advance(array, light, times))
 
 
 @pytest.mark.parametrize("first", range(0, 60, 10))
-def test_in_lanes_as_one_by_one(first, monkeypatch):
+def test_in_lanes_as_in_steps_of_time(first, monkeypatch):
     count = 0
     for seed in range(first, first + 10):
         draw = np.random.default_rng(seed)
         light, times = random_light(draw)
         pixel = quiet(**random_sections(draw))
         in_lanes = events(light, times, pixel, seed)
+        # a third of a step leaves a hundredth of its error
         with monkeypatch.context() as patch:
-            patch.setattr(circuit, "covers", lambda _: False)
-            one_by_one = events(light, times, pixel, seed)
-        found = count_and_time_errors(in_lanes, one_by_one)
+            patch.setattr(steps, "steps_of", lambda *given: 3 * steps_of(*given))
+            in_steps = events(light, times, pixel, seed, method="stepped")
+        found = count_and_time_errors(in_lanes, in_steps)
         assert not found.differing, seed
         assert found.max_dt_us < 1.0, seed
         count += found.count_b

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from harness import quiet
 
-from adv2e.config.model import Leak, LogResponse, LowPass, Sampling
-from adv2e.kernel import general_screens as stepped
+from adv2e.config.model import LogResponse, LowPass, Sampling
 from adv2e.kernel import quadrature, screen
 from adv2e.kernel import static_pixels as rest
 from adv2e.kernel.quadrature import Rule
@@ -215,18 +214,6 @@ def test_at_rest_it_agrees_with_itself():
         assert rest.next_due(b, 0, 1, starts, rows) == (0 if due.size else 1)
         count = rest.flag_block(b, size, np.float32(4000.0), rows, numbers)
         assert np.array_equal(numbers[:count], b + due)
-
-
-def test_stepped_forms_stay_between_their_steps():
-    for update in ("paper", "euler", "zero_order_hold", "first_order_hold"):
-        pixel = quiet(low_pass=LowPass(update=update), leak=Leak(rate_hz=1.0))
-        circuit = make_circuit(pixel, Sampling(K=7), 0)
-        x0, x1, lag = draw(1, 20.0)
-        end, low, high = (np.empty(PIXELS) for _ in range(3))
-        columns = np.zeros((5, PIXELS))
-        stepped.stepped_lags(x0, x1, lag, 4167.0, circuit, PIXELS, columns, end, low, high)
-        assert np.all(low <= np.minimum(x0 + lag, x1 + end) + 1e-12)
-        assert np.all(high >= np.maximum(x0 + lag, x1 + end) - 1e-12)
 
 
 def test_quadrature_is_chosen_by_its_error():

@@ -108,15 +108,6 @@ def test_exact(name, interval_s):
 
 
 @pytest.mark.parametrize("update", ["first_order_hold", "zero_order_hold", "euler", "paper"])
-@pytest.mark.parametrize("printed", [False, True])
-def test_stepped_forms(update, printed):
-    light = moving_light(31, 12, seed=3)
-    pixel = quiet(low_pass=LowPass(update=update), refractory=Refractory(period_us=700))
-    circuit = Circuit(update=update, K=5, L=10, printed_last_interval=printed, dead_time_us=700.0)
-    check(light, clock(31, 1 / 240), pixel, circuit, K=5, L=10, printed=printed, within_us=0.01)
-
-
-@pytest.mark.parametrize("update", ["first_order_hold", "zero_order_hold", "euler", "paper"])
 def test_stepped_forms_behind_a_second_pole_from_rest(update):
     """The paper's form moves at rest, too: its weights do not sum to one."""
     light = np.repeat(moving_light(8, 12, seed=3), 4, axis=0)

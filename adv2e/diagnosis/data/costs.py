@@ -72,7 +72,7 @@ def steps_of_time(evidence: Evidence, declared: Config) -> int:
     shown, config = evidence.simulated, _without_pictures(declared)
     hooks = active_hooks(config)
     additions, circuit = additions_of(hooks), make_circuit(config.pixel, config.sampling, 0)
-    if driver_of(config.pixel, circuit, additions, "auto") != "run_dense":
+    if driver_of(config.pixel, circuit, additions, "auto") != "run_stepped":
         return 0
     frames = zip(shown.times_ns, lights(shown, config), strict=True)
     # one at a time: all of them may be many

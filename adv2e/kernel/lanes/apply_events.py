@@ -5,51 +5,7 @@ from __future__ import annotations
 from adv2e.compiled import inlined, kernel
 from adv2e.effects.pixel.leak import next_leak_factor
 from adv2e.kernel.comparator import TIE, emit
-from adv2e.kernel.lanes.layout import (
-    AWAY_P,
-    AWAY_S,
-    DONE,
-    DX,
-    END,
-    ERROR,
-    EVENT,
-    FALL,
-    FALL_DN,
-    FALLEN_B,
-    FALLEN_P,
-    FALLEN_S,
-    FRESH,
-    GOAL,
-    HOLD,
-    I1,
-    KNOWN,
-    LAG_E,
-    LAG_P,
-    LAG_S,
-    LIGHT_E,
-    LIGHT_P,
-    LIGHT_S,
-    MOVES,
-    OFF,
-    ON,
-    PLACE,
-    READY,
-    REFERENCE,
-    RELEASE,
-    SEEK_OFF,
-    SEEK_ON,
-    SEEKS,
-    STOP,
-    STUCK,
-    SUM_E,
-    TAIL,
-    TOLERANCE,
-    TRIED,
-    U1,
-    WHEN,
-    X0,
-    S,
-)
+from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.pieces import fallen_at_place
 from adv2e.kernel.lanes.roots import evaluate_release
 from adv2e.kernel.workspace import S_LEAK_FACTOR
@@ -63,38 +19,38 @@ def land(count, ta, length, circuit, lanes):
     dead = circuit.dead_time / length
     has_dead_time = circuit.dead_time > 0.0
     for j in range(count):
-        seeks = lanes[SEEKS + j]
-        found = (lanes[MOVES + j] < 0.5) | (lanes[ERROR + j] <= TOLERANCE)
-        tried = lanes[TRIED + j] + 1.0
-        lanes[TRIED + j] = tried
-        failed = STUCK if tried >= _TRIES else seeks
-        crossed = found & ((seeks == SEEK_ON) | (seeks == SEEK_OFF))
-        place = lanes[PLACE + j]
+        seeks = lanes[rows.SEEKS + j]
+        found = (lanes[rows.MOVES + j] < 0.5) | (lanes[rows.ERROR + j] <= rows.TOLERANCE)
+        tried = lanes[rows.TRIED + j] + 1.0
+        lanes[rows.TRIED + j] = tried
+        failed = rows.STUCK if tried >= _TRIES else seeks
+        crossed = found & ((seeks == rows.SEEK_ON) | (seeks == rows.SEEK_OFF))
+        place = lanes[rows.PLACE + j]
         fallen = fallen_at_place(j, lanes)
-        sign = 1.0 if seeks == SEEK_ON else -1.0
-        lanes[EVENT + j] = sign if crossed else 0.0
-        lanes[WHEN + j] = ta + place * length
+        sign = 1.0 if seeks == rows.SEEK_ON else -1.0
+        lanes[rows.EVENT + j] = sign if crossed else 0.0
+        lanes[rows.WHEN + j] = ta + place * length
         # a crossing without dead time goes on from there, with the reference moved by the threshold
         goes_on = crossed & (not has_dead_time)
         waits = crossed & has_dead_time
-        level = lanes[ON + j] if seeks == SEEK_ON else -lanes[OFF + j]
+        level = lanes[rows.ON + j] if seeks == rows.SEEK_ON else -lanes[rows.OFF + j]
         moved = level if goes_on else 0.0
-        lag = lanes[GOAL + j] - lanes[DX + j] * place - fallen
-        lanes[REFERENCE + j] += moved
-        lanes[S + j] = place if crossed else lanes[S + j]
-        lanes[LAG_S + j] = lag if crossed else lanes[LAG_S + j]
-        lanes[LIGHT_S + j] = lanes[LIGHT_E + j] if crossed else lanes[LIGHT_S + j]
-        lanes[FALLEN_S + j] = fallen if crossed else lanes[FALLEN_S + j]
-        lanes[AWAY_S + j] = sign * TIE if goes_on else lanes[AWAY_S + j]
-        lanes[AWAY_P + j] -= moved
+        lag = lanes[rows.GOAL + j] - lanes[rows.DX + j] * place - fallen
+        lanes[rows.REFERENCE + j] += moved
+        lanes[rows.S + j] = place if crossed else lanes[rows.S + j]
+        lanes[rows.LAG_S + j] = lag if crossed else lanes[rows.LAG_S + j]
+        lanes[rows.LIGHT_S + j] = lanes[rows.LIGHT_E + j] if crossed else lanes[rows.LIGHT_S + j]
+        lanes[rows.FALLEN_S + j] = fallen if crossed else lanes[rows.FALLEN_S + j]
+        lanes[rows.AWAY_S + j] = sign * TIE if goes_on else lanes[rows.AWAY_S + j]
+        lanes[rows.AWAY_P + j] -= moved
         release = place + dead
-        lanes[HOLD + j] = ta + release * length if waits else lanes[HOLD + j]
-        lanes[PLACE + j] = release if waits else place
-        lanes[FRESH + j] = 0.0
-        lanes[MOVES + j] = 0.0 if waits else lanes[MOVES + j]
-        after = DONE if release >= lanes[END + j] else RELEASE
-        after = after if waits else (READY if goes_on else seeks)
-        lanes[SEEKS + j] = after if found else failed
+        lanes[rows.HOLD + j] = ta + release * length if waits else lanes[rows.HOLD + j]
+        lanes[rows.PLACE + j] = release if waits else place
+        lanes[rows.FRESH + j] = 0.0
+        lanes[rows.MOVES + j] = 0.0 if waits else lanes[rows.MOVES + j]
+        after = rows.DONE if release >= lanes[rows.END + j] else rows.RELEASE
+        after = after if waits else (rows.READY if goes_on else seeks)
+        lanes[rows.SEEKS + j] = after if found else failed
 
 
 @kernel
@@ -102,33 +58,39 @@ def release(count, length, circuit, rule, lanes):
     """See lanes that wait through their dead time: the reference at its end is the signal."""
     evaluate_release(lanes, count, length, circuit, rule)
     for j in range(count):
-        seeks = lanes[SEEKS + j]
-        waits = seeks == RELEASE
-        place = lanes[PLACE + j]
-        s = lanes[S + j]
-        lag = lanes[LAG_E + j]
-        since = lanes[FALL + j] * (place - s) + lanes[FALL_DN + j] * lanes[SUM_E + j]
-        fallen = lanes[FALLEN_S + j] + since
+        seeks = lanes[rows.SEEKS + j]
+        waits = seeks == rows.RELEASE
+        place = lanes[rows.PLACE + j]
+        s = lanes[rows.S + j]
+        lag = lanes[rows.LAG_E + j]
+        since = lanes[rows.FALL + j] * (place - s) + lanes[rows.FALL_DN + j] * lanes[rows.SUM_E + j]
+        fallen = lanes[rows.FALLEN_S + j] + since
         # counted from x at the start of the interval, as the reference is
-        x = lanes[X0 + j] + lanes[DX + j] * place
-        reference = x + lag + fallen if waits else lanes[REFERENCE + j]
-        end = lanes[END + j]
-        away_p = lanes[X0 + j] + lanes[DX + j] * end + lanes[U1 + j] + lanes[TAIL + j] - reference
-        lanes[REFERENCE + j] = reference
-        lanes[S + j] = place if waits else s
-        lanes[LAG_S + j] = lag if waits else lanes[LAG_S + j]
-        lanes[LIGHT_S + j] = lanes[LIGHT_E + j] if waits else lanes[LIGHT_S + j]
-        lanes[FALLEN_S + j] = fallen if waits else lanes[FALLEN_S + j]
-        lanes[AWAY_S + j] = 0.0 if waits else lanes[AWAY_S + j]
+        x = lanes[rows.X0 + j] + lanes[rows.DX + j] * place
+        reference = x + lag + fallen if waits else lanes[rows.REFERENCE + j]
+        end = lanes[rows.END + j]
+        away_p = (
+            lanes[rows.X0 + j]
+            + lanes[rows.DX + j] * end
+            + lanes[rows.U1 + j]
+            + lanes[rows.TAIL + j]
+            - reference
+        )
+        lanes[rows.REFERENCE + j] = reference
+        lanes[rows.S + j] = place if waits else s
+        lanes[rows.LAG_S + j] = lag if waits else lanes[rows.LAG_S + j]
+        lanes[rows.LIGHT_S + j] = lanes[rows.LIGHT_E + j] if waits else lanes[rows.LIGHT_S + j]
+        lanes[rows.FALLEN_S + j] = fallen if waits else lanes[rows.FALLEN_S + j]
+        lanes[rows.AWAY_S + j] = 0.0 if waits else lanes[rows.AWAY_S + j]
         # the next known place is the end of the piece again
-        lanes[STOP + j] = end if waits else lanes[STOP + j]
-        lanes[KNOWN + j] = 0.0 if waits else lanes[KNOWN + j]
-        lanes[LAG_P + j] = lanes[U1 + j] if waits else lanes[LAG_P + j]
-        lanes[LIGHT_P + j] = lanes[I1 + j] if waits else lanes[LIGHT_P + j]
-        lanes[FALLEN_P + j] = lanes[TAIL + j] if waits else lanes[FALLEN_P + j]
-        lanes[AWAY_P + j] = away_p if waits else lanes[AWAY_P + j]
-        lanes[HOLD + j] = -1.0 if waits else lanes[HOLD + j]
-        lanes[SEEKS + j] = READY if waits else seeks
+        lanes[rows.STOP + j] = end if waits else lanes[rows.STOP + j]
+        lanes[rows.KNOWN + j] = 0.0 if waits else lanes[rows.KNOWN + j]
+        lanes[rows.LAG_P + j] = lanes[rows.U1 + j] if waits else lanes[rows.LAG_P + j]
+        lanes[rows.LIGHT_P + j] = lanes[rows.I1 + j] if waits else lanes[rows.LIGHT_P + j]
+        lanes[rows.FALLEN_P + j] = lanes[rows.TAIL + j] if waits else lanes[rows.FALLEN_P + j]
+        lanes[rows.AWAY_P + j] = away_p if waits else lanes[rows.AWAY_P + j]
+        lanes[rows.HOLD + j] = -1.0 if waits else lanes[rows.HOLD + j]
+        lanes[rows.SEEKS + j] = rows.READY if waits else seeks
 
 
 @inlined
@@ -136,15 +98,15 @@ def _begin_leak_cycle(i, j, circuit, state, lanes):
     """Draw the leak speed of the cycle that begins at S; what has fallen until there stays."""
     share = 1.0 / state[S_LEAK_FACTOR, i]
     share *= next_leak_factor(i, circuit, state)
-    lanes[FALL + j] *= share
-    lanes[FALL_DN + j] *= share
-    fallen = lanes[FALLEN_S + j]
+    lanes[rows.FALL + j] *= share
+    lanes[rows.FALL_DN + j] *= share
+    fallen = lanes[rows.FALLEN_S + j]
     # as if the speed had been the new one from the start of the piece
-    lanes[FALLEN_B + j] = fallen + share * (lanes[FALLEN_B + j] - fallen)
-    lanes[TAIL + j] = fallen + share * (lanes[TAIL + j] - fallen)
-    until_stop = fallen + share * (lanes[FALLEN_P + j] - fallen)
-    lanes[AWAY_P + j] += until_stop - lanes[FALLEN_P + j]
-    lanes[FALLEN_P + j] = until_stop
+    lanes[rows.FALLEN_B + j] = fallen + share * (lanes[rows.FALLEN_B + j] - fallen)
+    lanes[rows.TAIL + j] = fallen + share * (lanes[rows.TAIL + j] - fallen)
+    until_stop = fallen + share * (lanes[rows.FALLEN_P + j] - fallen)
+    lanes[rows.AWAY_P + j] += until_stop - lanes[rows.FALLEN_P + j]
+    lanes[rows.FALLEN_P + j] = until_stop
 
 
 @inlined
@@ -159,8 +121,8 @@ def fire(i, j, when, polarity, t_base, circuit, state, lanes, keys, times, n):
 def fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n):
     """Write the events of the thresholds that were found."""
     for j in range(m):
-        event = lanes[EVENT + j]
+        event = lanes[rows.EVENT + j]
         if event != 0.0:
-            i, when = lo + pixels[j], lanes[WHEN + j]
+            i, when = lo + pixels[j], lanes[rows.WHEN + j]
             n = fire(i, j, when, event, t_base, circuit, state, lanes, keys, times, n)
     return n

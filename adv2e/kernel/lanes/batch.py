@@ -12,26 +12,13 @@ others one by one (:mod:`adv2e.kernel.lanes.slow_path`).  Pixels get into lanes,
 from __future__ import annotations
 
 from adv2e.compiled import kernel
+from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.apply_events import fire_found, land, release
 from adv2e.kernel.lanes.exchange import sort_out
-from adv2e.kernel.lanes.layout import (
-    DONE,
-    DOUBTFUL,
-    END,
-    ERROR,
-    HALF,
-    INJECTED,
-    OPEN,
-    RELEASE,
-    SEEKS,
-    STUCK,
-    TOLERANCE,
-    TURN,
-    whole,
-)
 from adv2e.kernel.lanes.next_target import plan
 from adv2e.kernel.lanes.pieces import next_piece, open_piece
 from adv2e.kernel.lanes.roots import evaluate, guess, refine
+from adv2e.kernel.lanes.rows import whole
 from adv2e.kernel.lanes.slow_path import found_stop, go_on
 
 
@@ -40,13 +27,13 @@ def _waiting(m, lanes):
     """Return how many lanes have to be looked through for those that wait: all, or none."""
     waiting = 0
     for j in range(m):
-        waiting += lanes[SEEKS + j] == RELEASE
+        waiting += lanes[rows.SEEKS + j] == rows.RELEASE
     return m if waiting > 0 else 0
 
 
 @kernel
 def decide(
-    lo, m, waiting, start, ta, length, t_base, circuit, rule, state, rows, pixels, lanes, keys,
+    lo, m, waiting, start, ta, length, t_base, circuit, rule, state, strip, pixels, lanes, keys,
     times, n,
 ):  # fmt: skip
     """Decide what each of m lanes looks for next; none of them then waits for a dead time to end.
@@ -60,14 +47,14 @@ def decide(
             release(whole(waiting), length, circuit, rule, lanes)
         plan(whole(m), ta, length, circuit, lanes)
         for j in range(m):
-            seeks = lanes[SEEKS + j]
-            if seeks in (DOUBTFUL, STUCK):
+            seeks = lanes[rows.SEEKS + j]
+            if seeks in (rows.DOUBTFUL, rows.STUCK):
                 i = lo + pixels[j]
                 n = go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n)
-                seeks = lanes[SEEKS + j]
-            if seeks == DONE and lanes[END + j] < 1.0:
+                seeks = lanes[rows.SEEKS + j]
+            if seeks == rows.DONE and lanes[rows.END + j] < 1.0:
                 next_piece(j, circuit, lanes)
-        m = sort_out(lo, m, start, state, rows, pixels, lanes)
+        m = sort_out(lo, m, start, state, strip, pixels, lanes)
         waiting = _waiting(m, lanes)
         if waiting == 0:
             return m, n
@@ -86,9 +73,11 @@ def search(lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys,
     land(count, ta, length, circuit, lanes)
     n = fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n)
     for j in range(m):
-        seeks = lanes[SEEKS + j]
-        if seeks in (INJECTED, HALF) or (seeks == TURN and lanes[ERROR + j] <= TOLERANCE):
+        seeks = lanes[rows.SEEKS + j]
+        if seeks in (rows.INJECTED, rows.HALF) or (
+            seeks == rows.TURN and lanes[rows.ERROR + j] <= rows.TOLERANCE
+        ):
             found_stop(lo + pixels[j], j, circuit, state, lanes)
-        elif seeks == OPEN:
+        elif seeks == rows.OPEN:
             open_piece(j, ta, length, lanes)
     return n, _waiting(m, lanes)

@@ -3,64 +3,11 @@
 from __future__ import annotations
 
 from adv2e.compiled import kernel
-from adv2e.kernel import special
+from adv2e.kernel import screen, special
 from adv2e.kernel.comparator import HOT, SHOT
-from adv2e.kernel.lanes.layout import (
-    A1,
-    AWAY_P,
-    AWAY_S,
-    BASE,
-    DONE,
-    DX,
-    END,
-    FALL,
-    FALL_DN,
-    FALLEN_B,
-    FALLEN_P,
-    FALLEN_S,
-    FRESH,
-    HOLD,
-    I0,
-    I1,
-    KAPPA,
-    KNOWN,
-    LAG_P,
-    LAG_S,
-    LIGHT_P,
-    LIGHT_S,
-    LOG,
-    MOVES,
-    NOISE,
-    OFF,
-    ON,
-    OPEN,
-    PLACE,
-    REFERENCE,
-    SEEKS,
-    STOP,
-    TAIL,
-    U0,
-    U1,
-    X0,
-    S,
-    move,
-    whole,
-)
+from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.pieces import end_of_piece, first_place
-from adv2e.kernel.screen import (
-    AWAY_1,
-    DUE,
-    LAG_0,
-    LAG_1,
-    LARGEST_LIGHT,
-    LARGEST_STEP,
-    LIGHT_0,
-    LIGHT_1,
-    MARGIN,
-    NEVER,
-)
-from adv2e.kernel.screen import OFF as SCREEN_OFF
-from adv2e.kernel.screen import ON as SCREEN_ON
+from adv2e.kernel.lanes.rows import move, whole
 from adv2e.kernel.workspace import (
     S_HOLD,
     S_HOT_TIME,
@@ -71,7 +18,7 @@ from adv2e.kernel.workspace import (
     S_SHOT_TIME,
 )
 
-_LEAVING, _STAYING = A1, KAPPA  # rows that hold nothing between two searches
+_LEAVING, _STAYING = rows.A1, rows.KAPPA  # rows that hold nothing between two searches
 EARLY = 1.0 - 1e-6  # single precision must not make a due time late
 _NO_TIME = 1e300
 
@@ -106,49 +53,49 @@ def kind_of_next_noise(i, circuit, state):
 
 
 @kernel
-def watch(k, i, x1, start, circuit, state, rows):
+def watch(k, i, x1, start, circuit, state, strip):
     """Rows of the screen for pixel k of a strip, i of the state: distance, thresholds, due time."""
-    rows[AWAY_1 + k] = x1 - state[S_REFERENCE, i]
+    strip[screen.AWAY_1 + k] = x1 - state[S_REFERENCE, i]
     hold = state[S_HOLD, i]
     if hold >= 0.0:
-        rows[SCREEN_ON + k] = NEVER
-        rows[SCREEN_OFF + k] = NEVER
-        rows[DUE + k] = (hold - start) * EARLY
+        strip[screen.ON + k] = screen.NEVER
+        strip[screen.OFF + k] = screen.NEVER
+        strip[screen.DUE + k] = (hold - start) * EARLY
     else:
-        rows[SCREEN_ON + k] = state[S_ON, i] - MARGIN
-        rows[SCREEN_OFF + k] = state[S_OFF, i] - MARGIN
-        rows[DUE + k] = min(next_noise(i, circuit, state) - start, NEVER) * EARLY
+        strip[screen.ON + k] = state[S_ON, i] - screen.MARGIN
+        strip[screen.OFF + k] = state[S_OFF, i] - screen.MARGIN
+        strip[screen.DUE + k] = min(next_noise(i, circuit, state) - start, screen.NEVER) * EARLY
 
 
 @kernel
-def _gather(lo, m, circuit, state, rows, falls, pixels, lanes):
+def _gather(lo, m, circuit, state, strip, falls, pixels, lanes):
     """Fill the lanes with what screen and state know of their pixels."""
     for j in range(m):
         k = pixels[j]
-        lanes[U0 + j] = rows[LAG_0 + k]
-        lanes[U1 + j] = rows[LAG_1 + k]
-        lanes[I0 + j] = rows[LIGHT_0 + k]
-        lanes[I1 + j] = rows[LIGHT_1 + k]
-        lanes[TAIL + j] = falls[k]
-        lanes[ON + j] = state[S_ON, lo + k]
-        lanes[OFF + j] = state[S_OFF, lo + k]
-        lanes[REFERENCE + j] = state[S_REFERENCE, lo + k]
-        lanes[HOLD + j] = state[S_HOLD, lo + k]
+        lanes[rows.U0 + j] = strip[screen.LAG_0 + k]
+        lanes[rows.U1 + j] = strip[screen.LAG_1 + k]
+        lanes[rows.I0 + j] = strip[screen.LIGHT_0 + k]
+        lanes[rows.I1 + j] = strip[screen.LIGHT_1 + k]
+        lanes[rows.TAIL + j] = falls[k]
+        lanes[rows.ON + j] = state[S_ON, lo + k]
+        lanes[rows.OFF + j] = state[S_OFF, lo + k]
+        lanes[rows.REFERENCE + j] = state[S_REFERENCE, lo + k]
+        lanes[rows.HOLD + j] = state[S_HOLD, lo + k]
     if circuit.shot_rate > 0.0 or circuit.hot_rate > 0.0:
         for j in range(m):
-            lanes[NOISE + j] = next_noise(lo + pixels[j], circuit, state)
+            lanes[rows.NOISE + j] = next_noise(lo + pixels[j], circuit, state)
     else:
         for j in range(m):
-            lanes[NOISE + j] = _NO_TIME
+            lanes[rows.NOISE + j] = _NO_TIME
 
 
 @kernel
-def held_first(m, rows, pixels):
+def held_first(m, strip, pixels):
     """Put pixels in dead time before the others; returns their number."""
     held = 0
     for j in range(m):
         k = pixels[j]
-        if rows[SCREEN_ON + k] >= NEVER:
+        if strip[screen.ON + k] >= screen.NEVER:
             pixels[j] = pixels[held]
             pixels[held] = k
             held += 1
@@ -156,81 +103,83 @@ def held_first(m, rows, pixels):
 
 
 @kernel
-def load(lo, m, ta, length, circuit, state, rows, falls, pixels, lanes):
+def load(lo, m, ta, length, circuit, state, strip, falls, pixels, lanes):
     """Put the m flagged pixels in lanes, at the start of their interval."""
-    _gather(lo, m, circuit, state, rows, falls, pixels, lanes)
+    _gather(lo, m, circuit, state, strip, falls, pixels, lanes)
     knee = circuit.knee
     knee_dn = circuit.slope * knee
     leak, photo_leak = length * circuit.leak, length * circuit.photo_leak
     for j in range(whole(m)):
-        i0, i1 = lanes[I0 + j], lanes[I1 + j]
-        u0, u1 = lanes[U0 + j], lanes[U1 + j]
+        i0, i1 = lanes[rows.I0 + j], lanes[rows.I1 + j]
+        u0, u1 = lanes[rows.U0 + j], lanes[rows.U1 + j]
         x0 = log_of(i0, circuit)
         x1 = log_of(i1, circuit)
         dx = x1 - x0
         mixed = (i0 < knee_dn) != (i1 < knee_dn)
-        bright = i1 > LARGEST_LIGHT
-        in_pieces = mixed | (abs(dx) > LARGEST_STEP) | bright
+        bright = i1 > screen.LARGEST_LIGHT
+        in_pieces = mixed | (abs(dx) > screen.LARGEST_STEP) | bright
         brightest = max(i0, i1) if in_pieces else 0.0
         end, on_log = end_of_piece(0.0, x0, dx, knee, mixed, brightest)
         on_log = on_log if mixed else min(i0, i1) >= knee_dn
-        lanes[X0 + j] = x0
-        lanes[DX + j] = dx
-        lanes[LOG + j] = 1.0 if on_log else 0.0
-        lanes[BASE + j] = 0.0
-        lanes[END + j] = end
-        lanes[FALLEN_B + j] = 0.0
-        lanes[FALL + j] = lanes[ON + j] * leak
-        lanes[FALL_DN + j] = lanes[ON + j] * photo_leak
-        lanes[S + j] = 0.0
-        lanes[LAG_S + j] = u0
-        lanes[LIGHT_S + j] = i0
-        lanes[FALLEN_S + j] = 0.0
-        lanes[AWAY_S + j] = x0 + u0 - lanes[REFERENCE + j]
-        lanes[STOP + j] = 1.0
-        lanes[KNOWN + j] = 0.0
-        lanes[LAG_P + j] = u1
-        lanes[LIGHT_P + j] = i1
-        lanes[FALLEN_P + j] = lanes[TAIL + j]
-        lanes[AWAY_P + j] = x0 + dx + u1 + lanes[TAIL + j] - lanes[REFERENCE + j]
+        lanes[rows.X0 + j] = x0
+        lanes[rows.DX + j] = dx
+        lanes[rows.LOG + j] = 1.0 if on_log else 0.0
+        lanes[rows.BASE + j] = 0.0
+        lanes[rows.END + j] = end
+        lanes[rows.FALLEN_B + j] = 0.0
+        lanes[rows.FALL + j] = lanes[rows.ON + j] * leak
+        lanes[rows.FALL_DN + j] = lanes[rows.ON + j] * photo_leak
+        lanes[rows.S + j] = 0.0
+        lanes[rows.LAG_S + j] = u0
+        lanes[rows.LIGHT_S + j] = i0
+        lanes[rows.FALLEN_S + j] = 0.0
+        lanes[rows.AWAY_S + j] = x0 + u0 - lanes[rows.REFERENCE + j]
+        lanes[rows.STOP + j] = 1.0
+        lanes[rows.KNOWN + j] = 0.0
+        lanes[rows.LAG_P + j] = u1
+        lanes[rows.LIGHT_P + j] = i1
+        lanes[rows.FALLEN_P + j] = lanes[rows.TAIL + j]
+        lanes[rows.AWAY_P + j] = x0 + dx + u1 + lanes[rows.TAIL + j] - lanes[rows.REFERENCE + j]
         seeks, place = first_place(j, ta, length, lanes)
-        seeks = OPEN if in_pieces else seeks
+        seeks = rows.OPEN if in_pieces else seeks
         place = end if in_pieces else place
-        lanes[SEEKS + j] = seeks
-        lanes[PLACE + j] = place
-        lanes[FRESH + j] = 0.0
-        lanes[MOVES + j] = 0.0
+        lanes[rows.SEEKS + j] = seeks
+        lanes[rows.PLACE + j] = place
+        lanes[rows.FRESH + j] = 0.0
+        lanes[rows.MOVES + j] = 0.0
     if circuit.leak_jitter > 0.0:
         for j in range(m):
             factor = state[S_LEAK_FACTOR, lo + pixels[j]]
-            lanes[FALL + j] *= factor
-            lanes[FALL_DN + j] *= factor
+            lanes[rows.FALL + j] *= factor
+            lanes[rows.FALL_DN + j] *= factor
 
 
 @kernel
-def _finish(j, lo, start, state, rows, pixels, lanes):
+def _finish(j, lo, start, state, strip, pixels, lanes):
     """Write back the state of a lane at the end of its interval."""
     k = pixels[j]
-    reference = lanes[REFERENCE + j] - lanes[TAIL + j]
-    hold = lanes[HOLD + j]
+    reference = lanes[rows.REFERENCE + j] - lanes[rows.TAIL + j]
+    hold = lanes[rows.HOLD + j]
     state[S_REFERENCE, lo + k] = reference
     state[S_HOLD, lo + k] = hold
-    rows[AWAY_1 + k] = lanes[X0 + j] + lanes[DX + j] - reference
-    rows[LAG_1 + k] = lanes[U1 + j]  # the screen does not know it where there are pieces
+    strip[screen.AWAY_1 + k] = lanes[rows.X0 + j] + lanes[rows.DX + j] - reference
+    strip[screen.LAG_1 + k] = lanes[
+        rows.U1 + j
+    ]  # the screen does not know it where there are pieces
     held = hold >= 0.0
-    rows[SCREEN_ON + k] = NEVER if held else lanes[ON + j] - MARGIN
-    rows[SCREEN_OFF + k] = NEVER if held else lanes[OFF + j] - MARGIN
-    due = hold if held else lanes[NOISE + j]
-    rows[DUE + k] = min(due - start, NEVER) * EARLY
+    strip[screen.ON + k] = screen.NEVER if held else lanes[rows.ON + j] - screen.MARGIN
+    strip[screen.OFF + k] = screen.NEVER if held else lanes[rows.OFF + j] - screen.MARGIN
+    due = hold if held else lanes[rows.NOISE + j]
+    strip[screen.DUE + k] = min(due - start, screen.NEVER) * EARLY
 
 
 @kernel
-def sort_out(lo, m, start, state, rows, pixels, lanes):
+def sort_out(lo, m, start, state, strip, pixels, lanes):
     """Take out the lanes that are done; returns how many stay."""
     leaving, staying = 0, 0
     for j in range(m):
-        if lanes[SEEKS + j] == DONE:
-            _finish(j, lo, start, state, rows, pixels, lanes)
+        if lanes[rows.SEEKS + j] == rows.DONE:
+            _finish(j, lo, start, state, strip, pixels, lanes)
             lanes[_LEAVING + leaving] = j
             leaving += 1
         else:

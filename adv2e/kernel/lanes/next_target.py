@@ -9,41 +9,7 @@ from __future__ import annotations
 
 from adv2e.compiled import kernel
 from adv2e.kernel.comparator import TIE
-from adv2e.kernel.lanes.layout import (
-    AWAY_P,
-    AWAY_S,
-    DONE,
-    DOUBTFUL,
-    DX,
-    END,
-    F_HI,
-    F_LO,
-    FALL,
-    FALL_DN,
-    FRESH,
-    G_HI,
-    G_LO,
-    GOAL,
-    KNOWN,
-    LAG_P,
-    LAG_S,
-    LIGHT_P,
-    LIGHT_S,
-    MOVES,
-    NOISE,
-    OFF,
-    ON,
-    READY,
-    REFERENCE,
-    ROOT,
-    SEEK_OFF,
-    SEEK_ON,
-    SEEKS,
-    STOP,
-    TRIED,
-    X0,
-    S,
-)
+from adv2e.kernel.lanes import rows
 
 
 @kernel
@@ -85,43 +51,43 @@ def plan(count, ta, length, circuit, lanes):
     """Choose the threshold that comes first for the lanes that are ready, or tell the doubtful."""
     dark, per_dn = circuit.dark * length, circuit.per_dn * length
     for j in range(count):
-        seeks = lanes[SEEKS + j]
-        ready = seeks == READY
-        on, off = lanes[ON + j] + TIE, lanes[OFF + j] + TIE
-        away_s, away_p = lanes[AWAY_S + j], lanes[AWAY_P + j]
-        lag_s, lag_p = lanes[LAG_S + j], lanes[LAG_P + j]
-        span = lanes[STOP + j] - lanes[S + j]
-        light_s, light_p = lanes[LIGHT_S + j], lanes[LIGHT_P + j]
-        fall, fall_dn = lanes[FALL + j], lanes[FALL_DN + j]
+        seeks = lanes[rows.SEEKS + j]
+        ready = seeks == rows.READY
+        on, off = lanes[rows.ON + j] + TIE, lanes[rows.OFF + j] + TIE
+        away_s, away_p = lanes[rows.AWAY_S + j], lanes[rows.AWAY_P + j]
+        lag_s, lag_p = lanes[rows.LAG_S + j], lanes[rows.LAG_P + j]
+        span = lanes[rows.STOP + j] - lanes[rows.S + j]
+        light_s, light_p = lanes[rows.LIGHT_S + j], lanes[rows.LIGHT_P + j]
+        fall, fall_dn = lanes[rows.FALL + j], lanes[rows.FALL_DN + j]
         rate_s, rate_p = dark + per_dn * light_s, dark + per_dn * light_p
-        dx = lanes[DX + j]
+        dx = lanes[rows.DX + j]
         leak = 1.01 * (fall + fall_dn * max(light_s, light_p))
         sure = sure_of_leak(away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, on, off)
         doubtful = (
             (lag_s * lag_p < 0.0)
-            | (lanes[NOISE + j] < ta + lanes[END + j] * length)
-            | (lanes[KNOWN + j] > 0.5)
+            | (lanes[rows.NOISE + j] < ta + lanes[rows.END + j] * length)
+            | (lanes[rows.KNOWN + j] > 0.5)
             | (away_s >= on)
             | (away_s <= -off)
             | ((leak > 0.0) & (lag_s + lag_p > 0.0) & (not sure))
         )
-        what = SEEK_ON if away_p >= on else (SEEK_OFF if away_p <= -off else DONE)
-        what = DOUBTFUL if doubtful else what
+        what = rows.SEEK_ON if away_p >= on else (rows.SEEK_OFF if away_p <= -off else rows.DONE)
+        what = rows.DOUBTFUL if doubtful else what
         what = what if ready else seeks
-        lanes[SEEKS + j] = what
-        crosses = ready & ((what == SEEK_ON) | (what == SEEK_OFF))
+        lanes[rows.SEEKS + j] = what
+        crosses = ready & ((what == rows.SEEK_ON) | (what == rows.SEEK_OFF))
         level = on if away_p >= on else -off
-        goal = lanes[REFERENCE + j] - lanes[X0 + j] + level
-        lanes[GOAL + j] = goal if crosses else lanes[GOAL + j]
+        goal = lanes[rows.REFERENCE + j] - lanes[rows.X0 + j] + level
+        lanes[rows.GOAL + j] = goal if crosses else lanes[rows.GOAL + j]
         f_lo = away_s - level
-        lanes[F_LO + j] = f_lo if crosses else lanes[F_LO + j]
+        lanes[rows.F_LO + j] = f_lo if crosses else lanes[rows.F_LO + j]
         f_hi = away_p - level
-        lanes[F_HI + j] = f_hi if crosses else lanes[F_HI + j]
+        lanes[rows.F_HI + j] = f_hi if crosses else lanes[rows.F_HI + j]
         g_lo = fall + fall_dn * light_s - rate_s * lag_s
-        lanes[G_LO + j] = g_lo if crosses else lanes[G_LO + j]
+        lanes[rows.G_LO + j] = g_lo if crosses else lanes[rows.G_LO + j]
         g_hi = fall + fall_dn * light_p - rate_p * lag_p
-        lanes[G_HI + j] = g_hi if crosses else lanes[G_HI + j]
-        lanes[ROOT + j] = 1.0 if crosses else lanes[ROOT + j]
-        lanes[FRESH + j] = 1.0 if crosses else lanes[FRESH + j]
-        lanes[MOVES + j] = 1.0 if crosses else lanes[MOVES + j]
-        lanes[TRIED + j] = 0.0 if crosses else lanes[TRIED + j]
+        lanes[rows.G_HI + j] = g_hi if crosses else lanes[rows.G_HI + j]
+        lanes[rows.ROOT + j] = 1.0 if crosses else lanes[rows.ROOT + j]
+        lanes[rows.FRESH + j] = 1.0 if crosses else lanes[rows.FRESH + j]
+        lanes[rows.MOVES + j] = 1.0 if crosses else lanes[rows.MOVES + j]
+        lanes[rows.TRIED + j] = 0.0 if crosses else lanes[rows.TRIED + j]

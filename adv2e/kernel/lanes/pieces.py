@@ -10,49 +10,8 @@ each piece is a place like those that lanes look for, before the piece is gone t
 from __future__ import annotations
 
 from adv2e.compiled import kernel
-from adv2e.kernel import special
-from adv2e.kernel.lanes.layout import (
-    AWAY_P,
-    AWAY_S,
-    BASE,
-    DONE,
-    DX,
-    END,
-    FALL,
-    FALL_DN,
-    FALLEN_B,
-    FALLEN_P,
-    FALLEN_S,
-    FRESH,
-    HOLD,
-    I0,
-    I1,
-    INJECTED,
-    KNOWN,
-    LAG_E,
-    LAG_P,
-    LAG_S,
-    LIGHT_E,
-    LIGHT_P,
-    LIGHT_S,
-    LOG,
-    MOVES,
-    NOISE,
-    OPEN,
-    PLACE,
-    READY,
-    REFERENCE,
-    RELEASE,
-    SEEKS,
-    STOP,
-    SUM_E,
-    TAIL,
-    U0,
-    U1,
-    X0,
-    S,
-)
-from adv2e.kernel.screen import AT_REST, LARGEST_LIGHT, LARGEST_STEP
+from adv2e.kernel import screen, special
+from adv2e.kernel.lanes import rows
 
 BEFORE_END = 1.0 - 2.0**-53
 """The last place before 1."""
@@ -63,19 +22,19 @@ _PIECE = 0.95  # longest piece of a step over LARGEST_STEP [ln units]
 @kernel
 def set_stop(j, place, lag, light, fallen, lanes):
     """Set the next known place, and the signal there."""
-    lanes[STOP + j] = place
-    lanes[LAG_P + j] = lag
-    lanes[LIGHT_P + j] = light
-    lanes[FALLEN_P + j] = fallen
-    x = lanes[X0 + j] + lanes[DX + j] * place
-    lanes[AWAY_P + j] = x + lag + fallen - lanes[REFERENCE + j]
+    lanes[rows.STOP + j] = place
+    lanes[rows.LAG_P + j] = lag
+    lanes[rows.LIGHT_P + j] = light
+    lanes[rows.FALLEN_P + j] = fallen
+    x = lanes[rows.X0 + j] + lanes[rows.DX + j] * place
+    lanes[rows.AWAY_P + j] = x + lag + fallen - lanes[rows.REFERENCE + j]
 
 
 @kernel
 def fallen_at_place(j, lanes):
     """Fall of the reference until the place that was looked at."""
-    since = lanes[FALL + j] * (lanes[PLACE + j] - lanes[BASE + j])
-    return lanes[FALLEN_B + j] + since + lanes[FALL_DN + j] * lanes[SUM_E + j]
+    since = lanes[rows.FALL + j] * (lanes[rows.PLACE + j] - lanes[rows.BASE + j])
+    return lanes[rows.FALLEN_B + j] + since + lanes[rows.FALL_DN + j] * lanes[rows.SUM_E + j]
 
 
 @kernel
@@ -91,8 +50,10 @@ def end_of_piece(base, x0, dx, knee, mixed, brightest):
     end = at_knee if ahead else 1.0
     step = abs(dx)
     longest = _PIECE / (step if step > _PIECE else 1.0)
-    end = base + longest if step * (end - base) > LARGEST_STEP else end
-    longest = LARGEST_LIGHT / (brightest if brightest > LARGEST_LIGHT else LARGEST_LIGHT)
+    end = base + longest if step * (end - base) > screen.LARGEST_STEP else end
+    longest = screen.LARGEST_LIGHT / (
+        brightest if brightest > screen.LARGEST_LIGHT else screen.LARGEST_LIGHT
+    )
     end = base + longest if end - base > longest else end
     return end, x0 + dx * 0.5 * (base + end) >= knee
 
@@ -100,14 +61,14 @@ def end_of_piece(base, x0, dx, knee, mixed, brightest):
 @kernel
 def first_place(j, ta, length, lanes):
     """Return what a lane at the start of its piece looks for first, and where."""
-    base, end = lanes[BASE + j], lanes[END + j]
-    hold = lanes[HOLD + j]
+    base, end = lanes[rows.BASE + j], lanes[rows.END + j]
+    hold = lanes[rows.HOLD + j]
     held = hold >= 0.0
     release = (hold - ta) / length
-    injected = (lanes[NOISE + j] - ta) / length
-    seeks = INJECTED if injected < end else READY
-    seeks = RELEASE if held else seeks
-    seeks = DONE if held & (release >= end) else seeks
+    injected = (lanes[rows.NOISE + j] - ta) / length
+    seeks = rows.INJECTED if injected < end else rows.READY
+    seeks = rows.RELEASE if held else seeks
+    seeks = rows.DONE if held & (release >= end) else seeks
     place = release if held else min(injected, end * BEFORE_END)
     return seeks, place if place > base else base
 
@@ -115,42 +76,42 @@ def first_place(j, ta, length, lanes):
 @kernel
 def open_piece(j, ta, length, lanes):
     """Begin a piece, the signal at whose end was looked at."""
-    lag = lanes[LAG_E + j]
-    lag = lag if abs(lag) > AT_REST else 0.0
+    lag = lanes[rows.LAG_E + j]
+    lag = lag if abs(lag) > screen.AT_REST else 0.0
     fallen = fallen_at_place(j, lanes)
-    lanes[U1 + j] = lag
-    lanes[I1 + j] = lanes[LIGHT_E + j]
-    lanes[TAIL + j] = fallen
-    set_stop(j, lanes[END + j], lag, lanes[LIGHT_E + j], fallen, lanes)
-    lanes[KNOWN + j] = 0.0
+    lanes[rows.U1 + j] = lag
+    lanes[rows.I1 + j] = lanes[rows.LIGHT_E + j]
+    lanes[rows.TAIL + j] = fallen
+    set_stop(j, lanes[rows.END + j], lag, lanes[rows.LIGHT_E + j], fallen, lanes)
+    lanes[rows.KNOWN + j] = 0.0
     seeks, place = first_place(j, ta, length, lanes)
-    lanes[SEEKS + j] = seeks
-    lanes[PLACE + j] = place
+    lanes[rows.SEEKS + j] = seeks
+    lanes[rows.PLACE + j] = place
 
 
 @kernel
 def next_piece(j, circuit, lanes):
     """Move a lane that is done with a piece on to the next one, to look at its end."""
-    base, dx, x0 = lanes[END + j], lanes[DX + j], lanes[X0 + j]
-    lag, fallen = lanes[U1 + j], lanes[TAIL + j]
-    light = lanes[I1 + j]
+    base, dx, x0 = lanes[rows.END + j], lanes[rows.DX + j], lanes[rows.X0 + j]
+    lag, fallen = lanes[rows.U1 + j], lanes[rows.TAIL + j]
+    light = lanes[rows.I1 + j]
     x1 = x0 + dx
     mixed = (x0 < circuit.knee) != (x1 < circuit.knee)
     brightest = max(light, special.exp(x1) if x1 >= circuit.knee else 0.0)
     end, on_log = end_of_piece(base, x0, dx, circuit.knee, mixed, brightest)
-    lanes[LOG + j] = 1.0 if on_log or circuit.slope == 0.0 else 0.0
-    lanes[BASE + j] = base
-    lanes[END + j] = end
-    lanes[U0 + j] = lag
-    lanes[I0 + j] = light
-    lanes[FALLEN_B + j] = fallen
-    lanes[S + j] = base
-    lanes[LAG_S + j] = lag
-    lanes[LIGHT_S + j] = light
-    lanes[FALLEN_S + j] = fallen
-    lanes[AWAY_S + j] = x0 + dx * base + lag + fallen - lanes[REFERENCE + j]
-    lanes[KNOWN + j] = 0.0
-    lanes[SEEKS + j] = OPEN
-    lanes[PLACE + j] = end
-    lanes[FRESH + j] = 0.0
-    lanes[MOVES + j] = 0.0
+    lanes[rows.LOG + j] = 1.0 if on_log or circuit.slope == 0.0 else 0.0
+    lanes[rows.BASE + j] = base
+    lanes[rows.END + j] = end
+    lanes[rows.U0 + j] = lag
+    lanes[rows.I0 + j] = light
+    lanes[rows.FALLEN_B + j] = fallen
+    lanes[rows.S + j] = base
+    lanes[rows.LAG_S + j] = lag
+    lanes[rows.LIGHT_S + j] = light
+    lanes[rows.FALLEN_S + j] = fallen
+    lanes[rows.AWAY_S + j] = x0 + dx * base + lag + fallen - lanes[rows.REFERENCE + j]
+    lanes[rows.KNOWN + j] = 0.0
+    lanes[rows.SEEKS + j] = rows.OPEN
+    lanes[rows.PLACE + j] = end
+    lanes[rows.FRESH + j] = 0.0
+    lanes[rows.MOVES + j] = 0.0

@@ -18,38 +18,7 @@ from __future__ import annotations
 
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import special
-from adv2e.kernel.lanes.layout import (
-    A1,
-    BASE,
-    DX,
-    ERROR,
-    F_HI,
-    F_LO,
-    FALL,
-    FALL_DN,
-    FALLEN_B,
-    FRESH,
-    G_HI,
-    G_LO,
-    GOAL,
-    I0,
-    KAPPA,
-    LAG_E,
-    LAG_S,
-    LIGHT_E,
-    LIGHT_S,
-    LOG,
-    MOVES,
-    PLACE,
-    ROOT,
-    STOP,
-    SUM_E,
-    TOTAL,
-    U0,
-    UPTO,
-    S,
-    Z,
-)
+from adv2e.kernel.lanes import rows
 from adv2e.kernel.quadrature import REACH
 
 
@@ -57,9 +26,9 @@ from adv2e.kernel.quadrature import REACH
 def guess(lanes, count):
     """First place: root of the cubic through both ends, by guarded Newton steps."""
     for k in range(count):
-        w = lanes[STOP + k] - lanes[S + k]
-        f0, f1 = lanes[F_LO + k], lanes[F_HI + k]
-        g0, g1 = lanes[G_LO + k] * w, lanes[G_HI + k] * w
+        w = lanes[rows.STOP + k] - lanes[rows.S + k]
+        f0, f1 = lanes[rows.F_LO + k], lanes[rows.F_HI + k]
+        g0, g1 = lanes[rows.G_LO + k] * w, lanes[rows.G_HI + k] * w
         c2 = 3.0 * (f1 - f0) - 2.0 * g0 - g1
         c3 = g0 + g1 - 2.0 * (f1 - f0)
         t = f0 / (f0 - f1 if f0 != f1 else 1.0)
@@ -68,8 +37,8 @@ def guess(lanes, count):
             dv = g0 + t * (2.0 * c2 + 3.0 * t * c3)
             q = t - v / (dv if dv != 0.0 else 1.0)
             t = q if (q > 0.0) & (q < 1.0) else t
-        fresh = lanes[FRESH + k] > 0.5
-        lanes[PLACE + k] = lanes[S + k] + w * t if fresh else lanes[PLACE + k]
+        fresh = lanes[rows.FRESH + k] > 0.5
+        lanes[rows.PLACE + k] = lanes[rows.S + k] + w * t if fresh else lanes[rows.PLACE + k]
 
 
 @inlined
@@ -97,18 +66,18 @@ def _exponent(light, span, d, z, on_log, dark, per_dn, slope):
 def _set_up(began, light_began, lanes, count, dark, per_dn, slope):
     """Light and its integral at each place, and the parameters of the quadrature."""
     for k in range(count):
-        span = lanes[PLACE + k] - lanes[began + k]
-        d = lanes[DX + k] * span
-        on_log = lanes[LOG + k] > 0.5
+        span = lanes[rows.PLACE + k] - lanes[began + k]
+        d = lanes[rows.DX + k] * span
+        on_log = lanes[rows.LOG + k] > 0.5
         light, mean, z = _light_after(lanes[light_began + k], d, on_log, slope)
-        lanes[LIGHT_E + k] = light
-        lanes[SUM_E + k] = span * mean
+        lanes[rows.LIGHT_E + k] = light
+        lanes[rows.SUM_E + k] = span * mean
         a1, kappa, z, v = _exponent(light, span, d, z, on_log, dark, per_dn, slope)
-        lanes[A1 + k] = a1
-        lanes[KAPPA + k] = kappa
-        lanes[Z + k] = z
-        lanes[UPTO + k] = v
-        lanes[TOTAL + k] = 0.0
+        lanes[rows.A1 + k] = a1
+        lanes[rows.KAPPA + k] = kappa
+        lanes[rows.Z + k] = z
+        lanes[rows.UPTO + k] = v
+        lanes[rows.TOTAL + k] = 0.0
 
 
 @kernel
@@ -116,8 +85,10 @@ def _node(lanes, count, node, weight):
     """Add one node of the quadrature."""
     square = node * node
     for k in range(count):
-        t = lanes[A1 + k] * node - lanes[KAPPA + k] * square * special.psi(lanes[Z + k] * node)
-        lanes[TOTAL + k] += weight * special.exp(-t)
+        t = lanes[rows.A1 + k] * node - lanes[rows.KAPPA + k] * square * special.psi(
+            lanes[rows.Z + k] * node
+        )
+        lanes[rows.TOTAL + k] += weight * special.exp(-t)
 
 
 @inlined
@@ -135,23 +106,33 @@ def _evaluate_from(
     for c in range(nodes.shape[0]):
         _node(lanes, count, nodes[c], weights[c])
     for k in range(count):
-        span = lanes[PLACE + k] - lanes[began + k]
-        t = dark * span + per_dn * lanes[SUM_E + k]
-        gone = lanes[DX + k] * span * lanes[UPTO + k] * lanes[TOTAL + k]
-        lanes[LAG_E + k] = special.exp(-t) * lanes[lag_began + k] - gone
+        span = lanes[rows.PLACE + k] - lanes[began + k]
+        t = dark * span + per_dn * lanes[rows.SUM_E + k]
+        gone = lanes[rows.DX + k] * span * lanes[rows.UPTO + k] * lanes[rows.TOTAL + k]
+        lanes[rows.LAG_E + k] = special.exp(-t) * lanes[lag_began + k] - gone
 
 
 @kernel
 def evaluate(lanes, count, length, circuit, rule):
     """From the start of the piece on."""
-    _evaluate_from(BASE, I0, U0, lanes, count, length, circuit, rule.nodes, rule.weights)
+    _evaluate_from(
+        rows.BASE, rows.I0, rows.U0, lanes, count, length, circuit, rule.nodes, rule.weights
+    )
 
 
 @kernel
 def evaluate_release(lanes, count, length, circuit, rule):
     """From the last known place on, which is at most a dead time before."""
     _evaluate_from(
-        S, LIGHT_S, LAG_S, lanes, count, length, circuit, rule.nodes_dead, rule.weights_dead
+        rows.S,
+        rows.LIGHT_S,
+        rows.LAG_S,
+        lanes,
+        count,
+        length,
+        circuit,
+        rule.nodes_dead,
+        rule.weights_dead,
     )
 
 
@@ -165,10 +146,10 @@ def refine(lanes, count, length, circuit):
     per_dn = circuit.per_dn * length
     slope = circuit.slope
     for k in range(count):
-        s = lanes[PLACE + k]
-        d = lanes[DX + k]
-        on_log = lanes[LOG + k] > 0.5
-        i0 = lanes[LIGHT_E + k]
+        s = lanes[rows.PLACE + k]
+        d = lanes[rows.DX + k]
+        on_log = lanes[rows.LOG + k] > 0.5
+        i0 = lanes[rows.LIGHT_E + k]
         i1 = d * i0 if on_log else slope * d
         e = d if on_log else 0.0
         i2 = i1 * e / 2.0
@@ -177,18 +158,22 @@ def refine(lanes, count, length, circuit):
         w0 = dark + per_dn * i0
         w1, w2, w3 = per_dn * i1, per_dn * i2, per_dn * i3
         w4, w5 = per_dn * i4, per_dn * i4 * e / 5.0
-        u0 = lanes[LAG_E + k]
+        u0 = lanes[rows.LAG_E + k]
         u1 = -w0 * u0 - d
         u2 = -(w0 * u1 + w1 * u0) / 2.0
         u3 = -(w0 * u2 + w1 * u1 + w2 * u0) / 3.0
         u4 = -(w0 * u3 + w1 * u2 + w2 * u1 + w3 * u0) / 4.0
         u5 = -(w0 * u4 + w1 * u3 + w2 * u2 + w3 * u1 + w4 * u0) / 5.0
         u6 = -(w0 * u5 + w1 * u4 + w2 * u3 + w3 * u2 + w4 * u1 + w5 * u0) / 6.0
-        root = lanes[ROOT + k]
-        fall = root * lanes[FALL + k]
-        q = root * lanes[FALL_DN + k]
-        fallen = root * lanes[FALLEN_B + k] + fall * (s - lanes[BASE + k]) + q * lanes[SUM_E + k]
-        f0 = root * d * s + u0 + fallen - lanes[GOAL + k]
+        root = lanes[rows.ROOT + k]
+        fall = root * lanes[rows.FALL + k]
+        q = root * lanes[rows.FALL_DN + k]
+        fallen = (
+            root * lanes[rows.FALLEN_B + k]
+            + fall * (s - lanes[rows.BASE + k])
+            + q * lanes[rows.SUM_E + k]
+        )
+        f0 = root * d * s + u0 + fallen - lanes[rows.GOAL + k]
         f1 = root * d + u1 + fall + q * i0
         f2 = u2 + q * i1 / 2.0
         f3 = u3 + q * i2 / 3.0
@@ -205,13 +190,13 @@ def refine(lanes, count, length, circuit):
             dv = dv if dv != 0.0 else 1.0
             last = v / dv
             t = t - last
-        t = t if lanes[MOVES + k] > 0.5 else 0.0
+        t = t if lanes[rows.MOVES + k] > 0.5 else 0.0
         place = s + t
-        lo, hi = lanes[S + k], lanes[STOP + k]
+        lo, hi = lanes[rows.S + k], lanes[rows.STOP + k]
         # the end values are single precision: a root beyond them by that is a root at the end, if
         # the slope there is not that of a second one close by
         inside = (place >= lo - 1e-6) & (place <= hi + 1e-6)
-        inside &= (dv > 0.0) == (lanes[F_HI + k] > lanes[F_LO + k])
+        inside &= (dv > 0.0) == (lanes[rows.F_HI + k] > lanes[rows.F_LO + k])
         place = place if place > lo else lo
         place = place if place < hi else hi
         reach = (w0 * (1.0 + abs(t * e)) + abs(d)) * abs(t)
@@ -219,8 +204,8 @@ def refine(lanes, count, length, circuit):
         remainder = (abs(u0) + abs(d)) * r2 * r2 * r2 * reach / 5040.0 / abs(dv)
         # close to a turn the steps only halve what is left: the next one tells how much
         left = (remainder + last * last * (abs(f2) + abs(f3)) / abs(dv)) * length
-        lanes[ERROR + k] = left if inside & (reach < 0.8) else 1e30
-        moves = (lanes[MOVES + k] > 0.5) & (abs(t) < 10.0)
-        lanes[PLACE + k] = place if moves else s
-        lanes[SUM_E + k] += t * (i0 + t * (i1 / 2.0 + t * (i2 / 3.0 + t * i3 / 4.0)))
-        lanes[LIGHT_E + k] = i0 + t * (i1 + t * (i2 + t * (i3 + t * i4)))
+        lanes[rows.ERROR + k] = left if inside & (reach < 0.8) else 1e30
+        moves = (lanes[rows.MOVES + k] > 0.5) & (abs(t) < 10.0)
+        lanes[rows.PLACE + k] = place if moves else s
+        lanes[rows.SUM_E + k] += t * (i0 + t * (i1 / 2.0 + t * (i2 / 3.0 + t * i3 / 4.0)))
+        lanes[rows.LIGHT_E + k] = i0 + t * (i1 + t * (i2 + t * (i3 + t * i4)))

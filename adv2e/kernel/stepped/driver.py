@@ -21,33 +21,7 @@ from adv2e.effects.pixel.photoreceptor_noise import fill_normals
 from adv2e.effects.pixel.slew_limit import keep_first, limit_slew
 from adv2e.kernel import screen
 from adv2e.kernel.event_buffer import tell_where, with_room
-from adv2e.kernel.stepped import events, signal
-from adv2e.kernel.stepped.rows import (
-    ADDED,
-    AHEAD,
-    BASE,
-    DRIVEN1,
-    DUE,
-    FIRST,
-    INPUT1,
-    LEAK_ON,
-    MOVE,
-    NEVER,
-    NOISE,
-    NORMAL,
-    OFF,
-    OFF_STEP,
-    ON,
-    ON_STEP,
-    PIECE,
-    REFERENCE,
-    SECOND,
-    SIGNAL1,
-    STEP,
-    WIDTH,
-    XA,
-    XB,
-)
+from adv2e.kernel.stepped import events, rows, signal
 from adv2e.kernel.tile import load
 from adv2e.kernel.work_queue import claim
 from adv2e.kernel.workspace import (
@@ -89,45 +63,47 @@ class Run(NamedTuple):
 
 
 @kernel
-def _open(lo, count, n, circuit, run, injected, state, rows):
+def _open(lo, count, n, circuit, run, injected, state, strip):
     """Rows of a strip at the start of a run."""
     noisy, jitter = circuit.noise_rms > 0.0, circuit.leak_jitter > 0.0
     for k in range(n):
-        rows[ON + k] = NEVER
-        rows[OFF + k] = NEVER
-        rows[ON_STEP + k] = NEVER
-        rows[OFF_STEP + k] = NEVER
-        rows[DUE + k] = NEVER
-        rows[ADDED + k] = 0.0
+        strip[rows.ON + k] = rows.NEVER
+        strip[rows.OFF + k] = rows.NEVER
+        strip[rows.ON_STEP + k] = rows.NEVER
+        strip[rows.OFF_STEP + k] = rows.NEVER
+        strip[rows.DUE + k] = rows.NEVER
+        strip[rows.ADDED + k] = 0.0
     for k in range(count):
         i = lo + k
-        rows[FIRST + k] = state[S_FIRST, i]
-        rows[INPUT1 + k] = state[S_FIRST, i]
+        strip[rows.FIRST + k] = state[S_FIRST, i]
+        strip[rows.INPUT1 + k] = state[S_FIRST, i]
         if noisy:
-            rows[NOISE + k] = state[S_NOISE, i]
-            rows[INPUT1 + k] += state[S_NOISE, i]
-        rows[SECOND + k] = state[S_SECOND, i]
-        rows[SIGNAL1 + k] = rows[SECOND + k] if circuit.follower > 0.0 else rows[INPUT1 + k]
-        rows[REFERENCE + k] = state[S_REFERENCE, i]
-        rows[LEAK_ON + k] = state[S_ON, i] * (state[S_LEAK_FACTOR, i] if jitter else 1.0)
-        events.watch(k, i, circuit, injected, state, rows)
+            strip[rows.NOISE + k] = state[S_NOISE, i]
+            strip[rows.INPUT1 + k] += state[S_NOISE, i]
+        strip[rows.SECOND + k] = state[S_SECOND, i]
+        strip[rows.SIGNAL1 + k] = (
+            strip[rows.SECOND + k] if circuit.follower > 0.0 else strip[rows.INPUT1 + k]
+        )
+        strip[rows.REFERENCE + k] = state[S_REFERENCE, i]
+        strip[rows.LEAK_ON + k] = state[S_ON, i] * (state[S_LEAK_FACTOR, i] if jitter else 1.0)
+        events.watch(k, i, circuit, injected, state, strip)
     if run.signal.shape[0] > 0:
-        signal.add_course(n, lo, count, run.signal, 0, ADDED, rows)
+        signal.add_course(n, lo, count, run.signal, 0, rows.ADDED, strip)
         for k in range(n):
-            rows[SIGNAL1 + k] += rows[ADDED + k]
+            strip[rows.SIGNAL1 + k] += strip[rows.ADDED + k]
 
 
 @kernel
-def _close(lo, count, draw, circuit, state, rows):
+def _close(lo, count, draw, circuit, state, strip):
     """State of a strip at the end of a run."""
     for k in range(count):
         i = lo + k
-        state[S_X, i] = rows[XB + k]
-        state[S_FIRST, i] = rows[FIRST + k]
-        state[S_SECOND, i] = rows[SECOND + k]
-        state[S_REFERENCE, i] = rows[REFERENCE + k]
+        state[S_X, i] = strip[rows.XB + k]
+        state[S_FIRST, i] = strip[rows.FIRST + k]
+        state[S_SECOND, i] = strip[rows.SECOND + k]
+        state[S_REFERENCE, i] = strip[rows.REFERENCE + k]
         if circuit.noise_rms > 0.0:
-            state[S_NOISE, i] = rows[NOISE + k]
+            state[S_NOISE, i] = strip[rows.NOISE + k]
             state[S_NOISE_DRAW, i] = draw
 
 
@@ -136,79 +112,79 @@ def _load_x(frames, before, share, lo, count, circuit, scratch, row):
     """Log intensity of a strip, `share` of the way from frame `before` to the next."""
     load(frames, before, share, lo, count, 0.0, scratch.rows)
     light = scratch.rows[screen.LIGHT_1 : screen.LIGHT_1 + count]
-    signal.log_of_light(light, circuit, scratch.dense[row : row + count])
+    signal.log_of_light(light, circuit, scratch.stepped[row : row + count])
 
 
 @kernel
-def _take_samples(count, begins, is_last, next_is_last, rows):
+def _take_samples(count, begins, is_last, next_is_last, strip):
     """Continuity samples of an interval: base + step k/K, but for the first and the last.
 
     With the paper's last interval as printed, the samples of a last one start from its end, but
     for the one at which the recording begins, and the interval before leads there.
     """
     for k in range(count):
-        xa, xb, ahead = rows[XA + k], rows[XB + k], rows[AHEAD + k]
+        xa, xb, ahead = strip[rows.XA + k], strip[rows.XB + k], strip[rows.AHEAD + k]
         base = xb if is_last else xa
-        rows[XA + k] = base if not begins else xa
-        rows[BASE + k] = base
-        rows[STEP + k] = xb - xa
-        rows[AHEAD + k] = ahead if next_is_last else xb
+        strip[rows.XA + k] = base if not begins else xa
+        strip[rows.BASE + k] = base
+        strip[rows.STEP + k] = xb - xa
+        strip[rows.AHEAD + k] = ahead if next_is_last else xb
 
 
 @kernel
-def _take_piece(n, p, pieces, rows):
+def _take_piece(n, p, pieces, strip):
     """Rows PIECE and MOVE: from sample p to the next."""
     start, end = p / pieces, (p + 1) / pieces
     for k in range(n):
-        a = rows[BASE + k] + rows[STEP + k] * start
-        b = rows[BASE + k] + rows[STEP + k] * end
-        a = rows[XA + k] if p == 0 else a
-        b = rows[AHEAD + k] if p == pieces - 1 else b
-        rows[PIECE + k] = a
-        rows[MOVE + k] = b - a
+        a = strip[rows.BASE + k] + strip[rows.STEP + k] * start
+        b = strip[rows.BASE + k] + strip[rows.STEP + k] * end
+        a = strip[rows.XA + k] if p == 0 else a
+        b = strip[rows.AHEAD + k] if p == pieces - 1 else b
+        strip[rows.PIECE + k] = a
+        strip[rows.MOVE + k] = b - a
 
 
 @kernel
-def _next_instant(n, rows):
+def _next_instant(n, strip):
     for k in range(n):
-        rows[XA + k] = rows[XB + k]
+        strip[rows.XA + k] = strip[rows.XB + k]
 
 
 @kernel
-def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, normals, rows):
+def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, normals, strip):
     """Signal of a strip over step m of a run, of h us, that ends at `share` of its piece."""
-    signal.advance_light(n, share, half, circuit, rows)
+    signal.advance_light(n, share, half, circuit, strip)
     if run.gain.shape[0] > 0:
-        signal.change_middle(lo, count, run.gain, m, rows)
-        signal.change_light(lo, count, run.gain, m + 1, circuit, rows)
+        signal.change_middle(lo, count, run.gain, m, strip)
+        signal.change_light(lo, count, run.gain, m + 1, circuit, strip)
     if run.drive.shape[0] > 0:
-        signal.add_course(n, lo, count, run.drive, m + 1, DRIVEN1, rows)
+        signal.add_course(n, lo, count, run.drive, m + 1, rows.DRIVEN1, strip)
     if circuit.slew > 0.0:
-        keep_first(n, rows)
+        keep_first(n, strip)
     if not circuit.filtered:
-        signal.no_pole(n, rows)
+        signal.no_pole(n, strip)
     elif circuit.update == EXACT:
-        signal.first_pole_exact(n, h, circuit, rows)
+        signal.first_pole_exact(n, h, circuit, strip)
     else:
-        signal.first_pole_stepped(n, h, circuit, rows)
+        signal.first_pole_stepped(n, h, circuit, strip)
     if circuit.slew > 0.0:
-        limit_slew(n, h, circuit, rows)
+        limit_slew(n, h, circuit, strip)
     if circuit.noise_rms > 0.0:
         if draw % 4 == 0 or m == 0:
             fill_normals(circuit.seed, lo, n, draw // 4, normals)
         lane = normals[draw % 4]
         for k in range(n):
-            rows[NORMAL + k] = lane[k]
-        signal.add_noise(n, circuit.noise_rms, rows)
+            strip[rows.NORMAL + k] = lane[k]
+        signal.add_noise(n, circuit.noise_rms, strip)
     else:
-        signal.no_noise(n, rows)
+        signal.no_noise(n, strip)
     if circuit.follower > 0.0:
-        signal.second_pole(n, circuit.follower * h, circuit.update, rows)
-        signal.take_signal(n, SECOND, rows)
+        signal.second_pole(n, circuit.follower * h, circuit.update, strip)
+        signal.take_signal(n, rows.SECOND, strip)
     else:
-        signal.take_signal(n, INPUT1, rows)
+        signal.take_signal(n, rows.INPUT1, strip)
     if run.signal.shape[0] > 0:
-        signal.add_to_signal(n, lo, count, run.signal, m + 1, rows)
+        signal.add_to_signal(n, lo, count, run.signal, m + 1, strip)
 
 
 @kernel
@@ -220,18 +196,18 @@ def _level(course, m, i):
 
 
 @kernel
-def _screen_step(lo, count, n, m, end, h, circuit, run, rows):
+def _screen_step(lo, count, n, m, end, h, circuit, run, strip):
     """Return how many pixels may fire in step m of a run; marks them."""
     on, off = 1.0, 1.0
     if run.on.shape[1] > 1:
-        events.step_thresholds(count, lo, run.on, m + 1, ON, ON_STEP, rows)
+        events.step_thresholds(count, lo, run.on, m + 1, rows.ON, rows.ON_STEP, strip)
     elif run.on.shape[0] > 0:
         on = min(run.on[m, 0], run.on[m + 1, 0])
     if run.off.shape[1] > 1:
-        events.step_thresholds(count, lo, run.off, m + 1, OFF, OFF_STEP, rows)
+        events.step_thresholds(count, lo, run.off, m + 1, rows.OFF, rows.OFF_STEP, strip)
     elif run.off.shape[0] > 0:
         off = min(run.off[m, 0], run.off[m + 1, 0])
-    return events.screen(n, end, circuit.leak * h, circuit.photo_leak * h, on, off, rows)
+    return events.screen(n, end, circuit.leak * h, circuit.photo_leak * h, on, off, strip)
 
 
 @kernel
@@ -239,8 +215,8 @@ def _fire_step(
     lo, n, m, ta, h, share, t_base, circuit, run, injected, state, scratch, keys, times, number
 ):  # fmt: skip
     """Fire the events of step m of a run, which begins at ta us."""
-    rows, pixels = scratch.dense, scratch.pixels
-    for c in range(events.gather(n, rows, pixels)):
+    strip, pixels = scratch.stepped, scratch.pixels
+    for c in range(events.gather(n, strip, pixels)):
         k = pixels[c]
         i = lo + k
         levels = (
@@ -252,7 +228,7 @@ def _fire_step(
             if number + _ROOM > keys.shape[0]:
                 keys, times = with_room(keys, times, number, number + _ROOM)
             number, whole = events.fire(
-                k, i, ta, h, levels, share, t_base, circuit, injected, state, rows, keys, times,
+                k, i, ta, h, levels, share, t_base, circuit, injected, state, strip, keys, times,
                 number,
             )  # fmt: skip
     return number, keys, times
@@ -264,53 +240,53 @@ def _strip(
     scratch, keys, times, number,
 ):  # fmt: skip
     """Advance one strip over a run."""
-    rows = scratch.dense
+    strip = scratch.stepped
     n = -(-count // 16) * 16
-    _open(lo, count, n, circuit, run, injected, state, rows)
+    _open(lo, count, n, circuit, run, injected, state, strip)
     draw = np.int64(0)
     if circuit.noise_rms > 0.0:
         draw = np.int64(state[S_NOISE_DRAW, lo])
-    _load_x(frames, before[run.first], share[run.first], lo, count, circuit, scratch, XA)
+    _load_x(frames, before[run.first], share[run.first], lo, count, circuit, scratch, rows.XA)
     m = np.int64(0)
     for f in range(run.first, run.last):
         length, steps = starts[f + 1] - starts[f], run.steps[f]
         total = run.pieces * steps
-        _load_x(frames, before[f + 1], share[f + 1], lo, count, circuit, scratch, XB)
+        _load_x(frames, before[f + 1], share[f + 1], lo, count, circuit, scratch, rows.XB)
         if last[f + 1]:
-            _load_x(frames, before[f + 2], share[f + 2], lo, count, circuit, scratch, AHEAD)
-        _take_samples(count, begins and f == 0, last[f], last[f + 1], rows)
+            _load_x(frames, before[f + 2], share[f + 2], lo, count, circuit, scratch, rows.AHEAD)
+        _take_samples(count, begins and f == 0, last[f], last[f + 1], strip)
         h, half = length / total, 0.5 / steps
         first = run.first_step if f == run.first else 0
         stop = run.last_step if f == run.last - 1 else total
         for j in range(first, stop):
             r = j % steps
             if r == 0 or j == first:
-                _take_piece(n, j // steps, run.pieces, rows)
+                _take_piece(n, j // steps, run.pieces, strip)
             if r % BLOCK == 0:
-                signal.begin_block(n, r / steps, half, circuit, rows)
+                signal.begin_block(n, r / steps, half, circuit, strip)
                 if run.gain.shape[0] > 0:
-                    signal.change_light(lo, count, run.gain, m, circuit, rows)
+                    signal.change_light(lo, count, run.gain, m, circuit, strip)
                 if run.drive.shape[0] > 0:
-                    signal.add_course(n, lo, count, run.drive, m, DRIVEN1, rows)
+                    signal.add_course(n, lo, count, run.drive, m, rows.DRIVEN1, strip)
             _make_step(
                 lo, count, n, m, h, (r + 1) / steps, half, draw, circuit, run, scratch.normals,
-                rows,
+                strip,
             )  # fmt: skip
             ta = starts[f] + length * (j / total)
             draw += 1
-            if _screen_step(lo, count, n, m, ta + h, h, circuit, run, rows) > 0:
+            if _screen_step(lo, count, n, m, ta + h, h, circuit, run, strip) > 0:
                 number, keys, times = _fire_step(
                     lo, n, m, ta, h, 2.0 * half, t_base, circuit, run, injected, state, scratch,
                     keys, times, number,
                 )  # fmt: skip
             m += 1
-        _next_instant(n, rows)
-    _close(lo, count, draw, circuit, state, rows)
+        _next_instant(n, strip)
+    _close(lo, count, draw, circuit, state, strip)
     return number, keys, times
 
 
 @entry
-def run_dense(
+def run_stepped(
     claimed, most, frames, before, share, starts, begins, last, circuit, run, injected, t_base,
     state, scratch, keys, times, places,
 ):  # fmt: skip
@@ -323,8 +299,8 @@ def run_dense(
         lo, hi = claim(claimed, state.shape[1])
         if lo == hi:
             break
-        for s in range(lo, hi, WIDTH):
-            count = min(WIDTH, hi - s)
+        for s in range(lo, hi, rows.WIDTH):
+            count = min(rows.WIDTH, hi - s)
             number, keys, times = _strip(
                 s, count, frames, before, share, starts, begins, last, circuit, run, injected,
                 t_base, state, scratch, keys, times, number,

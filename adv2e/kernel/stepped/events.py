@@ -23,27 +23,7 @@ from adv2e.kernel.comparator import (
     next_injected,
     use_up,
 )
-from adv2e.kernel.stepped.rows import (
-    DUE,
-    FROM,
-    HIT,
-    LEAK_ON,
-    LIGHT0,
-    LIGHT1,
-    LIGHTM,
-    MOVE,
-    NEVER,
-    OFF,
-    OFF_STEP,
-    ON,
-    ON_STEP,
-    REFERENCE,
-    SIGNAL0,
-    SIGNAL1,
-    SLOPE0,
-    SLOPE1,
-    X1,
-)
+from adv2e.kernel.stepped import rows
 from adv2e.kernel.workspace import (
     EXACT,
     S_BEYOND,
@@ -86,38 +66,38 @@ def injected_of(
 
 
 @kernel
-def watch(k, i, circuit, injected, state, rows):
+def watch(k, i, circuit, injected, state, strip):
     """Rows of the screen for pixel k of a strip, i of the state."""
     hold = state[S_HOLD, i]
     if hold >= 0.0:
-        on, off, due = NEVER, NEVER, hold
+        on, off, due = rows.NEVER, rows.NEVER, hold
     else:
-        on, off, due = state[S_ON, i], state[S_OFF, i], NEVER
+        on, off, due = state[S_ON, i], state[S_OFF, i], rows.NEVER
         if circuit.shot_rate > 0.0:
             due = min(due, state[S_SHOT_TIME, i])
         if circuit.hot_rate > 0.0:
             due = min(due, state[S_HOT_TIME, i])
         if injected.next.shape[0] > 0 and injected.next[i] < injected.stop[i]:
             due = min(due, injected.times[injected.next[i]])
-    rows[ON + k] = on
-    rows[OFF + k] = off
-    rows[ON_STEP + k] = on
-    rows[OFF_STEP + k] = off
-    rows[DUE + k] = due
-    rows[FROM + k] = 0.0
+    strip[rows.ON + k] = on
+    strip[rows.OFF + k] = off
+    strip[rows.ON_STEP + k] = on
+    strip[rows.OFF_STEP + k] = off
+    strip[rows.DUE + k] = due
+    strip[rows.FROM + k] = 0.0
 
 
 @kernel
-def step_thresholds(count, lo, course, m, row, step_row, rows):
+def step_thresholds(count, lo, course, m, row, step_row, strip):
     """Least threshold of each pixel over the step that instant m of a course ends."""
     before, after = course[m - 1, lo : lo + count], course[m, lo : lo + count]
     for k in range(count):
         least = before[k] if before[k] < after[k] else after[k]
-        rows[step_row + k] = rows[row + k] * least
+        strip[step_row + k] = strip[row + k] * least
 
 
 @kernel
-def screen(n, end, leak, photo, on, off, rows):
+def screen(n, end, leak, photo, on, off, strip):
     """Row HIT: who may fire before `end` [us]; REFERENCE: at the end of the step.
 
     leak, photo: leak events over the step, constant part and a DN; on, off: factors on the rows of
@@ -125,32 +105,32 @@ def screen(n, end, leak, photo, on, off, rows):
     """
     hits = np.int64(0)
     for k in range(n):
-        weight = rows[LEAK_ON + k]
-        i0, im, i1 = rows[LIGHT0 + k], rows[LIGHTM + k], rows[LIGHT1 + k]
+        weight = strip[rows.LEAK_ON + k]
+        i0, im, i1 = strip[rows.LIGHT0 + k], strip[rows.LIGHTM + k], strip[rows.LIGHT1 + k]
         fall = weight * (leak + photo * ((i0 + 4.0 * im + i1) * _SIXTH))
-        reference = rows[REFERENCE + k]
-        d0, d3 = rows[SIGNAL0 + k] - reference, rows[SIGNAL1 + k] - reference + fall
-        d1 = d0 + (rows[SLOPE0 + k] + weight * (leak + photo * i0)) * _THIRD
-        d2 = d3 - (rows[SLOPE1 + k] + weight * (leak + photo * i1)) * _THIRD
+        reference = strip[rows.REFERENCE + k]
+        d0, d3 = strip[rows.SIGNAL0 + k] - reference, strip[rows.SIGNAL1 + k] - reference + fall
+        d1 = d0 + (strip[rows.SLOPE0 + k] + weight * (leak + photo * i0)) * _THIRD
+        d2 = d3 - (strip[rows.SLOPE1 + k] + weight * (leak + photo * i1)) * _THIRD
         high = d1 if d1 > d2 else d2
         high = high if high > d3 else d3
         low = d1 if d1 < d2 else d2
         low = low if low < d3 else d3
-        hit = (high >= rows[ON_STEP + k] * on) | (-low >= rows[OFF_STEP + k] * off)
-        hit |= rows[DUE + k] < end
-        rows[REFERENCE + k] = reference - fall
-        rows[HIT + k] = 1.0 if hit else 0.0
+        hit = (high >= strip[rows.ON_STEP + k] * on) | (-low >= strip[rows.OFF_STEP + k] * off)
+        hit |= strip[rows.DUE + k] < end
+        strip[rows.REFERENCE + k] = reference - fall
+        strip[rows.HIT + k] = 1.0 if hit else 0.0
         hits += np.int64(hit)
     return hits
 
 
 @kernel
-def gather(n, rows, pixels):
+def gather(n, strip, pixels):
     """Numbers of the pixels that may fire."""
     m = np.int64(0)
     for k in range(n):
         pixels[m] = k
-        m += np.int64(rows[HIT + k] != 0.0)
+        m += np.int64(strip[rows.HIT + k] != 0.0)
     return m
 
 
@@ -242,7 +222,7 @@ def _noise_polarity(i, kind, light, circuit, injected, state):
 
 @kernel
 def fire(
-    k, i, ta, h, levels, share, t_base, circuit, injected, state, rows, keys, times, n
+    k, i, ta, h, levels, share, t_base, circuit, injected, state, strip, keys, times, n
 ):  # fmt: skip
     """Fire the events of pixel k of a strip, i of the state, in the step [ta, ta + h] us.
 
@@ -252,18 +232,21 @@ def fire(
     """
     on0, on1, off0, off1 = levels
     tb = ta + h
-    s = rows[FROM + k]
+    s = strip[rows.FROM + k]
     on_level, off_level = state[S_ON, i], state[S_OFF, i]
     jitter = circuit.leak_jitter > 0.0
     factor = state[S_LEAK_FACTOR, i] if jitter else 1.0
     c0, c1, c2, c3 = _cubic(
-        rows[SIGNAL0 + k], rows[SIGNAL1 + k], rows[SLOPE0 + k], rows[SLOPE1 + k]
+        strip[rows.SIGNAL0 + k],
+        strip[rows.SIGNAL1 + k],
+        strip[rows.SLOPE0 + k],
+        strip[rows.SLOPE1 + k],
     )
-    i0, im, i1 = rows[LIGHT0 + k], rows[LIGHTM + k], rows[LIGHT1 + k]
+    i0, im, i1 = strip[rows.LIGHT0 + k], strip[rows.LIGHTM + k], strip[rows.LIGHT1 + k]
     leak, photo = on_level * circuit.leak * h, on_level * circuit.photo_leak * h
     fallen = leak + photo * ((i0 + 4.0 * im + i1) * _SIXTH)
     _, l1, l2, l3 = _cubic(0.0, fallen, leak + photo * i0, leak + photo * i1)
-    reference = rows[REFERENCE + k] + factor * fallen
+    reference = strip[rows.REFERENCE + k] + factor * fallen
     if state[S_HOLD, i] >= 0.0:
         s = max(s, (state[S_HOLD, i] - ta) / h)
         reference = _at(c0, c1, c2, c3, s) + factor * _at(0.0, l1, l2, l3, s)
@@ -291,7 +274,7 @@ def fire(
             s_event = s_end
             light = i0 + (i1 - i0) * s_end
             if circuit.update == EXACT:
-                x = rows[X1 + k] - rows[MOVE + k] * share * (1.0 - s_end)
+                x = strip[rows.X1 + k] - strip[rows.MOVE + k] * share * (1.0 - s_end)
                 light = _light_of(x, circuit)
             polarity = _noise_polarity(i, kind, light, circuit, injected, state)
             if polarity == 0:
@@ -319,10 +302,10 @@ def fire(
             reference += (factor - before) * _at(0.0, l1, l2, l3, s)
         else:
             reference = _at(c0, c1, c2, c3, s) + factor * _at(0.0, l1, l2, l3, s) + beyond
-    rows[REFERENCE + k] = reference - factor * fallen
-    rows[LEAK_ON + k] = factor * on_level
+    strip[rows.REFERENCE + k] = reference - factor * fallen
+    strip[rows.LEAK_ON + k] = factor * on_level
     if whole:
-        watch(k, i, circuit, injected, state, rows)
+        watch(k, i, circuit, injected, state, strip)
     else:
-        rows[FROM + k] = s
+        strip[rows.FROM + k] = s
     return n, whole

@@ -22,30 +22,7 @@ import numpy as np
 
 from adv2e.compiled import entry, inlined, kernel
 from adv2e.kernel import special
-from adv2e.kernel.stepped.rows import (
-    ADDED,
-    DECAY,
-    DRIVEN0,
-    DRIVEN1,
-    FIRST,
-    GROWN,
-    INPUT0,
-    INPUT1,
-    LIGHT0,
-    LIGHT1,
-    LIGHTM,
-    MOVE,
-    NOISE,
-    NORMAL,
-    PIECE,
-    RATIO,
-    SECOND,
-    SIGNAL0,
-    SIGNAL1,
-    SLOPE0,
-    SLOPE1,
-    X1,
-)
+from adv2e.kernel.stepped import rows
 from adv2e.kernel.workspace import EULER, EXACT, PAPER, ZERO_ORDER_HOLD
 
 _SIXTH = 1.0 / 6.0
@@ -69,84 +46,84 @@ def log_of_light(frame, circuit, x):
 
 
 @kernel
-def begin_block(n, share, half, circuit, rows):
+def begin_block(n, share, half, circuit, strip):
     """Rows of a piece from `share` of it on, in steps of two times `half` of it."""
     for k in range(n):
-        x = rows[PIECE + k] + rows[MOVE + k] * share
+        x = strip[rows.PIECE + k] + strip[rows.MOVE + k] * share
         grown = special.exp(x)
-        rows[GROWN + k] = grown
-        rows[RATIO + k] = special.exp(rows[MOVE + k] * half)
+        strip[rows.GROWN + k] = grown
+        strip[rows.RATIO + k] = special.exp(strip[rows.MOVE + k] * half)
         foot = x * circuit.slope
-        rows[LIGHT1 + k] = foot if x < circuit.knee else grown
-        rows[X1 + k] = x
-        rows[DRIVEN1 + k] = x
+        strip[rows.LIGHT1 + k] = foot if x < circuit.knee else grown
+        strip[rows.X1 + k] = x
+        strip[rows.DRIVEN1 + k] = x
 
 
 @kernel
-def advance_light(n, share, half, circuit, rows):
+def advance_light(n, share, half, circuit, strip):
     """Light, and log intensity at the end of a step that ends at `share` of the piece."""
     knee, slope = circuit.knee, circuit.slope
     for k in range(n):
-        x1 = rows[PIECE + k] + rows[MOVE + k] * share
-        xm = x1 - rows[MOVE + k] * half
-        ratio = rows[RATIO + k]
-        middle = rows[GROWN + k] * ratio
+        x1 = strip[rows.PIECE + k] + strip[rows.MOVE + k] * share
+        xm = x1 - strip[rows.MOVE + k] * half
+        ratio = strip[rows.RATIO + k]
+        middle = strip[rows.GROWN + k] * ratio
         end = middle * ratio
-        rows[GROWN + k] = end
+        strip[rows.GROWN + k] = end
         foot_m, foot_1 = xm * slope, x1 * slope
-        rows[LIGHT0 + k] = rows[LIGHT1 + k]
-        rows[LIGHTM + k] = foot_m if xm < knee else middle
-        rows[LIGHT1 + k] = foot_1 if x1 < knee else end
-        rows[X1 + k] = x1
-        rows[DRIVEN0 + k] = rows[DRIVEN1 + k]
-        rows[DRIVEN1 + k] = x1
+        strip[rows.LIGHT0 + k] = strip[rows.LIGHT1 + k]
+        strip[rows.LIGHTM + k] = foot_m if xm < knee else middle
+        strip[rows.LIGHT1 + k] = foot_1 if x1 < knee else end
+        strip[rows.X1 + k] = x1
+        strip[rows.DRIVEN0 + k] = strip[rows.DRIVEN1 + k]
+        strip[rows.DRIVEN1 + k] = x1
 
 
 @kernel
-def add_course(n, lo, count, course, m, row, rows):
+def add_course(n, lo, count, course, m, row, strip):
     """Add instant m of a course to a row."""
     if course.shape[1] == 1:
         value = course[m, 0]
         for k in range(n):
-            rows[row + k] += value
+            strip[row + k] += value
     else:
         values = course[m, lo : lo + count]
         for k in range(count):
-            rows[row + k] += values[k]
+            strip[row + k] += values[k]
 
 
 @kernel
-def change_light(lo, count, course, m, circuit, rows):
+def change_light(lo, count, course, m, circuit, strip):
     """Put the factors of instant m of a course on the light at the end of a step, and on its x."""
     knee_dn = math.exp(circuit.knee)
     wide = course.shape[1] > 1
     for k in range(count):
         factor = course[m, lo + k] if wide else course[m, 0]
-        light = rows[LIGHT1 + k]
+        light = strip[rows.LIGHT1 + k]
         changed = factor * light
-        rows[LIGHT1 + k] = changed
+        strip[rows.LIGHT1 + k] = changed
         if changed < knee_dn:
-            rows[DRIVEN1 + k] = changed / circuit.slope
+            strip[rows.DRIVEN1 + k] = changed / circuit.slope
         else:
-            rows[DRIVEN1 + k] = special.log(changed)
+            strip[rows.DRIVEN1 + k] = special.log(changed)
 
 
 @kernel
-def change_middle(lo, count, course, m, rows):
+def change_middle(lo, count, course, m, strip):
     """Put the factors half-way between instants m and m + 1 of a course on the light there."""
     wide = course.shape[1] > 1
     for k in range(count):
         i = lo + k if wide else 0
-        rows[LIGHTM + k] *= 0.5 * (course[m, i] + course[m + 1, i])
+        strip[rows.LIGHTM + k] *= 0.5 * (course[m, i] + course[m + 1, i])
 
 
 @kernel
-def first_pole_exact(n, h, circuit, rows):
+def first_pole_exact(n, h, circuit, strip):
     """Advance row FIRST by a step of h us; its slopes; and the pole's DECAY."""
     constant, per_dn = circuit.dark * h, circuit.per_dn * h
     for k in range(n):
-        i0, im, i1 = rows[LIGHT0 + k], rows[LIGHTM + k], rows[LIGHT1 + k]
-        x0, x1 = rows[DRIVEN0 + k], rows[DRIVEN1 + k]
+        i0, im, i1 = strip[rows.LIGHT0 + k], strip[rows.LIGHTM + k], strip[rows.LIGHT1 + k]
+        x0, x1 = strip[rows.DRIVEN0 + k], strip[rows.DRIVEN1 + k]
         a = constant + per_dn * ((i0 + 4.0 * im + i1) * _SIXTH)
         decay = special.exp(-a)
         q = (1.0 - decay) / (a + 1e-300)
@@ -154,81 +131,81 @@ def first_pole_exact(n, h, circuit, rows):
         change = per_dn * (i1 - i0)
         turn = 1.0 - change * (1.0 / 12.0)
         turn = turn if abs(change) < 1.0 else 1.0
-        u0 = rows[FIRST + k] - x0
+        u0 = strip[rows.FIRST + k] - x0
         u1 = decay * u0 - (x1 - x0) * q * turn
-        rows[FIRST + k] = x1 + u1
-        rows[SLOPE0 + k] = -(constant + per_dn * i0) * u0
-        rows[SLOPE1 + k] = -(constant + per_dn * i1) * u1
-        rows[DECAY + k] = decay
+        strip[rows.FIRST + k] = x1 + u1
+        strip[rows.SLOPE0 + k] = -(constant + per_dn * i0) * u0
+        strip[rows.SLOPE1 + k] = -(constant + per_dn * i1) * u1
+        strip[rows.DECAY + k] = decay
 
 
 @kernel
-def first_pole_stepped(n, h, circuit, rows):
+def first_pole_stepped(n, h, circuit, strip):
     """Advance row FIRST by one of the K steps of low_pass; its slope is the line's."""
     constant, per_dn, update = circuit.dark * h, circuit.per_dn * h, circuit.update
     for k in range(n):
-        a1 = constant + per_dn * rows[LIGHT1 + k]
-        a = 0.5 * (constant + per_dn * rows[LIGHT0 + k] + a1)
-        rows[LIGHTM + k] = 0.5 * (rows[LIGHT0 + k] + rows[LIGHT1 + k])
-        rows[SLOPE0 + k] = rows[FIRST + k]
-        rows[SLOPE1 + k] = a1
-        rows[DECAY + k] = a
+        a1 = constant + per_dn * strip[rows.LIGHT1 + k]
+        a = 0.5 * (constant + per_dn * strip[rows.LIGHT0 + k] + a1)
+        strip[rows.LIGHTM + k] = 0.5 * (strip[rows.LIGHT0 + k] + strip[rows.LIGHT1 + k])
+        strip[rows.SLOPE0 + k] = strip[rows.FIRST + k]
+        strip[rows.SLOPE1 + k] = a1
+        strip[rows.DECAY + k] = a
     if update == EULER:
         for k in range(n):
-            a = rows[SLOPE1 + k]
+            a = strip[rows.SLOPE1 + k]
             a = a if a < 1.0 else 1.0
-            rows[FIRST + k] = (1.0 - a) * rows[FIRST + k] + a * rows[DRIVEN1 + k]
+            strip[rows.FIRST + k] = (1.0 - a) * strip[rows.FIRST + k] + a * strip[rows.DRIVEN1 + k]
     elif update in (PAPER, ZERO_ORDER_HOLD):
         for k in range(n):
-            a = rows[SLOPE1 + k]
+            a = strip[rows.SLOPE1 + k]
             decay = special.exp(-a)
             share = a if update == PAPER else 1.0 - decay
-            rows[FIRST + k] = decay * rows[FIRST + k] + share * rows[DRIVEN1 + k]
+            strip[rows.FIRST + k] = decay * strip[rows.FIRST + k] + share * strip[rows.DRIVEN1 + k]
     else:
         for k in range(n):
-            a = rows[DECAY + k]
+            a = strip[rows.DECAY + k]
             decay = special.exp(-a)
             mean = (1.0 - decay) / (a + 1e-300)
             mean = mean if a > 1e-4 else 1.0 - a / 2.0 + a * a / 6.0
-            first = rows[FIRST + k]
-            first = decay * first + (mean - decay) * rows[DRIVEN0 + k]
-            rows[FIRST + k] = first + (1.0 - mean) * rows[DRIVEN1 + k]
+            first = strip[rows.FIRST + k]
+            first = decay * first + (mean - decay) * strip[rows.DRIVEN0 + k]
+            strip[rows.FIRST + k] = first + (1.0 - mean) * strip[rows.DRIVEN1 + k]
     for k in range(n):
-        rise = rows[FIRST + k] - rows[SLOPE0 + k]
-        rows[SLOPE0 + k] = rise
-        rows[SLOPE1 + k] = rise
-        rows[DECAY + k] = special.exp(-rows[DECAY + k])
+        rise = strip[rows.FIRST + k] - strip[rows.SLOPE0 + k]
+        strip[rows.SLOPE0 + k] = rise
+        strip[rows.SLOPE1 + k] = rise
+        strip[rows.DECAY + k] = special.exp(-strip[rows.DECAY + k])
 
 
 @kernel
-def no_pole(n, rows):
+def no_pole(n, strip):
     """Row FIRST without a low-pass: what drives it."""
     for k in range(n):
-        rise = rows[DRIVEN1 + k] - rows[DRIVEN0 + k]
-        rows[FIRST + k] = rows[DRIVEN1 + k]
-        rows[SLOPE0 + k] = rise
-        rows[SLOPE1 + k] = rise
+        rise = strip[rows.DRIVEN1 + k] - strip[rows.DRIVEN0 + k]
+        strip[rows.FIRST + k] = strip[rows.DRIVEN1 + k]
+        strip[rows.SLOPE0 + k] = rise
+        strip[rows.SLOPE1 + k] = rise
 
 
 @kernel
-def add_noise(n, rms, rows):
+def add_noise(n, rms, strip):
     """Draw the photoreceptor noise at the end of the step; it is a line over the step."""
     for k in range(n):
-        decay, before = rows[DECAY + k], rows[NOISE + k]
-        after = decay * before + rms * math.sqrt(1.0 - decay * decay) * rows[NORMAL + k]
-        rows[NOISE + k] = after
-        rows[INPUT0 + k] = rows[INPUT1 + k]
-        rows[INPUT1 + k] = rows[FIRST + k] + after
-        rows[SLOPE0 + k] += after - before
-        rows[SLOPE1 + k] += after - before
+        decay, before = strip[rows.DECAY + k], strip[rows.NOISE + k]
+        after = decay * before + rms * math.sqrt(1.0 - decay * decay) * strip[rows.NORMAL + k]
+        strip[rows.NOISE + k] = after
+        strip[rows.INPUT0 + k] = strip[rows.INPUT1 + k]
+        strip[rows.INPUT1 + k] = strip[rows.FIRST + k] + after
+        strip[rows.SLOPE0 + k] += after - before
+        strip[rows.SLOPE1 + k] += after - before
 
 
 @kernel
-def no_noise(n, rows):
+def no_noise(n, strip):
     """Rows INPUT without photoreceptor noise."""
     for k in range(n):
-        rows[INPUT0 + k] = rows[INPUT1 + k]
-        rows[INPUT1 + k] = rows[FIRST + k]
+        strip[rows.INPUT0 + k] = strip[rows.INPUT1 + k]
+        strip[rows.INPUT1 + k] = strip[rows.FIRST + k]
 
 
 @inlined
@@ -253,39 +230,39 @@ def second_pole_weights(b, line):
 
 
 @kernel
-def second_pole(n, b, update, rows):
+def second_pole(n, b, update, strip):
     """Advance row SECOND by a step; its slopes."""
     line = update != EXACT
     decay, w0, w1, v0, v1 = second_pole_weights(b, line)
     for k in range(n):
-        before, in0, in1 = rows[SECOND + k], rows[INPUT0 + k], rows[INPUT1 + k]
+        before, in0, in1 = strip[rows.SECOND + k], strip[rows.INPUT0 + k], strip[rows.INPUT1 + k]
         after = decay * before + w0 * in0 + w1 * in1
-        after += v0 * rows[SLOPE0 + k] + v1 * rows[SLOPE1 + k]
-        rows[SECOND + k] = after
+        after += v0 * strip[rows.SLOPE0 + k] + v1 * strip[rows.SLOPE1 + k]
+        strip[rows.SECOND + k] = after
         rise = after - before
-        rows[SLOPE0 + k] = rise if line else b * (in0 - before)
-        rows[SLOPE1 + k] = rise if line else b * (in1 - after)
+        strip[rows.SLOPE0 + k] = rise if line else b * (in0 - before)
+        strip[rows.SLOPE1 + k] = rise if line else b * (in1 - after)
 
 
 @kernel
-def take_signal(n, row, rows):
+def take_signal(n, row, strip):
     """Rows SIGNAL: what the comparator saw at the start of the step, and sees at its end."""
     for k in range(n):
-        rows[SIGNAL0 + k] = rows[SIGNAL1 + k]
-        rows[SIGNAL1 + k] = rows[row + k]
+        strip[rows.SIGNAL0 + k] = strip[rows.SIGNAL1 + k]
+        strip[rows.SIGNAL1 + k] = strip[row + k]
 
 
 @kernel
-def add_to_signal(n, lo, count, course, m, rows):
+def add_to_signal(n, lo, count, course, m, strip):
     """Add a course, of which instant m ends the step, to the signal."""
-    before = rows[ADDED : ADDED + n]
+    before = strip[rows.ADDED : rows.ADDED + n]
     for k in range(n):
-        rows[SLOPE0 + k] -= before[k]
-        rows[SLOPE1 + k] -= before[k]
+        strip[rows.SLOPE0 + k] -= before[k]
+        strip[rows.SLOPE1 + k] -= before[k]
         before[k] = 0.0
-    add_course(n, lo, count, course, m, ADDED, rows)
+    add_course(n, lo, count, course, m, rows.ADDED, strip)
     for k in range(n):
-        added = rows[ADDED + k]
-        rows[SIGNAL1 + k] += added
-        rows[SLOPE0 + k] += added
-        rows[SLOPE1 + k] += added
+        added = strip[rows.ADDED + k]
+        strip[rows.SIGNAL1 + k] += added
+        strip[rows.SLOPE0 + k] += added
+        strip[rows.SLOPE1 + k] += added
