@@ -1,30 +1,24 @@
 """The compiled part of the pixel: plain numbers and arrays in, events out.
 
-``special``     exponential and logarithm that vectorise and give the same bits everywhere
-``polynomial``  the first crossing of a polynomial through two levels, without missing one
-``workspace``   rows of the state and the small records that the compiled functions share
-``solve``       one pixel over one interval: the circuit as short power series, or K steps
-``comparator``  events of one pixel on one such series: thresholds, dead time, leak, noise
-``screen``      all pixels of a strip over one interval: end values, and which may fire
-``quadrature``  Gauss rules for the lag at the end of an interval, or of a dead time
-``lanes``       rows of the pixels that are solved side by side
-``exchange``    pixels into lanes and out of them
-``pieces``      intervals cut at the knee of the log map, and into steps below an e-fold
-``places``      places within an interval (thresholds, turns, given times) for all lanes at a time
-``land``        what becomes of lanes whose place was found: events, ends of dead times
-``plan``        what lanes look for next, for all of them together
-``doubt``       the same lane by lane: turns, noise events, what leak makes doubtful
-``batch``       the pixels of a strip that may fire, from event to event, by these
-``rest``        pixels at rest, in closed form: a block at a time, from what is due to what is next
-``exact``       the exact circuit over a tile: screen, batch or rest, and what is left one by one
-``stepped``     screens for the circuits of ``general``
-``general``     the K-step forms over a tile, and ``exact`` without low-pass or as printed
-``dense``       any circuit over a tile, in steps of time: what acts on the pixels from outside, and
-                effects that the others do not have; ``dense_rows``, ``dense_signal`` and
-                ``dense_events`` are its parts
-``tile``        what the two drivers share; ``claims`` hands strips out to threads
-``room``        memory for events, which grows while they are made
-``order``       packed events into order
+Two solvers, each a strip of pixels at a time through all intervals:
+
+``exact``           the exact circuit of one pole: ``screen`` takes all pixels to the end of an
+                    interval and finds those that may fire, ``lanes`` solves these side by side,
+                    and ``static_pixels`` a strip at rest in closed form
+``stepped``         everything else, in steps of time: the K-step forms, no low-pass, the last
+                    interval as printed, second pole, noise, slew limit, overshoot, drift, and what
+                    acts on the pixels from outside
+
+and what they share:
+
+``workspace``       rows of the state and the small records that the compiled functions share
+``comparator``      ties, noise events, packed events
+``quadrature``      Gauss rules for the lag at the end of an interval, or of a dead time
+``special``         exponential and logarithm that vectorise and give the same bits everywhere
+``rng``             random numbers as functions of seed, effect, pixel and draw
+``tile``            frames and scratch memory; ``work_queue`` hands strips out to threads
+``event_buffer``    memory for events, which grows while they are made
+``packing``         packed events into order
 
 Where the time goes
 -------------------
@@ -43,8 +37,7 @@ first pass, strip at rest            0.2 (0.5): comparing the grey values
 pixels that may fire (7 to 13 %)     40 each in lanes: 9 evaluating the integral, 7 the Taylor
                                      polynomial, the rest gathering, deciding and writing back
 a pixel in pieces                    about 200, two at the knee of the log map between two frames
-a pixel by itself                    1,000 to 3,000: what leak makes doubtful, light far above white
-a step of all pixels, ``dense``      5 to 9, of which poles 2 to 3, photoreceptor noise 2 and
+a step of all pixels, ``stepped``    5 to 9, of which poles 2 to 3, photoreceptor noise 2 and
                                      screening 1; 0.5 us more for an event
 sorting and unpacking                6 an event
 ==================================== ===========================================================

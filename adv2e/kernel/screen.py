@@ -58,7 +58,7 @@ MARGIN = 1e-5
 """Rounding of a distance in single precision over a call, with room [ln units]."""
 
 AT_REST = 1e-10
-"""Lag below which it counts as none: a tenth of a tie (:mod:`adv2e.kernel.polynomial`)."""
+"""Lag below which it counts as none: a tenth of a tie (:data:`adv2e.kernel.comparator.TIE`)."""
 
 NEVER = 1e30
 """Distance, or time, that is not reached."""

@@ -63,7 +63,7 @@ def test_stepped_forms_against_the_twin(update, printed, follower_hz):
     pixel = quiet(
         low_pass=LowPass(update=update),
         refractory=Refractory(period_us=700),
-        leak=Leak(rate_hz=10.0, jitter=0.0),
+        leak=Leak(rate_hz=10.0, photo_rate_hz=20.0, jitter=0.0),
         source_follower=SourceFollower(cutoff_hz=follower_hz) if follower_hz else None,
     )
     circuit = Circuit(
@@ -73,6 +73,7 @@ def test_stepped_forms_against_the_twin(update, printed, follower_hz):
         printed_last_interval=printed,
         dead_time_us=700.0,
         leak_hz=10.0,
+        photo_leak_hz=20.0,
         follower_hz=follower_hz,
     )
     options = {"K": 5, "L": 10, "printed": printed, "method": "stepped", "within_us": 0.01}
