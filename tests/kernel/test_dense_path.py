@@ -63,7 +63,7 @@ def test_stepped_forms_against_the_twin(update, printed, follower_hz):
     pixel = quiet(
         low_pass=LowPass(update=update),
         refractory=Refractory(period_us=700),
-        leak=Leak(rate_hz=10.0, photo_rate_hz=20.0, jitter=0.0),
+        leak=Leak(rate_hz=10.0, jitter=0.0),
         source_follower=SourceFollower(cutoff_hz=follower_hz) if follower_hz else None,
     )
     circuit = Circuit(
@@ -73,11 +73,19 @@ def test_stepped_forms_against_the_twin(update, printed, follower_hz):
         printed_last_interval=printed,
         dead_time_us=700.0,
         leak_hz=10.0,
-        photo_leak_hz=20.0,
         follower_hz=follower_hz,
     )
     options = {"K": 5, "L": 10, "printed": printed, "method": "stepped", "within_us": 0.01}
     check(light, clock(31, 1 / 240), pixel, circuit, **options)
+
+
+@pytest.mark.parametrize("update", ["first_order_hold", "paper"])
+def test_leak_of_the_stepped_forms_follows_the_light(update):
+    """As if at the mean light of a step; the twin's is a line within it, which costs some us."""
+    light = moving_light(31, 24, seed=3)
+    pixel = quiet(low_pass=LowPass(update=update), leak=Leak(photo_rate_hz=40.0, jitter=0.0))
+    circuit = Circuit(update=update, K=5, leak_hz=0.1, photo_leak_hz=40.0)
+    check(light, clock(31, 1 / 240), pixel, circuit, K=5, within_us=10.0)
 
 
 NOISY = {
