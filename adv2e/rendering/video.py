@@ -28,7 +28,7 @@ import numpy as np
 from adv2e.errors import DataError
 from adv2e.rendering.output import NotWritten
 from adv2e.rendering.styles import Picture
-from adv2e.sources.opencv import quiet
+from adv2e.sources.images.opencv import quiet
 from adv2e.sources.video.containers import examine
 from adv2e.sources.video.opening import openable
 

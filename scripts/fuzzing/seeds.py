@@ -15,7 +15,7 @@ import cv2
 import h5py
 import numpy as np
 
-from adv2e.sources.opencv import quiet
+from adv2e.sources.images.opencv import quiet
 from fuzzing.mutations import ODD_NUMBERS, mutated
 
 Content = dict[str, bytes]

@@ -11,7 +11,7 @@ import pytest
 from adv2e.errors import DataError
 from adv2e.formats.reading import read_recording
 from adv2e.process.machine import machine_complaint
-from adv2e.sources import opencv
+from adv2e.sources.images import opencv
 
 MEMORY, THREADS = "not enough memory (see ulimit -v)", "the machine starts no more threads"
 

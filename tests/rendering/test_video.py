@@ -17,7 +17,7 @@ import pytest
 from adv2e.errors import OutputError
 from adv2e.rendering import video
 from adv2e.rendering.video import VideoFile
-from adv2e.sources.opencv import quiet
+from adv2e.sources.images.opencv import quiet
 
 CODERS = {".mp4": "vp9", ".webm": "vp8", ".avi": "huffyuv", "H.264": "h264"}
 

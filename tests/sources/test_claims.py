@@ -10,7 +10,7 @@ import pytest
 from adv2e.errors import DataError
 from adv2e.sources.images import claims
 from adv2e.sources.images.claims import check_claim
-from adv2e.sources.opencv import decode_image
+from adv2e.sources.images.opencv import decode_image
 
 
 def encoded(suffix, shape=(30, 50), *how):

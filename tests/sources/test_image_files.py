@@ -11,7 +11,7 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
-from adv2e.sources.opencv import decode_image
+from adv2e.sources.images.opencv import decode_image
 
 RAMP = np.arange(12, dtype=np.uint8).reshape(3, 4) * 20
 

@@ -27,7 +27,7 @@ from adv2e.formats.clock import Beside, Clock
 from adv2e.formats.recording import Recording
 from adv2e.formats.text.reader import Lines, read_lines
 from adv2e.sources.base import Pixels
-from adv2e.sources.opencv import decode_image
+from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.times.columns import has_lines
 from adv2e.sources.times.lists import FrameList, decoded, parse_list
 from adv2e.sources.times.names import found_outside, members_of, nowhere

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Selection
+from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
-from adv2e.sources.opencv import IMAGE_SUFFIXES, read_image
 from adv2e.sources.stored import light_beside
 from adv2e.sources.times.lists import read_list
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import cv2
 
-from adv2e.sources.opencv import quiet
+from adv2e.sources.images.opencv import quiet
 from adv2e.sources.video.containers.base import TINY_BYTES
 from adv2e.sources.video.opening import openable
 

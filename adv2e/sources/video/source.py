@@ -17,7 +17,7 @@ import numpy as np
 
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.sources.base import GivenTimes, Pixels, Selection, Shot, Source
-from adv2e.sources.opencv import quiet, rgb_of
+from adv2e.sources.images.opencv import quiet, rgb_of
 from adv2e.sources.times.gaps import gap_doubts
 from adv2e.sources.times.instants import Stamp, seconds
 from adv2e.sources.times.lists import read_list

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import cv2
 
-from adv2e.sources.opencv import quiet
+from adv2e.sources.images.opencv import quiet
 from adv2e.sources.video.colours import Colours
 from adv2e.sources.video.opening import openable
 from adv2e.sources.video.packets import RETRIES
