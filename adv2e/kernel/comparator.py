@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from adv2e.compiled import inlined, kernel
-from adv2e.effects.pixel.hot_pixels import next_hot_time
-from adv2e.effects.pixel.shot_noise import candidate_polarity, next_candidate_time
+from adv2e.kernel.noise import candidate_polarity, next_candidate_time, next_hot_time
 from adv2e.kernel.workspace import PIXEL_BITS, S_HOT_TIME, S_SHOT_TIME
 
 SIGNAL_EVENT, SHOT, HOT = 0, 1, 2

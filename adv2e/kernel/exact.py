@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.compiled import entry, kernel
-from adv2e.effects.pixel.leak import fill_falls
 from adv2e.kernel import screen, special, static_pixels
 from adv2e.kernel.event_buffer import tell_where, with_room
 from adv2e.kernel.lanes import batch, exchange
+from adv2e.kernel.leak import fill_falls
 from adv2e.kernel.quadrature import Rule
 from adv2e.kernel.tile import load
 from adv2e.kernel.work_queue import claim

@@ -12,7 +12,6 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.compiled import kernel
-from adv2e.effects.pixel.leak import fill_falls, next_leak_factor
 from adv2e.kernel import screen
 from adv2e.kernel.comparator import (
     SIGNAL_EVENT,
@@ -23,6 +22,7 @@ from adv2e.kernel.comparator import (
     use_up,
 )
 from adv2e.kernel.lanes.exchange import EARLY, log_of, next_noise, watch
+from adv2e.kernel.leak import fill_falls, next_leak_factor
 from adv2e.kernel.workspace import S_HOLD, S_OFF, S_ON, S_REFERENCE, STRIP
 
 BLOCK = 64

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config.model import Pixel
-from adv2e.effects.pixel.hot_pixels import fill_first_hot_times
-from adv2e.effects.pixel.initial_reference import RANDOM, RUNNING, fill_random_reference
-from adv2e.effects.pixel.leak import fill_first_factors, fill_running
-from adv2e.effects.pixel.photoreceptor_noise import fill_first_noise
-from adv2e.effects.pixel.shot_noise import fill_first_candidates
-from adv2e.effects.pixel.thresholds import fill_levels
+from adv2e.effects.pixel.initial_reference import RANDOM, RUNNING
+from adv2e.effects.pixel.thresholds import FLOOR
+from adv2e.kernel.first_state import fill_levels, fill_random_reference
+from adv2e.kernel.leak import fill_first_factors, fill_running
+from adv2e.kernel.noise import fill_first_candidates, fill_first_hot_times, fill_first_noise
 from adv2e.kernel.stepped.signal import log_of_light
 from adv2e.kernel.workspace import (
     S_FIRST,
@@ -72,7 +71,7 @@ def initial_state(
     levels = pixel.thresholds
     on, off = state[S_ON], state[S_OFF]
     means, spare = (levels.on, levels.off), state[S_REFERENCE]
-    fill(fill_levels, seed, *means, levels.mismatch, on, off, spare)
+    fill(fill_levels, seed, *means, levels.mismatch, FLOOR, on, off, spare)
     state[S_REFERENCE] = state[S_X]
     state[S_HOLD] = -1.0
     if pixel.initial_reference == RANDOM:

@@ -14,11 +14,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from adv2e.compiled import entry, inlined
-from adv2e.kernel import rng
-from adv2e.kernel.workspace import NEVER, S_HOT_DRAW, S_HOT_TIME, Array, Circuit
 from adv2e.parameters import Fit, Section, parameter
 
 
@@ -39,22 +34,3 @@ class HotPixels(Section):
         at_least=0,
         fit=Fit(1.0, 2e4, 150.0, log=True),
     )
-
-
-@inlined
-def next_hot_time(i: int, circuit: Circuit, state: Array) -> None:
-    """Move hot pixel i on to its next event."""
-    state[S_HOT_DRAW, i] += 1
-    wait = rng.exponential(circuit.seed, rng.HOT_TIME, i, state[S_HOT_DRAW, i])
-    state[S_HOT_TIME, i] += wait / circuit.hot_rate
-
-
-@entry
-def fill_first_hot_times(
-    seed: np.uint64, fraction: float, rate: float, start: float, times: Array
-) -> None:
-    """Choose the hot pixels and draw their first times [us]; the others never fire."""
-    for i in range(times.shape[0]):
-        times[i] = NEVER
-        if rng.uniforms(seed, rng.HOT_CHOICE, i, 0)[0] < fraction:
-            times[i] = start + rng.exponential(seed, rng.HOT_TIME, i, 0) / rate

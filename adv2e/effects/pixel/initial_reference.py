@@ -24,19 +24,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import entry
-from adv2e.kernel import rng
-
 Array = NDArray[np.float64]
 
 RUNNING, SETTLED, RANDOM = REFERENCES = ("running", "settled", "random")
-
-
-@entry
-def fill_random_reference(
-    seed: np.uint64, on: Array, off: Array, x: Array, reference: Array
-) -> None:
-    """Draw references so that x lies uniformly between the thresholds of each pixel."""
-    for i in range(x.shape[0]):
-        u = rng.uniforms(seed, rng.INITIAL_REFERENCE, i, 0)[0]
-        reference[i] = x[i] - (u * (on[i] + off[i]) - off[i])

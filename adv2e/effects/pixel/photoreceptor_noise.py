@@ -19,11 +19,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from adv2e.compiled import entry, kernel
-from adv2e.kernel import rng
-from adv2e.kernel.workspace import Array
 from adv2e.parameters import Fit, Section, parameter
 
 
@@ -44,16 +39,3 @@ class PhotoreceptorNoise(Section):
         above=0,
         at_most=1,
     )
-
-
-@entry
-def fill_first_noise(seed: np.uint64, rms: float, noise: Array) -> None:
-    """Draw the noise of every pixel at the start from its stationary distribution."""
-    for i in range(noise.shape[0]):
-        noise[i] = rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)
-
-
-@kernel
-def fill_normals(seed: np.uint64, first: int, count: int, block: int, normals: Array) -> None:
-    """Draw the normal numbers of four steps in time, (4, count..), for the pixels first.. ."""
-    rng.normals_of_four(seed, rng.PHOTORECEPTOR_STEPS, first, count, block, normals)

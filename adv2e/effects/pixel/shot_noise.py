@@ -23,14 +23,8 @@ References
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from adv2e.compiled import entry, inlined
-from adv2e.kernel import rng
-from adv2e.kernel.workspace import S_SHOT_DRAW, S_SHOT_TIME, Array, Circuit
 from adv2e.parameters import Fit, Section, parameter
 
 FALL_AT_WHITE = 0.75
@@ -49,35 +43,3 @@ class ShotNoise(Section):
         source="Joubert 2021: 0.01 at 161 lux, 12 at 0.1 lux",
         fit=Fit(1e-3, 500.0, 3.0, log=True),
     )
-
-
-@inlined
-def next_candidate_time(i: int, circuit: Circuit, state: Array) -> None:
-    """Move pixel i on to its next candidate."""
-    state[S_SHOT_DRAW, i] += 1
-    wait = rng.exponential(circuit.seed, rng.SHOT_TIME, i, state[S_SHOT_DRAW, i])
-    state[S_SHOT_TIME, i] += wait / circuit.shot_rate
-
-
-@inlined
-def candidate_polarity(i: int, light: float, circuit: Circuit, state: Array) -> int:
-    """Return what the present candidate of pixel i becomes at this light [DN]: 1, -1, 0 nothing."""
-    u, v = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[S_SHOT_DRAW, i])
-    if u >= 1.0 - circuit.shot_fall * light:
-        return 0
-    return 1 if v < 0.5 else -1
-
-
-@entry
-def fill_first_candidates(
-    lo: int, hi: int, seed: np.uint64, rate: float, start: float, times: Array, draws: Array
-) -> None:
-    """Draw the first candidate time [us] of the pixels lo..hi; rate in events a us.
-
-    `draws`, how often each has drawn since, becomes 0.
-    """
-    u, spare = times[lo:hi], draws[lo:hi]
-    rng.uniforms_of_pixels(seed, rng.SHOT_TIME, lo, u, spare)
-    for k in range(hi - lo):
-        u[k] = start + -math.log(u[k]) / rate
-        spare[k] = 0.0

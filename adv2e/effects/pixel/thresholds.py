@@ -19,11 +19,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from adv2e.compiled import entry, kernel
-from adv2e.kernel import rng
-from adv2e.kernel.workspace import Array
 from adv2e.parameters import Fit, Section, parameter
 
 FLOOR = 0.01
@@ -64,30 +59,3 @@ class Thresholds(Section):
         meaning="growth of both thresholds a second, as a share of them at the first frame",
         fit=Fit(-0.9, 20.0, 0.2),
     )
-
-
-@kernel
-def _fill_normal_levels(
-    seed: np.uint64, stream: int, first: int, mean: float, mismatch: float, levels: Array,
-    spare: Array,
-) -> None:  # fmt: skip
-    rng.uniforms_of_pixels(seed, stream, first, levels, spare)
-    for k in range(levels.shape[0]):
-        level = mean + mismatch * rng.normal_of(levels[k], spare[k])
-        levels[k] = level if level > FLOOR else FLOOR
-
-
-@entry
-def fill_levels(
-    lo: int, hi: int, seed: np.uint64, mean_on: float, mean_off: float, mismatch: float, on: Array,
-    off: Array, spare: Array,
-) -> None:  # fmt: skip
-    """Draw the thresholds of the pixels lo..hi into `on` and `off`; `spare` is overwritten."""
-    if mismatch > 0.0:
-        v = spare[lo:hi]
-        _fill_normal_levels(seed, rng.ON_THRESHOLD, lo, mean_on, mismatch, on[lo:hi], v)
-        _fill_normal_levels(seed, rng.OFF_THRESHOLD, lo, mean_off, mismatch, off[lo:hi], v)
-    else:
-        for i in range(lo, hi):
-            on[i] = mean_on if mean_on > FLOOR else FLOOR
-            off[i] = mean_off if mean_off > FLOOR else FLOOR

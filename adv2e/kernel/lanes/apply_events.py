@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from adv2e.compiled import inlined, kernel
-from adv2e.effects.pixel.leak import next_leak_factor
 from adv2e.kernel.comparator import TIE, emit
 from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.pieces import fallen_at_place
 from adv2e.kernel.lanes.roots import evaluate_release
+from adv2e.kernel.leak import next_leak_factor
 from adv2e.kernel.workspace import S_LEAK_FACTOR
 
 _TRIES = 3

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.compiled import entry, kernel
-from adv2e.effects.pixel.photoreceptor_noise import fill_normals
-from adv2e.effects.pixel.slew_limit import keep_first, limit_slew
 from adv2e.kernel import screen
 from adv2e.kernel.event_buffer import tell_where, with_room
+from adv2e.kernel.noise import fill_normals
 from adv2e.kernel.stepped import events, rows, signal
+from adv2e.kernel.stepped.slew import keep_first, limit_slew
 from adv2e.kernel.tile import load
 from adv2e.kernel.work_queue import claim
 from adv2e.kernel.workspace import (

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.compiled import inlined, kernel
-from adv2e.effects.pixel.leak import next_leak_factor
 from adv2e.kernel.comparator import (
     SIGNAL_EVENT,
     TIE,
@@ -23,6 +22,7 @@ from adv2e.kernel.comparator import (
     next_injected,
     use_up,
 )
+from adv2e.kernel.leak import next_leak_factor
 from adv2e.kernel.stepped import rows
 from adv2e.kernel.workspace import (
     EXACT,

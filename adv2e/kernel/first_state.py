@@ -1,0 +1,50 @@
+"""What differs from pixel to pixel before the first frame: thresholds and references.
+
+The equations are those of :mod:`adv2e.effects.pixel.thresholds` and
+:mod:`adv2e.effects.pixel.initial_reference`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adv2e.compiled import entry, kernel
+from adv2e.kernel import rng
+from adv2e.kernel.workspace import Array
+
+
+@kernel
+def _fill_normal_levels(
+    seed: np.uint64, stream: int, first: int, mean: float, mismatch: float, floor: float,
+    levels: Array, spare: Array,
+) -> None:  # fmt: skip
+    rng.uniforms_of_pixels(seed, stream, first, levels, spare)
+    for k in range(levels.shape[0]):
+        level = mean + mismatch * rng.normal_of(levels[k], spare[k])
+        levels[k] = level if level > floor else floor
+
+
+@entry
+def fill_levels(
+    lo: int, hi: int, seed: np.uint64, mean_on: float, mean_off: float, mismatch: float,
+    floor: float, on: Array, off: Array, spare: Array,
+) -> None:  # fmt: skip
+    """Draw the thresholds of the pixels lo..hi into `on` and `off`; `spare` is overwritten."""
+    if mismatch > 0.0:
+        v = spare[lo:hi]
+        _fill_normal_levels(seed, rng.ON_THRESHOLD, lo, mean_on, mismatch, floor, on[lo:hi], v)
+        _fill_normal_levels(seed, rng.OFF_THRESHOLD, lo, mean_off, mismatch, floor, off[lo:hi], v)
+    else:
+        for i in range(lo, hi):
+            on[i] = max(mean_on, floor)
+            off[i] = max(mean_off, floor)
+
+
+@entry
+def fill_random_reference(
+    seed: np.uint64, on: Array, off: Array, x: Array, reference: Array
+) -> None:
+    """Draw references so that x lies uniformly between the thresholds of each pixel."""
+    for i in range(x.shape[0]):
+        u = rng.uniforms(seed, rng.INITIAL_REFERENCE, i, 0)[0]
+        reference[i] = x[i] - (u * (on[i] + off[i]) - off[i])

@@ -1,0 +1,163 @@
+"""Leak of the reference: how far it falls, and where in its cycle a pixel is at the start.
+
+The equations are those of :mod:`adv2e.effects.pixel.leak`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from adv2e.compiled import entry, kernel
+from adv2e.kernel import rng
+from adv2e.kernel.workspace import (
+    NEVER,
+    S_BEYOND,
+    S_HOLD,
+    S_HOT_TIME,
+    S_LEAK_DRAW,
+    S_LEAK_FACTOR,
+    S_NOISE,
+    S_ON,
+    S_REFERENCE,
+    Array,
+    Circuit,
+)
+
+_MOST = 3.0
+"""Largest deviation of a period, in standard deviations."""
+
+_TRIES = 100
+"""Ages that are drawn for a pixel; none of them is left only where noise leaves leak no time."""
+
+
+@kernel
+def fill_falls(
+    lo: int, count: int, length: float, mean: Array, circuit: Circuit, state: Array, falls: Array
+) -> None:
+    """Fall of the reference over an interval of `length` us: pixels lo.., mean light [DN]."""
+    on = state[S_ON, lo : lo + count]
+    constant, per_dn = circuit.leak * length, circuit.photo_leak * length
+    if per_dn > 0.0:
+        for k in range(count):
+            falls[k] = on[k] * (constant + per_dn * mean[k])
+    else:
+        for k in range(count):
+            falls[k] = on[k] * constant
+    if circuit.leak_jitter > 0.0:
+        factor = state[S_LEAK_FACTOR, lo : lo + count]
+        for k in range(count):
+            falls[k] *= factor[k]
+
+
+@kernel
+def _factor(seed: np.uint64, jitter: float, i: int, draw: float) -> float:
+    """Leak speed of one cycle of pixel i, relative to the nominal one."""
+    return 1.0 / (1.0 + jitter * _cut(rng.normal(seed, rng.LEAK_PERIOD, i, draw)))
+
+
+@kernel
+def _cut(g: float) -> float:
+    return min(max(g, -_MOST), _MOST)
+
+
+@kernel
+def next_leak_factor(i: int, circuit: Circuit, state: Array) -> float:
+    """Draw the leak speed of the cycle that now begins."""
+    state[S_LEAK_DRAW, i] += 1
+    factor = _factor(circuit.seed, circuit.leak_jitter, i, state[S_LEAK_DRAW, i])
+    state[S_LEAK_FACTOR, i] = factor
+    return factor
+
+
+@entry
+def fill_first_factors(seed: np.uint64, jitter: float, factors: Array) -> None:
+    """Draw the leak speed of every pixel's first cycle."""
+    for i in range(factors.shape[0]):
+        factors[i] = _factor(seed, jitter, i, 0)
+
+
+@kernel
+def _met(dead: float, noise: float, period: float) -> float:
+    """Return the mean time that a cycle of this period lasts beside noise of rate `noise` [us]."""
+    return dead + (-math.expm1(-noise * period) / noise if noise > 0.0 else period)
+
+
+@kernel
+def _crossed(to_level: float, left: float, noise: float, corner: float, speed: float) -> float:
+    """Return how often photoreceptor noise was expected to cross the threshold in this cycle.
+
+    to_level, left : distance of the threshold [ln] at the start of the cycle and now; speed : of
+    the reference [ln/us].
+    """
+    first, now = max(to_level / noise, 0.0), max(left / noise, 0.0)
+    passed = math.exp(-0.5 * now * now) - math.exp(-0.5 * first * first)
+    return corner * noise / speed * passed / math.sqrt(2.0 * math.pi)
+
+
+@entry
+def fill_running(
+    lo: int, hi: int, circuit: Circuit, start: float, light: Array, level: Array, state: Array
+) -> None:
+    """Put the pixels lo..hi somewhere in their leak cycles at `start` [us].
+
+    Their references are those right after an event, beside signals at rest.
+
+    Parameters
+    ----------
+    lo, hi : int
+    circuit : Circuit
+    start : float
+    light : (pixels,)
+        What they have seen [DN].
+    level : (pixels,)
+        Factor on the ON threshold.
+    state : (rows, pixels)
+    """
+    seed, jitter, dead = circuit.seed, circuit.leak_jitter, circuit.dead_time
+    for i in range(lo, hi):
+        rate = circuit.leak + circuit.photo_leak * light[i]
+        factor = _factor(seed, jitter, i, 0) if jitter > 0.0 else 1.0
+        way = level[i] + circuit.overshoot
+        fallen, hold = 0.0, -1.0
+        if rate > 0.0 and way > 0.0:
+            noise = circuit.shot_rate * max(1.0 - circuit.shot_fall * light[i], 0.0)
+            if circuit.hot_rate > 0.0 and state[S_HOT_TIME, i] < NEVER:
+                noise += circuit.hot_rate
+            longest = way / rate * (1.0 + jitter * _MOST)
+            most = _met(dead, noise, longest)
+            for draw in range(_TRIES):
+                slowness = 1.0
+                if jitter > 0.0:
+                    slowness += jitter * _cut(rng.normal(seed, rng.LEAK_RUNNING, i, draw))
+                period = way / rate * slowness
+                mean = _met(dead, noise, period)
+                u, v = rng.uniforms(seed, rng.LEAK_AGE, i, draw)
+                if u * most >= mean:
+                    continue
+                age = v * mean - dead
+                if age < 0.0:
+                    factor, fallen, hold = 1.0 / slowness, 0.0, start - age
+                    break
+                if noise > 0.0:
+                    age = -math.log1p(-noise * age) / noise
+                fallen = way * min(age / period, 1.0) - circuit.overshoot
+                if circuit.noise_rms > 0.0:
+                    on, now = state[S_ON, i], state[S_NOISE, i]
+                    corner = circuit.dark + circuit.per_dn * light[i]
+                    crossed = _crossed(
+                        on * way + now, on * (level[i] - fallen) + now, circuit.noise_rms, corner,
+                        on * way / period,
+                    )  # fmt: skip
+                    if u * most >= mean * math.exp(-crossed):
+                        fallen = 0.0
+                        continue
+                factor = 1.0 / slowness
+                break
+        state[S_REFERENCE, i] -= fallen * state[S_ON, i]
+        state[S_HOLD, i] = hold
+        if circuit.overshoot != 0.0:
+            state[S_BEYOND, i] = circuit.overshoot * state[S_ON, i]
+        if jitter > 0.0:
+            state[S_LEAK_FACTOR, i] = factor
