@@ -45,8 +45,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import entry
 from adv2e.effects.hooks import Frames, Hooks
+from adv2e.kernel.sharpen import sharpen
 
 Array = NDArray[np.float64]
 
@@ -114,67 +114,6 @@ def _under_hats(at: Array, times: Array) -> Array:
     return np.asarray(up * up / (2.0 * before) + down - down * down / (2.0 * behind))
 
 
-@entry
-def _sharpen(
-    blurred: NDArray[Any],
-    first: NDArray[Any],
-    last: NDArray[Any],
-    weights: NDArray[Any],
-    norm: NDArray[Any],
-    iterations: int,
-    variation: NDArray[Any],
-    light: NDArray[Any],
-    mean: NDArray[Any],
-    factor: NDArray[Any],
-) -> None:
-    """Iterate over a strip of pixels.
-
-    Parameters
-    ----------
-    blurred : (n, pixels)
-        Frames [DN], above zero.
-    first, last : (n,) int
-        Where the weights of each row are not zero.
-    weights : (n, n), norm : (n,)
-        Rows, and sums of the columns.
-    iterations : int
-    variation : (2,)
-        Lambda and the square of epsilon.
-    light : (n, pixels)
-        In: where to begin.  Out: the light.
-    mean, factor : (pixels,), (n, pixels)
-        Memory to work in.
-    """
-    n, pixels = blurred.shape
-    cost, soft = variation
-    one = blurred.dtype.type(1)
-    two = one + one
-    for _ in range(iterations):
-        factor[:] = 0.0
-        for k in range(n):
-            mean[:] = 0.0
-            for j in range(first[k], last[k]):
-                weight, row = weights[k, j], light[j]
-                for p in range(pixels):
-                    mean[p] += weight * row[p]
-            now = blurred[k]
-            for p in range(pixels):
-                mean[p] = now[p] / mean[p]
-            for j in range(first[k], last[k]):
-                weight, row = weights[k, j], factor[j]
-                for p in range(pixels):
-                    row[p] += weight * mean[p]
-        mean[:] = 0.0  # from here on the pull of the step before
-        for k in range(n):
-            row, now, scale = light[k], factor[k], norm[k]
-            coming = light[min(k + 1, n - 1)]
-            for p in range(pixels):
-                step = two * (coming[p] - row[p]) / (coming[p] + row[p])
-                pull = step / np.sqrt(step * step + soft)
-                row[p] *= now[p] * scale / (one - cost * (pull - mean[p]))
-                mean[p] = pull
-
-
 def sharpened(
     frames: list[NDArray[Any]], times: Array, exposure: float, begin: int, end: int
 ) -> list[NDArray[Any]]:
@@ -206,7 +145,7 @@ def sharpened(
         light, factor = blurred.copy(), np.empty_like(blurred)
         mean = np.empty(hi - lo, dtype)
         rules = blurred, first, last, weights, norm, _ITERATIONS, variation
-        _sharpen(*rules, light, mean, factor)
+        sharpen(*rules, light, mean, factor)
         for frame, row in zip(made, light[begin:end], strict=True):
             frame.reshape(-1)[lo:hi] = row
     return made

@@ -24,22 +24,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import entry
 from adv2e.effects.hooks import Hooks, View
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.events import Events, make_events, pixels_of, sort_events
 from adv2e.kernel import rng
+from adv2e.kernel.arbiter import EVENTS, NOBODY, serve
 from adv2e.parameters import Fit, Section, parameter
-
-_NOBODY = -1
-
-# entries of the record of a channel
-_FREE, _HEAD, _ROWS, _EVENTS = 0, 1, 2, 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,94 +55,6 @@ class Arbiter(Section):
     )
 
 
-@entry
-def _serve(
-    time: NDArray[Any],
-    pixel: NDArray[Any],
-    polarity: NDArray[Any],
-    known: float,
-    row_us: float,
-    event_us: float,
-    columns: int,
-    channel: NDArray[Any],
-    queue: NDArray[Any],
-    asked: NDArray[Any],
-    waiting: NDArray[Any],
-    left: NDArray[Any],
-    out_time: NDArray[Any],
-    out_pixel: NDArray[Any],
-    out_polarity: NDArray[Any],
-) -> int:
-    """Take events in, and serve rows as long as all requests before their latch are known.
-
-    Parameters
-    ----------
-    time, pixel, polarity : (n,)
-        Events in order, times [us]; all of them are taken in.
-    known : float
-        Time before which no further event will come [us].
-    channel : (4,)
-        When the channel is free; first row of the queue, rows in it, events that wait.
-    queue : (rows,) int
-        Rows that wait, in a ring, in the order of their first requests.
-    asked : (rows,)
-        Time of the first request of each row that waits; below zero infinity: it does not.
-    waiting : (pixels,) int8
-        Polarity of the event that waits, or -1.
-    left : (pixels,)
-        When the last event of each pixel went out.
-
-    Returns
-    -------
-    int
-        Events written to the outputs.
-    """
-    rows = queue.shape[0]
-    arrived = np.int64(0)
-    count = time.shape[0]
-    head, length = np.int64(channel[_HEAD]), np.int64(channel[_ROWS])
-    free, pending = channel[_FREE], channel[_EVENTS]
-    written = np.int64(0)
-    while arrived < count or length > 0:
-        if length == 0 and time[arrived] <= left[pixel[arrived]]:
-            arrived += 1  # lost, and nothing waits
-            continue
-        request = asked[queue[head]] if length > 0 else time[arrived]
-        latch = max(free, request) + row_us
-        while arrived < count and time[arrived] <= latch:
-            place = pixel[arrived]
-            if time[arrived] > left[place]:
-                row = place // columns
-                if asked[row] == -np.inf:
-                    asked[row] = time[arrived]
-                    queue[(head + length) % rows] = row
-                    length += 1
-                if waiting[place] == _NOBODY:
-                    waiting[place] = polarity[arrived]
-                    pending += 1.0
-            arrived += 1
-        if latch >= known:
-            break  # others may still ask before it
-        row = queue[head]
-        head = (head + 1) % rows
-        length -= 1
-        asked[row] = -np.inf
-        free = latch
-        for place in range(row * columns, (row + 1) * columns):
-            if waiting[place] != _NOBODY:
-                free += event_us
-                left[place] = free
-                out_time[written] = free
-                out_pixel[written] = place
-                out_polarity[written] = waiting[place]
-                waiting[place] = _NOBODY
-                pending -= 1.0
-                written += 1
-    channel[_FREE], channel[_HEAD], channel[_ROWS] = free, head, length
-    channel[_EVENTS] = pending
-    return int(written)
-
-
 class ArbiterHooks(Hooks):
     """Sends the events through one channel."""
 
@@ -161,7 +67,7 @@ class ArbiterHooks(Hooks):
         self._channel = np.array([-np.inf, 0.0, 0.0, 0.0])
         self._queue = np.empty(view.rows, np.int64)
         self._asked = np.full(view.rows, -np.inf)
-        self._waiting = np.full(view.rows * view.columns, _NOBODY, np.int8)
+        self._waiting = np.full(view.rows * view.columns, NOBODY, np.int8)
         self._left = np.full(view.rows * view.columns, -np.inf)
         self._numbers = np.zeros(view.rows * view.columns, np.int64)
         # counted from the first frame: an epoch time would lose nanoseconds in rounding
@@ -184,10 +90,10 @@ class ArbiterHooks(Hooks):
     def _served(self, events: Events, known_us: float) -> Events:
         """Return what leaves the channel before `known_us`, in that order."""
         asking_us, pixel, polarity = self._requests(events)
-        most = events.size + int(self._channel[_EVENTS])
+        most = events.size + int(self._channel[EVENTS])
         times, pixels = np.empty(most), np.empty(most, np.int64)
         polarities = np.empty(most, np.int8)
-        count = _serve(
+        count = serve(
             asking_us,
             pixel,
             polarity,
