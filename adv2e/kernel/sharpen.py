@@ -1,6 +1,4 @@
-"""Light from frames that are means over exposures; see
-:mod:`adv2e.effects.frames.exposure_blur`.
-"""
+"""Light from means over exposures; see :mod:`adv2e.effects.frames.exposure_blur`."""
 
 from __future__ import annotations
 
