@@ -12,11 +12,17 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import entry
 from adv2e.events import EVENT_DTYPE, Events, empty_events, sort_events
-from adv2e.formats.clock import disagreement
 from adv2e.formats.recording import Recording, described_geometry
 from adv2e.sources.base import Image, Pixels
+from adv2e.sources.times.instants import seconds
+from adv2e.sources.times.units import SETTLED, Unit, event_unit
 
 _LARGEST = np.iinfo(np.uint16).max
+
+_FEW = 100
+"""So few events may well lie in a small part of the recording."""
+_APART = 300
+"""Events and frames that differ in length by this factor are in doubt."""
 
 Column = NDArray[Any]
 
@@ -28,6 +34,8 @@ class RecordingBuilder:
     ----------
     path : Path
         The file, or folder.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times, as the user says.
 
     Attributes
     ----------
@@ -37,23 +45,26 @@ class RecordingBuilder:
         What the file says of itself, if this program wrote it.
     geometry : (int, int) or None
         Width and height [pixels] that the file states.
+    time_unit : str or None
+        What the user says.
+    stated_unit : str or None
+        What the file says: that of times that we wrote.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, time_unit: str | None = None) -> None:
         self.problems: list[str] = []
         self.description: dict[str, Any] = {}
         self.geometry: tuple[int, int] | None = None
+        self.time_unit = time_unit
+        self.stated_unit: str | None = None
+        self._frames: tuple[Unit, bool] | None = None
+        self._events: tuple[Unit, bool] = Unit("s"), False
         self._path = path
         self._stated_by = ""
         self._parts: list[Events] = []
         self._unstorable = 0
         self._values: set[int] = set()
         self._odd_polarities = 0
-
-    @property
-    def unit(self) -> str | None:
-        """Unit of the times that we wrote; None: another program wrote them."""
-        return "s" if self.description else None
 
     def describe(self, text: str, label: str, name: str) -> None:
         """Take what the file says of itself; if that is broken, note a problem.
@@ -71,6 +82,7 @@ class RecordingBuilder:
             description = None
         if isinstance(description, dict):
             self.description = description
+            self.stated_unit = "s" if description else None
             self.state(described_geometry(description), name)
         else:
             self.problems.append(f"{label}: not a JSON mapping, ignored")
@@ -79,6 +91,61 @@ class RecordingBuilder:
         """Take (width, height) [pixels] that something states, unless something before it did."""
         if self.geometry is None:
             self.geometry, self._stated_by = geometry, by
+
+    def note_frames(self, unit: Unit, *, whole: bool) -> None:
+        """Take the unit of the times of two or more frames, and whether they are whole numbers."""
+        self._frames = unit, whole
+
+    def unit_of_events(
+        self, t: Column, x: Column, y: Column, size: tuple[int, int] | None, *, whole: bool
+    ) -> Unit:
+        """Return the unit of the times of the events.
+
+        Where the times of frames and events are written in different ways, one of them as whole
+        numbers, what the user says is meant for that one: the other is in seconds.
+
+        Parameters
+        ----------
+        t, x, y : arrays, (events,)
+            Times as the file has them, columns and rows; of all events, or of the first.
+        size : (int, int) or None
+            Width and height, where the file states them.
+        whole : bool
+            Times are written as whole numbers.
+        """
+        if self.stated_unit is not None:
+            unit = Unit(self.stated_unit)
+        else:
+            if size is None:
+                size = (int(x.max()) + 1, int(y.max()) + 1) if t.size else (1, 1)
+            frames = self._frames
+            alike = frames is None or frames[1] == whole
+            unit = event_unit(
+                t,
+                max(1, size[0] * size[1]),
+                whole=whole,
+                given=self.time_unit if alike or whole else None,
+                beside=frames[0] if frames is not None and alike else None,
+            )
+        if t.size and unit.doubt:
+            self.problems.append(unit.doubt)
+        self._events = unit, whole
+        return unit
+
+    def unit_of_frames(self, *, whole: bool) -> str | None:
+        """Return the unit of the frames' times that the user or events tell; None: neither.
+
+        Parameters
+        ----------
+        whole : bool
+            They are written as whole numbers.
+        """
+        unit, events_whole = self._events
+        if self.stated_unit is not None:
+            return None
+        if self.time_unit is not None:
+            return self.time_unit if whole or not events_whole else None
+        return unit.name if events_whole == whole and self._frames is None else None
 
     def add(self, t: Column, x: Column, y: Column, p: Column) -> None:
         """Append events, in the order of the file.
@@ -129,7 +196,7 @@ class RecordingBuilder:
         self._judge_polarities()
         events, width, height = self._fit(events)
         events = self._in_order(events)
-        self.problems += disagreement(events, frame_times_ns)
+        self.problems += _disagreement(events, frame_times_ns)
         return Recording(
             str(self._path),
             layout,
@@ -226,3 +293,19 @@ def _sort_ties(events: Events) -> None:
     np.equal(t[1:], t[:-1], out=tied[1:])
     tied[:-1] |= tied[1:]
     events[tied] = sort_events(events[tied])
+
+
+def _disagreement(events: Events, times_ns: NDArray[np.int64] | None) -> list[str]:
+    """Return what is to be told of events and frames that seem to be on different clocks."""
+    if times_ns is None or len(times_ns) < 2 or len(events) < _FEW:
+        return []
+    begin, end = int(events["t"][0]) * 1000, int(events["t"][-1]) * 1000
+    first, last = int(times_ns.min()), int(times_ns.max())
+    length, frames_length = max(end - begin, 1), max(last - first, 1)
+    alike = 1 / _APART < length / frames_length < _APART
+    if alike and begin <= last and first <= end:
+        return []
+    return [
+        f"events are from {seconds(begin)} to {seconds(end)} s, frames from {seconds(first)} to"
+        f" {seconds(last)} s: are some in another unit? {SETTLED}"
+    ]

@@ -26,7 +26,6 @@ from adv2e.errors import DataError
 from adv2e.files.npy import read_array
 from adv2e.files.zips import open_member, zip_archive
 from adv2e.formats.builder import RecordingBuilder
-from adv2e.formats.clock import Clock
 from adv2e.formats.recording import Recording, described_geometry
 from adv2e.ticks import US, to_ticks
 
@@ -64,10 +63,8 @@ def read_npz(path: Path, time_unit: str | None = None) -> Recording:
     if t.dtype.kind not in "iuf":
         raise DataError(f"{path}: {name} must hold numbers, not {t.dtype}")
     stated = name[2:] if name.startswith("t_") else None
-    clock = Clock(time_unit or stated)
-    unit = clock.of_events(t, x, y, builder.geometry, whole=t.dtype.kind != "f")
-    if unit.doubt:
-        builder.problems.append(unit.doubt)
+    builder.time_unit, builder.stated_unit = time_unit or stated, None
+    unit = builder.unit_of_events(t, x, y, builder.geometry, whole=t.dtype.kind != "f")
     builder.add(to_ticks(t, unit.ns, US, f"{path}: {name}"), x, y, p)
     return builder.finish("npz")
 

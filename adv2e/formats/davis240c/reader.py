@@ -23,9 +23,8 @@ import numpy as np
 from adv2e.errors import DataError
 from adv2e.files.zips import open_member, zip_archive
 from adv2e.formats.builder import RecordingBuilder
-from adv2e.formats.clock import Beside, Clock
 from adv2e.formats.recording import Recording
-from adv2e.formats.text.reader import Lines, read_lines
+from adv2e.formats.text.reader import read_lines
 from adv2e.sources.base import Pixels
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.times.columns import has_lines
@@ -122,21 +121,19 @@ def _read(
     time_unit: str | None,
     outside: Callable[[str], str | None],
 ) -> Recording:
-    builder = RecordingBuilder(files.path)
+    builder = RecordingBuilder(files.path, time_unit)
     if files.has(DESCRIPTION):
         with files.open(DESCRIPTION) as file:
             text = file.read().decode("utf-8-sig", "replace")
         builder.describe(text, files.label(DESCRIPTION), DESCRIPTION)
-    found = _listed(files, stated=builder.unit)
-    frames = None
+    found = _listed(files, stated=builder.stated_unit)
     if found is not None and len(found.stamps) > 1:
-        frames = Beside(found.unit, found.whole)
+        builder.note_frames(found.unit, whole=found.whole)
     with files.open(name) as file:
-        clock = Clock(time_unit, builder.unit, frames)
-        lines = read_lines(file, files.label(name), builder, clock)
+        geometry = read_lines(file, files.label(name), builder)
     times, names = None, []
     if found is not None:
-        if unit := _unit_beside(lines, found, clock):
+        if unit := builder.unit_of_frames(whole=found.whole):
             found = _listed(files, time_unit=unit) or found
         builder.problems += [f"{LIST}: {line}" for line in (found.unit.doubt, found.order) if line]
         names = members_of(found.stamps, files.label(LIST), files.has, outside=outside)
@@ -144,7 +141,7 @@ def _read(
     if builder.geometry is None and names:
         rows, columns = next(images(names[:1])).image.shape[:2]
         builder.state((columns, rows), names[0])
-    builder.state(lines.geometry, f"the first line of {name}")
+    builder.state(geometry, f"the first line of {name}")
     return builder.finish("davis240c" if name == EVENTS else "text", times, lambda: images(names))
 
 
@@ -156,13 +153,6 @@ def _listed(files: _Files, **evidence: Any) -> FrameList | None:
     with files.open(LIST) as file:
         text = decoded(file.read(), label)
     return parse_list(text, label, **evidence) if has_lines(text) else None
-
-
-def _unit_beside(lines: Lines, found: FrameList, clock: Clock) -> str | None:
-    """Return the unit of the frames that user or events say; None: the list itself tells."""
-    if clock.given is not None:
-        return clock.given_for_frames(whole=found.whole, events_whole=lines.whole)
-    return lines.unit if lines.whole == found.whole and clock.beside is None else None
 
 
 def _images(files: _Files, names: list[str]) -> Iterator[Pixels]:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.formats import hdf5
 from adv2e.formats.builder import RecordingBuilder
-from adv2e.formats.clock import Beside, Clock
 from adv2e.formats.recording import MOST_COLUMNS, Recording
 from adv2e.sources.base import Image
 from adv2e.sources.times.units import Unit, frame_unit
@@ -46,7 +45,7 @@ def read_hdf5(path: Path, time_unit: str | None = None) -> Recording:
 
 
 def _read(path: Path, file: h5py.File, time_unit: str | None) -> Recording:
-    builder = RecordingBuilder(path)
+    builder = RecordingBuilder(path, time_unit)
     if "adv2e" in file.attrs:
         text = str(file.attrs["adv2e"])
         builder.describe(text, f"{path}: attribute adv2e", "the attribute adv2e")
@@ -57,17 +56,18 @@ def _read(path: Path, file: h5py.File, time_unit: str | None) -> Recording:
     found = [hdf5.dataset(file, name) for name in names]
     builder.state(_geometry(path, file, found), "sensor_resolution")
     frames = _Stamps(path, found)
-    clock = Clock(time_unit, builder.unit, frames.beside(builder.unit))
-    whole = _read_events(path, file, builder, clock)
-    given = clock.given_for_frames(whole=frames.whole, events_whole=whole)
-    times, doubt = frames.times_ns(given, builder.unit)
-    if doubt:
-        builder.problems.append(f"images: {doubt}")
+    if len(found) > 1 and frames.name == "timestamp":
+        builder.note_frames(frames.unit(None, builder.stated_unit), whole=frames.whole)
+    _read_events(path, file, builder)
+    unit = frames.unit(builder.unit_of_frames(whole=frames.whole), builder.stated_unit)
+    if unit.doubt:
+        builder.problems.append(f"images: {unit.doubt}")
+    times = frames.times_ns(unit) if found else None
     return builder.finish("monash", times, lambda: _images(path, names))
 
 
-def _read_events(path: Path, file: h5py.File, builder: RecordingBuilder, clock: Clock) -> bool:
-    """Read all events into `builder`; return whether their times are whole numbers."""
+def _read_events(path: Path, file: h5py.File, builder: RecordingBuilder) -> None:
+    """Read all events into `builder`."""
     columns = [hdf5.dataset(file, name) for name in COLUMNS]
     if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
         shapes = ", ".join(
@@ -80,13 +80,10 @@ def _read_events(path: Path, file: h5py.File, builder: RecordingBuilder, clock: 
     hdf5.check_stored(columns, f"{path}: events")
     whole = columns[0].dtype.kind in "iu"
     t, x, y = (column[:_PART] for column in columns[:3])
-    unit = clock.of_events(t, x, y, builder.geometry, whole=whole)
+    unit = builder.unit_of_events(t, x, y, builder.geometry, whole=whole)
     for begin in range(0, columns[0].size, _PART):
         t, x, y, p = (column[begin : begin + _PART] for column in columns)
         builder.add(to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, _signs(p))
-    if columns[0].size and unit.doubt:
-        builder.problems.append(unit.doubt)
-    return whole
 
 
 def _signs(p: NDArray[Any]) -> NDArray[np.int8]:
@@ -123,36 +120,26 @@ def _pixels(path: Path, image: h5py.Dataset) -> tuple[int, ...]:
 
 
 class _Stamps:
-    """When the images were taken, as their attributes say."""
+    """When the images were taken, as their attributes of one name say."""
 
     def __init__(self, path: Path, images: list[h5py.Dataset]) -> None:
-        self._labels = [f"{path}: {image.name}" for image in images]
         exact = all("timestamp_ns" in image.attrs for image in images)
-        self._name = "timestamp_ns" if exact else "timestamp"
+        self.name = "timestamp_ns" if exact else "timestamp"
+        self._labels = [f"{path}: {image.name}" for image in images]
         pairs = zip(self._labels, images, strict=True)
-        self._stamps = [_stamp(label, image, self._name) for label, image in pairs]
+        self._stamps = [_stamp(label, image, self.name) for label, image in pairs]
         self.whole = all(stamp.dtype.kind != "f" for stamp in self._stamps)
 
-    def beside(self, stated: str | None) -> Beside | None:
-        """Return what tells the unit of the events, if it does."""
-        if self._name == "timestamp_ns" or len(self._stamps) < 2:
-            return None
-        return Beside(self._unit(None, stated), self.whole)
-
-    def times_ns(
-        self, given: str | None, stated: str | None
-    ) -> tuple[NDArray[np.int64] | None, str]:
-        """Return the times [ns], None without images, and what is to be told of their unit."""
-        unit = self._unit(given, stated)
-        pairs = zip(self._labels, self._stamps, strict=True)
-        ticks = [to_ticks(stamp, unit.ns, NS, f"{label}: {self._name}") for label, stamp in pairs]
-        return (np.concatenate(ticks), unit.doubt) if ticks else (None, "")
-
-    def _unit(self, given: str | None, stated: str | None) -> Unit:
-        if self._name == "timestamp_ns":
+    def unit(self, given: str | None, stated: str | None) -> Unit:
+        if self.name == "timestamp_ns":
             return Unit("ns")
         values = [Decimal(stamp.item()) for stamp in self._stamps]
         return frame_unit(values, given=given, stated=stated)
+
+    def times_ns(self, unit: Unit) -> NDArray[np.int64]:
+        pairs = zip(self._labels, self._stamps, strict=True)
+        ticks = [to_ticks(stamp, unit.ns, NS, f"{label}: {self.name}") for label, stamp in pairs]
+        return np.concatenate(ticks)
 
 
 def _stamp(label: str, image: h5py.Dataset, name: str) -> NDArray[Any]:

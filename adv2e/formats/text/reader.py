@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any
@@ -22,7 +21,6 @@ from numpy.typing import NDArray
 from adv2e.compiled import entry, kernel
 from adv2e.errors import DataError
 from adv2e.formats.builder import RecordingBuilder
-from adv2e.formats.clock import Clock
 from adv2e.formats.recording import Recording
 from adv2e.sources.times.units import Unit
 from adv2e.ticks import LARGEST_NS, US, check_us
@@ -155,7 +153,7 @@ def read_text(path: Path, time_unit: str | None = None) -> Recording:
     DataError
         A line that cannot be read.
     """
-    builder = RecordingBuilder(path)
+    builder = RecordingBuilder(path, time_unit)
     beside = [path.with_name(path.name + ".json")]
     if path.name == "events.txt":
         beside.append(path.with_name("adv2e.json"))
@@ -164,32 +162,13 @@ def read_text(path: Path, time_unit: str | None = None) -> Recording:
         text = description.read_text("utf-8", errors="replace")
         builder.describe(text, str(description), description.name)
     with path.open("rb") as file:
-        lines = read_lines(file, str(path), builder, Clock(time_unit, builder.unit))
-    builder.state(lines.geometry, "the first line")
+        geometry = read_lines(file, str(path), builder)
+    builder.state(geometry, "the first line")
     return builder.finish("text")
 
 
-@dataclass(frozen=True)
-class Lines:
-    """What the lines of a file told beside its events.
-
-    Attributes
-    ----------
-    geometry : (int, int) or None
-        Width and height [pixels], if the first line has them.
-    whole : bool
-        Times are written as whole numbers.
-    unit : str
-        Their unit.
-    """
-
-    geometry: tuple[int, int] | None
-    whole: bool
-    unit: str
-
-
-def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder, clock: Clock) -> Lines:
-    """Read all lines of `file` into `builder`.
+def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder) -> tuple[int, int] | None:
+    """Read all lines of `file` into `builder`; return what the first says of width and height.
 
     Parameters
     ----------
@@ -197,8 +176,7 @@ def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder, clock: Cl
         Read from where it stands to its end.
     label : str
         Its name, for messages.
-    clock : Clock
-        What is known of the unit of its times.
+    builder : RecordingBuilder
 
     Raises
     ------
@@ -214,7 +192,7 @@ def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder, clock: Cl
             data = data[begin:]
             whole = not _DECIMAL_TIME.search(block[begin:])
             t, x, y, *_ = _columns(data, whole, "us" if whole else "s")
-            unit = clock.of_events(t if whole else t / 1e6, x, y, geometry, whole=whole)
+            unit = builder.unit_of_events(t if whole else t / 1e6, x, y, geometry, whole=whole)
         t, x, y, p, lines, wrong = _columns(data, whole, unit.name)
         if wrong:
             raise _malformed(data.tobytes(), label, before, wrong)
@@ -224,9 +202,7 @@ def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder, clock: Cl
             check_us(t[late[:1]], f"{label} line {line}")
         builder.add(t, x, y, p)
         before += lines
-    if unit.doubt:
-        builder.problems.append(unit.doubt)
-    return Lines(geometry, whole, unit.name)
+    return geometry
 
 
 def _columns(data: NDArray[np.uint8], whole: bool, unit: str) -> tuple[Any, ...]:
