@@ -50,11 +50,9 @@ class _Output:
 class Staging(cleanup.Unfinished):
     """Files and folders on their way to their final names.
 
-    First all are named with :meth:`file` and :meth:`folder`, which check and touch nothing; then
-    :meth:`prepare`; then they are written; then :meth:`commit` or :meth:`discard`.
-
-    In a ``with`` block, several that write may share it: what they commit or discard waits for the
-    end of the block, which decides for all of them.
+    First they are named with :meth:`file` and :meth:`folder`, which check and touch nothing; then
+    :meth:`prepare`; then they are written; then :meth:`commit` or :meth:`discard`, which the end of
+    a ``with`` block calls.
 
     Parameters
     ----------
@@ -71,10 +69,8 @@ class Staging(cleanup.Unfinished):
         self._workspaces: dict[Path, Workspace] = {}
         self._made: list[Path] = []
         self._committing = False
-        self._is_shared = False
 
     def __enter__(self) -> Staging:
-        self._is_shared = True
         return self
 
     def __exit__(
@@ -83,7 +79,6 @@ class Staging(cleanup.Unfinished):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._is_shared = False
         try:
             if kind is None:
                 self.commit()
@@ -189,7 +184,7 @@ class Staging(cleanup.Unfinished):
         OutputError
             One cannot be written, or exists by now and is not to be replaced.
         """
-        if self._is_shared or not self._outputs:
+        if not self._outputs:
             return
         self._committing = True
         at_work = first = self._outputs[0]
@@ -256,8 +251,6 @@ class Staging(cleanup.Unfinished):
 
     def discard(self) -> None:
         """Remove everything temporary, and the folders made for it."""
-        if self._is_shared:
-            return
         self._end()
         for folder in reversed(self._made):
             with suppress(OSError):  # something else may lie in it by now
@@ -279,7 +272,6 @@ class Staging(cleanup.Unfinished):
         made = [workspace for workspace in self._workspaces.values() if workspace.is_made]
         for workspace in made:
             workspace.hide()
-        self._is_shared = False
         self.discard()
         return not any(workspace.path.exists() for workspace in made)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, ClassVar
@@ -111,13 +112,34 @@ class FileSink(Sink):
     request : Request
     staging : Staging
         Takes the files.
+    is_alone : bool
+        They come into place, or go, at the end of the sink; else with others of the `staging`.
     """
 
-    def __init__(self, writer: type[Writer], request: Request, staging: Staging) -> None:
+    def __init__(
+        self, writer: type[Writer], request: Request, staging: Staging, *, is_alone: bool
+    ) -> None:
         self.wants_frames = request.with_frames and writer.takes_frames
-        self._type, self._request, self._staging = writer, request, staging
-        self._temporary = writer.stage(request.path, staging)
-        self._stack = ExitStack()
+        self._path = request.path
+        temporary = writer.stage(request.path, staging)
+        self._open = self._opened(partial(writer, request), staging, temporary, is_alone)
+
+    @contextmanager
+    def _opened(
+        self,
+        writer: Callable[..., Writer],
+        staging: Staging,
+        temporary: list[Path],
+        is_alone: bool,
+    ) -> Iterator[Writer]:
+        with staging if is_alone else nullcontext(), _closing() as stack:
+            with self._naming():
+                staging.prepare()
+                made = writer(stack, *temporary)
+            yield made
+            with self._naming():
+                made.finish()
+                stack.close()
 
     def write_events(self, events: Events) -> None:
         """Append events; over all calls they are sorted by time."""
@@ -131,9 +153,7 @@ class FileSink(Sink):
                 self._writer.write_frame(t_ns, image)
 
     def __enter__(self) -> FileSink:
-        with self._discarding():
-            self._staging.prepare()
-            self._writer = self._type(self._request, self._stack, *self._temporary)
+        self._writer = self._open.__enter__()
         return self
 
     def __exit__(
@@ -142,30 +162,7 @@ class FileSink(Sink):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if kind is not None:
-            self._discard()
-            return
-        with self._discarding():
-            self._writer.finish()
-            self._stack.close()
-            self._staging.commit()
-
-    @contextmanager
-    def _discarding(self) -> Iterator[None]:
-        """Leave nothing of the output if the body raises."""
-        try:
-            with self._naming():
-                yield
-        except BaseException:
-            self._discard()
-            raise
-
-    def _discard(self) -> None:
-        try:
-            with suppress(Exception):  # the file is incomplete, whatever closing it says
-                self._stack.close()
-        finally:
-            self._staging.discard()
+        self._open.__exit__(kind, error, trace)
 
     @contextmanager
     def _naming(self) -> Iterator[None]:
@@ -173,9 +170,20 @@ class FileSink(Sink):
         try:
             yield
         except OSError as error:
-            raise OutputError(
-                f"{self._request.path}: cannot be written: {_reason(error)}"
-            ) from error
+            raise OutputError(f"{self._path}: cannot be written: {_reason(error)}") from error
+
+
+@contextmanager
+def _closing() -> Iterator[ExitStack]:
+    """Give a stack for files; where the body raises, what closing them says is of no interest."""
+    stack = ExitStack()
+    try:
+        yield stack
+    except BaseException:
+        with suppress(Exception):
+            stack.close()
+        raise
+    stack.close()
 
 
 def _reason(error: OSError) -> str:

@@ -90,7 +90,8 @@ def open_sink(
         with_frames=with_frames,
         threads=threads or default_threads(),
     )
-    return FileSink(_writer(name), request, staging or Staging(overwrite))
+    files = Staging(overwrite) if staging is None else staging
+    return FileSink(_writer(name), request, files, is_alone=staging is None)
 
 
 def _standard_output(format: str | None, layout: str | None) -> Sink:

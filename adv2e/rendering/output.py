@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from adv2e.errors import OutputError
@@ -29,16 +29,14 @@ def replacing(path: Path, overwrite: bool, staging: Staging | None = None) -> It
     OutputError
         `path` exists and `overwrite` is false, or it cannot be a file, or cannot be written.
     """
-    staging = staging or Staging(overwrite)
-    part = staging.file(path)
-    try:
-        staging.prepare()
-        yield part
-        staging.commit()
-    except BaseException as error:
-        staging.discard()
-        if isinstance(error, NotWritten):
+    with Staging(overwrite) if staging is None else nullcontext(staging) as files:
+        part = files.file(path)
+        try:
+            files.prepare()
+            yield part
+        except NotWritten as error:
             raise OutputError(f"{path}: {error}") from error
-        if isinstance(error, OSError) and error.errno in _OF_WRITING:
+        except OSError as error:
+            if error.errno not in _OF_WRITING:
+                raise
             raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
-        raise

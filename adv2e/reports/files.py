@@ -65,20 +65,15 @@ def write_reports(
         written.
     """
     texts = (page(diagnosis), record_text(diagnosis, wording), model_text(diagnosis, wording))
-    staging = Staging(overwrite)
-    unfinished = staging.folder(Path(folder), _foreign)
     try:
-        staging.prepare()
-        unfinished.mkdir()
-        for name, text in zip(NAMES, texts, strict=True):
-            (unfinished / name).write_text(text, encoding="utf-8", newline="\n")
-        staging.commit()
+        with Staging(overwrite) as staging:
+            unfinished = staging.folder(Path(folder), _foreign)
+            staging.prepare()
+            unfinished.mkdir()
+            for name, text in zip(NAMES, texts, strict=True):
+                (unfinished / name).write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
-        staging.discard()
         raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    except BaseException:
-        staging.discard()
-        raise
 
 
 def _foreign(folder: Path) -> str | None:

@@ -504,7 +504,6 @@ def test_a_block_decides_for_all_that_share_it(tmp_path):
         file = staging.file(tmp_path / name)
         staging.prepare()
         file.write_text(name)
-        staging.commit()
 
     with Staging(overwrite=False) as staging:
         write("a")
