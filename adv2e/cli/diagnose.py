@@ -64,10 +64,10 @@ def command(
     from adv2e.compiled import announcement
     from adv2e.config import names_of, written_keys
     from adv2e.config.own import user_effects
+    from adv2e.diagnosis.configurations import without_user_effects
     from adv2e.diagnosis.data.evidence import read_evidence
     from adv2e.diagnosis.diagnose import diagnose
     from adv2e.diagnosis.fitting.library import names
-    from adv2e.diagnosis.fitting.own_effects import without_user_effects
     from adv2e.diagnosis.outcome.report import write_reports
     from adv2e.pixel.array import is_compiled
     from adv2e.reports.files import check_folder
@@ -123,17 +123,16 @@ def _check_own_names(own: Iterable[str], known: Sequence[str]) -> None:
 
 
 @contextmanager
-def _counting(shown: bool) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar of simulations done, out of those that are likely to be needed."""
+def _counting(shown: bool) -> Iterator[Callable[[int], None]]:
+    """Show how many simulations were done."""
     if not shown:
-        yield lambda done, likely: None
+        yield lambda done: None
         return
     from tqdm import tqdm
 
     with tqdm(unit="simulation", leave=False) as bar:
 
-        def count(done: int, likely: int) -> None:
-            bar.total = max(likely, done)
+        def count(done: int) -> None:
             bar.update(done - bar.n)
 
         yield count

@@ -9,26 +9,24 @@ from contextlib import closing
 from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.config import Config
-from adv2e.diagnosis.data import splits as parts
-from adv2e.diagnosis.data.affordable import affordable
+from adv2e.diagnosis.configurations import as_found, own_of
+from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.fitting.library import names
 from adv2e.diagnosis.fitting.nuisances import thresholds_of
-from adv2e.diagnosis.fitting.own_effects import as_found, own_of
-from adv2e.diagnosis.fitting.simulations import Simulator
-from adv2e.diagnosis.outcome.conclusion import (
-    DRAWS,
+from adv2e.diagnosis.outcome.conclusion import conclude
+from adv2e.diagnosis.outcome.detectable import detectable
+from adv2e.diagnosis.outcome.findings import (
     about_drifts,
     about_frames,
-    conclude,
     finding_of,
     rejected_of,
     signatures_of,
 )
-from adv2e.diagnosis.outcome.detectable import LIKELY, detectable
 from adv2e.diagnosis.outcome.verdict import sentence_of
-from adv2e.diagnosis.prepare import make_ready
+from adv2e.diagnosis.prepare import prepare
 from adv2e.diagnosis.selection.search import Search
+from adv2e.diagnosis.simulation.affordable import affordable
+from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.reports.result import Diagnosis
 
 
@@ -41,7 +39,7 @@ def diagnose(
     free_thresholds: bool = False,
     sizes: bool = True,
     threads: int | None = None,
-    progress: Callable[[int, int], None] = lambda done, likely: None,
+    progress: Callable[[int], None] = lambda done: None,
     log: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
     """Find what the declared model of a recording lacks.
@@ -52,7 +50,7 @@ def diagnose(
     declared : Config
         What is known of the camera.  Effects of the user's own, for which it has sections, are
         candidates as the built-in ones are; those that are no knowledge of the camera are off
-        (:func:`adv2e.diagnosis.fitting.own_effects.without_user_effects`).
+        (:func:`adv2e.diagnosis.configurations.without_user_effects`).
     declared_name : str
         Its file, for the report.
     without : sequence of str
@@ -65,13 +63,9 @@ def diagnose(
     threads : int, optional
         Simulations at a time; default: all cores.  The result does not depend on it.
     progress : callable
-        Called with the number of simulations done, and of those likely to be needed in all.
+        Called with the number of simulations done.
     log : callable
         Takes lines for people.
-
-    Returns
-    -------
-    Diagnosis
 
     Raises
     ------
@@ -81,21 +75,12 @@ def diagnose(
     began = time.perf_counter()
     evidence = affordable(evidence, declared)
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
-        of_sizes = LIKELY * len(names(declared)) if sizes else 0
-        simulator.expect(0, after_the_search=2 * DRAWS + of_sizes)
-        ready = make_ready(evidence, declared, simulator, without, free_thresholds, log)
-        declared, evidence = ready.declared, ready.evidence
-        search = Search(
-            ready.laboratory,
-            ready.observed,
-            declared,
-            ready.candidates,
-            ready.error,
-            log,
-            ready.free,
-        )
+        prepared = prepare(evidence, declared, simulator, without, free_thresholds, log)
+        evidence, reference = prepared.evidence, prepared.reference
+        declared = reference.declared
+        search = Search(reference, prepared.candidates)
         outcome = search.run()
-        found = conclude(ready, search, outcome)
+        found = conclude(prepared, search, outcome)
         kept = found.kept
         return Diagnosis(
             verdict=found.verdict,
@@ -109,19 +94,17 @@ def diagnose(
             nuisances=thresholds_of(kept.config) if free_thresholds else {},
             rejected=rejected_of(outcome, kept, search.candidates),
             errors=found.errors,
-            global_p_before=search.probability(search.declared, parts.LAST),
-            global_p_after=search.probability(kept, parts.LAST),
-            signatures=signatures_of(ready, search, kept),
-            curves=found.gallery.curves(),
-            maps=found.gallery.maps(),
-            detectable=detectable(search.bench, search.declared, search.candidates)
-            if sizes
-            else [],
+            global_p_before=search.probability(search.declared, splits.TEST),
+            global_p_after=search.probability(kept, splits.TEST),
+            signatures=signatures_of(reference, search.declared, kept),
+            curves=found.curves,
+            maps=found.maps,
+            detectable=detectable(reference, search.declared, search.candidates) if sizes else [],
             masked=evidence.masked,
-            split=ready.laboratory.scene.parts.text(),
+            split=prepared.scene.split.text(),
             notes=[
                 *evidence.notes,
-                *about_frames(ready, search),
+                *about_frames(prepared),
                 *about_drifts(evidence, kept.config),
             ],
             model=as_found(kept.config),
@@ -136,7 +119,7 @@ def diagnose(
                 "adv2e": __version__,
             },
             own=own_of(declared),
-            doubts=evidence.notes,
+            input_checks=evidence.notes,
         )
 
 

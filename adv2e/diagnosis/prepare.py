@@ -6,148 +6,104 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.input_checks import doubts_of
-from adv2e.diagnosis.data.light import light_of, scene_of
+from adv2e.diagnosis.data.input_checks import check_inputs
 from adv2e.diagnosis.data.scene import Placed, Scene
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.fitting.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.library import library
 from adv2e.diagnosis.fitting.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of
-from adv2e.diagnosis.fitting.simulations import Laboratory, Simulator
 from adv2e.diagnosis.hints.collect import hints_of
-from adv2e.diagnosis.hints.lamps import Lamp, lamps_of
-from adv2e.diagnosis.hints.lines import strongest_lines
-from adv2e.diagnosis.hints.pulses import has_pulse
-from adv2e.diagnosis.outcome.error import of_part
-from adv2e.diagnosis.statistics.frame_error import FrameError
-from adv2e.diagnosis.statistics.interpolation import between_frames
-from adv2e.diagnosis.statistics.levels import between_levels
-from adv2e.diagnosis.statistics.pilot import Pilot
+from adv2e.diagnosis.hints.readouts import has_pulse
+from adv2e.diagnosis.selection.reference import Reference
+from adv2e.diagnosis.simulation.simulator import Simulator
+from adv2e.diagnosis.statistics.sampler import Sampler
+from adv2e.diagnosis.statistics.summary import SummaryStatistics
+from adv2e.diagnosis.statistics.uncertainty import (
+    PILOT_SEEDS,
+    FrameError,
+    Pilot,
+    between_frames,
+    between_levels,
+)
 
 _MATCHING_SEED = 9_999
-_LAMP_SEED = 9_998
 
 
 @dataclass(frozen=True)
-class Ready:
+class Prepared:
     """What a search begins with.
 
     Attributes
     ----------
     evidence : Evidence
-    declared : Config
-        With thresholds that match the totals, where they were not known.
-    laboratory : Laboratory
+    scene : Scene
+    reference : Reference
+        Of the declared model, with thresholds that match the totals where they were not known.
+    candidates : list of Candidate
     between_frames, between_levels : FrameError, optional
         Of the statistics; None: too few frames to tell, and levels too fine to matter.
-    measured : Placed
-        The recording's events.
-    observed : (views, statistics)
-    candidates : list of Candidate
-    free : tuple of Knob
-        Keys that are not known.
     """
 
     evidence: Evidence
-    declared: Config
-    laboratory: Laboratory
+    scene: Scene
+    reference: Reference
+    candidates: list[Candidate]
     between_frames: FrameError | None
     between_levels: FrameError | None
-    measured: Placed
-    observed: NDArray[np.float64]
-    candidates: list[Candidate]
-    free: tuple[Knob, ...]
-
-    @property
-    def error(self) -> FrameError:
-        """What the frames do not tell in all."""
-        none = FrameError.none(self.observed.shape)
-        return (self.between_frames or none) + (self.between_levels or none)
 
 
-def make_ready(
+def prepare(
     evidence: Evidence,
     declared: Config,
     simulator: Simulator,
     without: Sequence[str],
     free_thresholds: bool,
     log: Callable[[str], None],
-) -> Ready:
+) -> Prepared:
     """Simulate the declared model, so that the recording can be compared with it.
 
-    Parameters
-    ----------
-    evidence : Evidence
-    declared : Config
-    simulator : Simulator
-        Of the recording.
-    without : sequence of str
-        Effects that do not compete.
-    free_thresholds : bool
-        Whether thresholds are not known.
-    log : callable
-        Takes lines for people.
+    Parameters as of :func:`adv2e.diagnosis.diagnose.diagnose`; the `simulator` is of the recording.
     """
-    scene = scene_of(evidence, declared)
-    measured = Placed.of(evidence.stream, scene)
-    doubts = doubts_of(measured, scene, light_of(evidence, declared))
-    evidence = replace(evidence, notes=[*evidence.notes, *doubts])
+    scene = Scene.of_evidence(evidence, declared)
+    notes = [*evidence.notes]
+    notes += check_inputs(Placed.of(evidence.stream, scene), scene, evidence.light(declared))
     if free_thresholds:
-        declared, miss = _with_fitted_thresholds(evidence, declared, simulator, scene)
+
+        def counts(stream: Stream) -> tuple[int, int]:
+            train = scene.split.chosen(stream, splits.TRAIN)
+            on = int(np.count_nonzero(train.on))
+            return on, len(train) - on
+
+        declared, miss = fit_thresholds(
+            lambda config: counts(simulator.stream(config, _MATCHING_SEED)),
+            declared,
+            counts(evidence.stream),
+        )
         log(f"thresholds that match the totals: {thresholds_of(declared)}")
         if miss > TOLERANCE:
-            missed = f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}"
-            evidence = replace(evidence, notes=[*evidence.notes, missed])
-    pilot = Pilot.of(evidence, declared, scene, simulator)
+            notes.append(f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}")
+    streams = simulator.streams(declared, PILOT_SEEDS)
+    statistics = SummaryStatistics(scene, streams)
+    by_seed = dict(zip(PILOT_SEEDS, streams, strict=True))
+    pilot = Pilot(evidence, declared, statistics, by_seed, simulator.of)
     frames, levels = between_frames(pilot), between_levels(pilot)
-    laboratory = Laboratory(simulator, scene, pilot.markers, frames.bias if frames else None)
-    lamps = _lamps(pilot, simulator)
-    looked_at = of_part(evidence.stream, scene.parts, parts.FIT, parts.JUDGE)
-    hints = hints_of(evidence, looked_at, lamps, list(pilot.streams.values()))
+    hints = hints_of(evidence, declared, scene, streams, simulator)
     if hints.pulse and not has_pulse(declared):
-        evidence = replace(evidence, notes=[*evidence.notes, hints.pulse.text()])
-    return Ready(
-        evidence,
+        notes.append(hints.pulse.text())
+    observed = statistics.measure(evidence.stream)
+    none = FrameError.none(observed.shape)
+    reference = Reference(
+        Sampler(simulator, statistics, frames.bias if frames else 0.0),
+        observed,
         declared,
-        laboratory,
-        frames,
-        levels,
-        measured,
-        pilot.markers.measure(measured),
-        [one for one in library(declared, hints) if one.name not in without],
+        (frames or none) + (levels or none),
+        log,
         THRESHOLDS if free_thresholds else (),
     )
-
-
-def _lamps(pilot: Pilot, simulator: Simulator) -> list[Lamp]:
-    """Return the lamps that may have lit the scene, by the data that effects are fitted to."""
-    scene, declared = pilot.scene, pilot.declared
-
-    def to_fit(stream: Stream) -> Stream:
-        return of_part(stream, scene.parts, parts.FIT)
-
-    measured = to_fit(pilot.evidence.stream)
-    lines = strongest_lines(measured, list(map(to_fit, pilot.streams.values())), scene)
-    return lamps_of(
-        lines, measured, declared, lambda lit: to_fit(simulator.stream(lit, _LAMP_SEED))
-    )
-
-
-def _with_fitted_thresholds(
-    evidence: Evidence, declared: Config, simulator: Simulator, scene: Scene
-) -> tuple[Config, float]:
-    def counts(stream: Stream) -> tuple[int, int]:
-        fitted_to = of_part(stream, scene.parts, parts.FIT)
-        on = int(np.count_nonzero(fitted_to.on))
-        return on, len(fitted_to) - on
-
-    return fit_thresholds(
-        lambda config: counts(simulator.stream(config, _MATCHING_SEED)),
-        declared,
-        counts(evidence.stream),
-    )
+    candidates = [one for one in library(declared, hints) if one.name not in without]
+    evidence = replace(evidence, notes=notes)
+    return Prepared(evidence, scene, reference, candidates, frames, levels)

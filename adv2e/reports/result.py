@@ -78,7 +78,7 @@ class ErrorRow:
 
 @dataclass(frozen=True)
 class Signature:
-    """One marker statistic on held-out data.
+    """One summary statistic on held-out data.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class Diagnosis:
     detectable : list of Detectable
     masked : list of Masked
     split : str
-        How the data were divided into parts for fitting, judging and the last look.
+        How the data were divided into those for training, validation and test.
     notes : list of str
         What the reader should know besides, such as the bound of the interpolation error.
     model : mapping
@@ -223,7 +223,7 @@ class Diagnosis:
         Small things for the end of the report: sizes, seeds, simulations, seconds, versions.
     own : Own
         Effects of the user's own that competed.
-    doubts : list of str
+    input_checks : list of str
         Those of the notes that are on the recording itself, such as what may be wrong with it.
     """
 
@@ -248,4 +248,4 @@ class Diagnosis:
     model: Mapping[str, Any]
     facts: Mapping[str, str]
     own: Own = NO_OWN
-    doubts: Sequence[str] = ()
+    input_checks: Sequence[str] = ()

@@ -73,7 +73,6 @@ figcaption.note { font-weight: 400; }
 img.map { width: 100%; height: auto; image-rendering: pixelated; display: block; }
 svg { display: block; width: 100%; max-width: 560px; height: auto; }
 svg.wide { max-width: 100%; min-width: 560px; }
-svg.bar { max-width: 380px; }
 svg text { font-size: 11px; fill: var(--soft); }
 svg .label { fill: var(--ink); }
 svg text.number { font-size: 12px; fill: var(--ink); }

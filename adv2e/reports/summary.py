@@ -13,7 +13,7 @@ from adv2e.reports.standing_out import standing_out
 WIDTH = 100
 _MOST_PARAMETERS = 5
 _MOST_STANDING = 3
-_MOST_DOUBTS = 2
+_MOST_CHECKS = 2
 
 
 def summary_text(diagnosis: Diagnosis) -> str:
@@ -36,8 +36,8 @@ def summary_text(diagnosis: Diagnosis) -> str:
     before = probability_text(diagnosis.global_p_before).removeprefix("= ")
     after = probability_text(diagnosis.global_p_after).removeprefix("= ")
     lines.append(f"p {before} -> {after}")
-    for doubt in diagnosis.doubts[:_MOST_DOUBTS]:
-        lines += _wrapped(f"note: {doubt}", 2)
+    for line in diagnosis.input_checks[:_MOST_CHECKS]:
+        lines += _wrapped(f"note: {line}", 2)
     return "\n".join(lines)
 
 

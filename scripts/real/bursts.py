@@ -7,8 +7,8 @@ from writing import table
 
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
-from adv2e.diagnosis.hints.pulses import Pulse
-from adv2e.diagnosis.hints.readouts import without_coupling
+from adv2e.diagnosis.configurations import without_coupling
+from adv2e.diagnosis.hints.readouts import Pulse
 from adv2e.events import Events
 from real.model import Bench
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from adv2e.comparison.windows import Windows
 from adv2e.config import Config
-from adv2e.diagnosis.fitting.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from real.model import Bench
 from real.pattern import Place, pattern_search
 from real.tried import Added, label
@@ -92,16 +92,16 @@ class Fitter:
 
     def trial(self, candidate: Candidate, values: Sequence[float], base: Config) -> Added:
         """Return `base` with an effect, and how far it is."""
-        config = self.matched(candidate.applied(base, candidate.inner(values)))
+        config = self.matched(candidate.applied(base, candidate.scaled(values)))
         return Added(candidate, tuple(values), config, *self._score(config))
 
-    def ranked(self, probes: Iterable[Probe], base: Config) -> list[Added]:
+    def ranked(self, starts: Iterable[Probe], base: Config) -> list[Added]:
         """Return effects where their fits may start, the nearest first.
 
         All are tried with one seed, and only those that then lead with all of them.
         """
         seeds, self.seeds = self.seeds, self.seeds[:1]
-        tried = [self.trial(candidate, values, base) for candidate, values in probes]
+        tried = [self.trial(candidate, values, base) for candidate, values in starts]
         self.seeds = seeds
         tried.sort(key=_score_of)
         if len(seeds) > 1:
@@ -118,20 +118,20 @@ class Fitter:
         rest = {other: values for other, values in model.found.items() if other is not one}
         config = model.base
         for other, values in rest.items():
-            config = other.applied(config, other.inner(values))
+            config = other.applied(config, other.scaled(values))
         return Model(model.base, rest, self.trial(label(f"without {one.name}"), (), config))
 
     def refined(self, best: Added, base: Config) -> Added:
         """Return an effect with its keys at a better place, by steps that halve."""
         candidate = best.candidate
-        for k, knob in enumerate(candidate.knobs):
-            step = 0.5 * _unit(knob, best.values[k])
+        for k, parameter in enumerate(candidate.parameters):
+            step = 0.5 * _unit(parameter, best.values[k])
             for share in (1.0, 0.5):
-                here = np.array(candidate.inner(best.values))
+                here = np.array(candidate.scaled(best.values))
                 for way in (-1.0, 1.0):
                     place = here.copy()
                     place[k] += way * share * step
-                    trial = self.trial(candidate, _outer(candidate.knobs, place), base)
+                    trial = self.trial(candidate, _outer(candidate.parameters, place), base)
                     best = min(best, trial, key=_score_of)
         return best
 
@@ -143,7 +143,7 @@ class Fitter:
         here = best
         for _ in range(PASSES if len(found) > 1 else 0):
             before = here.score
-            for candidate in [one for one in found if one.knobs]:
+            for candidate in [one for one in found if one.parameters]:
                 current = replace(here, candidate=candidate, values=found[candidate])
                 better = self.refined(current, here.config)
                 if better.score < here.score:
@@ -156,24 +156,25 @@ class Fitter:
     def settled(self, model: Model) -> Model:
         """Return a model with all keys of what was found sought together, if there are several."""
         start = {
-            (knob.key, knob.part): (knob, value)
+            (parameter.key, parameter.part): (parameter, value)
             for one, values in model.found.items()
-            for knob, value in zip(one.knobs, values, strict=True)
+            for parameter, value in zip(one.parameters, values, strict=True)
         }
         if len(start) < 2:
             return model
-        knobs, values = zip(*start.values(), strict=True)
-        whole = Candidate("all keys", knobs, ())
-        units = np.array([_unit(knob, value) for knob, value in start.values()])
+        parameters, values = zip(*start.values(), strict=True)
+        whole = Candidate("all keys", parameters, ())
+        units = np.array([_unit(parameter, value) for parameter, value in start.values()])
 
         def at(place: Place) -> Added:
-            return self.trial(whole, _outer(knobs, place * units), model.here.config)
+            return self.trial(whole, _outer(parameters, place * units), model.here.config)
 
         first = replace(model.here, candidate=whole, values=values)
-        best = pattern_search(at, np.array(whole.inner(values)) / units, first, STEPS, MOVES)
+        best = pattern_search(at, np.array(whole.scaled(values)) / units, first, STEPS, MOVES)
         settled = dict(zip(start, best.values, strict=True))
         found = {
-            one: tuple(settled[knob.key, knob.part] for knob in one.knobs) for one in model.found
+            one: tuple(settled[each.key, each.part] for each in one.parameters)
+            for one in model.found
         }
         return Model(model.base, found, best.named("all keys together"))
 
@@ -193,7 +194,7 @@ def enough_seeds(
 
 def keys(candidate: Candidate) -> frozenset[str]:
     """Return the keys that a candidate fits, or sets where it fits none."""
-    fitted = {f"{knob.key}/{knob.part}" for knob in candidate.knobs}
+    fitted = {f"{parameter.key}/{parameter.part}" for parameter in candidate.parameters}
     return frozenset(fitted or {key for key, _ in candidate.extra})
 
 
@@ -201,10 +202,10 @@ def _score_of(tried: Added) -> float:
     return tried.score
 
 
-def _outer(knobs: Sequence[Knob], place: Place) -> tuple[float, ...]:
-    return tuple(knob.outer(inner) for knob, inner in zip(knobs, place, strict=True))
+def _outer(parameters: Sequence[FitParameter], place: Place) -> tuple[float, ...]:
+    return tuple(one.value_at(at) for one, at in zip(parameters, place, strict=True))
 
 
-def _unit(knob: Knob, value: float) -> float:
-    """Return what counts as one on a knob's scale: a factor of e, or the value itself."""
-    return 1.0 if knob.log else max(abs(knob.inner(value)), 1.0)
+def _unit(parameter: FitParameter, value: float) -> float:
+    """Return what counts as one on a parameter's scale: a factor of e, or the value itself."""
+    return 1.0 if parameter.log else max(abs(parameter.scaled(value)), 1.0)

@@ -15,9 +15,9 @@ from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.fitting.instants import Instants, Kept, events_of, is_made_once
 from adv2e.diagnosis.fitting.nuisances import match_totals, totals, with_thresholds
-from adv2e.diagnosis.hints.pulses import Pulse, has_pulse, pulse_of
+from adv2e.diagnosis.hints.readouts import Pulse, has_pulse, pulse_of
+from adv2e.diagnosis.simulation.frames import FrameCache, Instants, events_of, is_made_once
 from adv2e.events import Events
 from adv2e.light.decoding import decoder_for
 from adv2e.pixel.steps import Coarseness
@@ -82,7 +82,7 @@ class Bench:
     """Simulates a recording with configurations.
 
     In-between frames along the motion take longer than all else, so they are made once for what
-    they depend on (:mod:`adv2e.diagnosis.fitting.instants`).
+    they depend on (:mod:`adv2e.diagnosis.simulation.frames`).
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class Bench:
     def __init__(self, real: Real, threads: int | None, declared: Config | None = None) -> None:
         self.real, self.threads = real, threads
         self._stays = declared is not None and has_pulse(declared)
-        self._frames = Kept()
+        self._frames = FrameCache()
         self.simulations = 0
 
     @cached_property

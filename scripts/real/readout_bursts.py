@@ -21,7 +21,7 @@ import numpy as np
 from writing import one_line_errors, table
 
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.hints.pulses import Pulse, pulse_of
+from adv2e.diagnosis.hints.readouts import Pulse, pulse_of
 from adv2e.errors import DataError
 from adv2e.formats.reading import read_recording
 

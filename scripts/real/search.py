@@ -117,8 +117,8 @@ class Search:
 
         What made noise of its own in still pixels once is not tried again.
         """
-        probes = ((one, values) for one in candidates for values in one.probes)
-        quiet = (probe for probe in probes if probe not in self._noisy)
+        starts = ((one, values) for one in candidates for values in one.starts)
+        quiet = (start for start in starts if start not in self._noisy)
         tried = self._fit.ranked(quiet, here.config)
         noisier = [one for one in tried if one.noisier(here, self._measured_hz)]
         fair = [one for one in tried if one not in noisier]
@@ -139,7 +139,7 @@ class Search:
 
     def _replacements(self, group: Sequence[Candidate], model: Model) -> Steps:
         """Yield the model with others of a group in the place of an effect, if that is nearer."""
-        for one in [one for one in model.found if one.knobs]:
+        for one in [one for one in model.found if one.parameters]:
             others = [other for other in group if not keys(other) <= keys(one)]
             self._say(f"  {model.here.score:.4f}; what takes the place of {one.name}?")
             without = self._fit.without(model, one)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adv2e.config import Config
-from adv2e.diagnosis.fitting.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.diagnosis.fitting.library import library
 from adv2e.diagnosis.hints.collect import Hints
-from adv2e.diagnosis.hints.pulses import Pulse
+from adv2e.diagnosis.hints.readouts import Pulse
 
 NOISE_HZ = 0.1
 NOISES = ("leak", "photo_leak", "shot_noise", "photoreceptor_noise", "hot_pixels")
@@ -33,7 +33,7 @@ OWN = (
     Candidate("initial_reference", (), ((),), (("pixel.initial_reference", "random"),)),
     Candidate(
         "log_response",
-        (Knob("pixel.log_response.linear_below", 1.01, 100.0),),
+        (FitParameter("pixel.log_response.linear_below", 1.01, 100.0),),
         ((2.72,), (10.0,), (40.0,)),
         (("pixel.log_response.floor", 0.5),),
     ),
@@ -43,8 +43,8 @@ OWN = (
 CLIPPED_BLACK = Candidate(
     "clipped_black",
     (
-        Knob("frames.black_level_dn", 0.02, 100.0),
-        Knob("frames.black_depth_dn", 0.01, 100.0),
+        FitParameter("frames.black_level_dn", 0.02, 100.0),
+        FitParameter("frames.black_depth_dn", 0.01, 100.0),
     ),
     ((9.0, 3.0), (14.0, 5.0)),
 )
@@ -106,9 +106,9 @@ class Added:
     Attributes
     ----------
     candidate : Candidate
-        What was added; without knobs where no key is to be told.
+        What was added; without parameters where no key is to be told.
     values : tuple of float
-        Of its knobs.
+        Of its parameters.
     config : Config
         The model, its thresholds matched.
     score : float
@@ -144,7 +144,7 @@ class Added:
 
     def text(self) -> str:
         """Return name and values."""
-        keys = self.candidate.told(self.config, self.candidate.inner(self.values))
+        keys = self.candidate.settings_in(self.config, self.candidate.scaled(self.values))
         named = ((key.rpartition(".")[2], value) for key, value in keys.items())
         values = ", ".join(f"{key} {_short(value)}" for key, value in named)
         return f"{self.candidate.name}{f' ({values})' if values else ''}"

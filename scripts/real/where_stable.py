@@ -11,7 +11,7 @@ from writing import table
 from adv2e.comparison.floor import half_split
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
-from adv2e.diagnosis.hints.readouts import without_coupling
+from adv2e.diagnosis.configurations import without_coupling
 from adv2e.events import Events
 from real.model import SCORE, Bench
 from real.stability import LINES, MOST, Stability, compare_halved

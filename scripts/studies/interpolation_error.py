@@ -29,17 +29,20 @@ from numpy.typing import NDArray
 from writing import table
 
 from adv2e.config import Config, load_config
+from adv2e.diagnosis.configurations import with_keys
 from adv2e.diagnosis.data.evidence import Evidence, read_evidence
-from adv2e.diagnosis.data.light import scene_of
-from adv2e.diagnosis.data.scene import Placed
+from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.fitting.keys import with_keys
-from adv2e.diagnosis.fitting.simulations import Simulator
-from adv2e.diagnosis.statistics import BOTH, Markers
-from adv2e.diagnosis.statistics.frame_error import FrameError
-from adv2e.diagnosis.statistics.interpolation import between_frames, every
+from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.diagnosis.statistics.metric import compressed
-from adv2e.diagnosis.statistics.pilot import COUNT, Pilot
+from adv2e.diagnosis.statistics.summary import BOTH, SummaryStatistics
+from adv2e.diagnosis.statistics.uncertainty import (
+    PILOT_SEEDS,
+    FrameError,
+    Pilot,
+    between_frames,
+    every,
+)
 from studies.verdicts.camera import camera
 from studies.verdicts.cases import SCENES
 from studies.verdicts.options import Names, sampling
@@ -108,20 +111,20 @@ def row_of(
     threads: int,
 ) -> Row:
     """Return what frames at one rate make of the statistics."""
-    scene = scene_of(evidence, config)
+    scene = Scene.of_evidence(evidence, config)
     drawn = streams(evidence, config, threads)
-    pilot = {seed: drawn[seed] for seed in list(drawn)[:COUNT]}
-    markers = Markers(scene, [Placed.of(stream, scene) for stream in pilot.values()])
+    pilot = {seed: drawn[seed] for seed in list(drawn)[: len(PILOT_SEEDS)]}
+    statistics = SummaryStatistics(scene, list(pilot.values()))
     expected = between_frames(
-        Pilot(evidence, config, scene, markers, pilot, lambda fewer: Simulator(fewer, threads))
+        Pilot(evidence, config, statistics, pilot, lambda fewer: Simulator(fewer, threads))
     )
     if expected is None:
         raise click.UsageError(f"too few frames in so short a scene at {fps:.4g} a second")
 
     def measured(made: dict[int, Stream]) -> Any:
-        return np.array([markers.measure(Placed.of(one, scene))[BOTH] for one in made.values()])
+        return statistics.sample(made.values())[:, BOTH]
 
-    return compared(kind, fps, measured(drawn), measured(all_frames), expected, markers.least)
+    return compared(kind, fps, measured(drawn), measured(all_frames), expected, statistics.least)
 
 
 def compared(

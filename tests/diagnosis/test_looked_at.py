@@ -7,12 +7,12 @@ import pytest
 
 from adv2e import simulate
 from adv2e.config import load_config
-from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.splits import Parts
+from adv2e.diagnosis.data.splits import Split
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.fitting.simulations import Simulator
-from adv2e.diagnosis.prepare import make_ready
+from adv2e.diagnosis.prepare import prepare
+from adv2e.diagnosis.simulation.simulator import Simulator
 
 WIDTH, HEIGHT, COUNT = 32, 24, 25
 TIMES_S = 0.02 * np.arange(COUNT)
@@ -29,7 +29,7 @@ def recording(part):
         for k in range(COUNT)
     ]
     stream = Stream.of(np.concatenate(list(simulate(frames, TIMES_S, CONFIG))), WIDTH, HEIGHT)
-    division = Parts.of(WIDTH, HEIGHT, 0.0, 1e6 * TIMES_S[-1])
+    division = Split.of(WIDTH, HEIGHT, 0.0, 1e6 * TIMES_S[-1])
     t, pixel, on = [stream.t], [stream.pixel], [stream.on]
     for frame_us in (1e6 * TIMES_S[:-1]).astype(np.int64).tolist():
         segment = division.segment_of(np.array([frame_us]))[0]
@@ -46,19 +46,19 @@ def recording(part):
     return Evidence("made up", frames, TIMES_S, kept, WIDTH, HEIGHT)
 
 
-@pytest.mark.parametrize(("part", "seen"), [(parts.FIT, True), (parts.LAST, False)])
+@pytest.mark.parametrize(("part", "seen"), [(splits.TRAIN, True), (splits.TEST, False)])
 def test_bursts_are_looked_for_before_the_last_look(part, seen):
     evidence = recording(part)
     with closing(Simulator(evidence, 2)) as simulator:
-        ready = make_ready(evidence, CONFIG, simulator, [], False, lambda line: None)
-    assert any("come at once" in note for note in ready.evidence.notes) is seen
-    found = [one for one in ready.candidates if one.name == "frame_coupling"]
+        prepared = prepare(evidence, CONFIG, simulator, [], False, lambda line: None)
+    assert any("come at once" in note for note in prepared.evidence.notes) is seen
+    found = [one for one in prepared.candidates if one.name == "frame_coupling"]
     assert all(bool(one.pulse) is seen for one in found)
 
 
 def test_a_pulse_that_is_declared_is_not_told():
-    evidence = recording(parts.FIT)
+    evidence = recording(splits.TRAIN)
     declared = load_config(["ideal"], ["sampling.L=1", PULSE])
     with closing(Simulator(evidence, 2)) as simulator:
-        ready = make_ready(evidence, declared, simulator, [], False, lambda line: None)
-    assert not any("come at once" in note for note in ready.evidence.notes)
+        prepared = prepare(evidence, declared, simulator, [], False, lambda line: None)
+    assert not any("come at once" in note for note in prepared.evidence.notes)

@@ -12,8 +12,8 @@ from adv2e import load_config, simulate
 from adv2e.config import Config, from_dict, to_annotated_yaml, to_dict, to_yaml
 from adv2e.config.active_effects import active_hooks
 from adv2e.config.own_effects import load_effects
+from adv2e.diagnosis.configurations import as_found, own_of, without_user_effects
 from adv2e.diagnosis.fitting.library import library, names
-from adv2e.diagnosis.fitting.own_effects import as_found, own_of, without_user_effects
 from adv2e.diagnosis.hints.collect import Hints
 from adv2e.errors import ConfigError
 from adv2e.reports.keys import meaning_of, summary_of, unit_of
@@ -185,10 +185,10 @@ def test_each_number_of_a_list_is_fitted_by_itself(load):
     effects = load(fitted("tuple[float, float, float]"))
     declared = load_config((), ["user.a=null"], effects=effects)
     (one,) = (one for one in library(declared, HINTS) if one.name == "a")
-    assert [knob.part for knob in one.knobs] == [(0, 3), (1, 3), (2, 3)]
-    assert one.probes[0] == (3.0, 3.0, 3.0)
-    assert len(one.probes) == 7
-    assert one.applied(declared, one.inner((1.5, 2.5, 9.0))).user.a.depth == (1.5, 2.5, 9.0)
+    assert [parameter.part for parameter in one.parameters] == [(0, 3), (1, 3), (2, 3)]
+    assert one.starts[0] == (3.0, 3.0, 3.0)
+    assert len(one.starts) == 7
+    assert one.applied(declared, one.scaled((1.5, 2.5, 9.0))).user.a.depth == (1.5, 2.5, 9.0)
 
 
 def test_two_of_one_name_are_an_error(load):

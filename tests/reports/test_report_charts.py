@@ -12,12 +12,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from made_up_diagnosis import everything, strange
 
-from adv2e.diagnosis.outcome.report.sensor_map import (
+from adv2e.diagnosis.outcome.sensor_map import (
     colour_bar,
     colours,
     map_image,
-    reduced,
-    reduction,
 )
 from adv2e.reports.charts import paths
 from adv2e.reports.charts.axes import Axis, axis_over, drawable
@@ -246,21 +244,10 @@ def test_maps_of_narrow_sensors_are_no_larger_than_others(shape):
     assert max(shown.shape) <= 900
 
 
-def test_large_maps_are_averaged():
-    values = np.full((4, 1000), 2.0)
-    values[:2, :3] = [[1, 2, NAN], [NAN, NAN, NAN]]
-    side = reduction(values)
-    assert side == 3
-    means = reduced(values, side)
-    assert means.shape == (2, 334)
-    assert means[0, 0] == np.mean([1, 2, 2, 2, 2])
-    assert means[1, 333] == 2.0
-    assert reduction(np.zeros((260, 346))) == 1
-    np.testing.assert_array_equal(reduced(np.full((4, 4), NAN), 2), np.full((2, 2), NAN))
-
-
-def test_the_colour_bar_names_its_ends():
-    assert {"≤ -5", "0", "≥ +5", "masked"} <= set(re.findall(r">([^<>]+)</text>", colour_bar()))
+def test_the_colour_bar_goes_from_end_to_end():
+    shown = picture(colour_bar())
+    assert [*map(tuple, shown[0, [0, -1]].tolist())] == [(5, 48, 97), (103, 0, 31)]
+    assert "-5 to +5 standard deviations" in colour_bar()
 
 
 def test_a_curve_without_numbers_says_so():

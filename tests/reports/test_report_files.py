@@ -11,8 +11,7 @@ from made_up_diagnosis import MODEL, everything, nothing, strange
 
 from adv2e.config import from_dict, load_config
 from adv2e.config.yaml12 import Origin, parse
-from adv2e.diagnosis.outcome.report import write_reports
-from adv2e.diagnosis.outcome.report.page import WORDING
+from adv2e.diagnosis.outcome.report import WORDING, write_reports
 from adv2e.diagnosis.tables import report as characterisation_report
 from adv2e.errors import OutputError
 from adv2e.reports import files
@@ -220,9 +219,9 @@ def test_the_summary_of_random_events_says_how_far_their_mean_is():
 
 
 def test_the_summary_ends_with_what_may_be_wrong_with_the_recording():
-    doubts = ["no frames from 0.1 to 0.2 s", "ON events come where the light falls", "a third"]
-    lines = summary_text(replace(everything(), doubts=doubts)).splitlines()
-    assert lines[-2:] == [f"note: {doubt}" for doubt in doubts[:2]]
+    checks = ["no frames from 0.1 to 0.2 s", "ON events come where the light falls", "a third"]
+    lines = summary_text(replace(everything(), input_checks=checks)).splitlines()
+    assert lines[-2:] == [f"note: {line}" for line in checks[:2]]
 
 
 def test_long_intervals_are_not_cut_off():

@@ -6,7 +6,7 @@ import math
 import pytest
 from made_up_diagnosis import HOSTILE, everything, nothing, strange
 
-from adv2e.diagnosis.outcome.report.page import WORDING
+from adv2e.diagnosis.outcome.report import WORDING
 from adv2e.diagnosis.tables import report as characterisation_report
 from adv2e.reports.record import record, record_text
 

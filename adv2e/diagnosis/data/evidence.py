@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,43 +10,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.config import Config
 from adv2e.diagnosis.data.stream import Stream
+from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.formats.reading import read_recording
+from adv2e.light.decoding import decoder_for
 from adv2e.reports.result import Masked
 
 LEAST_EVENTS = 1000
 """Below that nothing can be told."""
-
-_UNCOVERED = 10.0
-"""A pause at an end that is longer than the longest within by this factor is no pause."""
-
-
 RUN_IN_S = 0.5
 """Of what pixels saw before, this much is simulated [s]: by then most have fired, and forgotten."""
 _RUN_IN_SHARE = 0.5
 """And no more than this share of what is looked at."""
+_UNCOVERED = 10.0
+"""A pause at an end that is longer than the longest within by this factor is no pause."""
 
 
 @dataclass(frozen=True)
 class RunIn:
-    """Frames before the first that is looked at: pixels saw them, and have left their first state.
-
-    Attributes
-    ----------
-    frames : list of (rows, columns[, 3]) arrays
-    times_s : (frames,)
-    """
+    """Frames before the first that is looked at, with their times [s]: pixels saw them."""
 
     frames: list[NDArray[Any]] = field(default_factory=list)
     times_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def seconds(self) -> float:
-        """Time from its first frame to its last."""
-        return float(self.times_s[-1] - self.times_s[0]) if len(self.times_s) else 0.0
 
 
 @dataclass(frozen=True)
@@ -112,6 +101,24 @@ class Evidence:
             run_in=RunIn(),
         )
 
+    def _decoder(self, declared: Config) -> LightDecoder:
+        image, auto = self.frames[0], self.encoding
+        is_colour = image.ndim == 3
+        return decoder_for(declared.frames, image.dtype, is_colour, auto=auto, white=self.white)
+
+    def lights(self, declared: Config) -> Iterator[NDArray[Any]]:
+        """Yield the light of each frame [DN], (rows, columns), as a model reads their numbers."""
+        yield from map(self._decoder(declared).decode, self.frames)
+
+    def light(self, declared: Config) -> NDArray[np.float32]:
+        """Return the light of all frames [DN], (frames, rows, columns)."""
+        return np.array(list(self.lights(declared)), np.float32)
+
+    def quantum_dn(self, declared: Config) -> float:
+        """Return the step of the frames' numbers [DN]; zero for floating-point frames."""
+        decoder = self._decoder(declared)
+        return 255.0 / decoder.full_scale if np.issubdtype(decoder.dtype, np.integer) else 0.0
+
     def with_frames(self, changed: Callable[[NDArray[Any]], NDArray[Any]]) -> Evidence:
         """Return the recording with all frames changed, those of the run-in as well."""
         before = replace(self.run_in, frames=[changed(one) for one in self.run_in.frames])
@@ -169,7 +176,9 @@ def read_evidence(path: str | Path, time_unit: str | None = None) -> Evidence:
             f"{path}: frames have {width}x{height} pixels, events {recording.width}x"
             f"{recording.height}"
         )
-    kept, masked = _between_frames(recording.events, times_s)
+    times_us = recording.events["t"]
+    inside = (times_us >= times_s[0] * 1e6) & (times_us < times_s[-1] * 1e6)
+    kept = recording.events[inside]
     if len(recording.events) and not len(kept):
         spans = (recording.events["t"][[0, -1]] * 1e-6).tolist(), times_s[[0, -1]].tolist()
         events, pictures = (f"{first:.3f} to {last:.3f} s" for first, last in spans)
@@ -177,6 +186,8 @@ def read_evidence(path: str | Path, time_unit: str | None = None) -> Evidence:
             f"{path}: events come from {events}, frames from {pictures}: they must be on one clock"
         )
     check_events(len(kept), path, "between its first and its last frame")
+    lost = 1.0 - len(kept) / len(inside)
+    masked = [Masked("events before the first frame or after the last", lost)] if lost else []
     whole = Evidence(
         name=shown(path),
         frames=frames,
@@ -192,8 +203,10 @@ def read_evidence(path: str | Path, time_unit: str | None = None) -> Evidence:
     first, last = _covered(kept, times_s)
     if (first, last) == (0, len(frames) - 1):
         return whole
-    covered = whole.during(first, last)
-    return replace(covered, masked=[*masked, _uncovered(times_s, covered.times_s)])
+    ends = (times_s[first] - times_s[0], "first"), (times_s[-1] - times_s[last], "last")
+    which = " and ".join(f"{time:.3g} s at the {end} frames" for time, end in ends if time > 0.0)
+    uncovered = Masked(f"{which}, which the events do not cover", 0.0)
+    return replace(whole.during(first, last), masked=[*masked, uncovered])
 
 
 def _check_alike(path: str | Path, frames: list[NDArray[Any]]) -> None:
@@ -214,22 +227,9 @@ def _form(frame: NDArray[Any]) -> str:
 
 
 def check_events(number: int, name: object, where: str) -> None:
-    """Refuse to diagnose fewer events than statistics can be made of.
-
-    Raises
-    ------
-    DataError
-    """
+    """Raise DataError for fewer events than statistics can be made of."""
     if number < LEAST_EVENTS:
         raise DataError(f"{name}: {number} events {where}; at least {LEAST_EVENTS} are needed")
-
-
-def _between_frames(events: Events, times_s: NDArray[np.float64]) -> tuple[Events, list[Masked]]:
-    first, last = times_s[0] * 1e6, times_s[-1] * 1e6
-    inside = (events["t"] >= first) & (events["t"] < last)
-    lost = 1.0 - float(np.count_nonzero(inside)) / max(1, len(events))
-    masked = [Masked("events before the first frame or after the last", lost)] if lost else []
-    return events[inside], masked
 
 
 def _covered(events: Events, times_s: NDArray[np.float64]) -> tuple[int, int]:
@@ -238,8 +238,6 @@ def _covered(events: Events, times_s: NDArray[np.float64]) -> tuple[int, int]:
     Streams are often cut, or begin late; what no event was kept of did not happen without any.
     """
     everything = 0, len(times_s) - 1
-    if len(events) < 2:
-        return everything
     t_s = events["t"] * 1e-6
     usual = max(_UNCOVERED * float(np.diff(t_s).max()), 2.0 * float(np.diff(times_s).max()))
     first, last = everything
@@ -248,10 +246,3 @@ def _covered(events: Events, times_s: NDArray[np.float64]) -> tuple[int, int]:
     if times_s[-1] - t_s[-1] > usual:
         last = int(np.searchsorted(times_s, t_s[-1]))
     return (first, last) if last - first >= 2 else everything
-
-
-def _uncovered(whole_s: NDArray[np.float64], kept_s: NDArray[np.float64]) -> Masked:
-    before, after = kept_s[0] - whole_s[0], whole_s[-1] - kept_s[-1]
-    ends = ((before, "first"), (after, "last"))
-    which = " and ".join(f"{time:.3g} s at the {end} frames" for time, end in ends if time > 0.0)
-    return Masked(f"{which}, which the events do not cover", 0.0)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.scene import Placed, Scene
 
+_WHITE_DN = 255.0
 _DIM = 0.01
 """Share of white that the brightest light of frames has at least."""
 _GAP = 5.0
@@ -21,30 +22,20 @@ _MIRRORED = 0.25
 """By how much better they go with mirrored light."""
 
 
-def doubts_of(
-    measured: Placed, scene: Scene, light: NDArray[np.float32], white: float = 255.0
-) -> list[str]:
+def check_inputs(measured: Placed, scene: Scene, light: NDArray[np.float32]) -> list[str]:
     """Return what may be wrong with a recording, a line each.
 
-    Parameters
-    ----------
-    measured : Placed
-        Its events.
-    scene : Scene
-    light : (frames, rows, columns)
-        Of its frames [DN].
-    white : float
-        [DN]
+    By its events, and the light of its frames [DN], (frames, rows, columns).
     """
     found = [
-        _brightness(light, white), *_gaps(scene.times_us), *_unseen(measured, scene),
+        _brightness(light), *_gaps(scene.times_us), *_unseen(measured, scene),
         _direction(measured, scene),
     ]  # fmt: skip
     return [line for line in found if line]
 
 
-def _brightness(light: NDArray[np.float32], white: float) -> str:
-    brightest = float(light.max()) / white
+def _brightness(light: NDArray[np.float32]) -> str:
+    brightest = float(light.max()) / _WHITE_DN
     if np.all(light == light[0]):
         return "the frames are all the same: nothing that moves can be simulated from them"
     if brightest < _DIM:

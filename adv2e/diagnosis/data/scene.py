@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.data.splits import Parts
+from adv2e.config import Config
+from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.data.splits import Split
 from adv2e.diagnosis.data.stream import Stream
 
 STILL = 0
@@ -33,7 +35,7 @@ class Scene:
         0: still for a while; 1 to 3: thirds of what moves.
     brightness : (frames - 1, pixels) uint8
         Thirds of what moves.
-    parts : Parts
+    split : Split
     width, height : int
     """
 
@@ -41,7 +43,7 @@ class Scene:
     slope: NDArray[np.float32]
     speed: NDArray[np.uint8]
     brightness: NDArray[np.uint8]
-    parts: Parts
+    split: Split
     width: int
     height: int
 
@@ -49,15 +51,9 @@ class Scene:
     def of(
         cls, light: NDArray[np.float32], times_s: NDArray[np.float64], quantum_dn: float
     ) -> Scene:
-        """Return the scene of frames.
+        """Return the scene of frames: their light [DN], (frames, rows, columns), and times.
 
-        Parameters
-        ----------
-        light : (frames, rows, columns)
-            [DN]
-        times_s : (frames,)
-        quantum_dn : float
-            Step of the frames' numbers [DN], below which a change means nothing.
+        `quantum_dn`: step of the frames' numbers [DN], below which a change means nothing.
         """
         frames, height, width = light.shape
         floor = max(quantum_dn, 0.1)
@@ -68,8 +64,14 @@ class Scene:
         speed, weight = _speeds(slope, seconds, np.maximum(STILL_PER_S, uncertain))
         edges = _weighted_quantiles(x[1:], weight, BRIGHTNESSES)
         brightness = np.digitize(x[1:], edges).astype(np.uint8)
-        parts = Parts.of(width, height, times_s[0] * 1e6, times_s[-1] * 1e6)
-        return cls(times_s * 1e6, slope, speed, brightness, parts, width, height)
+        split = Split.of(width, height, times_s[0] * 1e6, times_s[-1] * 1e6)
+        return cls(times_s * 1e6, slope, speed, brightness, split, width, height)
+
+    @classmethod
+    def of_evidence(cls, evidence: Evidence, declared: Config) -> Scene:
+        """Return the scene of a recording's frames, as the declared model reads them."""
+        light, quantum_dn = evidence.light(declared), evidence.quantum_dn(declared)
+        return cls.of(light, evidence.times_s, quantum_dn)
 
     @property
     def intervals(self) -> int:
@@ -132,19 +134,9 @@ def _weighted_quantiles(
 
 @dataclass(frozen=True)
 class Placed:
-    """A stream, and where each of its events lies in the scene.
+    """A stream, and where each of its events lies in the scene, (n,).
 
-    Attributes
-    ----------
-    stream : Stream
-    interval : (n,)
-        Frame interval.
-    segment : (n,)
-        Segment of time.
-    part : (n,)
-        Part of the data.
-    speed, brightness : (n,)
-        Classes.
+    Frame interval, segment of time, part of the data, and classes of speed and brightness.
     """
 
     stream: Stream
@@ -158,13 +150,13 @@ class Placed:
     def of(cls, stream: Stream, scene: Scene) -> Placed:
         """Find the events of `stream` in `scene`."""
         interval = scene.interval_of(stream.t)
-        segment = scene.parts.segment_of(stream.t)
+        segment = scene.split.segment_of(stream.t)
         pixel = stream.pixel
         return cls(
             stream=stream,
             interval=interval,
             segment=segment,
-            part=scene.parts.label[segment, pixel].astype(np.int64),
+            part=scene.split.label[segment, pixel].astype(np.int64),
             speed=scene.speed[interval, pixel].astype(np.int64),
             brightness=scene.brightness[interval, pixel].astype(np.int64),
         )

@@ -12,17 +12,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FIT, JUDGE, LAST = 0, 1, 2
+from adv2e.diagnosis.data.stream import Stream
+
+TRAIN, VALIDATION, TEST = 0, 1, 2
 COUNT = 3
-NAMES = ("fit", "judge", "last look")
+NAMES = ("train", "validation", "test")
 
 _TILE = 8
 _SEGMENTS = 4
-_PATTERN = np.array([FIT, JUDGE, FIT, LAST], np.int8)
+_PATTERN = np.array([TRAIN, VALIDATION, TRAIN, TEST], np.int8)
 
 
 @dataclass(frozen=True)
-class Parts:
+class Split:
     """Which part each pixel belongs to in each segment of time.
 
     Attributes
@@ -36,7 +38,7 @@ class Parts:
     label: NDArray[np.int8]
 
     @classmethod
-    def of(cls, width: int, height: int, start_us: float, stop_us: float) -> Parts:
+    def of(cls, width: int, height: int, start_us: float, stop_us: float) -> Split:
         """Return the division of a recording."""
         size = max(1, min(_TILE, width // 4, height // 4))
         y, x = np.mgrid[:height, :width] // size
@@ -51,9 +53,14 @@ class Parts:
         return len(self.label)
 
     def segment_of(self, t: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the segment of each time [us]."""
+        """Return the segment of each of sorted times [us]."""
         inner = np.searchsorted(t, self.borders_us[1:-1])  # sorted: few searches, not many
         return np.repeat(np.arange(self.segments), np.diff(np.r_[0, inner, len(t)]))
+
+    def chosen(self, stream: Stream, *parts: int) -> Stream:
+        """Return the events of one part of the data, or of several."""
+        label = self.label[self.segment_of(stream.t), stream.pixel]
+        return stream.chosen(np.isin(label, parts))
 
     def share(self, part: int) -> float:
         """Return the share of pixels and time that a part has."""
@@ -64,5 +71,5 @@ class Parts:
         shares = ", ".join(f"{name} {self.share(k):.0%}" for k, name in enumerate(NAMES))
         return (
             f"tiles of pixels crossed with {self.segments} segments of time, pixels and time shared"
-            f" out as: {shares}; the last part was looked at once, at the end"
+            f" out as: {shares}; the test data were looked at once, at the end"
         )

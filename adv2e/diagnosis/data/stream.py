@@ -1,9 +1,10 @@
-"""Events in the form that the marker statistics read, with each event's predecessor."""
+"""Events in the form that statistics read, with each event's predecessor."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,11 +44,10 @@ class Stream:
 
     def between(self, start_us: float, stop_us: float) -> Stream:
         """Return the events of a span of time."""
-        lo, hi = np.searchsorted(self.t, [start_us, stop_us])
-        return Stream(self.t[lo:hi], self.pixel[lo:hi], self.on[lo:hi], self.width, self.height)
+        return self.chosen(slice(*np.searchsorted(self.t, [start_us, stop_us])))
 
-    def chosen(self, which: NDArray[np.bool_]) -> Stream:
-        """Return some of the events."""
+    def chosen(self, which: Any) -> Stream:
+        """Return some of the events, chosen by a mask, a slice or indices."""
         return Stream(self.t[which], self.pixel[which], self.on[which], self.width, self.height)
 
     def events(self) -> Events:
@@ -65,25 +65,21 @@ class Stream:
         return np.argsort(self.pixel.astype(np.uint16) if small else self.pixel, kind="stable")
 
     @cached_property
+    def _before(self) -> NDArray[np.int64]:
+        """Index of the event before each in its pixel; its own where there is none."""
+        order, pixel = self.by_pixel, self.pixel[self.by_pixel]
+        before = np.arange(len(self))
+        same = pixel[1:] == pixel[:-1]
+        before[order[1:][same]] = order[:-1][same]
+        return before
+
+    @cached_property
     def since(self) -> NDArray[np.int64]:
         """Time since the event before it in its pixel [us]; -1: there is none."""
-        order = self.by_pixel
-        t, pixel = self.t[order], self.pixel[order]
-        gap = np.full(len(self), -1, np.int64)
-        same = pixel[1:] == pixel[:-1]
-        gap[1:][same] = (t[1:] - t[:-1])[same]
-        result = np.empty_like(gap)
-        result[order] = gap
-        return result
+        none = self._before == np.arange(len(self))
+        return np.where(none, -1, self.t - self.t[self._before])
 
     @cached_property
     def on_before(self) -> NDArray[np.int8]:
         """Polarity of the event before it in its pixel; where there is none, its own."""
-        order = self.by_pixel
-        on, pixel = self.on[order], self.pixel[order]
-        before = on.copy()
-        same = pixel[1:] == pixel[:-1]
-        before[1:][same] = on[:-1][same]
-        result = np.empty_like(before)
-        result[order] = before
-        return result
+        return self.on[self._before]

@@ -1,4 +1,4 @@
-"""A candidate: an effect that may be missing, as knobs on a configuration."""
+"""A candidate: an effect that may be missing, as parameters of a configuration that are fitted."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config, to_dict
 from adv2e.config.paths import flat, get_key, set_key
-from adv2e.diagnosis.fitting.keys import from_values
-from adv2e.diagnosis.hints.pulses import Pulse
-from adv2e.diagnosis.hints.readouts import Readouts
+from adv2e.diagnosis.configurations import from_values
+from adv2e.diagnosis.hints.readouts import Pulse, Readouts
 
-Places = Sequence[float] | NDArray[np.float64]
-"""A place on each knob's scale."""
+Point = Sequence[float] | NDArray[np.float64]
+"""A number on the scale of each parameter."""
 
 
 @dataclass(frozen=True)
-class Knob:
+class FitParameter:
     """One number that is fitted, and the key that it sets.
 
     Attributes
@@ -32,7 +31,7 @@ class Knob:
     log : bool
         Fitted as its logarithm.
     scale : float
-        Change that counts as one, for knobs that are fitted as they are.
+        Change that counts as one, for numbers that are fitted as they are.
     part : (int, int), optional
         Place in a key that is a list, and how many numbers that has.
     text : str
@@ -53,24 +52,36 @@ class Knob:
     neutral: float | None = None
     of_pixels: bool = False
 
-    def inner(self, value: float) -> float:
+    def scaled(self, value: float) -> float:
         """Return where on the fitted scale `value` is."""
         return math.log(value) if self.log else value / self.scale
 
-    def outer(self, inner: float) -> float:
-        """Return the value at a place on the fitted scale, kept in the physical range."""
-        value = math.exp(min(inner, 60.0)) if self.log else inner * self.scale
+    def value_at(self, scaled: float) -> float:
+        """Return the value at a number on the fitted scale, kept in the physical range."""
+        value = math.exp(min(scaled, 60.0)) if self.log else scaled * self.scale
         return float(min(max(value, self.low), self.high))
 
-    def at_border(self, inner: float) -> bool:
+    def at_border(self, scaled: float) -> bool:
         """Tell whether the fit has run to the end of the physical range."""
-        value = self.outer(inner)
+        value = self.value_at(scaled)
         low, high = 1e-9 * abs(self.low), 1e-9 * abs(self.high)
         return value <= self.low + low or value >= self.high - high
 
+    def set(self, values: dict[str, Any], value: float) -> None:
+        """Set the key in nested mappings."""
+        held: Any = value
+        if self.text:
+            held = self.text.format(f"{value:.6g}")
+        elif self.part is not None:
+            place, count = self.part
+            held = get_key(values, self.key)
+            held = list(held) if isinstance(held, (list, tuple)) else [0.0] * count
+            held[place] = value
+        set_key(values, self.key, held)
+
 
 NOTHING_KNOWN = (0.0, math.inf)
-"""Of a knob, besides what statistics tell: place and deviation."""
+"""Of a parameter, besides what statistics tell: where on its scale, and standard deviation."""
 
 FITTED = 0.02
 """Share of the residual that a fit may leave."""
@@ -83,8 +94,8 @@ class Candidate:
     Attributes
     ----------
     name : str
-    knobs : tuple of Knob
-    probes : tuple of tuple of float
+    parameters : tuple of FitParameter
+    starts : tuple of tuple of float
         Values from which the fit may start.
     extra : tuple of (str, value)
         Keys that are set besides, and not fitted.
@@ -94,8 +105,8 @@ class Candidate:
         Share of the residual that is put down to the fit where the model has this effect: more of
         those that undo what cannot be undone in full.
     known : tuple of (float, float)
-        Of each knob, where on its scale something else than the statistics says that it is, and its
-        standard deviation; none: nothing else tells.
+        Of each parameter, where on its scale something else than the statistics says that it is,
+        and its standard deviation; none: nothing else tells.
     readouts : Readouts, optional
         When frames were read out if this effect is there: of exposures that are fitted, only those
         which end then go with it, and no fit finds these from others.
@@ -108,8 +119,8 @@ class Candidate:
     """
 
     name: str
-    knobs: tuple[Knob, ...]
-    probes: tuple[tuple[float, ...], ...]
+    parameters: tuple[FitParameter, ...]
+    starts: tuple[tuple[float, ...], ...]
     extra: tuple[tuple[str, Any], ...] = ()
     defaults: tuple[tuple[str, Any], ...] = ()
     left: float = FITTED
@@ -120,27 +131,27 @@ class Candidate:
 
     @property
     def known_or_not(self) -> tuple[tuple[float, float], ...]:
-        """What is known of every knob besides, if only nothing."""
-        return self.known or (NOTHING_KNOWN,) * len(self.knobs)
+        """What is known of every parameter besides, if only nothing."""
+        return self.known or (NOTHING_KNOWN,) * len(self.parameters)
 
-    def inner(self, values: Sequence[float]) -> list[float]:
-        """Return where on the fitted scales values of the knobs are."""
-        return [knob.inner(value) for knob, value in zip(self.knobs, values, strict=True)]
+    def scaled(self, values: Sequence[float]) -> list[float]:
+        """Return where on the fitted scales values of the parameters are."""
+        return [one.scaled(value) for one, value in zip(self.parameters, values, strict=True)]
 
-    def applied(self, config: Config, inner: Places) -> Config:
+    def applied(self, config: Config, point: Point) -> Config:
         """Return `config` with this effect."""
         values = to_dict(config)
         for key, value in self.defaults:
             if get_key(values, key.rpartition(".")[0]) is None:
                 set_key(values, key, value)
-        applied = from_values(self._set(values, inner), self.name, config)
+        applied = from_values(self._set(values, point), self.name, config)
         return applied if self.pulse is None else self.pulse.placed(applied)
 
-    def parameters(self, inner: Places) -> dict[str, Any]:
+    def settings(self, point: Point) -> dict[str, Any]:
         """Return the keys that this effect sets, and their values."""
-        return dict(flat(self._set({}, inner)))
+        return dict(flat(self._set({}, point)))
 
-    def told(self, config: Config, inner: Places) -> dict[str, Any]:
+    def settings_in(self, config: Config, point: Point) -> dict[str, Any]:
         """Return the same of a model that has it: what was set besides, as it is there.
 
         Where a pulse is, others' keys tell, too.
@@ -148,29 +159,16 @@ class Candidate:
         besides, values = {key for key, _ in self.extra}, to_dict(config)
         return {
             key: get_key(values, key) if key in besides else value
-            for key, value in self.parameters(inner).items()
+            for key, value in self.settings(point).items()
         }
 
-    def _set(self, values: dict[str, Any], inner: Places) -> dict[str, Any]:
+    def _set(self, values: dict[str, Any], point: Point) -> dict[str, Any]:
         """Set this effect's keys in nested mappings, and return them."""
         for key, value in self.extra:
             set_key(values, key, value)
-        for knob, place in zip(self.knobs, inner, strict=True):
-            _turn(values, knob, knob.outer(place))
+        for one, scaled in zip(self.parameters, point, strict=True):
+            one.set(values, one.value_at(scaled))
         return values
-
-
-def _turn(values: dict[str, Any], knob: Knob, value: float) -> None:
-    if knob.text:
-        set_key(values, knob.key, knob.text.format(f"{value:.6g}"))
-    elif knob.part is not None:
-        place, count = knob.part
-        held = get_key(values, knob.key)
-        items = list(held) if isinstance(held, (list, tuple)) else [0.0] * count
-        items[place] = value
-        set_key(values, knob.key, items)
-    else:
-        set_key(values, knob.key, value)
 
 
 _OFF_AT_INFINITY = (
@@ -181,13 +179,13 @@ _OFF_AT_INFINITY = (
 )
 
 
-def neutral_value(config: Config, knob: Knob) -> float:
-    """Return the value of a knob at which `config` is as it was: what it holds, or nothing."""
-    if knob.neutral is not None:
-        return knob.neutral
-    held = get_key(to_dict(config), knob.key)
-    if knob.part is not None and isinstance(held, (list, tuple)):
-        held = held[knob.part[0]]
+def neutral_value(config: Config, parameter: FitParameter) -> float:
+    """Return the value of a parameter at which `config` is as it was: what it holds, or nothing."""
+    if parameter.neutral is not None:
+        return parameter.neutral
+    held = get_key(to_dict(config), parameter.key)
+    if parameter.part is not None and isinstance(held, (list, tuple)):
+        held = held[parameter.part[0]]
     if isinstance(held, (int, float)):
         return float(held)
-    return math.inf if knob.key in _OFF_AT_INFINITY else 0.0
+    return math.inf if parameter.key in _OFF_AT_INFINITY else 0.0

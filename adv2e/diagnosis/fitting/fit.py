@@ -1,4 +1,4 @@
-r"""Fitting a candidate's keys by simulation: damped Gauss-Newton steps on the marker statistics.
+r"""Fitting a candidate's keys by simulation: damped Gauss-Newton steps on the summary statistics.
 
 All simulations of one step share their seeds, so that most of chance falls out of the differences.
 What is left of it in a derivative :math:`J` does not cancel in :math:`J^T J`, where hundreds of
@@ -32,14 +32,14 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.fitting.candidates import Candidate
-from adv2e.diagnosis.fitting.simulations import Laboratory
 from adv2e.diagnosis.fitting.slope import Axes, Slope, gentler
 from adv2e.diagnosis.statistics.metric import Scale
+from adv2e.diagnosis.statistics.sampler import Sampler
 
 Array = NDArray[np.float64]
 
 WIDE, _NARROW = 0.8, 0.1
-"""Reach of the first derivative, and least of any, on the knobs' scales."""
+"""Reach of the first derivative, and least of any, on the scales of the parameters."""
 
 _NEAR = 2.0
 """Deviations; what is known from before a longer step is not taken into the mean."""
@@ -61,29 +61,29 @@ class Fitted:
     candidate : Candidate
     base : Config
         The model that the candidate is added to.
-    place : (knobs,)
-        Best place found, on the knobs' scales.
+    point : (parameters,)
+        Best point found, on the scales of the parameters.
     misfit : float
         Sum of squares there, as of the last step that was checked by it.
-    derivative : (knobs, statistics)
+    derivative : (parameters, statistics)
         The last one, of uncorrelated statistics.
-    normal : (knobs, knobs)
-        Of the last step, with what is known of the place besides.
-    covariance : (knobs, knobs)
-        Of the place; from the last step, as if statistics were as uncorrelated as they are taken
+    normal : (parameters, parameters)
+        Of the last step, with what is known of the point besides.
+    covariance : (parameters, parameters)
+        Of the point; from the last step, as if statistics were as uncorrelated as they are taken
         to be, until :meth:`Fitter.set_covariance` is called.
     reach : float
         Over which the next derivative is taken.
     damping : float
     moved : float
-        By the last step, at most, in deviations of the place.
+        By the last step, at most, in deviations of the point.
     simulations : int
-        That the place is told by.
+        That the point is told by.
     """
 
     candidate: Candidate
     base: Config
-    place: Array
+    point: Array
     misfit: float = np.inf
     derivative: NDArray[Any] = field(default_factory=lambda: np.zeros((0, 0)))
     normal: NDArray[Any] = field(default_factory=lambda: np.zeros((0, 0)))
@@ -95,108 +95,99 @@ class Fitted:
 
     @classmethod
     def at(cls, values: Sequence[float], candidate: Candidate, base: Config) -> Fitted:
-        """Return a fit that starts at values of the knobs, or the nearest that are physical."""
-        fit = cls(candidate, base, np.array(candidate.inner(values)))
-        fit.place = fit.inside(fit.place)
+        """Return a fit that starts at values of the keys, or the nearest that are physical."""
+        fit = cls(candidate, base, np.array(candidate.scaled(values)))
+        fit.point = fit.inside(fit.point)
         return fit
 
     @property
     def config(self) -> Config:
         """The model with the effect as fitted."""
-        return self.candidate.applied(self.base, self.place)
+        return self.at_point(self.point)
+
+    def at_point(self, point: Array) -> Config:
+        """Return the model with the effect at another point."""
+        return self.candidate.applied(self.base, point)
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def settings(self) -> dict[str, Any]:
         """The keys that the effect sets, and their values in that model."""
-        return self.candidate.told(self.config, self.place)
+        return self.candidate.settings_in(self.config, self.point)
 
-    def moved_to(self, place: Array) -> Config:
-        """Return the model with the effect at another place."""
-        return self.candidate.applied(self.base, place)
-
-    def inside(self, place: Array) -> Array:
-        """Return `place` within the physical ranges."""
-        knobs = self.candidate.knobs
-        return np.array([k.inner(k.outer(p)) for k, p in zip(knobs, place, strict=True)])
+    def inside(self, point: Array) -> Array:
+        """Return `point` within the physical ranges."""
+        parameters = self.candidate.parameters
+        return np.array(
+            [one.scaled(one.value_at(at)) for one, at in zip(parameters, point, strict=True)]
+        )
 
     @property
     def certainty(self) -> Array:
-        """Precision of what is known of each number of the place besides, (knobs,)."""
+        """Precision of what is known of each number of the point besides, (parameters,)."""
         return np.array([sd**-2.0 for _, sd in self.candidate.known_or_not])
 
-    def amiss(self, place: Array) -> Array:
-        """Return how far a place is from what is known of it besides, (knobs,)."""
-        return place - [known for known, _ in self.candidate.known_or_not]
+    def amiss(self, point: Array) -> Array:
+        """Return how far a point is from what is known of it besides, (parameters,)."""
+        return point - [known for known, _ in self.candidate.known_or_not]
 
     def slope(self, derivative: NDArray[Any], residual: Array) -> Slope:
-        """Return the slope at the place, with what is known of it besides; see :class:`Slope`."""
-        return Slope.of(derivative, residual).with_known(self.certainty, self.amiss(self.place))
+        """Return the slope at the point, with what is known of it besides; see :class:`Slope`."""
+        return Slope.of(derivative, residual).with_known(self.certainty, self.amiss(self.point))
 
     @property
     def deviation(self) -> Array:
-        """Standard deviation of each number of the place, above zero."""
+        """Standard deviation of each number of the point, above zero."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 1e-12)))
 
     @property
     def at_border(self) -> bool:
         """Whether a key has run to the end of its physical range."""
-        return any(
-            knob.at_border(p) for knob, p in zip(self.candidate.knobs, self.place, strict=True)
-        )
+        pairs = zip(self.candidate.parameters, self.point, strict=True)
+        return any(one.at_border(at) for one, at in pairs)
 
 
 class Fitter:
-    """Fits candidates to a recording's statistics in one view of the data.
+    """Fits candidates to a recording's statistics, (statistics,), in one view of the data.
 
-    Parameters
-    ----------
-    laboratory : Laboratory
-    scale : Scale
-    observed : (statistics,)
-        Of the recording.
-    view : int
-    sd : (statistics,), optional
-        Deviations to weigh by, in those of the scale; default: the scale's own.
+    `sd`: deviations to weigh by, (statistics,), in those of the scale; default: the scale's own.
     """
 
     def __init__(
         self,
-        laboratory: Laboratory,
+        sampler: Sampler,
         scale: Scale,
         observed: Array,
         view: int,
         sd: Array | None = None,
     ) -> None:
-        self._laboratory, self.scale, self._view = laboratory, scale, view
+        self._sampler, self.scale, self._view = sampler, scale, view
         self._whitening = scale.whitening if sd is None else scale.whitening / sd
         self._observed = self._whitening @ scale.of_values(observed)
 
     def _white_of_seeds(self, configs: Sequence[Config], seeds: Sequence[int]) -> Array:
         """Return the statistics of models, uncorrelated, (configs, seeds, statistics)."""
-        sample = self._laboratory.many(configs, seeds)[:, :, self._view]
+        sample = self._sampler.samples(configs, seeds)[:, :, self._view]
         return np.asarray(self.scale.of_values(sample) @ self._whitening.T)
 
     def whites(self, configs: Sequence[Config], seeds: Sequence[int]) -> Array:
         """Return the mean statistics of models, uncorrelated, (configs, statistics)."""
         return np.asarray(self._white_of_seeds(configs, seeds).mean(axis=1))
 
-    def probe(
+    def at_best_starts(
         self, candidates: Sequence[Candidate], base: Config, seeds: Sequence[int]
     ) -> list[Fitted]:
-        """Return each candidate at the best of its probes."""
+        """Return each candidate at the best of its starts."""
         fits = [
-            Fitted.at(probe, candidate, base)
+            Fitted.at(start, candidate, base)
             for candidate in candidates
-            for probe in candidate.probes
+            for start in candidate.starts
         ]
-        means = self.whites([fit.config for fit in fits], seeds)
-        best: dict[int, Fitted] = {}
-        for fit, mean in zip(fits, means, strict=True):
-            fit.misfit = self._misfit(fit, fit.place, mean)
-            held = best.get(id(fit.candidate))
-            if held is None or fit.misfit < held.misfit:
-                best[id(fit.candidate)] = fit
-        return [best[id(candidate)] for candidate in candidates]
+        for fit, mean in zip(fits, self.whites([fit.config for fit in fits], seeds), strict=True):
+            fit.misfit = self._misfit(fit, fit.point, mean)
+        return [
+            min((fit for fit in fits if fit.candidate is one), key=lambda fit: fit.misfit)
+            for one in candidates
+        ]
 
     def misfit(self, config: Config, seeds: Sequence[int]) -> float:
         """Return the sum of squares of a model as it is."""
@@ -206,100 +197,94 @@ class Fitter:
         """Return the sum of squares of what mean statistics leave."""
         return float(np.sum((self._observed - mean) ** 2))
 
-    def _misfit(self, fit: Fitted, place: Array, mean: Array) -> float:
+    def _misfit(self, fit: Fitted, point: Array, mean: Array) -> float:
         """Return the sum of squares of a fit elsewhere, from its mean statistics there."""
-        return self._square(mean) + float(np.sum(fit.certainty * fit.amiss(place) ** 2))
+        return self._square(mean) + float(np.sum(fit.certainty * fit.amiss(point) ** 2))
 
     def improve(self, fits: Sequence[Fitted], seeds: Sequence[int]) -> None:
         """Move every fit by one step, all of them with one batch of simulations for each half.
 
-        Parameters
-        ----------
-        fits : sequence of Fitted
-        seeds : sequence of int
-            Two at least.
+        Two `seeds` at least.
         """
-        fits = [fit for fit in fits if fit.candidate.knobs]
+        fits = [fit for fit in fits if fit.candidate.parameters]
         if not fits:
             return
-        configs: list[Config] = []
-        for fit in fits:
-            configs += [fit.config, *(fit.moved_to(place) for place in _nudged(fit))]
+        nudged = [_nudged(fit) for fit in fits]
+        configs = [
+            fit.at_point(point)
+            for fit, points in zip(fits, nudged, strict=True)
+            for point in (fit.point, *points)
+        ]
         whites = iter(self._white_of_seeds(configs, seeds))
         trials: list[list[Array]] = []
-        for fit in fits:
+        for fit, points in zip(fits, nudged, strict=True):
             here = next(whites)
-            columns = []
-            for k, place in enumerate(_nudged(fit)):
-                columns.append((next(whites) - here) / (place[k] - fit.place[k]))
+            columns = [
+                (next(whites) - here) / (point[k] - fit.point[k]) for k, point in enumerate(points)
+            ]
             slope = fit.slope(np.array(columns), self._observed - here)
-            fit.misfit = self._misfit(fit, fit.place, here.mean(axis=0))
+            fit.misfit = self._misfit(fit, fit.point, here.mean(axis=0))
             move = _damped(fit, slope)
             fit.normal, fit.derivative, fit.simulations = slope.normal, slope.derivative, len(seeds)
             fit.covariance = np.linalg.pinv(slope.normal) * _of_mean(len(seeds))
-            trials.append([fit.inside(fit.place + share * move) for share in _SHARES])
+            trials.append([fit.inside(fit.point + share * move) for share in _SHARES])
         tried = [
-            fit.moved_to(place)
-            for fit, places in zip(fits, trials, strict=True)
-            for place in places
+            fit.at_point(point)
+            for fit, points in zip(fits, trials, strict=True)
+            for point in points
         ]
         means = iter(self.whites(tried, seeds))
-        for fit, places in zip(fits, trials, strict=True):
-            misfits = [self._misfit(fit, place, next(means)) for place in places]
+        for fit, points in zip(fits, trials, strict=True):
+            misfits = [self._misfit(fit, point, next(means)) for point in points]
             nearest = int(np.argmin(misfits))
             fit.reach = max(0.5 * fit.reach, _NARROW)
             if misfits[nearest] >= fit.misfit:
                 fit.moved, fit.damping = 0.0, 4.0 * fit.damping
                 continue
-            fit.moved = float(np.max(np.abs(places[nearest] - fit.place) / fit.deviation))
-            fit.misfit, fit.place = misfits[nearest], places[nearest]
+            fit.moved = float(np.max(np.abs(points[nearest] - fit.point) / fit.deviation))
+            fit.misfit, fit.point = misfits[nearest], points[nearest]
             fit.damping = max(0.25 * fit.damping, 1e-3)
 
     def refine(self, fit: Fitted, rounds: Sequence[Sequence[int]]) -> None:
-        """Bring a fit that is near its end there.
+        """Bring a fit that is near its end, and was moved at least once, there.
 
-        Parameters
-        ----------
-        fit : Fitted
-            Moved at least once.
-        rounds : sequence of sequence of int
-            Seeds of each step, two at least; not all are taken where it is near at once.
+        `rounds`: seeds of each step, two at least; not all are taken where it is near at once.
         """
         slopes: list[Slope] = []
         gentler: list[Slope] = []
         axes, trust = Axes.of(fit.normal), 1.0
-        safe, least = fit.place, np.inf
+        safe, least = fit.point, np.inf
         for seeds in rounds:
             slope, gentle = self._slopes(fit, axes, seeds)
             if slope.left > least + _LEAP:
-                fit.place, trust = safe, 0.3 * trust
+                fit.point, trust = safe, 0.3 * trust
                 slopes.clear()
                 continue
-            safe, least = fit.place, min(least, slope.left)
+            safe, least = fit.point, min(least, slope.left)
             slopes.append(slope)
             gentler = [*gentler, gentle][-len(slopes) :]
             normal = np.asarray(np.mean([slope.normal for slope in slopes], axis=0))
             move = np.linalg.pinv(normal) @ slope.downhill / len(slopes)
             far = float(np.max(np.abs(axes.along(move)) / axes.reach))
             axes = Axes.of(normal)
-            fit.place = fit.inside(fit.place + move * min(1.0, trust / max(far, 1e-12)))
-            fit.moved = float(np.max(np.abs(axes.along(fit.place - safe)) / axes.deviation))
+            fit.point = fit.inside(fit.point + move * min(1.0, trust / max(far, 1e-12)))
+            fit.moved = float(np.max(np.abs(axes.along(fit.point - safe)) / axes.deviation))
             fit.simulations = len(seeds) * len(slopes)
             if far > trust or fit.moved > _NEAR:
                 slopes.clear()
             elif len(slopes) == _IN_THE_MEAN:
                 break
         if not slopes:
-            fit.place = safe  # as far as it is known to be better
+            fit.point = safe  # as far as it is known to be better
         fit.normal = np.asarray(np.mean([slope.normal for slope in gentler], axis=0))
         fit.derivative = np.asarray(np.mean([slope.derivative for slope in gentler], axis=0))
         fit.covariance = np.linalg.pinv(fit.normal)
 
     def _slopes(self, fit: Fitted, axes: Axes, seeds: Sequence[int]) -> tuple[Slope, Slope]:
-        """Return the slope at a fit's place by both sides of it, and by the gentler ones."""
+        """Return the slope at a fit's point by both sides of it, and by the gentler ones."""
         steps = axes.reach[:, None] * axes.directions
-        ends = [[fit.inside(fit.place + side * step) for step in steps] for side in (1, -1)]
-        configs = [fit.moved_to(place) for place in (fit.place, *ends[0], *ends[1])]
+        ends = [[fit.inside(fit.point + side * step) for step in steps] for side in (1, -1)]
+        configs = [fit.at_point(point) for point in (fit.point, *ends[0], *ends[1])]
         here, *others = self._white_of_seeds(configs, seeds)
         sides = list(zip(others[: len(steps)], others[len(steps) :], strict=True))
         # one end may lie at the border of what is physical, beside the axis
@@ -315,14 +300,9 @@ class Fitter:
         )
 
     def set_covariance(self, fit: Fitted, sample: Array) -> None:
-        """Note the covariance of a fit's place, as simulations of the fitted model tell it.
+        """Note the covariance of a fit's point, as simulations of the fitted model tell it.
 
-        Parameters
-        ----------
-        fit : Fitted
-            Moved at least once.
-        sample : (simulations, statistics)
-            Of the fitted model, in compressed deviations.
+        `sample`: (simulations, statistics) of that, in compressed deviations.
         """
         apart = (sample - sample.mean(axis=0)) @ self._whitening.T
         downhill = apart @ fit.derivative.T
@@ -337,15 +317,15 @@ def _of_mean(seeds: int) -> float:
 
 
 def _nudged(fit: Fitted) -> list[Array]:
-    """Return the place with each knob in turn moved, inwards at the end of its range."""
-    places = []
-    for k in range(len(fit.place)):
-        place = fit.place.copy()
-        place[k] += fit.reach
-        if fit.inside(place)[k] < place[k] - 1e-12:
-            place[k] = fit.place[k] - fit.reach
-        places.append(place)
-    return places
+    """Return the point with each number in turn moved, inwards at the end of its range."""
+    points = []
+    for k in range(len(fit.point)):
+        point = fit.point.copy()
+        point[k] += fit.reach
+        if fit.inside(point)[k] < point[k] - 1e-12:
+            point[k] = fit.point[k] - fit.reach
+        points.append(point)
+    return points
 
 
 def _damped(fit: Fitted, slope: Slope) -> Array:

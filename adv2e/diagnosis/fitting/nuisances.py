@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.fitting.candidates import Knob
+from adv2e.diagnosis.fitting.candidates import FitParameter
 from adv2e.effects.pixel.thresholds import FLOOR
 from adv2e.events import Events
 
@@ -26,8 +26,10 @@ ROUNDS = 15
 LARGEST = 5.0
 """Largest threshold tried [ln]; grey levels of 8 bits span 5.5."""
 
-Count = Callable[[float, float], tuple[int, int]]
-"""Takes ON and OFF thresholds [ln], returns counts of ON and OFF events."""
+THRESHOLDS = tuple(
+    FitParameter(f"pixel.thresholds.{name}", FLOOR, LARGEST) for name in ("on", "off")
+)
+"""Keys that :func:`fit_thresholds` fits, and a search then refines with what it finds."""
 
 
 def totals(events: Events) -> tuple[int, int]:
@@ -42,8 +44,31 @@ def with_thresholds(config: Config, on: float, off: float) -> Config:
     return replace(config, pixel=replace(config.pixel, thresholds=levels))
 
 
+def thresholds_of(config: Config) -> dict[str, float]:
+    """Return the thresholds of a configuration, by key."""
+    levels = config.pixel.thresholds
+    return {one.key: value for one, value in zip(THRESHOLDS, (levels.on, levels.off), strict=True)}
+
+
+def fit_thresholds(
+    simulate: Callable[[Config], tuple[int, int]], declared: Config, measured: tuple[int, int]
+) -> tuple[Config, float]:
+    """Return the declared model with thresholds that match the totals, and what they miss by.
+
+    As in :func:`match_totals`; `simulate` returns the counts of ON and OFF events of a simulation,
+    over the same pixels and times as those measured.
+    """
+
+    def count(on: float, off: float) -> tuple[int, int]:
+        return simulate(with_thresholds(declared, on, off))
+
+    here = declared.pixel.thresholds
+    on, off, miss = match_totals(count, (here.on, here.off), measured)
+    return with_thresholds(declared, on, off), miss
+
+
 def match_totals(
-    count: Count,
+    count: Callable[[float, float], tuple[int, int]],
     start: tuple[float, float],
     goal: tuple[int, int],
     *,
@@ -82,55 +107,12 @@ def match_totals(
         if best[0] <= np.log1p(tolerance):
             break
         if before is not None:
-            slope = _slope(levels - before[0], miss - before[1], slope)
+            moved, gained = levels - before[0], miss - before[1]
+            # each total depends on both thresholds: a secant may come out with the wrong sign
+            secant = np.divide(gained, moved, out=slope.copy(), where=np.abs(moved) > 1e-6)
+            slope = np.clip(secant, -6.0, -0.7)
         before = levels, miss
         step = np.clip(-miss / slope, -1.0, 1.0)
         levels = np.clip(levels + step, np.log(FLOOR), np.log(LARGEST))
     on, off = np.exp(best[1])
     return float(on), float(off), float(np.expm1(best[0]))
-
-
-def _slope(moved: NDArray[Any], gained: NDArray[Any], slope: NDArray[Any]) -> NDArray[Any]:
-    """Return the secants of both totals, each falling with its own threshold.
-
-    Each total depends on both thresholds, so that a secant may come out with the wrong sign.
-    """
-    told = np.abs(moved) > 1e-6
-    secant = np.divide(gained, moved, out=slope.copy(), where=told)
-    return np.asarray(np.clip(secant, -6.0, -0.7))
-
-
-THRESHOLDS = tuple(Knob(f"pixel.thresholds.{name}", FLOOR, LARGEST) for name in ("on", "off"))
-"""Keys that :func:`fit_thresholds` fits, and a search then refines with what it finds."""
-
-
-def thresholds_of(config: Config) -> dict[str, float]:
-    """Return the thresholds of a configuration, by key."""
-    levels = config.pixel.thresholds
-    return {
-        knob.key: value for knob, value in zip(THRESHOLDS, (levels.on, levels.off), strict=True)
-    }
-
-
-def fit_thresholds(
-    simulate: Callable[[Config], tuple[int, int]], declared: Config, measured: tuple[int, int]
-) -> tuple[Config, float]:
-    """Return the declared model with thresholds that match the totals, and what they miss by.
-
-    As in :func:`match_totals`.
-
-    Parameters
-    ----------
-    simulate : callable
-        Takes a configuration, returns the counts of ON and OFF events of a simulation.
-    declared : Config
-    measured : (int, int)
-        Counts of the recording, over the same pixels and times.
-    """
-
-    def count(on: float, off: float) -> tuple[int, int]:
-        return simulate(with_thresholds(declared, on, off))
-
-    here = declared.pixel.thresholds
-    on, off, miss = match_totals(count, (here.on, here.off), measured)
-    return with_thresholds(declared, on, off), miss

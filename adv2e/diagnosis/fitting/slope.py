@@ -1,4 +1,4 @@
-"""How a misfit falls at a place, and in which directions a place is known."""
+"""How a misfit falls at a point, and in which directions a point is known."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _REACH = 10.0
-"""Reach of the last derivatives, in deviations of the place: less, and chance is most of them."""
+"""Reach of the last derivatives, in deviations of the point: less, and chance is most of them."""
 _REACHES = (0.02, 0.3)
-"""Least and most, on the knobs' scales."""
+"""Least and most, on the scales of the parameters."""
 _CLIFF = 10.0
 """Square of the changes on one side over that on the other, from which one is no slope."""
 _LEAST_SHARE = 0.1
@@ -22,17 +22,11 @@ _LEAST_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Axes:
-    """Directions in which a place is known, each independently of the others.
+    """Directions in which a point is known, each independently of the others.
 
     Keys that go together, such as two times of which the sum shows, are known far better in some
-    directions than each by itself.
-
-    Attributes
-    ----------
-    directions : (knobs, knobs)
-        One a row.
-    deviation, reach : (knobs,)
-        Of the place, and of the last derivatives, along each.
+    directions (rows) than each by itself.  Along each, deviation of the point and reach of the last
+    derivatives.
     """
 
     directions: NDArray[Any]
@@ -53,14 +47,14 @@ class Axes:
 
 @dataclass(frozen=True)
 class Slope:
-    """How the misfit falls at a place.
+    """How the misfit falls at a point.
 
     Attributes
     ----------
-    derivative : (knobs, statistics)
-    normal : (knobs, knobs)
+    derivative : (parameters, statistics)
+    normal : (parameters, parameters)
         Products of derivatives.
-    downhill : (knobs,)
+    downhill : (parameters,)
         Products of derivatives and what is left.
     left : float
         Square of what is left.
@@ -75,10 +69,7 @@ class Slope:
     def of(cls, derivative: NDArray[Any], residual: Array) -> Slope:
         """Return the slope by the products of different seeds.
 
-        Parameters
-        ----------
-        derivative : (knobs, seeds, statistics)
-        residual : (seeds, statistics)
+        `derivative`: (parameters, seeds, statistics), `residual`: (seeds, statistics).
         """
         seeds = len(residual)
         total, left = derivative.sum(axis=1), residual.sum(axis=0)
@@ -94,14 +85,9 @@ class Slope:
         return cls(total / seeds, normal, downhill, square)
 
     def with_known(self, certainty: Array, amiss: Array) -> Slope:
-        """Return the slope with what is known of the place besides, as measurements more.
+        """Return the slope with what is known of the point besides, as measurements more.
 
-        Parameters
-        ----------
-        certainty : (knobs,)
-            Precision of what is known of each.
-        amiss : (knobs,)
-            How far the place is from that.
+        With their precision, and how far the point is from them, (parameters,).
         """
         return Slope(
             self.derivative,
@@ -114,12 +100,8 @@ class Slope:
 def gentler(above: Array, below: Array) -> Array:
     """Return the change from one end to the other, by one side where the other is a cliff.
 
-    A place is as uncertain as it is towards the side where little changes.
-
-    Parameters
-    ----------
-    above, below : (seeds, statistics)
-        Changes from the place to one end, and from the other to the place.
+    A point is as uncertain as it is towards the side where little changes.  From the changes from
+    the point to one end, and from the other to the point, (seeds, statistics).
     """
     squares = [float(np.sum(side.mean(axis=0) ** 2)) for side in (above, below)]
     if max(squares) < _CLIFF * min(squares):

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from adv2e.config import Config
+from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.hints.lamps import Lamp
-from adv2e.diagnosis.hints.pulses import Pulse, pulse_of
-from adv2e.diagnosis.hints.readouts import Readouts, readouts_of
+from adv2e.diagnosis.hints.lamps import Lamp, lamps_of, strongest_lines
+from adv2e.diagnosis.hints.readouts import Pulse, Readouts, pulse_of, readouts_of
 from adv2e.diagnosis.hints.stamps import Service, service_times, tick_of
+from adv2e.diagnosis.simulation.simulator import Simulator
+
+_LAMP_SEED = 9_998
 
 
 @dataclass(frozen=True)
@@ -50,22 +55,28 @@ class Hints:
 
 
 def hints_of(
-    evidence: Evidence, looked_at: Stream, lamps: Sequence[Lamp], pilot: Sequence[Stream] = ()
+    evidence: Evidence,
+    declared: Config,
+    scene: Scene,
+    pilot: Sequence[Stream],
+    simulator: Simulator,
 ) -> Hints:
     """Return hints from a recording.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        The whole of it, as how stamps follow one another shows in no part.
-    looked_at : Stream
-        Its events without those that are looked at last.
-    lamps : sequence of Lamp
-        That may have lit it.
-    pilot : sequence of Stream
-        Simulations of the declared model.
+    Lamps are told by the data that effects are fitted to, and what happens at each frame by all but
+    those that are looked at once; but how stamps follow one another shows in no part.  The `pilot`
+    is simulations of the declared model.
     """
+
+    def train(stream: Stream) -> Stream:
+        return scene.split.chosen(stream, splits.TRAIN)
+
     stream = evidence.stream
+    looked_at = scene.split.chosen(stream, splits.TRAIN, splits.VALIDATION)
+    lines = strongest_lines(train(stream), list(map(train, pilot)), scene)
+    lamps = lamps_of(
+        lines, train(stream), declared, lambda lit: train(simulator.stream(lit, _LAMP_SEED))
+    )
     return Hints(
         evidence.seconds,
         tuple(lamps),
@@ -80,7 +91,5 @@ def hints_of(
 
 def _too_many(stream: Stream, pilot: Sequence[Stream], polarity: int) -> float:
     """Return how many events of a polarity simulations have, over those of a stream."""
-    if not pilot:
-        return 1.0
     made = float(np.mean([np.count_nonzero(one.on == polarity) for one in pilot]))
     return (made + 1.0) / (float(np.count_nonzero(stream.on == polarity)) + 1.0)

@@ -100,14 +100,8 @@ def _of_both(often: NDArray[np.int64], about_us: int) -> tuple[float, float]:
     """Return the time that what had waited follows in, and its standard deviation [ns].
 
     Nothing follows sooner, and what comes by chance does so from there on, ever less often; both
-    stamps have lost their parts of a microsecond, which spreads a gap over two of them.
-
-    Parameters
-    ----------
-    often : (gaps,)
-        How often each gap is [us].
-    about_us : int
-        The most frequent one.
+    stamps have lost their parts of a microsecond, which spreads a gap over two of them.  `often`:
+    how often each gap is [us], of which `about_us` is the most frequent one.
     """
     near = about_us + np.arange(-1, 2)
     soon, later = (float(often[about_us + k : about_us + k + 4].mean()) for k in (2, 6))

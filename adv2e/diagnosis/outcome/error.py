@@ -1,4 +1,4 @@
-"""Distance between recording and simulations on the part of the data that is looked at once."""
+"""Distance between recording and simulations on the data that are looked at once."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_norms
-from adv2e.diagnosis.data.splits import Parts
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.reports.result import ErrorRow, Estimate
 
@@ -22,21 +21,11 @@ PAIRS = 20
 Array = NDArray[np.float64]
 
 
-def of_part(stream: Stream, parts: Parts, *wanted: int) -> Stream:
-    """Return the events of one part of the data, or of several."""
-    label = parts.label[parts.segment_of(stream.t), stream.pixel]
-    return stream.chosen(np.isin(label, wanted))
-
-
 @dataclass(frozen=True)
 class Distances:
     """Of the simulations of one model, as parts of the norm of what was measured.
 
-    Attributes
-    ----------
-    to_measured : (simulations, scales)
-    between : (pairs, scales)
-        Independent simulations from each other.
+    To that, (simulations, scales), and between independent ones, (pairs, scales).
     """
 
     to_measured: Array
@@ -62,14 +51,8 @@ def error_rows(before: Distances, after: Distances) -> list[ErrorRow]:
 
     Random events cost, wherever they come: a model that makes them as the camera does is farther
     off by the first of these than one without.  The last is not moved by that: the distance d from
-    one simulation and c from one to another are those from their mean by d^2 = m^2 + c^2/2.
-
-    Parameters
-    ----------
-    before : Distances
-        Of the declared model.
-    after : Distances
-        Of the model found, which the floor is of, too.
+    one simulation and c from one to another are those from their mean by d^2 = m^2 + c^2/2.  The
+    floor is that of the model found, `after`.
     """
     names = [NAME, *(f"{NAME} over {sigma / 1e3:g} ms" for sigma in SIGMAS_US)]
     first, second, floor = (
@@ -90,15 +73,8 @@ def of_interpolation(
 
     About half of what leaving out every second frame adds, give or take a factor of two: between a
     third, where frames resolve the motion, and all of it
-    (:mod:`adv2e.diagnosis.statistics.interpolation`).
-
-    Parameters
-    ----------
-    measured : Stream
-    full, half : sequence of Stream
-        Simulations of a model with all frames, and with every second, each with its own chance.
-    floor : float
-        Of the error of that model with all frames.
+    (:mod:`adv2e.diagnosis.statistics.uncertainty`).  By simulations of a model with all frames, the
+    error of which has that `floor`, and with every second, each with its own chance.
     """
     unit = _norm(measured)
     apart = np.mean([_apart(a, b, unit).mean() for a, b in zip(full, half, strict=True)])

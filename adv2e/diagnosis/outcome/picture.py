@@ -1,33 +1,64 @@
-"""The picture of a residual: curves and maps of the recording and of both models' simulations."""
+"""The picture of a residual: curves and maps of the recording and of both models' simulations.
+
+A measure turns the events of one stream into the values of a curve; a place is a pixel in a frame
+interval.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.data.scene import BRIGHTNESSES, SPEEDS, Placed, Scene
-from adv2e.diagnosis.statistics import classes, measures
-from adv2e.diagnosis.statistics.base import excess
+from adv2e.diagnosis.data.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
+from adv2e.diagnosis.statistics.groups import excess
 from adv2e.diagnosis.statistics.intervals import BORDERS_MS
-from adv2e.diagnosis.statistics.measures import Measure
+from adv2e.diagnosis.statistics.rates import by_load, rate_hz
 from adv2e.diagnosis.statistics.timing import LAGS_MS
 from adv2e.reports.result import Band, Curve, ResidualMap
 
 Array = NDArray[np.float64]
+Measure = Callable[[Placed], Array]
 
-_PER_PIXEL = "events a pixel a second"
+_PER_PIXEL, _PER_SENSOR = "events a pixel a second", "events a second"
 _MOTION = (("in motion", True), ("at rest", False))
 _POLARITIES = (("ON", 1), ("OFF", 0))
 _LOADS = 8
+_PHASES = np.linspace(0.0, 100.0, 11)
 _GAPS_MS = np.array([0.05, *BORDERS_MS, 512.0])
 _STAMPS_US = np.r_[0.5, 2.0 ** np.arange(14.0) + 0.5]
 """Borders between whole numbers of microseconds, the first for none and one together."""
 
+_NOWHERE = -1
+"""Class of a place that is not looked at."""
+_MOST_ROWS = 48
+_STEEPEST = 20.0
+"""Change of log light [1/s] at which slopes are cut off, so that single steps do not decide."""
+_CONTRAST_S = 0.05
+"""Time within which the change of log light counts as one contrast [s]."""
+_CONTRASTS: Array = 0.025 * 2.0 ** np.arange(9.0)
+"""Borders of classes of contrast [ln]; beyond the first and last are counted with them."""
 
-class Gallery:
-    """Draws curves and maps.
+
+@dataclass(frozen=True)
+class _Axes:
+    """What a curve shows over what: labels, points or borders, and how it is measured."""
+
+    title: str
+    x_label: str
+    y_label: str
+    x: Array
+    measure: Measure
+    x_log: bool = False
+
+
+def curves_of(
+    scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
+) -> list[Curve]:
+    """Return curves by time, by what the light does, by place, by load.
 
     Parameters
     ----------
@@ -36,188 +67,222 @@ class Gallery:
     before, after : sequence of Placed
         Simulations of the declared model and of the model found.
     """
-
-    def __init__(
-        self, scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
-    ) -> None:
-        self._scene = scene
-        self._measured, self._before, self._after = measured, before, after
-
-    def curves(self) -> list[Curve]:
-        """Return all curves: by time, by what the light does, by place, by load."""
-        return [
-            *self._between_events(),
-            *self._by_brightness(),
-            *self._by_change(),
-            self._by_row(),
-            self._by_load(),
-            *self._between_frames(),
-            self._course(),
-        ]
-
-    def maps(self) -> list[ResidualMap]:
-        """Return maps of the excess of events, ON and OFF."""
-        return [
-            ResidualMap(
-                f"{name} events: measured less expected, in deviations of chance",
-                self._excess(on, self._before),
-                self._excess(on, self._after),
-            )
-            for name, on in _POLARITIES
-        ]
-
-    def _between_events(self) -> list[Curve]:
-        """Return curves of the times between events of a pixel, and of the whole sensor."""
-        gaps_ms, stamps_us = _GAPS_MS, _STAMPS_US
-        of_pixel, of_sensor = "the event before [ms]", "the event before, of any pixel [us]"
-        kinds = [
-            ("a pixel, same polarity", of_pixel, gaps_ms, measures.gaps(gaps_ms, same=True)),
-            ("a pixel, other polarity", of_pixel, gaps_ms, measures.gaps(gaps_ms, same=False)),
-            ("the sensor, same row", of_sensor, stamps_us, measures.stamps(stamps_us, same=True)),
-            ("the sensor, other row", of_sensor, stamps_us, measures.stamps(stamps_us, same=False)),
-        ]
-        return [
-            self._curve(
-                f"Time between events of {text}", f"time since {since}", "events", borders, measure,
-                x_log=True,
-            )
-            for text, since, borders, measure in kinds
-        ]  # fmt: skip
-
-    def _by_brightness(self) -> list[Curve]:
-        scene = self._scene
-        return [
-            self._curve(
-                f"Rate against brightness, {text}, {name}",
-                "brightness (thirds)",
-                _PER_PIXEL,
-                np.arange(BRIGHTNESSES + 1.0),
-                measures.rates(
-                    scene,
-                    measures.restricted(scene, scene.brightness, moving=moving),
-                    BRIGHTNESSES,
-                    on,
-                ),
-            )
-            for text, moving in _MOTION
-            for name, on in _POLARITIES
-        ]
-
-    def _by_change(self) -> list[Curve]:
-        """Return curves against how fast and how far the light changes, and when events follow."""
-        scene = self._scene
-        contrasts = classes.of_contrast(scene)
-        return [
-            self._curve(
-                "Rate against speed",
-                "speed (still, then thirds)",
-                _PER_PIXEL,
-                np.arange(SPEEDS + 1.0),
-                measures.rates(scene, scene.speed, SPEEDS),
-            ),
-            *(
-                self._curve(
-                    f"Rate against contrast, {name}",
-                    "change of log light within 50 ms [ln]",
-                    _PER_PIXEL,
-                    classes.CONTRASTS,
-                    measures.rates(scene, contrasts, len(classes.CONTRASTS) - 1, on),
-                    x_log=True,
-                )
-                for name, on in _POLARITIES
-            ),
-            self._curve(
-                "Light before and after an event",
-                "time before the event [ms]",
-                "mean change of log light in its direction, at most 20 [1/s]",
-                np.array(LAGS_MS),
-                measures.lags(scene),
-            ),
-        ]
-
-    def _by_row(self) -> Curve:
-        scene = self._scene
-        borders = classes.row_borders(scene)
-        rows = classes.of_rows(scene, borders)
-        return self._curve(
-            "Rate against row",
-            "row, from the top",
-            _PER_PIXEL,
-            borders,
-            measures.rates(scene, rows, len(borders) - 1),
+    drawn = []
+    for kind in (*_between_events(), *_by_place(scene), *_by_time(scene, before)):
+        values = kind.measure(measured)
+        first, second = (
+            _band([kind.measure(one) for one in simulated]) for simulated in (before, after)
         )
-
-    def _by_load(self) -> Curve:
-        """Return the rate of the sensor against that of the declared model."""
-        scene = self._scene
-        declared = classes.rate_hz(scene, self._before)
-        step = classes.by_load(declared, _LOADS)
-        kinds, step = np.unique(step, return_inverse=True)
-        number = np.bincount(step, declared * scene.seconds)
-        whole = measures.rates(scene, step[:, None], len(kinds))
-        return self._curve(
-            "Rate of the sensor, from times of few events to times of many",
-            "rate of the declared model [events a second]",
-            "events a second",
-            number / np.bincount(step, scene.seconds),
-            lambda placed: scene.pixels * whole(placed),
+        drawn.append(
+            Curve(kind.title, kind.x_label, kind.y_label, kind.x, values, first, second, kind.x_log)
         )
+    return drawn
 
-    def _between_frames(self) -> list[Curve]:
-        phase = np.linspace(0.0, 100.0, 11)
-        return [
-            self._curve(
-                f"Place between two frames, {text}",
-                "place [% of the frame interval]",
-                "events",
-                phase,
-                measures.phases(self._scene, phase, moving=moving),
-            )
-            for text, moving in _MOTION
-        ]
 
-    def _course(self) -> Curve:
-        borders = np.linspace(0.0, float(self._scene.seconds.sum()), 25)
-        return self._curve(
-            "Course",
-            "time [s]",
-            "events a second",
-            borders,
-            measures.course(self._scene, borders),
+def maps_of(
+    scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
+) -> list[ResidualMap]:
+    """Return maps of the excess of events, ON and OFF; arguments as of :func:`curves_of`."""
+
+    def number(placed: Placed, on: int) -> Array:
+        pixel = placed.stream.pixel[placed.stream.on == on]
+        return np.bincount(pixel, minlength=scene.pixels).astype(np.float64)
+
+    def excess_of(on: int, simulated: Sequence[Placed]) -> Array:
+        mean = np.mean([number(placed, on) for placed in simulated], axis=0)
+        return excess(number(measured, on), mean).reshape(scene.height, scene.width)
+
+    return [
+        ResidualMap(
+            f"{name} events: measured less expected, in deviations of chance",
+            excess_of(on, before),
+            excess_of(on, after),
         )
-
-    def _curve(
-        self,
-        title: str,
-        x_label: str,
-        y_label: str,
-        x: Array,
-        measure: Measure,
-        x_log: bool = False,
-    ) -> Curve:
-        return Curve(
-            title=title,
-            x_label=x_label,
-            y_label=y_label,
-            x=x,
-            measured=measure(self._measured),
-            before=_band([measure(placed) for placed in self._before]),
-            after=_band([measure(placed) for placed in self._after]),
-            x_log=x_log,
-        )
-
-    def _excess(self, on: int, simulated: Sequence[Placed]) -> Array:
-        scene = self._scene
-
-        def number(placed: Placed) -> Array:
-            pixel = placed.stream.pixel[placed.stream.on == on]
-            return np.bincount(pixel, minlength=scene.pixels).astype(np.float64)
-
-        mean = np.mean([number(placed) for placed in simulated], axis=0)
-        return excess(number(self._measured), mean).reshape(scene.height, scene.width)
+        for name, on in _POLARITIES
+    ]
 
 
 def _band(rows: Sequence[Array]) -> Band:
-    table = np.array(rows)
-    low, middle, high = np.quantile(table, [0.025, 0.5, 0.975], axis=0)
+    low, middle, high = np.quantile(np.array(rows), [0.025, 0.5, 0.975], axis=0)
     return Band(middle, low, high)
+
+
+def _between_events() -> Iterator[_Axes]:
+    """Yield the times between events of a pixel, and of the whole sensor."""
+    for kind, same in (("same", True), ("other", False)):
+        title, label = f"a pixel, {kind} polarity", "the event before [ms]"
+        yield _times(title, label, _GAPS_MS, _gaps(same))
+    for kind, same in (("same", True), ("other", False)):
+        title, label = f"the sensor, {kind} row", "the event before, of any pixel [us]"
+        yield _times(title, label, _STAMPS_US, _stamps(same))
+
+
+def _times(of: str, since: str, borders: Array, measure: Measure) -> _Axes:
+    title, label = f"Time between events of {of}", f"time since {since}"
+    return _Axes(title, label, "events", borders, measure, x_log=True)
+
+
+def _by_place(scene: Scene) -> Iterator[_Axes]:
+    """Yield rates by what the light does, when events follow it, and rates by row."""
+    thirds = scene.brightness.astype(np.int64)
+    borders = np.arange(BRIGHTNESSES + 1.0)
+    for text, moving in _MOTION:
+        kind = np.where((scene.speed != STILL) == moving, thirds, _NOWHERE)
+        for name, on in _POLARITIES:
+            title = f"Rate against brightness, {text}, {name}"
+            measure = _rates(scene, kind, BRIGHTNESSES, on)
+            yield _Axes(title, "brightness (thirds)", _PER_PIXEL, borders, measure)
+    label, borders = "speed (still, then thirds)", np.arange(SPEEDS + 1.0)
+    speed = _rates(scene, scene.speed, SPEEDS)
+    yield _Axes("Rate against speed", label, _PER_PIXEL, borders, speed)
+    contrasts = np.digitize(contrast(scene), _CONTRASTS[1:-1])
+    label = "change of log light within 50 ms [ln]"
+    for name, on in _POLARITIES:
+        measure = _rates(scene, contrasts, len(_CONTRASTS) - 1, on)
+        title = f"Rate against contrast, {name}"
+        yield _Axes(title, label, _PER_PIXEL, _CONTRASTS, measure, x_log=True)
+    yield _Axes(
+        "Light before and after an event",
+        "time before the event [ms]",
+        "mean change of log light in its direction, at most 20 [1/s]",
+        np.array(LAGS_MS),
+        _lags(scene),
+    )
+    borders = row_borders(scene)
+    row = np.searchsorted(borders, np.arange(scene.pixels) // scene.width, "right") - 1
+    rows = _rates(scene, row[None], len(borders) - 1)
+    yield _Axes("Rate against row", "row, from the top", _PER_PIXEL, borders, rows)
+
+
+def _by_time(scene: Scene, before: Sequence[Placed]) -> Iterator[_Axes]:
+    """Yield rates by that of the declared model, between two frames, and over the recording."""
+    declared = rate_hz(scene, before)
+    loads, load = np.unique(by_load(declared, _LOADS), return_inverse=True)
+    number = np.bincount(load, declared * scene.seconds)
+    of_load = _rates(scene, load[:, None], len(loads))
+    yield _Axes(
+        "Rate of the sensor, from times of few events to times of many",
+        "rate of the declared model [events a second]",
+        _PER_SENSOR,
+        number / np.bincount(load, scene.seconds),
+        lambda placed: scene.pixels * of_load(placed),
+    )
+    for text, moving in _MOTION:
+        title, label = f"Place between two frames, {text}", "place [% of the frame interval]"
+        yield _Axes(title, label, "events", _PHASES, _phases(scene, moving))
+    borders_s = np.linspace(0.0, float(scene.seconds.sum()), 25)
+    yield _Axes("Course", "time [s]", _PER_SENSOR, borders_s, _course(scene, borders_s))
+
+
+def row_borders(scene: Scene) -> Array:
+    """Return the rows at which classes of rows begin, and the end."""
+    return np.rint(np.linspace(0.0, scene.height, min(scene.height, _MOST_ROWS) + 1))
+
+
+def contrast(scene: Scene) -> NDArray[np.float32]:
+    """Return the contrast [ln] that each place sees, (frame intervals, pixels).
+
+    It is the range of its log light within 50 ms about the middle of the interval, or from one
+    frame to the next where frames are as far apart.
+    """
+    seconds = scene.seconds.astype(np.float32)
+    light = np.zeros((scene.intervals + 1, scene.pixels), np.float32)
+    np.cumsum(scene.slope * seconds[:, None], axis=0, out=light[1:])
+    beside = int(max(0.0, 0.5 * (_CONTRAST_S / float(np.median(seconds)) - 1.0)))
+    high, low = light[1:].copy(), light[1:].copy()
+    for step in range(-beside, beside + 2):
+        frame = np.clip(np.arange(scene.intervals) + step, 0, scene.intervals)
+        np.maximum(high, light[frame], out=high)
+        np.minimum(low, light[frame], out=low)
+    return high - low
+
+
+def _gaps(same: bool) -> Measure:
+    """Count times between events of a pixel, of the same or of the other polarity."""
+
+    def measure(placed: Placed) -> Array:
+        stream = placed.stream
+        used = (stream.since >= 0) & ((stream.on == stream.on_before) == same)
+        gap = np.clip(stream.since[used] * 1e-3, _GAPS_MS[0], _GAPS_MS[-1])
+        return np.histogram(gap, _GAPS_MS)[0].astype(np.float64)
+
+    return measure
+
+
+def _stamps(same: bool) -> Measure:
+    """Count times between events of the whole sensor, of the same row or of another."""
+
+    def measure(placed: Placed) -> Array:
+        stream = placed.stream
+        used = (np.diff(stream.pixel // stream.width) == 0) == same
+        gap = np.clip(np.diff(stream.t)[used], _STAMPS_US[0], _STAMPS_US[-1])
+        return np.histogram(gap, _STAMPS_US)[0].astype(np.float64)
+
+    return measure
+
+
+def _rates(scene: Scene, kind: NDArray[Any], classes: int, on: int | None = None) -> Measure:
+    """Return rates of classes of places [events a pixel a second], NaN for those none is in.
+
+    Parameters
+    ----------
+    scene : Scene
+    kind : (frame intervals, pixels)
+        Class of each pixel in each frame interval, or nowhere; may be broadcast.
+    classes : int
+    on : int, optional
+        Polarity; default: both.
+    """
+    kind = np.broadcast_to(kind, scene.slope.shape)
+    weight = np.broadcast_to(scene.seconds[:, None], kind.shape)
+    used = kind != _NOWHERE
+    time = np.bincount(kind[used], weight[used], minlength=classes)
+
+    def measure(placed: Placed) -> Array:
+        of_events = kind[placed.interval, placed.stream.pixel]
+        chosen = of_events != _NOWHERE
+        if on is not None:
+            chosen &= placed.stream.on == on
+        number = np.bincount(of_events[chosen], minlength=classes)
+        return np.where(time > 0.0, number / np.maximum(time, 1e-9), np.nan)
+
+    return measure
+
+
+def _lags(scene: Scene) -> Measure:
+    """Return the mean slope of log light about events, in their direction [1/s], by lag."""
+
+    def measure(placed: Placed) -> Array:
+        stream = placed.stream
+        if not len(stream):
+            return np.full(len(LAGS_MS), np.nan)
+        sign = 2.0 * stream.on - 1.0
+        values = []
+        for lag in LAGS_MS:
+            slope = scene.slope[scene.interval_of(stream.t, lag * 1e3), stream.pixel]
+            values.append(float(np.mean(np.clip(slope, -_STEEPEST, _STEEPEST) * sign)))
+        return np.array(values)
+
+    return measure
+
+
+def _phases(scene: Scene, moving: bool) -> Measure:
+    """Count events by their place between two frames [%], in motion or at rest."""
+
+    def measure(placed: Placed) -> Array:
+        used = (placed.speed != STILL) == moving
+        phase = scene.phase_of(placed.stream.t[used], placed.interval[used])
+        return np.histogram(100.0 * phase, _PHASES)[0].astype(np.float64)
+
+    return measure
+
+
+def _course(scene: Scene, borders_s: Array) -> Measure:
+    """Return the rate of the whole sensor over time [events a second]."""
+    start, width = scene.times_us[0], borders_s[1] - borders_s[0]
+
+    def measure(placed: Placed) -> Array:
+        number, _ = np.histogram((placed.stream.t - start) * 1e-6, borders_s)
+        return np.asarray(number / width)
+
+    return measure

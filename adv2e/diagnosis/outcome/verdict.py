@@ -9,7 +9,7 @@ from adv2e.config import Config, to_dict
 from adv2e.config.paths import get_key
 from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
 from adv2e.diagnosis.fitting.fit import Fitted
-from adv2e.diagnosis.hints.pulses import DRIFT
+from adv2e.diagnosis.hints.readouts import DRIFT
 from adv2e.diagnosis.selection.reference import State
 from adv2e.diagnosis.selection.search import PER_LOOK, Outcome
 from adv2e.reports.result import ErrorRow, Verdict
@@ -18,21 +18,15 @@ _PARTLY = 0.8
 """Share of the residual that effects must explain to be named when something is left."""
 
 _ERROR_PARTLY, _ERROR_EXPLAINED = 0.9, 0.75
-"""The same of what the error can fall by, on the data that is looked at last, when something is
-left, and when all statistics are explained."""
+"""The same of what the error can fall by, on the test data, when something is left, and when all
+statistics are explained."""
 
 
 def verdict_of(outcome: Outcome, error: ErrorRow, interpolated: float = 0.0) -> Verdict:
     """Return the verdict.
 
-    Parameters
-    ----------
-    outcome : Outcome
-        Where the search ended.
-    error : ErrorRow
-        Of the declared model and of that where the search ended.
-    interpolated : float
-        What interpolation between the frames adds to it, in squares.
+    By the error of the declared model and of that where the search ended, and what interpolation
+    between the frames adds to it, in squares.
     """
     if not outcome.state.fits:
         return "consistent" if outcome.complete else "unexplained"
@@ -73,26 +67,16 @@ def _too_near(error: ErrorRow) -> bool:
 
 
 def sentence_of(verdict: Verdict, kept: State, outcome: Outcome, declared: Config) -> str:
-    """Return the verdict in a sentence.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    kept : State
-        The model that is reported: the declared one where nothing is named.
-    outcome : Outcome
-        Where the search ended.
-    declared : Config
-    """
+    """Return the verdict on the model that is reported, the declared one if none, in a sentence."""
     if verdict == "consistent":
         return (
             "The recording is what the declared model makes: nothing is missing that can be seen."
         )
-    only_last = outcome.probability >= PER_LOOK
-    if verdict == "unexplained" and only_last and not outcome.state.fits:
+    only_test = outcome.probability >= PER_LOOK
+    if verdict == "unexplained" and only_test and not outcome.state.fits:
         return (
-            "Nothing is missing in the data for fitting and judging, but in those looked at last"
-            f" something is, which chance makes {outcome.last:.0e} times."
+            "Nothing is missing in the data for training and validation, but in the test data"
+            f" something is, which chance makes {outcome.test_probability:.0e} times."
         )
     if verdict == "unexplained" and outcome.complete:
         return (
@@ -108,12 +92,12 @@ def sentence_of(verdict: Verdict, kept: State, outcome: Outcome, declared: Confi
     if verdict == "partly_explained":
         return (
             f"{wrong}; that explains {outcome.explained:.0%} of the"
-            f" residual, and something is left{' in the data looked at last' * only_last}."
+            f" residual, and something is left{' in the test data' * only_test}."
         )
     if verdict == "not_identifiable":
         others = ", ".join(outcome.alternatives)
         return f"{wrong}, or as well {others}."
-    if min(outcome.probability, outcome.last) < PER_LOOK:
+    if min(outcome.probability, outcome.test_probability) < PER_LOOK:
         share = f"{outcome.explained:.1%}"
         return f"{wrong}; that explains {share} of the residual."
     return f"{wrong}; with what was fitted, nothing is left that can be seen."
@@ -131,7 +115,7 @@ def _wrong(fits: Sequence[Fitted], declared: Config) -> str:
 
 def _has(declared: Config, candidate: Candidate) -> bool:
     """Tell whether a configuration has an effect already, of whatever size."""
-    values = (neutral_value(declared, knob) for knob in candidate.knobs)
+    values = (neutral_value(declared, parameter) for parameter in candidate.parameters)
     held = to_dict(declared)
     # how fast the clock of the frames is, a pulse tells besides
     besides = (key for key, _ in candidate.extra if key != DRIFT)

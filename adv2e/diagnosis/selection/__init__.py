@@ -1,1 +1,1 @@
-"""Which effects are added to the model, judged on data that they were not fitted to."""
+"""Which effects are added to the model, validated on data that they were not fitted to."""

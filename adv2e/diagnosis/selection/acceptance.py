@@ -1,15 +1,24 @@
-"""Whether a model is to be taken for the one before it, on data that it was not fitted to."""
+"""Whether a model is to be taken for the one before it, and which of several explains most.
+
+On data that it was not fitted to.  A likelihood by simulations is itself uncertain: the more is
+left of the residual, the more it hangs on which simulations it was made of.  Models that chance may
+have parted are simulated more often; what that does not tell, nobody knows.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.fit import Fitted
-from adv2e.diagnosis.selection.reference import Bench, State
-from adv2e.diagnosis.statistics import BOTH
-from adv2e.diagnosis.statistics.metric import Model, shrunk_correlation, whitening
+from adv2e.diagnosis.selection.reference import MANY, Reference, State
+from adv2e.diagnosis.selection.shortlist import scored
+from adv2e.diagnosis.statistics.metric import Ensemble, shrunk_correlation, whitening
+from adv2e.diagnosis.statistics.summary import BOTH
 
 Array = NDArray[np.float64]
 
@@ -21,22 +30,22 @@ _WORSE = 9.0
 BORDER = "its fit runs to the end of the physical range"
 BY_CHANCE = "what it gains on data it was not fitted to, chance could gain"
 
+CLOSE = 5.0
+"""Log likelihood that tells two models apart where simulations tell it: a factor of 150."""
+_DEVIATIONS = 2.0
+_OFTEN = (*range(1, MANY + 1), *range(2 * MANY + 1, 4 * MANY + 1))
+"""Seeds, where the first are too few; between them are those of the scales."""
 
-def objections(fit: Fitted, grown: State, ground: State, bench: Bench) -> list[str]:
-    """Return why a model is not to be taken for the one before it; none: it holds.
 
-    Parameters
-    ----------
-    fit : Fitted
-        Of the model.
-    grown, ground : State
-        The two, the first as :meth:`~adv2e.diagnosis.selection.reference.Bench.tried`.
-    bench : Bench
+def objections(fit: Fitted, grown: State, ground: State, reference: Reference) -> list[str]:
+    """Return why a fitted model is not to be taken for the one before it; none: it holds.
+
+    The first as :meth:`~adv2e.diagnosis.selection.reference.Reference.tried`.
     """
-    observed = bench.observed[parts.JUDGE]
-    after, before = grown.models[parts.JUDGE], ground.models[parts.JUDGE]
+    observed = reference.observed[splits.VALIDATION]
+    after, before = grown.ensembles[splits.VALIDATION], ground.ensembles[splits.VALIDATION]
     # as often as what is tried, by the same seeds: most of chance falls out of the difference
-    as_often = bench.tried(ground.config)[parts.JUDGE]
+    as_often = reference.tried(ground.config)[splits.VALIDATION]
     found = []
     if gain(after, as_often, observed) < chance_gain(after, as_often, observed):
         found.append(BY_CHANCE)
@@ -45,10 +54,10 @@ def objections(fit: Fitted, grown: State, ground: State, bench: Bench) -> list[s
     loud = loudness(after, before, observed)
     if loud > _QUIET:
         found.append(f"what it changes most still stands out by {loud:.1f} deviations")
-    for view in (parts.JUDGE, BOTH):
-        worst = _worse(grown.models[view], ground.models[view], bench.observed[view])
+    for view in (splits.VALIDATION, BOTH):
+        worst = _worse(grown.ensembles[view], ground.ensembles[view], reference.observed[view])
         if worst is not None:
-            name, deviations = bench.laboratory.markers.entries[worst[0]].name, worst[1]
+            name, deviations = reference.sampler.statistics.entries[worst[0]].name, worst[1]
             found.append(
                 f"makes '{name}' worse, which then stands out by {deviations:.0f} deviations"
             )
@@ -56,22 +65,16 @@ def objections(fit: Fitted, grown: State, ground: State, bench: Bench) -> list[s
     return found
 
 
-def gain(after: Model, before: Model, observed: Array) -> float:
+def gain(after: Ensemble, before: Ensemble, observed: Array) -> float:
     """Return what a model gains over the one before it in log likelihood."""
     return after.log_likelihood(observed) - before.log_likelihood(observed)
 
 
-def chance_gain(after: Model, before: Model, observed: Array) -> float:
+def chance_gain(after: Ensemble, before: Ensemble, observed: Array) -> float:
     """Return what a model gains by chance over the one before it, at most.
 
     On recordings of the one before it, and as far as the gain hangs on which simulations the two
-    were made of: where much is left, their chance is multiplied by it.
-
-    Parameters
-    ----------
-    after, before : Model
-        Of simulations with the same seeds.
-    observed : (statistics,)
+    were made of, with the same seeds: where much is left, their chance is multiplied by it.
     """
     rows = before.sample
     gains = after.likelihood_of_others(rows) - before.likelihood_of_others(rows)
@@ -79,17 +82,12 @@ def chance_gain(after: Model, before: Model, observed: Array) -> float:
     return float(max(gains.mean() + 3.0 * deviation, 3.0))
 
 
-def loudness(after: Model, before: Model, observed: Array) -> float:
+def loudness(after: Ensemble, before: Ensemble, observed: Array) -> float:
     """Return how far the statistics that a model changes most are still off [deviations].
 
     By the correlations that they have under the model itself: one fact that many of them tell, as
     that few of its hot pixels lie where they were looked for, counts as one.  Under the declared
     model, from which those of all others are taken, there may have been nothing to tell.
-
-    Parameters
-    ----------
-    after, before : Model
-    observed : (statistics,)
     """
     change = np.abs(before.scale.whitening @ (after.mean - before.mean))
     own = np.argsort(-change)[:_SIGNATURE]
@@ -99,7 +97,7 @@ def loudness(after: Model, before: Model, observed: Array) -> float:
     return float(np.sqrt(np.mean(z * z)))
 
 
-def _worse(after: Model, before: Model, observed: Array) -> tuple[int, float] | None:
+def _worse(after: Ensemble, before: Ensemble, observed: Array) -> tuple[int, float] | None:
     """Return which statistic a model makes worst, and how far it stands out then [deviations].
 
     None if no statistic gets worse by more than details of a simulation make, or none then stands
@@ -109,3 +107,42 @@ def _worse(after: Model, before: Model, observed: Array) -> tuple[int, float] | 
     worst = int(np.argmax(now - then))
     much = now[worst] > max(then[worst] + _WORSE, 2.0 * then[worst], then.max())
     return (worst, float(now[worst])) if much else None
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Scores of several models, the best of them, and others that cannot be told from it."""
+
+    scores: Array
+    best: int
+    alike: frozenset[int]
+
+
+def ranked(reference: Reference, states: Sequence[State], parameters: Sequence[int]) -> Ranking:
+    """Rank models by :func:`scored`; where chance may have parted some, by more simulations.
+
+    `parameters`: how many each adds.
+    """
+    ranking = _ranked(reference, [state.ensembles for state in states], parameters)
+    near = sorted({ranking.best} | ranking.alike)
+    if not np.any(ranking.scores[ranking.best] - ranking.scores[near] > CLOSE):
+        return ranking
+    configs = [states[k].config for k in near]
+    often = [reference.ensembles(one, reference.sampler.sample(one, _OFTEN)) for one in configs]
+    again = _ranked(reference, often, [parameters[k] for k in near])
+    scores = ranking.scores.copy()
+    scores[near] = again.scores
+    return Ranking(scores, near[again.best], frozenset(near[k] for k in again.alike))
+
+
+def _ranked(
+    reference: Reference, models: Sequence[Sequence[Ensemble]], parameters: Sequence[int]
+) -> Ranking:
+    """Rank models, of which each has an ensemble a view."""
+    each = zip(models, parameters, strict=True)
+    scores = np.array([scored(reference, *one) for one in each])
+    best, observed = int(np.argmax(scores)), reference.observed[BOTH]
+    first = models[best][BOTH]
+    chance = np.array([of_views[BOTH].parted_by_chance(first, observed) for of_views in models])
+    alike = np.flatnonzero(scores[best] - scores <= CLOSE + _DEVIATIONS * chance)
+    return Ranking(scores, best, frozenset(alike.tolist()) - {best})

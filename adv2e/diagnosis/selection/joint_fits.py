@@ -5,40 +5,43 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fit import Fitted
 from adv2e.diagnosis.hints.readouts import EXPOSURE
-from adv2e.diagnosis.selection.acceptance import BORDER, BY_CHANCE, objections
-from adv2e.diagnosis.selection.ranking import ranked
-from adv2e.diagnosis.selection.reference import MANY, SOME, Bench, State, likely_of_a_fit, parted
-from adv2e.diagnosis.selection.shortlist import Trial, finalists, likely_of_finalists
-from adv2e.diagnosis.statistics import BOTH
+from adv2e.diagnosis.selection.acceptance import BORDER, BY_CHANCE, objections, ranked
+from adv2e.diagnosis.selection.reference import Reference, State, parted
+from adv2e.diagnosis.selection.shortlist import Trial, shortlisted
+from adv2e.diagnosis.statistics.summary import BOTH
 
-_TRIED, _LIKELY_TRIED = 4, 2
+Array = NDArray[np.float64]
+
+_TRIED = 4
 CATCHES_UP = 60.0
 """Log likelihood that a fit may gain when it is brought to its end."""
 
+_PAIRS = 4
+_MOST_LEFT = 0.5
+"""Part of what the best effect alone would leave that two may, to be worth a fit."""
+_FARTHEST = 3.0
+"""Most by which what an effect changes is stretched, or it is not taken to go on in proportion."""
+
 
 @dataclass(frozen=True)
-class Attempt:
-    """A model with effects more, fitted to its end, and what speaks against it.
+class JointFit:
+    """A model with effects more, fitted to its end, and what speaks against it; nothing: it holds.
 
-    Attributes
-    ----------
-    state : State
-    objections : list of str
-        None: it holds.
-    judged : float
-        Log likelihood of the data that it was not fitted to.
+    `validated`: log likelihood of the data that it was not fitted to.
     """
 
     state: State
     objections: list[str]
-    judged: float
+    validated: float
 
     @property
     def physical(self) -> bool:
@@ -46,23 +49,9 @@ class Attempt:
         return not {BORDER, BY_CHANCE} & set(self.objections)
 
 
-def knobs_of(fits: Sequence[Fitted]) -> int:
-    """Return the number of knobs that fits have together."""
-    return sum(len(fit.candidate.knobs) for fit in fits)
-
-
-def likely_of_a_round(candidates: Sequence[Candidate], fits: Sequence[Fitted]) -> int:
-    """Return about how many simulations it takes to add an effect to others.
-
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-        Those that compete.
-    fits : sequence of Fitted
-        Those of the model.
-    """
-    fit = likely_of_a_fit(knobs_of(fits) + 1)
-    return likely_of_finalists(candidates) + _LIKELY_TRIED * (fit + SOME) + fit + MANY
+def count_parameters(fits: Sequence[Fitted]) -> int:
+    """Return the number of parameters that fits have together."""
+    return sum(len(fit.candidate.parameters) for fit in fits)
 
 
 def _exposed_as(trial: Trial, fit: Fitted) -> Fitted:
@@ -71,58 +60,45 @@ def _exposed_as(trial: Trial, fit: Fitted) -> Fitted:
     It is held near that: where it ends elsewhere, there is nothing that would tell it so.
     """
     readouts, candidate = trial.fit.candidate.readouts, fit.candidate
-    if readouts is None or [knob.key for knob in candidate.knobs] != [EXPOSURE]:
+    if readouts is None or [one.key for one in candidate.parameters] != [EXPOSURE]:
         return fit
     exposure_us = trial.fit.base.frames.exposure_us
-    place = np.array(candidate.inner([exposure_us]))
-    if np.allclose(place, fit.place, rtol=1e-9):
+    point = np.array(candidate.scaled([exposure_us]))
+    if np.allclose(point, fit.point, rtol=1e-9):
         return fit
-    known = ((float(place[0]), readouts.exposure_sd_us / exposure_us),)
+    known = ((float(point[0]), readouts.exposure_sd_us / exposure_us),)
     return dataclasses.replace(
-        fit, candidate=dataclasses.replace(candidate, known=known), place=place
+        fit, candidate=dataclasses.replace(candidate, known=known), point=point
     )
 
 
 @dataclass(frozen=True)
-class Attempts:
-    """Tries effects on top of models.
+class JointFits:
+    """Tries effects on top of models."""
 
-    Attributes
-    ----------
-    bench : Bench
-    candidates : list of Candidate
-        Those that compete.
-    """
-
-    bench: Bench
+    reference: Reference
     candidates: list[Candidate]
 
     def trials(self, state: State, besides: Sequence[str] = ()) -> list[Trial]:
         """Return the best form of each of the best effects on top of a model, the best first.
 
-        Parameters
-        ----------
-        state : State
-        besides : sequence of str
-            Effects that are not tried, beside those that it has.
+        Those named `besides` are not tried, nor those that it has.
         """
-        self.bench.laboratory.simulator.expect(likely_of_a_round(self.candidates, state.fits))
         best: dict[str, Trial] = {}
         competing = [one for one in self.candidates if one.name not in besides]
-        for trial in finalists(self.bench, state, competing):
+        for trial in shortlisted(self.reference, state, competing):
             best.setdefault(trial.name, trial)
         return list(best.values())
 
     def of_one(
         self, state: State, trials: Sequence[Trial], grounds: Sequence[State]
-    ) -> list[Attempt]:
+    ) -> list[JointFit]:
         """Return models with one effect more, judged against all `grounds`.
 
-        Fits are brought to their end on the data for fitting and judged on other data.  Before its
-        fit has ended, an effect may be behind another for that alone: all that are close are tried.
-        Others are, one after another, where none of these holds.
+        Before its fit has ended, an effect may be behind another for that alone: all that are close
+        are tried.  Others are, one after another, where none of these holds.
         """
-        made: list[Attempt] = []
+        made: list[JointFit] = []
         for trial in trials[:_TRIED]:
             close = trial.score > trials[0].score - CATCHES_UP
             if not close and any(not one.objections for one in made):
@@ -130,47 +106,50 @@ class Attempts:
             made.append(self.of(state, [trial], grounds))
         return made
 
-    def of(self, state: State, added: Sequence[Trial], grounds: Sequence[State]) -> Attempt:
+    def of(self, state: State, added: Sequence[Trial], grounds: Sequence[State]) -> JointFit:
         """Return the model with effects more, fitted to its end and judged."""
-        bench = self.bench
+        reference = self.reference
         before = state.fits
         for trial in added:
             before = tuple(_exposed_as(trial, fit) for fit in before)
         together = (*before, *(trial.fit for trial in added))
-        joint = bench.fitted(together, added[0].models[parts.FIT].sd, parts.FIT)
+        joint = reference.fitted(together, added[0].ensembles[splits.TRAIN].sd, splits.TRAIN)
         fits = parted(joint, together)
-        grown = State(joint.config, fits, bench.tried(joint.config))
+        grown = State(joint.config, fits, reference.tried(joint.config))
         against: list[str] = []
         for ground in grounds:
-            against = objections(joint, grown, ground, bench)
+            against = objections(joint, grown, ground, reference)
             if against:
                 break
         new = grown.beyond(state)
         told = [
-            f"{fit.candidate.name} {fit.candidate.told(joint.config, fit.place)}" for fit in new
+            f"{fit.candidate.name} {fit.candidate.settings_in(joint.config, fit.point)}"
+            for fit in new
         ]
-        bench.log(f"  {' and '.join(told)}: {'; '.join(against) or 'holds'}")
+        reference.log(f"  {' and '.join(told)}: {'; '.join(against) or 'holds'}")
         if against and len(new) == 1:  # of two, nobody knows which it is
-            bench.rejections.add(new[0], "; ".join(against), final=True)
-        return Attempt(grown, against, bench.likelihood(grown, parts.JUDGE))
+            reference.rejections.add(new[0], "; ".join(against), final=True)
+        return JointFit(grown, against, reference.likelihood(grown, splits.VALIDATION))
 
-    def best(self, attempts: Sequence[Attempt], state: State) -> State | None:
-        """Return the best of the models that hold, fitted to all data but those looked at last.
+    def best(self, made: Sequence[JointFit], state: State) -> State | None:
+        """Return the best of the models that hold, fitted to all data but those looked at once.
 
         Effects of others that do as well are noted as alternatives.
         """
+        reference = self.reference
         holding = [
-            self.bench.settled(one.state.fits, one.state.models[BOTH].sd)
-            for one in attempts
+            reference.settled(one.state.fits, one.state.ensembles[BOTH].sd)
+            for one in made
             if not one.objections
         ]
         if not holding:
             return None
-        ranking = ranked(self.bench, holding, [knobs_of(one.beyond(state)) for one in holding])
+        counts = [count_parameters(one.beyond(state)) for one in holding]
+        ranking = ranked(reference, holding, counts)
         chosen = holding[ranking.best]
         alike: set[str] = set()
         for k, one in enumerate(holding):
-            self.bench.log(
+            reference.log(
                 f"  {' and '.join(one.names)}, on more data: score {ranking.scores[k]:.0f}"
             )
             why = "others explain more"
@@ -179,8 +158,45 @@ class Attempts:
                 alike.update(fit.candidate.name for fit in others)
                 why = f"does as well as {chosen.names[-1]}, and cannot be told from it"
             for fit in others:
-                self.bench.rejections.add(fit, why, final=True)
+                reference.rejections.add(fit, why, final=True)
         if not alike:
             return dataclasses.replace(chosen, alternatives=state.alternatives)
         alternatives = {**state.alternatives, chosen.names[-1]: frozenset(alike)}
         return dataclasses.replace(chosen, alternatives=alternatives)
+
+
+def likely_pairs(
+    reference: Reference, state: State, trials: Sequence[Trial]
+) -> list[tuple[Trial, Trial]]:
+    """Return pairs of effects that together would leave the least, the best first.
+
+    Each of two strong effects may leave so much of the other that its own fit goes astray, and
+    nothing holds that could be built on.  As if each changed the statistics by itself, in
+    proportion to its size, what it changes tells which two could explain most together.  Those that
+    would not leave far less than the best effect alone are left out.  `trials`: effects alone on
+    top of the model, each in one form.
+    """
+    ground, observed = state.ensembles[splits.TRAIN], reference.observed[splits.TRAIN]
+    white = ground.scale.whitening / ground.sd
+    missing = white @ (ground.scale.of_values(observed) - ground.mean)
+    changes = [white @ (trial.ensembles[splits.TRAIN].mean - ground.mean) for trial in trials]
+    alone = min((_left(missing, [one]) for one in changes), default=0.0)
+    found = []
+    for a, b in combinations(range(len(trials)), 2):
+        least = _left(missing, [changes[a], changes[b]])
+        if least < _MOST_LEFT * alone:
+            found.append((least, a, b))
+    return [(trials[a], trials[b]) for _, a, b in sorted(found)[:_PAIRS]]
+
+
+def _left(missing: Array, changes: Sequence[Array]) -> float:
+    """Return the square of what is left when changes are stretched to fit what is missing.
+
+    All of it where one would be turned round, or stretched too far.
+    """
+    columns = np.transpose(changes)
+    stretch, *_ = np.linalg.lstsq(columns, missing, rcond=None)
+    if stretch.min() < 0.0 or stretch.max() > _FARTHEST:
+        return float(missing @ missing)
+    rest = missing - columns @ stretch
+    return float(rest @ rest)

@@ -5,20 +5,24 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.fitting.candidates import NOTHING_KNOWN, Candidate, Knob, neutral_value
+from adv2e.diagnosis.fitting.candidates import (
+    NOTHING_KNOWN,
+    Candidate,
+    FitParameter,
+    neutral_value,
+)
 from adv2e.diagnosis.fitting.fit import Fitted, Fitter
-from adv2e.diagnosis.fitting.simulations import Laboratory
-from adv2e.diagnosis.selection.rejections import Rejections
-from adv2e.diagnosis.statistics import BOTH, VIEWS
-from adv2e.diagnosis.statistics.frame_error import FrameError
-from adv2e.diagnosis.statistics.metric import Model, Scale
-from adv2e.diagnosis.statistics.resampling import Resampling
+from adv2e.diagnosis.statistics.metric import Ensemble, Scale
+from adv2e.diagnosis.statistics.sampler import Sampler
+from adv2e.diagnosis.statistics.summary import BOTH, VIEWS
+from adv2e.diagnosis.statistics.uncertainty import FrameError, Resampling
+from adv2e.reports.result import Rejected
 
 Array = NDArray[np.float64]
 
@@ -39,19 +43,12 @@ _REACH = 0.4
 class State:
     """A model: configuration, the fits that made it, and its simulations in every view.
 
-    Attributes
-    ----------
-    config : Config
-    fits : tuple of Fitted
-    models : tuple of Model
-        One a view.
-    alternatives : mapping of str to frozenset of str
-        Of effects that were added, others that cannot be told from them.
+    `alternatives`: of effects that were added, others that cannot be told from them.
     """
 
     config: Config
     fits: tuple[Fitted, ...]
-    models: tuple[Model, ...]
+    ensembles: tuple[Ensemble, ...]
     alternatives: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
     @property
@@ -64,97 +61,102 @@ class State:
         return self.fits[len(ground.fits) :]
 
 
-@dataclass(frozen=True)
-class Bench:
+@dataclass
+class Rejections:
+    """Why effects were not added: of each round, the reason of an effect's best form."""
+
+    held: dict[str, Rejected] = field(default_factory=dict)
+    _this_round: set[str] = field(default_factory=set)
+
+    def new_round(self) -> None:
+        """Let reasons take the place of earlier ones."""
+        self._this_round.clear()
+
+    def add(self, fit: Fitted, reason: str, *, final: bool = False) -> None:
+        """Note why an effect was not taken; `final` reasons replace those of the same round."""
+        name = fit.candidate.name
+        if final or name not in self._this_round:
+            self._this_round.add(name)
+            self.held[name] = Rejected(name, reason, fit.settings)
+
+
+class Reference:
     """The recording, the scales of its statistics, and the means to simulate.
 
-    Attributes
+    Parameters
     ----------
-    laboratory : Laboratory
+    sampler : Sampler
     observed : (views, statistics)
         Of the recording.
     declared : Config
-    scales : tuple of Scale
-        One a view.
-    error : FrameError
+    error : FrameError, optional
         Of the statistics.
-    resampling : Resampling
-        Of models that shift the frames.
     log : callable
         Told of each step.
-    free : tuple of Knob
+    free : tuple of FitParameter
         Keys that are not known: fitted with all effects, whatever these are.
-    rejections : Rejections
     """
 
-    laboratory: Laboratory
-    observed: Array
-    declared: Config
-    scales: tuple[Scale, ...]
-    error: FrameError
-    resampling: Resampling
-    log: Callable[[str], None]
-    free: tuple[Knob, ...] = ()
-    rejections: Rejections = field(default_factory=Rejections)
-
-    @classmethod
-    def of(
-        cls,
-        laboratory: Laboratory,
+    def __init__(
+        self,
+        sampler: Sampler,
         observed: Array,
         declared: Config,
-        error: FrameError | None,
-        log: Callable[[str], None],
-        free: tuple[Knob, ...] = (),
-    ) -> Bench:
-        """Return the bench of a declared model, which is simulated for the scales."""
-        error = error or FrameError.none(observed.shape)
+        error: FrameError | None = None,
+        log: Callable[[str], None] = lambda text: None,
+        free: tuple[FitParameter, ...] = (),
+    ) -> None:
+        self.sampler, self.observed, self.log = sampler, observed, log
+        self.error = error or FrameError.none(observed.shape)
+        self.declared, self.free = declared, free
+        self._resampling, self.rejections = Resampling(sampler, declared), Rejections()
+
+    @cached_property
+    def scales(self) -> tuple[Scale, ...]:
+        """Scales of the statistics, one a view, from simulations of the declared model."""
         # not the simulations that misfits are compared with: those would fit too well
-        sample = laboratory.ensemble(declared, range(MANY + 1, 2 * MANY + 1))
-        least = laboratory.markers.least
-        scales = tuple(
-            Scale.of(error.blurred(sample[:, view], view, _OF_SCALES), least)
+        sample = self.sampler.sample(self.declared, range(MANY + 1, 2 * MANY + 1))
+        least = self.sampler.statistics.least
+        return tuple(
+            Scale.of(self.error.blurred(sample[:, view], view, _OF_SCALES), least)
             for view in range(VIEWS)
         )
-        resampling = Resampling(laboratory, declared)
-        return cls(laboratory, observed, declared, scales, error, resampling, log, free)
 
     def fitter(
-        self, view: int, near: Config, sd: Array | None = None, *, first_look: bool = False
+        self, view: int, near: Config, sd: Array | None = None, *, rough: bool = False
     ) -> Fitter:
         """Return what fits candidates in one view of the data, to models near one.
 
-        Simulations with shifted frames are as far off as those of that model.  A `first_look` takes
-        rougher ones.
+        Simulations with shifted frames are as far off as those of that model.
         """
-        laboratory = self.laboratory.for_a_first_look if first_look else self.laboratory
-        shifted = self.resampling.error(near)
+        sampler = self.sampler.rough if rough else self.sampler
+        shifted = self._resampling.error(near)
         goal = self.observed[view] + (0.0 if shifted is None else shifted.bias[view])
-        return Fitter(laboratory, self.scales[view], goal, view, sd)
+        return Fitter(sampler, self.scales[view], goal, view, sd)
 
-    def models(self, config: Config, sample: Any) -> tuple[Model, ...]:
-        """Return the models of a configuration's simulations, (seeds, views, statistics)."""
-        shifted = self.resampling.error(config)
+    def ensembles(self, config: Config, sample: Array) -> tuple[Ensemble, ...]:
+        """Return, for each view, a configuration's simulations, (seeds, views, statistics)."""
+        shifted = self._resampling.error(config)
 
-        def of(view: int) -> Model:
+        def of(view: int) -> Ensemble:
             rows = self.error.blurred(sample[:, view], view, _OF_MODELS)
             if shifted is not None:
                 rows = shifted.blurred(rows - shifted.bias[view], view, _OF_SHIFTED)
-            return Model.of(self.scales[view], rows)
+            return Ensemble.of(self.scales[view], rows)
 
         return tuple(map(of, range(VIEWS)))
 
-    def tried(self, config: Config) -> tuple[Model, ...]:
-        """Return the models of a configuration, simulated often enough to judge it."""
-        return self.models(config, self.laboratory.ensemble(config, range(1, SOME + 1)))
+    def tried(self, config: Config) -> tuple[Ensemble, ...]:
+        """Return simulations of a configuration, often enough to judge it."""
+        return self.ensembles(config, self.sampler.sample(config, range(1, SOME + 1)))
 
     def state(self, config: Config, fits: tuple[Fitted, ...] = ()) -> State:
         """Return a model, simulated often enough to build on it."""
-        sample = self.laboratory.ensemble(config, range(1, MANY + 1))
-        return State(config, fits, self.models(config, sample))
+        sample = self.sampler.sample(config, range(1, MANY + 1))
+        return State(config, fits, self.ensembles(config, sample))
 
     def settled(self, fits: tuple[Fitted, ...], sd: Array) -> State:
-        """Return the model of effects fitted together to the data for fitting and judging.
+        """Return the model of effects fitted together to the data for training and validation.
 
         How precise the fits are is told by its simulations.
         """
@@ -162,12 +164,12 @@ class Bench:
         state = self.state(joint.config)
         if joint.derivative.size:
             fitter = self.fitter(BOTH, joint.config, sd)
-            fitter.set_covariance(joint, state.models[BOTH].sample)
+            fitter.set_covariance(joint, state.ensembles[BOTH].sample)
         return dataclasses.replace(state, fits=parted(joint, fits))
 
     def fitted(self, fits: tuple[Fitted, ...], sd: Array, view: int) -> Fitted:
         """Return the fit of all effects together in a view of the data."""
-        joint = _joined(fits, self.declared, self.free)
+        joint = self._joined(fits)
         for _ in range(_ROUNDS):
             fitter = self.fitter(view, joint.config, sd)
             fitter.improve([joint], range(11, 11 + _SEEDS))
@@ -180,42 +182,41 @@ class Bench:
                 self.log(f"  {names}: the last step of the fit moved it by {joint.moved:.1f} sd")
         return joint
 
+    def _joined(self, fits: tuple[Fitted, ...]) -> Fitted:
+        """Return one fit of all effects together, and of the keys that are not known, the last."""
+        each, free = [fit.candidate for fit in fits], self.free
+        unknown = [one.scaled(neutral_value(self.declared, one)) for one in free]
+        joint = Candidate(
+            " and ".join(one.name for one in each),
+            (*(parameter for one in each for parameter in one.parameters), *free),
+            (),
+            tuple(pair for one in each for pair in one.extra),
+            tuple(pair for one in each for pair in one.defaults),
+            known=(
+                *(pair for one in each for pair in one.known_or_not),
+                *(NOTHING_KNOWN for _ in free),
+            ),
+            pulse=next((one.pulse for one in each), None),
+        )
+        point = np.concatenate([*(fit.point for fit in fits), unknown])
+        return Fitted(joint, self.declared, point, reach=_REACH)
+
     def misfit(self, state: State, view: int = BOTH) -> float:
         """Return how far the recording is from a model."""
-        return state.models[view].misfit(self.observed[view])
+        return state.ensembles[view].misfit(self.observed[view])
 
     def likelihood(self, state: State, view: int = BOTH) -> float:
         """Return the log likelihood of the recording under a model."""
-        return state.models[view].log_likelihood(self.observed[view])
-
-
-def likely_of_a_fit(knobs: int) -> int:
-    """Return about how many simulations it takes to fit so many keys together."""
-    return _SEEDS * (2 * (knobs + 3) + 4 * (2 * knobs + 1))
-
-
-def _joined(fits: tuple[Fitted, ...], declared: Config, free: tuple[Knob, ...]) -> Fitted:
-    """Return one fit of all effects together, and of the keys that are not known, the last."""
-    knobs = (*(knob for fit in fits for knob in fit.candidate.knobs), *free)
-    extra = tuple(pair for fit in fits for pair in fit.candidate.extra)
-    defaults = tuple(pair for fit in fits for pair in fit.candidate.defaults)
-    known = tuple(pair for fit in fits for pair in fit.candidate.known_or_not)
-    known += (NOTHING_KNOWN,) * len(free)
-    name = " and ".join(fit.candidate.name for fit in fits)
-    unknown = [knob.inner(neutral_value(declared, knob)) for knob in free]
-    place = np.concatenate([*(fit.place for fit in fits), unknown])
-    pulse = next((fit.candidate.pulse for fit in fits), None)
-    joint = Candidate(name, knobs, (), extra, defaults, known=known, pulse=pulse)
-    return Fitted(joint, declared, place, reach=_REACH)
+        return state.ensembles[view].log_likelihood(self.observed[view])
 
 
 def parted(joint: Fitted, fits: tuple[Fitted, ...]) -> tuple[Fitted, ...]:
-    """Return the effects of a joined fit, each with its own place and covariance."""
+    """Return the effects of a joined fit, each with its own point and covariance."""
     result, start = [], 0
     for fit in fits:
-        stop = start + len(fit.candidate.knobs)
+        stop = start + len(fit.candidate.parameters)
         own = slice(start, stop)
-        place, covariance = joint.place[own], joint.covariance[own, own]
-        result.append(Fitted(fit.candidate, fit.base, place, joint.misfit, covariance=covariance))
+        point, covariance = joint.point[own], joint.covariance[own, own]
+        result.append(Fitted(fit.candidate, fit.base, point, joint.misfit, covariance=covariance))
         start = stop
     return tuple(result)

@@ -13,39 +13,32 @@ place of the first, which was added while more was missing, before a third is.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from adv2e.config import Config
-from adv2e.diagnosis.data import splits as parts
-from adv2e.diagnosis.fitting.candidates import FITTED, Candidate, Knob
+from adv2e.diagnosis.data import splits
+from adv2e.diagnosis.fitting.candidates import FITTED, Candidate
 from adv2e.diagnosis.fitting.fit import Fitted
-from adv2e.diagnosis.fitting.simulations import Laboratory
+from adv2e.diagnosis.selection.acceptance import CLOSE
 from adv2e.diagnosis.selection.joint_fits import (
     CATCHES_UP,
-    Attempt,
-    Attempts,
-    knobs_of,
-    likely_of_a_round,
+    JointFit,
+    JointFits,
+    count_parameters,
+    likely_pairs,
 )
-from adv2e.diagnosis.selection.pairs import likely_pairs
-from adv2e.diagnosis.selection.ranking import CLOSE
-from adv2e.diagnosis.selection.reference import MANY, Bench, State
+from adv2e.diagnosis.selection.reference import Reference, State
 from adv2e.diagnosis.selection.shortlist import Trial, scored
-from adv2e.diagnosis.statistics import BOTH
-from adv2e.diagnosis.statistics.frame_error import FrameError
+from adv2e.diagnosis.statistics.summary import BOTH
 from adv2e.reports.result import Rejected
-
-Array = NDArray[np.float64]
 
 LEVEL = 0.01
 """Probability below which chance is not believed to make a residual."""
 
 PER_LOOK = LEVEL / 2.0
-"""The same of each look: at the data for fitting and judging, and at those looked at last."""
+"""The same of each look: at the data for training and validation, and at the test data."""
 
 MOST_EFFECTS = 4
 _MOST_WITH_TWO = 3
@@ -66,8 +59,8 @@ class Outcome:
     Attributes
     ----------
     state : State
-    probability, last : float
-        Of the residual left, where the search looked, and in the data looked at last.
+    probability, test_probability : float
+        Of the residual left, where the search looked, and in the test data.
     explained : float
         Share of the declared model's residual that is gone.
     complete : bool
@@ -79,7 +72,7 @@ class Outcome:
 
     state: State
     probability: float
-    last: float
+    test_probability: float
     explained: float
     complete: bool
     rejected: dict[str, Rejected]
@@ -102,71 +95,42 @@ def _is_undone(state: State) -> bool:
 
 
 class Search:
-    """Looks for effects that a declared model lacks.
+    """Looks for effects that a declared model lacks, among those that compete.
 
-    Parameters
-    ----------
-    laboratory : Laboratory
-    observed : (views, statistics)
-        Of the recording.
-    declared : Config
-    candidates : sequence of Candidate
-    error : FrameError, optional
-        Of the statistics.
-    log : callable
-        Told of each step.
-    free : tuple of Knob
-        Keys that are not known: fitted with all effects, and no effect themselves.
-
-    Attributes
-    ----------
-    candidates : list of Candidate
-        Those that compete.
-    bench : Bench
-    attempts : Attempts
-    declared : State
+    Those of keys that are not known are none: they are fitted with all effects.
     """
 
-    def __init__(
-        self,
-        laboratory: Laboratory,
-        observed: Array,
-        declared: Config,
-        candidates: Sequence[Candidate],
-        error: FrameError | None = None,
-        log: Callable[[str], None] = lambda text: None,
-        free: tuple[Knob, ...] = (),
-    ) -> None:
-        unknown = {knob.key for knob in free}
+    def __init__(self, reference: Reference, candidates: list[Candidate]) -> None:
+        unknown = {parameter.key for parameter in reference.free}
         self.candidates = [
-            one for one in candidates if not unknown & {knob.key for knob in one.knobs}
+            one for one in candidates if not unknown & {each.key for each in one.parameters}
         ]
-        laboratory.simulator.expect(2 * MANY + likely_of_a_round(self.candidates, ()))
-        self.bench = Bench.of(laboratory, observed, declared, error, log, free)
-        self.attempts = Attempts(self.bench, self.candidates)
-        self.declared = self.bench.state(declared, ())
+        self.reference = reference
+        self.joint_fits = JointFits(reference, self.candidates)
+        self.declared = reference.state(reference.declared)
 
     def probability(self, state: State, view: int = BOTH) -> float:
         """Return how often chance makes a residual as large as the recording's."""
-        return state.models[view].probability(self.bench.observed[view])
+        return state.ensembles[view].probability(self.reference.observed[view])
 
     def explained(self, state: State, view: int = BOTH) -> float:
         """Return the share of the declared model's residual that is gone."""
-        return self._taken_away(self.declared, state, state.models[view].floor, view)
+        return self._taken_away(self.declared, state, state.ensembles[view].floor, view)
 
     def run(self) -> Outcome:
         """Search forward and backward."""
         state = self.declared
-        self.bench.log(f"declared model: probability of the residual {self.probability(state):.2g}")
+        told = f"declared model: probability of the residual {self.probability(state):.2g}"
+        self.reference.log(told)
         state = self._backward(self._forward(state))
-        held = self.bench.rejections.held
+        held = self.reference.rejections.held
         rejected = {name: why for name, why in held.items() if name not in state.names}
         return Outcome(
             state,
             self.probability(state),
-            self.probability(state, parts.LAST),
+            self.probability(state, splits.TEST),
             self.explained(state),
-            not any(self._is_something_left(state, view) for view in (BOTH, parts.LAST)),
+            not any(self._is_something_left(state, view) for view in (BOTH, splits.TEST)),
             rejected,
         )
 
@@ -183,7 +147,7 @@ class Search:
             if not self._is_open(state):
                 break
             if len(state.fits) >= MOST_EFFECTS:
-                self.bench.log(
+                self.reference.log(
                     f"something is left beside {MOST_EFFECTS} effects: no more are tried"
                 )
                 break
@@ -191,7 +155,7 @@ class Search:
             if grown is None or not self._is_worth_it(state, grown):
                 break
             state = grown
-            self.bench.log(
+            self.reference.log(
                 f"added {', '.join(state.names)}: probability {self.probability(state):.2g}"
             )
         return state
@@ -229,7 +193,7 @@ class Search:
         """
         if self._is_something_left(state):
             least = _LEAST_OF_THE_LEFT
-            stands_out = self.bench.misfit(state) < state.models[BOTH].limits(PER_LOOK)[0]
+            stands_out = self.reference.misfit(state) < state.ensembles[BOTH].limits(PER_LOOK)[0]
             if stands_out or not self._is_something_left(grown):
                 return True
         else:
@@ -238,10 +202,10 @@ class Search:
         if share >= least:
             return True
         added = " and ".join(fit.candidate.name for fit in grown.beyond(state))
-        self.bench.log(f"  {added} takes away {share:.0%} of what is left: too little")
+        self.reference.log(f"  {added} takes away {share:.0%} of what is left: too little")
         why = f"takes away no more than {max(share, 0.0):.0%} of what is left"
         for fit in grown.beyond(state):
-            self.bench.rejections.add(fit, why, final=True)
+            self.reference.rejections.add(fit, why, final=True)
         return False
 
     def _taken_away(
@@ -251,8 +215,8 @@ class Search:
 
         The floor is the model's own unless it is given.  Below it, nothing is left to take away.
         """
-        before, after = self.bench.misfit(state, view), self.bench.misfit(other, view)
-        above = before - (state.models[view].floor if floor is None else floor)
+        before, after = self.reference.misfit(state, view), self.reference.misfit(other, view)
+        above = before - (state.ensembles[view].floor if floor is None else floor)
         return float((before - after) / above) if above > 0.0 else 0.0
 
     def _grown(self, state: State) -> State | None:
@@ -261,50 +225,50 @@ class Search:
         Where one holds but another that does not explains far more, the one is no name for what is
         missing: it stands in for a part of the other.
         """
-        trials = self.attempts.trials(state)
+        trials = self.joint_fits.trials(state)
         # with one of two effects, something still stands out; but the one gains, and is physical
-        made = self.attempts.of_one(state, trials, [state])
+        made = self.joint_fits.of_one(state, trials, [state])
         physical = [one for one in made if one.physical]
-        most = max((one.judged for one in physical), default=-np.inf)
+        most = max((one.validated for one in physical), default=-np.inf)
         holding = [one for one in physical if not one.objections]
-        if any(one.judged > most - CATCHES_UP for one in holding):
-            return self.attempts.best(made, state)
+        if any(one.validated > most - CATCHES_UP for one in holding):
+            return self.joint_fits.best(made, state)
         grown = None
         if len(state.fits) + 2 <= _MOST_WITH_TWO:
-            grown = self.attempts.best(self._of_two(state, trials, physical), state)
+            grown = self.joint_fits.best(self._of_two(state, trials, physical), state)
         if grown is None and holding:
-            first = max(physical, key=lambda one: one.judged)
+            first = max(physical, key=lambda one: one.validated)
             why = f"holds, but {first.state.names[-1]}, which does not, explains far more"
             for one in holding:
-                self.bench.rejections.add(one.state.fits[-1], why, final=True)
+                self.reference.rejections.add(one.state.fits[-1], why, final=True)
         return grown
 
     def _of_two(
-        self, state: State, trials: Sequence[Trial], physical: Sequence[Attempt]
-    ) -> list[Attempt]:
+        self, state: State, trials: Sequence[Trial], physical: Sequence[JointFit]
+    ) -> list[JointFit]:
         """Return models with two effects more, of which none need hold alone.
 
         Others on top of the best that is physical, and the likeliest pairs.
         """
-        made: list[Attempt] = []
+        made: list[JointFit] = []
         if physical:
-            first = max(physical, key=lambda one: one.judged).state
-            self.bench.log(f"on trial: {', '.join(first.names)}")
-            made += self.attempts.of_one(first, self.attempts.trials(first), [first, state])
+            first = max(physical, key=lambda one: one.validated).state
+            self.reference.log(f"on trial: {', '.join(first.names)}")
+            made += self.joint_fits.of_one(first, self.joint_fits.trials(first), [first, state])
         had = {frozenset(one.state.names) for one in made}
-        for pair in likely_pairs(self.bench, state, trials):
+        for pair in likely_pairs(self.reference, state, trials):
             if frozenset((*state.names, *(one.name for one in pair))) not in had:
-                made.append(self.attempts.of(state, pair, [state]))
+                made.append(self.joint_fits.of(state, pair, [state]))
         return made
 
     def _backward(self, state: State) -> State:
         """Drop effects without which the others, fitted again, do as well, one after another."""
         for fit in state.fits[:-1]:
             without = self._without(state, fit)
-            loss = self.bench.likelihood(state) - self.bench.likelihood(without)
+            loss = self.reference.likelihood(state) - self.reference.likelihood(without)
             if loss < CLOSE:
-                self.bench.log(f"dropped {fit.candidate.name}: the others do without it")
-                self.bench.rejections.add(fit, "not needed beside the others", final=True)
+                self.reference.log(f"dropped {fit.candidate.name}: the others do without it")
+                self.reference.rejections.add(fit, "not needed beside the others", final=True)
                 return self._backward(without)
         return state
 
@@ -314,15 +278,15 @@ class Search:
         That was chosen while others were missing, whose part it may have taken.  Another has to
         hold on top of the rest, and instead of the one.
         """
-        reasons, first = self.bench.rejections, state.fits[0]
+        reasons, first = self.reference.rejections, state.fits[0]
         held, name = dict(reasons.held), first.candidate.name
         rest = self._without(state, first)
-        self.bench.log(f"in the place of {name}:")
-        trials = self.attempts.trials(rest, besides=[name])
-        other = self.attempts.best(self.attempts.of_one(rest, trials, [rest, state]), rest)
+        self.reference.log(f"in the place of {name}:")
+        trials = self.joint_fits.trials(rest, besides=[name])
+        other = self.joint_fits.best(self.joint_fits.of_one(rest, trials, [rest, state]), rest)
         if other is not None and self._is_better(other, state):
             reasons.add(first, f"does less than {other.names[-1]} in its place", final=True)
-            self.bench.log(f"replaced {name} by {other.names[-1]}")
+            self.reference.log(f"replaced {name} by {other.names[-1]}")
             return other
         reasons.held = held  # of what does not go on top of the model that is kept
         return None
@@ -333,7 +297,8 @@ class Search:
         Of what may be the fit's, it must take away most.
         """
         better, worse = (
-            scored(self.bench, one.models, knobs_of(one.fits)) for one in (other, state)
+            scored(self.reference, one.ensembles, count_parameters(one.fits))
+            for one in (other, state)
         )
         if better <= worse + CLOSE:
             return False
@@ -343,6 +308,6 @@ class Search:
     def _without(self, state: State, fit: Fitted) -> State:
         """Return the model without one of its effects, the others fitted again."""
         rest = tuple(other for other in state.fits if other is not fit)
-        without = self.bench.settled(rest, state.models[BOTH].sd)
+        without = self.reference.settled(rest, state.ensembles[BOTH].sd)
         alike = {name: of for name, of in state.alternatives.items() if name in without.names}
         return dataclasses.replace(without, alternatives=alike)

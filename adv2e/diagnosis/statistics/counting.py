@@ -1,4 +1,9 @@
-"""Sums over the events of a stream, compiled: they run beside simulations without the lock."""
+"""Sums over the events of a stream, compiled: they run beside simulations without the lock.
+
+Arguments in common: time [us], pixel, polarity and part of each event; `times`, (frames,) [us];
+`lags`, (lags,) [us]; `slope`, (pixels, frames - 1), all of a pixel side by side, as the lags of an
+event lie close to one another; `at`, (lags,) zeros, room for where in `times` each lag is.
+"""
 
 from __future__ import annotations
 
@@ -23,19 +28,7 @@ def sum_slopes(
 ) -> None:
     """Add up the change of light some time before each event, in the event's direction.
 
-    Parameters
-    ----------
-    t, pixel, on, cell : (events,)
-        Time [us], pixel, polarity, and the column of `sums` that the event counts for.
-    times : (frames,)
-        [us]
-    lags : (lags,)
-        [us]
-    slope : (pixels, frames - 1)
-        All of a pixel side by side, as the lags of an event lie close to one another.
-    at : (lags,)
-        Zeros: room for where in `times` each lag is.
-    sums : (lags, cells)
+    `cell`: (events,) column of `sums`, (lags, cells), that the event counts for.
     """
     for i in range(t.shape[0]):
         n, c = pixel[i], cell[i]
@@ -62,8 +55,7 @@ def sum_slopes_beside(
 ) -> None:
     """Add up the change of light right of each event less that left of it, and below less above.
 
-    Parameters are those of :func:`sum_slopes`; `sums`: (2 lags, parts), right and below in turn.
-    Events of the border do not count.
+    `sums`: (2 lags, parts), right and below in turn.  Events of the border do not count.
     """
     for i in range(t.shape[0]):
         n = pixel[i]
@@ -84,17 +76,8 @@ def count_gaps(
 ) -> None:
     """Count the times between neighbouring events of the stream.
 
-    Parameters
-    ----------
-    t, pixel, part : (events,)
-    width : int
-    borders : (gaps - 1,)
-        Of the gaps counted [us].
-    near : (kinds,)
-        Largest gap of each kind of closeness [us].
-    gaps : (parts, gaps)
-    rows : (parts, kinds, 2)
-        How many are close, and how many of those share a row.
+    `borders` of the `gaps` counted, (parts, gaps), and the largest gap that is `near`, (kinds,)
+    [us]; `rows`, (parts, kinds, 2): how many are close, and how many of those share a row.
     """
     for i in range(1, t.shape[0]):
         gap = t[i] - t[i - 1]
@@ -115,14 +98,8 @@ def count_gaps(
 def since_neighbours(t: Any, pixel: Any, on: Any, width: int, last: Any, since: Any) -> None:
     """Find how long ago the latest event of the four neighbouring pixels was.
 
-    Parameters
-    ----------
-    t, pixel, on : (events,)
-    width : int
-    last : (pixels, 2)
-        Time of the latest event of each pixel and polarity [us], long ago at first.
-    since : (events, 2)
-        Time since the latest event of the other, and of the same, polarity [us].
+    `last`, (pixels, 2): time of the latest event of each pixel and polarity [us], long ago at
+    first; `since`, (events, 2): since that of the other, and of the same, polarity [us].
     """
     pixels = last.shape[0]
     for k in range(t.shape[0]):

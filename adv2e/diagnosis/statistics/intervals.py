@@ -1,109 +1,106 @@
-"""Times between neighbouring events of one pixel, and runs of one polarity."""
+"""Times between events of one pixel and of its neighbours, and runs of one polarity."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.scene import STILL, Placed
-from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.statistics.base import POLARITIES, Entry, Numbers, Raw, counts
+from adv2e.diagnosis.statistics.counting import since_neighbours
+from adv2e.diagnosis.statistics.groups import POLARITIES, Array, Group, counts, numbers
 
 BORDERS_MS = (
     *(0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0),
     *(48.0, 64.0, 96.0, 128.0, 192.0, 256.0),
 )
 _REST_MS = (1.0, 4.0, 16.0, 64.0, 256.0)
+_NEIGHBOURS_MS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 _PAIRS = ("OFF-OFF", "ON-OFF", "OFF-ON", "ON-ON")
 
-
-def _bins_text(borders: Sequence[float]) -> list[str]:
-    low = [0.0, *borders]
-    return [f"{a:g}-{b:g} ms" for a, b in zip(low, borders, strict=False)] + [
-        f"> {borders[-1]:g} ms"
-    ]
+_LONGEST_GAP_US = 50_000
+_PLACES = ("1st", "2nd", "3rd", "4th", "5th-6th", "7th-9th", "10th or later")
+_PLACE_OF = np.array([0, 1, 2, 3, 4, 4, 5, 5, 5, 6])
 
 
-class Intervals(Numbers):
-    """Histogram of the time since the pixel's event before, by the pair of polarities."""
+def _bins_text(borders_ms: Sequence[float]) -> list[str]:
+    low = [0.0, *borders_ms]
+    bins = [f"{a:g}-{b:g} ms" for a, b in zip(low, borders_ms, strict=False)]
+    return [*bins, f"> {borders_ms[-1]:g} ms"]
 
-    title = "time between events of a pixel"
-    least = 0.6
 
-    def __init__(self, *, at_rest: bool = False) -> None:
-        self._at_rest = at_rest
-        borders = _REST_MS if at_rest else BORDERS_MS
-        borders_us = np.round(np.array(borders) * 1e3).astype(np.int64)
-        self._longest_us = borders_us[-1]
-        self._bin_of = np.searchsorted(borders_us, np.arange(self._longest_us + 1), "right")
-        self._texts = _bins_text(borders)
+def intervals(*, at_rest: bool = False) -> Group:
+    """Return the histogram of the time since the pixel's event before, by both polarities."""
+    borders_ms, where = (_REST_MS, " at rest") if at_rest else (BORDERS_MS, "")
+    borders_us = np.round(np.array(borders_ms) * 1e3).astype(np.int64)
+    longest_us = borders_us[-1]
+    bin_of = np.searchsorted(borders_us, np.arange(longest_us + 1), "right")
+    entries = numbers(
+        (
+            f"{pair} after {text}{where}",
+            f"events{where} that follow the one before in their pixel after {text},"
+            f" {pair.replace('-', ' then ')}",
+        )
+        for text in _bins_text(borders_ms)
+        for pair in _PAIRS
+    )
 
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        where = " at rest" if self._at_rest else ""
-        return [
-            Entry(
-                f"{pair} after {text}{where}",
-                f"number of events{where} that follow the one before in their pixel after {text},"
-                f" {pair.replace('-', ' then ')}",
-                is_number=True,
-            )
-            for text in self._texts
-            for pair in _PAIRS
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
+    def count(placed: Placed) -> Array:
         stream = placed.stream
         used = stream.since >= 0
-        if self._at_rest:
+        if at_rest:
             used &= placed.speed == STILL
-        gap = self._bin_of[np.minimum(stream.since[used], self._longest_us)]
+        gap = bin_of[np.minimum(stream.since[used], longest_us)]
         cell = gap * 4 + stream.on[used] * 2 + stream.on_before[used]
-        return counts(placed.part[used], cell, len(self._texts) * 4)
+        return counts(placed.part[used], cell, len(entries))
+
+    return Group("time between events of a pixel", 0.6, entries, count)
 
 
-class Runs(Numbers):
-    """How far into a run of one polarity events are: what a reset changes from event to event."""
+def runs() -> Group:
+    """Return how far into a run of one polarity events are: what a reset changes event by event."""
+    entries = numbers(
+        (
+            f"{place} {p} event of a run",
+            f"{p} events that are the {place} of a run without the other polarity and without a gap"
+            " of 50 ms",
+        )
+        for place in _PLACES
+        for p in POLARITIES
+    )
 
-    title = "runs of one polarity"
-    least = 0.6
-
-    _LONGEST_GAP_US = 50_000
-    _PLACES = ("1st", "2nd", "3rd", "4th", "5th-6th", "7th-9th", "10th or later")
-    _PLACE_OF = np.array([0, 1, 2, 3, 4, 4, 5, 5, 5, 6])
-
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(
-                f"{place} {p} event of a run",
-                f"number of {p} events that are the {place} of a run without the other polarity"
-                " and without a gap of 50 ms",
-                is_number=True,
-            )
-            for place in self._PLACES
-            for p in POLARITIES
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
+    def count(placed: Placed) -> Array:
         stream = placed.stream
-        place = self._PLACE_OF[np.minimum(_place_in_run(stream, self._LONGEST_GAP_US), 9)]
-        return counts(placed.part, place * 2 + stream.on, len(self._PLACES) * 2)
+        gap, on = stream.since, stream.on
+        begins = (gap < 0) | (gap > _LONGEST_GAP_US) | (on != stream.on_before)
+        order, index = stream.by_pixel, np.arange(len(stream))
+        start = np.maximum.accumulate(np.where(begins[order], index, 0))
+        place = _PLACE_OF[np.minimum(index - start, 9)]
+        return counts(placed.part[order], place * 2 + on[order], len(entries))
+
+    return Group("runs of one polarity", 0.6, entries, count)
 
 
-def _place_in_run(stream: Stream, longest_gap_us: int) -> NDArray[np.int64]:
-    order = stream.by_pixel
-    gap, on, before = stream.since[order], stream.on[order], stream.on_before[order]
-    begins = (gap < 0) | (gap > longest_gap_us) | (on != before)
-    index = np.arange(len(order))
-    start = np.maximum.accumulate(np.where(begins, index, 0))
-    place = np.empty_like(index)
-    place[order] = index - start
-    return place
+def neighbours() -> Group:
+    """Return the histogram of the time since an event of a neighbouring pixel."""
+    entries = numbers(
+        (
+            f"{text} after a neighbour's {kind}",
+            f"events {text} after the latest event of {kind} polarity in the four neighbouring"
+            " pixels",
+        )
+        for kind in ("other", "same")
+        for text in _bins_text(_NEIGHBOURS_MS)
+    )
+    borders_us = np.round(np.array(_NEIGHBOURS_MS) * 1e3).astype(np.int64)
+    bins = len(borders_us) + 1
+
+    def count(placed: Placed) -> Array:
+        stream = placed.stream
+        since = np.empty((len(stream), 2), np.int64)
+        last = np.full((stream.width * stream.height, 2), -(1 << 60), np.int64)
+        since_neighbours(stream.t, stream.pixel, stream.on, stream.width, last, since)
+        cell = np.searchsorted(borders_us, since, "right")
+        return np.concatenate([counts(placed.part, one, bins) for one in cell.T], axis=1)
+
+    return Group("neighbouring pixels", 0.6, entries, count)

@@ -37,13 +37,9 @@ _KNEE = 3.0
 
 @dataclass(frozen=True)
 class Scale:
-    """The declared model's mean and deviation of each statistic, and their correlations.
+    """The declared model's mean and deviation of each statistic, (statistics,).
 
-    Attributes
-    ----------
-    mean, sd : (statistics,)
-    correlation : (statistics, statistics)
-        Shrunk.
+    And their correlations, shrunk, (statistics, statistics).
     """
 
     mean: Array
@@ -54,11 +50,7 @@ class Scale:
     def of(cls, sample: Array, least: Array) -> Scale:
         """Return the scale of simulations, (seeds, statistics).
 
-        Parameters
-        ----------
-        sample : (seeds, statistics)
-        least : (statistics,)
-            Least deviation: what hardly varies is not known that well either.
+        `least` deviation, (statistics,): what hardly varies is not known that well either.
         """
         mean, sd = sample.mean(axis=0), np.maximum(sample.std(axis=0, ddof=1), least)
         scaled = compressed((sample - mean) / sd)
@@ -83,10 +75,7 @@ class Scale:
 def shrunk_correlation(apart: Array) -> Array:
     """Return the correlations of statistics, shrunk towards none.
 
-    Parameters
-    ----------
-    apart : (seeds, statistics)
-        Distances of simulations from their mean, in deviations.
+    From distances of simulations from their mean, in deviations, (seeds, statistics).
     """
     correlation = (1.0 - _SHRINK) * (apart.T @ apart) / (len(apart) - 1)
     np.fill_diagonal(correlation, 1.0)
@@ -109,22 +98,18 @@ def expanded(compressed: Array | float) -> Array:
 
 
 @dataclass(frozen=True)
-class Model:
-    """What simulations of one model say: mean and deviation on the scale of the declared one.
+class Ensemble:
+    """Simulations of one model on the scale of the declared one.
 
-    Attributes
-    ----------
-    scale : Scale
-    sample : (seeds, statistics)
-        Simulations, in compressed deviations.
+    `sample`: (seeds, statistics), in compressed deviations.
     """
 
     scale: Scale
     sample: Array
 
     @classmethod
-    def of(cls, scale: Scale, sample: Array) -> Model:
-        """Return the model of simulations, (seeds, statistics) as measured."""
+    def of(cls, scale: Scale, sample: Array) -> Ensemble:
+        """Return the ensemble of simulations, (seeds, statistics) as measured."""
         return cls(scale, scale.of_values(sample))
 
     @cached_property
@@ -166,7 +151,7 @@ class Model:
         of_sd = 0.5 * (apart**2 - 1.0) @ np.where(free, downhill * z - 1.0, 0.0)
         return np.asarray(of_mean + of_sd)
 
-    def parted_by_chance(self, other: Model, values: Array) -> float:
+    def parted_by_chance(self, other: Ensemble, values: Array) -> float:
         """Return how far two models of the same seeds are apart in log likelihood by chance.
 
         As a deviation: as far as that hangs on which simulations the two were made of.
@@ -177,15 +162,8 @@ class Model:
     def against_others(self, recordings: Array) -> tuple[Array, Array]:
         """Return recordings as seen by the model without the simulation of the same place.
 
-        Parameters
-        ----------
-        recordings : (seeds, statistics)
-            In compressed deviations.
-
-        Returns
-        -------
-        z, sd : (seeds, statistics)
-            Deviations, and what they were divided by but for how well the mean is known.
+        In deviations, and what they were divided by but for how well the mean is known; all
+        (seeds, statistics), the recordings in compressed deviations.
         """
         n = len(self.sample)
         total, square = self.sample.sum(axis=0), (self.sample**2).sum(axis=0)

@@ -3,147 +3,126 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
-from adv2e.diagnosis.statistics.base import (
+from adv2e.diagnosis.statistics.groups import (
     LIGHT_NAMES,
     POLARITIES,
     SPEED_NAMES,
+    Array,
     Entry,
-    Numbers,
-    Raw,
+    Group,
     counts,
     excess,
+    numbers,
 )
-from adv2e.diagnosis.statistics.classes import by_load
+
+_MOTION = ("at rest", "in motion")
+_COURSE, _LOADS, _PHASES = 6, 5, 10
 
 
-class Rates(Numbers):
-    """Numbers of events by speed, brightness and polarity."""
+def rates() -> Group:
+    """Return numbers of events by speed, brightness and polarity."""
+    entries = numbers(
+        (f"{p} events, {speed}, {light}", f"{p} events where the picture is {light} and {speed}")
+        for speed in SPEED_NAMES
+        for light in LIGHT_NAMES
+        for p in POLARITIES
+    )
 
-    title = "number of events"
-    least = 0.6
-
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(
-                f"{p} events, {speed}, {light}",
-                f"number of {p} events where the picture is {light} and {speed}",
-                is_number=True,
-            )
-            for speed in SPEED_NAMES
-            for light in LIGHT_NAMES
-            for p in POLARITIES
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
+    def count(placed: Placed) -> Array:
         cell = (placed.speed * BRIGHTNESSES + placed.brightness) * 2 + placed.stream.on
         return counts(placed.part, cell, SPEEDS * BRIGHTNESSES * 2)
 
+    return Group("number of events", 0.6, entries, count)
 
-class Course(Numbers):
-    """Numbers of events over the time of the recording."""
 
-    title = "course in time"
-    least = 0.6
+def course(start_us: float, stop_us: float) -> Group:
+    """Return numbers of events over the time of the recording."""
+    borders = np.linspace(start_us, stop_us, _COURSE + 1)[1:-1]
+    entries = numbers(
+        (
+            f"{p} events, {where}, time {k + 1}/{_COURSE}",
+            f"{p} events {where} in part {k + 1} of {_COURSE} of the time",
+        )
+        for k in range(_COURSE)
+        for where in _MOTION
+        for p in POLARITIES
+    )
 
-    def __init__(self, start_us: float, stop_us: float, steps: int = 6) -> None:
-        self._borders = np.linspace(start_us, stop_us, steps + 1)[1:-1]
-        self._steps = steps
-
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(
-                f"{p} events, {where}, time {k + 1}/{self._steps}",
-                f"number of {p} events {where} in part {k + 1} of {self._steps} of the time",
-                is_number=True,
-            )
-            for k in range(self._steps)
-            for where in ("at rest", "in motion")
-            for p in POLARITIES
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
-        step = np.searchsorted(self._borders, placed.stream.t, "right")
+    def count(placed: Placed) -> Array:
+        step = np.searchsorted(borders, placed.stream.t, "right")
         cell = (step * 2 + (placed.speed != STILL)) * 2 + placed.stream.on
-        return counts(placed.part, cell, self._steps * 4)
+        return counts(placed.part, cell, _COURSE * 4)
+
+    return Group("course in time", 0.6, entries, count)
 
 
-class Load(Numbers):
-    """Numbers of events when few and when many come from the whole sensor."""
-
-    title = "load of the readout"
-    least = 0.6
-
-    def __init__(self, rate_hz: NDArray[np.float64], steps: int = 5) -> None:
-        """`rate_hz`: (frame intervals,) events a second that the declared model makes."""
-        self._step_of = by_load(rate_hz, steps)
-        self._steps = steps
-
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(
-                f"{p} events, load {k + 1}/{self._steps}",
-                f"number of {p} events at times when the declared model's rate over the whole"
-                f" sensor is in part {k + 1} of {self._steps}",
-                is_number=True,
-            )
-            for k in range(self._steps)
-            for p in POLARITIES
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
-        cell = self._step_of[placed.interval] * 2 + placed.stream.on
-        return counts(placed.part, cell, self._steps * 2)
+def rate_hz(scene: Scene, simulations: Sequence[Placed]) -> Array:
+    """Return events a second on the whole sensor in each frame interval, mean of simulations."""
+    number = [np.bincount(one.interval, minlength=scene.intervals) for one in simulations]
+    return np.asarray(np.mean(number, axis=0) / scene.seconds)
 
 
-class Phase:
-    """Numbers of events by their place between two frames."""
+def by_load(rate_hz: Array, steps: int) -> NDArray[np.int64]:
+    """Return which of `steps` classes each frame interval is in, from few to many events.
 
-    title = "place between frames"
-    least = 0.6
+    By the events a second that a model makes on the whole sensor, (frame intervals,).  Each class
+    holds about as many events.
+    """
+    order = np.argsort(rate_hz, kind="stable")
+    total = np.cumsum(rate_hz[order])
+    step = np.empty(len(rate_hz), np.int64)
+    step[order] = np.minimum(steps * total / max(total[-1], 1e-9), steps - 1e-9).astype(np.int64)
+    return step
 
-    _STEPS = 10
 
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
+def load(rate_hz: Array) -> Group:
+    """Return numbers of events when few and when many come from the whole sensor.
 
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(
-                f"{p} events, {where}, {k * 10}-{k * 10 + 10} % after a frame",
-                f"number of {p} events {where} in that part of the time between frames, less a"
-                " tenth of all of them, in deviations of chance",
-            )
-            for k in range(self._STEPS)
-            for where in ("at rest", "in motion")
-            for p in ("OFF", "ON")
-        ]
+    `rate_hz`: (frame intervals,) events a second that the declared model makes.
+    """
+    step_of = by_load(rate_hz, _LOADS)
+    entries = numbers(
+        (
+            f"{p} events, load {k + 1}/{_LOADS}",
+            f"{p} events at times when the declared model's rate over the whole sensor is in part"
+            f" {k + 1} of {_LOADS}",
+        )
+        for k in range(_LOADS)
+        for p in POLARITIES
+    )
 
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
-        phase = self._scene.phase_of(placed.stream.t, placed.interval)
-        step = np.clip((phase * self._STEPS).astype(np.int64), 0, self._STEPS - 1)
-        cell = (step * 2 + (placed.speed > 0)) * 2 + placed.stream.on
-        return counts(placed.part, cell, self._STEPS * 4)
+    def count(placed: Placed) -> Array:
+        return counts(placed.part, step_of[placed.interval] * 2 + placed.stream.on, _LOADS * 2)
 
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics: shares of the events of their kind, relative to chance."""
-        number = raw.reshape(self._STEPS, 4)
-        whole = number.sum(axis=0)
-        return excess(number, whole / self._STEPS).ravel()
+    return Group("load of the readout", 0.6, entries, count)
+
+
+def phase(scene: Scene) -> Group:
+    """Return numbers of events by their place between two frames, relative to chance."""
+    entries = [
+        Entry(
+            f"{p} events, {where}, {k * 10}-{k * 10 + 10} % after a frame",
+            f"number of {p} events {where} in that part of the time between frames, less a tenth of"
+            " all of them, in deviations of chance",
+        )
+        for k in range(_PHASES)
+        for where in _MOTION
+        for p in POLARITIES
+    ]
+
+    def count(placed: Placed) -> Array:
+        at = scene.phase_of(placed.stream.t, placed.interval)
+        step = np.clip((at * _PHASES).astype(np.int64), 0, _PHASES - 1)
+        cell = (step * 2 + (placed.speed != STILL)) * 2 + placed.stream.on
+        return counts(placed.part, cell, _PHASES * 4)
+
+    def values(raw: Array) -> Array:
+        number = raw.reshape(_PHASES, 4)
+        return excess(number, number.sum(axis=0) / _PHASES).ravel()
+
+    return Group("place between frames", 0.6, entries, count, values)

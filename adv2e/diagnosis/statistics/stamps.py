@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import cached_property
-
 import numpy as np
-from numpy.typing import NDArray
 
-from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import Placed
-from adv2e.diagnosis.statistics.base import Entry, Raw, counts, share, stabilised
 from adv2e.diagnosis.statistics.counting import count_gaps
+from adv2e.diagnosis.statistics.groups import (
+    Array,
+    Entry,
+    Group,
+    counts,
+    numbers,
+    share,
+    stabilised,
+)
 
 TICKS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
 _ON_TICK = np.array([[t % tick == 0 for tick in TICKS_US] for t in range(TICKS_US[-1])], float)
@@ -28,108 +32,75 @@ No readout takes as long; what is longer counts as that.
 _BIN_OF = np.searchsorted(_BIN_BORDERS_US[1:-1], np.arange(int(_BIN_BORDERS_US[-1]) + 1))
 
 
-class Ticks:
-    """Shares of stamps that are whole multiples of a time."""
+def ticks() -> Group:
+    """Return shares of stamps that are whole multiples of a time."""
+    entries = [
+        Entry(f"stamps on {tick} us", f"share of stamps that are multiples of {tick} us")
+        for tick in TICKS_US
+    ]
 
-    title = "ticks of the stamps"
-    least = 0.001
-
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(f"stamps on {tick} us", f"share of stamps that are multiples of {tick} us")
-            for tick in TICKS_US
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
+    def count(placed: Placed) -> Array:
         # all ticks divide the largest one
-        rest = placed.stream.t % TICKS_US[-1]
-        number = counts(placed.part, rest, TICKS_US[-1])
+        number = counts(placed.part, placed.stream.t % TICKS_US[-1], TICKS_US[-1])
         return np.concatenate([number.sum(axis=1)[:, None], number @ _ON_TICK], axis=1)
 
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        return share(raw[1:], raw[0])
+    return Group("ticks of the stamps", 0.001, entries, count, lambda raw: share(raw[1:], raw[0]))
 
 
-class Gaps:
-    """Times between neighbouring events of the whole stream, and how often they share a row."""
+def gaps() -> Group:
+    """Return times between neighbours in the whole stream, and how often they share a row."""
+    bins = [f"{a}-{b} us" for a, b in zip((0, *_GAPS_US), _GAPS_US, strict=False)]
+    entries = numbers(
+        (f"next after {gap}", f"events {gap} after any other")
+        for gap in (*bins, f">= {_GAPS_US[-1]} us")
+    )
+    entries += [
+        Entry(
+            f"same row within {n} us",
+            f"share of events that are less than {n} us after one of their own row, of those so"
+            " soon after any",
+        )
+        for n in _NEAR_US
+    ]
 
-    title = "neighbours in the stream"
-    least = 0.002
-
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        gaps = [f"{a}-{b} us" for a, b in zip((0, *_GAPS_US), _GAPS_US, strict=False)]
-        gaps.append(f">= {_GAPS_US[-1]} us")
-        return [
-            *(
-                Entry(
-                    f"next after {gap}", f"number of events {gap} after any other", is_number=True
-                )
-                for gap in gaps
-            ),
-            *(
-                Entry(
-                    f"same row within {n} us",
-                    f"share of events that are less than {n} us after one of their own row, of"
-                    " those so soon after any",
-                )
-                for n in _NEAR_US
-            ),
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
+    def count(placed: Placed) -> Array:
         stream = placed.stream
-        gaps = np.zeros((parts.COUNT, len(_GAPS_US) + 1))
-        rows = np.zeros((parts.COUNT, len(_NEAR_US), 2))
+        number = np.zeros((splits.COUNT, len(_GAPS_US) + 1))
+        rows = np.zeros((splits.COUNT, len(_NEAR_US), 2))
         count_gaps(
             stream.t, stream.pixel, placed.part, stream.width,
-            np.array(_GAPS_US), np.array(_NEAR_US), gaps, rows,
+            np.array(_GAPS_US), np.array(_NEAR_US), number, rows,
         )  # fmt: skip
-        return np.concatenate([gaps, rows.reshape(parts.COUNT, -1)], axis=1)
+        return np.concatenate([number, rows.reshape(splits.COUNT, -1)], axis=1)
 
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        gaps, near = raw[: len(_GAPS_US) + 1], raw[len(_GAPS_US) + 1 :]
-        return np.concatenate([stabilised(gaps), (near[1::2] + 0.5) / (near[::2] + 1.0)])
+    def values(raw: Array) -> Array:
+        number, near = raw[: len(_GAPS_US) + 1], raw[len(_GAPS_US) + 1 :]
+        return np.concatenate([stabilised(number), (near[1::2] + 0.5) / (near[::2] + 1.0)])
+
+    return Group("neighbours in the stream", 0.002, entries, count, values)
 
 
-class RowGaps:
-    """Quantiles of the times between neighbouring events of the stream that are of two rows.
+def row_gaps() -> Group:
+    """Return quantiles of the times between neighbours in the stream that are of two rows.
 
     A busy readout gives all of them the time that it takes for a row, however it differs.
     """
+    entries = [
+        Entry(
+            f"{100 * q:g} % of gaps between rows",
+            f"logarithm of the time in us that {100 * q:g} % of events follow the one before in the"
+            " stream sooner than, of those that follow one of another row",
+        )
+        for q in _QUANTILES
+    ]
 
-    title = "gaps between rows"
-    least = 0.02
-
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(
-                f"{100 * q:g} % of gaps between rows",
-                f"logarithm of the time in us that {100 * q:g} % of events follow the one before"
-                " in the stream sooner than, of those that follow one of another row",
-            )
-            for q in _QUANTILES
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
+    def count(placed: Placed) -> Array:
         stream = placed.stream
-        row = stream.pixel // stream.width
-        other = np.flatnonzero(np.diff(row)) + 1
+        other = np.flatnonzero(np.diff(stream.pixel // stream.width)) + 1
         gap = np.minimum(stream.t[other] - stream.t[other - 1], len(_BIN_OF) - 1)
         return counts(placed.part[other], _BIN_OF[gap], len(_BIN_BORDERS_US) - 1)
 
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
+    def values(raw: Array) -> Array:
         up_to = np.cumsum(raw)
         if up_to[-1] == 0.0:
             return np.zeros(len(_QUANTILES))
@@ -138,3 +109,5 @@ class RowGaps:
         in_bin = 1.0 - (up_to[k] - wanted) / raw[k]
         gap = _BIN_BORDERS_US[k] + in_bin * np.diff(_BIN_BORDERS_US)[k]
         return np.asarray(np.log(np.maximum(gap, 0.5)))
+
+    return Group("gaps between rows", 0.02, entries, count, values)

@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.data import splits as parts
+from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import BRIGHTNESSES, Placed, Scene
-from adv2e.diagnosis.statistics.base import LIGHT_NAMES, Entry, Raw, counts, share
 from adv2e.diagnosis.statistics.counting import sum_slopes, sum_slopes_beside
+from adv2e.diagnosis.statistics.groups import LIGHT_NAMES, Array, Entry, Group, counts, share
 
 LAGS_MS = (-20.0, -8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 _PAIRS_MS = ((-2.0, 4.0), (-8.0, 16.0))
+_BESIDE_MS = (2.0, 10.0)
 
 
 class Slopes:
-    """Change of log light about events, bounded so that single large steps do not decide.
-
-    Attributes
-    ----------
-    scene : Scene
-    bounded : (pixels, frames - 1)
-    """
+    """Change of log light about events, bounded so that single large steps do not decide."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -33,130 +27,96 @@ class Slopes:
         bounded = scene.slope / (np.abs(scene.slope) + np.float32(max(typical, 1e-6)))
         self.bounded = np.ascontiguousarray(bounded.T)
 
-    def sums(
+    def count(
         self, placed: Placed, cell: NDArray[np.int64], cells: int, lags_ms: Sequence[float]
-    ) -> Raw:
-        """Return the change before events, in their direction, summed: (parts, lags x cells)."""
+    ) -> Array:
+        """Return events, then the change before them in their direction, summed.
+
+        (parts, cells + lags x cells)
+        """
         stream = placed.stream
         lags = 1e3 * np.array(lags_ms)
-        sums = np.zeros((len(lags), parts.COUNT * cells))
+        sums = np.zeros((len(lags), splits.COUNT * cells))
         sum_slopes(
             stream.t, stream.pixel, stream.on, placed.part * cells + cell,
             self.scene.times_us, lags, self.bounded, np.zeros(len(lags), np.int64), sums,
         )  # fmt: skip
-        by_part = sums.reshape(len(lags), parts.COUNT, cells).swapaxes(0, 1)
-        return np.ascontiguousarray(by_part).reshape(parts.COUNT, -1)
+        by_part = sums.reshape(len(lags), splits.COUNT, cells).swapaxes(0, 1)
+        number = counts(placed.part, cell, cells)
+        return np.concatenate([number, by_part.reshape(splits.COUNT, -1)], axis=1)
 
 
-class Lag:
-    """Mean change of light before and after an event, in the event's direction, by brightness."""
+def lag(slopes: Slopes) -> Group:
+    """Return the mean change of light before an event, in its direction, by brightness."""
+    entries = [
+        Entry(
+            f"change {lag:g} ms before, {light}",
+            f"mean change of log light {lag:g} ms before an event in its direction, bounded to 1,"
+            f" in {light} places",
+        )
+        for lag in LAGS_MS
+        for light in LIGHT_NAMES
+    ]
 
-    title = "lag behind the light"
-    least = 0.002
+    def count(placed: Placed) -> Array:
+        return slopes.count(placed, placed.brightness, BRIGHTNESSES, LAGS_MS)
 
-    def __init__(self, slopes: Slopes) -> None:
-        self._slopes = slopes
+    def values(raw: Array) -> Array:
+        number, *sums = raw.reshape(-1, BRIGHTNESSES)
+        return share(np.array(sums), number).ravel()
 
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(
-                f"change {lag:g} ms before, {light}",
-                f"mean change of log light {lag:g} ms before an event in its direction, bounded to"
-                f" 1, in {light} places",
-            )
-            for lag in LAGS_MS
-            for light in LIGHT_NAMES
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
-        number = counts(placed.part, placed.brightness, BRIGHTNESSES)
-        sums = self._slopes.sums(placed, placed.brightness, BRIGHTNESSES, LAGS_MS)
-        return np.concatenate([number, sums], axis=1)
-
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        number = raw[:BRIGHTNESSES]
-        return share(raw[BRIGHTNESSES:].reshape(-1, BRIGHTNESSES), number).ravel()
+    return Group("lag behind the light", 0.002, entries, count, values)
 
 
-class Drift:
-    """Change of the lag from segment to segment of the recording."""
+def drift(slopes: Slopes) -> Group:
+    """Return how the lag changes from segment to segment of the recording."""
+    segments = slopes.scene.split.segments
+    entries = [
+        Entry(
+            f"lag {b:g} less {a:g} ms, time {k + 1}/{segments}",
+            f"mean change of log light {b:g} ms before an event less that at {a:g} ms, in part"
+            f" {k + 1} of {segments} of the time",
+        )
+        for a, b in _PAIRS_MS
+        for k in range(segments)
+    ]
 
-    title = "course of the lag"
-    least = 0.002
+    def count(placed: Placed) -> Array:
+        return slopes.count(placed, placed.segment, segments, np.ravel(_PAIRS_MS).tolist())
 
-    def __init__(self, slopes: Slopes) -> None:
-        self._slopes = slopes
-        self._segments = slopes.scene.parts.segments
+    def values(raw: Array) -> Array:
+        sums = raw[segments:].reshape(len(_PAIRS_MS), 2, segments)
+        return share(sums[:, 1] - sums[:, 0], raw[:segments]).ravel()
 
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(
-                f"lag {b:g} less {a:g} ms, time {k + 1}/{self._segments}",
-                f"mean change of log light {b:g} ms before an event less that at {a:g} ms, in part"
-                f" {k + 1} of {self._segments} of the time",
-            )
-            for a, b in _PAIRS_MS
-            for k in range(self._segments)
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
-        number = counts(placed.part, placed.segment, self._segments)
-        lags = [lag for pair in _PAIRS_MS for lag in pair]
-        sums = self._slopes.sums(placed, placed.segment, self._segments, lags)
-        return np.concatenate([number, sums], axis=1)
-
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
-        number = raw[: self._segments]
-        sums = raw[self._segments :].reshape(len(_PAIRS_MS), 2, self._segments)
-        return share(sums[:, 1] - sums[:, 0], number).ravel()
+    return Group("course of the lag", 0.002, entries, count, values)
 
 
-class Shift:
-    """Whether the change that makes events lies beside them."""
+def shift(slopes: Slopes) -> Group:
+    """Return whether the change that makes events lies beside them."""
+    entries = [
+        Entry(
+            f"change {side} of the event, {lag:g} ms before",
+            f"mean change of log light one pixel {side} of an event less that on the other side,"
+            f" {lag:g} ms before it, in its direction",
+        )
+        for lag in _BESIDE_MS
+        for side in ("right", "below")
+    ]
+    lags = 1e3 * np.array(_BESIDE_MS)
 
-    title = "place of the change"
-    least = 0.002
-
-    _LAGS_MS = (2.0, 10.0)
-
-    def __init__(self, slopes: Slopes) -> None:
-        self._slopes = slopes
-
-    @cached_property
-    def entries(self) -> Sequence[Entry]:
-        """The statistics, in order."""
-        return [
-            Entry(
-                f"change {side} of the event, {lag:g} ms before",
-                f"mean change of log light one pixel {side} of an event less that on the other"
-                f" side, {lag:g} ms before it, in its direction",
-            )
-            for lag in self._LAGS_MS
-            for side in ("right", "below")
-        ]
-
-    def count(self, placed: Placed) -> Raw:
-        """Return the sums of a stream, (parts, numbers)."""
-        stream, scene = placed.stream, self._slopes.scene
+    def count(placed: Placed) -> Array:
+        stream, scene = placed.stream, slopes.scene
         x, y = stream.pixel % scene.width, stream.pixel // scene.width
         used = (x > 0) & (y > 0) & (x < scene.width - 1) & (y < scene.height - 1)
-        number = np.bincount(placed.part[used], minlength=parts.COUNT)
-        lags = 1e3 * np.array(self._LAGS_MS)
-        sums = np.zeros((2 * len(lags), parts.COUNT))
+        number = np.bincount(placed.part[used], minlength=splits.COUNT)
+        sums = np.zeros((2 * len(lags), splits.COUNT))
         sum_slopes_beside(
             stream.t, stream.pixel, stream.on, placed.part, scene.width, scene.height,
-            scene.times_us, lags, self._slopes.bounded, np.zeros(len(lags), np.int64), sums,
+            scene.times_us, lags, slopes.bounded, np.zeros(len(lags), np.int64), sums,
         )  # fmt: skip
         return np.concatenate([number[:, None], sums.T], axis=1)
 
-    def values(self, raw: Raw) -> NDArray[np.float64]:
-        """Return the statistics."""
+    def values(raw: Array) -> Array:
         return share(raw[1:], raw[0])
+
+    return Group("place of the change", 0.002, entries, count, values)

@@ -15,7 +15,7 @@ from written_recordings import write_recording
 
 from adv2e import simulate
 from adv2e.config import load_config
-from adv2e.diagnosis.hints.readouts import without_coupling
+from adv2e.diagnosis.configurations import without_coupling
 
 WIDTH, HEIGHT, FRAMES = 32, 24, 13
 TIMES = 0.04 * np.arange(FRAMES)

@@ -11,9 +11,11 @@ from real.tried import CLIPPED_BLACK, Added
 
 from adv2e.comparison.windows import Windows
 from adv2e.config import load_config
-from adv2e.diagnosis.fitting.candidates import Candidate, Knob
+from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 
-OFFSET = Candidate("clock_offset", (Knob("frames.clock_offset_us", -1e6, 1e6, False, 1e3),), ())
+OFFSET = Candidate(
+    "clock_offset", (FitParameter("frames.clock_offset_us", -1e6, 1e6, False, 1e3),), ()
+)
 
 
 EVERYTHING = Windows("frame intervals", ((0, 100_000),), 1)
@@ -72,7 +74,7 @@ def test_the_last_search_moves_all_keys_together():
 
 
 def test_what_is_no_longer_needed_is_dropped():
-    needless = Candidate("leak", (Knob("pixel.leak.rate_hz", 0.01, 10.0),), ())
+    needless = Candidate("leak", (FitParameter("pixel.leak.rate_hz", 0.01, 10.0),), ())
     search = Search(Valley(), EVERYTHING, print)
     search._fit.seeds = (0,)
     found = {CLIPPED_BLACK: (14.0, 5.0), needless: (0.5,), OFFSET: (2000.0,)}
@@ -115,10 +117,10 @@ class Pass(Valley):
 
 def test_what_was_found_first_is_replaced_by_what_is_nearer(monkeypatch):
     level, depth = (
-        Candidate(name, (Knob(f"frames.{name}_dn", 0.02, 100.0),), ((start,),))
+        Candidate(name, (FitParameter(f"frames.{name}_dn", 0.02, 100.0),), ((start,),))
         for name, start in (("black_level", 12.0), ("black_depth", 4.0))
     )
-    offset = Candidate("clock_offset", OFFSET.knobs, ((2000.0,),))
+    offset = Candidate("clock_offset", OFFSET.parameters, ((2000.0,),))
     monkeypatch.setattr("real.search.OWN", ())
     monkeypatch.setattr("real.search.of_the_camera", lambda *_: [level, depth, offset])
     declared = load_config(["ideal"], ["frames.black_level_dn=1", "frames.black_depth_dn=1"])
@@ -154,8 +156,8 @@ class Seen(Valley):
 
 def test_only_what_leads_with_one_seed_is_tried_with_all():
     bench = Seen()
-    probes = [(OFFSET, (1000.0 * late,)) for late in range(9)]
-    tried = fitted(bench, (0, 1, 2)).ranked(probes, IN_THE_VALLEY)
+    starts = [(OFFSET, (1000.0 * late,)) for late in range(9)]
+    tried = fitted(bench, (0, 1, 2)).ranked(starts, IN_THE_VALLEY)
     assert bench.seen[:9] == [(late, 1) for late in range(9)]
     assert sorted(bench.seen[9:]) == [(late, 3) for late in (0, 1, 2, 3, 4, 5)]
     assert [one.values[0] for one in tried[:3]] == [2000.0, 1000.0, 3000.0]
@@ -166,8 +168,8 @@ def test_what_made_noise_of_its_own_is_not_tried_again():
     bench = Seen()
     search = Search(bench, EVERYTHING, print)
     search._fit.seeds = (0,)
-    leak = Candidate("leak", (Knob("pixel.leak.rate_hz", 0.01, 10.0),), ((2.0,),))
-    late = Candidate("clock_offset", OFFSET.knobs, ((2000.0,),))
+    leak = Candidate("leak", (FitParameter("pixel.leak.rate_hz", 0.01, 10.0),), ((2.0,),))
+    late = Candidate("clock_offset", OFFSET.parameters, ((2000.0,),))
     here = Added.plain("here", IN_THE_VALLEY, 1.0, still_hz=0.1)
     for count in (2, 1):
         bench.seen.clear()

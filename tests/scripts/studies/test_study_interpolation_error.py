@@ -5,8 +5,8 @@ import pytest
 from click.testing import CliRunner
 from studies import interpolation_error as study
 
-from adv2e.diagnosis.statistics import BOTH
-from adv2e.diagnosis.statistics.frame_error import FrameError
+from adv2e.diagnosis.statistics.summary import BOTH
+from adv2e.diagnosis.statistics.uncertainty import FrameError
 
 
 def simulations(mean, seed, count=400):

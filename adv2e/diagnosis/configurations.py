@@ -1,0 +1,89 @@
+"""What a diagnosis does with configurations: sets keys by their paths, and takes effects away."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from typing import Any
+
+from adv2e.config import Config, from_dict, to_dict
+from adv2e.config.build import all_keys
+from adv2e.config.own import user_effects
+from adv2e.config.paths import set_key
+from adv2e.effects.readout.frame_coupling import FrameCoupling
+from adv2e.parameters import Parameter
+from adv2e.reports.result import Own
+
+
+def with_keys(config: Config, keys: Mapping[str, Any]) -> Config:
+    """Return `config` with other values of some keys, given by their paths."""
+    values = to_dict(config)
+    for key, value in keys.items():
+        set_key(values, key, value)
+    return from_values(values, ", ".join(keys), config)
+
+
+def from_values(values: dict[str, Any], name: str, like: Config) -> Config:
+    """Return the configuration of nested mappings, with the sections of `like`.
+
+    A mistake is put down to `name`.
+    """
+    return from_dict(values, name, list(user_effects(like).values()))
+
+
+def known_keys(section: type[Config]) -> dict[str, Parameter]:
+    """Return what is declared of each key, by its path."""
+    return {key.path: key.about for key in all_keys(section)}
+
+
+def coupling_of(config: Config) -> FrameCoupling | None:
+    """Return what the readout of frames does to the pixels, if anything."""
+    return None if config.readout is None else config.readout.frame_coupling
+
+
+def without_coupling(config: Config) -> Config:
+    """Return `config` without what the readout of frames does to the pixels.
+
+    Frames that are left out of a simulation, to see what is made up between others, were read out
+    all the same: with it both were to be compared without.
+    """
+    if config.readout is None or coupling_of(config) is None:
+        return config
+    return replace(config, readout=replace(config.readout, frame_coupling=None))
+
+
+def own_of(config: Config) -> Own:
+    """Return what is declared of the effects of the user's own that a configuration knows."""
+    effects = user_effects(config)
+    about = known_keys(type(config)) if effects else {}
+    return Own(
+        {path: one for path, one in about.items() if path.startswith("user.")},
+        {
+            name: (inspect.getdoc(effect) or "").partition("\n")[0]
+            for name, effect in effects.items()
+        },
+    )
+
+
+def as_found(config: Config) -> dict[str, Any]:
+    """Return a configuration as nested mappings, without effects of the user's own that are off.
+
+    Where none of them is on, it can be used without their files.
+    """
+    values = to_dict(config)
+    on = {name: keys for name, keys in values.pop("user", {}).items() if keys is not None}
+    return {**values, "user": on} if on else values
+
+
+def without_user_effects(config: Config, written: Collection[str] = ()) -> Config:
+    """Return the configuration with effects of the user's own switched off.
+
+    Those with a section among the dotted keys `written`, by somebody, stay as they are.
+    """
+    off = {
+        f"user.{name}": None
+        for name in user_effects(config)
+        if not any(f"{key}.".startswith(f"user.{name}.") for key in written)
+    }
+    return with_keys(config, off) if off else config

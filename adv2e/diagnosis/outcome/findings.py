@@ -1,0 +1,116 @@
+"""What is reported of the effects, of the statistics, and of what readers should know besides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from adv2e.config import Config
+from adv2e.diagnosis.data import splits
+from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.fitting.candidates import Candidate
+from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.prepare import Prepared
+from adv2e.diagnosis.selection.reference import Reference, State
+from adv2e.diagnosis.selection.search import Outcome
+from adv2e.diagnosis.statistics.summary import BOTH
+from adv2e.reports.result import Finding, Rejected, Signature
+
+
+def finding_of(fit: Fitted, pixels: int, config: Config) -> Finding:
+    """Return an effect that was added, with 95 % intervals of what was fitted.
+
+    Of a share of the recording's `pixels`, no more can be known than so many draws tell; `config`,
+    the model, tells what was set besides.
+    """
+    settings = fit.candidate.settings_in(config, fit.point)
+    interval: dict[str, Any] = {}
+    spread: Any = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)) if fit.covariance.size else []
+    for one, at, sd in zip(fit.candidate.parameters, fit.point, spread, strict=False):
+        # on its logarithmic scale
+        counted = (one.value_at(at) * pixels) ** -0.5 if one.of_pixels else 0.0
+        reach = 1.96 * max(sd, counted)
+        low, high = one.value_at(at - reach), one.value_at(at + reach)
+        if one.part is None:
+            interval[one.key] = low, high
+        else:  # parts of a list come in their order
+            below, above = interval.get(one.key, ((), ()))
+            interval[one.key] = (*below, low), (*above, high)
+    return Finding(fit.candidate.name, settings, interval)
+
+
+def rejected_of(outcome: Outcome, kept: State, candidates: Sequence[Candidate]) -> list[Rejected]:
+    """Return the effects that were not added, in the library's order."""
+    names = list(dict.fromkeys(candidate.name for candidate in candidates))
+    held = dict(outcome.rejected)
+    if outcome.state is not kept:
+        why = "explains a part, but too much is left to name it"
+        if outcome.complete:
+            why = "would account for every statistic, but not for where and when events come"
+        for fit in outcome.state.fits:
+            settings = fit.candidate.settings_in(outcome.state.config, fit.point)
+            held[fit.candidate.name] = Rejected(fit.candidate.name, why, settings)
+    return [held[name] for name in names if name in held and name not in kept.names]
+
+
+def signatures_of(reference: Reference, declared: State, kept: State) -> list[Signature]:
+    """Return every statistic of the test data: as measured, before and after."""
+    statistics, observed = reference.sampler.statistics, reference.observed[splits.TEST]
+    of_models = [state.ensembles[splits.TEST] for state in (declared, kept)]
+    means = [reference.scales[splits.TEST].values_of(one.mean) for one in of_models]
+    z = [one.z(observed) for one in of_models]
+    return [
+        Signature(
+            entry.name,
+            title,
+            entry.meaning,
+            *(entry.plain(float(values[k])) for values in (observed, *means)),
+            *(float(deviations[k]) for deviations in z),
+        )
+        for k, (entry, title) in enumerate(zip(statistics.entries, statistics.titles, strict=True))
+    ]
+
+
+def about_frames(prepared: Prepared) -> list[str]:
+    """Say how uncertain statistics are for what the frames do not tell."""
+    reference = prepared.reference
+    chance = reference.error.chance(reference.scales[BOTH].sd, BOTH)
+    notes = []
+    if prepared.between_frames is None:
+        notes.append(
+            "too few frames to leave any out: what the interpolation between them does to the"
+            " residual is not known, and may be all of it"
+        )
+    else:
+        doubt = prepared.between_frames.doubt(chance, BOTH)
+        made_up = "what interpolation makes up between the frames"
+        text = _uncertain(made_up, doubt, "frames left out")
+        unresolved = ": the frames hardly resolve the motion" if doubt > 1.0 else ""
+        notes.append(text + unresolved)
+    if prepared.between_levels is not None:
+        doubt = prepared.between_levels.doubt(chance, BOTH)
+        untold = "what frames do not tell between the levels of their numbers"
+        notes.append(_uncertain(untold, doubt, "frames of coarser levels"))
+    return notes
+
+
+def _uncertain(what: str, doubt: float, told_by: str) -> str:
+    return (
+        f"{what} leaves statistics uncertain by {doubt:.2g} times what chance does (root mean"
+        f" square), as simulations with {told_by} tell"
+    )
+
+
+def about_drifts(evidence: Evidence, model: Config) -> list[str]:
+    """Say from when on drifts of a model count, where that is not when the recording begins."""
+    drifting = {
+        "clock_drift_ppm": model.frames.clock_drift_ppm,
+        "drift_per_s": model.pixel.thresholds.drift_per_s,
+    }
+    names = " and ".join(name for name, value in drifting.items() if value)
+    if not names or not evidence.run_in.frames:
+        return []
+    start_s = evidence.simulated.times_s[0]
+    return [f"in model.yaml {names} counts from the first frame simulated, at {start_s:.3f} s"]

@@ -1,0 +1,151 @@
+"""Sections of the page that only recordings have: maps, signatures, what was left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from adv2e.diagnosis.outcome.sensor_map import CLIP_SD, Map, colour_bar, map_image
+from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.quantities import NOTHING, number_text, percent_text, short_text, unit_text
+from adv2e.reports.result import Diagnosis, ResidualMap, Signature
+from adv2e.reports.standing_out import LARGE_Z, standing_out
+from adv2e.reports.tables import SHOWN, Column, table
+
+
+def maps(given: Sequence[ResidualMap]) -> Markup:
+    """Return the maps before and after, side by side."""
+    parts = []
+    for one in given:
+        pictures = [
+            _map(one.title, "before (declared model)", one.before),
+            _map(one.title, "after (model found)", one.after),
+        ]
+        parts.append(tag("h3", one.title))
+        parts.append(tag("div", *pictures, class_="side"))
+        note = (
+            "Measured minus simulated, in standard deviations: red where more was measured, blue"
+            f" where less, from {-CLIP_SD:g} or less to {CLIP_SD:g} or more; grey where masked."
+        )
+        parts.append(tag("figure", colour_bar(), tag("figcaption", note, class_="note")))
+    return join(*parts)
+
+
+def _map(title: str, model: str, values: Map) -> Markup:
+    seen = values[~np.isnan(values)]
+    text = "all masked"
+    if len(seen):
+        far = percent_text(float(np.mean(np.abs(seen) > LARGE_Z)))
+        over = percent_text(float(np.mean(np.abs(seen) > CLIP_SD)))
+        text = f"{far} beyond ±{LARGE_Z:g} sd, {over} beyond ±{CLIP_SD:g} sd"
+    image = map_image(values, f"{title}, {model}: {text}")
+    caption = tag("figcaption", model, tag("span", text, class_="meaning"))
+    return tag("figure", caption, image)
+
+
+def groups(given: Sequence[Signature]) -> Markup:
+    """Return what stands out, by group of statistics: what an effect that is missing has to do."""
+    found = standing_out(given)
+    if not found:
+        return tag("p", f"No statistic is {LARGE_Z:g} deviations or more off.")
+    columns = [Column("group"), Column("farthest off")] + [
+        Column(name, number=True)
+        for name in ("measured", "before", "after", "beyond before", "beyond after")
+    ]
+    rows = [
+        (
+            one.group,
+            one.farthest.meaning,
+            *_values(one.farthest),
+            f"{one.before} of {one.number}",
+            f"{one.after} of {one.number}",
+        )
+        for one in found
+    ]
+    lead = (
+        "Of each group of summary statistics the one farthest off, as measured and as simulated,"
+        f" and how many are beyond ±{LARGE_Z:g} deviations. What is missing has to do all of it;"
+        " the curves and maps show when and where."
+    )
+    return join(tag("p", lead), table("Groups of statistics, on held-out data", columns, rows))
+
+
+def signatures(given: Sequence[Signature]) -> Markup:
+    """Return the summary statistics, the most telling ones first."""
+    if not given:
+        return tag("p", "None was measured.")
+    columns = [Column("signature"), Column("group")] + [
+        Column(name, number=True) for name in ("measured", "before", "after", "z before", "z after")
+    ]
+    rows = [_signature(one) for one in sorted(given, key=_rank)]
+    far = sum(abs(one.z_before) > LARGE_Z for one in given)
+    still = sum(abs(one.z_after) > LARGE_Z for one in given)
+    lead = (
+        "z: distance of the recording from the simulations, in their standard deviations. Beyond"
+        f" ±{LARGE_Z:g} (marked ▲ or ▼): {far} of {len(given)} before, {still} after."
+    )
+    caption = "Summary statistics on held-out data, by their distance before"
+    return join(tag("p", lead), table(caption, columns, rows, folded_from=SHOWN))
+
+
+def _rank(signature: Signature) -> tuple[float, float]:
+    """Return a number that is least for the largest distance; unknown ones come last."""
+    before, after = (
+        math.inf if math.isnan(z) else -abs(z) for z in (signature.z_before, signature.z_after)
+    )
+    return before, after
+
+
+def _signature(one: Signature) -> tuple[object, ...]:
+    name = join(
+        tag("span", one.name, title=one.meaning), tag("span", one.meaning, class_="meaning")
+    )
+    return name, one.group, *_values(one), _z(one.z_before), _z(one.z_after)
+
+
+def _values(one: Signature) -> list[str]:
+    return [number_text(value) for value in (one.measured, one.before, one.after)]
+
+
+def _z(z: float) -> Markup | str:
+    if math.isnan(z):
+        return NOTHING
+    text = f"{z:+.1f}" if abs(z) < 1000 else number_text(z)
+    if abs(z) <= LARGE_Z:
+        return text
+    sign = "▲" if z > 0 else "▼"
+    return tag("strong", tag("span", sign, aria_hidden="true"), f" {text}", class_="large")
+
+
+def detectable(diagnosis: Diagnosis) -> Markup:
+    """Return how small an effect could have been to be seen."""
+    if not diagnosis.detectable:
+        return tag("p", "This was not determined.")
+    columns = [Column("effect"), Column("key"), Column("size", number=True), Column("unit")]
+    rows = [
+        (one.name, tag("code", one.key), _size(one.size), unit_text(one.unit))
+        for one in diagnosis.detectable
+    ]
+    caption = (
+        "Values of a key from which on an effect would have been seen about 8 times in 10;"
+        f" {NOTHING}: none within the physical range, or not told by as many simulations"
+    )
+    return table(caption, columns, rows, folded_from=2 * SHOWN)
+
+
+def _size(size: float | None) -> str:
+    return NOTHING if size is None else short_text(size, 3)
+
+
+def data(diagnosis: Diagnosis) -> Markup:
+    """Return how the data were divided and what was set aside."""
+    parts = [tag("p", diagnosis.split)] if diagnosis.split else []
+    if diagnosis.masked:
+        columns = [Column("set aside"), Column("share of events", number=True)]
+        rows = [(one.what, percent_text(one.share)) for one in diagnosis.masked]
+        parts.append(table("Data that was not used", columns, rows))
+    else:
+        parts.append(tag("p", "Nothing was set aside."))
+    return join(*parts)

@@ -1,0 +1,95 @@
+"""What a group of summary statistics is, and counting by part of the data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.data import splits
+from adv2e.diagnosis.data.scene import Placed
+
+Array = NDArray[np.float64]
+
+POLARITIES = ("OFF", "ON")
+SPEED_NAMES = ("still", "slow", "moving", "fast")
+LIGHT_NAMES = ("dark", "medium", "bright")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One summary statistic.
+
+    Attributes
+    ----------
+    name : str
+    meaning : str
+        What it measures, in a sentence.
+    is_number : bool
+        A number, of events or pixels, which is compared as :func:`stabilised` puts it.
+    """
+
+    name: str
+    meaning: str
+    is_number: bool = False
+
+    def plain(self, value: float) -> float:
+        """Return the statistic as its meaning says, not as it is compared."""
+        return max(0.25 * value * value - 0.375, 0.0) if self.is_number else value
+
+
+def stabilised(number: Array) -> Array:
+    """Return numbers of events on a scale on which a Poisson number deviates by 1 everywhere."""
+    return np.asarray(2.0 * np.sqrt(np.maximum(number, 0.0) + 0.375))
+
+
+@dataclass(frozen=True)
+class Group:
+    """Statistics that are counted together.
+
+    Attributes
+    ----------
+    title : str
+    least : float, or a sequence of one for each statistic
+        Deviation below which none counts as known.
+    entries : list of Entry
+    count : callable
+        Takes a stream, returns sums that add up over the parts of the data, (parts, numbers).
+    values : callable
+        Takes the sums of a part, or of several added, and returns the statistics, (entries,).
+    """
+
+    title: str
+    least: float | Sequence[float]
+    entries: list[Entry]
+    count: Callable[[Placed], Array]
+    values: Callable[[Array], Array] = stabilised
+
+
+def numbers(named: Iterable[tuple[str, str]]) -> list[Entry]:
+    """Return the entries of numbers of events, by name and meaning."""
+    return [Entry(name, f"number of {meaning}", is_number=True) for name, meaning in named]
+
+
+def counts(
+    part: NDArray[np.int64], cell: NDArray[Any], cells: int, weight: NDArray[Any] | None = None
+) -> Array:
+    """Return how many events, or how much `weight`, each cell has in each part, (parts, cells)."""
+    number = np.bincount(part * cells + cell, weight, minlength=splits.COUNT * cells)
+    return number.astype(np.float64).reshape(splits.COUNT, cells)
+
+
+def excess(number: Array, mean: Array) -> Array:
+    """Return what numbers of events are above their mean, in deviations of chance.
+
+    It is zero where nothing is expected and nothing came.
+    """
+    return np.asarray((number - mean) / np.sqrt(mean + 1.0))
+
+
+def share(part: Array, whole: Array | float) -> Array:
+    """Return part of whole, zero where there is nothing."""
+    return np.asarray(part / np.maximum(whole, 1.0))

@@ -1,0 +1,83 @@
+"""All summary statistics of a stream, in every view of the data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from adv2e.diagnosis.data import splits
+from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.statistics.groups import Array, Entry, Group
+from adv2e.diagnosis.statistics.intervals import intervals, neighbours, runs
+from adv2e.diagnosis.statistics.pixels import count_pixels, pixels
+from adv2e.diagnosis.statistics.rates import course, load, phase, rate_hz, rates
+from adv2e.diagnosis.statistics.spectrum import spectrum
+from adv2e.diagnosis.statistics.stamps import gaps, row_gaps, ticks
+from adv2e.diagnosis.statistics.timing import Slopes, drift, lag, shift
+
+BOTH = splits.COUNT
+"""The view that joins the data for training and validation."""
+VIEWS = splits.COUNT + 1
+"""Every part of the data is a view of its own, and there is :data:`BOTH`."""
+
+
+class SummaryStatistics:
+    """All groups of statistics, for one scene and one declared model.
+
+    Parameters
+    ----------
+    scene : Scene
+    pilot : sequence of Stream
+        Simulations of the declared model, from which is known what to expect.
+
+    Attributes
+    ----------
+    titles : list of str
+        Of the group of each statistic.
+    least : (statistics,)
+        Deviation below which each does not count as known.
+    """
+
+    def __init__(self, scene: Scene, pilot: Sequence[Stream]) -> None:
+        placed = [Placed.of(stream, scene) for stream in pilot]
+        expected = np.mean([count_pixels(one, scene) for one in placed], axis=0)
+        slopes = Slopes(scene)
+        self.scene = scene
+        self.groups: list[Group] = [
+            rates(),
+            course(scene.times_us[0], scene.times_us[-1]),
+            load(rate_hz(scene, placed)),
+            intervals(),
+            intervals(at_rest=True),
+            runs(),
+            lag(slopes),
+            drift(slopes),
+            shift(slopes),
+            phase(scene),
+            spectrum(scene),
+            ticks(),
+            gaps(),
+            row_gaps(),
+            neighbours(),
+            pixels(scene, expected),
+        ]
+        self.entries: list[Entry] = [entry for group in self.groups for entry in group.entries]
+        self.least = np.concatenate(
+            [np.broadcast_to(group.least, len(group.entries)) for group in self.groups]
+        )
+        self.titles: list[str] = [group.title for group in self.groups for _ in group.entries]
+
+    def measure(self, stream: Stream) -> Array:
+        """Return all statistics of a stream, (views, statistics)."""
+        placed, columns = Placed.of(stream, self.scene), []
+        for group in self.groups:
+            raw = group.count(placed)
+            views = [*raw, raw[splits.TRAIN] + raw[splits.VALIDATION]]
+            columns.append(np.array([group.values(view) for view in views]))
+        return np.concatenate(columns, axis=1)
+
+    def sample(self, streams: Iterable[Stream]) -> Array:
+        """Return the statistics of several streams, (streams, views, statistics)."""
+        return np.array([self.measure(stream) for stream in streams])

@@ -1,0 +1,223 @@
+"""Recordings that can be diagnosed, and what is said of those that cannot."""
+
+import re
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from adv2e.config import load_config
+from adv2e.diagnosis.data.evidence import LEAST_EVENTS, read_evidence
+
+WIDTH, HEIGHT = 12, 8
+
+
+@pytest.fixture
+def record(tmp_path):
+    """Write a DAVIS240C folder; images and lines as given."""
+
+    def write(images=None, times=None, events=2000, span=(0.0, 0.09), sizes=(WIDTH, HEIGHT)):
+        folder = tmp_path / "recording"
+        (folder / "images").mkdir(parents=True)
+        draw = np.random.default_rng(1)
+        if images is None:
+            images = [np.full((HEIGHT, WIDTH), 20 * k, np.uint8) for k in range(10)]
+        times = 0.01 * np.arange(len(images)) if times is None else times
+        lines = []
+        for k, (t, image) in enumerate(zip(times, images, strict=True)):
+            assert cv2.imwrite(str(folder / f"images/{k}.png"), image)
+            lines.append(f"{t:.9f} images/{k}.png\n")
+        (folder / "images.txt").write_text("".join(lines))
+        t = np.sort(draw.integers(int(span[0] * 1e6), int(span[1] * 1e6), events))
+        text = (
+            f"{us / 1e6:.9f} {draw.integers(sizes[0])} {draw.integers(sizes[1])} {us % 2}\n"
+            for us in t.tolist()
+        )
+        (folder / "events.txt").write_text("".join(text))
+        return folder
+
+    return write
+
+
+def grey(shape=(HEIGHT, WIDTH), kind=np.uint8):
+    return np.full(shape, 7, kind)
+
+
+def complaint(adv2e, folder):
+    """Return what `adv2e diagnose` says of a recording: one line; and nothing is left."""
+    status, out, err = adv2e("diagnose", folder, "-o", folder.parent / "found", "--threads", 1)
+    assert (status, out) == (1, "")
+    assert err.count("\n") == 1
+    assert err.startswith("adv2e: error: ")
+    assert str(folder) in err
+    assert not (folder.parent / "found").exists()
+    return err
+
+
+def test_frames_and_events_are_on_one_clock(record):
+    evidence = read_evidence(record(times=5.0 + 0.01 * np.arange(10), span=(4.9, 5.2), events=9000))
+    assert (evidence.width, evidence.height) == (WIDTH, HEIGHT)
+    assert len(evidence.frames) == 10
+    assert evidence.seconds == pytest.approx(0.09)
+    assert evidence.times_ns == [5_000_000_000 + 10_000_000 * k for k in range(10)]
+    stream = evidence.stream
+    assert stream.t.min() >= 5_000_000
+    assert stream.t.max() < 5_090_000
+    (masked,) = evidence.masked
+    assert masked.share == pytest.approx(1 - len(stream) / 9000)
+    assert masked.share == pytest.approx(0.7, abs=0.03)
+
+
+def test_nothing_is_masked_between_the_frames(record):
+    evidence = read_evidence(record())
+    assert evidence.masked == []
+    assert len(evidence.stream) == 2000
+
+
+@pytest.mark.parametrize(
+    ("span", "kept", "which"),
+    [
+        ((0.0, 0.125), (0, 13), "0.07 s at the last frames"),
+        ((0.061, 0.2), (6, 20), "0.06 s at the first frames"),
+        ((0.061, 0.125), (6, 13), "0.06 s at the first frames and 0.07 s at the last frames"),
+    ],
+)
+def test_frames_that_the_events_do_not_cover_are_set_aside(record, span, kept, which):
+    images = [np.full((HEIGHT, WIDTH), 10 * k, np.uint8) for k in range(21)]
+    evidence = read_evidence(record(images=images, span=span))
+    first, last = kept
+    assert evidence.times_s == pytest.approx(0.01 * np.arange(first, last + 1))
+    assert [int(frame[0, 0]) // 10 for frame in evidence.frames] == list(range(first, last + 1))
+    before = [int(frame[0, 0]) // 10 for frame in evidence.run_in.frames]
+    assert before == list(range(max(first - (last - first) // 2, 0), first))
+    assert evidence.run_in.times_s == pytest.approx(0.01 * np.array(before))
+    (masked,) = evidence.masked
+    assert masked.what == f"{which}, which the events do not cover"
+    assert len(evidence.stream) == 2000
+
+
+def test_a_pause_at_the_end_like_others_is_one(record):
+    folder = record(images=[np.full((HEIGHT, WIDTH), 10 * k, np.uint8) for k in range(21)])
+    with (folder / "events.txt").open("a") as text:
+        text.write("0.120000000 1 1 1\n")
+    assert len(read_evidence(folder).frames) == 21
+
+
+def test_light_is_as_declared(record):
+    evidence = read_evidence(record())
+    linear, srgb = (load_config([], [f"frames.encoding={name}"]) for name in ("linear", "srgb"))
+    assert evidence.light(linear)[:, 0, 0].tolist() == pytest.approx([20 * k for k in range(10)])
+    assert evidence.light(srgb)[5, 0, 0] < 50
+    assert evidence.light(linear).shape == (10, HEIGHT, WIDTH)
+    assert evidence.quantum_dn(linear) == 1.0
+    white = load_config([], ["frames.full_scale=510"])
+    assert evidence.quantum_dn(white) == 0.5
+
+
+def test_colour_frames_of_a_camera_are_linear_as_in_a_conversion(record):
+    shades = [np.full((HEIGHT, WIDTH, 3), 20 * k, np.uint8) for k in range(10)]
+    evidence = read_evidence(record(shades))
+    assert evidence.frames[0].ndim == 3
+    light = evidence.light(load_config())
+    np.testing.assert_allclose(light[:, 0, 0], 20.0 * np.arange(10), atol=0.1)
+    curved = load_config([], ["frames.encoding=srgb"])
+    assert evidence.light(curved)[5, 0, 0] < 60.0
+
+
+def test_step_of_16_bit_frames(record):
+    evidence = read_evidence(record([np.full((HEIGHT, WIDTH), k, np.uint16) for k in range(10)]))
+    assert evidence.quantum_dn(load_config()) == pytest.approx(255 / 65535)
+
+
+def test_there_is_no_such_recording(adv2e, tmp_path):
+    err = complaint(adv2e, tmp_path / "nowhere.zip")
+    assert "no such file" in err
+
+
+def test_no_frames(adv2e, record):
+    folder = record()
+    (folder / "images.txt").unlink()
+    assert "holds no frames" in complaint(adv2e, folder)
+
+
+def test_too_few_frames(adv2e, record):
+    folder = record([grey(), grey()], span=(0.0, 0.01))
+    assert "holds 2 frames, at least 3 are needed" in complaint(adv2e, folder)
+
+
+@pytest.mark.parametrize("events", [0, LEAST_EVENTS - 1])
+def test_too_few_events(adv2e, record, events):
+    err = complaint(adv2e, record(events=events))
+    assert f"{events} events between its first and its last frame" in err
+    assert str(LEAST_EVENTS) in err
+
+
+def test_as_few_events_as_can_be(record):
+    assert len(read_evidence(record(events=LEAST_EVENTS)).stream) == LEAST_EVENTS
+
+
+def test_events_at_another_time(adv2e, record):
+    said = complaint(adv2e, record(span=(50.0, 60.0)))
+    assert re.search(r"events come from 50\.\d+ to 59\.\d+ s, frames from 0\.000 to \d", said)
+    assert "one clock" in said
+
+
+def test_a_list_out_of_order_is_put_in_order(record):
+    images = [np.full((HEIGHT, WIDTH), k, np.uint8) for k in (0, 60, 30, 90)]
+    evidence = read_evidence(record(images, [0, 0.06, 0.03, 0.09]))
+    assert [image[0, 0] for image in evidence.frames] == [0, 30, 60, 90]
+    np.testing.assert_allclose(evidence.times_s, [0, 0.03, 0.06, 0.09])
+
+
+def test_two_frames_at_one_time(adv2e, record):
+    folder = record([grey()] * 4, [0, 0.01, 0.01, 0.02])
+    assert "images.txt line 3: times must increase" in complaint(adv2e, folder)
+
+
+def test_frames_out_of_order(adv2e, tmp_path):
+    path = tmp_path / "recording.h5"
+    with h5py.File(path, "w") as file:
+        draw = np.random.default_rng(2)
+        for name, high in (("xs", WIDTH), ("ys", HEIGHT), ("ps", 2)):
+            file[f"events/{name}"] = draw.integers(0, high, 2000).astype(np.int16)
+        file["events/ts"] = np.sort(draw.random(2000)) * 0.03
+        file.attrs["sensor_resolution"] = (HEIGHT, WIDTH)
+        for k, t in enumerate((0.0, 0.02, 0.01, 0.03)):
+            file[f"images/image{k:09d}"] = grey()
+            file[f"images/image{k:09d}"].attrs["timestamp"] = t
+    assert "frame 2 is not later than the one before it" in complaint(adv2e, path)
+
+
+def test_frames_of_another_size_than_the_events_say(adv2e, record, monkeypatch):
+    from adv2e.diagnosis.data import evidence
+
+    read = evidence.read_recording
+
+    def wider(path, **options):
+        recording = read(path, **options)
+        object.__setattr__(recording, "width", 50)
+        return recording
+
+    monkeypatch.setattr(evidence, "read_recording", wider)
+    assert "frames have 12x8 pixels, events 50x8" in complaint(adv2e, record())
+
+
+@pytest.mark.parametrize(
+    ("odd", "text"),
+    [
+        (grey((HEIGHT, WIDTH + 1)), "frame 3 is 13x8 grey uint8, frame 0 is 12x8 grey uint8"),
+        (grey((HEIGHT, WIDTH, 3)), "frame 3 is 12x8 colour uint8, frame 0 is 12x8 grey uint8"),
+        (grey(kind=np.uint16), "frame 3 is 12x8 grey uint16, frame 0 is 12x8 grey uint8"),
+    ],
+)
+def test_frames_that_are_not_alike(adv2e, record, odd, text):
+    images = [np.full((HEIGHT, WIDTH), 9, np.uint8)] * 3 + [odd] + [grey()]
+    assert text in complaint(adv2e, record(images, span=(0.0, 0.04)))
+
+
+def test_a_broken_image(adv2e, record):
+    folder = record()
+    Path(folder / "images/4.png").write_bytes(b"nothing")
+    assert "4.png" in complaint(adv2e, folder)

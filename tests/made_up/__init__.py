@@ -1,0 +1,1 @@
+"""Small scenes, streams and samplers for the tests of the diagnosis."""
