@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from adv2e.config.model import Config, Frames, Pixel, Readout, Sampling
 from adv2e.config.own import user_effects
@@ -28,20 +28,18 @@ def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
     Those that are not the package's own follow its own of their stage, in the order given; the
     tick of the time stamps is the last of all.
     """
+    extra = [*user_hooks(config), *extra]
     own = {
         "frames": frame_hooks(config.frames, config.sampling),
         "pixel": _of_pixel(config.pixel),
         "readout": _of_readout(config.readout, config.frames) if config.readout else [],
     }
-    extra = [*user_hooks(config), *extra]
-    hooks = [hook for stage in STAGES for hook in (*own[stage], *_of_stage(extra, stage))]
+    hooks = []
+    for stage in STAGES:
+        hooks += [*own[stage], *(hook for hook in extra if hook.stage == stage)]
     if config.readout is not None and config.readout.tick_us > 0:
         hooks.append(TimestampTickHooks(config.readout.tick_us))
     return hooks
-
-
-def _of_stage(hooks: Iterable[Hooks], stage: str) -> list[Hooks]:
-    return [hook for hook in hooks if hook.stage == stage]
 
 
 def frame_hooks(frames: Frames, sampling: Sampling) -> list[Hooks]:
@@ -51,8 +49,13 @@ def frame_hooks(frames: Frames, sampling: Sampling) -> list[Hooks]:
         hooks.append(ClockDriftHooks(frames.clock_drift_ppm))
     if frames.clock_offset_us:
         hooks.append(ClockOffsetHooks(frames.clock_offset_us))
-    if frames.exposure_us:
-        hooks.append(_of_exposure(frames.exposure_us, sampling.interpolation))
+    if frames.exposure_us and sampling.interpolation == "flow":
+        # imported late: few conversions need it, and all would load its compiled loops
+        from adv2e.effects.frames.motion_blur import MotionBlurHooks  # noqa: PLC0415
+
+        hooks.append(MotionBlurHooks(frames.exposure_us))
+    elif frames.exposure_us:
+        hooks.append(ExposureBlurHooks(frames.exposure_us))
     # after the frames are sharp: over a pedestal the dark would hardly become so in as many steps
     if frames.black_level_dn or frames.black_depth_dn:
         hooks.append(BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn))
@@ -61,15 +64,6 @@ def frame_hooks(frames: Frames, sampling: Sampling) -> list[Hooks]:
     if frames.flicker is not None and frames.flicker.depth:
         hooks.append(FlickerHooks(frames.flicker))
     return hooks
-
-
-def _of_exposure(exposure_us: float, interpolation: str) -> Hooks:
-    if interpolation != "flow":
-        return ExposureBlurHooks(exposure_us)
-    # imported late: few conversions need it, and all would load its compiled loops
-    from adv2e.effects.frames.motion_blur import MotionBlurHooks  # noqa: PLC0415
-
-    return MotionBlurHooks(exposure_us)
 
 
 def _of_pixel(pixel: Pixel) -> list[Hooks]:

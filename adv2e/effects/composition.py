@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial, reduce
 from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.effects.courses import Additions, StepLimit, injection_complaint
+from adv2e.effects.courses import INJECTED_DTYPE, Additions, Course
 from adv2e.effects.hooks import Frames, Hooks, Times, View
 from adv2e.errors import Adv2eError, DataError
 from adv2e.events import EVENT_DTYPE, Events, empty_events
 
 Array = NDArray[Any]
 
-_TIMED = ("gain", "drive", "signal", "thresholds")
+_COURSES: dict[str, tuple[str, int | None, np.ufunc]] = {
+    "gain": ("gain", None, np.multiply),
+    "drive": ("drive", None, np.add),
+    "signal": ("signal", None, np.add),
+    "on": ("thresholds", 0, np.multiply),
+    "off": ("thresholds", 1, np.multiply),
+}
+"""Method that gives each course, which part of what it returns, and how effects combine."""
 
 
 def overrides(hook: Hooks, method: str) -> bool:
@@ -68,69 +76,49 @@ def _light(hook: Hooks, frames: Frames, shape: tuple[int, ...]) -> Frames:
 
 def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
     """Return what the effects add inside the pixel, as one; None: nothing."""
-    of = {name: [hook for hook in hooks if overrides(hook, name)] for name in (*_TIMED, "inject")}
-    if not any(of.values()):
+    courses: dict[str, Course] = {}
+    for name, (method, part, combine) in _COURSES.items():
+        of = [hook for hook in hooks if overrides(hook, method)]
+        if of:
+            courses[name] = partial(_together, of, method, part, combine)
+    injecting = [hook for hook in hooks if overrides(hook, "inject")]
+    if not courses and not injecting:
         return None
-    timed = list(dict.fromkeys(hook for name in _TIMED for hook in of[name]))
-    gains, levels = of["gain"], of["thresholds"]
+    methods = {method for method, *_ in _COURSES.values()}
+    timed = [hook for hook in hooks if any(overrides(hook, method) for method in methods)]
     return Additions(
-        step_us=_shortest(timed),
-        gain=_product(gains, "gain", lambda found: found) if gains else None,
-        drive=_sum(of["drive"], "drive") if of["drive"] else None,
-        signal=_sum(of["signal"], "signal") if of["signal"] else None,
-        on=_product(levels, "thresholds", lambda pair: pair[0]) if levels else None,
-        off=_product(levels, "thresholds", lambda pair: pair[1]) if levels else None,
-        inject=_merge(of["inject"]) if of["inject"] else None,
+        longest_step_us=partial(_shortest_us, timed),
+        inject=partial(_injected, injecting) if injecting else None,
+        **courses,
     )
 
 
-def _shortest(hooks: Sequence[Hooks]) -> StepLimit:
-    def shortest(start_s: float, stop_s: float) -> float:
-        return min((_longest_step_us(hook, start_s, stop_s) for hook in hooks), default=np.inf)
-
+def _shortest_us(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> float:
+    """Return the longest time step that resolves what all of `hooks` add [us]."""
+    shortest = np.inf
+    for hook in hooks:
+        with blamed(hook):
+            found = float(hook.longest_step_us(start_s, stop_s))
+        if not found > 0.0:
+            raise DataError(f"effect {hook.name}: longest_step_us: {found:g} us, must be above 0")
+        shortest = min(shortest, found)
     return shortest
 
 
-def _longest_step_us(hook: Hooks, start_s: float, stop_s: float) -> float:
-    with blamed(hook):
-        found = float(hook.longest_step_us(start_s, stop_s))
-    if not found > 0.0:
-        raise DataError(f"effect {hook.name}: longest_step_us: {found:g} us, must be above 0")
-    return found
-
-
-def _sum(hooks: Sequence[Hooks], method: str) -> Callable[[Times], Array]:
-    def total(times_s: Times) -> Array:
-        values = [_timed(hook, method, times_s, lambda found: found, 0.0) for hook in hooks]
-        return _combined(np.add, values)
-
-    return total
-
-
-def _product(
-    hooks: Sequence[Hooks], method: str, part: Callable[[Any], Any]
-) -> Callable[[Times], Array]:
-    def total(times_s: Times) -> Array:
-        values = [_timed(hook, method, times_s, part, 1.0) for hook in hooks]
-        for hook, value in zip(hooks, values, strict=True):
-            if not np.all(value > 0):
-                raise DataError(
-                    f"effect {hook.name}: {method}: a factor of {np.min(value):g}, must be above 0"
-                )
-        return _combined(np.multiply, values)
-
-    return total
-
-
-def _timed(
-    hook: Hooks, method: str, times_s: Times, part: Callable[[Any], Any], neutral: float
+def _together(
+    hooks: Sequence[Hooks], method: str, part: int | None, combine: np.ufunc, times_s: Times
 ) -> Array:
-    """Return what a method gives at `times_s`: (n,) or (n, pixels), finite."""
+    """Return the sum or product of what a method of all `hooks` gives, (n, 1) or (n, pixels)."""
+    values = (_values(hook, method, part, combine, times_s) for hook in hooks)
+    return np.asarray(reduce(combine, values))
+
+
+def _values(hook: Hooks, method: str, part: int | None, combine: np.ufunc, times_s: Times) -> Array:
     with blamed(hook):
         found = getattr(hook, method)(times_s)
         if found is None:
-            return np.full(times_s.size, neutral)
-        value = np.asarray(part(found), np.float64)
+            return np.full((times_s.size, 1), float(combine.identity))
+        value = np.asarray(found if part is None else found[part], np.float64)
     wanted = [(times_s.size,), (times_s.size, hook.view.rows, hook.view.columns)]
     if value.shape not in wanted:
         raise DataError(
@@ -139,36 +127,37 @@ def _timed(
         )
     if not np.all(np.isfinite(value)):
         raise DataError(f"effect {hook.name}: {method}: values that are NaN or infinite")
-    return value.reshape(times_s.size, -1) if value.ndim == 3 else value
+    if combine is np.multiply and not np.all(value > 0):
+        raise DataError(
+            f"effect {hook.name}: {method}: a factor of {np.min(value):g}, must be above 0"
+        )
+    return value.reshape(times_s.size, -1)
 
 
-def _combined(combine: Callable[[Array, Array], Array], values: Sequence[Array]) -> Array:
-    if any(value.ndim == 2 for value in values):
-        values = [value if value.ndim == 2 else value[:, None] for value in values]
-    total = values[0]
-    for value in values[1:]:
-        total = combine(total, value)
-    return total
+def _injected(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> Array:
+    """Return the events that all of `hooks` inject, sorted by time."""
+    parts = []
+    for hook in hooks:
+        with blamed(hook):
+            found = np.asarray(hook.inject(start_s, stop_s))
+        wrong = _injection_complaint(found, start_s, stop_s, hook.view)
+        if wrong:
+            raise DataError(f"effect {hook.name}: inject: {wrong}")
+        parts.append(found)
+    together = np.concatenate(parts)
+    return together[np.argsort(together["t"], kind="stable")]
 
 
-def _merge(hooks: Sequence[Hooks]) -> Callable[[float, float], Array]:
-    def merged(start_s: float, stop_s: float) -> Array:
-        parts = [_injected(hook, start_s, stop_s) for hook in hooks]
-        if len(parts) == 1:
-            return parts[0]
-        together = np.concatenate(parts)
-        return together[np.argsort(together["t"], kind="stable")]
-
-    return merged
-
-
-def _injected(hook: Hooks, start_s: float, stop_s: float) -> Array:
-    with blamed(hook):
-        found = np.asarray(hook.inject(start_s, stop_s))
-    wrong = injection_complaint(found, start_s, stop_s, hook.view.rows, hook.view.columns)
-    if wrong:
-        raise DataError(f"effect {hook.name}: inject: {wrong}")
-    return found
+def _injection_complaint(found: Array, start_s: float, stop_s: float, view: View) -> str | None:
+    if found.dtype != INJECTED_DTYPE or found.ndim != 1:
+        return f"must be (n,) of INJECTED_DTYPE, got {found.dtype} of shape {found.shape}"
+    times = found["t"]
+    inside = (times >= start_s) & (times < stop_s)
+    if not (np.all(inside) and np.all(times[1:] >= times[:-1])):
+        return f"times must be sorted and from {start_s:.6f} s to before {stop_s:.6f} s"
+    if np.any(found["x"] >= view.columns) or np.any(found["y"] >= view.rows):
+        return f"x must be below {view.columns} and y below {view.rows}"
+    return None
 
 
 def map_events(hooks: Iterable[Hooks], chunks: Iterable[Events]) -> Iterator[Events]:

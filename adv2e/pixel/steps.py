@@ -28,9 +28,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.effects.courses import LONGEST_US, Additions, Course, injection_complaint, values_of
+from adv2e.effects.courses import LONGEST_US, Additions, Course
 from adv2e.effects.pixel.threshold_drift import drift_factors
-from adv2e.errors import DataError
 from adv2e.kernel.stepped.driver import BLOCK, Run
 from adv2e.kernel.stepped.events import Injected, injected_of
 from adv2e.kernel.tile import Frames
@@ -53,7 +52,6 @@ _VALUES = 1 << 22
 """Values of a course that are in memory at a time, unless one block of steps has more."""
 
 _COURSES = ("gain", "drive", "signal", "on", "off")
-_ABOVE_ZERO = ("gain", "on", "off")
 
 _NONE = np.zeros((0, 1))
 _NO_INDEX = np.zeros(0, np.int64)
@@ -193,8 +191,6 @@ class Stepping:
         ------
         ConfigError
             Thresholds that drift to zero.
-        DataError
-            Courses or injected events that are none.
         """
         circuit = self._circuit
         lengths = np.diff(starts)
@@ -243,8 +239,8 @@ class Stepping:
         course: Course | None = getattr(self._additions, name, None)
         if course is None:
             return _NONE
-        above = 0.0 if name in _ABOVE_ZERO else -math.inf
-        return values_of(course, name, self._seconds(times), self._pixels, above=above)
+        values = np.asarray(course(self._seconds(times)), np.float64)
+        return np.ascontiguousarray(values.reshape(times.size, -1))
 
     def _factors(self, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the factors on a threshold, drift and course together."""
@@ -259,10 +255,7 @@ class Stepping:
         if self._additions is None or self._additions.inject is None:
             return _NOTHING
         t0, t1 = (float(t) for t in self._seconds(np.array([t0_us, t1_us])))
-        found = np.asarray(self._additions.inject(t0, t1))
-        wrong = injection_complaint(found, t0, t1, self._pixels // self._columns, self._columns)
-        if wrong:
-            raise DataError(f"inject: {wrong}")
+        found = self._additions.inject(t0, t1)
         pixels = found["y"].astype(np.int64) * self._columns + found["x"]
         # seconds and back: rounding must not take an event out of its run
         at = np.clip(found["t"] * 1e6 - self._origin, t0_us, np.nextafter(t1_us, -math.inf))

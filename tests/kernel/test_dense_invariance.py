@@ -51,7 +51,7 @@ def additions():
         return rows
 
     return Additions(
-        step_us=90.0,
+        longest_step_us=lambda a, b: 90.0,
         drive=lambda t: 0.2 * np.sin(700 * t)[:, None] * shape,
         signal=lambda t: 0.1 * np.sin(1300 * t),
         on=lambda t: 1 + 0.2 * np.sin(300 * t)[:, None] * shape,
@@ -114,7 +114,11 @@ from adv2e.config.model import Pixel, LowPass
 draw = np.random.default_rng(2)
 light = np.exp(draw.uniform(1, 5.5, (3, 3, 4))).astype(np.float32)
 times = [0, 2_000_000, 4_000_000]
-added = Additions(step_us=100.0, drive=lambda t: 0.1 * np.sin(900 * t), on=lambda t: 1 + 9 * t)
+added = Additions(
+    longest_step_us=lambda a, b: 100.0,
+    drive=lambda t: 0.1 * np.sin(900 * t),
+    on=lambda t: 1 + 9 * t,
+)
 everything = {{**EVERYTHING, **NEW}}
 for sections, additions in (
     ({{}}, None), (everything, None), (everything, added),
@@ -197,7 +201,7 @@ def test_slew_limit_keeps_events_apart(light, slew, threshold):
 @given(light=lights, offset=st.floats(-3.0, 3.0))
 def test_a_constant_added_to_the_signal_changes_nothing(light, offset):
     times = np.arange(len(light)) * 0.01
-    added = Additions(step_us=1e3, signal=lambda t: np.full(t.shape, offset))
+    added = Additions(longest_step_us=lambda a, b: 1e3, signal=lambda t: np.full(t.shape, offset))
     plain = solve(np.array(light), times, quiet(), method="stepped")
     found = solve(np.array(light), times, quiet(), additions=added)
     for a, b in zip(found, plain, strict=True):

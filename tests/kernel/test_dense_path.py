@@ -229,7 +229,10 @@ def test_additions_of_nothing_change_nothing():
     times_ns = [round(t * 1e9) for t in times]
     arrays = [
         start(light, times_ns, quiet(), exact_times=True, **options)
-        for options in ({"method": "stepped"}, {"additions": Additions(step_us=math.inf)})
+        for options in (
+            {"method": "stepped"},
+            {"additions": Additions(longest_step_us=lambda a, b: math.inf)},
+        )
     ]
     one, two = (by_pixel(array, *advance(array, light, times_ns)) for array in arrays)
     assert sum(map(len, one)) > 100
