@@ -21,7 +21,7 @@ from adv2e import __version__
 from adv2e.background import OrderedWork
 from adv2e.compiled import announcement
 from adv2e.config import Config, to_dict
-from adv2e.config.active_effects import user_sources
+from adv2e.config.active_effects import active_hooks, user_sources
 from adv2e.conversion.reading import Decoding, Reading, Still
 from adv2e.conversion.simulation import events_from_light, is_compiled
 from adv2e.conversion.versions import versions
@@ -71,65 +71,52 @@ class Summary:
         )
 
 
-_Call = Callable[..., None]
-"""Takes a function and its arguments, and calls it now or later."""
-
-
-def _call_now(function: Callable[..., None], *arguments: Any) -> None:
-    function(*arguments)
-
-
 class _Output:
-    """What frames and events go to: the sink, the preview if there is one, and the counts."""
+    """What frames and events go to, by `work`: the sink, the preview, if any, and the counts."""
 
-    def __init__(self, sink: Sink, preview: Timeline | None, white: float) -> None:
-        self._sink, self._preview, self._white = sink, preview, white
+    def __init__(
+        self, sink: Sink, preview: Timeline | None, white: float, work: OrderedWork
+    ) -> None:
+        self._sink, self._preview, self._white, self._work = sink, preview, white, work
         self.wants_frames = sink.wants_frames or preview is not None
-        self.events = 0
-        self.on = 0
+        self.frames = self.first_ns = self.last_ns = 0
+        self.events = self.on = 0
 
-    def add_frame(self, t_ns: int, picture: NDArray[Any]) -> None:
+    def light_of(self, stills: Iterable[Still]) -> Iterator[tuple[int, NDArray[Any]]]:
+        """Yield (t_ns, light), or grey values, of each frame; what is seen of it is written."""
+        for still in stills:
+            self.first_ns = still.t_ns if not self.frames else self.first_ns
+            self.last_ns = still.t_ns
+            self.frames += 1
+            if still.picture is not None:
+                self._work.submit(self._write_frame, still.t_ns, still.picture)
+            now = still.t_ns, still.light
+            del still  # with its picture
+            yield now
+        if self._preview is not None:
+            self._work.submit(self._preview.no_more_frames)
+
+    def complete_until(self, t_us: int) -> None:
+        """Tell the preview of a time [us] before which no event will come."""
+        if self._preview is not None:
+            self._work.submit(self._preview.complete_until, t_us)
+
+    def add(self, events: Events) -> None:
+        """Write events."""
+        for piece in _pieces(events):
+            self._work.submit(self._write_events, piece)
+
+    def _write_frame(self, t_ns: int, picture: NDArray[Any]) -> None:
         self._sink.write_frame(t_ns, picture)
         if self._preview is not None:
             self._preview.add_frame(t_ns, drawn(picture, self._white))
 
-    def no_more_frames(self) -> None:
-        if self._preview is not None:
-            self._preview.no_more_frames()
-
-    def complete_until(self, t_us: int) -> None:
-        if self._preview is not None:
-            self._preview.complete_until(t_us)
-
-    def add_events(self, events: Events) -> None:
+    def _write_events(self, events: Events) -> None:
         self.events += events.size
         self.on += int(np.count_nonzero(events["p"]))
         self._sink.write_events(events)
         if self._preview is not None:
             self._preview.add_events(events)
-
-
-class _Passing:
-    """Frames on their way to the pixel: counts them, and hands on what is kept of them."""
-
-    def __init__(self, stills: Iterable[Still], output: _Output, call: _Call) -> None:
-        self._stills, self._output, self._call = stills, output, call
-        self.count = 0
-        self.first_ns = 0
-        self.last_ns = 0
-
-    def light(self) -> Iterator[tuple[int, NDArray[Any]]]:
-        """Yield (t_ns, light), or grey values, of each frame."""
-        for still in self._stills:
-            self.first_ns = still.t_ns if not self.count else self.first_ns
-            self.last_ns = still.t_ns
-            self.count += 1
-            if still.picture is not None:
-                self._call(self._output.add_frame, still.t_ns, still.picture)
-            now = still.t_ns, still.light
-            del still  # with its picture
-            yield now
-        self._call(self._output.no_more_frames)
 
 
 def default_output(source: str) -> str:
@@ -213,18 +200,17 @@ def convert(
                 staging=staging,
             )
         )
-        out = _Output(sink, _open_preview(preview, recording, staging, stack), white)
-        call: _Call = _call_now
         # a write to standard output may block until the reader pleases, and only the main thread
         # can be interrupted in it
-        if workers > 1 and target != "-":
-            call = stack.enter_context(
-                OrderedWork(1, limit=BEHIND_BYTES, count=BEHIND_TASKS)
-            ).submit
+        beside = workers > 1 and target != "-"
+        seen = _open_preview(preview, recording, staging, stack)
+        work = stack.enter_context(OrderedWork(int(beside), limit=BEHIND_BYTES, count=BEHIND_TASKS))
+        out = _Output(sink, seen, white, work)
         told = _doubt_of_white(recording, recording.largest, config)
         for doubt in filter(None, (*recording.doubts, told)):
             log(doubt)
-        table = kernel_table(decoder, config.sampling)
+        hooks = active_hooks(config)
+        table = kernel_table(decoder, config.sampling, hooks)
         if not is_compiled(config):
             log(announcement())
             if compile_apart and not user_sources(config):
@@ -234,18 +220,17 @@ def convert(
         stills = reading.stills(
             Decoding(decoder, table is not None, out.wants_frames, stated, not keeps_all_bits)
         )
-        frames = _Passing(_progress(stills, recording.count, progress), out, call)
         chunks = events_from_light(
-            frames.light(),
+            out.light_of(_progress(stills, recording.count, progress)),
             config,
+            hooks=hooks,
             threads=workers,
             table=table,
-            complete=None if preview is None else lambda t_us: call(out.complete_until, t_us),
+            complete=out.complete_until,
         )
         for events in chunks:
-            for piece in _pieces(events):
-                call(out.add_events, piece)
-            del events, piece  # or they would stay while the next ones are made
+            out.add(events)
+            del events  # or they would stay while the next ones are made
     # at the end: an error is to be the only line
     log(f"light: {light_text(recording.light, recording.full_scale, config.frames)}")
     found = _doubt_of_white(recording, recording.largest_read, config)
@@ -258,8 +243,8 @@ def convert(
         output=target,
         width=recording.width,
         height=recording.height,
-        frames=frames.count,
-        duration_s=(frames.last_ns - frames.first_ns) * 1e-9,
+        frames=out.frames,
+        duration_s=(out.last_ns - out.first_ns) * 1e-9,
         events=out.events,
         on=out.on,
         seconds=time.perf_counter() - began,

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from adv2e.config.model import Frames, Sampling
+from adv2e.effects.composition import changes_light
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.effects.hooks import Hooks
 from adv2e.sources.base import Light
 
 
@@ -35,13 +39,15 @@ def decoder_for(
     return LightDecoder(encoding_for(frames, auto), full_scale, dtype, colour)
 
 
-def kernel_table(decoder: LightDecoder, sampling: Sampling) -> NDArray[np.float32] | None:
+def kernel_table(
+    decoder: LightDecoder, sampling: Sampling, hooks: Iterable[Hooks]
+) -> NDArray[np.float32] | None:
     """Return the table with which the kernel decodes grey frames itself; None: it takes light.
 
     A quarter of the memory traffic, but every instant looks its frames up again, and only linear
-    interpolation needs no light before.
+    interpolation, without effects on the light (`hooks`), needs no light before.
     """
-    once = sampling.L == 1 and sampling.interpolation == "linear"
+    once = sampling.L == 1 and sampling.interpolation == "linear" and not changes_light(hooks)
     return decoder.grey_table if once else None
 
 

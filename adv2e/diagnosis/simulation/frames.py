@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.config.active_effects import frame_hooks
+from adv2e.config.active_effects import active_hooks, frame_hooks
 from adv2e.config.model import Frames
 from adv2e.config.own import user_effects
 from adv2e.conversion.simulation import events_from_light
@@ -87,9 +87,8 @@ def events_of(
     """
     lean, effects = _as_recorded(config)
     frames = zip(*instants, strict=True)
-    chunks = events_from_light(
-        frames, lean, threads=threads, effects=effects, coarseness=coarseness
-    )
+    hooks = active_hooks(lean, effects)
+    chunks = events_from_light(frames, lean, hooks=hooks, threads=threads, coarseness=coarseness)
     return np.concatenate(list(chunks))
 
 

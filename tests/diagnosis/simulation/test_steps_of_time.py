@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from adv2e.config import load_config
+from adv2e.config.active_effects import active_hooks
 from adv2e.conversion.simulation import events_from_light
 from adv2e.diagnosis.data.evidence import Evidence, RunIn
 from adv2e.diagnosis.data.stream import Stream
@@ -67,7 +68,8 @@ def test_as_many_steps_are_counted_as_the_pixel_takes(keys):
     config = load_config(["adv2e"], keys)
     shown, asked = recording(), Asked()
     light = zip(shown.times_ns, shown.lights(config), strict=True)
-    for _ in events_from_light(light, config, threads=1, effects=[asked], coarseness=FINE):
+    hooks = active_hooks(config, [asked])
+    for _ in events_from_light(light, config, threads=1, hooks=hooks, coarseness=FINE):
         pass
     taken = len(asked.times) - 1  # the first is where it begins
     assert steps_of_time(shown, config) == taken
