@@ -18,15 +18,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import yaml
-from yaml.composer import Composer
-from yaml.parser import Parser
-from yaml.reader import Reader
-from yaml.resolver import BaseResolver
-from yaml.scanner import Scanner
 
 from adv2e.errors import Adv2eError, ConfigError, UsageError
 
@@ -43,6 +38,10 @@ class Origin:
     """File name, or the option of the command line."""
     line: int | None = None
     on_command_line: bool = False
+
+    def at(self, line: int | None) -> Origin:
+        """Return a line of this file; a command line has none."""
+        return self if self.on_command_line else Origin(self.name, line)
 
     def complaint(self, path: str, text: str) -> Adv2eError:
         """Return the exception that says `text` of the key at `path` and names the place."""
@@ -74,17 +73,11 @@ class Value:
         return shown if len(shown) <= 60 else shown[:57] + "..."
 
 
-class _Loader(Reader, Scanner, Parser, Composer, BaseResolver):
-    """PyYAML's reader up to the node tree, with the tags of the core schema."""
-
-    def __init__(self, text: str) -> None:
-        Reader.__init__(self, text)
-        Scanner.__init__(self)
-        Parser.__init__(self)
-        Composer.__init__(self)
-        BaseResolver.__init__(self)
+class _Loader(yaml.SafeLoader):
+    """PyYAML's reader with the tags of the core schema."""
 
 
+_Loader.yaml_implicit_resolvers = {}
 _NUMBER_START = list("-+.0123456789")
 for _tag, _pattern, _first in (
     ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
@@ -147,10 +140,7 @@ class _Builder:
         self.sizes: dict[int, int] = {}
 
     def place(self, node: yaml.Node) -> Origin:
-        """Return the place of `node`; a command line has no lines."""
-        if self.origin.on_command_line or node.start_mark is None:
-            return self.origin
-        return Origin(self.origin.name, node.start_mark.line + 1)
+        return self.origin.at(node.start_mark.line + 1)
 
     def build(self, node: yaml.Node, path: str) -> Value:
         """Return the value of `node`, which stands at the key `path`."""
@@ -209,13 +199,9 @@ class _Builder:
                 also = f" (a key {key_node.value} is {key})" if isinstance(name, bool) else ""
                 raise place.complaint(full, f"given twice{where}{also}: keep one")
             # the line of the key says more than that of a section's first entry
-            content[key] = self.relocated(self.build(value_node, full), place)
+            content[key] = replace(self.build(value_node, full), origin=place)
             lines[key] = place
         return content
-
-    @staticmethod
-    def relocated(value: Value, place: Origin) -> Value:
-        return Value(value.content, place, value.text)
 
 
 def parse(text: str, origin: Origin, path: str = "") -> Value:
@@ -236,30 +222,18 @@ def parse(text: str, origin: Origin, path: str = "") -> Value:
         Not YAML, a key given twice, a key that is not text; the kind depends on `origin`.
     """
     try:
-        node = _compose(text)
+        node = yaml.compose(text, Loader=_Loader)
         return Value(None, origin) if node is None else _Builder(origin).build(node, path)
     except yaml.reader.ReaderError as error:
-        at = _at(origin, text[: error.position].count("\n") + 1)
+        at = origin.at(text[: error.position].count("\n") + 1)
         why = f"the character {chr(error.character)!r} is not allowed"
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        at = _at(origin, mark.line + 1 if mark else None)
+        at = origin.at(mark.line + 1 if mark else None)
         why = ", ".join(part for part in (error.context, error.problem) if part)
     except RecursionError:
         at, why = origin, "nested too deeply"
     raise at.complaint(path, f"not YAML: {why}")
-
-
-def _compose(text: str) -> yaml.Node | None:
-    loader = _Loader(text)
-    try:
-        return loader.get_single_node()
-    finally:
-        loader.dispose()
-
-
-def _at(origin: Origin, line: int | None) -> Origin:
-    return origin if origin.on_command_line else Origin(origin.name, line)
 
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_.:/+-]*[A-Za-z0-9_]|[A-Za-z_]")
