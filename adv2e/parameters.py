@@ -85,47 +85,23 @@ def _digits(value: int | float) -> str:
     return str(value) if value.bit_length() < _MANY_BITS else f"one of {value.bit_length()} bits"
 
 
-def parameter(
-    default: Any = MISSING,
-    *,
-    unit: str,
-    meaning: str,
-    above: float | None = None,
-    at_least: float | None = None,
-    at_most: float | None = None,
-    choices: tuple[str, ...] | None = None,
-    source: str = "",
-    fit: Fit | None = None,
-) -> Any:
-    """Declare one key of a section; without `default` the key must be given."""
-    about = Parameter(
-        unit=unit,
-        meaning=meaning,
-        above=above,
-        at_least=at_least,
-        at_most=at_most,
-        choices=choices,
-        source=source,
-        fit=fit,
-    )
-    return field(default=default, metadata={"parameter": about})
+def parameter(default: Any = MISSING, **about: Any) -> Any:
+    """Declare one key of a section; without `default` the key must be given.
+
+    `about` are the attributes of :class:`Parameter`, of which `unit` and `meaning` must be given.
+    """
+    return field(default=default, metadata={"parameter": Parameter(**about)})
 
 
-def subsection(default_factory: Any, *, meaning: str, optional: bool = False) -> Any:
-    """Declare a key that holds a section of its own; `optional`: ``null`` switches it off."""
-    about = Parameter(unit="", meaning=meaning)
-    return field(
-        default_factory=default_factory, metadata={"parameter": about, "optional": optional}
-    )
+def subsection(default: Any, *, meaning: str) -> Any:
+    """Declare a key that holds a section of its own.
 
-
-def about(owner: Any, name: str) -> Parameter:
-    """Return the declaration of key `name` of the section class or instance `owner`."""
-    for item in dataclasses.fields(owner):
-        if item.name == name:
-            declared: Parameter = item.metadata["parameter"]
-            return declared
-    raise KeyError(name)
+    `default`: the class of the section, None (it is off), or MISSING (it must be given).
+    """
+    metadata = {"parameter": Parameter(unit="", meaning=meaning)}
+    if default is None:
+        return field(default=None, metadata=metadata)
+    return field(default_factory=default, metadata=metadata)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,10 +33,6 @@ from adv2e.parameters import Fit, Section, parameter, subsection
 INTERPOLATIONS = ("linear", "flow")
 
 
-def _off() -> None:
-    return None
-
-
 @dataclass(frozen=True, kw_only=True)
 class Frames(Section):
     """How the numbers in the frames stand for light."""
@@ -94,7 +90,7 @@ class Frames(Section):
         fit=Fit(-20.0, 20.0, 0.3),
     )
     flicker: Flicker | None = subsection(
-        _off, meaning="light of lamps, of which the frames know nothing", optional=True
+        None, meaning="light of lamps, of which the frames know nothing"
     )
 
     def __post_init__(self) -> None:
@@ -148,34 +144,20 @@ class Pixel(Section):
         choices=REFERENCES,
     )
     dark_current: DarkCurrent | None = subsection(
-        _off, meaning="constant light that the frames lack", optional=True
+        None, meaning="constant light that the frames lack"
     )
     log_response: LogResponse = subsection(LogResponse, meaning="light to log intensity")
-    photoreceptor_noise: PhotoreceptorNoise | None = subsection(
-        _off, meaning="band-limited noise", optional=True
-    )
-    low_pass: LowPass | None = subsection(
-        LowPass, meaning="first pole, follows the light", optional=True
-    )
-    slew_limit: SlewLimit | None = subsection(
-        _off, meaning="slew rate of the first pole", optional=True
-    )
-    source_follower: SourceFollower | None = subsection(_off, meaning="second pole", optional=True)
+    photoreceptor_noise: PhotoreceptorNoise | None = subsection(None, meaning="band-limited noise")
+    low_pass: LowPass | None = subsection(LowPass, meaning="first pole, follows the light")
+    slew_limit: SlewLimit | None = subsection(None, meaning="slew rate of the first pole")
+    source_follower: SourceFollower | None = subsection(None, meaning="second pole")
     thresholds: Thresholds = subsection(Thresholds, meaning="contrast thresholds")
-    refractory: Refractory | None = subsection(Refractory, meaning="dead time", optional=True)
-    reset_overshoot: ResetOvershoot | None = subsection(
-        _off, meaning="reference after an event", optional=True
-    )
-    leak: Leak | None = subsection(Leak, meaning="leak of the reference", optional=True)
-    shot_noise: ShotNoise | None = subsection(
-        ShotNoise, meaning="Poisson background events", optional=True
-    )
-    hot_pixels: HotPixels | None = subsection(
-        _off, meaning="pixels that fire by themselves", optional=True
-    )
-    dead_pixels: DeadPixels | None = subsection(
-        _off, meaning="pixels that never fire", optional=True
-    )
+    refractory: Refractory | None = subsection(Refractory, meaning="dead time")
+    reset_overshoot: ResetOvershoot | None = subsection(None, meaning="reference after an event")
+    leak: Leak | None = subsection(Leak, meaning="leak of the reference")
+    shot_noise: ShotNoise | None = subsection(ShotNoise, meaning="Poisson background events")
+    hot_pixels: HotPixels | None = subsection(None, meaning="pixels that fire by themselves")
+    dead_pixels: DeadPixels | None = subsection(None, meaning="pixels that never fire")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -192,12 +174,10 @@ class Readout(Section):
     """What happens to events between pixel and file, and what the readout of frames does."""
 
     frame_coupling: FrameCoupling | None = subsection(
-        _off, meaning="disturbance of the event pixels by the readout of frames", optional=True
+        None, meaning="disturbance of the event pixels by the readout of frames"
     )
-    arbiter: Arbiter | None = subsection(
-        _off, meaning="one channel for the events of all rows", optional=True
-    )
-    loss: EventLoss | None = subsection(_off, meaning="events lost at random", optional=True)
+    arbiter: Arbiter | None = subsection(None, meaning="one channel for the events of all rows")
+    loss: EventLoss | None = subsection(None, meaning="events lost at random")
     tick_us: float = parameter(
         0.0,
         unit="us",
@@ -217,4 +197,4 @@ class Config(Section):
     frames: Frames = subsection(Frames, meaning="the input's numbers")
     sampling: Sampling = subsection(Sampling, meaning="in-between frames and samples")
     pixel: Pixel = subsection(Pixel, meaning="the pixel")
-    readout: Readout | None = subsection(_off, meaning="the readout", optional=True)
+    readout: Readout | None = subsection(None, meaning="the readout")

@@ -63,7 +63,7 @@ def _declared(effect: type[Hooks]) -> Any:
         for item in dataclasses.fields(section)
     )
     meaning = (inspect.getdoc(effect) or effect.name).partition("\n")[0]
-    return subsection(MISSING if needed else section, meaning=meaning, optional=True)
+    return subsection(MISSING if needed else section, meaning=meaning)
 
 
 def user_effects(config: Config) -> Mapping[str, type[Hooks]]:

@@ -26,7 +26,7 @@ from adv2e.config.model import (
     Thresholds,
 )
 from adv2e.errors import ConfigError
-from adv2e.parameters import Section, about
+from adv2e.parameters import Section
 
 # for each section: parameters that do something here, and neutral ones (None: being absent)
 CASES = {
@@ -98,14 +98,16 @@ def test_says_what_it_is(name):
     assert section.__doc__
     assert re.search(r"doi:10\.|arXiv:", module.__doc__), "the module names no source"
     for field in dataclasses.fields(section):
-        declared = about(section, field.name)
+        declared = field.metadata["parameter"]
         assert declared.unit, field.name
         assert declared.meaning, field.name
         fit = declared.fit
         if fit is not None:
             assert declared.complaint(fit.low) is declared.complaint(fit.high) is None
     # what is known of a circuit, not measured, is nothing to fit
-    fitted = {f.name for f in dataclasses.fields(section) if about(section, f.name).fit is not None}
+    fitted = {
+        f.name for f in dataclasses.fields(section) if f.metadata["parameter"].fit is not None
+    }
     given = {"linear_below", "floor", "update", "jitter", "step"}
     assert fitted | given >= {f.name for f in dataclasses.fields(section)}
 
