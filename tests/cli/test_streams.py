@@ -57,7 +57,7 @@ def test_last_words_on_a_signal_are_still_said(tmp_path):
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     until = time.monotonic() + 60
-    while not list(tmp_path.glob(".o.*")) and time.monotonic() < until:
+    while not list(tmp_path.glob(".adv2e.*/new*")) and time.monotonic() < until:
         time.sleep(0.02)
     child.send_signal(signal.SIGTERM)
     _, said = child.communicate(timeout=60)

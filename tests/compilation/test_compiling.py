@@ -189,7 +189,7 @@ def test_the_compiler_is_of_this_package_wherever_it_lies(traps, tmp_path, monke
     """A checkout that is not installed, in the current folder; another one is on the path."""
     here = tmp_path / "checkout"
     shutil.copytree(
-        Path(compiling.__file__).parent,
+        Path(compiling.__file__).parents[1],
         here / "adv2e",
         ignore=shutil.ignore_patterns("__pycache__"),
     )
@@ -205,7 +205,7 @@ def main() -> None:
     )
     monkeypatch.setattr(compiling, "__file__", str(here / "adv2e" / "conversion" / "compiling.py"))
     status, out, last = compiler_in(here, {}, monkeypatch)
-    assert (status, out, last) == (1, "", f"of {here / 'adv2e' / 'compiling.py'}")
+    assert (status, out, last) == (1, "", f"of {here / 'adv2e' / 'conversion' / 'compiling.py'}")
 
 
 def test_the_command_imports_no_library_from_the_current_folder(traps):

@@ -45,7 +45,7 @@ def test_a_signal_ends_a_conversion_without_a_trace(long_stack, tmp_path, name, 
     target = tmp_path / "results"
     target.mkdir()
     with started(long_stack, target / "out.txt", "--threads", threads) as process:
-        wait_until(lambda: any(map(is_long, target.glob(".out.*.txt"))), seconds=60)
+        wait_until(lambda: any(map(is_long, target.glob(".adv2e.*/*.txt"))), seconds=60)
         process.send_signal(getattr(signal, name))
         _, err = process.communicate(timeout=20)
     assert process.returncode == status, err
