@@ -142,6 +142,7 @@ def _take_piece(n, p, pieces, strip):
         b = strip[rows.AHEAD + k] if p == pieces - 1 else b
         strip[rows.PIECE + k] = a
         strip[rows.MOVE + k] = b - a
+        strip[rows.UNTIL + k] = b
 
 
 @kernel
@@ -153,7 +154,10 @@ def _next_instant(n, strip):
 @kernel
 def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, normals, strip):
     """Signal of a strip over step m of a run, of h us, that ends at `share` of its piece."""
-    signal.advance_light(n, share, half, circuit, strip)
+    if circuit.update == EXACT:
+        signal.advance_light(n, share, half, circuit, strip)
+    else:
+        signal.next_sample(n, circuit, strip)
     if run.gain.shape[0] > 0:
         signal.change_middle(lo, count, run.gain, m, strip)
         signal.change_light(lo, count, run.gain, m + 1, circuit, strip)
@@ -262,7 +266,7 @@ def _strip(
             r = j % steps
             if r == 0 or j == first:
                 _take_piece(n, j // steps, run.pieces, strip)
-            if r % BLOCK == 0:
+            if m == 0 or (circuit.update == EXACT and r % BLOCK == 0):
                 signal.begin_block(n, r / steps, half, circuit, strip)
                 if run.gain.shape[0] > 0:
                     signal.change_light(lo, count, run.gain, m, circuit, strip)

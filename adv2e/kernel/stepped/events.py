@@ -39,6 +39,8 @@ _THIRD = 1.0 / 3.0
 _SIXTH = 1.0 / 6.0
 _NEWTON = 50
 _NOWHERE = 2.0
+_STRAIGHT = 1e-14
+"""Curvature over slope that rounding gives a line."""
 ADDED_EVENT = 3
 
 
@@ -179,6 +181,9 @@ def first_reach(p0, p1, p2, p3, start, end):
     """Where a cubic is first at or above zero in [start, end]; beyond 1: nowhere."""
     if _at(p0, p1, p2, p3, start) >= 0.0:
         return start
+    if p3 == 0.0 and abs(p2) <= _STRAIGHT * abs(p1):
+        s = -p0 / p1 if p1 > 0.0 else _NOWHERE
+        return s if s <= end else _NOWHERE
     first, second = end, end
     inner = p2 * p2 - 3.0 * p1 * p3
     if inner > 0.0:

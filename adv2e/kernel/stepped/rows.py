@@ -23,6 +23,7 @@ NEVER = 1e300
     STEP,
     PIECE,  # x at the start of a straight piece, and how far it goes
     MOVE,
+    UNTIL,  # x at its end
     GROWN,  # e^x at the start of the step
     RATIO,  # by which that grows in half a step
     LIGHT0,  # light [DN] at the start, in the middle and at the end of the step
@@ -53,12 +54,12 @@ NEVER = 1e300
     DUE,  # when something happens whatever the signal does [us]
     FROM,  # part of the step that is over
     HIT,
-) = range(0, 37 * _PADDED, _PADDED)
+) = range(0, 38 * _PADDED, _PADDED)
 
 
 def scratch() -> NDArray[np.float64]:
     """Return the rows of a strip."""
-    return np.zeros(37 * _PADDED)
+    return np.zeros(38 * _PADDED)
 
 
 def normals() -> NDArray[np.float64]:

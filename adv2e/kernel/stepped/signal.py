@@ -60,6 +60,23 @@ def begin_block(n, share, half, circuit, strip):
 
 
 @kernel
+def next_sample(n, circuit, strip):
+    """Light, and log intensity at the end of one of the K steps, which is a sample.
+
+    The next one begins with the same bits, so that no block has to.
+    """
+    knee, slope = circuit.knee, circuit.slope
+    for k in range(n):
+        x = strip[rows.UNTIL + k]
+        grown, foot = special.exp(x), x * slope
+        strip[rows.LIGHT0 + k] = strip[rows.LIGHT1 + k]
+        strip[rows.LIGHT1 + k] = foot if x < knee else grown
+        strip[rows.X1 + k] = x
+        strip[rows.DRIVEN0 + k] = strip[rows.DRIVEN1 + k]
+        strip[rows.DRIVEN1 + k] = x
+
+
+@kernel
 def advance_light(n, share, half, circuit, strip):
     """Light, and log intensity at the end of a step that ends at `share` of the piece."""
     knee, slope = circuit.knee, circuit.slope
@@ -174,7 +191,9 @@ def first_pole_stepped(n, h, circuit, strip):
         rise = strip[rows.FIRST + k] - strip[rows.SLOPE0 + k]
         strip[rows.SLOPE0 + k] = rise
         strip[rows.SLOPE1 + k] = rise
-        strip[rows.DECAY + k] = special.exp(-strip[rows.DECAY + k])
+    if circuit.noise_rms > 0.0:
+        for k in range(n):
+            strip[rows.DECAY + k] = special.exp(-strip[rows.DECAY + k])
 
 
 @kernel
