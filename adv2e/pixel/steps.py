@@ -119,7 +119,8 @@ def steps_of(
     if circuit.follower > 0.0:
         limit = min(limit, share / circuit.follower)
     few = min(_FEWEST, math.ceil(length_us / _SHORT_US))
-    return max(1, few, math.ceil(length_us / limit))
+    # where the light overshoots, up to 4 us were found
+    return max(1, few, math.ceil(length_us / limit)) * (2 if circuit.printed else 1)
 
 
 class Stepping:
@@ -204,8 +205,6 @@ class Stepping:
                 steps[f] = steps_of(
                     length / pieces, circuit, step_us, brightest[f], self._coarseness
                 )
-            if circuit.printed:  # where the light overshoots, up to 4 us were found
-                steps *= 2
         for first, first_step, stop, stop_step in self._cuts(pieces, steps):
             times = _instants(starts, pieces * steps, first, first_step, stop, stop_step)
             run = Run(

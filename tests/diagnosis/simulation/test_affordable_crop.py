@@ -81,8 +81,9 @@ def test_a_stepped_filter_costs_more(monkeypatch):
     whole = recording()
     limit(monkeypatch, WIDTH * HEIGHT)
     stepped = load_config(["paper"])
+    monkeypatch.setattr(affordable_module, "STEP_S", 1.0)
     assert affordable(whole, stepped).width < WIDTH
-    limit(monkeypatch, WIDTH * HEIGHT, steps=10)
+    limit(monkeypatch, WIDTH * HEIGHT, steps=1 + stepped.sampling.K)
     assert affordable(whole, stepped) is whole
 
 
