@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import entry
 from adv2e.events import EVENT_DTYPE, Events, empty_events, sort_events
 from adv2e.formats.recording import Recording, described_geometry
 from adv2e.sources.base import Image, Pixels
@@ -23,6 +22,9 @@ _FEW = 100
 """So few events may well lie in a small part of the recording."""
 _APART = 300
 """Events and frames that differ in length by this factor are in doubt."""
+
+_PART = 1 << 20
+"""Events examined at once."""
 
 Column = NDArray[Any]
 
@@ -250,14 +252,14 @@ class RecordingBuilder:
         return events[inside], width, height
 
     def _in_order(self, events: Events) -> Events:
-        back, untidy, repeated = _examine(events["t"], events["x"], events["y"], events["p"])
+        back, untidy, repeated = _examine(events)
         if back:
             self._say(f"events are not in the order of time ({back} steps back): sorted")
             events = sort_events(events)
         elif untidy:
             _sort_ties(events)
         if back or untidy:
-            repeated = _examine(events["t"], events["x"], events["y"], events["p"])[2]
+            repeated = _examine(events)[2]
         if events.size and events["t"][0] < 0:
             self._say(f"times begin below zero, at {events['t'][0] / 1e6:.6f} s")
         if repeated:
@@ -265,25 +267,24 @@ class RecordingBuilder:
         return events
 
 
-@entry
-def _examine(t: Any, x: Any, y: Any, p: Any) -> Any:
+def _examine(events: Events) -> tuple[int, int, int]:
     """Count steps back in time, ties out of (y, x, p) order, and neighbours that are equal."""
-    back = 0
-    untidy = 0
-    equal = 0
-    for i in range(1, t.shape[0]):
-        if t[i] < t[i - 1]:
-            back += 1
-        elif t[i] == t[i - 1]:
-            if y[i] != y[i - 1]:
-                untidy += y[i] < y[i - 1]
-            elif x[i] != x[i - 1]:
-                untidy += x[i] < x[i - 1]
-            elif p[i] != p[i - 1]:
-                untidy += p[i] < p[i - 1]
-            else:
-                equal += 1
+    back = untidy = equal = 0
+    for begin in range(0, events.size - 1, _PART):
+        part = events[begin : begin + _PART + 1]
+        step = np.diff(part["t"])
+        back += int(np.count_nonzero(step < 0))
+        tied = np.flatnonzero(step == 0)
+        former, latter = (_rank(part[place]) for place in (tied, tied + 1))
+        untidy += int(np.count_nonzero(latter < former))
+        equal += int(np.count_nonzero(latter == former))
     return back, untidy, equal
+
+
+def _rank(events: Events) -> NDArray[np.int64]:
+    """Return numbers that are in the order of (y, x, p)."""
+    y, x, p = (events[name].astype(np.int64) for name in "yxp")
+    return (y << 17) | (x << 1) | p
 
 
 def _sort_ties(events: Events) -> None:

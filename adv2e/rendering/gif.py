@@ -1,5 +1,7 @@
 """Animated GIF, written picture by picture with one palette for all.
 
+Its codes come from a compiled loop: of all that draws, this alone imports Numba.
+
 References
 ----------
 .. [1] CompuServe, "Graphics Interchange Format, Version 89a", 1990.

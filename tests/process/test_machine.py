@@ -41,12 +41,12 @@ def test_what_is_told(error, begin):
 @pytest.mark.parametrize("suffix", [".txt", ".h5", ".npz", ".zip"])
 @pytest.mark.parametrize("error", [RuntimeError("can't start new thread"), OSError("bad_alloc")])
 def test_readers_leave_it_as_it_is(tmp_path, monkeypatch, suffix, error):
-    def fail(*_):
+    def fail(*_, **__):
         raise error
 
     path = tmp_path / f"a{suffix}"
     path.write_text("0.1 1 1 1\n")
-    for name in ("zipfile.ZipFile", "h5py.File", "adv2e.formats.text.reader.gather_lines"):
+    for name in ("zipfile.ZipFile", "h5py.File", "adv2e.formats.text.reader.parse_lines"):
         monkeypatch.setattr(name, fail)
     with pytest.raises(type(error), match=str(error)):
         read_recording(path)

@@ -11,17 +11,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
-from numpy.typing import NDArray
 
-from adv2e.compiled import entry, kernel
 from adv2e.errors import DataError
 from adv2e.formats.builder import RecordingBuilder
 from adv2e.formats.recording import Recording
+from adv2e.formats.text.lines import parse_lines
 from adv2e.sources.times.units import Unit
 from adv2e.ticks import LARGEST_NS, US, check_us
 
@@ -29,118 +27,7 @@ _BLOCK = 1 << 22  # bytes read at once
 _DECIMALS = {"s": 6, "ms": 3, "us": 0, "ns": -3}  # that make a microsecond
 
 _SIZE = re.compile(rb"0{0,9}[1-9][0-9]{0,4}")
-_HOLDS = re.compile(rb"[\x00-\x20]*[^\x00-\x20#]")
 _DECIMAL_TIME = re.compile(rb"^[\x00-\x09\x0b-\x20]*(?!#)[^\x00-\x20.eE]*[.eE]", re.M)
-
-_MALFORMED, _WHOLE, _ROUNDED = -1, 0, 1
-
-
-@kernel
-def _number(data: Any, start: int, stop: int, decimals: int) -> Any:
-    """Return (value times 10**decimals to the nearest, what became of it) of a decimal number.
-
-    What became of it: _MALFORMED, _WHOLE or _ROUNDED.
-    """
-    at = start
-    negative = data[at] == 45
-    if negative or data[at] == 43:
-        at += 1
-    first = at
-    point = -1
-    digits = 0
-    while at < stop and data[at] != 101 and data[at] != 69:  # e, E
-        if data[at] == 46 and point < 0:
-            point = at
-        elif 48 <= data[at] <= 57:
-            digits += 1
-        else:
-            return 0, _MALFORMED
-        at += 1
-    last = at
-    if digits == 0:
-        return 0, _MALFORMED
-    exponent = 0
-    if at < stop:
-        at += 1
-        below = at < stop and data[at] == 45
-        if at < stop and (below or data[at] == 43):
-            at += 1
-        if at == stop or stop - at > 4:
-            return 0, _MALFORMED
-        while at < stop:
-            if not 48 <= data[at] <= 57:
-                return 0, _MALFORMED
-            exponent = exponent * 10 + int(data[at]) - 48
-            at += 1
-        if below:
-            exponent = -exponent
-    kept = (last if point < 0 else point) - first + exponent + decimals
-    value = 0
-    seen = 0
-    up = False
-    whole = True
-    for k in range(first, last):
-        if k == point:
-            continue
-        digit = int(data[k]) - 48
-        if seen < kept:
-            if value > 922337203685477579:
-                return 0, _MALFORMED
-            value = value * 10 + digit
-        elif digit > 0:
-            whole = False
-            up = up or (seen == kept and digit >= 5)
-        seen += 1
-    while seen < kept and value > 0:
-        if value > 922337203685477579:
-            return 0, _MALFORMED
-        value *= 10
-        seen += 1
-    if up:
-        value += 1
-    return (-value if negative else value), (_WHOLE if whole else _ROUNDED)
-
-
-@entry
-def parse_lines(data: Any, decimals: int, t: Any, x: Any, y: Any, p: Any) -> Any:
-    """Read the lines in `data` into columns; return (events, lines, line that is wrong or 0)."""
-    count = 0
-    line = 0
-    at = 0
-    size = data.shape[0]
-    while at < size:
-        line += 1
-        fields = 0
-        comment = False
-        while at < size and data[at] != 10:
-            if data[at] <= 32:
-                at += 1
-                continue
-            comment = comment or (data[at] == 35 and fields == 0)
-            start = at
-            while at < size and data[at] > 32:
-                at += 1
-            if comment:
-                continue
-            value, became = _number(data, start, at, decimals if fields == 0 else 0)
-            rounded = became == _ROUNDED and (fields > 0 or decimals == 0)
-            if became == _MALFORMED or rounded or fields == 4:
-                return count, line, line
-            if fields == 0:
-                t[count] = value
-            elif fields == 1:
-                x[count] = value
-            elif fields == 2:
-                y[count] = value
-            else:
-                p[count] = value
-            fields += 1
-        at += 1
-        if fields == 4:
-            count += 1
-        elif fields > 0:
-            return count, line, line
-    return count, line, 0
 
 
 def read_text(path: Path, time_unit: str | None = None) -> Recording:
@@ -185,35 +72,25 @@ def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder) -> tuple[
     """
     geometry, whole, unit = None, False, Unit("s")
     before = 0  # lines in earlier blocks
-    for number, block in enumerate(_blocks(file)):
-        data = np.frombuffer(block, np.uint8)
+    for number, read in enumerate(_blocks(file)):
+        block = read
         if number == 0:
-            geometry, begin, before = _header(block)
-            data = data[begin:]
-            whole = not _DECIMAL_TIME.search(block[begin:])
-            t, x, y, *_ = _columns(data, whole, "us" if whole else "s")
+            geometry, begin, before = _header(read)
+            block = read[begin:]
+            whole = not _DECIMAL_TIME.search(block)
+            (t, x, y, _), *_ = parse_lines(block, 0 if whole else 6, exact=whole)
             unit = builder.unit_of_events(t if whole else t / 1e6, x, y, geometry, whole=whole)
-        t, x, y, p, lines, wrong = _columns(data, whole, unit.name)
+        decimals = _DECIMALS[unit.name]
+        columns, lines, wrong = parse_lines(block, decimals, exact=whole and decimals == 0)
         if wrong:
-            raise _malformed(data.tobytes(), label, before, wrong)
+            raise _malformed(block, label, before, wrong)
+        t = columns[0]
         late = np.flatnonzero(np.abs(t) > LARGEST_NS // US)
         if late.size:
-            line = before + _line_of(data.tobytes(), int(late[0]))
-            check_us(t[late[:1]], f"{label} line {line}")
-        builder.add(t, x, y, p)
-        before += lines
+            check_us(t[late[:1]], f"{label} line {before + lines[late[0]]}")
+        builder.add(*columns)
+        before += block.count(b"\n")
     return geometry
-
-
-def _columns(data: NDArray[np.uint8], whole: bool, unit: str) -> tuple[Any, ...]:
-    """Return time [us], x, y and polarity of each line, lines read, and the wrong one or 0."""
-    rows = int(np.count_nonzero(data == 10)) + 1
-    columns = [np.empty(rows, np.int64) for _ in range(4)]
-    # digits behind the point of microseconds are rounded, where some were expected
-    parts = 1000 if unit == "us" and not whole else 1
-    count, lines, wrong = parse_lines(data, 3 if parts > 1 else _DECIMALS[unit], *columns)
-    t, x, y, p = (column[:count] for column in columns)
-    return (t + parts // 2) // parts, x, y, p, lines, wrong
 
 
 def _blocks(file: IO[bytes]) -> Iterator[bytes]:
@@ -243,12 +120,6 @@ def _header(block: bytes) -> tuple[tuple[int, int] | None, int, int]:
                 return (int(fields[0]), int(fields[1])), at, lines
             break
     return None, begin, 0
-
-
-def _line_of(data: bytes, event: int) -> int:
-    """Return the number of the line, from 1, that holds an event, from 0."""
-    lines = (n for n, line in enumerate(data.split(b"\n"), 1) if _HOLDS.match(line))
-    return next(islice(lines, event, None))
 
 
 def _malformed(data: bytes, label: str, before: int, wrong: int) -> DataError:

@@ -1,0 +1,140 @@
+"""Lines of ``time x y polarity``, read digit by digit, all numbers of a block at once."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+_COMMENT = re.compile(rb"^[\x00-\x09\x0b-\x20]*#[^\n]*", re.M)
+_LONGEST = 1000  # digits of a number
+_MOST = 2**63 // 10 - 1  # that one more digit leaves within 64 bits
+_TENS = 10 ** np.arange(19)
+
+Numbers = NDArray[np.int64]
+
+
+def parse_lines(block: bytes, decimals: int, *, exact: bool) -> tuple[Numbers, Numbers, int]:
+    """Read lines of ``time x y polarity``.
+
+    Parameters
+    ----------
+    block : bytes
+        Whole lines.
+    decimals : int
+        Times are multiplied by 10**decimals, and rounded to the nearest, halves away from zero.
+    exact : bool
+        A time that would have to be rounded is wrong, as a column, row or polarity always is.
+
+    Returns
+    -------
+    columns : array of int64, (4, events)
+        Time, x, y and polarity.
+    lines : array of int64, (events,)
+        Which line each stands in, from 1.
+    wrong : int
+        The first line that is wrong, from 1, before which the columns end; 0 if there is none.
+    """
+    if b"#" in block:
+        block = _COMMENT.sub(b"", block)
+    data = np.frombuffer(b"\n" + block + b"\n", np.uint8)
+    filled = data > 32
+    edges = np.flatnonzero(filled[1:] != filled[:-1]) + 1
+    begin, end = edges[::2], edges[1::2]
+    fields = np.diff(np.searchsorted(begin, np.flatnonzero(data == 10)))
+    lines = np.flatnonzero(fields) + 1
+    uneven = lines[fields[lines - 1] != 4]
+    wrong = int(uneven[0]) if uneven.size else 0
+    if wrong:
+        lines = lines[lines < wrong]
+    begin, end = (edge[: 4 * lines.size].reshape(-1, 4) for edge in (begin, end))
+    marks = np.flatnonzero(filled & (data - np.uint8(48) > 9))
+    columns = np.empty((4, lines.size), np.int64)
+    sound = np.empty((2, lines.size), np.bool_)
+    columns[0], sound[0] = _numbers(data, marks, begin[:, 0], end[:, 0], decimals, exact)
+    values, good = _numbers(data, marks, begin[:, 1:].ravel(), end[:, 1:].ravel(), 0, True)
+    columns[1:], sound[1] = values.reshape(-1, 3).T, good.reshape(-1, 3).all(axis=1)
+    bad = np.flatnonzero(~sound.all(axis=0))
+    if bad.size:
+        wrong = int(lines[bad[0]])
+        return columns[:, : bad[0]], lines[: bad[0]], wrong
+    return columns, lines, wrong
+
+
+def _numbers(
+    data: NDArray[np.uint8],
+    marks: Numbers,
+    begin: Numbers,
+    end: Numbers,
+    decimals: int,
+    exact: bool,
+) -> tuple[Numbers, NDArray[np.bool_]]:
+    """Return the numbers in data[begin:end] times 10**decimals, and which are sound.
+
+    `marks` is where something other than digits stands, in all fields.
+    """
+    owner = np.searchsorted(begin, marks, side="right") - 1
+    mine = (owner >= 0) & (marks < end[owner]) if begin.size else np.zeros(marks.size, np.bool_)
+    marks, owner = marks[mine], owner[mine]
+    mark, before = data[marks], data[marks - 1]
+    is_sign, is_point, is_e = (mark == 43) | (mark == 45), mark == 46, mark | 32 == 101
+    leads = is_sign & (marks == begin[owner])
+    good = np.ones(begin.size, np.bool_)
+    good[owner[~(leads | is_point | is_e | (is_sign & (before | 32 == 101)))]] = False
+    first, point, e = begin.copy(), end.copy(), end.copy()
+    first[owner[leads]] += 1
+    for place, which in ((point, is_point), (e, is_e)):
+        owners = owner[which]
+        place[owners] = marks[which]
+        good[owners[1:][owners[1:] == owners[:-1]]] = False  # two in one field
+    good &= (point < e) | (point == end)
+    point = np.minimum(point, e)
+    digits = e - first - (point < e)
+    good &= (digits > 0) & (digits <= _LONGEST)
+
+    kept = point - first + decimals
+    powers = np.flatnonzero(good & (e < end))
+    if powers.size:
+        at = e[powers] + 1
+        below = data[at] == 45
+        at += below | (data[at] == 43)
+        length = end[powers] - at
+        good[powers] &= (length > 0) & (length <= 4)
+        power = _whole_numbers(data, at, np.minimum(length, 4), end[powers])
+        kept[powers] += np.where(below, -power, power)
+
+    used = np.where(good, np.clip(kept, 0, digits), 0)
+    values = _whole_numbers(data, first, used, point)
+    rest = np.flatnonzero(good & (used < digits))
+    if rest.size:
+        place = first[rest] + used[rest]
+        place += place >= point[rest]
+        if exact:
+            nonzero = np.cumsum((data > 48) & (data <= 57))
+            good[rest] = nonzero[e[rest] - 1] == nonzero[place - 1]
+        else:
+            values[rest] += (data[place] >= 53) & (kept[rest] >= 0)
+    zeros = np.clip(kept - used, 0, 18)
+    if zeros.any():
+        good &= (values <= (2**63 - 1) // _TENS[zeros]) & ((kept - used <= 18) | (values == 0))
+        values *= _TENS[zeros]
+    good &= values >= 0
+    return np.where(data[begin] == 45, -values, values), good
+
+
+def _whole_numbers(
+    data: NDArray[np.uint8], first: Numbers, digits: Numbers, point: Numbers
+) -> Numbers:
+    """Return the numbers of so many digits from `first`, over the point; -1: beyond 64 bits."""
+    values = np.zeros(first.size, np.int64)
+    some = np.arange(first.size)
+    for k in range(int(digits.max(initial=0))):
+        some = some[digits[some] > k]
+        place = first[some] + k
+        place += place >= point[some]
+        value = values[some]
+        if k >= 18:
+            value[(value > _MOST) | (value < 0)] = -1
+        values[some] = value * 10 + (data[place] - np.uint8(48))
+    return values
