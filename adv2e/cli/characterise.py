@@ -91,10 +91,10 @@ def command(
     """
     from adv2e.diagnosis.tables.characterise import Settings, characterise
     from adv2e.diagnosis.tables.declared import read_declared
-    from adv2e.diagnosis.tables.report import summary, write_reports
     from adv2e.diagnosis.tables.table import read_table
     from adv2e.files.names import shown
-    from adv2e.reports.files import check_folder
+    from adv2e.reports.files import check_folder, write_reports
+    from adv2e.reports.summary import details_text, summary_text
 
     if output is not None:
         check_folder(output, overwrite=overwrite, inputs=[table, *options.files_given()])
@@ -112,6 +112,7 @@ def command(
     if output is not None:
         write_reports(found, output, overwrite=overwrite)
     if log.level >= 0:
-        click.echo(summary(found))
+        click.echo(summary_text(found))
+        click.echo(details_text(found))
         if output is not None:
             click.echo(shown(f"written: {Path(output) / 'report.html'}, report.json, model.yaml"))

@@ -68,9 +68,8 @@ def command(
     from adv2e.diagnosis.data.evidence import read_evidence
     from adv2e.diagnosis.diagnose import diagnose
     from adv2e.diagnosis.fitting.library import names
-    from adv2e.diagnosis.outcome.report import write_reports
     from adv2e.pixel.array import is_compiled
-    from adv2e.reports.files import check_folder
+    from adv2e.reports.files import check_folder, write_reports
     from adv2e.reports.summary import summary_text
 
     check_names(without, names(config))

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 from adv2e.errors import OutputError
 from adv2e.files.staging import Staging, nearest_there
 from adv2e.reports.model_file import model_text
+from adv2e.reports.page import page
 from adv2e.reports.record import record_text
 from adv2e.reports.result import Diagnosis
-from adv2e.reports.wording import Wording
 
 NAMES = ("report.html", "report.json", "model.yaml")
 
@@ -38,25 +38,10 @@ def check_folder(
         raise OutputError(f"{folder}: cannot be made in {above}: {error.strerror}") from None
 
 
-def write_reports(
-    diagnosis: Diagnosis,
-    folder: str | Path,
-    page: Callable[[Diagnosis], str],
-    wording: Wording,
-    *,
-    overwrite: bool = False,
-) -> None:
+def write_reports(diagnosis: Diagnosis, folder: str | Path, *, overwrite: bool = False) -> None:
     """Write ``report.html``, ``report.json`` and ``model.yaml`` into a new `folder`.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    folder : str or Path
-    page : callable
-        Makes ``report.html``.
-    wording : Wording
-    overwrite : bool
-        Replace a folder of an earlier report.
+    With `overwrite`, the folder of an earlier report is replaced.
 
     Raises
     ------
@@ -64,7 +49,7 @@ def write_reports(
         `folder` exists and is not to be replaced, holds other things than a report, or cannot be
         written.
     """
-    texts = (page(diagnosis), record_text(diagnosis, wording), model_text(diagnosis, wording))
+    texts = (page(diagnosis), record_text(diagnosis), model_text(diagnosis))
     try:
         with Staging(overwrite) as staging:
             unfinished = staging.folder(Path(folder), _foreign)

@@ -17,7 +17,6 @@ from adv2e.reports.quantities import (
 )
 from adv2e.reports.result import Diagnosis, Finding, Interval, ListInterval, Own
 from adv2e.reports.tables import Column, table
-from adv2e.reports.wording import Wording
 
 MARKS = {
     "consistent": ("✓", "Consistent", "nothing is missing from the declared model"),
@@ -41,7 +40,7 @@ def verdict(diagnosis: Diagnosis) -> Markup:
     )
 
 
-def errors(diagnosis: Diagnosis, wording: Wording) -> Markup:
+def errors(diagnosis: Diagnosis) -> Markup:
     """Return the errors before and after, beside the floor, as a picture and a table."""
     names = ("measure", "before", "after", "floor")
     columns = [Column(name, number=name != "measure") for name in names]
@@ -55,21 +54,14 @@ def errors(diagnosis: Diagnosis, wording: Wording) -> Markup:
         given = any(row.before.interval or row.after.interval for row in diagnosis.errors)
         caption = f"Errors on held-out data{', with 95 % intervals' if given else ''}"
         parts.append(table(caption, columns, rows))
-    else:
-        parts.append(tag("p", "No error was measured."))
-    before, after = diagnosis.global_p_before, diagnosis.global_p_after
-    parts.append(
-        tag(
-            "p",
-            "Probability of a residual as large if nothing were missing: ",
-            tag("strong", f"p {probability_text(before)}"),
-            " before, ",
-            tag("strong", f"p {probability_text(after)}"),
-            " after.",
-        )
+    before, after = (
+        tag("strong", f"p {probability_text(p)}")
+        for p in (diagnosis.global_p_before, diagnosis.global_p_after)
     )
-    explained = f"Before: the declared model. After: the model found. Floor: {wording.floor}."
-    parts.append(tag("p", explained, class_="note"))
+    lead = "Probability of a residual as large if nothing were missing: "
+    parts.append(tag("p", lead, before, " before, ", after, " after."))
+    roles = "Before: the declared model. After: the model found. Floor: "
+    parts.append(tag("p", f"{roles}{diagnosis.wording.floor}.", class_="note"))
     return join(*parts)
 
 
@@ -114,7 +106,7 @@ def _cell(value: Any, interval: Interval | ListInterval | None = None) -> Markup
 def nuisances(values: Mapping[str, Any]) -> Markup:
     """Return the keys that were fitted because nothing was declared of them."""
     if not values:
-        return tag("p", "None was fitted.")
+        return Markup()
     columns = [Column("key"), Column("value", number=True), Column("unit"), Column("meaning")]
     rows = [
         (tag("code", path), _cell(value), unit_text(unit_of(path)), meaning_of(path))
@@ -125,7 +117,7 @@ def nuisances(values: Mapping[str, Any]) -> Markup:
 
 def notes(texts: Sequence[str]) -> Markup:
     """Return what the reader should know besides."""
-    return tag("ul", *(tag("li", text) for text in texts)) if texts else tag("p", "None.")
+    return tag("ul", *(tag("li", text) for text in texts)) if texts else Markup()
 
 
 def facts(given: Mapping[str, str]) -> Markup:

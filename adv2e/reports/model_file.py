@@ -12,22 +12,22 @@ from adv2e.reports.keys import unit_of
 from adv2e.reports.markup import plain
 from adv2e.reports.quantities import interval_text, native
 from adv2e.reports.result import Diagnosis, Own
-from adv2e.reports.wording import Wording
 
 _WIDTH = 100
 
 
-def model_text(diagnosis: Diagnosis, wording: Wording) -> str:
+def model_text(diagnosis: Diagnosis) -> str:
     """Return the configuration found as YAML that ``adv2e convert -c`` takes.
 
     Keys that were added, and nuisances, say so; every key that has a unit names it.
     """
     origins = _origins(diagnosis)
     lines = list(_lines(native(diagnosis.model), "", 0, _Notes(origins, diagnosis.own)))
-    return "\n".join([*_head(diagnosis, wording), "", *(lines or ["{}"]), ""])
+    return "\n".join([*_head(diagnosis), "", *(lines or ["{}"]), ""])
 
 
-def _head(diagnosis: Diagnosis, wording: Wording) -> list[str]:
+def _head(diagnosis: Diagnosis) -> list[str]:
+    wording = diagnosis.wording
     texts = [
         f"Model found by {wording.command} in {diagnosis.recording},"
         f" on top of {diagnosis.declared}: {diagnosis.verdict}.",

@@ -8,23 +8,22 @@ from typing import Any
 
 from adv2e.reports.quantities import native
 from adv2e.reports.result import Diagnosis, Estimate
-from adv2e.reports.wording import Wording
 
 
-def record(diagnosis: Diagnosis, wording: Wording) -> dict[str, Any]:
+def record(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the content of ``report.json``.
 
     The keys up to ``signatures`` are what programs may rely on; those after it hold the rest of
     what the page shows.  Numbers are finite, or None.
     """
-    content = {**_fixed(diagnosis), **_further(diagnosis, wording)}
+    content = {**_fixed(diagnosis), **_further(diagnosis)}
     finite: dict[str, Any] = _finite(native(content))
     return finite
 
 
-def record_text(diagnosis: Diagnosis, wording: Wording) -> str:
+def record_text(diagnosis: Diagnosis) -> str:
     """Return ``report.json`` as text."""
-    return json.dumps(record(diagnosis, wording), indent=2, allow_nan=False) + "\n"
+    return json.dumps(record(diagnosis), indent=2, allow_nan=False) + "\n"
 
 
 def _fixed(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -50,10 +49,10 @@ def _fixed(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _further(diagnosis: Diagnosis, wording: Wording) -> dict[str, Any]:
+def _further(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "sentence": diagnosis.sentence,
-        wording.subject: diagnosis.recording,
+        diagnosis.wording.subject: diagnosis.recording,
         "declared": diagnosis.declared,
         "errors": [
             {

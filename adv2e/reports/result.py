@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.parameters import Parameter
+from adv2e.reports.wording import OF_RECORDINGS, Wording
 
 Verdict = Literal["consistent", "explained", "partly_explained", "not_identifiable", "unexplained"]
 
@@ -225,6 +226,8 @@ class Diagnosis:
         Effects of the user's own that competed.
     input_checks : list of str
         Those of the notes that are on the recording itself, such as what may be wrong with it.
+    wording : Wording
+        What the reports call things.
     """
 
     verdict: Verdict
@@ -249,3 +252,4 @@ class Diagnosis:
     facts: Mapping[str, str]
     own: Own = NO_OWN
     input_checks: Sequence[str] = ()
+    wording: Wording = OF_RECORDINGS

@@ -1,4 +1,4 @@
-"""A diagnosis in a few lines, for the terminal."""
+"""A diagnosis for the terminal: in a few lines, and all that was tried."""
 
 from __future__ import annotations
 
@@ -39,6 +39,18 @@ def summary_text(diagnosis: Diagnosis) -> str:
     for line in diagnosis.input_checks[:_MOST_CHECKS]:
         lines += _wrapped(f"note: {line}", 2)
     return "\n".join(lines)
+
+
+def details_text(diagnosis: Diagnosis) -> str:
+    """Return what else was found: how data were held out, nuisances, what was rejected, notes."""
+    lines = [f"held out: {diagnosis.split}"]
+    lines += [
+        f"nuisance {key} = {value_text(value)} {unit_of(key)}".rstrip()
+        for key, value in diagnosis.nuisances.items()
+    ]
+    lines += [f"rejected {one.name}: {one.reason}" for one in diagnosis.rejected]
+    lines += [f"note: {note}" for note in diagnosis.notes]
+    return "\n".join(map(plain, lines))
 
 
 def _error(row: ErrorRow) -> list[str]:

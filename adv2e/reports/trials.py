@@ -15,7 +15,7 @@ from adv2e.reports.tables import SHOWN, Column, table
 def alternatives(diagnosis: Diagnosis) -> Markup:
     """Return which effects explain the residual as well, and what would separate them."""
     if not diagnosis.alternatives:
-        return tag("p", "None.")
+        return Markup()
     names = [finding.name for finding in diagnosis.effects] + diagnosis.alternatives
     paths = _paths(diagnosis)
     rows = []
@@ -45,7 +45,7 @@ def _paths(diagnosis: Diagnosis) -> dict[str, list[str]]:
 def rejected(given: Sequence[Rejected], own: Own = NO_OWN) -> Markup:
     """Return what was tried and not added, and why."""
     if not given:
-        return tag("p", "Nothing else was tried.")
+        return Markup()
     columns = [Column("effect"), Column("why not"), Column("tried with")]
     caption = "Effects tried and not added"
     judged = any(one.held_out is not None for one in given)

@@ -31,3 +31,22 @@ class Wording:
     floor: str
     bands: str
     others: str
+
+
+OF_RECORDINGS = Wording(
+    title="Diagnosis of",
+    command="adv2e diagnose",
+    subject="recording",
+    floor="independent draws of the model found against each other: as near as it comes to itself",
+    bands="the middle 95 % of simulations",
+    others="as declared",
+)
+
+OF_TABLES = Wording(
+    title="Characterisation of",
+    command="adv2e characterise",
+    subject="table",
+    floor="the standard errors of the table's rows",
+    bands="the middle 95 % of fits to tables drawn from the model",
+    others="as declared; what was not is off, or its default where a table cannot show it",
+)

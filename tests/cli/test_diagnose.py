@@ -15,10 +15,10 @@ from adv2e.diagnosis import diagnose as whole
 from adv2e.diagnosis import prepare
 from adv2e.diagnosis.data import evidence
 from adv2e.diagnosis.fitting.library import names
-from adv2e.diagnosis.outcome import conclusion, report
+from adv2e.diagnosis.outcome import conclusion
 from adv2e.diagnosis.selection import reference, shortlist
 from adv2e.formats.writing import open_sink
-from adv2e.reports import summary
+from adv2e.reports import files, summary
 
 FILES = ["model.yaml", "report.html", "report.json"]
 TRIED = ("refractory", "leak", "event_loss")
@@ -242,7 +242,7 @@ def made_up(monkeypatch, tmp_path):
 
     monkeypatch.setattr(evidence, "read_evidence", read)
     monkeypatch.setattr(whole, "diagnose", diagnose)
-    monkeypatch.setattr(report, "write_reports", write)
+    monkeypatch.setattr(files, "write_reports", write)
     monkeypatch.setattr(summary, "summary_text", lambda found: "\n".join(SUMMARY))
     monkeypatch.chdir(tmp_path)
     return calls

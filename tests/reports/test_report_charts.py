@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from made_up_diagnosis import everything, strange
 
-from adv2e.diagnosis.outcome.sensor_map import (
-    colour_bar,
-    colours,
-    map_image,
-)
 from adv2e.reports.charts import paths
 from adv2e.reports.charts.axes import Axis, axis_over, drawable
 from adv2e.reports.charts.curve_chart import curve_chart
 from adv2e.reports.charts.error_chart import error_chart
+from adv2e.reports.charts.sensor_map import (
+    colour_bar,
+    colours,
+    map_image,
+)
 from adv2e.reports.result import Band, Curve, ErrorRow, Estimate
 
 NAN = np.nan

@@ -11,11 +11,9 @@ from made_up_diagnosis import MODEL, everything, nothing, strange
 
 from adv2e.config import from_dict, load_config
 from adv2e.config.yaml12 import Origin, parse
-from adv2e.diagnosis.outcome.report import WORDING, write_reports
-from adv2e.diagnosis.tables import report as characterisation_report
 from adv2e.errors import OutputError
 from adv2e.reports import files
-from adv2e.reports.files import check_folder
+from adv2e.reports.files import check_folder, write_reports
 from adv2e.reports.model_file import model_text
 from adv2e.reports.quantities import native
 from adv2e.reports.result import ErrorRow, Estimate, Finding
@@ -28,10 +26,9 @@ def listing(folder):
     return sorted(entry.name for entry in folder.iterdir())
 
 
-@pytest.mark.parametrize("write", [write_reports, characterisation_report.write_reports])
 @pytest.mark.parametrize("make", [everything, nothing, strange])
-def test_three_files_are_written(make, write, tmp_path):
-    write(make(), tmp_path / "new" / "found")
+def test_three_files_are_written(make, tmp_path):
+    write_reports(make(), tmp_path / "new" / "found")
     assert listing(tmp_path / "new" / "found") == NAMES
     assert listing(tmp_path) == ["new"]
 
@@ -69,7 +66,7 @@ def test_a_free_name_is_left_untouched_by_the_check(tmp_path):
 
 
 def test_what_fails_leaves_nothing(tmp_path, monkeypatch):
-    def full_disk(diagnosis, wording):
+    def full_disk(diagnosis):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(files, "model_text", full_disk)
@@ -118,16 +115,14 @@ def test_hostile_names_stay_in_comments(tmp_path):
 
 
 def test_the_model_says_where_its_values_are_from():
-    lines = {
-        line.split(":")[0].strip(): line for line in model_text(everything(), WORDING).splitlines()
-    }
+    lines = {line.split(":")[0].strip(): line for line in model_text(everything()).splitlines()}
     assert lines["period_us"].endswith("# [us] added: refractory, 95 % interval 5,500 to 6,500")
     assert lines["cutoff_hz"].endswith("# [Hz] added: low_pass, 95 % interval 172 to 204")
     assert lines['"on"'].endswith('"on": 0.21  # [ln] nuisance')
     assert lines['"off"'].endswith('"off": 0.2  # [ln]')
     assert lines["encoding"].endswith("# nuisance")
     assert lines["source_follower"].strip() == "source_follower: null"
-    assert all(len(line) <= 100 for line in model_text(everything(), WORDING).splitlines())
+    assert all(len(line) <= 100 for line in model_text(everything()).splitlines())
 
 
 _SCALARS = (
@@ -154,7 +149,7 @@ _KEYS = st.text(max_size=20) | st.sampled_from(["on", "off", "yes", "n", "null",
     )
 )
 def test_readers_of_either_version_of_yaml_read_what_was_written(model):
-    text = model_text(replace(everything(), model=model), WORDING)
+    text = model_text(replace(everything(), model=model))
     assert yaml.safe_load(text) == model
     assert _content(parse(text, Origin("model.yaml"))) == model
 
@@ -181,7 +176,7 @@ def test_a_model_that_another_program_wrote_back_is_the_same(tmp_path):
 
 def test_lists_are_written_in_one_line():
     model = {"frames": {"shift_px": [0.5, -0.25]}}
-    text = model_text(replace(everything(), model=model), WORDING)
+    text = model_text(replace(everything(), model=model))
     assert yaml.safe_load(text) == model
     assert "shift_px: [0.5, -0.25]" in text
 

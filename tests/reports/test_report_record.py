@@ -2,13 +2,13 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from made_up_diagnosis import HOSTILE, everything, nothing, strange
 
-from adv2e.diagnosis.outcome.report import WORDING
-from adv2e.diagnosis.tables import report as characterisation_report
 from adv2e.reports.record import record, record_text
+from adv2e.reports.wording import OF_RECORDINGS, OF_TABLES
 
 VERDICTS = ("consistent", "explained", "partly_explained", "not_identifiable", "unexplained")
 
@@ -60,17 +60,17 @@ def check(report):
         assert is_number(one["z_after"])
 
 
-@pytest.mark.parametrize("wording", [WORDING, characterisation_report.WORDING])
+@pytest.mark.parametrize("wording", [OF_RECORDINGS, OF_TABLES])
 @pytest.mark.parametrize("make", [everything, nothing, strange])
 def test_the_record_keeps_the_contract(make, wording):
     def no_constant(name):
         raise AssertionError(f"{name} is no JSON")
 
-    check(json.loads(record_text(make(), wording), parse_constant=no_constant))
+    check(json.loads(record_text(replace(make(), wording=wording)), parse_constant=no_constant))
 
 
 def test_the_record_says_what_was_found():
-    report = json.loads(record_text(everything(), WORDING))
+    report = json.loads(record_text(everything()))
     assert report["effects"][0] == {
         "name": "refractory",
         "parameters": {"pixel.refractory.period_us": 6012.34},
@@ -93,13 +93,13 @@ def test_the_record_says_what_was_found():
     assert report["masked"][1] == {"what": "hot pixels", "share": 0.0006}
     assert report["trials"][0]["held_out"] == 0.998
     assert report["recording"] == "office_zigzag.zip"
-    table = record(everything(), characterisation_report.WORDING)
+    table = record(replace(everything(), wording=OF_TABLES))
     assert table.pop("table") == report.pop("recording")
     assert table == report
 
 
 def test_an_empty_diagnosis_has_no_error():
-    report = record(nothing(), WORDING)
+    report = record(nothing())
     assert report["error"] == {
         "name": None, "before": None, "after": None, "floor": None, "held_out": False,
     }  # fmt: skip
@@ -107,7 +107,7 @@ def test_an_empty_diagnosis_has_no_error():
 
 
 def test_odd_numbers_are_null_and_odd_texts_survive():
-    report = json.loads(record_text(strange(), WORDING))
+    report = json.loads(record_text(strange()))
     assert report["error"] == {
         "name": HOSTILE, "before": 0.0, "after": None, "floor": None, "held_out": True,
     }  # fmt: skip

@@ -32,6 +32,7 @@ from adv2e.reports.result import (
     Rejected,
     Verdict,
 )
+from adv2e.reports.wording import OF_TABLES
 
 Array = NDArray[np.float64]
 
@@ -128,6 +129,7 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
             "seed": str(settings.seed),
             "adv2e": __version__,
         },
+        wording=OF_TABLES,
     )
 
 

@@ -1,4 +1,4 @@
-"""Sections of the page that only recordings have: maps, signatures, what was left out."""
+"""Sections of the page on the residual of recordings: maps, signatures, what was left out."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adv2e.diagnosis.outcome.sensor_map import CLIP_SD, Map, colour_bar, map_image
+from adv2e.reports.charts.sensor_map import CLIP_SD, Map, colour_bar, map_image
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.quantities import NOTHING, number_text, percent_text, short_text, unit_text
-from adv2e.reports.result import Diagnosis, ResidualMap, Signature
+from adv2e.reports.result import Detectable, Diagnosis, ResidualMap, Signature
 from adv2e.reports.standing_out import LARGE_Z, standing_out
 from adv2e.reports.tables import SHOWN, Column, table
 
@@ -47,6 +47,8 @@ def _map(title: str, model: str, values: Map) -> Markup:
 
 def groups(given: Sequence[Signature]) -> Markup:
     """Return what stands out, by group of statistics: what an effect that is missing has to do."""
+    if not given:
+        return Markup()
     found = standing_out(given)
     if not found:
         return tag("p", f"No statistic is {LARGE_Z:g} deviations or more off.")
@@ -75,7 +77,7 @@ def groups(given: Sequence[Signature]) -> Markup:
 def signatures(given: Sequence[Signature]) -> Markup:
     """Return the summary statistics, the most telling ones first."""
     if not given:
-        return tag("p", "None was measured.")
+        return Markup()
     columns = [Column("signature"), Column("group")] + [
         Column(name, number=True) for name in ("measured", "before", "after", "z before", "z after")
     ]
@@ -119,15 +121,12 @@ def _z(z: float) -> Markup | str:
     return tag("strong", tag("span", sign, aria_hidden="true"), f" {text}", class_="large")
 
 
-def detectable(diagnosis: Diagnosis) -> Markup:
+def detectable(given: Sequence[Detectable]) -> Markup:
     """Return how small an effect could have been to be seen."""
-    if not diagnosis.detectable:
-        return tag("p", "This was not determined.")
+    if not given:
+        return Markup()
     columns = [Column("effect"), Column("key"), Column("size", number=True), Column("unit")]
-    rows = [
-        (one.name, tag("code", one.key), _size(one.size), unit_text(one.unit))
-        for one in diagnosis.detectable
-    ]
+    rows = [(one.name, tag("code", one.key), _size(one.size), unit_text(one.unit)) for one in given]
     caption = (
         "Values of a key from which on an effect would have been seen about 8 times in 10;"
         f" {NOTHING}: none within the physical range, or not told by as many simulations"
@@ -146,6 +145,4 @@ def data(diagnosis: Diagnosis) -> Markup:
         columns = [Column("set aside"), Column("share of events", number=True)]
         rows = [(one.what, percent_text(one.share)) for one in diagnosis.masked]
         parts.append(table("Data that was not used", columns, rows))
-    else:
-        parts.append(tag("p", "Nothing was set aside."))
     return join(*parts)
