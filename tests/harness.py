@@ -21,7 +21,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
-from adv2e.kernel.workspace import S_HOLD, S_LEAK_FACTOR, S_REFERENCE, S_X
+from adv2e.kernel import per_pixel
 from adv2e.pixel.array import PixelArray
 
 QUIET = {"refractory": None, "leak": None, "shot_noise": None}
@@ -86,14 +86,14 @@ def first_draws(array, factors=None):
     `factors` : per pixel, leak speeds of the cycles, of which this one's is put in.
     """
     state = array.state
-    hold = state[S_HOLD]
+    hold = state[per_pixel.HOLD]
     release = np.where(hold < 0.0, -np.inf, (hold + array.origin_us) * 1e-6)
     if factors is not None and array.circuit.leak_jitter > 0:
         factors = [
             np.append(now, later[1:])
-            for now, later in zip(state[S_LEAK_FACTOR], factors, strict=True)
+            for now, later in zip(state[per_pixel.LEAK_FACTOR], factors, strict=True)
         ]
-    offset = state[S_REFERENCE] - state[S_X]
+    offset = state[per_pixel.REFERENCE] - state[per_pixel.X]
     return Draws(reference_offset=offset, first_release=release, leak_factors=factors)
 
 

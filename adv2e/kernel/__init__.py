@@ -11,14 +11,18 @@ Two solvers, each a strip of pixels at a time through all intervals:
 
 and what they share:
 
-``workspace``       rows of the state and the small records that the compiled functions share
-``comparator``      ties, noise events, packed events
+``circuit``         the record of the circuit; ``per_pixel`` what is kept of each pixel
+``first_state``     what differs from pixel to pixel before the first frame
+``comparator``      when a level counts as reached, and how an event fires
+``leak``, ``noise``  what leak takes from the reference; events that come by themselves
 ``quadrature``      Gauss rules for the lag at the end of an interval, or of a dead time
 ``special``         exponential and logarithm that vectorise and give the same bits everywhere
 ``rng``             random numbers as functions of seed, effect, pixel and draw
-``tile``            frames and scratch memory; ``work_queue`` hands strips out to threads
+``frames``          frames, and the light of a strip; ``work_queue`` hands strips out to threads
 ``event_buffer``    memory for events, which grows while they are made
 ``packing``         packed events into order
+
+Beside the pixel, ``frame_effects`` and ``arbiter`` hold the loops of effects on frames and events.
 
 Where the time goes
 -------------------

@@ -6,20 +6,39 @@ once a call, and only the frames stream through memory.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.compiled import entry, kernel
-from adv2e.kernel import screen, special, static_pixels
+from adv2e.kernel import per_pixel, screen, special, static_pixels
+from adv2e.kernel.circuit import EXACT, Circuit
 from adv2e.kernel.event_buffer import tell_where, with_room
-from adv2e.kernel.lanes import batch, exchange
+from adv2e.kernel.frames import load
+from adv2e.kernel.lanes import batch, exchange, rows
 from adv2e.kernel.leak import fill_falls
 from adv2e.kernel.quadrature import Rule
-from adv2e.kernel.tile import load
-from adv2e.kernel.work_queue import claim
-from adv2e.kernel.workspace import EXACT, S_LAG, S_REFERENCE, S_X, STRIP, Circuit
+from adv2e.kernel.work_queue import STRIP, claim
 
 _f = np.float32
 _BLOCK = 256
+
+
+class Scratch(NamedTuple):
+    """Memory of whoever works on a tile."""
+
+    strip: NDArray[np.float32]  # of the screen
+    lanes: NDArray[np.float64]
+    pixels: NDArray[np.int64]  # numbers of the lanes' pixels
+    falls: NDArray[np.float64]
+    means: NDArray[np.float64]
+
+
+def scratch() -> Scratch:
+    """Return fresh memory."""
+    pixels = np.zeros(STRIP + rows.WIDTH, np.int64)
+    return Scratch(screen.scratch(), rows.scratch(), pixels, np.zeros(STRIP), np.zeros(STRIP))
 
 
 def covers(circuit: Circuit) -> bool:
@@ -60,10 +79,10 @@ def _open_strip(lo, count, start, circuit, state, strip):
     """Rows of a strip at the start of a call, its light being in LIGHT_1."""
     for k in range(count):
         strip[screen.LIGHT_0 + k] = strip[screen.LIGHT_1 + k]
-        strip[screen.LAG_0 + k] = state[S_LAG, lo + k]
+        strip[screen.LAG_0 + k] = state[per_pixel.LAG, lo + k]
     for k in range(count):
         i = lo + k
-        exchange.watch(k, i, state[S_X, i], start, circuit, state, strip)
+        exchange.watch(k, i, state[per_pixel.X, i], start, circuit, state, strip)
         strip[screen.AWAY_0 + k] = strip[screen.AWAY_1 + k]
     # the rest of the last strip must be harmless
     for k in range(count, STRIP):
@@ -81,8 +100,8 @@ def _open_strip(lo, count, start, circuit, state, strip):
 def _close_strip(lo, count, circuit, state, strip):
     """State of a strip at the end of a call."""
     for k in range(count):
-        state[S_LAG, lo + k] = strip[screen.LAG_0 + k]
-        state[S_X, lo + k] = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
+        state[per_pixel.LAG, lo + k] = strip[screen.LAG_0 + k]
+        state[per_pixel.X, lo + k] = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
 
 
 @kernel
@@ -108,7 +127,7 @@ def _leak_strip(lo, count, length, circuit, state, strip, falls, means):
 @kernel
 def _lower_references(lo, count, state, strip, falls):
     """Take the fall from the references of the pixels that are done."""
-    reference = state[S_REFERENCE, lo : lo + count]
+    reference = state[per_pixel.REFERENCE, lo : lo + count]
     for k in range(count):
         fall = falls[k] if strip[screen.HIT + k] == 0.0 else 0.0
         reference[k] -= fall
@@ -127,7 +146,7 @@ def _solve_flagged(
     lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
 ):  # fmt: skip
     """Solve the m pixels whose numbers are in scratch.pixels, in lanes."""
-    strip, pixels, lanes = scratch.rows, scratch.pixels, scratch.lanes
+    strip, pixels, lanes = scratch.strip, scratch.pixels, scratch.lanes
     waiting = exchange.held_first(m, strip, pixels)
     exchange.load(lo, m, ta, length, circuit, state, strip, scratch.falls, pixels, lanes)
     while True:
@@ -148,7 +167,7 @@ def _advance_strip(
     lo, count, start, ta, length, circuit, rule, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
     """Advance one strip over one interval, whose light is in LIGHT_0 and LIGHT_1."""
-    strip, falls = scratch.rows, scratch.falls
+    strip, falls = scratch.strip, scratch.falls
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     if leaks:
         _leak_strip(lo, count, length, circuit, state, strip, falls, scratch.means)
@@ -182,7 +201,7 @@ def _rest_strip(
     b, f, j, m, s = 0, first, 0, 0, 0.0
     while b < count:
         n, b, f, j, m, s = static_pixels.go_through(
-            lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, scratch.rows,
+            lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, scratch.strip,
             scratch.falls, scratch.means, scratch.pixels, keys, times, n,
         )  # fmt: skip
         if b < count:
@@ -196,10 +215,11 @@ def _strip(
     state, scratch, keys, times, n,
 ):  # fmt: skip
     """Advance one strip of the exact circuit over all intervals."""
-    strip = scratch.rows
+    strip = scratch.strip
+    light = strip[screen.LIGHT_1 : screen.LIGHT_1 + count]
     floor = 0.0 if circuit.slope > 0.0 else circuit.floor
     start = starts[0]
-    load(frames, before[0], share[0], lo, count, floor, strip)
+    load(frames, before[0], share[0], lo, floor, light)
     _open_strip(lo, count, start, circuit, state, strip)
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     intervals = starts.shape[0] - 1
@@ -208,7 +228,7 @@ def _strip(
     while f < intervals:
         still = _rests(frames, f, before, share, lo, count)
         if not still:
-            load(frames, before[f + 1], share[f + 1], lo, count, floor, strip)
+            load(frames, before[f + 1], share[f + 1], lo, floor, light)
             still = screen.is_still(strip)
         if still and settled:
             if not resting:

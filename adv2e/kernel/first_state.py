@@ -6,18 +6,12 @@ The equations are those of :mod:`adv2e.effects.pixel.thresholds` and
 
 from __future__ import annotations
 
-import numpy as np
-
 from adv2e.compiled import entry, kernel
 from adv2e.kernel import rng
-from adv2e.kernel.workspace import Array
 
 
 @kernel
-def _fill_normal_levels(
-    seed: np.uint64, stream: int, first: int, mean: float, mismatch: float, floor: float,
-    levels: Array, spare: Array,
-) -> None:  # fmt: skip
+def _fill_normal_levels(seed, stream, first, mean, mismatch, floor, levels, spare):
     rng.uniforms_of_pixels(seed, stream, first, levels, spare)
     for k in range(levels.shape[0]):
         level = mean + mismatch * rng.normal_of(levels[k], spare[k])
@@ -25,10 +19,7 @@ def _fill_normal_levels(
 
 
 @entry
-def fill_levels(
-    lo: int, hi: int, seed: np.uint64, mean_on: float, mean_off: float, mismatch: float,
-    floor: float, on: Array, off: Array, spare: Array,
-) -> None:  # fmt: skip
+def fill_levels(lo, hi, seed, mean_on, mean_off, mismatch, floor, on, off, spare):
     """Draw the thresholds of the pixels lo..hi into `on` and `off`; `spare` is overwritten."""
     if mismatch > 0.0:
         v = spare[lo:hi]
@@ -41,9 +32,7 @@ def fill_levels(
 
 
 @entry
-def fill_random_reference(
-    seed: np.uint64, on: Array, off: Array, x: Array, reference: Array
-) -> None:
+def fill_random_reference(seed, on, off, x, reference):
     """Draw references so that x lies uniformly between the thresholds of each pixel."""
     for i in range(x.shape[0]):
         u = rng.uniforms(seed, rng.INITIAL_REFERENCE, i, 0)[0]

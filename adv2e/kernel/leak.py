@@ -7,23 +7,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from adv2e.compiled import entry, kernel
-from adv2e.kernel import rng
-from adv2e.kernel.workspace import (
-    NEVER,
-    S_BEYOND,
-    S_HOLD,
-    S_HOT_TIME,
-    S_LEAK_DRAW,
-    S_LEAK_FACTOR,
-    S_NOISE,
-    S_ON,
-    S_REFERENCE,
-    Array,
-    Circuit,
-)
+from adv2e.kernel import per_pixel, rng
 
 _MOST = 3.0
 """Largest deviation of a period, in standard deviations."""
@@ -33,12 +18,16 @@ _TRIES = 100
 
 
 @kernel
-def fill_falls(
-    lo: int, count: int, length: float, mean: Array, circuit: Circuit, state: Array, falls: Array
-) -> None:
+def leak_over(length, circuit):
+    """Fall of the reference over `length` us in ON thresholds: constant part, and for each DN."""
+    return circuit.leak * length, circuit.photo_leak * length
+
+
+@kernel
+def fill_falls(lo, count, length, mean, circuit, state, falls):
     """Fall of the reference over an interval of `length` us: pixels lo.., mean light [DN]."""
-    on = state[S_ON, lo : lo + count]
-    constant, per_dn = circuit.leak * length, circuit.photo_leak * length
+    on = state[per_pixel.ON, lo : lo + count]
+    constant, per_dn = leak_over(length, circuit)
     if per_dn > 0.0:
         for k in range(count):
             falls[k] = on[k] * (constant + per_dn * mean[k])
@@ -46,46 +35,46 @@ def fill_falls(
         for k in range(count):
             falls[k] = on[k] * constant
     if circuit.leak_jitter > 0.0:
-        factor = state[S_LEAK_FACTOR, lo : lo + count]
+        factor = state[per_pixel.LEAK_FACTOR, lo : lo + count]
         for k in range(count):
             falls[k] *= factor[k]
 
 
 @kernel
-def _factor(seed: np.uint64, jitter: float, i: int, draw: float) -> float:
+def _factor(seed, jitter, i, draw):
     """Leak speed of one cycle of pixel i, relative to the nominal one."""
     return 1.0 / (1.0 + jitter * _cut(rng.normal(seed, rng.LEAK_PERIOD, i, draw)))
 
 
 @kernel
-def _cut(g: float) -> float:
+def _cut(g):
     return min(max(g, -_MOST), _MOST)
 
 
 @kernel
-def next_leak_factor(i: int, circuit: Circuit, state: Array) -> float:
+def begin_leak_cycle(i, circuit, state):
     """Draw the leak speed of the cycle that now begins."""
-    state[S_LEAK_DRAW, i] += 1
-    factor = _factor(circuit.seed, circuit.leak_jitter, i, state[S_LEAK_DRAW, i])
-    state[S_LEAK_FACTOR, i] = factor
-    return factor
+    state[per_pixel.LEAK_DRAW, i] += 1
+    state[per_pixel.LEAK_FACTOR, i] = _factor(
+        circuit.seed, circuit.leak_jitter, i, state[per_pixel.LEAK_DRAW, i]
+    )
 
 
 @entry
-def fill_first_factors(seed: np.uint64, jitter: float, factors: Array) -> None:
+def fill_first_factors(seed, jitter, factors):
     """Draw the leak speed of every pixel's first cycle."""
     for i in range(factors.shape[0]):
         factors[i] = _factor(seed, jitter, i, 0)
 
 
 @kernel
-def _met(dead: float, noise: float, period: float) -> float:
+def _met(dead, noise, period):
     """Return the mean time that a cycle of this period lasts beside noise of rate `noise` [us]."""
     return dead + (-math.expm1(-noise * period) / noise if noise > 0.0 else period)
 
 
 @kernel
-def _crossed(to_level: float, left: float, noise: float, corner: float, speed: float) -> float:
+def _crossed(to_level, left, noise, corner, speed):
     """Return how often photoreceptor noise was expected to cross the threshold in this cycle.
 
     to_level, left : distance of the threshold [ln] at the start of the cycle and now; speed : of
@@ -97,23 +86,11 @@ def _crossed(to_level: float, left: float, noise: float, corner: float, speed: f
 
 
 @entry
-def fill_running(
-    lo: int, hi: int, circuit: Circuit, start: float, light: Array, level: Array, state: Array
-) -> None:
+def fill_running(lo, hi, circuit, start, light, level, state):
     """Put the pixels lo..hi somewhere in their leak cycles at `start` [us].
 
-    Their references are those right after an event, beside signals at rest.
-
-    Parameters
-    ----------
-    lo, hi : int
-    circuit : Circuit
-    start : float
-    light : (pixels,)
-        What they have seen [DN].
-    level : (pixels,)
-        Factor on the ON threshold.
-    state : (rows, pixels)
+    Their references are those right after an event, beside signals at rest; `light` (pixels,) is
+    what they have seen [DN], `level` (pixels,) the factor on the ON threshold.
     """
     seed, jitter, dead = circuit.seed, circuit.leak_jitter, circuit.dead_time
     for i in range(lo, hi):
@@ -123,7 +100,7 @@ def fill_running(
         fallen, hold = 0.0, -1.0
         if rate > 0.0 and way > 0.0:
             noise = circuit.shot_rate * max(1.0 - circuit.shot_fall * light[i], 0.0)
-            if circuit.hot_rate > 0.0 and state[S_HOT_TIME, i] < NEVER:
+            if circuit.hot_rate > 0.0 and state[per_pixel.HOT_TIME, i] < per_pixel.NEVER:
                 noise += circuit.hot_rate
             longest = way / rate * (1.0 + jitter * _MOST)
             most = _met(dead, noise, longest)
@@ -144,7 +121,7 @@ def fill_running(
                     age = -math.log1p(-noise * age) / noise
                 fallen = way * min(age / period, 1.0) - circuit.overshoot
                 if circuit.noise_rms > 0.0:
-                    on, now = state[S_ON, i], state[S_NOISE, i]
+                    on, now = state[per_pixel.ON, i], state[per_pixel.NOISE, i]
                     corner = circuit.dark + circuit.per_dn * light[i]
                     crossed = _crossed(
                         on * way + now, on * (level[i] - fallen) + now, circuit.noise_rms, corner,
@@ -155,9 +132,9 @@ def fill_running(
                         continue
                 factor = 1.0 / slowness
                 break
-        state[S_REFERENCE, i] -= fallen * state[S_ON, i]
-        state[S_HOLD, i] = hold
+        state[per_pixel.REFERENCE, i] -= fallen * state[per_pixel.ON, i]
+        state[per_pixel.HOLD, i] = hold
         if circuit.overshoot != 0.0:
-            state[S_BEYOND, i] = circuit.overshoot * state[S_ON, i]
+            state[per_pixel.BEYOND, i] = circuit.overshoot * state[per_pixel.ON, i]
         if jitter > 0.0:
-            state[S_LEAK_FACTOR, i] = factor
+            state[per_pixel.LEAK_FACTOR, i] = factor

@@ -7,42 +7,74 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from adv2e.compiled import entry, inlined, kernel
-from adv2e.kernel import rng
-from adv2e.kernel.workspace import (
-    NEVER,
-    S_HOT_DRAW,
-    S_HOT_TIME,
-    S_SHOT_DRAW,
-    S_SHOT_TIME,
-    Array,
-    Circuit,
-)
+from adv2e.kernel import per_pixel, rng
+
+NONE, SHOT, HOT = 0, 1, 2
+"""Kinds of noise events."""
 
 
 @inlined
-def next_candidate_time(i: int, circuit: Circuit, state: Array) -> None:
-    """Move pixel i on to its next candidate."""
-    state[S_SHOT_DRAW, i] += 1
-    wait = rng.exponential(circuit.seed, rng.SHOT_TIME, i, state[S_SHOT_DRAW, i])
-    state[S_SHOT_TIME, i] += wait / circuit.shot_rate
+def _next_candidate(i, circuit, state):
+    state[per_pixel.SHOT_DRAW, i] += 1
+    wait = rng.exponential(circuit.seed, rng.SHOT_TIME, i, state[per_pixel.SHOT_DRAW, i])
+    state[per_pixel.SHOT_TIME, i] += wait / circuit.shot_rate
 
 
 @inlined
-def candidate_polarity(i: int, light: float, circuit: Circuit, state: Array) -> int:
-    """Return what the present candidate of pixel i becomes at this light [DN]: 1, -1, 0 nothing."""
-    u, v = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[S_SHOT_DRAW, i])
-    if u >= 1.0 - circuit.shot_fall * light:
-        return 0
-    return 1 if v < 0.5 else -1
+def _next_hot(i, circuit, state):
+    state[per_pixel.HOT_DRAW, i] += 1
+    wait = rng.exponential(circuit.seed, rng.HOT_TIME, i, state[per_pixel.HOT_DRAW, i])
+    state[per_pixel.HOT_TIME, i] += wait / circuit.hot_rate
+
+
+@kernel
+def next_noise(i, circuit, state):
+    """Kind of the next noise event of pixel i, and when it may come [us]."""
+    kind, t = NONE, per_pixel.NEVER
+    if circuit.shot_rate > 0.0:
+        kind, t = SHOT, state[per_pixel.SHOT_TIME, i]
+    if circuit.hot_rate > 0.0 and state[per_pixel.HOT_TIME, i] < t:
+        kind, t = HOT, state[per_pixel.HOT_TIME, i]
+    return kind, t
+
+
+@inlined
+def noise_within(i, now, t_end, circuit, state):
+    """Kind and time of the next noise event of pixel i in [now, t_end); those before are lost."""
+    if circuit.shot_rate > 0.0:
+        while state[per_pixel.SHOT_TIME, i] < now:
+            _next_candidate(i, circuit, state)
+    if circuit.hot_rate > 0.0:
+        while state[per_pixel.HOT_TIME, i] < now:
+            _next_hot(i, circuit, state)
+    kind, t = next_noise(i, circuit, state)
+    if t >= t_end:
+        kind, t = NONE, t_end
+    return kind, t
+
+
+@inlined
+def take_noise(i, kind, light, circuit, state):
+    """Return the polarity of the present noise event of pixel i, and go on to the next one.
+
+    It is 0 where the light [DN] thins the event out.
+    """
+    polarity = 1
+    if kind == HOT:
+        _next_hot(i, circuit, state)
+    else:
+        u, v = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[per_pixel.SHOT_DRAW, i])
+        if u >= 1.0 - circuit.shot_fall * light:
+            polarity = 0
+        elif v >= 0.5:
+            polarity = -1
+        _next_candidate(i, circuit, state)
+    return polarity
 
 
 @entry
-def fill_first_candidates(
-    lo: int, hi: int, seed: np.uint64, rate: float, start: float, times: Array, draws: Array
-) -> None:
+def fill_first_candidates(lo, hi, seed, rate, start, times, draws):
     """Draw the first candidate time [us] of the pixels lo..hi; rate in events a us.
 
     `draws`, how often each has drawn since, becomes 0.
@@ -54,33 +86,17 @@ def fill_first_candidates(
         spare[k] = 0.0
 
 
-@inlined
-def next_hot_time(i: int, circuit: Circuit, state: Array) -> None:
-    """Move hot pixel i on to its next event."""
-    state[S_HOT_DRAW, i] += 1
-    wait = rng.exponential(circuit.seed, rng.HOT_TIME, i, state[S_HOT_DRAW, i])
-    state[S_HOT_TIME, i] += wait / circuit.hot_rate
-
-
 @entry
-def fill_first_hot_times(
-    seed: np.uint64, fraction: float, rate: float, start: float, times: Array
-) -> None:
+def fill_first_hot_times(seed, fraction, rate, start, times):
     """Choose the hot pixels and draw their first times [us]; the others never fire."""
     for i in range(times.shape[0]):
-        times[i] = NEVER
+        times[i] = per_pixel.NEVER
         if rng.uniforms(seed, rng.HOT_CHOICE, i, 0)[0] < fraction:
             times[i] = start + rng.exponential(seed, rng.HOT_TIME, i, 0) / rate
 
 
 @entry
-def fill_first_noise(seed: np.uint64, rms: float, noise: Array) -> None:
+def fill_first_noise(seed, rms, noise):
     """Draw the noise of every pixel at the start from its stationary distribution."""
     for i in range(noise.shape[0]):
         noise[i] = rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)
-
-
-@kernel
-def fill_normals(seed: np.uint64, first: int, count: int, block: int, normals: Array) -> None:
-    """Draw the normal numbers of four steps in time, (4, count..), for the pixels first.. ."""
-    rng.normals_of_four(seed, rng.PHOTORECEPTOR_STEPS, first, count, block, normals)

@@ -9,12 +9,19 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.compiled import entry, kernel
-from adv2e.kernel.workspace import PIXEL_BITS
+
+PIXEL_BITS = 27
+"""Bits of the flat pixel index in a packed event."""
 
 SLICES = 64
 """Equal parts of a call's time, so that events can be sorted in several threads."""
 
 _PIXEL = (1 << PIXEL_BITS) - 1
+
+
+def pack_limit_us() -> int:
+    """Longest time span of packed events [us]."""
+    return 1 << (63 - PIXEL_BITS - 1)
 
 
 @kernel

@@ -46,7 +46,7 @@ from numpy.typing import NDArray
 from adv2e.compiled import kernel
 from adv2e.kernel import special
 from adv2e.kernel.quadrature import REACH
-from adv2e.kernel.workspace import STRIP
+from adv2e.kernel.work_queue import STRIP
 
 LARGEST_STEP = 0.98
 """Change of log intensity above which a pixel is looked at in any case [ln units]."""

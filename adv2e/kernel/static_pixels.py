@@ -12,18 +12,12 @@ from __future__ import annotations
 import numpy as np
 
 from adv2e.compiled import kernel
-from adv2e.kernel import screen
-from adv2e.kernel.comparator import (
-    SIGNAL_EVENT,
-    TIE,
-    emit,
-    injected_polarity,
-    next_injected,
-    use_up,
-)
-from adv2e.kernel.lanes.exchange import EARLY, log_of, next_noise, watch
-from adv2e.kernel.leak import fill_falls, next_leak_factor
-from adv2e.kernel.workspace import S_HOLD, S_OFF, S_ON, S_REFERENCE, STRIP
+from adv2e.kernel import per_pixel, screen
+from adv2e.kernel.comparator import TIE, fire
+from adv2e.kernel.lanes.exchange import EARLY, log_of, watch
+from adv2e.kernel.leak import fill_falls
+from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
+from adv2e.kernel.work_queue import STRIP
 
 BLOCK = 64
 """Pixels that are looked through together where something is due."""
@@ -78,7 +72,7 @@ def end_rest(lo, count, circuit, state, strip):
     """Row AWAY_0 of a strip that is at rest no longer: leak has gone on."""
     for k in range(count):
         x = log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
-        strip[screen.AWAY_0 + k] = x - state[S_REFERENCE, lo + k]
+        strip[screen.AWAY_0 + k] = x - state[per_pixel.REFERENCE, lo + k]
 
 
 @kernel
@@ -90,7 +84,7 @@ def fall_of_block(i, b, size, length, circuit, state, falls, means):
 @kernel
 def _lower_block(i, b, size, state, falls):
     """Take the falls from the references of a block."""
-    reference, fall = state[S_REFERENCE, i : i + size], falls[b : b + size]
+    reference, fall = state[per_pixel.REFERENCE, i : i + size], falls[b : b + size]
     for k in range(size):
         reference[k] -= fall[k]
 
@@ -98,7 +92,7 @@ def _lower_block(i, b, size, state, falls):
 @kernel
 def _lower_unflagged(i, b, size, state, strip, falls):
     """Take the falls from the references of the pixels of a block that are not looked at."""
-    reference, fall = state[S_REFERENCE, i : i + size], falls[b : b + size]
+    reference, fall = state[per_pixel.REFERENCE, i : i + size], falls[b : b + size]
     for k in range(size):
         reference[k] -= fall[k] if strip[screen.HIT + b + k] == _ZERO else 0.0
 
@@ -140,15 +134,6 @@ def _go_on(b, m, end, strip, index):
 
 
 @kernel
-def _begin_leak_cycle(k, i, length, circuit, state, strip, falls, means):
-    """Draw the leak speed of pixel k of the strip, i of all, from its event on."""
-    next_leak_factor(i, circuit, state)
-    fall_of_block(i, k, 1, 1.0, circuit, state, falls, means)
-    strip[screen.FALL + k] = falls[k]
-    fall_of_block(i, k, 1, length, circuit, state, falls, means)
-
-
-@kernel
 def _solve(
     k, i, s, start, ta, length, t_base, circuit, state, strip, falls, means, keys, times, n
 ):  # fmt: skip
@@ -159,54 +144,55 @@ def _solve(
     """
     light = np.float64(strip[screen.LIGHT_1 + k])
     x, fall = log_of(light, circuit), falls[k]
-    on, off = state[S_ON, i] + TIE, state[S_OFF, i] + TIE
-    reference = state[S_REFERENCE, i]
-    noise = next_noise(i, circuit, state)
+    on, off = state[per_pixel.ON, i] + TIE, state[per_pixel.OFF, i] + TIE
+    reference = state[per_pixel.REFERENCE, i]
+    noise = next_noise(i, circuit, state)[1]
     while True:
         if n == keys.shape[0]:
-            state[S_REFERENCE, i] = reference
+            state[per_pixel.REFERENCE, i] = reference
             return n, s
-        hold = state[S_HOLD, i]
+        hold = state[per_pixel.HOLD, i]
         if hold >= 0.0:
             s = max(s, (hold - ta) / length)
             if s >= 1.0:
                 break
             reference = x + fall * s
-            state[S_HOLD, i] = -1.0
-        kind, t_end, s_end = SIGNAL_EVENT, ta + length, 1.0
+            state[per_pixel.HOLD, i] = -1.0
+        kind, t_end, s_end = NONE, ta + length, 1.0
         if noise < ta + length:
-            kind, t_end = next_injected(i, ta + s * length, ta + length, circuit, state)
-            noise = next_noise(i, circuit, state)
-            if kind != SIGNAL_EVENT:
+            kind, t_end = noise_within(i, ta + s * length, ta + length, circuit, state)
+            noise = next_noise(i, circuit, state)[1]
+            if kind != NONE:
                 s_end = max(s, (t_end - ta) / length)
         away = x - reference
         polarity, level = 0, 0.0
         if away + fall * s_end >= on:
-            polarity, level = 1, state[S_ON, i]
+            polarity, level = 1, state[per_pixel.ON, i]
             s = max(s, min(s_end, (on - away) / fall if fall > 0.0 else 0.0))
         elif away + fall * s <= -off:
-            polarity, level = -1, -state[S_OFF, i]
-        elif kind == SIGNAL_EVENT:
+            polarity, level = -1, -state[per_pixel.OFF, i]
+        elif kind == NONE:
             break
         else:
             s = s_end
-            polarity = injected_polarity(i, kind, light, circuit, state)
-            use_up(i, kind, circuit, state)
-            noise = next_noise(i, circuit, state)
+            polarity = take_noise(i, kind, light, circuit, state)
+            noise = next_noise(i, circuit, state)[1]
             if polarity == 0:
                 continue
             level = away + fall * s
         when = ta + s * length
-        n = emit(keys, times, n, when, t_base, i, 1 if polarity > 0 else 0)
+        n = fire(i, when, polarity, t_base, circuit, state, keys, times, n)
         if circuit.leak_jitter > 0.0:
-            _begin_leak_cycle(k, i, length, circuit, state, strip, falls, means)
+            fall_of_block(i, k, 1, 1.0, circuit, state, falls, means)
+            strip[screen.FALL + k] = falls[k]
+            fall_of_block(i, k, 1, length, circuit, state, falls, means)
             reference += (falls[k] - fall) * s
             fall = falls[k]
         if circuit.dead_time > 0.0:
-            state[S_HOLD, i] = when + circuit.dead_time
+            state[per_pixel.HOLD, i] = when + circuit.dead_time
         else:
             reference += level
-    state[S_REFERENCE, i] = reference - fall
+    state[per_pixel.REFERENCE, i] = reference - fall
     strip[screen.LAG_1 + k] = 0.0
     watch(k, i, x, start, circuit, state, strip)
     return n, DONE
@@ -224,22 +210,9 @@ def _solve_block(
     while j < m:
         k = index[j]
         n, s = _solve(
-            k,
-            lo + k,
-            s,
-            start,
-            ta,
-            length,
-            t_base,
-            circuit,
-            state,
-            strip,
-            falls,
-            means,
-            keys,
-            times,
-            n,
-        )
+            k, lo + k, s, start, ta, length, t_base, circuit, state, strip, falls, means, keys,
+            times, n,
+        )  # fmt: skip
         if s != DONE:
             return n, j, s
         j, s = j + 1, 0.0

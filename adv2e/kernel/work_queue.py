@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.compiled import intrinsic, kernel
-from adv2e.kernel.workspace import STRIP
+
+STRIP = 2048
+"""Pixels that are handed out together: their scratch rows fit the first two levels of cache."""
 
 _LOCK = threading.Lock()
 

@@ -17,18 +17,14 @@ from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.courses import Additions
 from adv2e.errors import DataError
 from adv2e.events import Events, empty_events
+from adv2e.kernel import exact
 from adv2e.kernel import packing as order
 from adv2e.kernel.event_buffer import Room
-from adv2e.kernel.exact import run_exact
+from adv2e.kernel.frames import Frames, frames_of
+from adv2e.kernel.packing import PIXEL_BITS, pack_limit_us
 from adv2e.kernel.quadrature import rules_for
-from adv2e.kernel.stepped.driver import run_stepped
-from adv2e.kernel.tile import Frames, frames_of, scratch
-from adv2e.kernel.work_queue import nothing_claimed
-from adv2e.kernel.workspace import (
-    PIXEL_BITS,
-    STRIP,
-    pack_limit_us,
-)
+from adv2e.kernel.stepped import driver
+from adv2e.kernel.work_queue import STRIP, nothing_claimed
 from adv2e.light.intervals import Part
 from adv2e.pixel.circuit import driver_of, make_circuit
 from adv2e.pixel.merge import Parted, in_order
@@ -54,8 +50,8 @@ def is_compiled(pixel: Pixel, sampling: Sampling, additions: Additions | None = 
 class _Worker:
     """Memory that one thread works with."""
 
-    def __init__(self, exact_times: bool) -> None:
-        self.scratch = scratch()
+    def __init__(self, stepped: bool, exact_times: bool) -> None:
+        self.scratch: Any = driver.scratch() if stepped else exact.scratch()
         self.room = Room(exact_times)
 
 
@@ -134,7 +130,7 @@ class PixelArray:
         self._tiles = strips // self._most + self.threads
         self._workers: SimpleQueue[_Worker] = SimpleQueue()
         for _ in range(self.threads):
-            self._workers.put(_Worker(exact_times))
+            self._workers.put(_Worker(stepped, exact_times))
         self.last_times = np.empty(0)
 
     def _relative(self, t_ns: int) -> float:
@@ -206,7 +202,7 @@ class PixelArray:
         fastest = max(self.circuit.dark + 255.0 * self.circuit.per_dn, self.circuit.dark)
         rules = rules_for(np.diff(starts), fastest, self.circuit.dead_time)
         return self._by_tiles(
-            run_exact,
+            exact.run_exact,
             (
                 frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
                 rules, t_base, self.state,
@@ -231,7 +227,7 @@ class PixelArray:
                 frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
                 steps, injected, t_base, self.state,
             )  # fmt: skip
-            parted += self._by_tiles(run_stepped, arguments, per_us, pool)
+            parted += self._by_tiles(driver.run_stepped, arguments, per_us, pool)
         return parted
 
     def _by_tiles(

@@ -14,26 +14,12 @@ from numpy.typing import NDArray
 from adv2e.config.model import Pixel
 from adv2e.effects.pixel.initial_reference import RANDOM, RUNNING
 from adv2e.effects.pixel.thresholds import FLOOR
+from adv2e.kernel import per_pixel
+from adv2e.kernel.circuit import Circuit
 from adv2e.kernel.first_state import fill_levels, fill_random_reference
 from adv2e.kernel.leak import fill_first_factors, fill_running
 from adv2e.kernel.noise import fill_first_candidates, fill_first_hot_times, fill_first_noise
 from adv2e.kernel.stepped.signal import log_of_light
-from adv2e.kernel.workspace import (
-    S_FIRST,
-    S_HOLD,
-    S_HOT_TIME,
-    S_LEAK_FACTOR,
-    S_NOISE,
-    S_OFF,
-    S_ON,
-    S_REFERENCE,
-    S_SECOND,
-    S_SHOT_DRAW,
-    S_SHOT_TIME,
-    S_X,
-    STATE_ROWS,
-    Circuit,
-)
 from adv2e.pixel.steps import Stepping
 
 
@@ -64,27 +50,27 @@ def initial_state(
     fill = partial(_over_pixels, threads, first.size)
     seed = circuit.seed
     # rows that nothing writes to take no memory
-    state = np.zeros((STATE_ROWS, first.size))
+    state = np.zeros((per_pixel.ROWS, first.size))
     least = 0.0 if circuit.slope > 0.0 else circuit.floor
     light = np.maximum(first.reshape(-1), least, dtype=float)
-    log_of_light(light, circuit, state[S_X])
+    log_of_light(light, circuit, state[per_pixel.X])
     levels = pixel.thresholds
-    on, off = state[S_ON], state[S_OFF]
-    means, spare = (levels.on, levels.off), state[S_REFERENCE]
+    on, off = state[per_pixel.ON], state[per_pixel.OFF]
+    means, spare = (levels.on, levels.off), state[per_pixel.REFERENCE]
     fill(fill_levels, seed, *means, levels.mismatch, FLOOR, on, off, spare)
-    state[S_REFERENCE] = state[S_X]
-    state[S_HOLD] = -1.0
+    state[per_pixel.REFERENCE] = state[per_pixel.X]
+    state[per_pixel.HOLD] = -1.0
     if pixel.initial_reference == RANDOM:
-        fill_random_reference(seed, on, off, state[S_X], state[S_REFERENCE])
+        fill_random_reference(seed, on, off, state[per_pixel.X], state[per_pixel.REFERENCE])
     if circuit.shot_rate > 0:
-        times = state[S_SHOT_TIME]
-        draws = state[S_SHOT_DRAW]
+        times = state[per_pixel.SHOT_TIME]
+        draws = state[per_pixel.SHOT_DRAW]
         fill(fill_first_candidates, seed, circuit.shot_rate, start, times, draws)
     if pixel.hot_pixels and circuit.hot_rate > 0:
-        share, times = pixel.hot_pixels.fraction, state[S_HOT_TIME]
+        share, times = pixel.hot_pixels.fraction, state[per_pixel.HOT_TIME]
         fill_first_hot_times(seed, share, circuit.hot_rate, start, times)
     if circuit.noise_rms > 0:
-        fill_first_noise(seed, circuit.noise_rms, state[S_NOISE])
+        fill_first_noise(seed, circuit.noise_rms, state[per_pixel.NOISE])
     if stepping is not None:
         _rest_poles(state, circuit, stepping)
     leaks = circuit.leak > 0 or circuit.photo_leak > 0
@@ -94,21 +80,21 @@ def initial_state(
             light, level = stepping.first_light(light), level * stepping.first_level()
         fill(fill_running, circuit, start, light, level, state)
     elif circuit.leak_jitter > 0:
-        fill_first_factors(seed, circuit.leak_jitter, state[S_LEAK_FACTOR])
+        fill_first_factors(seed, circuit.leak_jitter, state[per_pixel.LEAK_FACTOR])
     return state
 
 
 def _rest_poles(state: NDArray[np.float64], circuit: Circuit, stepping: Stepping) -> None:
     """Fill the rows of a state that only steps of time have; all poles are at rest."""
-    driven = stepping.first_driven(state[S_X])
-    state[S_FIRST] = driven
-    state[S_SECOND] = driven
-    state[S_REFERENCE] += driven - state[S_X] + stepping.first_signal()
+    driven = stepping.first_driven(state[per_pixel.X])
+    state[per_pixel.FIRST] = driven
+    state[per_pixel.SECOND] = driven
+    state[per_pixel.REFERENCE] += driven - state[per_pixel.X] + stepping.first_signal()
     if circuit.noise_rms > 0:
         # the noise was there before the first frame: a second pole without it, and references
         # in the middle of its course, would take seconds to forget that
-        state[S_SECOND] += state[S_NOISE]
-        state[S_REFERENCE] += state[S_NOISE]
+        state[per_pixel.SECOND] += state[per_pixel.NOISE]
+        state[per_pixel.REFERENCE] += state[per_pixel.NOISE]
 
 
 def _over_pixels(threads: int, pixels: int, fill: Callable[..., None], *arguments: Any) -> None:

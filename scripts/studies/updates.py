@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from writing import table
 
 from adv2e.config.model import LogResponse, LowPass, Pixel, Sampling, Thresholds
-from adv2e.kernel.workspace import S_LAG, S_REFERENCE, S_X
+from adv2e.kernel import per_pixel
 from adv2e.pixel.array import PixelArray
 
 INTERVAL_NS = round(1e9 / 240)
@@ -64,8 +64,8 @@ def solve(light: NDArray[Any], update: str, K: int) -> tuple[NDArray[Any], NDArr
     array = PixelArray(pixel, Sampling(K=K), 0, light[0][None], 0, threads=1, exact_times=True)
     if update == "paper":
         a = 2 * np.pi * 300 * light[0] / 255 * INTERVAL_NS * 1e-9 / K
-        array.state[S_LAG] = (a / -np.expm1(-a) - 1) * array.state[S_X]
-        array.state[S_REFERENCE] += array.state[S_LAG]
+        array.state[per_pixel.LAG] = (a / -np.expm1(-a) - 1) * array.state[per_pixel.X]
+        array.state[per_pixel.REFERENCE] += array.state[per_pixel.LAG]
     events = array.advance(light[:, None, :], times, np.zeros(len(light), np.bool_))
     return array.last_times, events["p"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from adv2e.events import is_sorted, make_events, sort_events
-from adv2e.kernel.workspace import PIXEL_BITS
+from adv2e.kernel.packing import PIXEL_BITS
 
 COUNT, WIDTH, HEIGHT, TILES = 200_000, 346, 260, 8
 INTERVAL_US = 4167

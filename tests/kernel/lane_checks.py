@@ -9,7 +9,7 @@ from reference.dense_ode import as_lists, find_events
 from reference.dense_signal import solve_signal, turning_points
 
 from adv2e.config.model import Leak, LogResponse, LowPass, Refractory
-from adv2e.kernel.workspace import S_OFF, S_ON
+from adv2e.kernel import per_pixel
 
 
 def clock(intervals_ms):
@@ -38,7 +38,7 @@ def fire(light, times, circuit, seed=0, **sections):
     pixel = quiet(**sections_of(circuit), **sections)
     times_ns = [round(float(t) * 1e9) for t in times]
     array = start(light, times_ns, pixel, seed=seed, exact_times=True)
-    array.state[S_ON], array.state[S_OFF] = circuit.levels(array.pixels)
+    array.state[per_pixel.ON], array.state[per_pixel.OFF] = circuit.levels(array.pixels)
     return by_pixel(array, *advance(array, light, times_ns))
 
 

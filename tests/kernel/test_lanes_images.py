@@ -8,7 +8,7 @@ from reference.agreement import count_and_time_errors
 
 from adv2e.config.model import Leak, Refractory, ShotNoise, Thresholds
 from adv2e.kernel.screen import LARGEST_STEP
-from adv2e.kernel.workspace import STRIP
+from adv2e.kernel.work_queue import STRIP
 
 CLIP = walks(7, 25, 13, lo=3.0, steps=(0.05, 0.1, 0.2))
 """Light of 13 pixels without steps above an e-fold, which larger images repeat."""

@@ -10,7 +10,7 @@ from adv2e.config.model import LowPass, Thresholds
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE
 from adv2e.kernel import packing as order
-from adv2e.kernel.workspace import PIXEL_BITS, pack_limit_us
+from adv2e.kernel.packing import PIXEL_BITS, pack_limit_us
 from adv2e.pixel import merge as sorting
 
 LAST_PIXEL = (1 << PIXEL_BITS) - 1

@@ -10,7 +10,7 @@ from harness import advance, quiet, start
 from reference import stimuli
 
 from adv2e.config.model import LogResponse, LowPass
-from adv2e.kernel.workspace import S_FIRST, S_REFERENCE, S_X
+from adv2e.kernel import per_pixel
 
 KS = (1, 2, 5, 10, 20, 50, 100)
 PAPER = {
@@ -29,9 +29,9 @@ def count(stimulus, update, K, fixed_point=False):
     array = start(light, times, pixel, K=K)
     if fixed_point:
         a = 2 * np.pi * 300 * light[0] / 255 * (times[1] - times[0]) * 1e-9 / K
-        above = (a / -np.expm1(-a) - 1) * array.state[S_X]
-        array.state[S_FIRST] += above
-        array.state[S_REFERENCE] += above
+        above = (a / -np.expm1(-a) - 1) * array.state[per_pixel.X]
+        array.state[per_pixel.FIRST] += above
+        array.state[per_pixel.REFERENCE] += above
     return len(advance(array, light, times)[0])
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.config.model import LogResponse, LowPass, Thresholds
-from adv2e.kernel.workspace import S_LAG, S_REFERENCE, S_X
+from adv2e.kernel import per_pixel
 
 LIGHTS = st.lists(st.floats(0.0, 255.0, width=32), min_size=2, max_size=8)
 INTERVAL_NS = 4_166_667
@@ -23,12 +23,16 @@ def test_the_reference_is_the_sum_of_the_events(values, on, off):
     light, times = stimulus(values)
     pixel = quiet(thresholds=Thresholds(on=on, off=off, mismatch=0))
     array = start(light, times, pixel)
-    before = array.state[S_REFERENCE, 0]
+    before = array.state[per_pixel.REFERENCE, 0]
     events, _ = advance(array, light, times)
     up = int(events["p"].sum())
     moved = up * on - (len(events) - up) * off
-    assert abs(array.state[S_REFERENCE, 0] - before - moved) < 1e-9
-    distance = array.state[S_X, 0] + array.state[S_LAG, 0] - array.state[S_REFERENCE, 0]
+    assert abs(array.state[per_pixel.REFERENCE, 0] - before - moved) < 1e-9
+    distance = (
+        array.state[per_pixel.X, 0]
+        + array.state[per_pixel.LAG, 0]
+        - array.state[per_pixel.REFERENCE, 0]
+    )
     assert -off - 2e-9 < distance < on + 2e-9
     assert np.all(np.diff(events["t"]) >= 0)
     assert np.all((events["t"] >= 0) & (events["t"] <= times[-1] // 1000 + 1))

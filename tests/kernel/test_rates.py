@@ -18,7 +18,7 @@ from adv2e.config.model import (
     Thresholds,
 )
 from adv2e.diagnosis.tables.noise import NoisySources, noise_rates
-from adv2e.kernel.workspace import S_NOISE, S_REFERENCE, S_X
+from adv2e.kernel import per_pixel
 
 PIXELS = 3000
 SECONDS = 4.0
@@ -150,10 +150,10 @@ def test_what_has_come_before_is_drawn_pixel_by_pixel():
     )
     for other in others:
         assert np.array_equal(other, first[:, : other.shape[1]])
-    fallen = (first[S_X] - first[S_REFERENCE]) / 0.2
+    fallen = (first[per_pixel.X] - first[per_pixel.REFERENCE]) / 0.2
     assert stats.kstest(fallen, "uniform").pvalue > 1e-3
     steady = start(light, [0], quiet(leak=Leak(rate_hz=0.0), **RUNNING), threads=1).state
-    assert np.array_equal(steady[S_REFERENCE], steady[S_X])
+    assert np.array_equal(steady[per_pixel.REFERENCE], steady[per_pixel.X])
 
 
 @pytest.mark.parametrize("overshoot", [-0.4, 0.4])
@@ -187,7 +187,9 @@ def test_random_reference_is_uniform_between_the_thresholds():
     pixel = quiet(initial_reference="random")
     light = np.full((2, 1, PIXELS), 100, np.float32)
     array = start(light, [0], pixel)
-    offset = (array.state[S_X] - array.state[S_REFERENCE]) / 0.2  # signal minus reference
+    offset = (
+        array.state[per_pixel.X] - array.state[per_pixel.REFERENCE]
+    ) / 0.2  # signal minus reference
     assert stats.kstest(offset, stats.uniform(-1, 2).cdf).pvalue > 1e-3
 
 
@@ -201,7 +203,7 @@ def test_photoreceptor_noise_has_its_rms_and_correlation():
         samples = []
         for k in range(30):
             advance(array, light, [k * interval_ns, (k + 1) * interval_ns])
-            samples.append(array.state[S_NOISE].copy())
+            samples.append(array.state[per_pixel.NOISE].copy())
         noise = np.array(samples)
         assert noise.std() == pytest.approx(0.05, rel=0.03)
         corner = 2e-9 * np.pi * (21.8 + 278.2 * dn / 255)

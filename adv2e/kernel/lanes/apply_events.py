@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from adv2e.compiled import inlined, kernel
-from adv2e.kernel.comparator import TIE, emit
+from adv2e.kernel import per_pixel
+from adv2e.kernel.comparator import TIE, fire
 from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.pieces import fallen_at_place
 from adv2e.kernel.lanes.roots import evaluate_release
-from adv2e.kernel.leak import next_leak_factor
-from adv2e.kernel.workspace import S_LEAK_FACTOR
 
 _TRIES = 3
 
 
 @kernel
-def land(count, ta, length, circuit, lanes):
+def cross(count, ta, length, circuit, lanes):
     """Take the thresholds that were found; other places are left as they are."""
     dead = circuit.dead_time / length
     has_dead_time = circuit.dead_time > 0.0
@@ -46,7 +45,6 @@ def land(count, ta, length, circuit, lanes):
         release = place + dead
         lanes[rows.HOLD + j] = ta + release * length if waits else lanes[rows.HOLD + j]
         lanes[rows.PLACE + j] = release if waits else place
-        lanes[rows.FRESH + j] = 0.0
         lanes[rows.MOVES + j] = 0.0 if waits else lanes[rows.MOVES + j]
         after = rows.DONE if release >= lanes[rows.END + j] else rows.RELEASE
         after = after if waits else (rows.READY if goes_on else seeks)
@@ -94,10 +92,18 @@ def release(count, length, circuit, rule, lanes):
 
 
 @inlined
-def _begin_leak_cycle(i, j, circuit, state, lanes):
-    """Draw the leak speed of the cycle that begins at S; what has fallen until there stays."""
-    share = 1.0 / state[S_LEAK_FACTOR, i]
-    share *= next_leak_factor(i, circuit, state)
+def fire_lane(i, j, when, polarity, t_base, circuit, state, lanes, keys, times, n):
+    """Write an event of pixel i, in lane j, where the lane is; returns the number of events."""
+    before = state[per_pixel.LEAK_FACTOR, i]
+    n = fire(i, when, polarity, t_base, circuit, state, keys, times, n)
+    if circuit.leak_jitter > 0.0:
+        _change_leak(j, 1.0 / before * state[per_pixel.LEAK_FACTOR, i], lanes)
+    return n
+
+
+@inlined
+def _change_leak(j, share, lanes):
+    """Go on at a leak speed that is `share` of the one before; what has fallen until S stays."""
     lanes[rows.FALL + j] *= share
     lanes[rows.FALL_DN + j] *= share
     fallen = lanes[rows.FALLEN_S + j]
@@ -109,14 +115,6 @@ def _begin_leak_cycle(i, j, circuit, state, lanes):
     lanes[rows.FALLEN_P + j] = until_stop
 
 
-@inlined
-def fire(i, j, when, polarity, t_base, circuit, state, lanes, keys, times, n):
-    """Write an event of pixel i, in lane j, where the lane is; returns the number of events."""
-    if circuit.leak_jitter > 0.0:
-        _begin_leak_cycle(i, j, circuit, state, lanes)
-    return emit(keys, times, n, when, t_base, i, 1 if polarity > 0 else 0)
-
-
 @kernel
 def fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n):
     """Write the events of the thresholds that were found."""
@@ -124,5 +122,5 @@ def fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n):
         event = lanes[rows.EVENT + j]
         if event != 0.0:
             i, when = lo + pixels[j], lanes[rows.WHEN + j]
-            n = fire(i, j, when, event, t_base, circuit, state, lanes, keys, times, n)
+            n = fire_lane(i, j, when, event, t_base, circuit, state, lanes, keys, times, n)
     return n

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from adv2e.compiled import kernel
 from adv2e.kernel.lanes import rows
-from adv2e.kernel.lanes.apply_events import fire_found, land, release
+from adv2e.kernel.lanes.apply_events import cross, fire_found, release
 from adv2e.kernel.lanes.exchange import sort_out
-from adv2e.kernel.lanes.next_target import plan
+from adv2e.kernel.lanes.next_target import choose
 from adv2e.kernel.lanes.pieces import next_piece, open_piece
 from adv2e.kernel.lanes.roots import evaluate, guess, refine
 from adv2e.kernel.lanes.rows import whole
@@ -45,7 +45,7 @@ def decide(
     while True:
         if waiting > 0:
             release(whole(waiting), length, circuit, rule, lanes)
-        plan(whole(m), ta, length, circuit, lanes)
+        choose(whole(m), ta, length, circuit, lanes)
         for j in range(m):
             seeks = lanes[rows.SEEKS + j]
             if seeks in (rows.DOUBTFUL, rows.STUCK):
@@ -67,10 +67,10 @@ def search(lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys,
     At most one event a lane is written.  See `decide` for the latter.
     """
     count = whole(m)
-    guess(lanes, count)
+    guess(lanes, count, length, circuit)
     evaluate(lanes, count, length, circuit, rule)
     refine(lanes, count, length, circuit)
-    land(count, ta, length, circuit, lanes)
+    cross(count, ta, length, circuit, lanes)
     n = fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n)
     for j in range(m):
         seeks = lanes[rows.SEEKS + j]

@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 from adv2e.compiled import kernel
-from adv2e.kernel import screen, special
-from adv2e.kernel.comparator import HOT, SHOT
+from adv2e.kernel import per_pixel, screen, special
 from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.pieces import end_of_piece, first_place
 from adv2e.kernel.lanes.rows import move, whole
-from adv2e.kernel.workspace import (
-    S_HOLD,
-    S_HOT_TIME,
-    S_LEAK_FACTOR,
-    S_OFF,
-    S_ON,
-    S_REFERENCE,
-    S_SHOT_TIME,
-)
+from adv2e.kernel.leak import leak_over
+from adv2e.kernel.noise import next_noise
 
 _LEAVING, _STAYING = rows.A1, rows.KAPPA  # rows that hold nothing between two searches
 EARLY = 1.0 - 1e-6  # single precision must not make a due time late
-_NO_TIME = 1e300
 
 
 @kernel
@@ -34,37 +25,19 @@ def log_of(light, circuit):
 
 
 @kernel
-def next_noise(i, circuit, state):
-    """When the next noise event of pixel i may come [us]."""
-    due = _NO_TIME
-    if circuit.shot_rate > 0.0:
-        due = min(due, state[S_SHOT_TIME, i])
-    if circuit.hot_rate > 0.0:
-        due = min(due, state[S_HOT_TIME, i])
-    return due
-
-
-@kernel
-def kind_of_next_noise(i, circuit, state):
-    """Tell whether the next noise event of pixel i is SHOT or HOT."""
-    shot = state[S_SHOT_TIME, i] if circuit.shot_rate > 0.0 else _NO_TIME
-    hot = state[S_HOT_TIME, i] if circuit.hot_rate > 0.0 else _NO_TIME
-    return HOT if hot < shot else SHOT
-
-
-@kernel
 def watch(k, i, x1, start, circuit, state, strip):
     """Rows of the screen for pixel k of a strip, i of the state: distance, thresholds, due time."""
-    strip[screen.AWAY_1 + k] = x1 - state[S_REFERENCE, i]
-    hold = state[S_HOLD, i]
+    strip[screen.AWAY_1 + k] = x1 - state[per_pixel.REFERENCE, i]
+    hold = state[per_pixel.HOLD, i]
     if hold >= 0.0:
         strip[screen.ON + k] = screen.NEVER
         strip[screen.OFF + k] = screen.NEVER
         strip[screen.DUE + k] = (hold - start) * EARLY
     else:
-        strip[screen.ON + k] = state[S_ON, i] - screen.MARGIN
-        strip[screen.OFF + k] = state[S_OFF, i] - screen.MARGIN
-        strip[screen.DUE + k] = min(next_noise(i, circuit, state) - start, screen.NEVER) * EARLY
+        strip[screen.ON + k] = state[per_pixel.ON, i] - screen.MARGIN
+        strip[screen.OFF + k] = state[per_pixel.OFF, i] - screen.MARGIN
+        due = next_noise(i, circuit, state)[1]
+        strip[screen.DUE + k] = min(due - start, screen.NEVER) * EARLY
 
 
 @kernel
@@ -77,16 +50,11 @@ def _gather(lo, m, circuit, state, strip, falls, pixels, lanes):
         lanes[rows.I0 + j] = strip[screen.LIGHT_0 + k]
         lanes[rows.I1 + j] = strip[screen.LIGHT_1 + k]
         lanes[rows.TAIL + j] = falls[k]
-        lanes[rows.ON + j] = state[S_ON, lo + k]
-        lanes[rows.OFF + j] = state[S_OFF, lo + k]
-        lanes[rows.REFERENCE + j] = state[S_REFERENCE, lo + k]
-        lanes[rows.HOLD + j] = state[S_HOLD, lo + k]
-    if circuit.shot_rate > 0.0 or circuit.hot_rate > 0.0:
-        for j in range(m):
-            lanes[rows.NOISE + j] = next_noise(lo + pixels[j], circuit, state)
-    else:
-        for j in range(m):
-            lanes[rows.NOISE + j] = _NO_TIME
+        lanes[rows.ON + j] = state[per_pixel.ON, lo + k]
+        lanes[rows.OFF + j] = state[per_pixel.OFF, lo + k]
+        lanes[rows.REFERENCE + j] = state[per_pixel.REFERENCE, lo + k]
+        lanes[rows.HOLD + j] = state[per_pixel.HOLD, lo + k]
+        lanes[rows.NOISE + j] = next_noise(lo + k, circuit, state)[1]
 
 
 @kernel
@@ -108,7 +76,7 @@ def load(lo, m, ta, length, circuit, state, strip, falls, pixels, lanes):
     _gather(lo, m, circuit, state, strip, falls, pixels, lanes)
     knee = circuit.knee
     knee_dn = circuit.slope * knee
-    leak, photo_leak = length * circuit.leak, length * circuit.photo_leak
+    leak, photo_leak = leak_over(length, circuit)
     for j in range(whole(m)):
         i0, i1 = lanes[rows.I0 + j], lanes[rows.I1 + j]
         u0, u1 = lanes[rows.U0 + j], lanes[rows.U1 + j]
@@ -145,11 +113,10 @@ def load(lo, m, ta, length, circuit, state, strip, falls, pixels, lanes):
         place = end if in_pieces else place
         lanes[rows.SEEKS + j] = seeks
         lanes[rows.PLACE + j] = place
-        lanes[rows.FRESH + j] = 0.0
         lanes[rows.MOVES + j] = 0.0
     if circuit.leak_jitter > 0.0:
         for j in range(m):
-            factor = state[S_LEAK_FACTOR, lo + pixels[j]]
+            factor = state[per_pixel.LEAK_FACTOR, lo + pixels[j]]
             lanes[rows.FALL + j] *= factor
             lanes[rows.FALL_DN + j] *= factor
 
@@ -160,12 +127,11 @@ def _finish(j, lo, start, state, strip, pixels, lanes):
     k = pixels[j]
     reference = lanes[rows.REFERENCE + j] - lanes[rows.TAIL + j]
     hold = lanes[rows.HOLD + j]
-    state[S_REFERENCE, lo + k] = reference
-    state[S_HOLD, lo + k] = hold
+    state[per_pixel.REFERENCE, lo + k] = reference
+    state[per_pixel.HOLD, lo + k] = hold
     strip[screen.AWAY_1 + k] = lanes[rows.X0 + j] + lanes[rows.DX + j] - reference
-    strip[screen.LAG_1 + k] = lanes[
-        rows.U1 + j
-    ]  # the screen does not know it where there are pieces
+    # the screen does not know it where there are pieces
+    strip[screen.LAG_1 + k] = lanes[rows.U1 + j]
     held = hold >= 0.0
     strip[screen.ON + k] = screen.NEVER if held else lanes[rows.ON + j] - screen.MARGIN
     strip[screen.OFF + k] = screen.NEVER if held else lanes[rows.OFF + j] - screen.MARGIN

@@ -47,7 +47,7 @@ def sure_of_leak(away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, o
 
 
 @kernel
-def plan(count, ta, length, circuit, lanes):
+def choose(count, ta, length, circuit, lanes):
     """Choose the threshold that comes first for the lanes that are ready, or tell the doubtful."""
     dark, per_dn = circuit.dark * length, circuit.per_dn * length
     for j in range(count):
@@ -58,10 +58,9 @@ def plan(count, ta, length, circuit, lanes):
         lag_s, lag_p = lanes[rows.LAG_S + j], lanes[rows.LAG_P + j]
         span = lanes[rows.STOP + j] - lanes[rows.S + j]
         light_s, light_p = lanes[rows.LIGHT_S + j], lanes[rows.LIGHT_P + j]
-        fall, fall_dn = lanes[rows.FALL + j], lanes[rows.FALL_DN + j]
         rate_s, rate_p = dark + per_dn * light_s, dark + per_dn * light_p
         dx = lanes[rows.DX + j]
-        leak = 1.01 * (fall + fall_dn * max(light_s, light_p))
+        leak = 1.01 * (lanes[rows.FALL + j] + lanes[rows.FALL_DN + j] * max(light_s, light_p))
         sure = sure_of_leak(away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, on, off)
         doubtful = (
             (lag_s * lag_p < 0.0)
@@ -76,18 +75,5 @@ def plan(count, ta, length, circuit, lanes):
         what = what if ready else seeks
         lanes[rows.SEEKS + j] = what
         crosses = ready & ((what == rows.SEEK_ON) | (what == rows.SEEK_OFF))
-        level = on if away_p >= on else -off
-        goal = lanes[rows.REFERENCE + j] - lanes[rows.X0 + j] + level
-        lanes[rows.GOAL + j] = goal if crosses else lanes[rows.GOAL + j]
-        f_lo = away_s - level
-        lanes[rows.F_LO + j] = f_lo if crosses else lanes[rows.F_LO + j]
-        f_hi = away_p - level
-        lanes[rows.F_HI + j] = f_hi if crosses else lanes[rows.F_HI + j]
-        g_lo = fall + fall_dn * light_s - rate_s * lag_s
-        lanes[rows.G_LO + j] = g_lo if crosses else lanes[rows.G_LO + j]
-        g_hi = fall + fall_dn * light_p - rate_p * lag_p
-        lanes[rows.G_HI + j] = g_hi if crosses else lanes[rows.G_HI + j]
-        lanes[rows.ROOT + j] = 1.0 if crosses else lanes[rows.ROOT + j]
-        lanes[rows.FRESH + j] = 1.0 if crosses else lanes[rows.FRESH + j]
         lanes[rows.MOVES + j] = 1.0 if crosses else lanes[rows.MOVES + j]
         lanes[rows.TRIED + j] = 0.0 if crosses else lanes[rows.TRIED + j]

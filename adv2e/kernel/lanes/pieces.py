@@ -113,5 +113,4 @@ def next_piece(j, circuit, lanes):
     lanes[rows.KNOWN + j] = 0.0
     lanes[rows.SEEKS + j] = rows.OPEN
     lanes[rows.PLACE + j] = end
-    lanes[rows.FRESH + j] = 0.0
     lanes[rows.MOVES + j] = 0.0

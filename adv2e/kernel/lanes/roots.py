@@ -18,17 +18,35 @@ from __future__ import annotations
 
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import special
+from adv2e.kernel.comparator import TIE
 from adv2e.kernel.lanes import rows
 from adv2e.kernel.quadrature import REACH
 
 
 @kernel
-def guess(lanes, count):
-    """First place: root of the cubic through both ends, by guarded Newton steps."""
+def guess(lanes, count, length, circuit):
+    """First place: root of the cubic through both ends, by guarded Newton steps.
+
+    What is to be zero is the lag, or its sum with x and the fall of the reference, less the goal.
+    """
+    dark, per_dn = circuit.dark * length, circuit.per_dn * length
     for k in range(count):
-        w = lanes[rows.STOP + k] - lanes[rows.S + k]
-        f0, f1 = lanes[rows.F_LO + k], lanes[rows.F_HI + k]
-        g0, g1 = lanes[rows.G_LO + k] * w, lanes[rows.G_HI + k] * w
+        s, w = lanes[rows.S + k], lanes[rows.STOP + k] - lanes[rows.S + k]
+        seeks = lanes[rows.SEEKS + k]
+        turn = seeks == rows.TURN
+        level = lanes[rows.ON + k] + TIE if seeks == rows.SEEK_ON else -lanes[rows.OFF + k] - TIE
+        goal = lanes[rows.REFERENCE + k] - lanes[rows.X0 + k] + level
+        lanes[rows.GOAL + k] = 0.0 if turn else goal
+        lag_s, lag_p = lanes[rows.LAG_S + k], lanes[rows.LAG_P + k]
+        f0 = lag_s if turn else lanes[rows.AWAY_S + k] - level
+        f1 = lag_p if turn else lanes[rows.AWAY_P + k] - level
+        # the slope of the lag is -w u - dx, that of the distance -w u plus the leak
+        light_s, light_p = lanes[rows.LIGHT_S + k], lanes[rows.LIGHT_P + k]
+        fall, fall_dn = lanes[rows.FALL + k], lanes[rows.FALL_DN + k]
+        drift_s = -lanes[rows.DX + k] if turn else fall + fall_dn * light_s
+        drift_p = -lanes[rows.DX + k] if turn else fall + fall_dn * light_p
+        g0 = (drift_s - (dark + per_dn * light_s) * lag_s) * w
+        g1 = (drift_p - (dark + per_dn * light_p) * lag_p) * w
         c2 = 3.0 * (f1 - f0) - 2.0 * g0 - g1
         c3 = g0 + g1 - 2.0 * (f1 - f0)
         t = f0 / (f0 - f1 if f0 != f1 else 1.0)
@@ -37,8 +55,8 @@ def guess(lanes, count):
             dv = g0 + t * (2.0 * c2 + 3.0 * t * c3)
             q = t - v / (dv if dv != 0.0 else 1.0)
             t = q if (q > 0.0) & (q < 1.0) else t
-        fresh = lanes[rows.FRESH + k] > 0.5
-        lanes[rows.PLACE + k] = lanes[rows.S + k] + w * t if fresh else lanes[rows.PLACE + k]
+        fresh = (lanes[rows.MOVES + k] > 0.5) & (lanes[rows.TRIED + k] < 0.5)
+        lanes[rows.PLACE + k] = s + w * t if fresh else lanes[rows.PLACE + k]
 
 
 @inlined
@@ -124,16 +142,9 @@ def evaluate(lanes, count, length, circuit, rule):
 def evaluate_release(lanes, count, length, circuit, rule):
     """From the last known place on, which is at most a dead time before."""
     _evaluate_from(
-        rows.S,
-        rows.LIGHT_S,
-        rows.LAG_S,
-        lanes,
-        count,
-        length,
-        circuit,
-        rule.nodes_dead,
+        rows.S, rows.LIGHT_S, rows.LAG_S, lanes, count, length, circuit, rule.nodes_dead,
         rule.weights_dead,
-    )
+    )  # fmt: skip
 
 
 @kernel
@@ -165,7 +176,8 @@ def refine(lanes, count, length, circuit):
         u4 = -(w0 * u3 + w1 * u2 + w2 * u1 + w3 * u0) / 4.0
         u5 = -(w0 * u4 + w1 * u3 + w2 * u2 + w3 * u1 + w4 * u0) / 5.0
         u6 = -(w0 * u5 + w1 * u4 + w2 * u3 + w3 * u2 + w4 * u1 + w5 * u0) / 6.0
-        root = lanes[rows.ROOT + k]
+        turn = lanes[rows.SEEKS + k] == rows.TURN
+        root = 0.0 if turn else 1.0
         fall = root * lanes[rows.FALL + k]
         q = root * lanes[rows.FALL_DN + k]
         fallen = (
@@ -196,7 +208,9 @@ def refine(lanes, count, length, circuit):
         # the end values are single precision: a root beyond them by that is a root at the end, if
         # the slope there is not that of a second one close by
         inside = (place >= lo - 1e-6) & (place <= hi + 1e-6)
-        inside &= (dv > 0.0) == (lanes[rows.F_HI + k] > lanes[rows.F_LO + k])
+        from_s = lanes[rows.LAG_S + k] if turn else lanes[rows.AWAY_S + k]
+        to_stop = lanes[rows.LAG_P + k] if turn else lanes[rows.AWAY_P + k]
+        inside &= (dv > 0.0) == (to_stop > from_s)
         place = place if place > lo else lo
         place = place if place < hi else hi
         reach = (w0 * (1.0 + abs(t * e)) + abs(d)) * abs(t)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.compiled import kernel
-from adv2e.kernel.workspace import STRIP
+from adv2e.kernel.work_queue import STRIP
 
 TOLERANCE = 0.002
 """Largest remainder of the Taylor polynomial that is accepted [us]."""
@@ -59,14 +59,8 @@ _STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
     # what it looks for
     SEEKS,
     TRIED,  # how often
-    FRESH,  # 1: the place is to be guessed, 0: it is given
-    MOVES,  # 1: the place is to be refined
-    ROOT,  # 1: towards a threshold, 0: towards the turn of the signal
+    MOVES,  # 1: the place is a root, guessed and refined; 0: it is given
     GOAL,  # value to be reached
-    F_LO,  # distance from the goal at S, and its slope
-    G_LO,
-    F_HI,  # the same at STOP
-    G_HI,
     # what was found
     PLACE,
     LAG_E,  # lag and light there, integral of the light since the start of the piece
@@ -81,8 +75,8 @@ _STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
     Z,
     UPTO,
     TOTAL,
-) = (row * _STRIDE for row in range(52))
-SIZE = 52 * _STRIDE
+) = (row * _STRIDE for row in range(46))
+SIZE = 46 * _STRIDE
 
 # what a lane is looking for; READY: to be decided; DOUBTFUL: to be decided lane by lane, STUCK:
 # because its search failed; HALF: the signal half-way to STOP; OPEN: at the end of its piece
@@ -91,19 +85,11 @@ DONE, STUCK, SEEK_ON, SEEK_OFF, TURN, INJECTED, RELEASE, READY, DOUBTFUL, OPEN, 
 )
 
 
-def pixel_numbers() -> NDArray[np.int64]:
-    """Return room for the numbers, within the strip, of the lanes' pixels."""
-    return np.zeros(STRIP + WIDTH, np.int64)
-
-
 def scratch() -> NDArray[np.float64]:
     """Return the flat array of rows; lanes that fill up a vector must be harmless."""
     rows = np.zeros(SIZE)
-    for row in (I0, I1, END, STOP, F_LO, DX, U0):
+    for row in (I0, I1, END, STOP, DX, U0):
         rows[row : row + _STRIDE] = 1.0
-    rows[F_HI : F_HI + _STRIDE] = -1.0
-    for row in (G_LO, G_HI):
-        rows[row : row + _STRIDE] = -2.0
     return rows
 
 

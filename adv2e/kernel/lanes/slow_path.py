@@ -8,19 +8,13 @@ place so passed it goes on by twice the step.
 from __future__ import annotations
 
 from adv2e.compiled import inlined, kernel
-from adv2e.kernel.comparator import (
-    SIGNAL_EVENT,
-    TIE,
-    injected_polarity,
-    next_injected,
-    use_up,
-)
+from adv2e.kernel import per_pixel
+from adv2e.kernel.comparator import TIE
 from adv2e.kernel.lanes import rows
-from adv2e.kernel.lanes.apply_events import fire
-from adv2e.kernel.lanes.exchange import kind_of_next_noise, next_noise
+from adv2e.kernel.lanes.apply_events import fire_lane
 from adv2e.kernel.lanes.next_target import sure_of_leak
 from adv2e.kernel.lanes.pieces import BEFORE_END, fallen_at_place, set_stop
-from adv2e.kernel.workspace import NEVER
+from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
 
 _STRAIGHT = 0.9
 _HALF_WAY = -1
@@ -31,39 +25,21 @@ def _seek_given(j, what, place, lanes):
     """Look at a given place next."""
     lanes[rows.SEEKS + j] = what
     lanes[rows.PLACE + j] = place
-    lanes[rows.FRESH + j] = 0.0
     lanes[rows.MOVES + j] = 0.0
 
 
 @kernel
-def _seek_root(j, what, length, circuit, lanes):
+def _seek_root(j, what, length, lanes):
     """Look for a threshold, or for the turn, between S and STOP next.
 
     A place at S, and one up to a STOP that is near, is known without a search.
     """
-    turn = what == rows.TURN
-    level = lanes[rows.ON + j] + TIE if what == rows.SEEK_ON else -lanes[rows.OFF + j] - TIE
-    drift = -lanes[rows.DX + j] if turn else 0.0
-    root = 0.0 if turn else 1.0
-    lanes[rows.SEEKS + j] = what
-    lanes[rows.TRIED + j] = 0.0
-    lanes[rows.ROOT + j] = root
-    lanes[rows.GOAL + j] = 0.0 if turn else lanes[rows.REFERENCE + j] - lanes[rows.X0 + j] + level
-    lanes[rows.F_LO + j] = lanes[rows.LAG_S + j] if turn else lanes[rows.AWAY_S + j] - level
-    lanes[rows.F_HI + j] = lanes[rows.LAG_P + j] if turn else lanes[rows.AWAY_P + j] - level
-    away = lanes[rows.F_LO + j]
-    beyond = (what == rows.SEEK_ON and away >= 0.0) or (what == rows.SEEK_OFF and away <= 0.0)
+    away, on, off = lanes[rows.AWAY_S + j], lanes[rows.ON + j] + TIE, lanes[rows.OFF + j] + TIE
+    beyond = (what == rows.SEEK_ON and away >= on) or (what == rows.SEEK_OFF and away <= -off)
     near = (lanes[rows.STOP + j] - lanes[rows.S + j]) * length <= rows.TOLERANCE
-    lanes[rows.FRESH + j] = 0.0 if beyond or near else 1.0
-    lanes[rows.MOVES + j] = lanes[rows.FRESH + j]
-    lanes[rows.PLACE + j] = lanes[rows.S + j] if beyond else lanes[rows.STOP + j]
-    # the slope of the lag is -w u - dx, that of the distance -w u plus the leak
-    rate_s = (circuit.dark + circuit.per_dn * lanes[rows.LIGHT_S + j]) * length
-    rate_p = (circuit.dark + circuit.per_dn * lanes[rows.LIGHT_P + j]) * length
-    leak_s = root * (lanes[rows.FALL + j] + lanes[rows.FALL_DN + j] * lanes[rows.LIGHT_S + j])
-    leak_p = root * (lanes[rows.FALL + j] + lanes[rows.FALL_DN + j] * lanes[rows.LIGHT_P + j])
-    lanes[rows.G_LO + j] = drift - rate_s * lanes[rows.LAG_S + j] + leak_s
-    lanes[rows.G_HI + j] = drift - rate_p * lanes[rows.LAG_P + j] + leak_p
+    _seek_given(j, what, lanes[rows.S + j] if beyond else lanes[rows.STOP + j], lanes)
+    lanes[rows.MOVES + j] = 0.0 if beyond or near else 1.0
+    lanes[rows.TRIED + j] = 0.0
 
 
 @kernel
@@ -103,7 +79,7 @@ def _choose(j, length, circuit, lanes):
             return rows.TURN if reach <= -off or away_s + drift >= on else by_end
         # rises, then falls: what holds from the turn on, where u = 0, decides
         sure = drift == 0.0 or sure_of_leak(
-            -NEVER, away_p, 0.0, lag_p, span, dx, rate_s, rate_p, leak, on, off
+            -per_pixel.NEVER, away_p, 0.0, lag_p, span, dx, rate_s, rate_p, leak, on, off
         )
         return by_end if sure and reach + drift < on else rows.TURN
     falls = drift > 0.0 and lag_s + lag_p > 0.0
@@ -118,9 +94,9 @@ def _choose(j, length, circuit, lanes):
 def found_stop(i, j, circuit, state, lanes):
     """Make the place that was looked at, a turn, a half or that of a noise event, the next stop."""
     seeks = lanes[rows.SEEKS + j]
-    lanes[rows.KIND + j] = SIGNAL_EVENT
+    lanes[rows.KIND + j] = NONE
     if seeks == rows.INJECTED:
-        lanes[rows.KIND + j] = kind_of_next_noise(i, circuit, state)
+        lanes[rows.KIND + j] = next_noise(i, circuit, state)[0]
     elif seeks == rows.HALF:
         lanes[rows.KIND + j] = _HALF_WAY
     lag = 0.0 if seeks == rows.TURN else lanes[rows.LAG_E + j]
@@ -138,9 +114,9 @@ def _find_stop(i, j, ta, length, circuit, state, lanes):
     t_end = ta + end * length
     if lanes[rows.NOISE + j] < t_end:
         now = ta + lanes[rows.S + j] * length
-        kind, t = next_injected(i, now, t_end, circuit, state)
-        lanes[rows.NOISE + j] = next_noise(i, circuit, state)
-        if kind != SIGNAL_EVENT:
+        kind, t = noise_within(i, now, t_end, circuit, state)
+        lanes[rows.NOISE + j] = next_noise(i, circuit, state)[1]
+        if kind != NONE:
             place = min(max((t - ta) / length, lanes[rows.S + j]), end * BEFORE_END)
             _seek_given(j, rows.INJECTED, place, lanes)
             return True
@@ -161,15 +137,14 @@ def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
     lanes[rows.FALLEN_S + j] = lanes[rows.FALLEN_P + j]
     lanes[rows.AWAY_S + j] = lanes[rows.AWAY_P + j]
     kind = int(lanes[rows.KIND + j])
-    if kind in (SIGNAL_EVENT, _HALF_WAY):
+    if kind in (NONE, _HALF_WAY):
         return n, False
-    polarity = injected_polarity(i, kind, lanes[rows.LIGHT_S + j], circuit, state)
-    use_up(i, kind, circuit, state)
-    lanes[rows.NOISE + j] = next_noise(i, circuit, state)
+    polarity = take_noise(i, kind, lanes[rows.LIGHT_S + j], circuit, state)
+    lanes[rows.NOISE + j] = next_noise(i, circuit, state)[1]
     if polarity == 0:
         return n, False
     when = ta + lanes[rows.S + j] * length
-    n = fire(i, j, when, polarity, t_base, circuit, state, lanes, keys, times, n)
+    n = fire_lane(i, j, when, polarity, t_base, circuit, state, lanes, keys, times, n)
     lanes[rows.REFERENCE + j] += lanes[rows.AWAY_S + j]
     lanes[rows.AWAY_S + j] = 0.0
     return n, True
@@ -186,7 +161,7 @@ def go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
             _seek_given(j, rows.HALF, 0.5 * (lanes[rows.S + j] + lanes[rows.STOP + j]), lanes)
             return n
         if what != rows.DONE:
-            _seek_root(j, what, length, circuit, lanes)
+            _seek_root(j, what, length, lanes)
             return n
         if lanes[rows.KNOWN + j] < 0.5:
             lanes[rows.SEEKS + j] = rows.DONE

@@ -17,24 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.compiled import entry, kernel
-from adv2e.kernel import screen
+from adv2e.kernel import per_pixel, rng
+from adv2e.kernel.circuit import EXACT
 from adv2e.kernel.event_buffer import tell_where, with_room
-from adv2e.kernel.noise import fill_normals
+from adv2e.kernel.frames import load
+from adv2e.kernel.leak import leak_over
 from adv2e.kernel.stepped import events, rows, signal
 from adv2e.kernel.stepped.slew import keep_first, limit_slew
-from adv2e.kernel.tile import load
 from adv2e.kernel.work_queue import claim
-from adv2e.kernel.workspace import (
-    EXACT,
-    S_FIRST,
-    S_LEAK_FACTOR,
-    S_NOISE,
-    S_NOISE_DRAW,
-    S_ON,
-    S_REFERENCE,
-    S_SECOND,
-    S_X,
-)
 
 BLOCK = 16
 """Steps after which light and log intensity are computed anew."""
@@ -62,30 +52,51 @@ class Run(NamedTuple):
     off: NDArray[np.float64]
 
 
+class Scratch(NamedTuple):
+    """Memory of whoever works on a tile."""
+
+    strip: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    light: NDArray[np.float32]
+    pixels: NDArray[np.int64]  # numbers, within the strip, of the pixels that may fire
+
+
+def scratch() -> Scratch:
+    """Return fresh memory."""
+    return Scratch(
+        rows.scratch(),
+        rows.normals(),
+        np.zeros(rows.WIDTH, np.float32),
+        np.zeros(rows.WIDTH + 16, np.int64),
+    )
+
+
 @kernel
 def _open(lo, count, n, circuit, run, injected, state, strip):
     """Rows of a strip at the start of a run."""
     noisy, jitter = circuit.noise_rms > 0.0, circuit.leak_jitter > 0.0
     for k in range(n):
-        strip[rows.ON + k] = rows.NEVER
-        strip[rows.OFF + k] = rows.NEVER
-        strip[rows.ON_STEP + k] = rows.NEVER
-        strip[rows.OFF_STEP + k] = rows.NEVER
-        strip[rows.DUE + k] = rows.NEVER
+        strip[rows.ON + k] = per_pixel.NEVER
+        strip[rows.OFF + k] = per_pixel.NEVER
+        strip[rows.ON_STEP + k] = per_pixel.NEVER
+        strip[rows.OFF_STEP + k] = per_pixel.NEVER
+        strip[rows.DUE + k] = per_pixel.NEVER
         strip[rows.ADDED + k] = 0.0
     for k in range(count):
         i = lo + k
-        strip[rows.FIRST + k] = state[S_FIRST, i]
-        strip[rows.INPUT1 + k] = state[S_FIRST, i]
+        strip[rows.FIRST + k] = state[per_pixel.FIRST, i]
+        strip[rows.INPUT1 + k] = state[per_pixel.FIRST, i]
         if noisy:
-            strip[rows.NOISE + k] = state[S_NOISE, i]
-            strip[rows.INPUT1 + k] += state[S_NOISE, i]
-        strip[rows.SECOND + k] = state[S_SECOND, i]
+            strip[rows.NOISE + k] = state[per_pixel.NOISE, i]
+            strip[rows.INPUT1 + k] += state[per_pixel.NOISE, i]
+        strip[rows.SECOND + k] = state[per_pixel.SECOND, i]
         strip[rows.SIGNAL1 + k] = (
             strip[rows.SECOND + k] if circuit.follower > 0.0 else strip[rows.INPUT1 + k]
         )
-        strip[rows.REFERENCE + k] = state[S_REFERENCE, i]
-        strip[rows.LEAK_ON + k] = state[S_ON, i] * (state[S_LEAK_FACTOR, i] if jitter else 1.0)
+        strip[rows.REFERENCE + k] = state[per_pixel.REFERENCE, i]
+        strip[rows.LEAK_ON + k] = state[per_pixel.ON, i] * (
+            state[per_pixel.LEAK_FACTOR, i] if jitter else 1.0
+        )
         events.watch(k, i, circuit, injected, state, strip)
     if run.signal.shape[0] > 0:
         signal.add_course(n, lo, count, run.signal, 0, rows.ADDED, strip)
@@ -98,21 +109,21 @@ def _close(lo, count, draw, circuit, state, strip):
     """State of a strip at the end of a run."""
     for k in range(count):
         i = lo + k
-        state[S_X, i] = strip[rows.XB + k]
-        state[S_FIRST, i] = strip[rows.FIRST + k]
-        state[S_SECOND, i] = strip[rows.SECOND + k]
-        state[S_REFERENCE, i] = strip[rows.REFERENCE + k]
+        state[per_pixel.X, i] = strip[rows.XB + k]
+        state[per_pixel.FIRST, i] = strip[rows.FIRST + k]
+        state[per_pixel.SECOND, i] = strip[rows.SECOND + k]
+        state[per_pixel.REFERENCE, i] = strip[rows.REFERENCE + k]
         if circuit.noise_rms > 0.0:
-            state[S_NOISE, i] = strip[rows.NOISE + k]
-            state[S_NOISE_DRAW, i] = draw
+            state[per_pixel.NOISE, i] = strip[rows.NOISE + k]
+            state[per_pixel.NOISE_DRAW, i] = draw
 
 
 @kernel
 def _load_x(frames, before, share, lo, count, circuit, scratch, row):
     """Log intensity of a strip, `share` of the way from frame `before` to the next."""
-    load(frames, before, share, lo, count, 0.0, scratch.rows)
-    light = scratch.rows[screen.LIGHT_1 : screen.LIGHT_1 + count]
-    signal.log_of_light(light, circuit, scratch.stepped[row : row + count])
+    light = scratch.light[:count]
+    load(frames, before, share, lo, 0.0, light)
+    signal.log_of_light(light, circuit, scratch.strip[row : row + count])
 
 
 @kernel
@@ -146,13 +157,7 @@ def _take_piece(n, p, pieces, strip):
 
 
 @kernel
-def _next_instant(n, strip):
-    for k in range(n):
-        strip[rows.XA + k] = strip[rows.XB + k]
-
-
-@kernel
-def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, normals, strip):
+def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, second, normals, strip):
     """Signal of a strip over step m of a run, of h us, that ends at `share` of its piece."""
     if circuit.update == EXACT:
         signal.advance_light(n, share, half, circuit, strip)
@@ -175,15 +180,12 @@ def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, normals, str
         limit_slew(n, h, circuit, strip)
     if circuit.noise_rms > 0.0:
         if draw % 4 == 0 or m == 0:
-            fill_normals(circuit.seed, lo, n, draw // 4, normals)
-        lane = normals[draw % 4]
-        for k in range(n):
-            strip[rows.NORMAL + k] = lane[k]
-        signal.add_noise(n, circuit.noise_rms, strip)
+            rng.normals_of_four(circuit.seed, rng.PHOTORECEPTOR_STEPS, lo, n, draw // 4, normals)
+        signal.add_noise(n, circuit.noise_rms, normals[draw % 4], strip)
     else:
         signal.no_noise(n, strip)
     if circuit.follower > 0.0:
-        signal.second_pole(n, circuit.follower * h, circuit.update, strip)
+        signal.second_pole(n, circuit.follower * h, circuit.update != EXACT, second, strip)
         signal.take_signal(n, rows.SECOND, strip)
     else:
         signal.take_signal(n, rows.INPUT1, strip)
@@ -211,7 +213,7 @@ def _screen_step(lo, count, n, m, end, h, circuit, run, strip):
         events.step_thresholds(count, lo, run.off, m + 1, rows.OFF, rows.OFF_STEP, strip)
     elif run.off.shape[0] > 0:
         off = min(run.off[m, 0], run.off[m + 1, 0])
-    return events.screen(n, end, circuit.leak * h, circuit.photo_leak * h, on, off, strip)
+    return events.screen(n, end, leak_over(h, circuit), on, off, strip)
 
 
 @kernel
@@ -219,7 +221,7 @@ def _fire_step(
     lo, n, m, ta, h, share, t_base, circuit, run, injected, state, scratch, keys, times, number
 ):  # fmt: skip
     """Fire the events of step m of a run, which begins at ta us."""
-    strip, pixels = scratch.stepped, scratch.pixels
+    strip, pixels, leak = scratch.strip, scratch.pixels, leak_over(h, circuit)
     for c in range(events.gather(n, strip, pixels)):
         k = pixels[c]
         i = lo + k
@@ -231,9 +233,9 @@ def _fire_step(
         while not whole:
             if number + _ROOM > keys.shape[0]:
                 keys, times = with_room(keys, times, number, number + _ROOM)
-            number, whole = events.fire(
-                k, i, ta, h, levels, share, t_base, circuit, injected, state, strip, keys, times,
-                number,
+            number, whole = events.fire_step(
+                k, i, ta, h, leak, levels, share, t_base, circuit, injected, state, strip, keys,
+                times, number,
             )  # fmt: skip
     return number, keys, times
 
@@ -244,12 +246,12 @@ def _strip(
     scratch, keys, times, number,
 ):  # fmt: skip
     """Advance one strip over a run."""
-    strip = scratch.stepped
+    strip = scratch.strip
     n = -(-count // 16) * 16
     _open(lo, count, n, circuit, run, injected, state, strip)
     draw = np.int64(0)
     if circuit.noise_rms > 0.0:
-        draw = np.int64(state[S_NOISE_DRAW, lo])
+        draw = np.int64(state[per_pixel.NOISE_DRAW, lo])
     _load_x(frames, before[run.first], share[run.first], lo, count, circuit, scratch, rows.XA)
     m = np.int64(0)
     for f in range(run.first, run.last):
@@ -260,6 +262,7 @@ def _strip(
             _load_x(frames, before[f + 2], share[f + 2], lo, count, circuit, scratch, rows.AHEAD)
         _take_samples(count, begins and f == 0, last[f], last[f + 1], strip)
         h, half = length / total, 0.5 / steps
+        second = signal.second_pole_weights(circuit.follower * h, circuit.update != EXACT)
         first = run.first_step if f == run.first else 0
         stop = run.last_step if f == run.last - 1 else total
         for j in range(first, stop):
@@ -273,8 +276,8 @@ def _strip(
                 if run.drive.shape[0] > 0:
                     signal.add_course(n, lo, count, run.drive, m, rows.DRIVEN1, strip)
             _make_step(
-                lo, count, n, m, h, (r + 1) / steps, half, draw, circuit, run, scratch.normals,
-                strip,
+                lo, count, n, m, h, (r + 1) / steps, half, draw, circuit, run, second,
+                scratch.normals, strip,
             )  # fmt: skip
             ta = starts[f] + length * (j / total)
             draw += 1
@@ -284,7 +287,8 @@ def _strip(
                     keys, times, number,
                 )  # fmt: skip
             m += 1
-        _next_instant(n, strip)
+        for k in range(n):
+            strip[rows.XA + k] = strip[rows.XB + k]
     _close(lo, count, draw, circuit, state, strip)
     return number, keys, times
 

@@ -14,26 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.compiled import inlined, kernel
-from adv2e.kernel.comparator import (
-    SIGNAL_EVENT,
-    TIE,
-    emit,
-    injected_polarity,
-    next_injected,
-    use_up,
-)
-from adv2e.kernel.leak import next_leak_factor
+from adv2e.kernel import per_pixel
+from adv2e.kernel.circuit import EXACT
+from adv2e.kernel.comparator import TIE, fire
+from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
 from adv2e.kernel.stepped import rows
-from adv2e.kernel.workspace import (
-    EXACT,
-    S_BEYOND,
-    S_HOLD,
-    S_HOT_TIME,
-    S_LEAK_FACTOR,
-    S_OFF,
-    S_ON,
-    S_SHOT_TIME,
-)
 
 _THIRD = 1.0 / 3.0
 _SIXTH = 1.0 / 6.0
@@ -41,7 +26,8 @@ _NEWTON = 50
 _NOWHERE = 2.0
 _STRAIGHT = 1e-14
 """Curvature over slope that rounding gives a line."""
-ADDED_EVENT = 3
+INJECTED = 3
+"""Kind of an event from outside, beside those of noise."""
 
 
 class Injected(NamedTuple):
@@ -70,15 +56,12 @@ def injected_of(
 @kernel
 def watch(k, i, circuit, injected, state, strip):
     """Rows of the screen for pixel k of a strip, i of the state."""
-    hold = state[S_HOLD, i]
+    hold = state[per_pixel.HOLD, i]
     if hold >= 0.0:
-        on, off, due = rows.NEVER, rows.NEVER, hold
+        on, off, due = per_pixel.NEVER, per_pixel.NEVER, hold
     else:
-        on, off, due = state[S_ON, i], state[S_OFF, i], rows.NEVER
-        if circuit.shot_rate > 0.0:
-            due = min(due, state[S_SHOT_TIME, i])
-        if circuit.hot_rate > 0.0:
-            due = min(due, state[S_HOT_TIME, i])
+        on, off = state[per_pixel.ON, i], state[per_pixel.OFF, i]
+        due = next_noise(i, circuit, state)[1]
         if injected.next.shape[0] > 0 and injected.next[i] < injected.stop[i]:
             due = min(due, injected.times[injected.next[i]])
     strip[rows.ON + k] = on
@@ -99,21 +82,30 @@ def step_thresholds(count, lo, course, m, row, step_row, strip):
 
 
 @kernel
-def screen(n, end, leak, photo, on, off, strip):
+def _fall(k, on, leak, strip):
+    """Fall of the reference of pixel k over the step, and its slope at both ends [ln a step].
+
+    leak: over the step, constant part and for each DN; on: ON threshold times the leak's speed.
+    """
+    constant, per_dn = leak
+    i0, im, i1 = strip[rows.LIGHT0 + k], strip[rows.LIGHTM + k], strip[rows.LIGHT1 + k]
+    fall = on * (constant + per_dn * ((i0 + 4.0 * im + i1) * _SIXTH))
+    return fall, on * (constant + per_dn * i0), on * (constant + per_dn * i1)
+
+
+@kernel
+def screen(n, end, leak, on, off, strip):
     """Row HIT: who may fire before `end` [us]; REFERENCE: at the end of the step.
 
-    leak, photo: leak events over the step, constant part and a DN; on, off: factors on the rows of
-    thresholds.  Returns the number of those who may.
+    on, off: factors on the rows of thresholds.  Returns the number of those who may.
     """
     hits = np.int64(0)
     for k in range(n):
-        weight = strip[rows.LEAK_ON + k]
-        i0, im, i1 = strip[rows.LIGHT0 + k], strip[rows.LIGHTM + k], strip[rows.LIGHT1 + k]
-        fall = weight * (leak + photo * ((i0 + 4.0 * im + i1) * _SIXTH))
+        fall, slope0, slope1 = _fall(k, strip[rows.LEAK_ON + k], leak, strip)
         reference = strip[rows.REFERENCE + k]
         d0, d3 = strip[rows.SIGNAL0 + k] - reference, strip[rows.SIGNAL1 + k] - reference + fall
-        d1 = d0 + (strip[rows.SLOPE0 + k] + weight * (leak + photo * i0)) * _THIRD
-        d2 = d3 - (strip[rows.SLOPE1 + k] + weight * (leak + photo * i1)) * _THIRD
+        d1 = d0 + (strip[rows.SLOPE0 + k] + slope0) * _THIRD
+        d2 = d3 - (strip[rows.SLOPE1 + k] + slope1) * _THIRD
         high = d1 if d1 > d2 else d2
         high = high if high > d3 else d3
         low = d1 if d1 < d2 else d2
@@ -202,68 +194,63 @@ def first_reach(p0, p1, p2, p3, start, end):
 
 
 @inlined
-def _next_noise(i, now, t_end, circuit, injected, state):
-    """Kind and time of the next noise event of pixel i in [now, t_end); those before are lost."""
-    kind, t = next_injected(i, now, t_end, circuit, state)
+def _due_within(i, now, t_end, circuit, injected, state):
+    """Kind and time of what happens to pixel i by itself in [now, t_end); earlier ones are lost."""
+    kind, t = noise_within(i, now, t_end, circuit, state)
     if injected.next.shape[0] > 0:
         while injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < now:
             injected.next[i] += 1
         if injected.next[i] < injected.stop[i] and injected.times[injected.next[i]] < t:
-            kind, t = ADDED_EVENT, injected.times[injected.next[i]]
+            kind, t = INJECTED, injected.times[injected.next[i]]
     return kind, t
 
 
 @inlined
-def _noise_polarity(i, kind, light, circuit, injected, state):
-    """Polarity of the present noise event of pixel i, 0 where it is none; goes on to the next."""
-    if kind == ADDED_EVENT:
+def _take_due(i, kind, light, circuit, injected, state):
+    """Polarity of what happens to pixel i by itself, 0 where it is nothing; goes on to the next."""
+    if kind == INJECTED:
         polarity = 1 if injected.on[injected.next[i]] else -1
         injected.next[i] += 1
     else:
-        polarity = injected_polarity(i, kind, light, circuit, state)
-        use_up(i, kind, circuit, state)
+        polarity = take_noise(i, kind, light, circuit, state)
     return polarity
 
 
 @kernel
-def fire(
-    k, i, ta, h, levels, share, t_base, circuit, injected, state, strip, keys, times, n
+def fire_step(
+    k, i, ta, h, leak, levels, share, t_base, circuit, injected, state, strip, keys, times, n
 ):  # fmt: skip
     """Fire the events of pixel k of a strip, i of the state, in the step [ta, ta + h] us.
 
-    levels: factors on the ON threshold at both ends of the step, on OFF likewise; share: of its
-    piece that the step takes.  Returns the number of events so far, and whether there was room for
-    all; if not, the next call goes on.
+    leak: see `_fall`; levels: factors on the ON threshold at both ends of the step, on OFF
+    likewise; share: of its piece that the step takes.  Returns the number of events so far, and
+    whether there was room for all; if not, the next call goes on.
     """
     on0, on1, off0, off1 = levels
     tb = ta + h
     s = strip[rows.FROM + k]
-    on_level, off_level = state[S_ON, i], state[S_OFF, i]
+    on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
     jitter = circuit.leak_jitter > 0.0
-    factor = state[S_LEAK_FACTOR, i] if jitter else 1.0
+    factor = state[per_pixel.LEAK_FACTOR, i] if jitter else 1.0
     c0, c1, c2, c3 = _cubic(
-        strip[rows.SIGNAL0 + k],
-        strip[rows.SIGNAL1 + k],
-        strip[rows.SLOPE0 + k],
-        strip[rows.SLOPE1 + k],
-    )
-    i0, im, i1 = strip[rows.LIGHT0 + k], strip[rows.LIGHTM + k], strip[rows.LIGHT1 + k]
-    leak, photo = on_level * circuit.leak * h, on_level * circuit.photo_leak * h
-    fallen = leak + photo * ((i0 + 4.0 * im + i1) * _SIXTH)
-    _, l1, l2, l3 = _cubic(0.0, fallen, leak + photo * i0, leak + photo * i1)
+        strip[rows.SIGNAL0 + k], strip[rows.SIGNAL1 + k],
+        strip[rows.SLOPE0 + k], strip[rows.SLOPE1 + k],
+    )  # fmt: skip
+    fallen, slope0, slope1 = _fall(k, on_level, leak, strip)
+    _, l1, l2, l3 = _cubic(0.0, fallen, slope0, slope1)
     reference = strip[rows.REFERENCE + k] + factor * fallen
-    if state[S_HOLD, i] >= 0.0:
-        s = max(s, (state[S_HOLD, i] - ta) / h)
+    if state[per_pixel.HOLD, i] >= 0.0:
+        s = max(s, (state[per_pixel.HOLD, i] - ta) / h)
         reference = _at(c0, c1, c2, c3, s) + factor * _at(0.0, l1, l2, l3, s)
-        reference += state[S_BEYOND, i]
-        state[S_HOLD, i] = -1.0
+        reference += state[per_pixel.BEYOND, i]
+        state[per_pixel.HOLD, i] = -1.0
     whole = True
     while True:
         if n == keys.shape[0]:
             whole = False
             break
-        kind, t_end = _next_noise(i, ta + s * h, tb, circuit, injected, state)
-        s_end = 1.0 if kind == SIGNAL_EVENT else max(s, (t_end - ta) / h)
+        kind, t_end = _due_within(i, ta + s * h, tb, circuit, injected, state)
+        s_end = 1.0 if kind == NONE else max(s, (t_end - ta) / h)
         d0 = c0 - reference
         d1, d2, d3 = c1 + factor * l1, c2 + factor * l2, c3 + factor * l3
         up = first_reach(d0 - on_level * on0 - TIE, d1 - on_level * (on1 - on0), d2, d3, s, s_end)
@@ -274,39 +261,38 @@ def fire(
         signal_event = s_event <= 1.0
         polarity = 1 if up <= down else -1
         if not signal_event:
-            if kind == SIGNAL_EVENT:
+            if kind == NONE:
                 break
             s_event = s_end
-            light = i0 + (i1 - i0) * s_end
+            light0, light1 = strip[rows.LIGHT0 + k], strip[rows.LIGHT1 + k]
+            light = light0 + (light1 - light0) * s_end
             if circuit.update == EXACT:
                 x = strip[rows.X1 + k] - strip[rows.MOVE + k] * share * (1.0 - s_end)
                 light = _light_of(x, circuit)
-            polarity = _noise_polarity(i, kind, light, circuit, injected, state)
+            polarity = _take_due(i, kind, light, circuit, injected, state)
             if polarity == 0:
                 s = s_end
                 continue
         t = ta + s_event * h
-        n = emit(keys, times, n, t, t_base, i, 1 if polarity > 0 else 0)
+        n = fire(i, t, polarity, t_base, circuit, state, keys, times, n)
         before = factor
-        if jitter:
-            factor = next_leak_factor(i, circuit, state)
+        factor = state[per_pixel.LEAK_FACTOR, i] if jitter else 1.0
         s = s_event
         level = on_level if polarity > 0 else -off_level
         beyond = circuit.overshoot * level
         if circuit.dead_time > 0.0:
             hold = t + circuit.dead_time
             if hold >= tb:
-                state[S_HOLD, i] = hold
-                state[S_BEYOND, i] = beyond
+                state[per_pixel.HOLD, i] = hold
+                state[per_pixel.BEYOND, i] = beyond
                 break
             s = (hold - ta) / h
+        if circuit.dead_time > 0.0 or not signal_event:
             reference = _at(c0, c1, c2, c3, s) + factor * _at(0.0, l1, l2, l3, s) + beyond
-        elif signal_event:
+        else:
             level *= on0 + (on1 - on0) * s if polarity > 0 else off0 + (off1 - off0) * s
             reference += level * (1.0 + circuit.overshoot)
             reference += (factor - before) * _at(0.0, l1, l2, l3, s)
-        else:
-            reference = _at(c0, c1, c2, c3, s) + factor * _at(0.0, l1, l2, l3, s) + beyond
     strip[rows.REFERENCE + k] = reference - factor * fallen
     strip[rows.LEAK_ON + k] = factor * on_level
     if whole:

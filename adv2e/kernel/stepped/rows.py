@@ -13,12 +13,10 @@ WIDTH = 512
 
 _PADDED = WIDTH + 24  # rows must not share cache sets
 
-NEVER = 1e300
-
 (
     XA,  # log intensity at the start and at the end of an interval
     XB,
-    AHEAD,  # and at the end of the next, for the printed last interval
+    AHEAD,  # at the end of the next one, for the printed last interval
     BASE,  # continuity samples of the interval, see driver._take_samples
     STEP,
     PIECE,  # x at the start of a straight piece, and how far it goes
@@ -36,7 +34,6 @@ NEVER = 1e300
     CANDIDATE,  # the same if the slew limit played no part
     DECAY,  # of the first pole over the step
     NOISE,
-    NORMAL,
     INPUT0,  # of the second pole
     INPUT1,
     SLOPE0,  # of the signal at both ends [ln units a step]
@@ -47,19 +44,19 @@ NEVER = 1e300
     SIGNAL1,
     REFERENCE,
     LEAK_ON,  # ON threshold times the leak's speed
-    ON,  # thresholds, NEVER in the dead time
+    ON,  # thresholds, per_pixel.NEVER in the dead time
     OFF,
     ON_STEP,  # the same with factors of each pixel, the lesser of both ends of the step
     OFF_STEP,
     DUE,  # when something happens whatever the signal does [us]
     FROM,  # part of the step that is over
     HIT,
-) = range(0, 38 * _PADDED, _PADDED)
+) = range(0, 37 * _PADDED, _PADDED)
 
 
 def scratch() -> NDArray[np.float64]:
     """Return the rows of a strip."""
-    return np.zeros(38 * _PADDED)
+    return np.zeros(37 * _PADDED)
 
 
 def normals() -> NDArray[np.float64]:

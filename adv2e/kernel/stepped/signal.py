@@ -20,10 +20,10 @@ import math
 
 import numpy as np
 
-from adv2e.compiled import entry, inlined, kernel
+from adv2e.compiled import entry, kernel
 from adv2e.kernel import special
+from adv2e.kernel.circuit import EULER, PAPER, ZERO_ORDER_HOLD
 from adv2e.kernel.stepped import rows
-from adv2e.kernel.workspace import EULER, EXACT, PAPER, ZERO_ORDER_HOLD
 
 _SIXTH = 1.0 / 6.0
 _NODES, _WEIGHTS = (0.5 * v for v in np.polynomial.legendre.leggauss(12))
@@ -207,11 +207,11 @@ def no_pole(n, strip):
 
 
 @kernel
-def add_noise(n, rms, strip):
-    """Draw the photoreceptor noise at the end of the step; it is a line over the step."""
+def add_noise(n, rms, normals, strip):
+    """Make the photoreceptor noise at the end of the step of `normals`; it is a line over it."""
     for k in range(n):
         decay, before = strip[rows.DECAY + k], strip[rows.NOISE + k]
-        after = decay * before + rms * math.sqrt(1.0 - decay * decay) * strip[rows.NORMAL + k]
+        after = decay * before + rms * math.sqrt(1.0 - decay * decay) * normals[k]
         strip[rows.NOISE + k] = after
         strip[rows.INPUT0 + k] = strip[rows.INPUT1 + k]
         strip[rows.INPUT1 + k] = strip[rows.FIRST + k] + after
@@ -227,12 +227,14 @@ def no_noise(n, strip):
         strip[rows.INPUT1 + k] = strip[rows.FIRST + k]
 
 
-@inlined
+@kernel
 def second_pole_weights(b, line):
     """Return what the second pole keeps, and takes of values and slopes at its input, in a step.
 
     b is its corner times the step; with `line` the input is a line, its slopes do not count.
     """
+    if b == 0.0:
+        return 1.0, 0.0, 0.0, 0.0, 0.0
     decay = math.exp(-b)
     if line:
         mean = 1.0 - b / 2.0 + b * b / 6.0 if b < 1e-4 else -math.expm1(-b) / b
@@ -249,10 +251,9 @@ def second_pole_weights(b, line):
 
 
 @kernel
-def second_pole(n, b, update, strip):
-    """Advance row SECOND by a step; its slopes."""
-    line = update != EXACT
-    decay, w0, w1, v0, v1 = second_pole_weights(b, line)
+def second_pole(n, b, line, weights, strip):
+    """Advance row SECOND by a step; its slopes.  The others: see `second_pole_weights`."""
+    decay, w0, w1, v0, v1 = weights
     for k in range(n):
         before, in0, in1 = strip[rows.SECOND + k], strip[rows.INPUT0 + k], strip[rows.INPUT1 + k]
         after = decay * before + w0 * in0 + w1 * in1

@@ -1,7 +1,7 @@
-"""Scratch rows and the records that compiled functions share.
+"""The record of the circuit.
 
-The records are named tuples of plain arrays and numbers, of the same types whatever is switched on,
-so that switching an effect compiles nothing.
+A named tuple of plain numbers, of the same types whatever is switched on, so that switching an
+effect compiles nothing.
 """
 
 from __future__ import annotations
@@ -15,12 +15,6 @@ Array = NDArray[Any]
 
 # codes of the update forms
 EXACT, FIRST_ORDER_HOLD, ZERO_ORDER_HOLD, EULER, PAPER = range(5)
-
-NEVER = 1e300
-"""Time of what does not happen [us]."""
-
-STRIP = 2048
-"""Pixels that are screened together: their scratch rows fit the first two levels of cache."""
 
 
 class Circuit(NamedTuple):
@@ -48,36 +42,3 @@ class Circuit(NamedTuple):
     noise_rms: float  # photoreceptor noise
     noise_step: float
     seed: np.uint64
-
-
-STATE_ROWS = 17
-
-# rows of the state: one column a pixel
-(
-    S_X,  # log intensity at the last frame
-    S_LAG,  # filtered signal minus x
-    S_REFERENCE,
-    S_HOLD,  # end of the dead time [us], -1: not in it
-    S_ON,  # thresholds
-    S_OFF,
-    S_SHOT_TIME,  # next candidate [us]
-    S_SHOT_DRAW,
-    S_HOT_TIME,
-    S_HOT_DRAW,
-    S_LEAK_FACTOR,  # leak speed of this cycle
-    S_LEAK_DRAW,
-    S_NOISE,
-    S_NOISE_DRAW,
-    S_FIRST,  # signal behind the first pole, as the stepping path keeps it
-    S_SECOND,  # the same behind the second pole
-    S_BEYOND,  # where the reference goes beyond the signal at the end of the dead time
-) = range(STATE_ROWS)
-
-
-PIXEL_BITS = 27
-"""Bits of the flat pixel index in a packed event."""
-
-
-def pack_limit_us() -> int:
-    """Longest time span of packed events [us]."""
-    return 1 << (63 - PIXEL_BITS - 1)

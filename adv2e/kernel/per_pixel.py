@@ -1,0 +1,28 @@
+"""What is kept of each pixel from interval to interval: rows of the state, one column a pixel."""
+
+from __future__ import annotations
+
+NEVER = 1e300
+"""Time of what does not happen [us]."""
+
+ROWS = 17
+
+(
+    X,  # log intensity at the last frame
+    LAG,  # filtered signal minus x
+    REFERENCE,
+    HOLD,  # end of the dead time [us], -1: not in it
+    ON,  # thresholds
+    OFF,
+    SHOT_TIME,  # next candidate [us]
+    SHOT_DRAW,
+    HOT_TIME,
+    HOT_DRAW,
+    LEAK_FACTOR,  # leak speed of this cycle
+    LEAK_DRAW,
+    NOISE,
+    NOISE_DRAW,
+    FIRST,  # signal behind the first pole, as the stepping path keeps it
+    SECOND,  # the same behind the second pole
+    BEYOND,  # where the reference goes beyond the signal at the end of the dead time
+) = range(ROWS)
