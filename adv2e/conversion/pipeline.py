@@ -174,7 +174,8 @@ def convert(
     if recording.largest is not None and recording.dtype.kind == "f":
         check_white(recording.largest, recording.path, config.frames.full_scale)
     target = output or default_output(reading.path)
-    keeps_all_bits = _holds_frames(target, format)
+    name = format_name(Path(target), format)
+    keeps_all_bits = name in ("folder", "zip")  # whole recordings, to which the frames belong
     with_frames = with_frames or keeps_all_bits
     decoder = decoder_for(
         config.frames,
@@ -189,7 +190,7 @@ def convert(
     with Staging(overwrite, inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
-                target if target == "-" else Path(target),
+                target,
                 width=recording.width,
                 height=recording.height,
                 format=format,
@@ -214,7 +215,6 @@ def convert(
         if not is_compiled(config):
             log(announcement())
             if compile_apart and not user_sources(config):
-                name = "txt" if target == "-" else format_name(Path(target), format)
                 _compile_apart(recording, config, decoder.encoding, name, layout, workers)
         stated = config.frames.full_scale
         stills = reading.stills(
@@ -270,11 +270,6 @@ def _compile_apart(
         layout=layout,
         threads=threads,
     )
-
-
-def _holds_frames(target: str, format: str | None) -> bool:
-    """Tell whether the output is a whole DAVIS240C recording, to which the frames belong."""
-    return target != "-" and format_name(Path(target), format) in ("folder", "zip")
 
 
 def _doubt_of_white(recording: Source, largest: float | None, config: Config) -> str:

@@ -1,4 +1,4 @@
-"""What a sink is: it takes sorted events and frames, and leaves a finished output or none."""
+"""What events and frames go to: it leaves a finished output or none."""
 
 from __future__ import annotations
 
@@ -20,42 +20,6 @@ from adv2e.events import Events
 from adv2e.files.staging import Staging
 
 
-class Sink(ABC):
-    """Takes the events and frames of one recording, inside a ``with`` block.
-
-    Leaving the block normally finishes the output; an exception leaves no trace of it.
-
-    Attributes
-    ----------
-    wants_frames : bool
-        Whether frames are stored; if not, they are ignored.
-    """
-
-    wants_frames = False
-
-    @abstractmethod
-    def write_events(self, events: Events) -> None:
-        """Append events; over all calls they are sorted by time."""
-
-    def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:  # noqa: B027
-        """Append a frame taken at `t_ns` [ns]; over all calls sorted by time.
-
-        `image` is uint8 or uint16, (rows, columns) or (rows, columns, 3) in RGB.  It may come
-        long before the events around it.
-        """
-
-    def __enter__(self) -> Sink:
-        return self
-
-    def __exit__(  # noqa: B027
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        pass
-
-
 @dataclass(frozen=True, kw_only=True)
 class Request:
     """What is to be written, as :func:`adv2e.formats.writing.open_sink` was told."""
@@ -69,7 +33,7 @@ class Request:
 
 
 class Writer(ABC):
-    """Writes files of a format under their temporary names.
+    """Writes a format, files under their temporary names.
 
     Parameters
     ----------
@@ -102,8 +66,10 @@ class Writer(ABC):
         """Write what is left."""
 
 
-class FileSink(Sink):
-    """A sink that writes files.
+class Sink:
+    """Takes the events and frames of one recording, inside a ``with`` block.
+
+    Leaving the block normally finishes the output; an exception leaves no trace of it.
 
     Parameters
     ----------
@@ -114,13 +80,18 @@ class FileSink(Sink):
         Takes the files.
     is_alone : bool
         They come into place, or go, at the end of the sink; else with others of the `staging`.
+
+    Attributes
+    ----------
+    wants_frames : bool
+        Whether frames are stored; if not, they are ignored.
     """
 
     def __init__(
         self, writer: type[Writer], request: Request, staging: Staging, *, is_alone: bool
     ) -> None:
         self.wants_frames = request.with_frames and writer.takes_frames
-        self._path = request.path
+        self._name = "standard output" if str(request.path) == "-" else str(request.path)
         temporary = writer.stage(request.path, staging)
         self._open = self._opened(partial(writer, request), staging, temporary, is_alone)
 
@@ -142,17 +113,29 @@ class FileSink(Sink):
                 stack.close()
 
     def write_events(self, events: Events) -> None:
-        """Append events; over all calls they are sorted by time."""
+        """Append events; over all calls they are sorted by time.
+
+        Raises
+        ------
+        OutputError
+            They cannot be written, as when the disk is full.
+        BrokenPipeError
+            They go to standard output, and nobody reads them any more.
+        """
         with self._naming():
             self._writer.write_events(events)
 
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
-        """Append a frame taken at `t_ns` [ns], if frames are wanted."""
+        """Append a frame taken at `t_ns` [ns]; over all calls sorted by time.
+
+        `image` is uint8 or uint16, (rows, columns) or (rows, columns, 3) in RGB.  It may come
+        long before the events around it.
+        """
         if self.wants_frames:
             with self._naming():
                 self._writer.write_frame(t_ns, image)
 
-    def __enter__(self) -> FileSink:
+    def __enter__(self) -> Sink:
         self._writer = self._open.__enter__()
         return self
 
@@ -169,8 +152,10 @@ class FileSink(Sink):
         """Name the output in errors of the system, such as a full disk."""
         try:
             yield
+        except BrokenPipeError:
+            raise
         except OSError as error:
-            raise OutputError(f"{self._path}: cannot be written: {_reason(error)}") from error
+            raise OutputError(f"{self._name}: cannot be written: {_reason(error)}") from error
 
 
 @contextmanager
@@ -197,9 +182,3 @@ def to_json(description: dict[str, Any]) -> str:
     """Return the description as text, the same for the same content, and fit for UTF-8."""
     text = json.dumps(description, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
-
-
-def seconds_text(t_ns: int) -> str:
-    """Return a time [ns] in seconds with nine decimals, exactly."""
-    whole, rest = divmod(abs(t_ns), 1_000_000_000)
-    return f"{'-' if t_ns < 0 else ''}{whole}.{rest:09d}"

@@ -17,7 +17,7 @@ from typing import Any
 from adv2e.background import default_threads
 from adv2e.errors import UsageError
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import FileSink, Request, Sink, Writer
+from adv2e.formats.sink import Request, Sink, Writer
 
 FORMATS = {"txt": (".txt",), "zip": (".zip",), "folder": ("",), "h5": (".h5", ".hdf5")}
 """Formats by name, and the suffixes that stand for them."""
@@ -72,11 +72,11 @@ def open_sink(
     OutputError
         Unknown suffix; the output exists already, or cannot be made.
     """
-    if str(path) == "-":
-        return _standard_output(format, layout)
     path = Path(path)
     name = format_name(path, format)
     if layout is not None:
+        if str(path) == "-":
+            raise UsageError(f"--layout {layout}: standard output takes text only")
         if name != "h5":
             raise UsageError(f"--layout {layout}: only HDF5 files (.h5) have layouts")
         if layout not in LAYOUTS:
@@ -91,21 +91,15 @@ def open_sink(
         threads=threads or default_threads(),
     )
     files = Staging(overwrite) if staging is None else staging
-    return FileSink(_writer(name), request, files, is_alone=staging is None)
+    return Sink(_writer(path, name), request, files, is_alone=staging is None)
 
 
-def _standard_output(format: str | None, layout: str | None) -> Sink:
-    from adv2e.formats.text.writer import StandardOutput  # noqa: PLC0415
-
-    if layout is not None:
-        raise UsageError(f"--layout {layout}: standard output takes text only")
-    if format not in (None, "txt"):
-        raise UsageError(f"--format {format}: standard output takes txt only")
-    return StandardOutput()
-
-
-def _writer(name: str) -> type[Writer]:
+def _writer(path: Path, name: str) -> type[Writer]:
     """Return what writes a format; imported late, as each needs other libraries."""
+    if str(path) == "-":
+        from adv2e.formats.text.writer import StandardOutput  # noqa: PLC0415
+
+        return StandardOutput
     if name == "h5":
         from adv2e.formats.monash.writer import MonashWriter  # noqa: PLC0415
 
@@ -120,13 +114,17 @@ def _writer(name: str) -> type[Writer]:
 
 
 def format_name(path: Path, format: str | None) -> str:
-    """Return the format that was asked for by name, or by the path's suffix.
+    """Return the format that was asked for by name, or by the path's suffix; of "-", text.
 
     Raises
     ------
     UsageError
         There is no such format.
     """
+    if str(path) == "-":
+        if format not in (None, "txt"):
+            raise UsageError(f"--format {format}: standard output takes txt only")
+        return "txt"
     if format is not None:
         if format not in FORMATS:
             raise UsageError(f"--format {format}: unknown, must be one of {', '.join(FORMATS)}")

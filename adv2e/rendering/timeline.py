@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import Events, empty_events
-from adv2e.rendering.backlog import Backlog
+from adv2e.files.backlog import Backlog
 from adv2e.rendering.films import Album
 from adv2e.rendering.layout import Cell
 from adv2e.rendering.styles import Picture, Style, draw

@@ -29,13 +29,20 @@ from numpy.typing import NDArray
 
 from adv2e.background import OrderedWork
 from adv2e.events import Events
+from adv2e.files.backlog import Backlog
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import Request, Writer, seconds_text, to_json
-from adv2e.formats.spool import FrameSpool
+from adv2e.formats.sink import Request, Writer, to_json
 from adv2e.formats.text.writer import text_blocks
+from adv2e.sources.times.instants import NS_PER_S
 
 _BLOCK = 1 << 20  # bytes of text deflated at once: the archive must not depend on who calls how
 _LEVEL = 4  # of deflate: a fifth more bytes than level 6, in a third of its time
+
+
+def _seconds(t_ns: int) -> str:
+    """Return a time [ns] in seconds with nine decimals, exactly."""
+    whole, rest = divmod(abs(t_ns), NS_PER_S)
+    return f"{'-' if t_ns < 0 else ''}{whole}.{rest:09d}"
 
 
 def _png(image: NDArray[Any]) -> bytes:
@@ -58,7 +65,7 @@ class _Davis240cWriter(Writer):
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         """Append a frame."""
         name = f"images/frame_{len(self._lines):08d}.png"
-        self._lines.append(f"{seconds_text(t_ns)} {name}\n")
+        self._lines.append(f"{_seconds(t_ns)} {name}\n")
         ordered = image[..., ::-1] if image.ndim == 3 else image  # the colours of OpenCV
         self._store_frame(name, t_ns, np.array(ordered))
 
@@ -124,7 +131,7 @@ class ZipWriter(_Davis240cWriter):
         self._deflating = OrderedWork(min(1, request.threads - 1))
         stack.callback(self._deflating.abandon)
         self._text = bytearray()
-        self._spool = stack.enter_context(closing(FrameSpool(path.parent, self._work)))
+        self._encoded = stack.enter_context(closing(Backlog(path.parent, limit=0)))
 
     def write_events(self, events: Events) -> None:
         """Append events."""
@@ -138,7 +145,10 @@ class ZipWriter(_Davis240cWriter):
         self._deflating.submit(self._events.write, text)
 
     def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
-        self._spool.add(t_ns, _png, image)
+        def take(data: bytes) -> None:
+            self._encoded.append(t_ns, np.frombuffer(data, np.uint8))
+
+        self._work.submit(_png, image, take=take)
 
     def finish(self) -> None:
         """Write what is left, the list, the frames and the description."""
@@ -148,8 +158,9 @@ class ZipWriter(_Davis240cWriter):
         self._archive.getinfo("events.txt").external_attr = 0o644 << 16
         self._work.finish()
         self._add("images.txt", "".join(self._lines).encode("ascii"))
-        for number, frame in enumerate(self._spool):
-            self._add(f"images/frame_{number:08d}.png", frame.data, zipfile.ZIP_STORED)
+        for number in range(len(self._encoded)):
+            data = self._encoded.take().tobytes()
+            self._add(f"images/frame_{number:08d}.png", data, zipfile.ZIP_STORED)
         self._add("adv2e.json", self._description.encode())
 
     def _add(self, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:

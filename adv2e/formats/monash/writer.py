@@ -32,10 +32,10 @@ from numpy.typing import NDArray
 
 from adv2e.background import OrderedWork
 from adv2e.events import EVENT_DTYPE, Events
+from adv2e.files.backlog import Backlog
 from adv2e.formats.columns import FILTERS, ChunkedColumns, Column
 from adv2e.formats.compression import compress
 from adv2e.formats.sink import Request, Writer, to_json
-from adv2e.formats.spool import FrameSpool, StoredFrame
 
 _CACHE_BYTES = 512 << 10
 """Memory for the index of chunks and images, as HDF5 counts it, a tenth of what it takes.
@@ -57,7 +57,9 @@ class MonashWriter(Writer):
         _bound_cache(self._file)
         self._work = OrderedWork(request.threads - 1)
         stack.callback(self._work.abandon)
-        self._spool = stack.enter_context(closing(FrameSpool(path.parent, self._work)))
+        # kept aside until the events are all written: the file must not depend on how they come
+        self._encoded = stack.enter_context(closing(Backlog(path.parent, limit=0)))
+        self._shapes: list[tuple[int, ...]] = []
         pixel = np.dtype(np.int16 if max(request.width, request.height) <= 32767 else np.uint16)
         columns: dict[str, Column] = {
             "xs": (pixel, lambda events: events["x"]),
@@ -83,7 +85,12 @@ class MonashWriter(Writer):
         """Append a frame."""
         picture = _eight_bit(image)
         picture = picture[..., ::-1].copy() if picture.ndim == 3 else picture.copy()
-        self._spool.add(t_ns, compress, picture)
+        self._shapes.append(picture.shape)
+
+        def take(data: bytes) -> None:
+            self._encoded.append(t_ns, np.frombuffer(data, np.uint8))
+
+        self._work.submit(compress, picture, take=take)
         self._indices.add_frame(t_ns / 1e9)
 
     def finish(self) -> None:
@@ -91,8 +98,8 @@ class MonashWriter(Writer):
         self._columns.finish()
         self._work.finish()
         indices = self._indices.finish()
-        for number, (frame, index) in enumerate(zip(self._spool, indices, strict=True)):
-            _add_image(self._images, f"image{number:09d}", frame, index)
+        for number, (shape, index) in enumerate(zip(self._shapes, indices, strict=True)):
+            self._add_image(f"image{number:09d}", shape, index)
         self._images.attrs["num_images"] = np.int64(len(indices))
         times = self._events["ts"]
         first, last = (times[0], times[-1]) if times.size else (0.0, 0.0)
@@ -116,6 +123,16 @@ class MonashWriter(Writer):
             }
         )
 
+    def _add_image(self, name: str, shape: tuple[int, ...], event_index: int) -> None:
+        image = self._images.create_dataset(name, shape, np.uint8, chunks=shape, **FILTERS)
+        t_ns = self._encoded.time(0)
+        image.id.write_direct_chunk((0,) * len(shape), self._encoded.take().tobytes())
+        image.attrs["size"] = np.array(shape, np.int64)
+        image.attrs["timestamp"] = np.float64(t_ns / 1e9)
+        image.attrs["timestamp_ns"] = np.int64(t_ns)
+        image.attrs["type"] = "greyscale" if len(shape) == 2 else "color_bgr"
+        image.attrs["event_idx"] = np.int64(event_index)
+
 
 def _bound_cache(file: h5py.File) -> None:
     """Keep HDF5 from holding what it has written of the index of the chunks.
@@ -133,16 +150,6 @@ def _eight_bit(image: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:
     if image.dtype == np.uint8:
         return image.astype(np.uint8, copy=False)
     return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
-
-
-def _add_image(group: h5py.Group, name: str, frame: StoredFrame, event_index: int) -> None:
-    image = group.create_dataset(name, frame.shape, np.uint8, chunks=frame.shape, **FILTERS)
-    image.id.write_direct_chunk((0,) * len(frame.shape), frame.data)
-    image.attrs["size"] = np.array(frame.shape, np.int64)
-    image.attrs["timestamp"] = np.float64(frame.t_ns / 1e9)
-    image.attrs["timestamp_ns"] = np.int64(frame.t_ns)
-    image.attrs["type"] = "greyscale" if len(frame.shape) == 2 else "color_bgr"
-    image.attrs["event_idx"] = np.int64(event_index)
 
 
 class _EventIndices:

@@ -22,10 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.compiled import entry, kernel
-from adv2e.errors import OutputError
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import Request, Sink, Writer, to_json
+from adv2e.formats.sink import Request, Writer, to_json
 
 _BLOCK = 1 << 15  # events formatted at once
 _LONGEST = 48  # bytes of the longest line, and what the kernel may write beyond its end
@@ -136,29 +135,20 @@ class TextWriter(Writer):
             self._file.write(block)
 
 
-class StandardOutput(Sink):
-    """Events as text on standard output, flushed with every write."""
+class StandardOutput(Writer):
+    """Writes events as text to standard output, flushed with every write."""
 
-    def write_events(self, events: Events) -> None:
-        """Write the lines of `events`.
+    @staticmethod
+    def stage(path: Path, staging: Staging) -> list[Path]:
+        """Return no names: there are no files."""
+        return []
 
-        Raises
-        ------
-        BrokenPipeError
-            Nobody reads them any more.
-        OutputError
-            They cannot be written, as when they go to a file and the disk is full.
-        """
-        try:
-            for block in text_blocks(events):
-                sys.stdout.buffer.write(block)
-            sys.stdout.buffer.flush()
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            raise OutputError(f"standard output: cannot be written: {error.strerror}") from error
-
-    def __enter__(self) -> StandardOutput:
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
         if sys.stdout is None:  # closed before the program began: nobody reads
             raise BrokenPipeError
-        return self
+
+    def write_events(self, events: Events) -> None:
+        """Write the lines of `events`."""
+        for block in text_blocks(events):
+            sys.stdout.buffer.write(block)
+        sys.stdout.buffer.flush()

@@ -31,7 +31,7 @@ class Backlog:
     folder : Path, optional
         Where the disk has room; by default, that of the system for temporary files.
     limit : int, optional
-        Memory to take [bytes]; by default ``LIMIT_BYTES``.
+        Memory to take [bytes]; by default ``LIMIT_BYTES``; 0: all wait on disk.
     """
 
     def __init__(self, folder: Path | None = None, limit: int | None = None) -> None:
