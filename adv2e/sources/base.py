@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from adv2e.effects.frames.brightness import doubt_of_white
 from adv2e.effects.frames.encoding import encoding_of_images, full_scale_of
 from adv2e.errors import DataError, UsageError
-from adv2e.sources.times.instants import NS_PER_S, FrameRate, seconds
-from adv2e.sources.times.rates import Rate, parse_rate
+from adv2e.sources.times.instants import NS_PER_S, seconds
+from adv2e.sources.times.rates import FrameRate, Rate, parse_rate
 from adv2e.sources.times.units import UNITS
 from adv2e.ticks import check_time
 

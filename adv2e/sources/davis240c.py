@@ -23,7 +23,7 @@ from adv2e.sources.images.opencv import decode_image, read_image
 from adv2e.sources.listed import ListedSource, Picture, given_shots, told
 from adv2e.sources.stored import DESCRIPTION, MOST_BYTES, light_beside, read_light
 from adv2e.sources.times.lists import FrameList, decoded, first_name, parse_list, read_list
-from adv2e.sources.times.names import found_outside, member_of, members_of, nowhere
+from adv2e.sources.times.names import member_of, members_of
 
 LIST = "images.txt"
 
@@ -59,7 +59,8 @@ def _open_folder(path: Path, given: GivenTimes, selection: Selection) -> ListedS
         label,
         lambda member: (path / member).is_file(),
         where=f" in {path}",
-        outside=found_outside(path) if given.images_anywhere else nowhere,
+        folder=path,
+        anywhere=given.images_anywhere,
     )
     files = [path / member for member in members]
     pictures = [Picture(str(f), str(f.absolute()), partial(read_image, f)) for f in files]

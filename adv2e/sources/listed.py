@@ -18,10 +18,9 @@ from adv2e.sources.base import (
     as_pixels,
     check_values,
 )
-from adv2e.sources.times.gaps import gap_doubts
+from adv2e.sources.times.gaps import gap_doubts, numbering_doubt
 from adv2e.sources.times.lists import FrameList, read_list
 from adv2e.sources.times.names import match
-from adv2e.sources.times.numbering import numbering_doubt
 
 
 @dataclass(frozen=True)
@@ -82,19 +81,17 @@ def listed_shots(found: FrameList, label: str, pictures: Sequence[Picture], path
         A picture is missing or named twice, with the line of the list; or a list without names is
         of another length.
     """
-    others = 0
     stamps, paths = found.stamps, [p.path for p in pictures if p.path is not None]
-    if stamps[0].name is None or not paths:
-        if len(stamps) != len(pictures):
-            raise _other_number(label, len(stamps), len(pictures), path)
-        pairs = list(zip(stamps, range(len(pictures)), strict=True))
+    if stamps[0].name is not None and paths:
+        places = match(stamps, paths, label, f" in {path}")
+    elif len(stamps) == len(pictures):
+        places = list(range(len(pictures)))
     else:
-        pairs, others = match(stamps, paths, label, path)
-    shots = [Shot(stamp.t_ns, pictures[at].label, pictures[at].load) for stamp, at in pairs]
-    timed = told(found, label, shots)
-    if others:
-        timed.notes.append(f"{label}: {others} lines name images of other folders: left out")
-    return timed
+        raise _other_number(label, len(stamps), len(pictures), path)
+    pairs = zip(stamps, places, strict=True)
+    return told(
+        found, label, [Shot(s.t_ns, pictures[at].label, pictures[at].load) for s, at in pairs]
+    )
 
 
 def told(found: FrameList, label: str, shots: list[Shot]) -> Timed:

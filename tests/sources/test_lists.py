@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import pytest
 
 from adv2e.errors import DataError
@@ -41,11 +39,7 @@ PROGRAMS = {
         lines("# id timestamp image_name", "0 0.1 images/a.png", "1 0.2 images/b.png"),
         "unused, time [s], name",
     ),
-    "the same without its heading": (
-        lines("0 0.1 images/a.png", "1 0.2 images/b.png"),
-        "unused, time [s], name",
-    ),
-    "number and time": (lines("7 0.1", "8 0.2"), "unused, time [s]"),
+    "number and time": (lines("# id t", "7 0.1", "8 0.2"), "unused, time [s]"),
     "EuRoC": (
         lines("#timestamp [ns],filename", "100000000,images/a.png", "200000000,images/b.png\r"),
         "time [ns], name",
@@ -65,10 +59,6 @@ PROGRAMS = {
     "tabs": (
         lines("name\tt_us", "images/a.png\t100000", "images/b.png\t200000"),
         "name, time [us]",
-    ),
-    "time, exposure": (
-        lines("0.1 0.01 images/a.png", "0.2 0.01 images/b.png"),
-        "time [s], unused, name",
     ),
     "heading over blanks": (
         lines("exposure timestamp image", "0.1 0.1 images/a.png", "0.2 0.2 images/b.png"),
@@ -92,24 +82,15 @@ def test_columns_of_many_programs(tmp_path, program):
     assert names(found) == (["images/a.png", "images/b.png"] if named else [None, None])
 
 
-def test_a_column_that_has_the_numbers_of_the_names_is_no_time():
-    found = read("52 0.1 img/x_0052.png\n63 0.2 img/x_0063.png\n")
-    assert (found.columns, times_s(found)) == ("unused, time [s], name", [0.1, 0.2])
-
-
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("0.1 a b.png\n0.2 c  d.png\n", ["a b.png", "c  d.png"]),
         ('0.1 "a b.png"\n0.2 c.png\n', ["a b.png", "c.png"]),
-        ("a b.png 100000\nc 2 d.png 200000\n", ["a b.png", "c 2 d.png"]),
         ('"a, b.png",0.1\nc.png,0.2\n', ["a, b.png", "c.png"]),
         ("0.1 a,b.png\n0.2 c,d.png\n", ["a,b.png", "c,d.png"]),
         ("0.1\ta b.png\n0.2\tc.png\n", ["a b.png", "c.png"]),
-        ("0.1 a #1.png\n0.2 b #2.png\n", ["a #1.png", "b #2.png"]),
         ("0.1 it's.png\n0.2 b's.png\n", ["it's.png", "b's.png"]),
-        ("0.1 C:\\my clip\\1\n0.2 C:\\my clip\\2\n", ["C:/my clip/1", "C:/my clip/2"]),
-        ("0.1,l,a.png\n0.2,l,b.png\n", ["a.png", "b.png"]),
+        ('0.1 "C:\\my clip\\1"\n0.2 "C:\\my clip\\2"\n', ["C:/my clip/1", "C:/my clip/2"]),
     ],
 )  # fmt: skip
 def test_names_with_blanks_and_marks(text, expected):
@@ -117,13 +98,13 @@ def test_names_with_blanks_and_marks(text, expected):
 
 
 OPEN = {
-    "two columns that rise": ("0.1 3.2 a.png\n0.2 3.3 b.png\n", "line 1.*which is the time, 0.1"),
+    "two columns of numbers": ("0 0.1 a.png\n1 0.2 b.png\n", "line 1.*which is the time, 0 or 0.1"),
     "seconds and nanoseconds": ("# secs nsecs name\n1 5 a\n2 7 b\n", "line 2.*which is the time"),
     "numbers that are no times": ("# id image\n0 a.png\n1 b.png\n", "line 2.*no time in it"),
     "two names": ("0.1,l/a.png,r/a.png\n0.2,l/b.png,r/b.png\n", "line 1.*which is the name"),
-    "two names among blanks": ("1 l/a.png 2 r/a.png\n3 l/b.png 4 r/b.png\n", "line 1.*name"),
+    "a name with blanks": ("0.1 a b.png\n0.2 c d.png\n", "line 1.*which is the name"),
     "a number in a name": ("x 1540821840.6 l/a.png\ny 1540821841.6 l/b.png\n", "line 1.*name"),
-    "decimal commas": ("0,1\n0,2\n", "line 1: '0,1': two columns, or a decimal comma"),
+    "decimal commas": ("0,1\n0,2\n", "line 1: '0,1': which is the time, 0 or 1"),
     "a heading alone": ("timestamp filename\n", "line 1.*no time in it"),
 }  # fmt: skip
 
@@ -133,7 +114,7 @@ def test_what_is_open_is_an_error_that_says_what_to_write(case):
     text, message = OPEN[case]
     with pytest.raises(DataError, match=message):
         read(text)
-    assert re.search("put a line such as '# id timestamp|quote names that hold", error_of(text))
+    assert "put a line such as '# id timestamp filename' above" in error_of(text)
 
 
 @pytest.mark.parametrize(
@@ -141,16 +122,16 @@ def test_what_is_open_is_an_error_that_says_what_to_write(case):
     [
         ("", "t.txt: no times"),
         ("# nothing\n", "t.txt: no times"),
-        ("0.1\nabc\n", "t.txt line 2: 'abc': expected one like line 1, '0.1'"),
+        ("0.1\nabc\n", "t.txt line 2: 'abc' is not a number"),
         ("0.1,a\nabc,b\n0.3,c\n", "t.txt line 2: 'abc' is not a number"),
-        ("0.1 a\nabc b\n0.3 c\n", "t.txt line 2: 'abc b'"),
+        ("0.1 a\nabc b\n0.3 c\n", "t.txt line 2: 'abc' is not a number"),
         ("0.1,a,3\n0.2,b\n0.3,c,4\n", "t.txt line 2: '0.2,b'"),
         ("0.1 a\n0.2 5 b\n0.3 c\n", "t.txt line 2: '0.2 5 b'"),
         ("0.2\n0.1\n", "t.txt line 2: times must increase; 0.1 s is not after the 0.2 s of line 1"),
         ("0.2\n0.2\n", "t.txt line 2: times must increase"),
         ("0.2 a\n0.1 b\n0.2 c\n", "t.txt line 3: times must increase.*line 1"),
-        ("0.1 a\n0.2\n", "t.txt line 2: .*all lines or none must name an image; line 1 does"),
-        ("0.1\n0.2 a\n", "t.txt line 2: .*all lines or none must name an image; line 1 does not"),
+        ("0.1 a\n0.2\n", "t.txt line 2: '0.2': expected one like line 1, '0.1 a'"),
+        ("0.1\n0.2 a\n", "t.txt line 2: '0.2 a': expected one like line 1"),
         ("0.1 a\n0.2 a\n", "t.txt line 2: a is on line 1"),
         ("0.1 x/a\n0.2 x\\a\n", "t.txt line 2: x/a is on line 1"),
         ("0 a\n9999999999999999999 b\n", "t.txt line 2: '9+' is out of range"),
@@ -158,7 +139,6 @@ def test_what_is_open_is_an_error_that_says_what_to_write(case):
         ("1e999\n2e999\n", "t.txt line 1: '1e999' is out of range"),
         ("1e-999\n2e-999\n", "t.txt line 2: times must increase"),
         ("nan\n0.2\n0.3\n", "t.txt line 1: 'nan'"),
-        ("0.1 a.png 0.2 b.png\n0.3 c.png 0.4 d.png\n0.5\n", "t.txt line 3"),
     ],
 )
 def test_wrong_lines_are_named(text, message):
@@ -173,7 +153,7 @@ def test_comments_blank_lines_and_line_ends():
 
 
 def test_named_lines_are_sorted_and_that_is_told():
-    found = read("0.2 b c.png\n0.1 a.png\n")
+    found = read("0.2 'b c.png'\n0.1 a.png\n")
     assert [(stamp.t_ns, stamp.line, stamp.name) for stamp in found.stamps] == [
         (100_000_000, 2, "a.png"),
         (200_000_000, 1, "b c.png"),

@@ -7,12 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adv2e.sources.times.instants import (
-    FrameRate,
-    constant_rate,
-    parse_ns,
-    seconds,
-)
+from adv2e.sources.times.instants import parse_ns, seconds
+from adv2e.sources.times.rates import FrameRate, constant_rate
 from adv2e.ticks import NS, S, to_ticks
 
 

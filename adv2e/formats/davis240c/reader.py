@@ -29,7 +29,7 @@ from adv2e.sources.base import Pixels
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.times.columns import has_lines
 from adv2e.sources.times.lists import FrameList, decoded, parse_list
-from adv2e.sources.times.names import found_outside, members_of, nowhere
+from adv2e.sources.times.names import members_of
 
 EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
 
@@ -77,8 +77,7 @@ def read_folder(
     if not (path / EVENTS).is_file():
         raise DataError(f"{path}: no {EVENTS} in it; a folder must be a DAVIS240C recording")
     files = _in_folder(path)
-    outside = found_outside(path) if images_anywhere else nowhere
-    return _read(files, EVENTS, lambda names: _images(files, names), time_unit, outside)
+    return _read(files, EVENTS, lambda names: _images(files, names), time_unit, images_anywhere)
 
 
 def read_zip(path: Path, time_unit: str | None = None) -> Recording:
@@ -96,7 +95,7 @@ def read_zip(path: Path, time_unit: str | None = None) -> Recording:
             with zip_archive(path) as again:
                 yield from _images(_in_archive(path, again, top), names)
 
-        return _read(_in_archive(path, archive, top), name, images, time_unit, nowhere)
+        return _read(_in_archive(path, archive, top), name, images, time_unit)
 
 
 def _events_member(path: Path, archive: zipfile.ZipFile) -> tuple[str, str]:
@@ -119,7 +118,7 @@ def _read(
     name: str,
     images: Callable[[list[str]], Iterator[Pixels]],
     time_unit: str | None,
-    outside: Callable[[str], str | None],
+    anywhere: bool = False,
 ) -> Recording:
     builder = RecordingBuilder(files.path, time_unit)
     if files.has(DESCRIPTION):
@@ -136,7 +135,9 @@ def _read(
         if unit := builder.unit_of_frames(whole=found.whole):
             found = _listed(files, time_unit=unit) or found
         builder.problems += [f"{LIST}: {line}" for line in (found.unit.doubt, found.order) if line]
-        names = members_of(found.stamps, files.label(LIST), files.has, outside=outside)
+        folder = files.path if files.path.is_dir() else None
+        label = files.label(LIST)
+        names = members_of(found.stamps, label, files.has, folder=folder, anywhere=anywhere)
         times = np.array([stamp.t_ns for stamp in found.stamps], np.int64)
     if builder.geometry is None and names:
         rows, columns = next(images(names[:1])).image.shape[:2]

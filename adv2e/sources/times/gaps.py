@@ -1,16 +1,26 @@
-"""Gaps between frames, as a recording that was interrupted and resumed has them."""
+"""Frames that are missing: by their times, or by the numbers in their names.
+
+A recording that was interrupted and resumed has gaps between its times.  Where a rate is given in
+place of times, the numbers in the names tell.
+"""
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
+from pathlib import PurePath
 from statistics import median
 
 from adv2e.sources.times.instants import NS_PER_S, seconds
+from adv2e.sources.times.rates import FrameRate
 
 _LONG_NS = NS_PER_S
 _USUAL, _UNUSUAL = 3, 30
 """How many usual steps a long gap has at least, and one of any length."""
+_NO_NUMBERS = 1000
+"""Steps from which on numbers are times: of nanoseconds, microseconds, or decimals of seconds."""
 
 
 def gap_doubts(times_ns: Sequence[int], label: str) -> list[str]:
@@ -42,3 +52,53 @@ def gap_doubts(times_ns: Sequence[int], label: str) -> list[str]:
         f"{label}: no frame for {seconds(longest)} s between frames {number} and {number + 1}"
         f"{others}; usual are {seconds(round(usual))} s"
     ]
+
+
+def numbering_doubt(paths: Sequence[str], rate: FrameRate) -> str:
+    """Return what is to be told of frames at a constant rate whose numbers have gaps, or "".
+
+    Parameters
+    ----------
+    paths : sequence of str
+        Of the frames, in order.
+    rate : FrameRate
+        The rate that was given.
+    """
+    names = [PurePath(path).name for path in paths]
+    for before, after in pairwise(names):
+        if before != after and PurePath(before).stem == PurePath(after).stem:
+            return f"{before} and {after} differ in their endings alone, and are two frames"
+    numbers = _numbers(names)
+    steps = [after - before for before, after in pairwise(numbers)]
+    if not steps or median(steps) >= _NO_NUMBERS:
+        return ""
+    usual = Counter(steps).most_common(1)[0][0]
+    told = []
+    if usual > 1:
+        told.append(
+            f"the numbers in the frames' names are mostly {usual} apart ({names[0]}, {names[1]}):"
+            f" if all frames came at {float(rate.hz):.6g} a second, these come at"
+            f" {float(rate.hz / usual):.4g}: give --fps {rate.hz.numerator}/"
+            f"{rate.hz.denominator * usual}"
+        )
+    if missing := [at for at, step in enumerate(steps) if step > usual]:
+        at = missing[0]
+        more = f", and at {len(missing) - 1} more places" if len(missing) > 1 else ""
+        told.append(
+            f"frames are missing between {names[at]} and {names[at + 1]}{more}: --fps leaves no"
+            " room for them; --timestamps does"
+        )
+    return "; ".join(told)
+
+
+def _numbers(names: Sequence[str]) -> list[int]:
+    """Return the one number in each name that differs from name to name; [] if that is unclear."""
+    split = [re.split(r"([0-9]+)", name) for name in names]
+    if len({len(parts) for parts in split}) != 1:
+        return []
+    columns = list(zip(*split, strict=True))
+    differ = [at for at, column in enumerate(columns) if len(set(column)) > 1]
+    if len(differ) != 1 or differ[0] % 2 == 0 or max(map(len, columns[differ[0]])) > 20:
+        return []
+    numbers = [int(text) for text in columns[differ[0]]]
+    return numbers if all(before < after for before, after in pairwise(numbers)) else []

@@ -118,7 +118,7 @@ def parse_list(
         with the line's number.
     """
     table = table_of(text, label)
-    fields = table.times()
+    fields = [line.fields[table.time] for line in table.lines]
     unit = frame_unit(
         [Decimal(field) for field in fields],
         given=time_unit,

@@ -1,9 +1,15 @@
-"""Frame rates that people give: a number, or the fraction that it stands for."""
+"""Frame rates: as people give them, and those that times stand for."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
+
+import numpy as np
+
+from adv2e.sources.times.instants import NS_PER_S
 
 Rate = float | Fraction | str
 """A frame rate [Hz]: 30, 29.97, or exactly ``30000/1001``."""
@@ -12,6 +18,17 @@ _NUMBER = r"(\d{1,40}\.?\d{0,40}|\.\d{1,40})"
 _FORM = re.compile(rf"[+-]?{_NUMBER}([eE][+-]?\d{{1,2}})?(/{_NUMBER})?", re.ASCII)
 _LOWEST_HZ, _HIGHEST_HZ = Fraction(1, 10**6), 10**9
 """Beyond these, times do not fit 64 bits of nanoseconds, or frames share one."""
+
+
+@dataclass(frozen=True)
+class FrameRate:
+    """Frames at an exact, constant rate [Hz]; the first is at zero."""
+
+    hz: Fraction
+
+    def time_ns(self, number: int) -> int:
+        """Return the time [ns] of frame `number`, to the nearest nanosecond."""
+        return round(Fraction(number * NS_PER_S) / self.hz)
 
 
 def parse_rate(rate: Rate) -> Fraction:
@@ -34,3 +51,43 @@ def parse_rate(rate: Rate) -> Fraction:
     if not _LOWEST_HZ <= hz <= _HIGHEST_HZ:
         raise ValueError(f"must be from 1e-6 to 1e9 Hz, got {text}")
     return hz
+
+
+def rates_near(about: float) -> list[Fraction]:
+    """Return the usual rates within 0.2 % of one [Hz], nearest first: whole, or over 1.001."""
+    whole, broadcast = Fraction(round(about)), Fraction(round(about * 1.001) * 1000, 1001)
+    near = [hz for hz in (whole, broadcast) if hz > 0 and abs(float(hz) - about) <= 0.002 * about]
+    return sorted(near, key=lambda hz: abs(float(hz) - about))
+
+
+def constant_rate(
+    stamps_ns: Sequence[int], *, stated_hz: float, tolerance_ns: int
+) -> FrameRate | None:
+    """Return the constant frame rate that stamps rounded to a coarse clock stand for, or None.
+
+    The rates tried are the whole numbers and the whole numbers over 1.001 (24000/1001,
+    30000/1001, ...) within 0.2 % of the stated or the mean rate, nearest first, then the stated
+    rate itself.
+
+    Parameters
+    ----------
+    stamps_ns : sequence of int
+        Times of all frames, increasing [ns].
+    stated_hz : float
+        Rate that the container states; 0 if it does not.
+    tolerance_ns : int
+        How far a stamp may lie from its place at the constant rate: one tick of the clock [ns].
+    """
+    if len(stamps_ns) < 2:
+        return None
+    since_first = np.asarray(stamps_ns, dtype=np.int64) - stamps_ns[0]
+    mean_hz = (len(stamps_ns) - 1) * NS_PER_S / max(int(since_first[-1]), 1)
+    numbers = np.arange(len(stamps_ns))
+    tried = rates_near(stated_hz) + rates_near(mean_hz)
+    if stated_hz > 0:
+        tried.append(Fraction(stated_hz).limit_denominator(1001))
+    for hz in tried:
+        places = numbers * (NS_PER_S / float(hz))
+        if np.all(np.abs(since_first - places) <= tolerance_ns):
+            return FrameRate(hz)
+    return None

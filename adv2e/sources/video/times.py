@@ -16,7 +16,8 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.sources.times.instants import NS_PER_S, FrameRate, constant_rate, rates_near, seconds
+from adv2e.sources.times.instants import NS_PER_S, seconds
+from adv2e.sources.times.rates import FrameRate, constant_rate, rates_near
 from adv2e.sources.video.completeness import lost_by_count, lost_by_time
 from adv2e.sources.video.containers import Container
 from adv2e.sources.video.packets import Packets

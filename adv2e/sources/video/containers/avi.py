@@ -15,7 +15,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from adv2e.sources.times.instants import FrameRate
+from adv2e.sources.times.rates import FrameRate
 from adv2e.sources.video.containers.base import Container, cut_short
 
 _INDEX_OF_INDEXES = 0

@@ -11,7 +11,7 @@ import mmap
 import re
 from fractions import Fraction
 
-from adv2e.sources.times.instants import FrameRate
+from adv2e.sources.times.rates import FrameRate
 from adv2e.sources.video.containers.base import Container, DamagedError, cut_short
 
 MAGIC = b"YUV4MPEG2 "
