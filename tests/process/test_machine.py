@@ -55,12 +55,12 @@ def test_readers_leave_it_as_it_is(tmp_path, monkeypatch, suffix, error):
 def test_an_image_for_which_memory_is_short(monkeypatch):
     cv2 = opencv.cv2
 
-    def fail(*_):
+    def fail(*_, **__):
         error = cv2.error("Insufficient memory")
         error.code, error.err = cv2.Error.StsNoMem, "Failed to allocate 3 bytes"
         raise error
 
-    monkeypatch.setattr(cv2, "imdecode", fail)
+    monkeypatch.setattr(cv2, "imdecodeWithMetadata", fail)
     with pytest.raises(MemoryError, match=r"a\.png: Failed to allocate"):
         opencv.decode_image(b"\x89PNG", "a.png")
     monkeypatch.undo()

@@ -100,14 +100,6 @@ def with_exif(jpeg, orientation, order="<"):
     return jpeg[:2] + b"\xff\xe1" + struct.pack(">H", len(content) + 2) + content + jpeg[2:]
 
 
-def pam(rows, most, kind):
-    """Return a PAM of (rows, columns, channels) numbers."""
-    rows = np.asarray(rows)
-    header = f"P7\n# made here\nWIDTH {rows.shape[1]}\nHEIGHT {rows.shape[0]}\n"
-    header += f"DEPTH {rows.shape[2]}\nMAXVAL {most}\nTUPLTYPE {kind}\nENDHDR\n"
-    return header.encode() + rows.astype(np.uint8 if most < 256 else ">u2").tobytes()
-
-
 def webp(chunks):
     """Return the container of a WebP around chunks (name, content)."""
     body = b"".join(

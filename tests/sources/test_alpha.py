@@ -66,8 +66,6 @@ FILES = {
     "tiff of opencv": (of_opencv(".tiff", RGBA), RGB),
     "webp": (of_opencv(".webp", RGBA, cv2.IMWRITE_WEBP_QUALITY, 101), RGB),
     "bmp": (of_opencv(".bmp", RGBA), RGB),
-    "pam": (made.pam(RGBA, 255, "RGB_ALPHA"), RGB),
-    "pam of grey": (made.pam(beside(GREY, ALPHA), 255, "GRAYSCALE_ALPHA"), GREY),
 }
 
 
@@ -191,7 +189,6 @@ ENCODERS = {
     "png": lambda rgba: made.png(rgba, 6),
     "tiff": lambda rgba: made.tiff(rgba, tags=extra(UNASSOCIATED)),
     "webp": lambda rgba: of_opencv(".webp", rgba, cv2.IMWRITE_WEBP_QUALITY, 101),
-    "pam": lambda rgba: made.pam(rgba, 255, "RGB_ALPHA"),
 }
 
 

@@ -1,10 +1,14 @@
-"""What the headers of PNG, JPEG, WebP and BMP say that OpenCV does not tell.
+"""What the headers of PNG, JPEG, WebP and BMP say that OpenCV does not tell, or too late.
+
+Decoders make room for a picture first and fill it with whatever comes: a JPEG of 600 bytes became
+2.7 GB.  A picture of one colour packs well, so that a small file may hold a large one; up to the
+size of the largest sensors it is let be.
 
 References
 ----------
 .. [1] W3C, "Portable Network Graphics (PNG) Specification, third edition".
-.. [2] CIPA DC-008, "Exchangeable image file format (Exif)".
-.. [3] Google, "WebP Container Specification".
+.. [2] ITU-T T.81 (JPEG), B.2.2 (frame header).
+.. [3] Google, "WebP Container Specification" and "Specification for WebP Lossless Bitstream".
 """
 
 from __future__ import annotations
@@ -13,11 +17,15 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from adv2e.sources.images import tiff
+from adv2e.errors import DataError
 from adv2e.sources.images.alpha import Alpha
 
+FREE = 1 << 25
+"""Pixels of a picture that its file may hold in as few bytes as it likes: 8192x4096."""
+MOST = 100
+"""Pixels that one byte may stand for, of a larger one."""
+
 _GREY, _GREY_ALPHA = 0, 4
-_EXIF = b"Exif\0\0"
 _V3 = 56  # bytes of the first header of BMP that has a mask for alpha
 
 
@@ -27,8 +35,8 @@ class Header:
 
     Attributes
     ----------
-    orientation : int
-        As Exif counts it, 1 to 8, of a picture that OpenCV leaves as it is stored.
+    width, height : int
+        Zero where they are not stated, or OpenCV looks at them before it makes room.
     pictures : int
         How many are in the file.
     alpha : Alpha
@@ -41,7 +49,8 @@ class Header:
         How many bits of each number the camera gave.
     """
 
-    orientation: int = 1
+    width: int = 0
+    height: int = 0
     pictures: int = 1
     alpha: Alpha = Alpha.STRAIGHT
     grey: bool = False
@@ -55,7 +64,7 @@ def read_header(data: bytes) -> Header:
         if data.startswith(b"\x89PNG\r\n\x1a\n"):
             return _png(data)
         if data.startswith(b"\xff\xd8"):
-            return Header(orientation=_jpeg_orientation(data))
+            return _jpeg(data)
         if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
             return _webp(data)
         if data[:2] == b"BM":
@@ -66,21 +75,28 @@ def read_header(data: bytes) -> Header:
     return Header()
 
 
+def check_size(width: int, height: int, data: bytes, label: str) -> None:
+    """Raise DataError if the bytes of a file can hold no picture of this size."""
+    if width * height > max(FREE, MOST * len(data)):
+        raise DataError(
+            f"{label}: states {width}x{height} pixels in {len(data):,} bytes: damaged, or made to"
+            " fill the memory"
+        )
+
+
 def _png(data: bytes) -> Header:
-    depth, colours = data[24], data[25]
-    pictures, orientation, clear, bits = 1, 1, None, None
+    width, height, depth, colours = struct.unpack_from(">IIBB", data, 16)
+    pictures, clear, bits = 1, None, None
     for kind, content in _png_chunks(data):
         if kind == b"acTL":
             (pictures,) = struct.unpack_from(">I", content)
-        elif kind == b"eXIf":
-            orientation = tiff.orientation(content.removeprefix(_EXIF))
         elif kind == b"tRNS" and colours == _GREY:
             (clear,) = struct.unpack_from(">H", content)
             clear *= 255 // ((1 << depth) - 1) if depth < 8 else 1
         elif kind == b"sBIT" and depth == 16:
             bits = max(content[:1] if colours in (_GREY, _GREY_ALPHA) else content[:3])
     grey = colours == _GREY_ALPHA
-    return Header(orientation, max(pictures, 1), Alpha.STRAIGHT, grey, clear, bits)
+    return Header(width, height, max(pictures, 1), grey=grey, clear=clear, bits=bits)
 
 
 def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
@@ -92,31 +108,34 @@ def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
         at += 12 + size
 
 
-def _jpeg_orientation(data: bytes) -> int:
+def _jpeg(data: bytes) -> Header:
     at = 2
-    while data[at] == 0xFF:
-        marker = data[at + 1]
-        if marker == 0xFF:  # filling
+    while at >= 0:
+        while data[at] == 0xFF:  # any number of them begins a marker
             at += 1
-            continue
-        if marker in (0xD9, 0xDA):  # end, or the picture itself
-            break
-        (size,) = struct.unpack_from(">H", data, at + 2)
-        if marker == 0xE1 and data.startswith(_EXIF, at + 4):
-            return tiff.orientation(data[at + 4 + len(_EXIF) : at + 2 + size])
-        at += 2 + size
-    return 1
+        marker = data[at]
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
+            height, width = struct.unpack_from(">HH", data, at + 4)
+            return Header(width, height)
+        alone = marker in (0x00, 0x01) or 0xD0 <= marker <= 0xD9
+        at += 1 if alone else 1 + struct.unpack_from(">H", data, at + 1)[0]
+        at = data.find(b"\xff", at)
+    return Header()
 
 
 def _webp(data: bytes) -> Header:
-    at, pictures, orientation = 12, 0, 1
+    at, pictures, width, height = 12, 0, 0, 0
     while at + 8 <= len(data):
-        kind = data[at : at + 4]
-        (size,) = struct.unpack_from("<I", data, at + 4)
+        kind, size = struct.unpack_from("<4sI", data, at)
         if kind == b"ANMF":
             pictures += 1
-        elif kind == b"EXIF":
-            exif = data[at + 8 : at + 8 + size]
-            orientation = tiff.orientation(exif.removeprefix(_EXIF))
+        elif kind == b"VP8X":
+            width = 1 + int.from_bytes(data[at + 12 : at + 15], "little")
+            height = 1 + int.from_bytes(data[at + 15 : at + 18], "little")
+        elif kind == b"VP8L" and not width:
+            (bits,) = struct.unpack_from("<I", data, at + 9)
+            width, height = 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+        elif kind == b"VP8 " and not width:
+            width, height = (n & 0x3FFF for n in struct.unpack_from("<HH", data, at + 14))
         at += 8 + size + size % 2
-    return Header(orientation, max(pictures, 1))
+    return Header(width, height, max(pictures, 1))

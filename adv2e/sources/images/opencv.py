@@ -26,12 +26,11 @@ from adv2e.process.standard_error import overhearing
 from adv2e.sources.base import Image, Pixels
 from adv2e.sources.images import netpbm, tiff
 from adv2e.sources.images.alpha import Alpha, with_alpha
-from adv2e.sources.images.claims import check_claim
-from adv2e.sources.images.headers import read_header
+from adv2e.sources.images.headers import check_size, read_header
 
 IMAGE_SUFFIXES = (
-    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pbm", ".pam"),
-    *(".pfm", ".webp", ".hdr", ".exr"),
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pfm"),
+    *(".webp", ".hdr", ".exr"),
 )
 """Still images that can be read (``.exr`` with the optional package OpenEXR)."""
 
@@ -121,17 +120,18 @@ def decode_image(data: bytes, label: str) -> Pixels:
     """
     if label.lower().endswith(".exr"):
         return _decode_exr(data, label)
-    check_claim(data, label)
     if netpbm.is_netpbm(data):
         return netpbm.decode(data, label)
     if tiff.is_tiff(data):
         return _decode_tiff(data, label)
     header = read_header(data)
+    check_size(header.width, header.height, data, label)
     if header.pictures > 1:
         raise DataError(
             f"{label}: {header.pictures} pictures in it; give each frame a file of its own"
         )
-    image = upright(_decoded(data, label), header.orientation)
+    image, orientation = _decoded(data, label)
+    image = upright(image, orientation)
     colours, alpha = rgb_of(image), _fourth(image)
     if header.grey:
         colours = np.ascontiguousarray(colours[..., 0])
@@ -168,7 +168,7 @@ def _decode_tiff(data: bytes, label: str) -> Pixels:
     header = tiff.examine(data, label)
     if header is None:
         raise _unreadable(label)
-    image = _decoded(header.data, label)
+    image, _ = _decoded(header.data, label)  # upright
     colours, alpha, white = rgb_of(image), _fourth(image), header.white
     if not is_light(colours.dtype):  # its source refuses it
         return Pixels(colours)
@@ -188,12 +188,16 @@ _CUT = re.compile(
 """What libjpeg says, and fills the picture with grey.  Foreign bytes between parts do no harm."""
 
 
-def _decoded(data: bytes, label: str) -> Any:
+def _decoded(data: bytes, label: str) -> tuple[Any, int]:
+    """Return the image, and the orientation that its Exif states."""
     image: Any = None
+    orientation = 1
     if data and _is_whole(data):
         try:
             with quiet(), overhearing() as said:
-                image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+                image, kinds, contents = cv2.imdecodeWithMetadata(
+                    np.frombuffer(data, np.uint8), flags=cv2.IMREAD_UNCHANGED
+                )
                 if _CUT.search(said()):
                     image = None
         except cv2.error as error:
@@ -202,7 +206,10 @@ def _decoded(data: bytes, label: str) -> Any:
             image = None
     if image is None:
         raise _unreadable(label)
-    return image
+    for kind, content in zip(kinds, contents, strict=True):
+        if kind == cv2.IMAGE_METADATA_EXIF:
+            orientation = tiff.orientation(content.tobytes().removeprefix(b"Exif\0\0"))
+    return image, orientation
 
 
 def _unreadable(label: str) -> DataError:

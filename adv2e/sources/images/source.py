@@ -17,7 +17,20 @@ LISTS = ("images.txt", "timestamps.txt", "info.txt")
 """Lists of times that are looked for in the folder, then beside it."""
 
 _UNREAD = (
-    *(".heic", ".heif", ".avif", ".jxl", ".jp2", ".gif", ".tga", ".psd", ".dpx", ".cin"),
+    *(
+        ".heic",
+        ".heif",
+        ".avif",
+        ".jxl",
+        ".jp2",
+        ".gif",
+        ".pbm",
+        ".pam",
+        ".tga",
+        ".psd",
+        ".dpx",
+        ".cin",
+    ),
     *(".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
 )
 """Still images that are not read: they are not left out without a word."""

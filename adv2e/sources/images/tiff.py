@@ -19,10 +19,13 @@ from dataclasses import dataclass
 
 from adv2e.errors import DataError
 from adv2e.sources.images.alpha import Alpha
+from adv2e.sources.images.headers import check_size
 
+_WIDTH, _HEIGHT = 256, 257
 _KIND, _BITS, _COLOURS, _DESCRIPTION, _ORIENTATION, _SAMPLES = 254, 258, 262, 270, 274, 277
 _WHITE, _EXTRA, _FORMAT = 281, 338, 339
 _WANTED = (
+    *(_WIDTH, _HEIGHT),
     *(_KIND, _BITS, _COLOURS, _DESCRIPTION, _ORIENTATION, _SAMPLES),
     *(_WHITE, _EXTRA, _FORMAT),
 )
@@ -76,7 +79,7 @@ def examine(data: bytes, label: str) -> Tiff | None:
     Raises
     ------
     DataError
-        There are more pages, or colours that are not read.
+        There are more pages, a size that is not there, or colours that are not read.
     """
     directories = _directories(data)
     if not directories:
@@ -87,6 +90,7 @@ def examine(data: bytes, label: str) -> Tiff | None:
     if pages > 1:
         raise DataError(f"{label}: {pages} pages in it; give each frame a file of its own")
     tags = directories[0]
+    check_size(_first(tags, _WIDTH, 0), _first(tags, _HEIGHT, 0), data, label)
     bits, colours = _first(tags, _BITS, 1), _first(tags, _COLOURS, _BLACK_IS_ZERO)
     samples, floats = _first(tags, _SAMPLES, 1), _first(tags, _FORMAT, 1) == _FLOAT
     if bits > 8 and colours not in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _LOG_L, _LOG_LUV):

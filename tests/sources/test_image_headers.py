@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.sources.images import claims
-from adv2e.sources.images.claims import check_claim
+from adv2e.sources.images import headers
 from adv2e.sources.images.opencv import decode_image
 
 
@@ -66,21 +65,17 @@ def webp(width, height):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_size_is_that_which_the_decoder_finds(monkeypatch, kind):
-    monkeypatch.setattr(claims, "FREE", 0)
-    monkeypatch.setattr(claims, "MOST", 0)
+    monkeypatch.setattr(headers, "FREE", 0)
+    monkeypatch.setattr(headers, "MOST", 0)
     with pytest.raises(DataError, match=r"^a: states 50x30 pixels in "):
-        check_claim(KINDS[kind], "a")
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_whole_pictures_are_read(kind):
-    assert decode_image(KINDS[kind], f"a.{kind[:3]}") is not None
+        decode_image(KINDS[kind], "a")
 
 
 def test_a_large_picture_of_one_colour_is_read():
     for suffix in (".png", ".jpg"):
         data = cv2.imencode(suffix, np.zeros((4320, 7680), np.uint8))[1].tobytes()
-        check_claim(data, f"8k{suffix}")
+        header = headers.read_header(data)
+        headers.check_size(header.width, header.height, data, f"8k{suffix}")
 
 
 @pytest.mark.parametrize(
@@ -95,4 +90,4 @@ def test_a_size_that_is_not_there(make, size):
 @pytest.mark.parametrize("kind", KINDS)
 def test_any_part_of_a_file_may_be_missing(kind):
     for length in range(min(len(KINDS[kind]), 700)):
-        check_claim(KINDS[kind][:length], "a")
+        headers.read_header(KINDS[kind][:length])
