@@ -28,7 +28,7 @@ from adv2e.sources.times.rates import Rate
 if TYPE_CHECKING:
     from adv2e.effects.frames.encoding import LightDecoder
 
-AHEAD_BYTES = 16 << 20
+AHEAD_BYTES, AHEAD_FRAMES = 16 << 20, 256
 """Memory for frames that were decoded and not taken yet, light and what is seen of them."""
 
 EARLY_BYTES = 32 << 20
@@ -160,8 +160,10 @@ class Reading:
         source.threads = self.threads
         self._stills = _stills(source.frames(), self._decoding)
         if self.threads > 1:
-            count = max(1, AHEAD_BYTES // (8 * source.width * source.height))
-            self._stills = self._at_end.enter_context(read_ahead(self._stills, count))
+            count = AHEAD_BYTES // (8 * source.width * source.height)
+            self._stills = self._at_end.enter_context(
+                read_ahead(self._stills, min(max(1, count), AHEAD_FRAMES))
+            )
             self._at_end.callback(self._decoding.cancel)  # its thread may wait for it
         return self
 
