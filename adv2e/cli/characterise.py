@@ -89,8 +89,8 @@ def command(
       adv2e characterise latency.csv --where bias=0 --judge camera=CAM2 -o judged/
       adv2e characterise noise.csv -c v2e -o noise/
     """
-    from adv2e.diagnosis.tables.characterise import Settings, characterise
-    from adv2e.diagnosis.tables.declared import read_declared
+    from adv2e.diagnosis.tables.characterise import characterise
+    from adv2e.diagnosis.tables.problem import Settings, read_declared
     from adv2e.diagnosis.tables.table import read_table
     from adv2e.files.names import shown
     from adv2e.reports.files import check_folder, write_reports
@@ -106,7 +106,7 @@ def command(
         contrast=contrast,
         error=error,
         seed=seed,
-        tick=lambda line: log(line, 1),
+        log=lambda text: log(text, 1),
     )
     found = characterise(read_table(table), declared, settings)
     if output is not None:

@@ -23,8 +23,8 @@ from writing import one_line_errors, table
 
 from adv2e import simulate
 from adv2e.config import Config, from_dict
-from adv2e.diagnosis.tables.characterise import Settings, characterise
-from adv2e.diagnosis.tables.declared import read_declared
+from adv2e.diagnosis.tables.characterise import characterise
+from adv2e.diagnosis.tables.problem import Settings, read_declared
 from adv2e.diagnosis.tables.table import Table, parse_table
 from adv2e.errors import DataError
 from adv2e.reports.result import Diagnosis

@@ -21,9 +21,9 @@ from writing import one_line_errors, table
 
 from adv2e import simulate
 from adv2e.config import Config, load_config
-from adv2e.diagnosis.tables.characterise import Settings, characterise, problem_of
-from adv2e.diagnosis.tables.declared import read_declared
+from adv2e.diagnosis.tables.characterise import characterise, problem_of
 from adv2e.diagnosis.tables.noise_problem import NoiseProblem
+from adv2e.diagnosis.tables.problem import Settings, read_declared
 from adv2e.diagnosis.tables.table import Table, parse_table
 from adv2e.reports.result import Diagnosis
 from real.cradle import still_rates, top_share

@@ -129,6 +129,24 @@ class Candidate:
     pulse: Pulse | None = None
     of_chance: bool = False
 
+    @classmethod
+    def joined(cls, each: Sequence[Candidate]) -> Candidate:
+        """Return one of all parameters; it starts at their first starts, their second ones, ..."""
+        count = max((len(one.starts) for one in each), default=0)
+        starts = [
+            [value for one in each for value in one.starts[min(k, len(one.starts) - 1)]]
+            for k in range(count)
+        ]
+        return cls(
+            " and ".join(one.name for one in each if one.name),
+            tuple(parameter for one in each for parameter in one.parameters),
+            tuple(map(tuple, starts)),
+            tuple(pair for one in each for pair in one.extra),
+            tuple(pair for one in each for pair in one.defaults),
+            known=tuple(pair for one in each for pair in one.known_or_not),
+            pulse=next((one.pulse for one in each), None),
+        )
+
     @property
     def known_or_not(self) -> tuple[tuple[float, float], ...]:
         """What is known of every parameter besides, if only nothing."""

@@ -11,12 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.fitting.candidates import (
-    NOTHING_KNOWN,
-    Candidate,
-    FitParameter,
-    neutral_value,
-)
+from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter, neutral_value
 from adv2e.diagnosis.fitting.fit import Fitted, Fitter
 from adv2e.diagnosis.statistics.metric import Ensemble, Scale
 from adv2e.diagnosis.statistics.sampler import Sampler
@@ -184,21 +179,10 @@ class Reference:
 
     def _joined(self, fits: tuple[Fitted, ...]) -> Fitted:
         """Return one fit of all effects together, and of the keys that are not known, the last."""
-        each, free = [fit.candidate for fit in fits], self.free
-        unknown = [one.scaled(neutral_value(self.declared, one)) for one in free]
-        joint = Candidate(
-            " and ".join(one.name for one in each),
-            (*(parameter for one in each for parameter in one.parameters), *free),
-            (),
-            tuple(pair for one in each for pair in one.extra),
-            tuple(pair for one in each for pair in one.defaults),
-            known=(
-                *(pair for one in each for pair in one.known_or_not),
-                *(NOTHING_KNOWN for _ in free),
-            ),
-            pulse=next((one.pulse for one in each), None),
-        )
-        point = np.concatenate([*(fit.point for fit in fits), unknown])
+        unknown = [neutral_value(self.declared, one) for one in self.free]
+        free = Candidate("", self.free, (tuple(unknown),))
+        joint = Candidate.joined([*(fit.candidate for fit in fits), free])
+        point = np.concatenate([*(fit.point for fit in fits), free.scaled(unknown)])
         return Fitted(joint, self.declared, point, reach=_REACH)
 
     def misfit(self, state: State, view: int = BOTH) -> float:

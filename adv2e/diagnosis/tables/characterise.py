@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +10,11 @@ from numpy.typing import NDArray
 from adv2e import __version__
 from adv2e.config import to_dict
 from adv2e.config.paths import set_key
-from adv2e.diagnosis.tables.declared import Declared
 from adv2e.diagnosis.tables.latency_problem import LatencyProblem
 from adv2e.diagnosis.tables.measurements import Latencies, measurements_of
 from adv2e.diagnosis.tables.noise_problem import NoiseProblem
-from adv2e.diagnosis.tables.problem import Problem, held_rows, is_key
-from adv2e.diagnosis.tables.selection import Draws, Model, Selection, Selector
+from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, is_key
+from adv2e.diagnosis.tables.selection import FittedSet, Selection, Selector
 from adv2e.diagnosis.tables.table import Table
 from adv2e.errors import DataError
 from adv2e.files.names import shown
@@ -30,45 +27,8 @@ from adv2e.reports.result import (
     Finding,
     Interval,
     Rejected,
-    Verdict,
 )
 from adv2e.reports.wording import OF_TABLES
-
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How a table is to be characterised.
-
-    Attributes
-    ----------
-    where : sequence of str
-        ``COLUMN=VALUE``: only rows that meet all of them.
-    judge : sequence of str
-        Rows that meet all of them are kept for judging; none: each light level is held out in turn.
-    white : float, optional
-        Light that 255 DN stand for, in the table's unit; default: the highest.
-    contrast : float
-        Size of the steps [ln] where a table of latencies does not say.
-    error : float, optional
-        Relative standard error of every row; default: the table's.
-    seed : int
-        Of the drawn tables.
-    draws : int
-        How many are drawn.
-    tick : callable
-        Called with a line of progress.
-    """
-
-    where: Sequence[str] = ()
-    judge: Sequence[str] = ()
-    white: float | None = None
-    contrast: float = 1.0
-    error: float | None = None
-    seed: int = 0
-    draws: int = 199
-    tick: Callable[[str], None] = field(default=lambda line: None)
 
 
 def characterise(table: Table, declared: Declared, settings: Settings | None = None) -> Diagnosis:
@@ -89,39 +49,35 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
     """
     settings = settings or Settings()
     problem = problem_of(table, declared, settings)
-    selector = Selector(problem, settings.seed, settings.draws, settings.tick)
+    selector = Selector(problem, settings)
     chosen = selector.select()
-    draws = selector.drawn(chosen.after)
+    before, after = chosen.before, chosen.after
+    found = after.settings
+    split = "each light level held out in turn: fitted to all others, judged on it"
+    if problem.judged.any():
+        rows = f"the {problem.judged.sum()} rows where {' and '.join(settings.judge)}"
+        split = f"fitted without {rows}, judged there"
+    out_of_reach = [Rejected(*one) for one in problem.out_of_reach.items()]
     return Diagnosis(
-        verdict=cast(Verdict, chosen.verdict),
-        sentence=_sentence(chosen, problem),
+        verdict=chosen.verdict,
+        sentence=_sentence(chosen, problem, selector),
         recording=shown(table.name),
         declared=declared.name,
-        effects=_findings(chosen.after, draws, problem),
+        effects=_findings(after, selector),
         alternatives=_alternatives(chosen),
-        nuisances={
-            free.key: value
-            for free, value in zip(chosen.after.free, chosen.after.fit.values, strict=True)
-            if free in problem.nuisances
-        },
-        rejected=[
-            *(
-                Rejected(" + ".join(m.names), why, m.values, m.error / chosen.before.error)
-                for m, why in chosen.tried
-            ),
-            *(Rejected(name, why) for name, why in problem.out_of_reach.items()),
-        ],
-        errors=_errors(chosen, problem),
-        global_p_before=_number(chosen.before.p),
-        global_p_after=_number(chosen.after.p),
+        nuisances={one.key: found[one.key] for one in problem.nuisances.parameters},
+        rejected=[*chosen.rejected, *out_of_reach],
+        errors=_errors(chosen, selector),
+        global_p_before=selector.drawn(before).p,
+        global_p_after=selector.drawn(after).p,
         signatures=[],
-        curves=_curves(problem, chosen, selector.drawn(chosen.before), draws),
+        curves=_curves(chosen, selector),
         maps=[],
         detectable=[],
         masked=[],
-        split=_split(problem, settings),
+        split=split,
         notes=[*problem.notes, f"Errors of the rows: {problem.error_source}."],
-        model=found_model(declared, chosen.after, problem),
+        model=_model(declared, {**problem.neutral, **found}),
         facts={
             "rows": str(problem.measured.size),
             "light levels": str(np.unique(problem.level).size),
@@ -139,91 +95,81 @@ def problem_of(
     """Return the model of the table's chosen rows; the errors are those of `characterise`."""
     for condition in settings.where:
         table = table.kept(table.matching(condition, "--where"))
-    judged = np.ones(len(table), dtype=np.bool_)
+    judged = np.full(len(table), bool(settings.judge))
     for condition in settings.judge:
         judged &= table.matching(condition, "--judge")
-    if not settings.judge:
-        judged[:] = False
-    elif not judged.any():
+    if settings.judge and not judged.any():
         raise DataError(f"{table.name}: --judge: no row meets {' and '.join(settings.judge)}")
     data = measurements_of(table)
     problem: LatencyProblem | NoiseProblem
     if isinstance(data, Latencies):
-        problem = LatencyProblem(
-            data, declared, judged, settings.white, settings.contrast, settings.error
-        )
-        problem.check(table.name)
+        problem = LatencyProblem(data, declared, judged, settings)
     else:
-        problem = NoiseProblem(data, declared, judged, settings.white, settings.error)
-    rest = int((~problem.judged).sum())
-    if rest <= len(problem.nuisances) + 1:
+        problem = NoiseProblem(data, declared, judged, settings)
+    rest, unknown = int((~problem.judged).sum()), len(problem.nuisances.parameters)
+    if rest <= unknown + 1:
         raise DataError(
-            f"{table.name}: {rest} rows are left for fitting {len(problem.nuisances)} parameters"
-            " and an effect; that is too few"
+            f"{table.name}: {rest} rows are left for fitting {unknown} parameters and an effect;"
+            " that is too few"
         )
     return problem
 
 
-def found_model(declared: Declared, model: Model, problem: Problem) -> dict[str, Any]:
+def _model(declared: Declared, values: dict[str, float]) -> dict[str, Any]:
     """Return the declared configuration with what was fitted, as nested mappings.
 
     Keys that were not written stand as they were fitted: effects that are not found are off.
     """
     tree = to_dict(declared.config)
-    values = problem.completed(model.values)
-    for key, value in problem.neutral.items():
-        values.setdefault(key, value)
     for key, value in values.items():
         if is_key(key):
             set_key(tree, key, value)
     return tree
 
 
-def _findings(model: Model, draws: Draws, problem: Problem) -> list[Finding]:
-    intervals = _intervals(model, draws, problem)
-    found: list[Finding] = []
+def _findings(model: FittedSet, selector: Selector) -> list[Finding]:
+    intervals, values = _intervals(model, selector), model.settings
+    found: dict[str, Finding] = {}
     for effect in model.effects:
-        parameters = problem.completed({free.key: model.values[free.key] for free in effect.free})
-        inside: dict[str, Any] = {free.key: intervals[free.key] for free in effect.free}
-        same = next((one for one in found if one.name == effect.name), None)
-        if same is not None:  # two keys of one effect, added one after another
-            found.remove(same)
-            parameters = {**same.parameters, **parameters}
-            inside = {**same.interval, **inside}
-        found.append(Finding(effect.name, parameters, inside))
-    return found
-
-
-def _intervals(model: Model, draws: Draws, problem: Problem) -> dict[str, Interval]:
-    """Return 95 % intervals, widened where the model misfits by more than the stated errors."""
-    freedom = int((~problem.judged).sum()) - len(model.free)
-    factor = max(1.0, (model.fit.sum_of_squares / freedom) ** 0.5) if freedom > 0 else 1.0
-    intervals = {}
-    for k, free in enumerate(model.free):
-        low, high = np.quantile(draws.logs[:, k] - model.fit.logs[k], (0.025, 0.975))
-        at = model.fit.logs[k]
-        intervals[free.key] = (
-            float(np.exp(at + factor * min(low, 0.0))),
-            float(np.exp(at + factor * max(high, 0.0))),
+        keys = [one.key for one in effect.parameters]
+        # two keys of one effect may have been added one after another
+        same = found.pop(effect.name, Finding(effect.name, {}, {}))
+        besides = [key for key, _ in effect.extra]
+        found[effect.name] = Finding(
+            effect.name,
+            {**same.parameters, **{key: values[key] for key in (*keys, *besides)}},
+            {**same.interval, **{key: intervals[key] for key in keys}},
         )
+    return list(found.values())
+
+
+def _intervals(model: FittedSet, selector: Selector) -> dict[str, Interval]:
+    """Return 95 % intervals, widened where the model misfits by more than the stated errors."""
+    freedom = int((~selector.problem.judged).sum()) - len(model.point)
+    factor = max(1.0, (model.misfit / freedom) ** 0.5) if freedom > 0 else 1.0
+    apart = selector.drawn(model).logs - model.point
+    intervals = {}
+    for one, at, column in zip(model.joint.parameters, model.point, apart.T, strict=True):
+        low, high = np.quantile(column, (0.025, 0.975))
+        ends = at + factor * min(low, 0.0), at + factor * max(high, 0.0)
+        intervals[one.key] = float(np.exp(ends[0])), float(np.exp(ends[1]))
     return intervals
 
 
 def _alternatives(chosen: Selection) -> list[str]:
-    names: list[str] = []
-    for model in chosen.alternatives:
-        names += [n for n in model.names if n not in (*chosen.after.names, *names)]
-    return names or [" + ".join(model.names) for model in chosen.alternatives]
+    names = dict.fromkeys(name for model in chosen.alternatives for name in model.names)
+    others = [name for name in names if name not in chosen.after.names]
+    return others or [" + ".join(model.names) for model in chosen.alternatives]
 
 
-def _errors(chosen: Selection, problem: Problem) -> list[ErrorRow]:
+def _errors(chosen: Selection, selector: Selector) -> list[ErrorRow]:
+    problem, floors = selector.problem, selector.floors
     held = f"weighted root mean square of ln(measured/predicted) {problem.what}, on light held out"
-    floor = float(np.sqrt(chosen.floors.mean()))
-    rows = [_row(held, chosen.before.error, chosen.after.error, floor)]
-    levels = np.unique(problem.level[held_rows(problem)])
+    rows = [_row(held, chosen.before.error, chosen.after.error, float(np.sqrt(floors.mean())))]
+    levels = np.unique(problem.level[problem.held])
     for k, level in enumerate(levels if levels.size > 1 else ()):
         light = float(problem.light[problem.level == level][0])
-        at_level = (chosen.before.errors[k], chosen.after.errors[k], chosen.floors[k])
+        at_level = (chosen.before.errors[k], chosen.after.errors[k], floors[k])
         name = f"the same, at {light:g} {problem.light_unit}"
         rows.append(_row(name, *(float(square**0.5) for square in at_level)))
     return rows
@@ -233,24 +179,21 @@ def _row(name: str, before: float, after: float, floor: float) -> ErrorRow:
     return ErrorRow(name, Estimate(before), Estimate(after), Estimate(floor))
 
 
-def _curves(problem: Problem, chosen: Selection, before: Draws, after: Draws) -> list[Curve]:
+def _curves(chosen: Selection, selector: Selector) -> list[Curve]:
     """Return measured and predicted values over the light, a curve a group of rows."""
-    curves = []
-    for group in problem.groups:
-        rows = group.rows[np.argsort(problem.light[group.rows], kind="stable")]
-        bands = [
-            _band(problem, model, draws, rows)
-            for model, draws in ((chosen.before, before), (chosen.after, after))
-        ]
+    problem, curves = selector.problem, []
+    for title, group in problem.groups.items():
+        rows = group[np.argsort(problem.light[group], kind="stable")]
+        before, after = (_band(model, selector, rows) for model in (chosen.before, chosen.after))
         curves.append(
             Curve(
-                title=f"{problem.what.capitalize()}, {group.title}",
+                title=f"{problem.what.capitalize()}, {title}",
                 x_label=f"light [{problem.light_unit}]",
                 y_label=f"{problem.what} [{problem.unit}]",
                 x=problem.light[rows],
                 measured=np.exp(problem.measured[rows]),
-                before=bands[0],
-                after=bands[1],
+                before=before,
+                after=after,
                 x_log=True,
                 y_log=True,
             )
@@ -258,26 +201,16 @@ def _curves(problem: Problem, chosen: Selection, before: Draws, after: Draws) ->
     return curves
 
 
-def _band(problem: Problem, model: Model, draws: Draws, rows: NDArray[np.int64]) -> Band:
-    keys = [free.key for free in model.free]
-
+def _band(model: FittedSet, selector: Selector, rows: NDArray[np.int64]) -> Band:
     def at(logs: Array) -> Array:
-        values = dict(zip(keys, np.exp(logs).tolist(), strict=True))
-        return np.exp(problem.predict(values)[rows])
+        return np.exp(selector.predicted(model.joint, logs)[rows])
 
-    many = np.array([at(logs) for logs in draws.logs])
+    many = np.array([at(logs) for logs in selector.drawn(model).logs])
     low, high = np.quantile(many, (0.025, 0.975), axis=0)
-    return Band(at(model.fit.logs), low, high)
+    return Band(at(model.point), low, high)
 
 
-def _split(problem: Problem, settings: Settings) -> str:
-    if problem.judged.any():
-        rows = int(problem.judged.sum())
-        return f"fitted without the {rows} rows where {' and '.join(settings.judge)}, judged there"
-    return "each light level held out in turn: fitted to all others, judged on it"
-
-
-def _sentence(chosen: Selection, problem: Problem) -> str:
+def _sentence(chosen: Selection, problem: Problem, selector: Selector) -> str:
     names = " and ".join(dict.fromkeys(chosen.after.names))
     change = f"held-out error {chosen.before.error:.3g} before, {chosen.after.error:.3g} after"
     if chosen.verdict == "consistent":
@@ -285,7 +218,7 @@ def _sentence(chosen: Selection, problem: Problem) -> str:
     if chosen.verdict == "unexplained":
         return (
             f"Something is missing, and no effect of the library accounts for it ({change}; a"
-            f" constant: {chosen.constant:.3g})."
+            f" constant: {selector.constant:.3g})."
         )
     if chosen.verdict == "not_identifiable":
         others = " or ".join(" and ".join(model.names) for model in chosen.alternatives)
@@ -293,8 +226,3 @@ def _sentence(chosen: Selection, problem: Problem) -> str:
     if chosen.verdict == "partly_explained":
         return f"Missing: {names}; more than the errors of the table remains ({change})."
     return f"Missing: {names} ({change})."
-
-
-def _number(value: float | None) -> float:
-    assert value is not None
-    return value

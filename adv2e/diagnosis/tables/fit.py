@@ -9,7 +9,6 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,27 +19,14 @@ _STEP = 1e-5
 _MOST_STEPS = 60
 
 
-@dataclass(frozen=True)
-class Solution:
-    """What a fit found: parameters (their logarithms) and the sum of squares there."""
-
-    logs: Array
-    sum_of_squares: float
-
-    @property
-    def values(self) -> Array:
-        """The parameters themselves."""
-        return np.exp(self.logs)
-
-
 def fit(
     residuals: Callable[[Array], Array],
     starts: Iterable[Array],
     lower: Array,
     upper: Array,
     tolerance: float = 1e-8,
-) -> Solution:
-    """Return the best of the fits from several starts.
+) -> tuple[Array, float]:
+    """Return the best of the fits from several starts, and its sum of squares.
 
     Parameters
     ----------
@@ -54,13 +40,13 @@ def fit(
     """
     return min(
         (_descend(residuals, start, lower, upper, tolerance) for start in starts),
-        key=lambda found: found.sum_of_squares,
+        key=lambda found: found[1],
     )
 
 
 def _descend(
     residuals: Callable[[Array], Array], start: Array, lower: Array, upper: Array, tolerance: float
-) -> Solution:
+) -> tuple[Array, float]:
     at = np.clip(start, lower, upper)
     r = residuals(at)
     best = float(r @ r)
@@ -85,7 +71,7 @@ def _descend(
             damping *= 8.0
             if damping > 1e8:
                 break
-    return Solution(at, best)
+    return at, best
 
 
 def _slopes(residuals: Callable[[Array], Array], at: Array, r: Array, upper: Array) -> Array:

@@ -57,6 +57,8 @@ class Latencies:
 
     Attributes
     ----------
+    name : str
+        The table's.
     light : (rows,)
         In `unit`; that of the brighter side of the step.
     unit : str
@@ -71,6 +73,7 @@ class Latencies:
         Label of the biases, empty where there is no such column.
     """
 
+    name: str
     light: Array
     unit: str
     latency_us: Array
@@ -171,7 +174,9 @@ def _latencies(table: Table, column: str, light: Array, unit: str) -> Latencies:
             polarity[k] = POLARITIES[text.lower()]
     bias = table.texts("bias") if "bias" in table.columns else [""] * len(table)
     error = _standard_error(table, column) / latency
-    return Latencies(light, unit, factor * latency, error, contrast, polarity, tuple(bias))
+    return Latencies(
+        table.name, light, unit, factor * latency, error, contrast, polarity, tuple(bias)
+    )
 
 
 def _standard_error(table: Table, column: str) -> Array:

@@ -2,116 +2,171 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from adv2e.config import Config, load_config, names_of, written_keys
+from adv2e.diagnosis.fitting.candidates import Candidate
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Free:
-    """A positive number that may be fitted.
+class Settings:
+    """How a table is to be characterised.
 
     Attributes
     ----------
-    key : str
-        Its path in the configuration; or, with a bracket, what else it is.
-    starts : tuple of float
-        Where fits begin.
-    lower, upper : float
-        Borders.
+    where : sequence of str
+        ``COLUMN=VALUE``: only rows that meet all of them.
+    judge : sequence of str
+        Rows that meet all of them are kept for judging; none: each light level is held out in turn.
+    white : float, optional
+        Light that 255 DN stand for, in the table's unit; default: the highest.
+    contrast : float
+        Size of the steps [ln] where a table of latencies does not say.
+    error : float, optional
+        Relative standard error of every row; default: the table's.
+    seed : int
+        Of the drawn tables.
+    draws : int
+        How many are drawn.
+    log : callable
+        Takes lines for people.
     """
 
-    key: str
-    starts: tuple[float, ...]
-    lower: float
-    upper: float
+    where: Sequence[str] = ()
+    judge: Sequence[str] = ()
+    white: float | None = None
+    contrast: float = 1.0
+    error: float | None = None
+    seed: int = 0
+    draws: int = 199
+    log: Callable[[str], None] = lambda text: None
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """An effect that the declared model may lack, or have in the wrong size."""
+class Declared:
+    """What is known of the camera.
+
+    Attributes
+    ----------
+    name : str
+        Names of the files, for reports.
+    config : Config
+        The written keys on top of the defaults.
+    written : mapping of str to value
+        The keys that were written, by path; they are held.
+    """
 
     name: str
-    free: tuple[Free, ...]
+    config: Config
+    written: Mapping[str, Any]
+
+    def switched_off(self, section: str) -> bool:
+        """Tell whether it was written that an effect is not there."""
+        return section in self.written and self.written[section] is None
+
+    def held(self, path: str, neutral: float | None) -> float | None:
+        """Return the number written for a key; `neutral` where none is, or its section is off.
+
+        Defaults of this program are no knowledge of a camera, so that a key which is not written
+        stands for the effect being absent.
+        """
+        value = self.written.get(path)
+        return neutral if value is None else float(value)
+
+    def value(self, fitted: Mapping[str, float], path: str, neutral: float | None) -> float | None:
+        """Return what was fitted for a key, else what is :meth:`held`."""
+        return fitted[path] if path in fitted else self.held(path, neutral)
 
 
-@dataclass(frozen=True)
-class Group:
-    """Rows that make one curve over the light."""
+def read_declared(
+    files: Sequence[str | Path] = (), sets: Sequence[str] = (), seed: int | None = None
+) -> Declared:
+    """Return the declared model of configuration files and ``--set`` values.
 
-    title: str
-    rows: NDArray[np.int64]
+    Raises
+    ------
+    ConfigError, UsageError
+        As :func:`adv2e.config.load_config`.
+    """
+    config = load_config(files, sets, seed)
+    return Declared(names_of(files, sets) or "nothing", config, written_keys(files, sets))
 
 
-class Problem(Protocol):
-    """Measured values and a model of them.
+class Problem(ABC):
+    """Measured values, n in all, and a model of them.
 
     Attributes
     ----------
-    measured : (n,)
-        Natural logarithms.
-    error : (n,)
-        Their standard errors.
-    error_source : str
-        Where those come from.
-    level : (n,) of int
-        Number of the light level.
-    light : (n,)
-    judged : (n,) of bool
-        Kept for judging, never fitted.
-    nuisances : tuple of Free
-        Always fitted.
-    candidates : tuple of Candidate
+    what, unit : str
+        What is measured.
     out_of_reach : mapping of str to str
         Effects that cannot act on such a table, and why.
-    what, unit, light_unit : str
-        What is measured.
-    groups : tuple of Group
-    notes : tuple of str
+    measured, error : (n,)
+        Natural logarithms, and their standard errors.
+    error_source : str
+        Where those come from.
+    light : (n,)
+        In `light_unit`; `white` of it is 255 DN.
+    level : (n,) of int
+        Number of the light level.
+    judged : (n,) of bool
+        Kept for judging, never fitted.
+    groups : mapping of str to arrays of int
+        Rows that make one curve over the light, by its title.
+    nuisances : Candidate
+        Keys that are always fitted; in a name with a bracket, what is no key of the configuration.
+    candidates : list of Candidate
+    neutral : mapping of str to float
+        Keys that this model has at a value other than the default, where not written.
+    notes : list of str
     """
 
+    what: ClassVar[str]
+    unit: ClassVar[str]
+    out_of_reach: ClassVar[Mapping[str, str]]
     measured: Array
     error: Array
     error_source: str
     level: NDArray[np.int64]
-    light: Array
-    judged: NDArray[np.bool_]
-    nuisances: tuple[Free, ...]
-    candidates: tuple[Candidate, ...]
-    out_of_reach: Mapping[str, str]
-    what: str
-    unit: str
-    light_unit: str
-    groups: tuple[Group, ...]
-    notes: tuple[str, ...]
+    groups: dict[str, NDArray[np.int64]]
+    nuisances: Candidate
+    candidates: list[Candidate]
+    neutral: dict[str, float]
+    notes: list[str]
 
-    def predict(self, values: Mapping[str, float]) -> Array:
-        """Return the logarithms that the model predicts, (n,), finite."""
+    def __init__(
+        self, declared: Declared, light: Array, unit: str, judged: NDArray[np.bool_], white: float
+    ) -> None:
+        self.declared, self.light, self.light_unit, self.white = declared, light, unit, white
+        self.judged = judged
+        self.level = np.unique(light, return_inverse=True)[1].astype(np.int64)
 
     @property
-    def neutral(self) -> Mapping[str, float]:
-        """Keys that this model has at a value other than the default, where not written."""
+    def held(self) -> NDArray[np.bool_]:
+        """Rows that errors are told of: those kept for judging, or else all, (n,)."""
+        return self.judged if self.judged.any() else ~self.judged
 
-    def completed(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return keys that were fitted with those which go with them and cannot be told."""
+    @abstractmethod
+    def predict(self, values: Mapping[str, float]) -> Array:
+        """Return the logarithms that the model with fitted values predicts, (n,), finite."""
+
+    def _number(self, values: Mapping[str, float], key: str) -> float:
+        """Return what is fitted or held of a key; nothing stands for none."""
+        return self.declared.value(values, key, 0.0) or 0.0
 
 
 def is_key(name: str) -> bool:
-    """Tell whether what is fitted is a key of the configuration, not something else of the table.
-
-    `name`: as :attr:`Free.key` has it.
-    """
+    """Tell whether a nuisance is a key of the configuration, not something else of the table."""
     return "[" not in name
-
-
-def held_rows(problem: Problem) -> NDArray[np.bool_]:
-    """Return which rows errors are told of: those kept for judging, or else all, (n,)."""
-    return problem.judged if problem.judged.any() else ~problem.judged
 
 
 def row_errors(
@@ -160,8 +215,3 @@ def row_errors(
         errors = np.where(known, errors, other)
         sources.append(source)
     return errors, "; ".join(sources)
-
-
-def levels_of(light: Array) -> NDArray[np.int64]:
-    """Return the number of the light level of each row, from 0, (n,)."""
-    return np.unique(light, return_inverse=True)[1].astype(np.int64)

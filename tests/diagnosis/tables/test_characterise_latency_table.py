@@ -12,10 +12,10 @@ from scipy.optimize import brentq
 
 from adv2e.cli import main
 from adv2e.config import load_config
-from adv2e.diagnosis.tables.characterise import Settings, characterise, problem_of
-from adv2e.diagnosis.tables.declared import read_declared
+from adv2e.diagnosis.tables.characterise import characterise, problem_of
 from adv2e.diagnosis.tables.latency import first_crossing
 from adv2e.diagnosis.tables.measurements import measurements_of
+from adv2e.diagnosis.tables.problem import Settings, read_declared
 from adv2e.diagnosis.tables.selection import Selector
 from adv2e.diagnosis.tables.table import parse_table
 from adv2e.errors import DataError
@@ -288,8 +288,8 @@ def test_floors_are_what_the_errors_of_the_rows_make_of_the_true_model():
         measured = table(latency, light, 0.0, latency_error_us=relative * latency)
         sets = [f"pixel.low_pass.cutoff_hz={CUTOFF_HZ}", "pixel.low_pass.dark_cutoff_hz=0"]
         problem = problem_of(measured, read_declared([], sets), Settings())
-        selector = Selector(problem, seed=0, draws=1)
-        squares.append(selector.model(()).errors)
+        selector = Selector(problem, Settings(draws=1))
+        squares.append(selector.fitted(()).errors)
         floors.append(selector.floors)
     low, high = (np.quantile(np.sqrt(floors), q) for q in (0.05, 0.95))
     assert high > 5 * low
