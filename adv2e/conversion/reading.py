@@ -22,7 +22,8 @@ from adv2e.effects.frames.brightness import check_floats, check_light
 from adv2e.errors import Adv2eError, DataError
 from adv2e.light.pictures import picture_of
 from adv2e.sources import open_source
-from adv2e.sources.base import Frame, Source
+from adv2e.sources.base import Source
+from adv2e.sources.frame import Frame
 from adv2e.sources.times.rates import Rate
 
 if TYPE_CHECKING:

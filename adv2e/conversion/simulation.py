@@ -37,7 +37,7 @@ from adv2e.light.intervals import Intervals, Part
 from adv2e.pixel import array as pixel
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
-from adv2e.sources.base import check_values
+from adv2e.sources.frame import check_values
 from adv2e.ticks import check_time
 
 

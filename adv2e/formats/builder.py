@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from adv2e.events import EVENT_DTYPE, Events, empty_events, sort_events
 from adv2e.formats.recording import Recording, described_geometry
-from adv2e.sources.base import Image, Pixels
+from adv2e.sources.frame import Image, Pixels
 from adv2e.sources.times.instants import seconds
 from adv2e.sources.times.units import SETTLED, Unit, event_unit
 

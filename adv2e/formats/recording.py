@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import Events
-from adv2e.sources.base import RECORDED, Frame, Image, Light, Pixels, as_pixels, odd_white
+from adv2e.sources.frame import RECORDED, Frame, Image, Light, Pixels, as_pixels, odd_white
 from adv2e.sources.stored import light_stored
 
 MOST_COLUMNS = 1 << 16

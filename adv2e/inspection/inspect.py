@@ -17,7 +17,7 @@ from adv2e.formats.reading import Recording, read_recording
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
 from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
-from adv2e.sources.base import Light
+from adv2e.sources.frame import Light
 from adv2e.sources.times.rates import Rate
 
 EVENTS = "events.txt"

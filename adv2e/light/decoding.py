@@ -11,7 +11,7 @@ from adv2e.config.model import Frames, Sampling
 from adv2e.effects.composition import changes_light
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.effects.hooks import Hooks
-from adv2e.sources.base import Light
+from adv2e.sources.frame import Light
 
 
 def encoding_for(frames: Frames, auto: str) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
-from adv2e.sources.base import Frame
+from adv2e.sources.frame import Frame
 
 
 def _stays(dtype: DTypeLike, eight_bit: bool) -> bool:

@@ -7,8 +7,10 @@ from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.files.regular import check_ends
-from adv2e.sources.base import Frame, GivenTimes, Selection, Source
+from adv2e.sources.base import Source
+from adv2e.sources.frame import Frame
 from adv2e.sources.times.rates import Rate
+from adv2e.sources.wanted import GivenTimes, Selection
 
 __all__ = ["Frame", "Source", "open_source"]
 

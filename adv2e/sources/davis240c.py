@@ -18,12 +18,13 @@ from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
 from adv2e.files.zips import UNREADABLE, open_member
-from adv2e.sources.base import RECORDED, GivenTimes, Light, Pixels, Selection, Shot
+from adv2e.sources.frame import RECORDED, Light, Pixels, Shot
 from adv2e.sources.images.opencv import decode_image, read_image
 from adv2e.sources.listed import ListedSource, Picture, given_shots, told
 from adv2e.sources.stored import DESCRIPTION, MOST_BYTES, light_beside, read_light
 from adv2e.sources.times.lists import FrameList, decoded, first_name, parse_list, read_list
 from adv2e.sources.times.names import member_of, members_of
+from adv2e.sources.wanted import GivenTimes, Selection
 
 LIST = "images.txt"
 

@@ -7,20 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adv2e.errors import DataError
-from adv2e.sources.base import (
-    GivenTimes,
-    Image,
-    Light,
-    Pixels,
-    Selection,
-    Shot,
-    Source,
-    as_pixels,
-    check_values,
-)
+from adv2e.sources.base import Source
+from adv2e.sources.frame import Light, Pixels, Shot, check_values
 from adv2e.sources.times.gaps import gap_doubts, numbering_doubt
 from adv2e.sources.times.lists import FrameList, read_list
 from adv2e.sources.times.names import match
+from adv2e.sources.wanted import GivenTimes, Selection
 
 
 @dataclass(frozen=True)
@@ -29,7 +21,7 @@ class Picture:
 
     label: str
     path: str | None
-    load: Callable[[], Image | Pixels]
+    load: Callable[[], Pixels]
 
 
 @dataclass(frozen=True)
@@ -147,7 +139,7 @@ class ListedSource(Source):
         self.notes += timed.notes
         self._count()
         self.doubts += gap_doubts([shot.t_ns for shot in shots], str(path))
-        first = as_pixels(shots[0].load())
+        first = shots[0].load()
         self._describe(first, shots[0].label, light)
         check_values(first.image, shots[0].label)
         self.largest = float(first.image.max())
@@ -165,7 +157,7 @@ class ListedSource(Source):
             assert self.largest is not None
             if self.largest and not self.doubt_of_white(self.largest):
                 break
-            self.largest = max(self.largest, float(as_pixels(shot.load()).image.max()))
+            self.largest = max(self.largest, float(shot.load().image.max()))
 
     def _count(self) -> None:
         if len(self._shots) < 2:

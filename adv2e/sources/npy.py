@@ -1,6 +1,6 @@
 """Stacks of frames in a ``.npy`` file: (frames, rows, columns) or (frames, rows, columns, 3) RGB.
 
-Frames are read one by one.  Times come from the command line or from beside the file:
+Times come from the command line or from beside the file:
 ``<stem>_ts.npy`` or ``<stem>.timestamps.txt`` (one time a line).
 """
 
@@ -19,15 +19,13 @@ from numpy.typing import NDArray
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
 from adv2e.files.npy import Header, read_array, read_header
-from adv2e.sources.base import GivenTimes, Image, Light, Selection
+from adv2e.sources.frame import Light, Pixels
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
 from adv2e.sources.times.instants import Stamp
 from adv2e.sources.times.lists import FrameList, read_list
 from adv2e.sources.times.units import frame_unit
+from adv2e.sources.wanted import GivenTimes, Selection
 from adv2e.ticks import NS, to_ticks
-
-_BLOCK_BYTES = 16 << 20
-"""Memory for frames whose pixels are strewn over the file."""
 
 _LIGHT = Light("linear", "a .npy stack")
 
@@ -83,7 +81,7 @@ def _open_stack(path: Path) -> _Stack:
 
 
 class _Stack:
-    """The frames of a file, read one by one.
+    """The frames of a file, read one by one, or all at once where their pixels lie apart.
 
     Not through a mapping: what was read of it would count as memory of this process, and a file
     that is cut short meanwhile would end the program.
@@ -92,56 +90,31 @@ class _Stack:
     def __init__(self, path: Path, header: Header) -> None:
         self.count, *self._shape = header.shape
         self._path, self._header = path, header
-        self._pixels = math.prod(self._shape)
-        self._block: tuple[range, NDArray[Any]] = range(0), np.empty(0)
+        self._whole: NDArray[Any] | None = None
 
-    def read(self, number: int) -> Image:
+    def read(self, number: int) -> Pixels:
         """Return a frame in the machine's byte order; DataError if it is not there."""
         header, label = self._header, f"{self._path}: frame {number}"
         try:
             if header.fortran:
-                image = self._strewn(number, label)
+                if self._whole is None:
+                    self._whole = _read_whole(self._path)
+                image = self._whole[number]
             else:
-                image = self._run(number * self._pixels, self._pixels, label)
+                size = math.prod(self._shape)
+                begin = header.begin + number * size * header.dtype.itemsize
+                image = np.fromfile(self._path, header.dtype, size, offset=begin)
+                if image.size < size:
+                    raise DataError(f"{label}: cut short while it was read")
         except OSError as error:
             raise DataError(f"{label}: {error.strerror or error}") from error
-        shaped = image.reshape(self._shape, order="F" if header.fortran else "C")
-        return np.require(shaped, header.dtype.newbyteorder("="), ["C"])
+        native = header.dtype.newbyteorder("=")
+        return Pixels(np.require(image.reshape(self._shape), native, ["C"]))
 
-    def _run(self, first: int, count: int, label: str) -> NDArray[Any]:
-        dtype = self._header.dtype
-        found = np.fromfile(
-            self._path, dtype, count, offset=self._header.begin + first * dtype.itemsize
-        )
-        if found.size < count:
-            raise DataError(f"{label}: cut short while it was read")
-        return found
 
-    def _strewn(self, number: int, label: str) -> NDArray[Any]:
-        """Return a frame whose pixels lie apart, each beside the same one of other frames."""
-        held, block = self._block
-        if number not in held:
-            nbytes = self._pixels * self._header.dtype.itemsize
-            together = max(1, min(self.count, _BLOCK_BYTES // nbytes))
-            held = range(number, min(number + together, self.count))
-            block = np.empty((len(held), self._pixels), self._header.dtype)
-            if len(held) == self.count:
-                block[:] = self._run(0, block.size, label).reshape(self._pixels, -1).T
-            else:
-                self._gather(held, block, label)
-            self._block = held, block
-        image: NDArray[Any] = block[number - held.start]
-        return image
-
-    def _gather(self, frames: range, block: NDArray[Any], label: str) -> None:
-        size = self._header.dtype.itemsize
-        with self._path.open("rb", buffering=0) as file:
-            for pixel in range(self._pixels):
-                file.seek(self._header.begin + (pixel * self.count + frames.start) * size)
-                found = np.frombuffer(file.read(len(frames) * size), np.uint8)
-                if found.size < len(frames) * size:
-                    raise DataError(f"{label}: cut short while it was read")
-                block[:, pixel] = found.view(self._header.dtype)
+def _read_whole(path: Path) -> NDArray[Any]:
+    with path.open("rb") as file:
+        return read_array(file, os.fstat(file.fileno()).st_size, str(path))
 
 
 def _found_times(path: Path) -> Path | None:
@@ -153,8 +126,7 @@ def _read_times(file: Path, given: GivenTimes) -> FrameList:
     if file.suffix != ".npy":
         return read_list(file, time_unit=given.time_unit)
     try:
-        with file.open("rb") as opened:
-            times = read_array(opened, os.fstat(opened.fileno()).st_size, str(file))
+        times = _read_whole(file)
     except OSError as error:
         raise DataError(f"{file}: {error.strerror or error}") from error
     if times.ndim != 1 or times.dtype.kind not in "iuf" or times.dtype.itemsize < 8:

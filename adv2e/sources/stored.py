@@ -13,7 +13,7 @@ from typing import Any
 
 from adv2e.effects.frames.encoding import check_encoding
 from adv2e.errors import ConfigError, DataError
-from adv2e.sources.base import Light
+from adv2e.sources.frame import Light
 
 DESCRIPTION = "adv2e.json"
 """The file beside a recording that says how it was made."""

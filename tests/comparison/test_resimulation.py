@@ -6,7 +6,7 @@ import pytest
 from adv2e.comparison import resimulation
 from adv2e.config import from_dict
 from adv2e.events import make_events
-from adv2e.sources.base import Frame
+from adv2e.sources.frame import Frame
 
 
 @pytest.fixture

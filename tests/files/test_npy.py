@@ -79,31 +79,13 @@ def test_files_cut_short(length):
         read(stored(np.arange(8.0))[:length])
 
 
-@pytest.mark.parametrize("together", [1, 3, 100])
 @pytest.mark.parametrize("colour", [False, True])
-def test_frames_strewn_over_the_file_come_in_any_order(tmp_path, monkeypatch, together, colour):
+def test_frames_strewn_over_the_file_come_in_any_order(tmp_path, colour):
     shape = (11, 5, 7, 3) if colour else (11, 5, 7)
     stack = np.random.default_rng(0).random(shape).astype(">f4", order="F")
     np.save(tmp_path / "a.npy", np.asfortranarray(stack))
-    monkeypatch.setattr("adv2e.sources.npy._BLOCK_BYTES", together * stack[0].nbytes)
     source = open_source(tmp_path / "a.npy", fps=10)
     for _ in range(2):
         frames = list(source.frames())
         assert all(np.array_equal(f.image, image) for f, image in zip(frames, stack, strict=True))
         assert all(frame.image.dtype == np.float32 for frame in frames)
-
-
-@pytest.mark.parametrize("together", [1, 100])
-def test_a_strewn_file_cut_short_while_it_is_read(tmp_path, monkeypatch, together):
-    path = tmp_path / "a.npy"
-    np.save(path, np.zeros((50, 40, 40), np.uint8, order="F"))
-    monkeypatch.setattr("adv2e.sources.npy._BLOCK_BYTES", together * 1600)
-    source = open_source(path, fps=100)
-    with path.open("r+b") as file:
-        file.truncate(path.stat().st_size // 2)
-    found = source.frames()
-    with pytest.raises(DataError, match=r"a\.npy: frame \d+: cut short while it was read"):
-        for _ in range(50):
-            next(found)
-            monkeypatch.setattr("adv2e.sources.npy._BLOCK_BYTES", 1600)
-            source._shots[1].load.func.__self__._block = range(0), np.empty(0)

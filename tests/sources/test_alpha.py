@@ -13,7 +13,7 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.formats.reading import read_recording
 from adv2e.sources import open_source
-from adv2e.sources.base import OVER_BLACK
+from adv2e.sources.frame import OVER_BLACK
 from adv2e.sources.images.opencv import decode_image
 
 RGB = np.array([[[50, 25, 0], [200, 100, 7]], [[50, 25, 0], [255, 255, 255]]], np.uint8)

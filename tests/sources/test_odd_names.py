@@ -98,7 +98,8 @@ def test_lists_name_images_by_what_they_are_called(write_images, picture, odd):
     lines = []
     for n, image in enumerate(sorted(plain.iterdir())):
         shutil.copy(image, folder / f"{name}.{2 - n}.png")
-        lines.append(f"0.{n} {name}.{2 - n}.png\n")
+        mark = '"' if " " in name else ""
+        lines.append(f"0.{n} {mark}{name}.{2 - n}.png{mark}\n")
     (folder / "images.txt").write_bytes(os.fsencode("".join(lines)))
     expected = times_and_images(open_source(plain, fps=10))
     assert times_and_images(open_source(folder)) == expected

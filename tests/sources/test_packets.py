@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from adv2e.sources.video.packets import Jump, arranged, list_packets
+from adv2e.sources.video.packets import Jump, arranged, read_packets
 
 MS = 10**6
 
@@ -39,8 +39,10 @@ def test_no_pictures():
 
 def test_pictures_of_a_file_are_counted(write_video, picture, tmp_path):
     path = write_video("clip.avi", [picture(n, (32, 32, 3)) for n in range(7)], 25, "mp4v")
-    found = list_packets(str(path))
+    stream, found = read_packets(str(path), 32, listed=False)
+    assert (stream.codec, stream.clear, stream.interlaced) == ("MPEG-4", True, False)
     assert found.known_ns == [40 * MS * n for n in range(7)]
     assert (found.count, found.complete) == (7, True)
     (tmp_path / "none.avi").write_bytes(b"nothing")
-    assert list_packets(str(tmp_path / "none.avi")).count == 0
+    assert read_packets(str(tmp_path / "none.avi"), 0, listed=False)[1].count == 0
+    assert read_packets(str(path), 32, listed=True) == (stream, None)

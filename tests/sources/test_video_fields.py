@@ -62,7 +62,8 @@ def test_interlaced_pictures_are_those_in_the_file(tmp_path, name):
 def test_interlaced_video_is_refused_without_pyav(tmp_path, name, monkeypatch):
     path = written(tmp_path, name)
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(MissingExtraError, match=r"interlaced.*adv2e\[video\]"):
+    why = "its codec" if name in ("prores.mov", "dv.avi") else "interlaced"
+    with pytest.raises(MissingExtraError, match=rf"{why}.*adv2e\[video\]"):
         open_source(path)
 
 
@@ -139,7 +140,7 @@ def test_frames_that_are_timed_as_fields_are_those_in_the_file(tmp_path, monkeyp
     ("codec", "pixels"),
     [
         *(("libx264", "yuv420p"), ("mpeg2video", "yuv420p"), ("mpeg4", "yuv420p")),
-        *(("ffv1", "yuv420p"), ("libx264", "yuv422p")),
+        *(("libx264", "yuv422p"),),
         *(("mjpeg", "yuvj422p"), ("huffyuv", "yuv422p")),
     ],
 )

@@ -25,7 +25,7 @@ from adv2e.files.zips import open_member, zip_archive
 from adv2e.formats.builder import RecordingBuilder
 from adv2e.formats.recording import Recording
 from adv2e.formats.text.reader import read_lines
-from adv2e.sources.base import Pixels
+from adv2e.sources.frame import Pixels
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.times.columns import has_lines
 from adv2e.sources.times.lists import FrameList, decoded, parse_list

@@ -20,7 +20,7 @@ from adv2e.errors import DataError
 from adv2e.formats import hdf5
 from adv2e.formats.builder import RecordingBuilder
 from adv2e.formats.recording import MOST_COLUMNS, Recording
-from adv2e.sources.base import Image
+from adv2e.sources.frame import Image
 from adv2e.sources.times.units import Unit, frame_unit
 from adv2e.ticks import NS, US, to_ticks
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.sources.base import Image, Pixels
+from adv2e.sources.frame import Image, Pixels
 
 
 class Alpha(Enum):

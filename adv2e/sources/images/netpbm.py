@@ -14,7 +14,7 @@ import re
 import numpy as np
 
 from adv2e.errors import DataError
-from adv2e.sources.base import Image, Pixels
+from adv2e.sources.frame import Image, Pixels
 
 _SPACE = rb"(?:\s|#[^\n\r]*[\n\r])+"
 _HEADER = re.compile(rb"P[2356]" + 3 * (_SPACE + rb"([0-9]{1,10})") + rb"\s")

@@ -23,7 +23,7 @@ import numpy as np
 from adv2e.effects.frames.encoding import full_scale_of, is_light
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.process.standard_error import overhearing
-from adv2e.sources.base import Image, Pixels
+from adv2e.sources.frame import Image, Pixels
 from adv2e.sources.images import netpbm, tiff
 from adv2e.sources.images.alpha import Alpha, with_alpha
 from adv2e.sources.images.headers import check_size, read_header

@@ -7,11 +7,11 @@ from functools import partial
 from pathlib import Path
 
 from adv2e.errors import DataError
-from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
 from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
 from adv2e.sources.stored import light_beside
 from adv2e.sources.times.lists import read_list
+from adv2e.sources.wanted import GivenTimes, Selection
 
 LISTS = ("images.txt", "timestamps.txt", "info.txt")
 """Lists of times that are looked for in the folder, then beside it."""

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 from adv2e.errors import DataError
 from adv2e.sources.video.colours import HIGH_RANGE, Colours, encoding_of, is_stated
-from adv2e.sources.video.stated import Stated, stated_by
-from adv2e.sources.video.streams import RAW, Stream, examine_stream
+from adv2e.sources.video.containers import Container
+from adv2e.sources.video.packets import Stream
+from adv2e.sources.video.streams import RAW
 
 _PACKED_ALPHA = (b"BGRA", b"RGBA", b"ARGB", b"ABGR", b"RBA@", b"BRA@", b"@RBA", b"@BRA")
 _COLOURS_TOGETHER, _MOST_TOGETHER = (b"RGB", b"BGR"), bytes([48])
@@ -35,15 +36,15 @@ class Choice:
     colours: Colours
 
 
-def choose(path: str, height: int, pixels: bytes = b"") -> Choice:
-    """Look at the headers of a video and of all its coded pictures.
+def choose(path: str, container: Container, stream: Stream, pixels: bytes = b"") -> Choice:
+    """Choose by what a video's container and its coded pictures say.
 
     Parameters
     ----------
     path : str
-        The video.
-    height : int
-        Rows that its container states.
+        The video, for messages.
+    container : Container
+    stream : Stream
     pixels : bytes
         FFmpeg's tag of the kind of pixels.
 
@@ -52,17 +53,15 @@ def choose(path: str, height: int, pixels: bytes = b"") -> Choice:
     DataError
         Parts of it state transfers that differ, or it has transparency that cannot be read.
     """
-    stated, stream = stated_by(path), examine_stream(path, height)
-    if stated.alpha_apart and stream.codec in ("vp80", "vp90"):
+    if container.alpha_apart and stream.codec in ("vp80", "vp90"):
         raise DataError(
             f"{path}: its transparency is beside the pictures, where it cannot be read; make"
             " pictures of it with ffmpeg -c:v libvpx-vp9 -i VIDEO folder/%06d.png"
         )
-    colours = [each.completed(stated.colours) for each in stream.colours] or [stated.colours]
+    colours = [each.completed(container.colours) for each in stream.colours] or [container.colours]
     _check_transfer(path, colours)
-    interlaced = stream.interlaced or (stated.interlaced and stream.codec in (RAW, "FFV1"))
-    why = _beyond_opencv(stated, stream, interlaced, colours)
-    if not why and stream.transparent and _has_alpha(pixels):
+    why = _beyond_opencv(container, stream, colours)
+    if not why and not container.opaque and _has_alpha(pixels):
         why = "its pixels could be transparent"
     return Choice(why, colours[-1])
 
@@ -91,9 +90,9 @@ def _check_transfer(path: str, colours: list[Colours]) -> None:
         raise DataError(f"{path}: its parts differ ({reasons}); cut it where that changes")
 
 
-def _beyond_opencv(stated: Stated, stream: Stream, interlaced: bool, colours: list[Colours]) -> str:
+def _beyond_opencv(container: Container, stream: Stream, colours: list[Colours]) -> str:
     transfer = colours[-1].transfer
-    if interlaced:
+    if stream.interlaced or (container.interlaced and stream.codec == RAW):
         return "its pictures are interlaced, or could be"
     if not stream.known:
         return f"its codec ({stream.codec}) is not one that OpenCV is known to read rightly"
@@ -103,6 +102,6 @@ def _beyond_opencv(stated: Stated, stream: Stream, interlaced: bool, colours: li
         return f"it has a high dynamic range ({encoding_of(transfer)[0]})"
     if not all(each.kept_by_opencv for each in colours):
         return "it states colours that OpenCV does not keep"
-    if not stated.readable and not is_stated(transfer):
+    if not container.readable and not is_stated(transfer):
         return "its container may state colours that cannot be read here"
     return ""

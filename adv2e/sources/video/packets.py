@@ -1,27 +1,58 @@
-"""The coded pictures of a video, listed without decoding them.
+"""The coded pictures of a video, gone through once without decoding them.
 
-Containers that have no index of their pictures are read through once by FFmpeg's demultiplexer,
-which takes little beside decoding: how many pictures there are and what is known of their times is
-told before the work.
+FFmpeg's demultiplexer takes little beside decoding.  How many pictures there are and what is known
+of their times, where the container has no index, and what they say of themselves, is told before
+the work.
 """
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import cv2
+from numpy.typing import NDArray
 
 from adv2e.sources.images.opencv import quiet
+from adv2e.sources.video.colours import Colours
 from adv2e.sources.video.containers.base import TINY_BYTES
 from adv2e.sources.video.opening import openable
+from adv2e.sources.video.streams import parser_of
+from adv2e.sources.video.streams.base import Findings
 
 if TYPE_CHECKING:
     from adv2e.sources.video.pyav import PyavCapture
 
 RETRIES = 1000
 """How often the next picture may fail to come before that counts as the end."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """What the coded pictures of a video say of themselves.
+
+    Attributes
+    ----------
+    codec : str
+        Its name, or the four letters by which FFmpeg knows it; ``raw`` for pictures not coded.
+    known : bool
+        It is known how its coded pictures say whether they are fields.
+    clear : bool
+        All of them could be read.
+    interlaced : bool
+        They are fields, or could be.
+    colours : tuple of Colours
+        All that are stated, none twice.
+    """
+
+    codec: str
+    known: bool
+    clear: bool
+    interlaced: bool
+    colours: tuple[Colours, ...]
 
 
 @dataclass(frozen=True)
@@ -71,25 +102,65 @@ _HALF_WRAP_NS = 2**32 * 10**9 // 90_000
 """Clocks of MPEG streams begin again after twice this; FFmpeg takes going back for that."""
 
 
-def list_packets(path: str) -> Packets:
-    """Return the coded pictures of a video; none if it cannot be opened."""
+def read_packets(path: str, height: int, *, listed: bool) -> tuple[Stream, Packets | None]:
+    """Return what the coded pictures of a video say, and when they are shown.
+
+    Parameters
+    ----------
+    path : str
+        The video; nothing is in it if it cannot be opened.
+    height : int
+        Rows that its container states.
+    listed : bool
+        The container lists the times of its pictures: no more of them are read than say something.
+    """
+    findings, clear = Findings(), True
     stamps: list[int] = []
     tiny = 0
-    with quiet():
-        with openable(path) as name:
-            capture = cv2.VideoCapture(name, cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1])
+    with quiet(), openable(path) as name:
+        capture = cv2.VideoCapture(name, cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1])
+        letters = (int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).to_bytes(4, "little")
+        codec, known, parser = parser_of(letters.decode("latin-1").lower().strip("\0 "), height)
+        try:
+            if parser is not None:
+                index = int(capture.get(cv2.CAP_PROP_CODEC_EXTRADATA_INDEX))
+                good, extra = capture.retrieve(flag=index)
+                clear = _read(parser.header, extra if good else None, findings)
+            for data in _pictures(capture):
+                if not listed:
+                    stamps.append(stamp_of(capture))
+                    tiny += data.size <= TINY_BYTES
+                if parser is not None and clear and not findings.interlaced:
+                    clear = _read(parser.picture, data, findings)
+                elif listed:
+                    break
+        finally:
+            capture.release()
+    stream = Stream(codec, known, clear, findings.interlaced, tuple(findings.colours))
+    return stream, None if listed else arranged(stamps, tiny)
+
+
+def _pictures(capture: cv2.VideoCapture) -> Iterator[NDArray[Any]]:
+    failed = 0
+    while capture.isOpened() and failed < RETRIES:
+        if not capture.grab():
+            failed += 1
+            continue
         failed = 0
-        while capture.isOpened() and failed < RETRIES:
-            if not capture.grab():
-                failed += 1
-                continue
-            failed = 0
-            good, data = capture.retrieve()
-            if good and data is not None and data.size:
-                stamps.append(stamp_of(capture))
-                tiny += data.size <= TINY_BYTES
-        capture.release()
-    return arranged(stamps, tiny)
+        good, data = capture.retrieve()
+        if good and data is not None and data.size:
+            yield data
+
+
+def _read(
+    read: Callable[[bytes, Findings], None], data: NDArray[Any] | None, findings: Findings
+) -> bool:
+    """Let a parser read; return False where it cannot."""
+    try:
+        read(b"" if data is None else data.tobytes(), findings)
+    except (IndexError, struct.error):
+        return False
+    return True
 
 
 def stamp_of(capture: cv2.VideoCapture | PyavCapture) -> int:

@@ -16,7 +16,8 @@ import cv2
 import numpy as np
 
 from adv2e.errors import DataError, MissingExtraError
-from adv2e.sources.base import GivenTimes, Pixels, Selection, Shot, Source
+from adv2e.sources.base import Source
+from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.images.opencv import quiet, rgb_of
 from adv2e.sources.times.gaps import gap_doubts
 from adv2e.sources.times.instants import Stamp, seconds
@@ -26,8 +27,9 @@ from adv2e.sources.video.choice import bits_of, choose
 from adv2e.sources.video.colours import Colours, encoding_of, is_stated
 from adv2e.sources.video.containers import examine
 from adv2e.sources.video.opening import openable
-from adv2e.sources.video.packets import RETRIES, list_packets, stamp_of
+from adv2e.sources.video.packets import RETRIES, Packets, read_packets, stamp_of
 from adv2e.sources.video.times import VideoTimes
+from adv2e.sources.wanted import GivenTimes, Selection
 
 if TYPE_CHECKING:
     Capture = cv2.VideoCapture | pyav.PyavCapture
@@ -72,7 +74,7 @@ class VideoSource(Source):
         self.doubts += [f"{path}: {line}" for line in told]
         self._why_pyav, self._pixels = "", b""
         self._colours = Colours()
-        self._choose_decoder()
+        packets = self._choose_decoder()
         with self._opened() as capture:
             self._keep_grey(capture)
             if not any(capture.grab() for _ in range(RETRIES)):
@@ -84,7 +86,7 @@ class VideoSource(Source):
             if isinstance(capture, pyav.PyavCapture):
                 # of codecs whose own headers are not read here
                 self._colours = self._colours.completed(Colours(transfer=capture.transfer))
-        self._times = self._known_times()
+        self._times = VideoTimes(self._container, packets, self._fps)
         if selection.start_s is None and selection.stop_s is None:
             self.count = self._times.expected
         self._choose_encoding()
@@ -92,10 +94,6 @@ class VideoSource(Source):
         self._given = self._given_times(given)
         if self._own_clock:
             self._tell_times()
-
-    def _known_times(self) -> VideoTimes:
-        packets = None if self._container.stamps_ns else list_packets(self.path)
-        return VideoTimes(self._container, packets, self._fps)
 
     def _given_times(self, given: GivenTimes) -> Callable[[int], int] | None:
         """Return the times that replace those in the file: a function of a frame's number."""
@@ -147,13 +145,16 @@ class VideoSource(Source):
             self.doubts.append(f"{timestamps}: {found.unit.doubt}")
         return found.stamps
 
-    def _choose_decoder(self) -> None:
+    def _choose_decoder(self) -> Packets | None:
+        """Choose by what container and coded pictures say; return when these are shown."""
         with self._opened() as capture:
             pixels = int(capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT))
             self._pixels = pixels.to_bytes(4, "little") if pixels >= 0 else b""
             self._fps = max(float(capture.get(cv2.CAP_PROP_FPS)), 0.0)
             height = int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
-        choice = choose(self.path, height, self._pixels)
+        container = self._container
+        stream, packets = read_packets(self.path, height, listed=bool(container.stamps_ns))
+        choice = choose(self.path, container, stream, self._pixels)
         self._why_pyav, self._colours = choice.why_pyav, choice.colours
         if not self._pixels and not self._why_pyav and pyav.is_installed():
             self._why_pyav = _NO_TAG
@@ -168,6 +169,7 @@ class VideoSource(Source):
                 )
         if self._why_pyav:
             self.packages = ("av",)
+        return packets
 
     def _keep_grey(self, capture: Capture) -> None:
         # grey pictures come as stored; conversion would repeat them three times, in 8 bits

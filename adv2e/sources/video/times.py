@@ -179,7 +179,8 @@ class VideoTimes:
         def time_ns(number: int, own_ns: int | None) -> int:
             nonlocal previous
             if self.rate is not None:
-                previous = self._at_rate(self.rate, number, own_ns if in_order else None)
+                told = in_order or not self._container.decoding_times
+                previous = self._at_rate(self.rate, number, own_ns if told else None)
             elif listed and number < len(self.shown_ns):
                 previous = self.shown_ns[number] - self.shown_ns[0]
             elif own_ns is not None:

@@ -12,32 +12,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 from adv2e.errors import DataError
-from adv2e.sources.video.containers import (
-    asf,
-    avi,
-    flv,
-    gif,
-    matroska,
-    mp4,
-    mpegps,
-    mpegts,
-    mxf,
-    ogg,
-    y4m,
-)
+from adv2e.sources.video.containers import avi, matroska, mp4, mpegts, parts, y4m
 from adv2e.sources.video.containers.base import Container, DamagedError
 
 __all__ = ["Container", "examine"]
 
-_FAMILIES: dict[bytes, Callable[[mmap.mmap], Container]] = {
+_FAMILIES: dict[bytes, Callable[[mmap.mmap, Container], None]] = {
     matroska.MAGIC: matroska.examine,
     y4m.MAGIC: y4m.examine,
-    gif.MAGIC: gif.examine,
-    flv.MAGIC: flv.examine,
-    ogg.MAGIC: ogg.examine,
-    asf.MAGIC: asf.examine,
-    mxf.MAGIC: mxf.examine,
-    mpegps.MAGIC: mpegps.examine,
+    parts.FLV: parts.flv,
+    parts.GIF: parts.gif,
+    parts.MPEG_PS: parts.mpeg_ps,
+    parts.MXF: parts.mxf,
+    parts.OGG: parts.ogg,
+    parts.ASF: parts.asf,
 }
 """How files begin, and what reads them."""
 _MPEG_VIDEO = b"\x00\x00\x01\xb3"
@@ -57,32 +45,33 @@ def examine(path: Path, *, allow_damaged: bool = False) -> Container:
     DataError
         If the file is empty, cut short, or its structure is broken.
     """
+    found = Container()
     try:
         with path.open("rb") as file:
             if not file.read(1):
                 raise DataError(f"{path}: an empty file")
             with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                return _examine(data)
+                _examine(data, found)
     except DamagedError as error:
-        fault = str(error)
+        found.faults.append(str(error))
     except (struct.error, IndexError):
-        fault = "its headers are damaged"
+        found.faults.append("its headers are damaged")
     except OSError as error:
         raise DataError(f"{path}: {error.strerror}") from error
-    if not allow_damaged:
-        raise DataError(f"{path}: {fault}")
-    return Container(faults=[fault])
+    if found.faults and not allow_damaged:
+        raise DataError(f"{path}: {found.faults[0]}")
+    return found
 
 
-def _examine(data: mmap.mmap) -> Container:
+def _examine(data: mmap.mmap, found: Container) -> None:
     if data[4:8] in mp4.FIRST:
-        return mp4.examine(data)
-    if data[:4] == b"RIFF" and data[8:12] == b"AVI ":
-        return avi.examine(data)
-    for magic, family in _FAMILIES.items():
-        if data[: len(magic)] == magic:
-            return family(data)
-    if layout := mpegts.layout_of(data):
-        return mpegts.examine(data, *layout)
-    # pictures of MPEG-1 and -2 without a container have no times
-    return Container(decoding_times=data[:4] == _MPEG_VIDEO)
+        mp4.examine(data, found)
+    elif data[:4] == b"RIFF" and data[8:12] == b"AVI ":
+        avi.examine(data, found)
+    elif family := next((_FAMILIES[m] for m in _FAMILIES if data[: len(m)] == m), None):
+        family(data, found)
+    elif layout := mpegts.layout_of(data):
+        mpegts.examine(data, *layout, found)
+    else:
+        # pictures of MPEG-1 and -2 without a container have no times
+        found.decoding_times = data[:4] == _MPEG_VIDEO

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import mmap
-import struct
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from adv2e.sources.video.colours import Colours
 
-@dataclass(frozen=True)
+
+@dataclass
 class Container:
     """What the headers of a video file say.
 
@@ -29,11 +28,20 @@ class Container:
     end_ns : int or None
         When the last picture ends, from the first, as the headers state it (ASF, AVI) [ns].
     whole : bool
-        Checksums prove that nothing is missing (Ogg).
+        Numbers of its parts prove that nothing is missing (Ogg).
     leading : int
         How many of the pictures are shown before the first in the file.
     tiny : int
         How many of those that are listed are too small to hold a picture.
+    colours : Colours
+    interlaced : bool
+        Pictures are two fields each.
+    alpha_apart : bool
+        Transparency is stored beside the pictures (WebM), where decoders do not look for it.
+    opaque : bool
+        No pixel is transparent, whatever kind they are of (GIF).
+    readable : bool
+        False where it may state colours that are not read here (MXF, or damaged).
     faults : list of str
         What is wrong with the structure, with where.
     doubts : list of str
@@ -49,6 +57,11 @@ class Container:
     whole: bool = False
     leading: int = 0
     tiny: int = 0
+    colours: Colours = field(default_factory=Colours)
+    interlaced: bool = False
+    alpha_apart: bool = False
+    opaque: bool = False
+    readable: bool = True
     faults: list[str] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
 
@@ -66,38 +79,3 @@ def cut_short(needed: int, present: int) -> DamagedError:
     return DamagedError(
         f"cut short: it holds {present} bytes where at least {needed} belong; copy it again"
     )
-
-
-def chained(
-    data: mmap.mmap, place: int, measure: Callable[[mmap.mmap, int], int], padding: int = 0
-) -> Iterator[tuple[int, int]]:
-    """Yield where each part of a file begins and ends, whose parts follow one another.
-
-    Parameters
-    ----------
-    data : mmap
-    place : int
-        Where the first part begins.
-    measure : callable
-        Returns the bytes of the part at a place; 0 if none begins there.
-    padding : int
-        How many zeros may stand at the end.
-
-    Raises
-    ------
-    DamagedError
-        Something else stands between two parts, or the last one is cut.
-    """
-    while place < len(data):
-        try:
-            size = measure(data, place)
-        except (IndexError, struct.error):
-            raise cut_short(len(data) + 1, len(data)) from None
-        if size == 0:
-            if len(data) - place <= padding and not data[place:].strip(b"\0"):
-                return
-            raise DamagedError(f"damaged at byte {place}")
-        if place + size > len(data):
-            raise cut_short(place + size, len(data))
-        yield place, place + size
-        place += size

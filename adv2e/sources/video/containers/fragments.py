@@ -21,8 +21,8 @@ _KINDS = frozenset(
 _MORE = "bytes follow its last box: fragments may be missing"
 
 
-def examine(data: mmap.mmap, boxes: Boxes, track: int | None) -> Container:
-    """Return how many pictures the fragments list; DamagedError if one is missing or cut.
+def count_pictures(data: mmap.mmap, boxes: Boxes, track: int | None, found: Container) -> None:
+    """Note how many pictures the fragments list; DamagedError if one is missing or cut.
 
     Parameters
     ----------
@@ -31,6 +31,8 @@ def examine(data: mmap.mmap, boxes: Boxes, track: int | None) -> Container:
         Yields kind, start and end of the contents of each box between two places.
     track : int or None
         Number of the track with pictures; None where there are several.
+    found : Container
+        Where it is noted.
     """
     pictures, before, end = 0, None, 0
     for kind, start, stop in boxes(data, 0, len(data)):
@@ -47,8 +49,9 @@ def examine(data: mmap.mmap, boxes: Boxes, track: int | None) -> Container:
             pictures += count
     if data.find(b"moof", end) >= 0:
         raise DamagedError(f"damaged at byte {end}")
-    doubts = [_MORE] if end < len(data) else []
-    return Container(pictures=None if track is None else pictures, doubts=doubts)
+    if end < len(data):
+        found.doubts.append(_MORE)
+    found.pictures = None if track is None else pictures
 
 
 def _fragment(

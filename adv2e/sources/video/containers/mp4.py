@@ -1,9 +1,11 @@
-"""Index of MP4 and MOV files: when each picture is shown, and where the last sample ends.
+"""Index of MP4 and MOV files: when each picture is shown, where the last sample ends, and colours.
 
 References
 ----------
 .. [1] ISO/IEC 14496-12, ISO base media file format: boxes; ``mvhd``, ``mdhd``, ``elst``; ``stts``,
-   ``ctts``, ``stsz``, ``stsc``, ``stco``, ``co64``.
+   ``ctts``, ``stsz``, ``stsc``, ``stco``, ``co64``; ``stsd``, ``colr``.
+.. [2] Apple, QuickTime File Format: ``colr``, ``fiel``.
+.. [3] VP Codec ISO Media File Format Binding: ``vpcC``.
 """
 
 from __future__ import annotations
@@ -16,21 +18,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.sources.times.instants import NS_PER_S
+from adv2e.sources.video.colours import Colours
 from adv2e.sources.video.containers import fragments
 from adv2e.sources.video.containers.base import TINY_BYTES, Container, DamagedError, cut_short
 
 FIRST = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
 """Kinds of box that a file can begin with."""
 
+_SAMPLE_ENTRY = 86
+"""Bytes of the description of pictures before the boxes in it, from its size on."""
+
 _Span = tuple[int, int]
 """Where the contents of a box begin and end."""
 
 
-def examine(data: mmap.mmap) -> Container:
-    """Return what the index says; DamagedError if it is missing or lists more than there is.
+def examine(data: mmap.mmap, found: Container) -> None:
+    """Note what the index says; DamagedError if it is missing or lists more than there is.
 
     What follows the last box, and boxes that hold no samples, may be anything: players ignore it.
     """
+    found.readable = False
     top = list(boxes(data, 0, len(data)))
     index = [(start, stop) for kind, start, stop in top if kind == b"moov"]
     if not index or index[0][1] > len(data):
@@ -42,21 +49,22 @@ def examine(data: mmap.mmap) -> Container:
         elif kind == b"trak":
             tracks.append(_Track(data, start, stop))
     videos = [track for track in tracks if track.is_video]
+    if videos:
+        videos[0].describe(found)
     if any(kind in (b"moof", b"sidx") for kind, _, _ in top):
-        return fragments.examine(data, boxes, videos[0].number if len(videos) == 1 else None)
+        track = videos[0].number if len(videos) == 1 else None
+        fragments.count_pictures(data, boxes, track, found)
+        return
     end = max((track.end for track in tracks), default=0)
     if end > len(data):
         raise cut_short(end, len(data))
     if len(videos) != 1:  # which one FFmpeg takes is its own affair
-        return Container()
+        return
     stamps_ns = videos[0].stamps_ns(movie_scale) or []
-    leading = sum(t < stamps_ns[0] for t in stamps_ns)
-    return Container(
-        sorted(stamps_ns) or None,
-        leading=leading,
-        tiny=videos[0].tiny,
-        doubts=videos[0].doubts,
-    )
+    found.stamps_ns = sorted(stamps_ns) or None
+    found.leading = sum(t < stamps_ns[0] for t in stamps_ns)
+    found.tiny = videos[0].tiny
+    found.doubts += videos[0].doubts
 
 
 def boxes(data: mmap.mmap, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:
@@ -101,6 +109,26 @@ class _Track:
             return None
         place = span[0] + (20 if self._data[span[0]] else 12)
         return int(struct.unpack_from(">I", self._data, place)[0])
+
+    def describe(self, found: Container) -> None:
+        """Note what the description of its pictures says of colours and fields."""
+        span = self._found.get(b"stsd")
+        if span is None:
+            return
+        found.readable = True
+        begin = span[0] + 8
+        (size,) = struct.unpack_from(">I", self._data, begin)
+        end = min(span[1], begin + size)
+        for kind, place, stop in boxes(self._data, begin + _SAMPLE_ENTRY, end):
+            if stop > end:
+                return
+            if kind == b"colr" and self._data[place : place + 4] in (b"nclx", b"nclc"):
+                found.colours = Colours(*struct.unpack_from(">HHH", self._data, place + 4))
+            elif kind == b"vpcC" and stop - place >= 10:
+                codes = self._data[place + 7 : place + 10]
+                found.colours = Colours(*codes).completed(found.colours)
+            elif kind == b"fiel":
+                found.interlaced = self._data[place] == 2
 
     @property
     def doubts(self) -> list[str]:

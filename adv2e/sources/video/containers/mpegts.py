@@ -30,8 +30,8 @@ def layout_of(data: mmap.mmap) -> tuple[int, int] | None:
     return None
 
 
-def examine(data: mmap.mmap, size: int, lead: int) -> Container:
-    """Return doubts about packets that are missing; DamagedError if some are no packets."""
+def examine(data: mmap.mmap, size: int, lead: int, found: Container) -> None:
+    """Doubt where packets are missing; DamagedError if some are no packets."""
     count, rest = divmod(len(data), size)
     breaks, last = 0, np.full(_NULL + 1, -1)
     for begin in range(0, count, _CHUNK):
@@ -44,9 +44,10 @@ def examine(data: mmap.mmap, size: int, lead: int) -> Container:
         breaks += _breaks(heads.astype(np.int64), last)
     if rest > lead and data[count * size + lead] == _SYNC:
         raise cut_short((count + 1) * size, len(data))
-    places = f"{breaks} places" if breaks > 1 else "a place"
-    told = f"packets are missing at {places}: pictures may be missing or spoilt there"
-    return Container(doubts=[told] if breaks else [])
+    if breaks:
+        places = f"{breaks} places" if breaks > 1 else "a place"
+        told = f"packets are missing at {places}: pictures may be missing or spoilt there"
+        found.doubts.append(told)
 
 
 def _breaks(heads: NDArray[np.int64], last: NDArray[np.int64]) -> int:

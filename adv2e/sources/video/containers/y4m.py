@@ -20,15 +20,16 @@ _SHARE = {"420": (2, 2), "411": (4, 1), "422": (2, 1), "440": (1, 2), "444": (1,
 """Columns and rows of luma that share a sample of each chroma."""
 
 
-def examine(data: mmap.mmap) -> Container:
-    """Return the times of the pictures; DamagedError if not all of them are there."""
+def examine(data: mmap.mmap, found: Container) -> None:
+    """Note the times of the pictures; DamagedError if not all of them are there."""
     place = data.find(b"\n", 0, _LONGEST_LINE)
     tags = data[len(MAGIC) : max(place, 0)].decode("latin-1").split(" ")
     stated = {tag[0]: tag[1:] for tag in tags if tag}
+    found.interlaced = stated.get("I", "") in ("t", "b", "m")
     size = _picture_bytes(stated)
     rate = re.fullmatch(r"(\d{1,10}):(\d{1,10})", stated.get("F", ""))
     if place < 0 or size is None:
-        return Container()
+        return
     place, count = place + 1, 0
     while place < len(data):
         line = data.find(b"\n", place, place + _LONGEST_LINE)
@@ -41,9 +42,10 @@ def examine(data: mmap.mmap) -> Container:
             raise cut_short(place, len(data))
         count += 1
     if not rate or not int(rate[1]) or not int(rate[2]):
-        return Container(pictures=count)
-    hz = Fraction(int(rate[1]), int(rate[2]))
-    return Container(stamps_ns=[FrameRate(hz).time_ns(n) for n in range(count)], rate=hz)
+        found.pictures = count
+        return
+    found.rate = Fraction(int(rate[1]), int(rate[2]))
+    found.stamps_ns = [FrameRate(found.rate).time_ns(n) for n in range(count)]
 
 
 def _picture_bytes(stated: dict[str, str]) -> int | None:

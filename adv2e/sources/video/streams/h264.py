@@ -3,57 +3,32 @@
 References
 ----------
 .. [1] ITU-T H.264 (08/2021): 7.3.2.1.1 (sequence parameter set), 7.3.2.2 (picture parameter set),
-   7.3.3 (slice header), D.1 (supplemental enhancement information), E.1 (video usability
-   information).
+   7.3.3 (slice header), D.1.3 (picture timing), E.1 (video usability information).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from dataclasses import dataclass, field
 
-from adv2e.sources.video.colours import Colours, is_stated
-from adv2e.sources.video.streams.base import Findings
-from adv2e.sources.video.streams.bits import Bits
+from adv2e.sources.video.streams.base import Bits, Findings, Parser
+from adv2e.sources.video.streams.nal import (
+    StatedColours,
+    messages,
+    signal,
+    unguarded,
+    units,
+    units_of_picture,
+)
 
-_START = b"\0\0\1"
 _CHROMA_PROFILES = (100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135)
 _SLICES, _SEI, _SPS, _PPS = (1, 2, 5), 6, 7, 8
 _HEADER_BYTES = 32
 """Of a slice: more than what is read of its header takes."""
-_PICTURE_TIMING, _OTHER_TRANSFER = 1, 147
-_ANY_ASPECT = 255
+_PICTURE_TIMING = 1
 _WHOLE_FRAME, _ONE_FIELD, _LAST_OF_ONE_FRAME, _LAST = 0, (1, 2), 4, 8
 _FRAME_SCAN, _FIELD_SCAN = 0, 1
-
-
-def units(data: bytes) -> Iterator[bytes]:
-    """Yield the units between start codes, the bytes that guard against these still in them."""
-    after = data.find(_START)
-    while after >= 0:
-        begin = after + len(_START)
-        after = data.find(_START, begin)
-        unit = data[begin : after if after >= 0 else len(data)]
-        if unit:
-            yield unit
-
-
-def units_of_picture(data: bytes) -> Iterator[bytes]:
-    """Yield the units of H.264 or HEVC, between start codes or each after its length.
-
-    Copied from MP4 into another container they may keep lengths, which can look like start codes.
-    """
-    places = [0]
-    while places[-1] < len(data):
-        size = int.from_bytes(data[places[-1] : places[-1] + 4], "big")
-        if not size or places[-1] + 4 + size > len(data):
-            yield from units(data)
-            return
-        places.append(places[-1] + 4 + size)
-    for begin, end in pairwise(places):
-        yield data[begin + 4 : end]
 
 
 def _units_of_header(data: bytes) -> Iterator[bytes]:
@@ -69,45 +44,6 @@ def _units_of_header(data: bytes) -> Iterator[bytes]:
             place = begin + int.from_bytes(data[place:begin], "big")
             if place > begin:
                 yield data[begin:place]
-
-
-def unguarded(unit: bytes) -> bytes:
-    """Return a unit without the bytes that guard against start codes."""
-    return unit.replace(b"\0\0\3", b"\0\0")
-
-
-def messages(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield kind and contents of supplemental enhancement information."""
-    place = 0
-    while place + 2 < len(data):  # the last byte only ends the unit
-        numbers = []
-        for _ in range(2):
-            number = 0
-            while data[place] == 0xFF:
-                number, place = number + 255, place + 1
-            numbers.append(number + data[place])
-            place += 1
-        kind, size = numbers
-        yield kind, data[place : place + size]
-        place += size
-
-
-@dataclass
-class StatedColours:
-    """Colours of the parameter set, and the transfer that takes the place of its own.
-
-    Broadcasts so state HLG, that receivers that do not know it may take it for BT.2020.
-    """
-
-    usual: Colours | None = None
-    other_transfer: int = 0
-
-    def tell(self, findings: Findings) -> None:
-        """Note the colours that count."""
-        if is_stated(self.other_transfer):
-            findings.state(replace(self.usual or Colours(), transfer=self.other_transfer))
-        elif self.usual is not None:
-            findings.state(self.usual)
 
 
 @dataclass
@@ -129,24 +65,7 @@ class _Sequence:
     timing: _Timing = field(default_factory=_Timing)
 
 
-def signal(bits: Bits) -> Colours | None:
-    """Read the part of the usability information that H.264 and HEVC share; None: no colours."""
-    if bits.flag() and bits.take(8) == _ANY_ASPECT:
-        bits.skip(32)
-    if bits.flag():  # overscan
-        bits.skip(1)
-    colours = None
-    if bits.flag():
-        bits.skip(4)
-        if bits.flag():
-            colours = Colours(bits.take(8), bits.take(8), bits.take(8))
-    if bits.flag():  # place of the chroma samples
-        bits.ue()
-        bits.ue()
-    return colours
-
-
-class H264:
+class H264(Parser):
     """Parser of H.264 with start codes."""
 
     def __init__(self) -> None:
@@ -233,9 +152,8 @@ class H264:
         """Read messages, and return what is said of the timing of the picture."""
         timing = b""
         for kind, content in messages(data):
-            if kind == _OTHER_TRANSFER and content:
-                self._colours.other_transfer = content[0]
-            elif kind == _PICTURE_TIMING:
+            self._colours.hear(kind, content)
+            if kind == _PICTURE_TIMING:
                 timing = content
         return timing
 

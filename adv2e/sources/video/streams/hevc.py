@@ -8,9 +8,8 @@ References
 
 from __future__ import annotations
 
-from adv2e.sources.video.streams.base import Findings
-from adv2e.sources.video.streams.bits import Bits
-from adv2e.sources.video.streams.h264 import (
+from adv2e.sources.video.streams.base import Bits, Findings, Parser
+from adv2e.sources.video.streams.nal import (
     StatedColours,
     messages,
     signal,
@@ -19,20 +18,17 @@ from adv2e.sources.video.streams.h264 import (
 )
 
 _LAST_SLICE, _SPS, _SEI = 31, 33, 39
-_PICTURE_TIMING, _OTHER_TRANSFER = 1, 147
+_PICTURE_TIMING = 1
 _ONE_FIELD = (1, 2, 9, 10, 11, 12)
 _MOST_SETS = 64
 
 
-class Hevc:
-    """Parser of HEVC with start codes."""
+class Hevc(Parser):
+    """Parser of HEVC with start codes; OpenCV repeats in the pictures what stands before them."""
 
     def __init__(self) -> None:
         self._structure = False
         self._colours = StatedColours()
-
-    def header(self, data: bytes, findings: Findings) -> None:
-        """Nothing: OpenCV repeats in the pictures what stands there."""
 
     def picture(self, data: bytes, findings: Findings) -> None:
         """Read parameter sets and messages up to the first slice."""
@@ -48,9 +44,8 @@ class Hevc:
 
     def _messages(self, data: bytes, findings: Findings) -> None:
         for kind, content in messages(data):
-            if kind == _OTHER_TRANSFER and content:
-                self._colours.other_transfer = content[0]
-            elif kind == _PICTURE_TIMING and self._structure:
+            self._colours.hear(kind, content)
+            if kind == _PICTURE_TIMING and self._structure:
                 findings.interlaced |= content[0] >> 4 in _ONE_FIELD
 
     def _parameters(self, bits: Bits, findings: Findings) -> None:

@@ -1,18 +1,20 @@
-"""MPEG-2 and MPEG-4 part 2: the headers before pictures.
+"""MPEG-2, MPEG-4 part 2 and Motion JPEG: the headers before pictures.
 
 References
 ----------
 .. [1] ITU-T H.262 (02/2012): 6.2.2.3 (sequence extension), 6.2.2.4 (sequence display extension),
    6.2.3.1 (picture coding extension).
 .. [2] ISO/IEC 14496-2:2004: 6.2.2 (visual object), 6.2.3 (video object layer).
+.. [3] ITU-T T.81 (JPEG), B.2.2 (frame header).
 """
 
 from __future__ import annotations
 
+import struct
+
 from adv2e.sources.video.colours import Colours
-from adv2e.sources.video.streams.base import Findings
-from adv2e.sources.video.streams.bits import Bits
-from adv2e.sources.video.streams.h264 import units
+from adv2e.sources.video.streams.base import Bits, Findings, Parser
+from adv2e.sources.video.streams.nal import units
 
 _SLICES, _EXTENSION = range(0x01, 0xB0), 0xB5
 _SEQUENCE, _DISPLAY, _CODING = 1, 2, 8
@@ -22,7 +24,7 @@ _LAYERS, _VISUAL_OBJECT, _PICTURE = range(0x20, 0x30), 0xB5, 0xB6
 _ANY_ASPECT = 15
 
 
-class Mpeg2:
+class Mpeg2(Parser):
     """Parser of MPEG-2."""
 
     def __init__(self) -> None:
@@ -55,7 +57,7 @@ class Mpeg2:
                 findings.interlaced |= structure != _WHOLE_FRAME or not bits.flag()
 
 
-class Mpeg4:
+class Mpeg4(Parser):
     """Parser of MPEG-4 part 2."""
 
     def header(self, data: bytes, findings: Findings) -> None:
@@ -106,3 +108,30 @@ def _read_layer(bits: Bits, findings: Findings) -> None:
     if shape == 0:
         bits.skip(29)
     findings.interlaced |= bits.flag()
+
+
+_BASELINE, _PROGRESSIVE, _SCAN = 0xC0, 0xC2, 0xDA
+
+
+class MotionJpeg(Parser):
+    """Parser of Motion JPEG.
+
+    Parameters
+    ----------
+    height : int
+        Rows that the container states; a picture of fewer is a field.
+    """
+
+    def __init__(self, height: int) -> None:
+        self._height = height
+
+    def picture(self, data: bytes, findings: Findings) -> None:
+        """Read the size of a picture."""
+        place = 2
+        while data[place] == 0xFF and data[place + 1] != _SCAN:
+            marker, size = struct.unpack_from(">xBH", data, place)
+            if _BASELINE <= marker <= _PROGRESSIVE:
+                (rows,) = struct.unpack_from(">H", data, place + 5)
+                findings.interlaced |= 4 * rows < 3 * self._height
+                return
+            place += 2 + size

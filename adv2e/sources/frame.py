@@ -1,0 +1,146 @@
+"""A frame, and what the numbers in it stand for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.effects.frames.encoding import encoding_of_images, full_scale_of
+from adv2e.errors import DataError
+
+Image = NDArray[Any]
+"""(rows, columns) or (rows, columns, 3) RGB; uint8, uint16, float32 or float64."""
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """An image as its file has it.
+
+    Attributes
+    ----------
+    image : array
+        Grey or RGB.
+    alpha : (rows, columns) float32, optional
+        How much of each pixel is there, 0..1; None: all of it.  The colours are not multiplied
+        by it.
+    composed : bool
+        The file has transparent pixels, and its colours are light over black already.
+    white : float, optional
+        Number that means white, where the file says it and it is not that of the data type.
+    """
+
+    image: Image
+    alpha: NDArray[np.float32] | None = None
+    composed: bool = False
+    white: float | None = None
+
+
+OVER_BLACK = "transparent pixels are composed over black, in linear light"
+"""What is told, once, of a source that has some."""
+
+
+RECORDED = "frames of a recording"
+"""Why those are linear that cameras recorded beside events."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """What the numbers of frames stand for, and why, in a few words.
+
+    Attributes
+    ----------
+    encoding : str
+        What ``encoding: auto`` means.
+    encoding_reason : str
+    full_scale : float, optional
+        Number that means white, whatever the files of the frames say of it.
+    full_scale_reason : str
+        Empty where the reason is the same, or the data type says it.
+    """
+
+    encoding: str
+    encoding_reason: str
+    full_scale: float | None = None
+    full_scale_reason: str = ""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame.
+
+    Attributes
+    ----------
+    t_ns : int
+        Its time [ns].
+    image : array
+        As read, colour as RGB.
+    label : str
+        Its name, for messages.
+    alpha : array, optional
+        See :class:`Pixels`.
+    white : float, optional
+        Number that means white in it; None: that of the data type.
+    odd_white : str
+        How the white that its file states differs from that of the first frame.
+    """
+
+    t_ns: int
+    image: Image
+    label: str = ""
+    alpha: NDArray[np.float32] | None = None
+    white: float | None = None
+    odd_white: str = ""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A frame not loaded yet: time on the source's clock [ns], name for messages, loader."""
+
+    t_ns: int
+    label: str
+    load: Callable[[], Pixels]
+
+
+def odd_white(pixels: Pixels, first: float | None) -> str:
+    """Return how the white of an image differs from `first`, that of the first; or nothing.
+
+    None is that of the data type.  Where all is black, white does not matter.
+    """
+    usual = full_scale_of(pixels.image.dtype)
+    white, expected = pixels.white or usual, first or usual
+    if white == expected or not pixels.image.any():
+        return ""
+    return (
+        f"white is {white:g} in it, but {expected:g} in the first frame; say what it is in all,"
+        f" with frames.full_scale={expected:g} or another number"
+    )
+
+
+def as_pixels(loaded: Image | Pixels) -> Pixels:
+    """Return what a loader gave as pixels."""
+    return loaded if isinstance(loaded, Pixels) else Pixels(loaded)
+
+
+def light_of_images(dtype: np.dtype[Any], *, colour: bool) -> Light:
+    """Return what the numbers of images stand for that do not say so."""
+    depth = "floating-point" if dtype.kind == "f" else f"{8 * dtype.itemsize}-bit"
+    reason = f"{depth} {'colour' if colour else 'grey'} images"
+    if dtype == np.uint8 and not colour:
+        reason += "; frames.encoding=srgb if they are ordinary pictures"
+    return Light(encoding_of_images(dtype, colour), reason)
+
+
+def check_values(image: Image, label: str) -> None:
+    """Raise DataError if a float image holds NaN, infinite or negative values."""
+    if image.dtype.kind != "f" or image.size == 0:
+        return
+    low, high = float(image.min()), float(image.max())
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise DataError(f"{label}: pixels that are NaN or infinite; light must be a finite number")
+    if low < 0:
+        raise DataError(f"{label}: a pixel of {low:g}; light cannot be negative")

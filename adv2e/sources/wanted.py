@@ -1,0 +1,111 @@
+"""What the user says of frames: when they are, and which are wanted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from adv2e.errors import UsageError
+from adv2e.sources.times.instants import NS_PER_S
+from adv2e.sources.times.rates import FrameRate, Rate, parse_rate
+from adv2e.sources.times.units import UNITS
+
+
+@dataclass(frozen=True)
+class GivenTimes:
+    """What the user says of times: a rate or a file in place of the source's own, and the unit.
+
+    Parameters
+    ----------
+    fps : float, Fraction or str, optional
+    timestamps : Path, optional
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times in lists.
+    images_anywhere : bool
+        The list of a recording may name images outside its folder.
+
+    Raises
+    ------
+    UsageError
+        If rate and file or rate and unit are given, or a value is impossible.
+    """
+
+    fps: Rate | None = None
+    timestamps: Path | None = None
+    time_unit: str | None = None
+    images_anywhere: bool = False
+
+    def __post_init__(self) -> None:
+        if self.time_unit is not None and self.time_unit not in UNITS:
+            raise UsageError(f"--time-unit: must be s, ms, us or ns, got {self.time_unit!r}")
+        if self.fps is not None and self.time_unit is not None:
+            raise UsageError("--time-unit is for lists of times, which --fps replaces; give one")
+        if self.fps is not None and self.timestamps is not None:
+            raise UsageError("--fps and --timestamps both say when the frames are; give one")
+        if self.fps is not None:
+            try:
+                parse_rate(self.fps)
+            except ValueError as error:
+                raise UsageError(f"--fps: {error}") from error
+
+    @property
+    def rate(self) -> FrameRate | None:
+        """The constant rate, exactly; None if none is given."""
+        return None if self.fps is None else FrameRate(parse_rate(self.fps))
+
+    def __str__(self) -> str:
+        if self.fps is None:
+            return f"--timestamps {self.timestamps}"
+        return f"--fps {self.fps:g}" if isinstance(self.fps, float) else f"--fps {self.fps}"
+
+    def __bool__(self) -> bool:
+        return self.fps is not None or self.timestamps is not None
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which frames are wanted and where their time begins.
+
+    Parameters
+    ----------
+    start_s, stop_s : float, optional
+        First and last time wanted, counted from the source's first frame [s]; a frame at either
+        is in, so that neighbouring pieces share the frame between them.
+    t0 : {'auto', 'keep', 'zero'}
+        auto, keep: the source's own clock where there is one, else zero at the source's first
+        frame.  zero: zero at the first frame wanted.
+    allow_damaged : bool
+        What can be decoded of a damaged video is wanted; what is missing is told.
+
+    Raises
+    ------
+    UsageError
+        If a value is impossible.
+    """
+
+    start_s: float | None = None
+    stop_s: float | None = None
+    t0: str = "auto"
+    allow_damaged: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value in (("--start", self.start_s), ("--stop", self.stop_s)):
+            if value is not None and not (value >= 0 and math.isfinite(value)):
+                raise UsageError(f"{name}: must be seconds from the first frame, got {value:g}")
+        if self.start_s is not None and self.stop_s is not None and self.stop_s <= self.start_s:
+            raise UsageError(
+                f"--stop: must be after --start ({self.start_s:g} s), got {self.stop_s:g}"
+            )
+        if self.t0 not in ("auto", "keep", "zero"):
+            raise UsageError(f"--t0: must be auto, keep or zero, got {self.t0!r}")
+
+    @property
+    def start_ns(self) -> int:
+        """First time wanted, from the first frame [ns]."""
+        return round((self.start_s or 0) * NS_PER_S)
+
+    @property
+    def stop_ns(self) -> float:
+        """Last time wanted, from the first frame [ns]; infinite when there is none."""
+        return math.inf if self.stop_s is None else round(self.stop_s * NS_PER_S)
