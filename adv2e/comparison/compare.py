@@ -4,28 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.comparison.compact import compact
-from adv2e.comparison.counts import count_statistics
 from adv2e.comparison.distances import MEASURES, Distances, distances
-from adv2e.comparison.floor import Floor, half_split, two_seeds
-from adv2e.comparison.intervals import QUANTILES, interval_statistics
+from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.offset import latency_offset_us
 from adv2e.comparison.smoothed_error import SIGMAS_US
-from adv2e.comparison.windows import (
-    Window,
-    Windows,
-    cut,
-    fixed_windows,
-    frame_windows,
-    span_of,
-)
+from adv2e.comparison.stream_statistics import STATISTICS, stream_statistics
+from adv2e.comparison.windows import Window, Windows, cut, fixed_windows, frame_windows, span_of
 from adv2e.errors import DataError
 from adv2e.events import Events
+from adv2e.formats.recording import Recording
 from adv2e.sources.times.instants import seconds
 
 DEFAULT_WINDOW_S = 0.05
@@ -36,63 +29,21 @@ WARNING = (
     " not stated."
 )
 
-STATISTICS = {
-    "events": "events in the time compared",
-    "on_events": "ON events",
-    "off_events": "OFF events",
-    "rate": "events a pixel a second",
-    "on_rate": "ON events a pixel a second",
-    "off_rate": "OFF events a pixel a second",
-    "on_share": "ON events over all events",
-    **{
-        f"inter_event_us_{q:02d}": f"{q} % quantile of the time to the next event of the same"
-        " pixel, of either polarity [us]"
-        for q in QUANTILES
-    },
-    "inter_event_share_under_1ms": "share of those times below 1 ms",
-}
-"""What is told of each stream by itself: name and definition."""
-
 OFFSET = (
     "how much later the simulated events are [us]: where the correlation of the signed streams,"
     " pixel by pixel, both smoothed with a Gaussian of 2 ms, is largest within +-50 ms; null where"
     " it does not stand out"
 )
 
-
 HALF_SPLIT = (
     "distance between two halves of the measured events, each event put into one of them by chance,"
     " relative measures over the norm of all: about how near the true rate of a Poisson process"
     " would come; needs no model"
 )
-
-
-class Stream(Protocol):
-    """What is needed of a recording."""
-
-    @property
-    def path(self) -> Any:
-        """Its file."""
-
-    @property
-    def layout(self) -> str:
-        """Its layout or format."""
-
-    @property
-    def width(self) -> int:
-        """Columns of the sensor."""
-
-    @property
-    def height(self) -> int:
-        """Rows of the sensor."""
-
-    @property
-    def events(self) -> Events:
-        """Its events, sorted."""
-
-    @property
-    def frame_times_ns(self) -> NDArray[np.int64] | None:
-        """Times of its frames [ns], if it has any."""
+TWO_SEEDS = (
+    "distance between two simulations of the configuration given that differ in their seed alone"
+    " ({} and {}); relative measures over the norm of the measured stream"
+)
 
 
 @dataclass(frozen=True)
@@ -104,8 +55,8 @@ class Resimulation:
 
 
 def compare(
-    measured: Stream,
-    simulated: Stream,
+    measured: Recording,
+    simulated: Recording,
     *,
     frame_times_ns: NDArray[np.int64] | None = None,
     window_s: float | None = None,
@@ -115,7 +66,7 @@ def compare(
 
     Parameters
     ----------
-    measured, simulated : Stream
+    measured, simulated : Recording
         Two recordings of one size on one clock.
     frame_times_ns : array of int64, optional
         Times of the frames whose intervals are the windows [ns]; default: those of `measured`.
@@ -132,15 +83,17 @@ def compare(
     """
     spans = _spans(measured, simulated)
     times = measured.frame_times_ns if frame_times_ns is None else frame_times_ns
-    windows = _windows(spans, times, window_s)
+    if window_s is None and times is not None and len(times) > 1:
+        windows = frame_windows(times, spans)
+    else:
+        windows = fixed_windows(max(1, round((window_s or DEFAULT_WINDOW_S) * 1e6)), spans)
     size = (measured.width, measured.height)
     (ours, theirs), *kept = compact([measured.events, simulated.events], *size)
     found = distances(ours, theirs, windows, *kept)
     floors = {"half_split": half_split(ours, windows, *kept)}
     if again is not None:
-        floors["two_seeds"] = two_seeds(
-            again.simulate_events, again.seeds, measured.events, windows, *size
-        )
+        one, other = map(again.simulate_events, again.seeds)
+        floors["two_seeds"] = distances(one, other, windows, *size, whole=measured.events).values
     return {
         "measured": _stream(measured),
         "simulated": _stream(simulated),
@@ -154,16 +107,21 @@ def compare(
         "statistics": _statistics(measured, simulated, windows),
         "floors": {
             "half_split": HALF_SPLIT,
-            "two_seeds": None if again is None else _about_seeds(again),
+            "two_seeds": None if again is None else TWO_SEEDS.format(*again.seeds),
         },
         "warning": WARNING,
     }
 
 
-def _spans(measured: Stream, simulated: Stream) -> list[Window]:
+def _spans(measured: Recording, simulated: Recording) -> list[Window]:
     """Return the spans of both, after checking that they can be compared."""
     # a simulated pixel may keep still while its frames last; measured events may be a part cut out
-    spans = [_span(measured, None), _span(simulated, simulated.frame_times_ns)]
+    spans = []
+    for stream, times in ((measured, None), (simulated, simulated.frame_times_ns)):
+        span = span_of(stream.events, times)
+        if span is None:
+            raise DataError(f"{stream.path}: holds no events, so there is nothing to compare")
+        spans.append(span)
     if (measured.width, measured.height) != (simulated.width, simulated.height):
         raise DataError(
             f"{simulated.path}: {simulated.width}x{simulated.height} pixels, but {measured.path}"
@@ -177,27 +135,11 @@ def _spans(measured: Stream, simulated: Stream) -> list[Window]:
     return spans
 
 
-def _windows(
-    spans: list[Window], times: NDArray[np.int64] | None, window_s: float | None
-) -> Windows:
-    if window_s is None and times is not None and len(times) > 1:
-        return frame_windows(times, spans)
-    length_us = max(1, round((DEFAULT_WINDOW_S if window_s is None else window_s) * 1e6))
-    return fixed_windows(length_us, spans)
-
-
-def _span(stream: Stream, times: NDArray[np.int64] | None) -> Window:
-    span = span_of(stream.events, times)
-    if span is None:
-        raise DataError(f"{stream.path}: holds no events, so there is nothing to compare")
-    return span
-
-
 def _seconds(span: Window) -> str:
     return f"{seconds(span[0] * 1000)} to {seconds(span[1] * 1000)} s"
 
 
-def _stream(stream: Stream) -> dict[str, Any]:
+def _stream(stream: Recording) -> dict[str, Any]:
     events = stream.events
     return {
         "file": str(stream.path),
@@ -228,26 +170,13 @@ def _measure(name: str, found: Distances, floors: dict[str, Floor]) -> dict[str,
 _FLOORS = ("half_split", "two_seeds")
 
 
-def _statistics(measured: Stream, simulated: Stream, windows: Windows) -> dict[str, Any]:
+def _statistics(measured: Recording, simulated: Recording, windows: Windows) -> dict[str, Any]:
     ours, theirs = (cut(s.events, windows.start, windows.stop) for s in (measured, simulated))
-    told = [
-        {
-            **count_statistics(events, windows.duration_s, measured.width, measured.height),
-            **interval_statistics(events, measured.width),
-        }
-        for events in (ours, theirs)
-    ]
+    size = measured.width, measured.height
+    told = [stream_statistics(events, windows.duration_s, *size) for events in (ours, theirs)]
     each = {
         name: {"definition": definition, "measured": told[0][name], "simulated": told[1][name]}
         for name, definition in STATISTICS.items()
     }
     offset = latency_offset_us(ours, theirs, measured.width)
     return {**each, "latency_offset_us": {"definition": OFFSET, "value": offset}}
-
-
-def _about_seeds(again: Resimulation) -> str:
-    return (
-        f"distance between two simulations of the configuration given that differ in their seed"
-        f" alone ({again.seeds[0]} and {again.seeds[1]}); relative measures over the norm of the"
-        " measured stream"
-    )

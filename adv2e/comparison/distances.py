@@ -87,18 +87,9 @@ def distances(
     *,
     whole: Events | None = None,
 ) -> Distances:
-    """Return all distances between two sorted streams.
+    """Return all distances between two sorted streams, which are cut to the windows here.
 
-    Parameters
-    ----------
-    measured, simulated : Events
-        Sorted; cut to the windows here.
-    windows : Windows
-        Where to compare.
-    width, height : int
-        Columns and rows of the sensor.
-    whole : Events, optional
-        The stream whose norm the relative measures are divided by, where not `measured`.
+    `whole` is the stream whose norm the relative measures are divided by, where not `measured`.
     """
     unit = [] if whole is None else [whole]
     per_window: dict[str, list[float | None]] = {name: [] for name in MEASURES}
@@ -122,10 +113,7 @@ def distances(
 def _window_distances(
     parts: Sequence[Events], window: Window, width: int, height: int
 ) -> dict[str, float | None]:
-    """Return the grid measures between the first two of `parts`, relative to a third or the first.
-
-    All parts are cut to the window already.
-    """
+    """Return the grid measures between two of `parts`, relative to a third or the first."""
     grids = [voxel_grid(part, window, BINS, width, height) for part in parts]
     counts = [voxel_grid(part, window, 1, width, height) for part in parts]
     own_a, own_b = (voxel_grid(part, own_window(part), BINS, width, height) for part in parts[:2])

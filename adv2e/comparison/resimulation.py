@@ -27,16 +27,8 @@ def resimulator(
 ) -> Callable[[int], Events]:
     """Return a function that simulates `frames` with a seed and returns sorted events.
 
-    Parameters
-    ----------
-    frames : callable
-        Starts reading the frames from the beginning, each time it is called.
-    config : Config
-        All but the seed.
-    encoding : str
-        What ``frames.encoding: auto`` means for these frames.
-    threads : int, optional
-        Default: all cores.  The events do not depend on it.
+    `frames` starts reading them from the beginning, each time it is called; `encoding` is what
+    ``frames.encoding: auto`` means for them.
     """
 
     def simulate_events(seed: int) -> Events:

@@ -44,18 +44,10 @@ def smoothed_errors(
     *,
     whole: Events | None = None,
 ) -> list[float] | None:
-    """Return the error at each scale, None if there is no measured event to divide by.
+    """Return the error of streams cut to one time, None if there is no event to divide by.
 
-    Parameters
-    ----------
-    measured, simulated : Events
-        The streams, cut to the same time.
-    width : int
-        Columns of the sensor.
-    sigmas_us : sequence of float
-        Deviations of the Gaussian [us].
-    whole : Events, optional
-        The stream whose norm is divided by, where it is not `measured`.
+    One value for each deviation of the Gaussian [us].  `whole` is the stream whose norm is divided
+    by, where it is not `measured`.
     """
     norms = smoothed_norms([(measured if whole is None else whole, 1.0)], width, sigmas_us)
     if not norms.all():

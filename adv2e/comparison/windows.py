@@ -86,14 +86,7 @@ def to_us(times_ns: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def frame_windows(frame_times_ns: NDArray[np.int64], spans: Sequence[Window]) -> Windows:
-    """Return the frame intervals that lie inside all `spans`.
-
-    Parameters
-    ----------
-    frame_times_ns : array of int64, (frames,)
-        Times of the frames [ns], increasing.
-    spans : sequence of (first, last)
-        Spans of the streams [us].
+    """Return the intervals of frames [ns] that lie inside all `spans`.
 
     Raises
     ------

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import dataclass, replace
 from typing import Any
@@ -7,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adv2e.comparison.compare import STATISTICS, WARNING, Resimulation, compare
-from adv2e.comparison.distances import MEASURES
+from adv2e.comparison.compare import WARNING, Resimulation, compare
+from adv2e.comparison.distances import MEASURES, distances
 from adv2e.comparison.report import text
+from adv2e.comparison.stream_statistics import STATISTICS
+from adv2e.comparison.windows import Windows
 from adv2e.errors import DataError
 from adv2e.events import empty_events
 
@@ -95,7 +98,13 @@ def test_statistics_are_those_of_the_time_compared(measured, simulated):
 def test_a_way_to_simulate_again_gives_the_floor_of_two_seeds(measured, simulated, random_events):
     again = Resimulation(lambda seed: random_events(seed, 2500), (4, 5))
     report = compare(measured, simulated, again=again)
-    assert report["measures"]["bins_shared_window"]["floor"]["two_seeds"] > 0
+    edges = report["windows"]["edges_us"]
+    windows = Windows("", tuple(itertools.pairwise(edges)), len(edges) - 1)
+    draws = random_events(4, 2500), random_events(5, 2500)
+    expected = distances(*draws, windows, 12, 9, whole=measured.events).values
+    found = {name: one["floor"]["two_seeds"] for name, one in report["measures"].items()}
+    assert found == expected
+    assert found["bins_shared_window"] > 0
     assert "4 and 5" in report["floors"]["two_seeds"]
     assert "two_seeds" in text(report)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from adv2e.comparison.distances import distances
-from adv2e.comparison.floor import half_split, two_seeds
+from adv2e.comparison.floor import half_split
 from adv2e.comparison.windows import Windows
 from adv2e.events import make_events, sort_events
 
@@ -42,24 +42,3 @@ def test_more_events_of_a_rate_lower_the_relative_floor(events):
     tripled = sort_events(np.concatenate([events] * 3))
     few, many = (half_split(stream, WINDOWS, *SIZE) for stream in (events, tripled))
     assert many["relative_5_bins"] < few["relative_5_bins"]
-
-
-def test_a_simulation_that_ignores_its_seed_has_no_floor(events):
-    found = two_seeds(lambda seed: events, (0, 1), events, WINDOWS, *SIZE)
-    assert set(found.values()) == {0.0}
-
-
-def test_two_seeds_are_told_apart_relative_to_the_measured_stream(random_events):
-    asked = []
-
-    def simulate_events(seed):
-        asked.append(seed)
-        return random_events(seed, 800)
-
-    measured = random_events(1, 3000)
-    found = two_seeds(simulate_events, (7, 8), measured, WINDOWS, *SIZE)
-    assert asked == [7, 8]
-    expected = distances(
-        random_events(7, 800), random_events(8, 800), WINDOWS, *SIZE, whole=measured
-    )
-    assert found == expected.values
