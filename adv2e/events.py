@@ -18,6 +18,8 @@ EVENT_DTYPE = np.dtype([("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
 Events = NDArray[Any]
 """A structured array of ``EVENT_DTYPE``."""
 
+_PART = 1 << 20  # events looked at together
+
 
 def empty_events(count: int = 0) -> Events:
     """Return an event array of `count` zeroed events."""
@@ -54,3 +56,32 @@ def sort_events(events: Events) -> Events:
 def is_sorted(events: Events) -> bool:
     """Tell whether times never decrease."""
     return bool(np.all(events["t"][1:] >= events["t"][:-1]))
+
+
+def disorder(events: Events) -> tuple[int, int, int]:
+    """Return the number of steps back in time, of ties out of order, and of repeated events."""
+    back = untidy = repeated = 0
+    for begin in range(0, events.size - 1, _PART):
+        part = events[begin : begin + _PART + 1]
+        step = np.diff(part["t"])
+        back += int(np.count_nonzero(step < 0))
+        tied = np.flatnonzero(step == 0)
+        former, latter = (_rank(part[place]) for place in (tied, tied + 1))
+        untidy += int(np.count_nonzero(latter < former))
+        repeated += int(np.count_nonzero(latter == former))
+    return back, untidy, repeated
+
+
+def _rank(events: Events) -> NDArray[np.int64]:
+    """Return numbers that are in the order of (y, x, p)."""
+    y, x, p = (events[name].astype(np.int64) for name in "yxp")
+    return (y << 17) | (x << 1) | p
+
+
+def sort_ties(events: Events) -> None:
+    """Sort events that share a time, in place; times are in order already."""
+    t = events["t"]
+    tied = np.zeros(events.size, np.bool_)
+    np.equal(t[1:], t[:-1], out=tied[1:])
+    tied[:-1] |= tied[1:]
+    events[tied] = sort_events(events[tied])

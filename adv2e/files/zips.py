@@ -8,14 +8,14 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import IO
 
 from adv2e.errors import DataError
 from adv2e.files.expansion import check_expansion
 from adv2e.process.machine import machine_complaint
 
-UNREADABLE = (
+_UNREADABLE = (
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, struct.error, OSError),
     *(NotImplementedError, RuntimeError, UnicodeDecodeError),
 )
@@ -23,15 +23,21 @@ UNREADABLE = (
 
 
 @contextmanager
-def zip_archive(path: Path, kind: str = "a zip archive") -> Iterator[zipfile.ZipFile]:
-    """Open an archive; what is wrong with it, when it is opened or read, is a DataError."""
+def unpacking(trouble: str) -> Iterator[None]:
+    """Make what an archive raises in the body a DataError that says `trouble`, and why."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            yield archive
-    except UNREADABLE as error:
+        yield
+    except _UNREADABLE as error:
         if machine_complaint(error):
             raise
-        raise DataError(f"{path}: not {kind} that can be read, or damaged: {error}") from error
+        raise DataError(f"{trouble}, or damaged: {error}") from error
+
+
+@contextmanager
+def zip_archive(path: Path, kind: str = "a zip archive") -> Iterator[zipfile.ZipFile]:
+    """Open an archive; what is wrong with it, when it is opened or read, is a DataError."""
+    with unpacking(f"{path}: not {kind} that can be read"), zipfile.ZipFile(path) as archive:
+        yield archive
 
 
 def open_member(archive: zipfile.ZipFile, member: str | zipfile.ZipInfo) -> IO[bytes]:
@@ -42,3 +48,68 @@ def open_member(archive: zipfile.ZipFile, member: str | zipfile.ZipInfo) -> IO[b
     held = min(info.compress_size, archive.start_dir)
     check_expansion(info.file_size, held, f"{archive.filename}: {info.filename}")
     return archive.open(info)
+
+
+class Members:
+    """The files of a recording by their names in it, in a folder or a zip.
+
+    A zip holds them at its root or in one folder, and stays open as long as they may be read.
+
+    Raises
+    ------
+    DataError
+        `path` is neither a folder nor a zip that can be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._archive: zipfile.ZipFile | None = None
+        self._names: set[str] = set()
+        self._top = ""
+        if not path.is_dir():
+            with unpacking(f"{path}: not a zip archive that can be read"):
+                self._archive = zipfile.ZipFile(path)
+            self._names = set(self._archive.namelist())
+
+    def enter(self, pattern: str) -> list[str]:
+        """Return the files whose name matches; if there is one, the others are beside it."""
+        if self._archive is None:
+            return [file.name for file in self.path.glob(pattern) if file.is_file()]
+        shallow = (
+            place
+            for place in map(PurePosixPath, sorted(self._names))
+            if len(place.parts) <= 2 and place.parts[0] != "__MACOSX"
+        )
+        found = [place for place in shallow if place.match(pattern)]
+        if len(found) == 1:
+            self._top = "" if len(found[0].parts) == 1 else f"{found[0].parent}/"
+        return [place.name for place in found]
+
+    def has(self, name: str) -> bool:
+        """Tell whether there is a file of that name, with the folders in which it is."""
+        return self._top + name in self._names or (
+            self._archive is None and (self.path / name).is_file()
+        )
+
+    def label(self, name: str) -> str:
+        """Return what a file is called in messages."""
+        return str(self.path / name) if self._archive is None else f"{self.path}: {self._top}{name}"
+
+    @contextmanager
+    def open(self, name: str) -> Iterator[IO[bytes]]:
+        """Open a file; what is wrong with it, when it is opened or read, is a DataError."""
+        if self._archive is None:
+            with (self.path / name).open("rb") as file:
+                yield file
+            return
+        trouble = f"{self.label(name)}: cannot be read from the zip archive"
+        with unpacking(trouble), open_member(self._archive, self._top + name) as file:
+            yield file
+
+    def read(self, name: str) -> bytes:
+        """Return what a file holds; DataError if it cannot be read."""
+        try:
+            with self.open(name) as file:
+                return file.read()
+        except OSError as error:
+            raise DataError(f"{self.label(name)}: {error.strerror or error}") from error

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.events import EVENT_DTYPE, Events, empty_events, sort_events
+from adv2e.events import EVENT_DTYPE, Events, disorder, empty_events, sort_events, sort_ties
 from adv2e.formats.recording import Recording, described_geometry
 from adv2e.sources.frame import Image, Pixels
 from adv2e.sources.times.instants import seconds
@@ -22,9 +22,6 @@ _FEW = 100
 """So few events may well lie in a small part of the recording."""
 _APART = 300
 """Events and frames that differ in length by this factor are in doubt."""
-
-_PART = 1 << 20
-"""Events examined at once."""
 
 Column = NDArray[Any]
 
@@ -252,48 +249,19 @@ class RecordingBuilder:
         return events[inside], width, height
 
     def _in_order(self, events: Events) -> Events:
-        back, untidy, repeated = _examine(events)
+        back, untidy, repeated = disorder(events)
         if back:
             self._say(f"events are not in the order of time ({back} steps back): sorted")
             events = sort_events(events)
         elif untidy:
-            _sort_ties(events)
+            sort_ties(events)
         if back or untidy:
-            repeated = _examine(events)[2]
+            repeated = disorder(events)[2]
         if events.size and events["t"][0] < 0:
             self._say(f"times begin below zero, at {events['t'][0] / 1e6:.6f} s")
         if repeated:
             self._say(f"{repeated} events repeat another one exactly: kept")
         return events
-
-
-def _examine(events: Events) -> tuple[int, int, int]:
-    """Count steps back in time, ties out of (y, x, p) order, and neighbours that are equal."""
-    back = untidy = equal = 0
-    for begin in range(0, events.size - 1, _PART):
-        part = events[begin : begin + _PART + 1]
-        step = np.diff(part["t"])
-        back += int(np.count_nonzero(step < 0))
-        tied = np.flatnonzero(step == 0)
-        former, latter = (_rank(part[place]) for place in (tied, tied + 1))
-        untidy += int(np.count_nonzero(latter < former))
-        equal += int(np.count_nonzero(latter == former))
-    return back, untidy, equal
-
-
-def _rank(events: Events) -> NDArray[np.int64]:
-    """Return numbers that are in the order of (y, x, p)."""
-    y, x, p = (events[name].astype(np.int64) for name in "yxp")
-    return (y << 17) | (x << 1) | p
-
-
-def _sort_ties(events: Events) -> None:
-    """Sort events that share a time by (y, x, p), in place; times are in order already."""
-    t = events["t"]
-    tied = np.zeros(events.size, np.bool_)
-    np.equal(t[1:], t[:-1], out=tied[1:])
-    tied[:-1] |= tied[1:]
-    events[tied] = sort_events(events[tied])
 
 
 def _disagreement(events: Events, times_ns: NDArray[np.int64] | None) -> list[str]:

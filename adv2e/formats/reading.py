@@ -79,14 +79,10 @@ def _check_size(recording: Recording) -> None:
 def _read(path: Path, time_unit: str | None, images_anywhere: bool) -> Recording:
     """Read a file or folder by what is imported late, as each needs other libraries."""
     suffix = path.suffix.lower()
-    if path.is_dir():
-        from adv2e.formats.davis240c.reader import read_folder  # noqa: PLC0415
+    if path.is_dir() or suffix == ".zip":
+        from adv2e.formats.davis240c.reader import read_davis240c  # noqa: PLC0415
 
-        return read_folder(path, time_unit, images_anywhere=images_anywhere)
-    if suffix == ".zip":
-        from adv2e.formats.davis240c.reader import read_zip  # noqa: PLC0415
-
-        return read_zip(path, time_unit)
+        return read_davis240c(path, time_unit, images_anywhere=images_anywhere)
     if suffix == ".txt":
         from adv2e.formats.text.reader import read_text  # noqa: PLC0415
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.files.names import shown
 from adv2e.files.regular import check_ends
-from adv2e.files.zips import UNREADABLE
+from adv2e.files.zips import zip_archive
 from adv2e.formats.reading import Recording, read_recording
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
@@ -81,12 +80,9 @@ def _has_only_frames(path: Path) -> bool:
 
 
 def _members(path: Path) -> set[str]:
-    """Return the names of the files in a zip, without folders; none if it cannot be read."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return {PurePosixPath(name).name for name in archive.namelist()}
-    except UNREADABLE:
-        return set()
+    """Return the names of the files in a zip, without folders."""
+    with zip_archive(path) as archive:
+        return {PurePosixPath(name).name for name in archive.namelist()}
 
 
 def _of_recording(recording: Recording) -> dict[str, Any]:

@@ -12,17 +12,16 @@ References
 
 from __future__ import annotations
 
-import zipfile
 from functools import partial
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from adv2e.errors import DataError
-from adv2e.files.zips import UNREADABLE, open_member
+from adv2e.files.zips import Members
 from adv2e.sources.frame import RECORDED, Light, Pixels, Shot
-from adv2e.sources.images.opencv import decode_image, read_image
+from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.listed import ListedSource, Picture, given_shots, told
-from adv2e.sources.stored import DESCRIPTION, MOST_BYTES, light_beside, read_light
-from adv2e.sources.times.lists import FrameList, decoded, first_name, parse_list, read_list
+from adv2e.sources.stored import DESCRIPTION, read_light
+from adv2e.sources.times.lists import FrameList, decoded, first_name, parse_list
 from adv2e.sources.times.names import member_of, members_of
 from adv2e.sources.wanted import GivenTimes, Selection
 
@@ -47,92 +46,45 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     DataError
         Not such a recording, or an image that is listed is missing.
     """
-    if path.is_dir():
-        return _open_folder(path, given, selection)
-    return _open_zip(path, given, selection)
-
-
-def _open_folder(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
-    label = str(path / LIST)
-    found = read_list(path / LIST, time_unit=_unit(given))
-    members = members_of(
-        found.stamps,
-        label,
-        lambda member: (path / member).is_file(),
-        where=f" in {path}",
-        folder=path,
-        anywhere=given.images_anywhere,
-    )
-    files = [path / member for member in members]
-    pictures = [Picture(str(f), str(f.absolute()), partial(read_image, f)) for f in files]
-    return _source(path, label, found, pictures, given, selection, light_beside(path))
-
-
-def _open_zip(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
-    try:
-        archive = zipfile.ZipFile(path)  # stays open as long as its members may be read
-        names = set(archive.namelist())
-        listed = _list_in(path, names)
-        with open_member(archive, listed) as file:
-            data = file.read()
-    except UNREADABLE as error:
-        raise DataError(f"{path}: not a zip that can be read, or damaged") from error
-    label = f"{path}: {listed}"
-    top = listed.removesuffix(LIST)
-    stated = "s" if top + DESCRIPTION in names else None
-    found = parse_list(decoded(data, label), label, time_unit=_unit(given), stated=stated)
-    members = members_of(
-        found.stamps, label, lambda member: top + member in names, where=" in the zip"
-    )
-    pictures = []
-    for member in members:
-        name = f"{path}: {top}{member}"
-        pictures.append(
-            Picture(name, top + member, partial(_read_member, archive, top + member, name))
-        )
-    light = _light_in(archive, top + DESCRIPTION, path)
-    return _source(path, label, found, pictures, given, selection, light)
-
-
-def _unit(given: GivenTimes) -> str | None:
-    """Return the unit that the user says the list has; with another list it is that one's."""
-    return None if given else given.time_unit
-
-
-def _list_in(path: Path, names: set[str]) -> str:
-    depths = {name: len(PurePosixPath(name).parts) for name in names}
-    lists = [
-        name
-        for name, depth in sorted(depths.items())
-        if PurePosixPath(name).name == LIST and depth <= 2 and not name.startswith("__MACOSX/")
-    ]
+    files = Members(path)
+    lists = files.enter(LIST)
     if len(lists) != 1:
         raise DataError(
             f"{path}: {'more than one' if lists else 'no'} {LIST} in it; a DAVIS240C zip has it at"
             " its root or in one folder"
         )
-    return lists[0]
+    label = files.label(LIST)
+    found = parse_list(
+        decoded(files.read(LIST), label),
+        label,
+        time_unit=None if given else given.time_unit,  # else it is that of the other list
+        stated="s" if files.has(DESCRIPTION) else None,
+    )
+    is_folder = path.is_dir()
+    members = members_of(
+        found.stamps,
+        label,
+        files.has,
+        where=f" in {path}" if is_folder else " in the zip",
+        folder=path if is_folder else None,
+        anywhere=given.images_anywhere,
+    )
+    pictures = [
+        Picture(
+            files.label(member),
+            str((path / member).absolute()) if is_folder else member,
+            partial(_read_image, files, member),
+        )
+        for member in members
+    ]
+    light = None
+    if files.has(DESCRIPTION):
+        light = read_light(files.read(DESCRIPTION), files.label(DESCRIPTION))
+    return _source(path, label, found, pictures, given, selection, light)
 
 
-def _light_in(archive: zipfile.ZipFile, member: str, path: Path) -> Light | None:
-    if member not in archive.namelist():
-        return None
-    label = f"{path}: {member}"
-    try:
-        with archive.open(member) as file:
-            text = file.read(MOST_BYTES + 1)
-    except UNREADABLE as error:
-        raise DataError(f"{label}: cannot be read from the zip, or damaged") from error
-    return read_light(text, label)
-
-
-def _read_member(archive: zipfile.ZipFile, member: str, label: str) -> Pixels:
-    try:
-        with open_member(archive, member) as file:
-            data = file.read()
-    except UNREADABLE as error:
-        raise DataError(f"{label}: cannot be read from the zip, or damaged") from error
-    return decode_image(data, label)
+def _read_image(files: Members, member: str) -> Pixels:
+    return decode_image(files.read(member), files.label(member))
 
 
 def _source(

@@ -154,7 +154,7 @@ def test_files_that_are_no_zip(tmp_path, pack):
     path = tmp_path / "bad.zip"
     for data in (b"", b"text" * 100, whole[:-30]):
         path.write_bytes(data)
-        with pytest.raises(DataError, match=r"bad\.zip: not a zip that can be read"):
+        with pytest.raises(DataError, match=r"bad\.zip: not a zip archive that can be read"):
             open_source(path)
 
 
