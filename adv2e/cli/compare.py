@@ -9,9 +9,6 @@ import click
 from adv2e.cli import options
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from adv2e.cli.options import Log
     from adv2e.comparison.compare import Resimulation
     from adv2e.config import Config
@@ -66,6 +63,8 @@ def command(
       adv2e compare urban.zip urban_simulated.h5 -c davis240c --json
       adv2e compare measured.txt simulated.txt --window 0.02
     """
+    import numpy as np
+
     from adv2e.comparison.compare import compare
     from adv2e.formats.reading import read_recording
     from adv2e.sources import open_source
@@ -75,7 +74,7 @@ def command(
     source = open_source(frames_path) if frames_path else None
     for doubt in source.doubts if source else []:
         log(doubt)
-    times = _frame_times(source) if source else None
+    times = np.array([frame.t_ns for frame in source.frames()]) if source else None
     again = _resimulation(ours, source, config, threads, log) if _configured() else None
     report = compare(ours, theirs, frame_times_ns=times, window_s=window_s, again=again)
     for stream in (ours, theirs):
@@ -95,12 +94,6 @@ def _configured() -> bool:
     """Tell whether a configuration was asked for on the command line."""
     given = click.get_current_context().params
     return bool(given["config_files"] or given["sets"] or given["seed"] is not None)
-
-
-def _frame_times(source: Source) -> NDArray[np.int64]:
-    import numpy as np
-
-    return np.array([frame.t_ns for frame in source.frames()], dtype=np.int64)
 
 
 def _resimulation(

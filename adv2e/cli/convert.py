@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,8 +21,7 @@ SECONDS = options.FiniteNumber(min=0)
 @click.argument("source", metavar="INPUT")
 @options.late_config_options
 @options.run_options
-@options.fps_option
-@options.list_options
+@options.source_options
 @click.option("--start", type=SECONDS, metavar="S", help="Begin S seconds after the first frame.")
 @click.option("--stop", type=SECONDS, metavar="S", help="End S seconds after the first frame.")
 @click.option(
@@ -33,7 +31,6 @@ SECONDS = options.FiniteNumber(min=0)
     show_default=True,
     help="Time of the first frame: zero, or as on the source's clock; auto: keep where it has one.",
 )
-@options.allow_damaged_option
 @click.option(
     "--format",
     "format_",
@@ -64,14 +61,10 @@ def command(
     threads: int | None,
     progress: bool,
     log: Log,
-    fps: str | None,
-    timestamps: Path | None,
-    time_unit: str | None,
-    images_anywhere: bool,
+    given: dict[str, Any],
     start: float | None,
     stop: float | None,
     t0: str,
-    allow_damaged: bool,
     format_: str | None,
     layout: str | None,
     with_frames: bool,
@@ -93,26 +86,15 @@ def command(
       adv2e convert frames/ --fps 240 -o events.h5 --with-frames
       adv2e convert urban.zip -o urban_simulated --preview urban.mp4
     """
-    if fps is not None and timestamps is not None:
+    if given["fps"] is not None and given["timestamps"] is not None:
         raise click.UsageError("--fps and --timestamps both give the times of the frames: keep one")
-    if fps is not None and time_unit is not None:
+    if given["fps"] is not None and given["time_unit"] is not None:
         raise click.UsageError("--time-unit is for lists of times, which --fps replaces: keep one")
     if start is not None and stop is not None and stop <= start:
         raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
     from adv2e.conversion.reading import Reading
 
-    reading = Reading(
-        source,
-        fps=fps,
-        timestamps=timestamps,
-        time_unit=time_unit,
-        images_anywhere=images_anywhere,
-        start_s=start,
-        stop_s=stop,
-        t0=t0,
-        allow_damaged=allow_damaged,
-        threads=threads,
-    )
+    reading = Reading(source, **given, start_s=start, stop_s=stop, t0=t0, threads=threads)
     with reading:  # it reads while all else that is needed is imported
         from adv2e.conversion.pipeline import convert
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import click
@@ -10,7 +9,7 @@ import click
 from adv2e.cli import options
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
     from adv2e.cli.options import Log
     from adv2e.config import Config
@@ -18,7 +17,8 @@ if TYPE_CHECKING:
 
 @click.command("diagnose")
 @click.argument("recording", metavar="RECORDING")
-@options.common_options
+@options.config_options
+@options.run_options
 @click.option(
     "--without",
     "without",
@@ -61,6 +61,8 @@ def command(
     """
     from pathlib import Path
 
+    from tqdm import tqdm
+
     from adv2e.compiled import announcement
     from adv2e.config import names_of, written_keys
     from adv2e.config.own import user_effects
@@ -83,7 +85,11 @@ def command(
     evidence = read_evidence(recording, time_unit)
     if not is_compiled(config.pixel, config.sampling):
         log(announcement())
-    with _counting(progress) as count:
+    with tqdm(unit="simulation", leave=False, disable=not progress) as bar:
+
+        def count(done: int) -> None:
+            bar.update(done - bar.n)
+
         found = diagnose(
             evidence,
             config,
@@ -119,19 +125,3 @@ def _check_own_names(own: Iterable[str], known: Sequence[str]) -> None:
     for name in own:
         if name in known:
             raise UsageError(f"--effect: {name}: a built-in effect has that name; choose another")
-
-
-@contextmanager
-def _counting(shown: bool) -> Iterator[Callable[[int], None]]:
-    """Show how many simulations were done."""
-    if not shown:
-        yield lambda done: None
-        return
-    from tqdm import tqdm
-
-    with tqdm(unit="simulation", leave=False) as bar:
-
-        def count(done: int) -> None:
-            bar.update(done - bar.n)
-
-        yield count

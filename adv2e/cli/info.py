@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -12,20 +13,9 @@ from adv2e.cli import options
 @click.command("info")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print JSON; all keys are always there.")
-@options.fps_option
-@options.list_options
-@options.allow_damaged_option
+@options.source_options
 @options.verbosity_options
-def command(
-    file: Path,
-    as_json: bool,
-    fps: str | None,
-    timestamps: Path | None,
-    time_unit: str | None,
-    images_anywhere: bool,
-    allow_damaged: bool,
-    log: options.Log,
-) -> None:
+def command(file: Path, as_json: bool, given: dict[str, Any], log: options.Log) -> None:
     """Say what a recording or event file holds.
 
     Tells geometry, span, counts and rates of the events, the frames, which program and seed made
@@ -41,14 +31,7 @@ def command(
     from adv2e.inspection.inspect import inspect
 
     log(f"reading {file}", 1)
-    report = inspect(
-        file,
-        fps=fps,
-        timestamps=timestamps,
-        time_unit=time_unit,
-        images_anywhere=images_anywhere,
-        allow_damaged=allow_damaged,
-    )
+    report = inspect(file, **given)
     if as_json:
         import json
 

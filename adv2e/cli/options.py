@@ -21,8 +21,6 @@ from adv2e.cli.run import VERBOSITY
 from adv2e.files.names import shown
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from adv2e.config import Config
     from adv2e.effects.hooks import Hooks
 
@@ -59,25 +57,6 @@ class FiniteNumber(click.FloatRange):
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number", param, ctx)
         return number
-
-
-def fps_option(body: Body) -> Body:
-    """Add --fps; the command gets ``fps``, as it was written, or None."""
-    return click.option(
-        "--fps",
-        metavar="F",
-        callback=_rate,
-        help="Frames a second, such as 30 or 30000/1001.",
-    )(body)
-
-
-def allow_damaged_option(body: Body) -> Body:
-    """Add --allow-damaged; the command gets ``allow_damaged``."""
-    return click.option(
-        "--allow-damaged",
-        is_flag=True,
-        help="Take what can be decoded of a damaged video, and say what is missing.",
-    )(body)
 
 
 def _rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -174,20 +153,42 @@ def config_options(body: Body) -> Body:
     return late_config_options(with_config)  # type: ignore[return-value]
 
 
-def list_options(body: Body) -> Body:
-    """Add --timestamps, --time-unit and --images-anywhere, all as :class:`GivenTimes` has them."""
-    body = click.option(
-        "--images-anywhere",
-        is_flag=True,
-        help="Let a recording's images.txt name images outside its folder.",
-    )(body)
-    body = time_unit_option(body)
-    return click.option(
+def source_options(body: Body) -> Body:
+    """Add what says how to read an input with frames.
+
+    The command gets ``given``, these by the names that :func:`adv2e.sources.open_source` has for
+    them: fps, as it was written, timestamps, time_unit, images_anywhere and allow_damaged.
+    """
+
+    @click.option(
+        "--fps",
+        metavar="F",
+        callback=_rate,
+        help="Frames a second, such as 30 or 30000/1001.",
+    )
+    @click.option(
         "--timestamps",
         type=click.Path(path_type=Path),
         metavar="FILE",
         help="Times of the frames, one a line.",
-    )(body)
+    )
+    @time_unit_option
+    @click.option(
+        "--images-anywhere",
+        is_flag=True,
+        help="Let a recording's images.txt name images outside its folder.",
+    )
+    @click.option(
+        "--allow-damaged",
+        is_flag=True,
+        help="Take what can be decoded of a damaged video, and say what is missing.",
+    )
+    @functools.wraps(body)
+    def with_given(*args: Any, **kw: Any) -> Any:
+        names = ("fps", "timestamps", "time_unit", "images_anywhere", "allow_damaged")
+        return body(*args, given={name: kw.pop(name) for name in names}, **kw)
+
+    return with_given  # type: ignore[return-value]
 
 
 def time_unit_option(body: Body) -> Body:
@@ -277,8 +278,3 @@ def run_options(body: Body) -> Body:
     for decorator in (progress_option, verbosity_options, threads_option, output_options):
         body = decorator(body)
     return body
-
-
-def common_options(body: Body) -> Body:
-    """Add all of them: the command gets config, output, overwrite, threads, progress and log."""
-    return config_options(run_options(body))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adv2e.config.build import Key, all_keys, build, keys_of
 from adv2e.config.files import read, shipped
-from adv2e.config.merge import merge_all, parse_set
+from adv2e.config.merge import merge, parse_set
 from adv2e.config.model import Config
 from adv2e.config.own import config_class
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
@@ -61,11 +62,16 @@ def load_config(
     UsageError
         One of `sets` is wrong.
     """
-    over = [parse_set(text) for text in sets]
+    return build(config_class(effects), _merged(files, sets, seed))
+
+
+def _merged(files: Sequence[str | Path], sets: Sequence[str], seed: int | None = None) -> Value:
+    """Return what `files`, `sets` and `seed` say, later ones on top."""
+    over = [parse_set(text) for text in sets]  # what is wrong on the command line comes first
     if seed is not None:
         origin = Origin("--seed", on_command_line=True)
         over.append(Value({"seed": Value(seed, origin)}, origin))
-    return build(config_class(effects), merge_all([*(read(name) for name in files), *over]))
+    return reduce(merge, [*map(read, files), *over], Value({}))
 
 
 def names_of(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> str:
@@ -83,8 +89,7 @@ def written_keys(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> 
     ConfigError, UsageError
         As :func:`load_config`.
     """
-    layers = [*(read(name) for name in files), *(parse_set(text) for text in sets)]
-    return dict(_scalars(merge_all(layers), ""))
+    return dict(_scalars(_merged(files, sets), ""))
 
 
 def _scalars(tree: Value, path: str) -> Iterator[tuple[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 
 from adv2e.config.yaml12 import Origin, Value, parse
 from adv2e.errors import UsageError
@@ -25,14 +24,6 @@ def merge(under: Value, over: Value) -> Value:
     return Value(content, under.origin)
 
 
-def merge_all(layers: Iterable[Value]) -> Value:
-    """Return all layers merged; later ones win."""
-    merged = Value({})
-    for layer in layers:
-        merged = merge(merged, layer)
-    return merged
-
-
 def parse_set(text: str) -> Value:
     """Return the tree of one ``--set`` argument, ``KEY=VALUE`` with VALUE in YAML.
 
@@ -48,11 +39,7 @@ def parse_set(text: str) -> Value:
             f"--set {text}: must be KEY=VALUE, such as --set pixel.low_pass.cutoff_hz=100"
         )
     origin = Origin("--set", on_command_line=True)
-    return nest(path, parse(written, origin, path))
-
-
-def nest(path: str, value: Value) -> Value:
-    """Return the tree in which `value` stands at the dotted `path`."""
+    value = parse(written, origin, path)
     for key in reversed(path.split(".")):
-        value = Value({key: value}, value.origin)
+        value = Value({key: value}, origin)
     return value
