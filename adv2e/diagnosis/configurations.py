@@ -8,11 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 from adv2e.config import Config, from_dict, to_dict
-from adv2e.config.build import all_keys
 from adv2e.config.own import user_effects
 from adv2e.config.paths import set_key
 from adv2e.effects.readout.frame_coupling import FrameCoupling
-from adv2e.parameters import Parameter
+from adv2e.reports.keys import known_keys
 from adv2e.reports.result import Own
 
 
@@ -30,11 +29,6 @@ def from_values(values: dict[str, Any], name: str, like: Config) -> Config:
     A mistake is put down to `name`.
     """
     return from_dict(values, name, list(user_effects(like).values()))
-
-
-def known_keys(section: type[Config]) -> dict[str, Parameter]:
-    """Return what is declared of each key, by its path."""
-    return {key.path: key.about for key in all_keys(section)}
 
 
 def coupling_of(config: Config) -> FrameCoupling | None:

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
-from types import MappingProxyType
 
-from adv2e.config import Key, all_keys
+from adv2e.config import Config, all_keys
 from adv2e.effects import EFFECTS
 from adv2e.parameters import Parameter
 from adv2e.reports.result import NO_OWN, Own
 
 
-@lru_cache(maxsize=1)
-def _declared() -> Mapping[str, Key]:
-    return MappingProxyType({key.path: key for key in all_keys()})
-
-
-def key_named(path: str) -> Key | None:
-    """Return the declaration of the key `path`, or None for a key of a user's own effect."""
-    return _declared().get(path)
+def known_keys(section: type[Config] = Config) -> Mapping[str, Parameter]:
+    """Return what is declared of each key, by its path."""
+    return {key.path: key.about for key in all_keys(section)}
 
 
 def _about(path: str, own: Own) -> Parameter | None:
-    key = key_named(path)
-    return own.keys.get(path) if key is None else key.about
+    return known_keys().get(path, own.keys.get(path))
 
 
 def unit_of(path: str, own: Own = NO_OWN) -> str:
@@ -47,10 +39,7 @@ def summary_of(name: str, paths: Sequence[str] = (), own: Own = NO_OWN) -> str:
         if effect.name == name:
             return effect.summary()
     for effect in EFFECTS:
-        if any(_below(path, section) for path in paths for section in effect.paths):
+        sections = tuple(f"{section}." for section in effect.paths)
+        if any(f"{path}.".startswith(sections) for path in paths):
             return effect.summary()
     return ""
-
-
-def _below(path: str, section: str) -> bool:
-    return path == section or path.startswith(f"{section}.")

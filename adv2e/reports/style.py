@@ -91,7 +91,6 @@ svg .band { fill: var(--role); fill-opacity: 0.2; stroke: none; }
 svg .curve { fill: none; stroke: var(--role); stroke-width: 1.6; stroke-linejoin: round; }
 svg .curve.before { stroke-dasharray: 5 3; }
 svg .curve.measured { stroke-width: 2.2; }
-svg .curve.dense { stroke-width: 0.9; }
 svg .dot { fill: var(--role); }
 svg .whisker { stroke: var(--role); stroke-width: 1.6; }
 @media print {

@@ -12,15 +12,6 @@ from adv2e.reports.charts.ticks import linear_ticks, log_ticks, tick_labels
 
 NUMBERS = st.floats(-1e250, 1e250, allow_subnormal=False)
 POSITIVE = st.floats(1e-250, 1e250)
-SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-
-
-def number_of(label):
-    """Read a label as a person does."""
-    if label[-1] not in "⁰¹²³⁴⁵⁶⁷⁸⁹":
-        return float(label)
-    factor, _, power = label.rpartition("10")
-    return float(f"{factor.rstrip('×') or '1'}e{power.translate(SUPERSCRIPTS)}")
 
 
 @st.composite
@@ -35,12 +26,12 @@ def ranges(draw):
 @pytest.mark.parametrize(
     ("low", "high", "ticks", "labels"),
     [
-        (0, 1, [0, 0.2, 0.4, 0.6, 0.8, 1], ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]),
+        (0, 1, [0, 0.2, 0.4, 0.6, 0.8, 1], ["0", "0.2", "0.4", "0.6", "0.8", "1"]),
         (-3, 8.5, [-2, 0, 2, 4, 6, 8], ["-2", "0", "2", "4", "6", "8"]),
         (0.31, 0.349, [0.31, 0.32, 0.33, 0.34], ["0.31", "0.32", "0.33", "0.34"]),
-        (0, 4e6, [0, 1e6, 2e6, 3e6, 4e6], ["0", "1×10⁶", "2×10⁶", "3×10⁶", "4×10⁶"]),
+        (0, 4e6, [0, 1e6, 2e6, 3e6, 4e6], ["0", "1e6", "2e6", "3e6", "4e6"]),
         (0, 3e-5, [0, 5e-6, 1e-5, 1.5e-5, 2e-5, 2.5e-5, 3e-5],
-         ["0", "0.5×10⁻⁵", "1.0×10⁻⁵", "1.5×10⁻⁵", "2.0×10⁻⁵", "2.5×10⁻⁵", "3.0×10⁻⁵"]),
+         ["0", "5e-6", "1e-5", "1.5e-5", "2e-5", "2.5e-5", "3e-5"]),
     ],
 )  # fmt: skip
 def test_linear_examples(low, high, ticks, labels):
@@ -52,15 +43,15 @@ def test_linear_examples(low, high, ticks, labels):
     ("low", "high", "ticks", "labels"),
     [
         (0.5, 2000, [1, 10, 100, 1000], ["1", "10", "100", "1000"]),
-        (100, 1e6, [100, 1e3, 1e4, 1e5, 1e6], ["10²", "10³", "10⁴", "10⁵", "10⁶"]),
+        (100, 1e6, [100, 1e3, 1e4, 1e5, 1e6], ["100", "1000", "10000", "100000", "1e6"]),
         (2, 300, [2, 5, 10, 20, 50, 100, 200], ["2", "5", "10", "20", "50", "100", "200"]),
-        (2e-6, 3e-5, [2e-6, 5e-6, 1e-5, 2e-5], ["2×10⁻⁶", "5×10⁻⁶", "10⁻⁵", "2×10⁻⁵"]),
+        (2e-6, 3e-5, [2e-6, 5e-6, 1e-5, 2e-5], ["2e-6", "5e-6", "1e-5", "2e-5"]),
         (4.1, 4.6, [4.1, 4.2, 4.3, 4.4, 4.5, 4.6], ["4.1", "4.2", "4.3", "4.4", "4.5", "4.6"]),
     ],
 )
 def test_logarithmic_examples(low, high, ticks, labels):
     assert log_ticks(low, high) == ticks
-    assert tick_labels(ticks, log=True) == labels
+    assert tick_labels(ticks) == labels
 
 
 @settings(deadline=None)
@@ -98,11 +89,11 @@ def test_labels_say_the_number(ends, log):
         ticks = log_ticks(low, high)
     else:
         ticks = linear_ticks(*ends)
-    labels = tick_labels(ticks, log)
+    labels = tick_labels(ticks)
     assert len(set(labels)) == len(labels) == len(ticks)
     gap = min(b - a for a, b in itertools.pairwise(ticks))
     for label, tick in zip(labels, ticks, strict=True):
-        assert math.isclose(number_of(label), tick, rel_tol=1e-9, abs_tol=1e-3 * gap)
+        assert math.isclose(float(label), tick, rel_tol=1e-9, abs_tol=1e-3 * gap)
 
 
 def test_labels_of_few_ticks():

@@ -18,13 +18,13 @@ from adv2e.config import Config, to_dict
 from adv2e.config.build import keys_of
 from adv2e.config.own import user_effects
 from adv2e.config.paths import get_key
-from adv2e.diagnosis.configurations import known_keys
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.diagnosis.hints.collect import Hints
 from adv2e.diagnosis.hints.lamps import Lamp
 from adv2e.diagnosis.hints.readouts import WIDTH, has_pulse
 from adv2e.effects.pixel.initial_reference import RANDOM, SETTLED
 from adv2e.parameters import Fit
+from adv2e.reports.keys import known_keys
 
 _DECLARED = known_keys(Config)
 

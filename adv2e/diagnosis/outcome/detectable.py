@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.configurations import known_keys
 from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
 from adv2e.diagnosis.hints.readouts import DRIFT
 from adv2e.diagnosis.selection.reference import OF_RECORDINGS, Reference, State
 from adv2e.diagnosis.selection.search import PER_LOOK
 from adv2e.diagnosis.statistics.metric import Ensemble, expanded
 from adv2e.diagnosis.statistics.summary import BOTH
+from adv2e.reports.keys import known_keys
 from adv2e.reports.result import Detectable
 
 _SEEN = 0.8

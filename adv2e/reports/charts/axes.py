@@ -56,8 +56,7 @@ class Axis:
         """Return places in the picture and labels."""
         ticks = log_ticks(self.low, self.high) if self.log else linear_ticks(self.low, self.high)
         return [
-            (self.at(tick), label)
-            for tick, label in zip(ticks, tick_labels(ticks, self.log), strict=True)
+            (self.at(tick), label) for tick, label in zip(ticks, tick_labels(ticks), strict=True)
         ]
 
     def _scaled(self, values: Floats | np.float64) -> Floats:
@@ -73,16 +72,8 @@ def axis_over(
 ) -> Axis | None:
     """Return an axis that shows all `values`, or None if there is nothing to show.
 
-    Parameters
-    ----------
-    values : iterable of arrays
-        As :func:`drawable` returns them.
-    start, end : float
-        Where its ends lie in the picture.
-    log : bool
-        Logarithmic; values that are not positive are then not shown.
-    tight : bool
-        No room beyond the values, nor down to a zero near them.
+    They are :func:`drawable`; a logarithm shows only those above zero.  A `tight` axis has no room
+    beyond the values, nor down to a zero near them.
     """
     shown = np.concatenate([np.ravel(part) for part in values] or [np.empty(0)])
     shown = shown[np.isfinite(shown) & ((shown > 0) | (not log))]

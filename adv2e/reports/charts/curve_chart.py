@@ -24,8 +24,8 @@ from adv2e.reports.wording import Wording
 
 WIDTH, _PLOT_HEIGHT = 460, 200
 _LEFT, _RIGHT, _LEGEND = 58, 14, 22
-_FEW_POINTS, _MANY_POINTS = 40, 250
-"""Up to the one number, points of a line are marked; from the other on, the line is thin."""
+_FEW_POINTS = 40
+"""Up to as many, points of a line are marked."""
 
 _LEGENDS = (
     ("measured", "measured", 4),
@@ -91,8 +91,7 @@ def curve_chart(curve: Curve) -> Markup:
     for name, band in (("before", curve.before), ("after", curve.after)):
         content.append(tag("path", d=frame.band(band), class_=f"band {name}"))
     if joined:
-        width = " dense" if len(measured) > _MANY_POINTS else ""
-        content.append(tag("path", d=frame.line(measured), class_=f"curve measured{width}"))
+        content.append(tag("path", d=frame.line(measured), class_="curve measured"))
     if dots:
         ys = frame.up.place(measured)
         content += [_dot(x, y, joined) for x, y in zip(frame.x, ys, strict=True)]

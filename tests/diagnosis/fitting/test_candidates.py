@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from adv2e.config import Config, load_config, shipped, to_dict
 from adv2e.config.paths import flat, get_key, set_key
-from adv2e.diagnosis.configurations import known_keys
 from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
 from adv2e.diagnosis.fitting.library import library, names
 from adv2e.diagnosis.hints.collect import Hints
 from adv2e.diagnosis.hints.lamps import Lamp
+from adv2e.reports.keys import known_keys
 
 HINTS = Hints(0.3, (Lamp(100.0), Lamp(63.5, 1.2)), 10)
 CONFIGS = [None, *shipped()]
