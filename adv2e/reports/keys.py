@@ -15,8 +15,11 @@ def known_keys(section: type[Config] = Config) -> Mapping[str, Parameter]:
     return {key.path: key.about for key in all_keys(section)}
 
 
+BUILT_IN = known_keys()
+
+
 def _about(path: str, own: Own) -> Parameter | None:
-    return known_keys().get(path, own.keys.get(path))
+    return BUILT_IN.get(path, own.keys.get(path))
 
 
 def unit_of(path: str, own: Own = NO_OWN) -> str:

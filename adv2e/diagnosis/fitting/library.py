@@ -24,9 +24,7 @@ from adv2e.diagnosis.hints.lamps import Lamp
 from adv2e.diagnosis.hints.readouts import WIDTH, has_pulse
 from adv2e.effects.pixel.initial_reference import RANDOM, SETTLED
 from adv2e.parameters import Fit
-from adv2e.reports.keys import known_keys
-
-_DECLARED = known_keys(Config)
+from adv2e.reports.keys import BUILT_IN
 
 _LEAST_DN = 0.02
 """Of a black level, either way."""
@@ -59,7 +57,7 @@ def _built_in(declared: Config, hints: Hints) -> Iterator[Candidate]:
 
 def _fit_of(key: str) -> Fit:
     """Return where the parameter of a key is declared to be fitted."""
-    fit = _DECLARED[key].fit
+    fit = BUILT_IN[key].fit
     assert fit is not None, key
     return fit
 
