@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from adv2e.events import EVENT_DTYPE, Events, disorder, empty_events, sort_events, sort_ties
 from adv2e.formats.recording import Recording, described_geometry
+from adv2e.formats.units import event_unit
 from adv2e.sources.frame import Image, Pixels
 from adv2e.sources.times.instants import seconds
-from adv2e.sources.times.units import SETTLED, Unit, event_unit
+from adv2e.sources.times.units import SETTLED, Unit
 
 _LARGEST = np.iinfo(np.uint16).max
 

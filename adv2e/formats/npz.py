@@ -4,7 +4,7 @@
 column     names                   meaning
 ========== ======================= =================================================
 time       t_s, t_ms, t_us, t_ns   as they say
-           t, ts, time(stamp)(s)   told from the times: :mod:`adv2e.sources.times.units`
+           t, ts, time(stamp)(s)   told from the times: :mod:`adv2e.formats.units`
 column     x, xs                   from the left
 row        y, ys                   from the top
 polarity   p, ps, pol(arity)       ON above 0

@@ -30,7 +30,7 @@ def read_recording(
         The suffix tells the format: .txt, .zip (DAVIS240C, or a single text file), .h5 or .hdf5
         (layout ``monash``), .npz.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
-        Unit of the times; default: see :mod:`adv2e.sources.times.units`.
+        Unit of the times; default: see :mod:`adv2e.formats.units`.
     images_anywhere : bool
         The ``images.txt`` of a folder may name images outside of it.
 

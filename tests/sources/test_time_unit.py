@@ -144,7 +144,7 @@ def test_what_dvs_voltmeter_writes_is_in_microseconds(write_images, picture):
     )
     source = open_source(folder)
     assert times_of(source) == [0, 41_667_000, 83_334_000]
-    assert source.doubts == []
+    assert "are taken as us (23.9998 frames a second)" in source.doubts[0]
 
 
 def test_info_of_a_stack_tells_its_doubts(adv2e, tmp_path):

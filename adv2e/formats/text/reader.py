@@ -4,7 +4,7 @@ A line is ``time x y polarity``, separated by blanks.  Lines that begin with ``#
 are skipped.  Times are seconds, plain or scientific, read digit by digit to the nearest
 microsecond, so that 1.47e9 s loses nothing.  A first line of two numbers is the geometry
 (``width height``, as rpg_e2vid writes it).  Other units than seconds, such as the microseconds of
-DVS-Voltmeter, are told from the times: see :mod:`adv2e.sources.times.units`.
+DVS-Voltmeter, are told from the times: see :mod:`adv2e.formats.units`.
 """
 
 from __future__ import annotations

@@ -55,11 +55,8 @@ def first_name(path: Path) -> str:
 def read_list(path: Path, **evidence: Any) -> FrameList:
     """Read a list of frames from a file; parameters and errors as :func:`parse_list`.
 
-    The ``info.txt`` of DVS-Voltmeter is in microseconds, and what lies beside our own
-    ``adv2e.json`` in seconds.
+    What lies beside our own ``adv2e.json`` is in seconds.
     """
-    if path.name == "info.txt":
-        evidence.setdefault("usual", "us")
     if path.name == "images.txt" and path.with_name("adv2e.json").is_file():
         evidence.setdefault("stated", "s")
     return parse_list(_text(path), str(path), **evidence)
@@ -91,7 +88,6 @@ def parse_list(
     *,
     time_unit: str | None = None,
     stated: str | None = None,
-    usual: str | None = None,
     own_step_s: float | None = None,
 ) -> FrameList:
     """Read a list of frames.
@@ -107,14 +103,14 @@ def parse_list(
         Name of the file, for messages.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         What the user says.
-    stated, usual, own_step_s
+    stated, own_step_s
         What else tells of the unit; see :func:`adv2e.sources.times.units.frame_unit`.
 
     Raises
     ------
     DataError
         Columns whose meaning is open, a line that is unlike the others or whose time cannot be
-        read, a time or a name that occurs twice, times that do not increase, or an empty list;
+        read, a time that occurs twice, times that do not increase, or an empty list;
         with the line's number.
     """
     table = table_of(text, label)
@@ -123,11 +119,9 @@ def parse_list(
         [Decimal(field) for field in fields],
         given=time_unit,
         stated=table.unit or stated,
-        usual=usual,
         own_step_s=own_step_s,
     )
     stamps = [_stamp(line, table, unit, label) for line in table.lines]
-    _check_names(stamps, label)
     order = ""
     if table.name is not None:
         order = _disorder(stamps)
@@ -149,15 +143,6 @@ def _stamp(line: Line, table: Table, unit: Unit, label: str) -> Stamp:
 
 def _name(line: Line, table: Table) -> str | None:
     return None if table.name is None else line.fields[table.name].replace("\\", "/")
-
-
-def _check_names(stamps: list[Stamp], label: str) -> None:
-    lines: dict[str, int] = {}
-    for stamp in stamps:
-        if stamp.name is not None and lines.setdefault(stamp.name, stamp.line) != stamp.line:
-            raise DataError(
-                f"{label} line {stamp.line}: {stamp.name} is on line {lines[stamp.name]} already"
-            )
 
 
 def _disorder(stamps: list[Stamp]) -> str:

@@ -24,14 +24,13 @@ from adv2e.errors import DataError, MissingExtraError
 from adv2e.sources.video.colours import UNSTATED, is_stated
 from adv2e.sources.video.opening import openable
 
-_FULL, _WHITE = 2, 65535
+_FULL = 2
 _SHARES = {
     **dict.fromkeys((0, 2, 3, 5, 6), (0.299, 0.114)),
     **{1: (0.2126, 0.0722), 4: (0.30, 0.11), 7: (0.212, 0.087), 9: (0.2627, 0.0593)},
 }
 """Shares of red and blue in luma; what is not stated is BT.601, as for FFmpeg."""
 
-_YCGCO = 8
 _TURNS = {90: cv2.ROTATE_90_COUNTERCLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_CLOCKWISE}
 
 
@@ -190,21 +189,22 @@ def codes_of(frame: Any, matrix: int = UNSTATED) -> NDArray[Any]:
     matrix = int(frame.colorspace) if is_stated(int(frame.colorspace)) else matrix
     alpha = parts[-1].is_alpha
     rgb = frame.format.is_rgb or len(parts) - alpha < 3
-    if not rgb and matrix not in _SHARES and matrix != _YCGCO:
+    if not rgb and matrix not in _SHARES:
         raise ValueError(f"colours by the matrix {frame.colorspace} cannot be read")
     if bits > 16 or frame.format.name.startswith(("xyz", "bayer", "grayf", "gbrpf", "rgbf")):
         raise ValueError(f"pixels of {frame.format.name} cannot be read")
-    if bits <= 8 and matrix != _YCGCO:
+    if bits <= 8:
         if len(parts) == 1 and not frame.format.has_palette:
             return np.asarray(frame.to_ndarray(format="gray"))
         return np.asarray(frame.to_ndarray(format="bgra" if alpha else "bgr24"))
     planes = _planes(frame)
     top = (1 << bits) - 1
     if len(planes) == 1:
-        return _rounded(planes[0], 1 / top, bits)
+        return _rounded(planes[0] * np.float32(1 / top))
     there = planes[3:]
     if rgb:
-        return _rounded(cv2.merge([planes[1], planes[0], planes[2], *there]), 1 / top, bits)
+        bgr = cv2.merge([planes[1], planes[0], planes[2], *there])
+        return _rounded(bgr * np.float32(1 / top))
     luma, chroma = 1 / top, 1 / top
     black = 0
     if int(frame.color_range) != _FULL:
@@ -213,7 +213,7 @@ def codes_of(frame: Any, matrix: int = UNSTATED) -> NDArray[Any]:
     to_bgr = _to_bgr(matrix) * [luma, chroma, chroma]
     offset = to_bgr @ np.array([black, 1 << bits - 1, 1 << bits - 1])
     image = cv2.transform(cv2.merge(whole), np.column_stack([to_bgr, -offset]).astype(np.float32))
-    return _rounded(np.dstack([image, *(plane / top for plane in there)]), 1.0, bits)
+    return _rounded(np.dstack([image, *(plane / top for plane in there)]))
 
 
 def _spread(plane: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
@@ -223,17 +223,12 @@ def _spread(plane: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     return plane[: shape[0], : shape[1]]
 
 
-def _rounded(image: NDArray[Any], factor: float, bits: int) -> NDArray[Any]:
-    white = _WHITE if bits > 8 else 255
-    return np.rint(np.clip(image * np.float32(factor), 0, 1) * white).astype(
-        np.uint16 if bits > 8 else np.uint8
-    )
+def _rounded(image: NDArray[Any]) -> NDArray[Any]:
+    return np.asarray(np.rint(np.clip(image, 0, 1) * 65535), np.uint16)
 
 
 def _to_bgr(matrix: int) -> NDArray[np.float64]:
     """Return blue, green and red of luma 0..1 and two chromas of -0.5..0.5."""
-    if matrix == _YCGCO:
-        return np.array([[1.0, -1, -1], [1, 1, 0], [1, -1, 1]])
     red, blue = _SHARES[matrix]
     green = 1 - red - blue
     to_red, to_blue = 2 * (1 - red), 2 * (1 - blue)
@@ -244,16 +239,13 @@ def _to_bgr(matrix: int) -> NDArray[np.float64]:
 
 def _planes(frame: Any) -> list[NDArray[np.float32]]:
     """Return the planes: luma and two chromas, or green, blue and red, and alpha; or grey."""
-    bits = frame.format.components[0].bits
-    name = frame.format.name
-    count = len(frame.format.components)
+    parts = frame.format.components
     # shared by interleaved samples, or not in the lowest bits: laid out anew, the same samples
-    if len(frame.planes) < count or name.startswith(("p0", "p2", "p4")):
-        frame = frame.reformat(format=_planar(frame, bits))
-        count = len(frame.format.components)
-    sample = np.dtype(np.uint8 if bits <= 8 else (">u2" if frame.format.is_big_endian else "<u2"))
+    if len(frame.planes) < len(parts) or frame.format.name.startswith(("p0", "p2", "p4")):
+        frame = frame.reformat(format=_planar(frame, parts[0].bits))
+    sample = np.dtype(">u2" if frame.format.is_big_endian else "<u2")
     planes = []
-    for plane in frame.planes[:count]:
+    for plane in frame.planes[: len(frame.format.components)]:
         rows = np.frombuffer(plane, sample).reshape(plane.height, -1)
         planes.append(rows[:, : plane.width].astype(np.float32))
     return planes
@@ -266,4 +258,4 @@ def _planar(frame: Any, bits: int) -> str:
     luma, chroma = frame.format.components[:2]
     kind = {(False, False): 444, (True, False): 422, (True, True): 420, (False, True): 440}
     halved = luma.width > chroma.width, luma.height > chroma.height
-    return f"yuv{alpha}{kind[halved]}p{'' if bits <= 8 else f'{bits}le'}"
+    return f"yuv{alpha}{kind[halved]}p{bits}le"

@@ -74,7 +74,7 @@ class VideoSource(Source):
         self.doubts += [f"{path}: {line}" for line in told]
         self._why_pyav, self._pixels = "", b""
         self._colours = Colours()
-        packets = self._choose_decoder()
+        self._packets = self._choose_decoder()
         with self._opened() as capture:
             self._keep_grey(capture)
             if not any(capture.grab() for _ in range(RETRIES)):
@@ -86,7 +86,7 @@ class VideoSource(Source):
             if isinstance(capture, pyav.PyavCapture):
                 # of codecs whose own headers are not read here
                 self._colours = self._colours.completed(Colours(transfer=capture.transfer))
-        self._times = VideoTimes(self._container, packets, self._fps)
+        self._times = VideoTimes(self._container, self._packets, self._fps)
         if selection.start_s is None and selection.stop_s is None:
             self.count = self._times.expected
         self._choose_encoding()
@@ -123,7 +123,7 @@ class VideoSource(Source):
             raise DataError(f"{self.path}: {listed} times given for {count} frames")
 
     def _tell_times(self) -> None:
-        back = self._times.back
+        back = None if self._packets is None else self._packets.back
         if back is not None and back.latest_ns <= self.selection.stop_ns:
             raise DataError(
                 f"{self.path}: times begin again near frame {back.number}: {seconds(back.t_ns)} s"

@@ -14,7 +14,6 @@ from itertools import pairwise
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.sources.times.instants import NS_PER_S, seconds
 from adv2e.sources.times.rates import FrameRate, constant_rate, rates_near
@@ -58,8 +57,6 @@ class VideoTimes:
         An index says so.
     rate : FrameRate or None
         The rate at which all pictures are, where there is one.
-    back : Jump or None
-        Where times begin again, as in files that were joined.
     doubts : list of str
         What is guessed, and what may be wrong.
     """
@@ -67,77 +64,47 @@ class VideoTimes:
     def __init__(self, container: Container, packets: Packets | None, fps: float) -> None:
         self._container, self._packets = container, packets
         self._snaps_within_ns = container.tick_ns
+        self._grid: Fraction | None = None
         self.rate: FrameRate | None = None
         self.doubts: list[str] = []
-        self._grid: Fraction | None = None
         if packets is None:
-            self.shown_ns = sorted(set(container.stamps_ns or []))
+            stamps_ns = container.stamps_ns or []
+            self.shown_ns = sorted(set(stamps_ns))
+            counted = len(self.shown_ns)
             if container.rate is not None:
                 self.rate = FrameRate(container.rate)
             elif container.tick_ns:
-                self.rate = _behind(container.stamps_ns or [], container.tick_ns, fps)
+                self.rate = _behind(stamps_ns, container.tick_ns, fps)
         else:
-            self.shown_ns = packets.known_ns
+            self.shown_ns, counted = packets.known_ns, packets.count
             if container.decoding_times or packets.unstamped:
                 self._grid = container.rate
                 self._find_rate(container, packets, fps)
-        steps = [after - before for before, after in pairwise(self.shown_ns)]
-        nominal = round(NS_PER_S / fps) if fps > 0 else NS_PER_S
-        self.usual_ns = round(median(steps)) if steps else nominal
-        if self.rate is not None:
-            self.usual_ns = self.rate.time_ns(1)
-        elif packets is not None and not (container.pictures or container.whole or packets.back):
-            self._look_for_holes(packets, container.tick_ns or 1000)
-        self._compare_end(container.end_ns)
-        counted = len(self.shown_ns) if packets is None else packets.count
-        self.back = None if packets is None else packets.back
         self.exact = packets is None or container.pictures == counted
         self.expected = max(counted, container.pictures or 0) or None
+        steps = [after - before for before, after in pairwise(self.shown_ns)]
+        if self.rate is not None:
+            self._usual_ns = self.rate.time_ns(1)
+        else:
+            nominal = NS_PER_S / fps if fps > 0 else NS_PER_S
+            self._usual_ns = round(median(steps) if steps else nominal)
+        last_ns = self.shown_ns[-1] - self.shown_ns[0] if self.shown_ns else 0
+        if container.end_ns and last_ns + _MOVED * self._usual_ns < container.end_ns:
+            self.doubts.append(
+                f"it states a length of {seconds(container.end_ns)} s, and its last picture is at"
+                f" {seconds(last_ns)} s: cut short or damaged"
+            )
 
     def _find_rate(self, container: Container, packets: Packets, fps: float) -> None:
         known, count = packets.known_ns, packets.count
-        tick_ns = container.tick_ns or 1000
-        missing = count - len(known)
-        hz = None if packets.back else _standing(known, count, container.rate, fps, tick_ns)
-        hz = None if packets.tiny else hz
+        hz = None
+        if not packets.back and not packets.tiny:
+            hz = _standing(known, count, container.rate, fps, container.tick_ns or 1000)
         if hz is not None:
             self.rate, self._snaps_within_ns = FrameRate(hz), round(_MOVED * NS_PER_S / hz)
-        if missing > 0:
-            rest = "the others follow"
-            if hz is not None:
-                rest = f"taken at {float(hz):.6g} frames a second"
-            told = f"it states times for {len(known)} of its {count} frames: {rest}"
-            self.doubts.append(told)
-
-    def _look_for_holes(self, packets: Packets, tick_ns: int) -> None:
-        """Doubt times that leave some of those at a constant rate out."""
-        steps = np.diff(np.array(self.shown_ns, dtype=np.float64))
-        if steps.size < 2:
-            return
-        usual = steps[np.abs(steps - np.median(steps)) <= max(0.1 * np.median(steps), tick_ns)]
-        if not usual.size:
-            return
-        hz = NS_PER_S / float(usual.mean())
-        for rate in [*map(float, rates_near(hz)), hz]:
-            numbers = _numbers(self.shown_ns, rate, tick_ns)
-            missing = 0 if numbers is None else int(numbers[-1]) + 1 - packets.count
-            if 0 < missing <= packets.count:  # more are a gap
-                self.doubts.append(
-                    f"at {rate:.6g} frames a second {missing} are missing among its"
-                    f" {packets.count}: left out when it was recorded, or damaged"
-                )
-                return
-
-    def _compare_end(self, end_ns: int | None) -> None:
-        if end_ns is None or not self.shown_ns:
-            return
-        last_ns = self.shown_ns[-1] - self.shown_ns[0]
-        moved = _MOVED if self._container.rate is None else 1.5
-        if last_ns + moved * self.usual_ns < end_ns:
-            self.doubts.append(
-                f"it states a length of {seconds(end_ns)} s, and its last picture is at"
-                f" {seconds(last_ns)} s: cut short or damaged"
-            )
+        if count > len(known):
+            rest = f"taken at {float(hz):.6g} frames a second" if hz else "the others follow"
+            self.doubts.append(f"it states times for {len(known)} of its {count} frames: {rest}")
 
     @property
     def zero_means_none(self) -> bool:
@@ -171,22 +138,21 @@ class VideoTimes:
             Where times are those of decoding, stamps are brought into the order of showing, as
             OpenCV does.
         """
-        previous = -self.usual_ns
+        previous = -self._usual_ns
         packets = self._packets
-        listed = not in_order and self._container.decoding_times
-        listed &= packets is not None and packets.complete
+        of_decoding = not in_order and self._container.decoding_times
+        listed = of_decoding and packets is not None and packets.complete
 
         def time_ns(number: int, own_ns: int | None) -> int:
             nonlocal previous
             if self.rate is not None:
-                told = in_order or not self._container.decoding_times
-                previous = self._at_rate(self.rate, number, own_ns if told else None)
+                previous = self._at_rate(self.rate, number, None if of_decoding else own_ns)
             elif listed and number < len(self.shown_ns):
                 previous = self.shown_ns[number] - self.shown_ns[0]
             elif own_ns is not None:
                 previous = own_ns if self._grid is None else _snapped(own_ns, self._grid)
             else:
-                previous += self.usual_ns
+                previous += self._usual_ns
             return previous
 
         return time_ns
@@ -226,18 +192,12 @@ def _standing(
         tried += rates_near(about)
     if clear and fps > 0:
         tried.append(Fraction(fps).limit_denominator(1001))
+    since_first = np.array(known_ns, dtype=np.int64) - known_ns[0]
     for hz in tried:
-        numbers = _numbers(known_ns, float(hz), tick_ns)
-        if numbers is not None and numbers[-1] < count:
+        places = since_first * (float(hz) / NS_PER_S)
+        numbers = np.rint(places)
+        within = max(2 * tick_ns * float(hz) / NS_PER_S, _ROUNDED)
+        near = np.all(np.abs(places - numbers) <= within) and np.all(np.diff(numbers) > 0)
+        if near and numbers[-1] < count:
             return hz
     return None
-
-
-def _numbers(times_ns: Sequence[int], hz: float, tick_ns: int) -> NDArray[np.float64] | None:
-    """Return which pictures at a rate are at these times; None if some are at none."""
-    since_first = np.array(times_ns, dtype=np.int64) - times_ns[0]
-    places = since_first * (hz / NS_PER_S)
-    numbers: NDArray[np.float64] = np.rint(places)
-    within = max(2 * tick_ns * hz / NS_PER_S, _ROUNDED)
-    near = np.all(np.abs(places - numbers) <= within) and np.all(np.diff(numbers) > 0)
-    return numbers if near else None

@@ -24,11 +24,9 @@ class Container:
     decoding_times : bool
         The times in the file, if any, are those of decoding, or not all of them are there.
     pictures : int or None
-        How many pictures the index lists, where it lists no times (AVI).
+        How many pictures it states, where it lists no times (AVI, GIF).
     end_ns : int or None
-        When the last picture ends, from the first, as the headers state it (ASF, AVI) [ns].
-    whole : bool
-        Numbers of its parts prove that nothing is missing (Ogg).
+        When the last picture ends, from the first, as the headers state it (ASF) [ns].
     leading : int
         How many of the pictures are shown before the first in the file.
     tiny : int
@@ -54,7 +52,6 @@ class Container:
     decoding_times: bool = False
     pictures: int | None = None
     end_ns: int | None = None
-    whole: bool = False
     leading: int = 0
     tiny: int = 0
     colours: Colours = field(default_factory=Colours)

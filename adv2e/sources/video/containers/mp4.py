@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from adv2e.sources.times.instants import NS_PER_S
 from adv2e.sources.video.colours import Colours
-from adv2e.sources.video.containers import fragments
 from adv2e.sources.video.containers.base import TINY_BYTES, Container, DamagedError, cut_short
+from adv2e.sources.video.containers.fragments import check_fragments
 
 FIRST = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
 """Kinds of box that a file can begin with."""
@@ -52,8 +52,7 @@ def examine(data: mmap.mmap, found: Container) -> None:
     if videos:
         videos[0].describe(found)
     if any(kind in (b"moof", b"sidx") for kind, _, _ in top):
-        track = videos[0].number if len(videos) == 1 else None
-        fragments.count_pictures(data, boxes, track, found)
+        check_fragments(data, boxes, found)
         return
     end = max((track.end for track in tracks), default=0)
     if end > len(data):
@@ -100,15 +99,6 @@ class _Track:
                 self._open(begin, end)
             elif kind != b"hdlr" or kind not in self._found:  # minf may have one of its own
                 self._found[kind] = begin, end
-
-    @property
-    def number(self) -> int | None:
-        """By which fragments name it."""
-        span = self._found.get(b"tkhd")
-        if span is None:
-            return None
-        place = span[0] + (20 if self._data[span[0]] else 12)
-        return int(struct.unpack_from(">I", self._data, place)[0])
 
     def describe(self, found: Container) -> None:
         """Note what the description of its pictures says of colours and fields."""

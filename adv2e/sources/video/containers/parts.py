@@ -162,7 +162,7 @@ def _value_bytes(data: mmap.mmap, place: int) -> tuple[int, int]:
 
 
 def ogg(data: mmap.mmap, found: Container) -> None:
-    """Note that all is there; DamagedError if pages are missing."""
+    """Doubt what has no end; DamagedError if pages are missing."""
     numbers: dict[int, int] = {}
     last_page = flags = 4
     for place, _ in _parts(data, 0, _page):
@@ -170,7 +170,6 @@ def ogg(data: mmap.mmap, found: Container) -> None:
         if number != numbers.get(serial, number - 1) + 1:
             raise DamagedError(f"damaged before byte {place}: pages are missing")
         numbers[serial] = number
-    found.whole = True
     if not flags & last_page:
         found.doubts.append("its last page has no end mark: it may be cut short")
 
