@@ -6,7 +6,7 @@ import pytest
 
 from adv2e.errors import OutputError
 from adv2e.events import empty_events, make_events
-from adv2e.formats.columns import CHUNK
+from adv2e.formats.monash.writer import CHUNK
 from adv2e.formats.writing import open_sink
 
 METADATA = {"adv2e": "9", "config": {"pixel": {"low_pass": {"cutoff_hz": 300.0}}}, "seed": 3}
@@ -177,13 +177,14 @@ def test_event_index_is_that_of_the_last_event_before_the_frame(tmp_path):
             assert found == [0, 0, 1, 4, 6, 8]
 
 
-def test_frames_far_ahead_leave_no_times_of_events_in_memory(tmp_path):
-    sink = open_sink(tmp_path / "a.h5", width=346, height=260, metadata={}, with_frames=True)
-    with sink:
-        for k in range(5):
-            sink.write_frame((k + 1) * 10_000_000, grey())
-            sink.write_events(many(10, begin=10_000 * k))
-            assert not sink._writer._indices._blocks
+def test_event_index_holds_over_many_chunks(tmp_path):
+    events = many(3 * CHUNK + 5)
+    stamps_us = np.unique([0, *events["t"][[0, CHUNK - 1, CHUNK, 2 * CHUNK, -1]], 10**9])
+    frames = [(int(t) * 1000, grey()) for t in stamps_us]
+    with write(tmp_path / "a.h5", [*frames, events], with_frames=True) as file:
+        found = [image.attrs["event_idx"] for image in file["images"].values()]
+    expected = np.searchsorted(events["t"], stamps_us) - 1
+    assert found == np.maximum(expected, 0).tolist()
 
 
 def test_metadata_may_be_long(tmp_path):

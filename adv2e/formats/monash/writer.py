@@ -22,9 +22,10 @@ References
 
 from __future__ import annotations
 
-from collections import deque
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -33,9 +34,14 @@ from numpy.typing import NDArray
 from adv2e.background import OrderedWork
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.backlog import Backlog
-from adv2e.formats.columns import FILTERS, ChunkedColumns, Column
-from adv2e.formats.compression import compress
+from adv2e.formats.compression import compress, compress_shuffled
 from adv2e.formats.sink import Request, Writer, to_json
+
+CHUNK = 1 << 16
+"""Events of a chunk."""
+
+_FILTERS: dict[str, Any] = {"compression": "gzip", "compression_opts": 1, "track_times": False}
+"""Of a dataset whose chunks are zlib streams."""
 
 _CACHE_BYTES = 512 << 10
 """Memory for the index of chunks and images, as HDF5 counts it, a tenth of what it takes.
@@ -43,9 +49,21 @@ _CACHE_BYTES = 512 << 10
 Only the end of the index grows; but below this, storing many images takes longer.
 """
 
+_COLUMNS: dict[str, Callable[[Events], NDArray[Any]]] = {
+    "xs": lambda events: events["x"],
+    "ys": lambda events: events["y"],
+    "ts": lambda events: events["t"] / 1e6,
+    "ps": lambda events: events["p"],
+}
+
 
 class MonashWriter(Writer):
-    """Writes an HDF5 file in the layout ``monash``; its bytes follow from its content."""
+    """Writes an HDF5 file in the layout ``monash``; its bytes follow from its content.
+
+    HDF5 compresses in the thread that writes.  Here whole chunks are compressed beforehand, in
+    threads, into what its filters shuffle and deflate would read, and stored as they are, so that
+    any reader of HDF5 opens them without plug-ins.
+    """
 
     takes_frames = True
 
@@ -59,59 +77,93 @@ class MonashWriter(Writer):
         stack.callback(self._work.abandon)
         # kept aside until the events are all written: the file must not depend on how they come
         self._encoded = stack.enter_context(closing(Backlog(path.parent, limit=0)))
-        self._shapes: list[tuple[int, ...]] = []
-        pixel = np.dtype(np.int16 if max(request.width, request.height) <= 32767 else np.uint16)
-        columns: dict[str, Column] = {
-            "xs": (pixel, lambda events: events["x"]),
-            "ys": (pixel, lambda events: events["y"]),
-            "ts": (np.dtype(np.float64), lambda events: events["t"] / 1e6),
-            "ps": (np.dtype(np.bool_), lambda events: events["p"]),
+        self._frames: list[tuple[int, tuple[int, ...]]] = []  # times [ns] and shapes
+        pixel = np.int16 if max(request.width, request.height) <= 32767 else np.uint16
+        group = self._file.create_group("events")
+        self._columns = {
+            name: group.create_dataset(
+                *(name, (0,), dtype),
+                **(_FILTERS | {"chunks": (CHUNK,), "maxshape": (None,), "shuffle": True}),
+            )
+            for name, dtype in zip(_COLUMNS, (pixel, pixel, np.float64, np.bool_), strict=True)
         }
-        self._events = self._file.create_group("events")
-        self._columns = ChunkedColumns(self._events, columns, EVENT_DTYPE, self._work)
         self._images = self._file.create_group("images")
-        self._indices = _EventIndices()
-        self._on = 0
+        self._buffer = np.zeros(CHUNK, EVENT_DTYPE)
+        self._held = 0  # events in it
+        self._ends: list[float] = []  # time of the last event of each chunk [s]
+        self._size = self._on = 0
 
     def write_events(self, events: Events) -> None:
         """Append events."""
-        if events.size:
-            self._columns.append(events)
-            self._on += int(np.count_nonzero(events["p"]))
-            if self._request.with_frames:
-                self._indices.add_events(events["t"] / 1e6)
+        while events.size:
+            part, events = np.split(events, [CHUNK - self._held])
+            self._buffer[self._held : self._held + part.size] = part
+            self._held += part.size
+            if self._held == CHUNK:
+                self._write_chunk()
+
+    def _write_chunk(self) -> None:
+        held = self._buffer[: self._held]
+        begin = self._size
+        self._size += held.size
+        self._on += int(np.count_nonzero(held["p"]))
+        self._ends.append(held["t"][-1] / 1e6)
+        end = self._size
+
+        def take(chunks: list[bytes]) -> None:
+            for column, data in zip(self._columns.values(), chunks, strict=True):
+                column.resize((end,))
+                column.id.write_direct_chunk((begin,), data)
+
+        self._work.submit(self._compressed, self._buffer, take=take)
+        # zeros: the last chunk is stored in full
+        self._held, self._buffer = 0, np.zeros(CHUNK, EVENT_DTYPE)
+
+    def _compressed(self, events: Events) -> list[bytes]:
+        return [
+            compress_shuffled(_COLUMNS[name](events).astype(column.dtype, copy=False))
+            for name, column in self._columns.items()
+        ]
 
     def write_frame(self, t_ns: int, image: NDArray[np.uint8 | np.uint16]) -> None:
         """Append a frame."""
         picture = _eight_bit(image)
         picture = picture[..., ::-1].copy() if picture.ndim == 3 else picture.copy()
-        self._shapes.append(picture.shape)
+        self._frames.append((t_ns, picture.shape))
 
         def take(data: bytes) -> None:
             self._encoded.append(t_ns, np.frombuffer(data, np.uint8))
 
         self._work.submit(compress, picture, take=take)
-        self._indices.add_frame(t_ns / 1e9)
 
     def finish(self) -> None:
         """Write what is left, the frames and the attributes."""
-        self._columns.finish()
+        if self._held:
+            self._write_chunk()
         self._work.finish()
-        indices = self._indices.finish()
-        for number, (shape, index) in enumerate(zip(self._shapes, indices, strict=True)):
-            self._add_image(f"image{number:09d}", shape, index)
-        self._images.attrs["num_images"] = np.int64(len(indices))
-        times = self._events["ts"]
-        first, last = (times[0], times[-1]) if times.size else (0.0, 0.0)
+        for number, before in enumerate(self._events_before_frames()):
+            t_ns, shape = self._frames[number]
+            image = self._images.create_dataset(
+                f"image{number:09d}", shape, np.uint8, chunks=shape, **_FILTERS
+            )
+            image.id.write_direct_chunk((0,) * len(shape), self._encoded.take().tobytes())
+            image.attrs["size"] = np.array(shape, np.int64)
+            image.attrs["timestamp"] = np.float64(t_ns / 1e9)
+            image.attrs["timestamp_ns"] = np.int64(t_ns)
+            image.attrs["type"] = "greyscale" if len(shape) == 2 else "color_bgr"
+            image.attrs["event_idx"] = np.int64(max(before - 1, 0))
+        self._images.attrs["num_images"] = np.int64(len(self._frames))
+        times = self._columns["ts"]
+        first, last = (times[0], times[-1]) if self._size else (0.0, 0.0)
         self._file.attrs.update(
             {
-                "num_events": np.int64(times.size),
+                "num_events": np.int64(self._size),
                 "num_pos": np.int64(self._on),
-                "num_neg": np.int64(times.size - self._on),
+                "num_neg": np.int64(self._size - self._on),
                 "duration": np.float64(last - first),
                 "t0": np.float64(first),
                 "tk": np.float64(last),
-                "num_imgs": np.int64(len(indices)),
+                "num_imgs": np.int64(len(self._frames)),
                 "num_flow": np.int64(0),
                 "sensor_resolution": np.array(
                     [self._request.height, self._request.width], np.int64
@@ -123,15 +175,14 @@ class MonashWriter(Writer):
             }
         )
 
-    def _add_image(self, name: str, shape: tuple[int, ...], event_index: int) -> None:
-        image = self._images.create_dataset(name, shape, np.uint8, chunks=shape, **FILTERS)
-        t_ns = self._encoded.time(0)
-        image.id.write_direct_chunk((0,) * len(shape), self._encoded.take().tobytes())
-        image.attrs["size"] = np.array(shape, np.int64)
-        image.attrs["timestamp"] = np.float64(t_ns / 1e9)
-        image.attrs["timestamp_ns"] = np.int64(t_ns)
-        image.attrs["type"] = "greyscale" if len(shape) == 2 else "color_bgr"
-        image.attrs["event_idx"] = np.int64(event_index)
+    def _events_before_frames(self) -> Iterator[int]:
+        """Yield how many events are before each frame."""
+        there, times = -1, np.zeros(0)
+        for t_ns, _ in self._frames:
+            chunk = int(np.searchsorted(self._ends, t_ns / 1e9))
+            if chunk != there:  # it ends at the frame or after it, or is behind the last one
+                there, times = chunk, self._columns["ts"][chunk * CHUNK : (chunk + 1) * CHUNK]
+            yield min(chunk * CHUNK, self._size) + int(np.searchsorted(times, t_ns / 1e9))
 
 
 def _bound_cache(file: h5py.File) -> None:
@@ -150,36 +201,3 @@ def _eight_bit(image: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:
     if image.dtype == np.uint8:
         return image.astype(np.uint8, copy=False)
     return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
-
-
-class _EventIndices:
-    """Finds the last event before each frame; either may come before the other."""
-
-    def __init__(self) -> None:
-        self._frames: deque[float] = deque()  # times of those not settled
-        self._found: list[int] = []
-        self._blocks: deque[NDArray[np.float64]] = deque()  # of times that a frame may yet precede
-        self._before = 0  # events before these
-
-    def add_frame(self, seconds: float) -> None:
-        self._frames.append(seconds)
-        self._settle()
-
-    def add_events(self, seconds: NDArray[np.float64]) -> None:
-        self._blocks.append(seconds)
-        self._settle()
-
-    def _settle(self) -> None:
-        """Settle the frames after which an event has come, and forget events before the others."""
-        while self._frames and self._blocks:
-            block = self._blocks[0]
-            if block[-1] < self._frames[0]:
-                self._before += block.size
-                self._blocks.popleft()
-            else:
-                index = int(np.searchsorted(block, self._frames.popleft(), side="left"))
-                self._found.append(max(self._before + index - 1, 0))
-
-    def finish(self) -> list[int]:
-        """Return the index for each frame."""
-        return self._found + [max(self._before - 1, 0)] * len(self._frames)
