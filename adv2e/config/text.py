@@ -17,7 +17,7 @@ _WIDTH = 100
 
 def to_dict(config: Section) -> dict[str, Any]:
     """Return the configuration as nested dictionaries of numbers, texts, lists and None."""
-    return {key.name: _plain(value) for key, value in _entries(config, "")}
+    return {key.name: _plain(getattr(config, key.name)) for key in keys_of(type(config))}
 
 
 def _plain(value: Any) -> Any:
@@ -28,7 +28,9 @@ def _plain(value: Any) -> Any:
 
 def to_yaml(config: Config) -> str:
     """Return the configuration as YAML that reads back as an equal one."""
-    return "".join(f"{line}\n" for line, _ in _lines(config, "", 0) if not _is_comment(line))
+    return "".join(
+        f"{line}\n" for line, _ in _lines(type(config), config, "") if not _is_comment(line)
+    )
 
 
 def to_annotated_yaml(config: Config) -> str:
@@ -37,7 +39,7 @@ def to_annotated_yaml(config: Config) -> str:
     Short comments stand behind the value, long ones above it; the keys of a section that is off
     are comments altogether.
     """
-    lines = list(_lines(config, "", 0))
+    lines = list(_lines(type(config), config, ""))
     column = max(len(line) for line, _ in lines) + 2
     written = []
     for line, note in lines:
@@ -52,36 +54,23 @@ def to_annotated_yaml(config: Config) -> str:
     return "".join(f"{line}\n" for line in written)
 
 
-def _entries(section: Section, path: str) -> Iterator[tuple[Key, Any]]:
-    for key in keys_of(type(section), path):
-        yield key, getattr(section, key.name)
-
-
-def _lines(section: Section, path: str, depth: int) -> Iterator[tuple[str, str]]:
-    """Yield each line of YAML and its comment; the keys of sections that are off as comments."""
-    indent = "  " * depth
-    for key, value in _entries(section, path):
-        if isinstance(value, Section) and keys_of(type(value)):
-            yield f"{indent}{scalar_text(key.name)}:", _note(key)
-            yield from _lines(value, key.path, depth + 1)
-        elif isinstance(value, Section):
-            yield f"{indent}{scalar_text(key.name)}: {{}}", _note(key)
-        elif key.is_section:
-            yield f"{indent}{scalar_text(key.name)}: null", f"{_note(key)}; off"
-            yield from _lines_off(key, indent + "  # ")
+def _lines(
+    section: type[Section], values: Section | None, indent: str
+) -> Iterator[tuple[str, str]]:
+    """Yield each line of YAML and its comment; without `values`, those of a section that is off."""
+    for key in keys_of(section):
+        name = f"{indent}{scalar_text(key.name)}"
+        value = key.default if values is None else getattr(values, key.name)
+        if not key.is_section:
+            yield f"{name}:{'' if value is MISSING else f' {scalar_text(value)}'}", _note(key)
+        elif values is None or value is None:
+            yield f"{name}: null", f"{_note(key)}; off"
+            yield from _lines(key.kind, None, indent + ("  " if values is None else "  # "))
+        elif keys_of(key.kind):
+            yield f"{name}:", _note(key)
+            yield from _lines(key.kind, value, indent + "  ")
         else:
-            yield f"{indent}{scalar_text(key.name)}: {scalar_text(value)}", _note(key)
-
-
-def _lines_off(section: Key, indent: str) -> Iterator[tuple[str, str]]:
-    """Yield the keys of a section that is off, and of those in it."""
-    for key in keys_of(section.kind):
-        if key.is_section:
-            yield f"{indent}{scalar_text(key.name)}: null", f"{_note(key)}; off"
-            yield from _lines_off(key, indent + "  ")
-        else:
-            default = "" if key.default is MISSING else f" {scalar_text(key.default)}"
-            yield f"{indent}{scalar_text(key.name)}:{default}", _note(key)
+            yield f"{name}: {{}}", _note(key)
 
 
 def _is_comment(line: str) -> bool:

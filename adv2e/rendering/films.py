@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
 
 import cv2
 
@@ -32,29 +31,11 @@ def check_suffix(path: str | Path) -> str:
     return suffix
 
 
-class Album(Protocol):
-    """Takes cells one by one."""
-
-    whole: bool
-    """Whether every event is to be in a picture, the last one included."""
-
-    def wanted_from(self, number: int) -> int:
-        """Return the first instant that would be kept, counted from 0, at or after `number`."""
-
-    def add(self, number: int, cell: Cell) -> None:
-        """Take the cell of instant `number`."""
-
-    def finish(self) -> None:
-        """Complete the file."""
-
-    def close(self) -> None:
-        """Let go of the file."""
-
-
 class Film:
     """Cells as a film, each shown for 1/fps."""
 
     whole = True
+    """Every event is to be in a picture, the last one included."""
 
     def __init__(self, path: Path, fps: float, style: Style, scale: int | None) -> None:
         self._style, self._scale = style, scale
@@ -65,7 +46,7 @@ class Film:
             self._file = VideoFile(path, fps)
 
     def wanted_from(self, number: int) -> int:
-        """Return `number`: every cell is shown."""
+        """Return the first instant, counted from 0, at or after `number` that is shown: that."""
         return number
 
     def add(self, number: int, cell: Cell) -> None:
@@ -140,3 +121,7 @@ class Sheet:
     def close(self) -> None:
         """Forget the cells."""
         self._cells.clear()
+
+
+Album = Film | Sheet
+"""What takes cells one by one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +45,11 @@ def write_video(
     OutputError
         `path` exists and may not be overwritten, or cannot be written.
     """
-    with replacing(Path(path), overwrite) as unfinished, VideoFile(unfinished, fps) as film:
+    with (
+        replacing(Path(path), overwrite) as unfinished,
+        closing(VideoFile(unfinished, fps)) as film,
+    ):
         for t_s in frame_times(fps, duration_s):
             grey = encode_srgb(scene.light(t_s, width, height))
             film.add(np.repeat(grey[:, :, None], 3, axis=2))
+        film.finish()

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from contextlib import closing
 
 import cv2
 import numpy as np
@@ -45,9 +46,10 @@ def noise(rows, columns, seed=0):
 
 
 def write(path, pictures, fps=20.0):
-    with VideoFile(path, fps) as film:
+    with closing(VideoFile(path, fps)) as film:
         for picture in pictures:
             film.add(picture)
+        film.finish()
 
 
 def test_avi_loses_nothing(tmp_path):
