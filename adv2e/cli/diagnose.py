@@ -65,7 +65,7 @@ def command(
 
     from adv2e.compiled import announcement
     from adv2e.config import names_of, written_keys
-    from adv2e.config.own import user_effects
+    from adv2e.config.user_effects import user_effects
     from adv2e.diagnosis.configurations import without_user_effects
     from adv2e.diagnosis.data.evidence import read_evidence
     from adv2e.diagnosis.diagnose import diagnose

@@ -86,7 +86,7 @@ def own_effects(files: tuple[str, ...]) -> list[type[Hooks]]:
     """Return the effects that files hold."""
     if not files:
         return []
-    from adv2e.config.own_effects import load_effects
+    from adv2e.config.effect_files import load_effects
 
     return [effect for name in files for effect in load_effects(name)]
 

@@ -11,8 +11,8 @@ from adv2e.config.build import Key, all_keys, build, keys_of
 from adv2e.config.files import read, shipped
 from adv2e.config.merge import merge, parse_set
 from adv2e.config.model import Config
-from adv2e.config.own import config_class
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
+from adv2e.config.user_effects import config_class
 from adv2e.config.yaml12 import Origin, Value, key_text
 from adv2e.files.names import shown
 

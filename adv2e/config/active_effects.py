@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from adv2e.config.model import Config, Frames, Pixel, Readout, Sampling
-from adv2e.config.own import user_effects
+from adv2e.config.user_effects import user_effects
 from adv2e.effects import STAGES
 from adv2e.effects.frames.black_level import BlackLevelHooks
 from adv2e.effects.frames.clock_drift import ClockDriftHooks

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 from adv2e.config import Config, from_dict, to_dict
-from adv2e.config.own import user_effects
 from adv2e.config.paths import set_key
+from adv2e.config.user_effects import user_effects
 from adv2e.effects.readout.frame_coupling import FrameCoupling
 from adv2e.reports.keys import known_keys
 from adv2e.reports.result import Own

@@ -16,8 +16,8 @@ from typing import Any
 
 from adv2e.config import Config, to_dict
 from adv2e.config.build import keys_of
-from adv2e.config.own import user_effects
 from adv2e.config.paths import get_key
+from adv2e.config.user_effects import user_effects
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.diagnosis.hints.collect import Hints
 from adv2e.diagnosis.hints.lamps import Lamp

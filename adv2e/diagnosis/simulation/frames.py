@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.config.active_effects import active_hooks, frame_hooks
 from adv2e.config.model import Frames
-from adv2e.config.own import user_effects
+from adv2e.config.user_effects import user_effects
 from adv2e.conversion.simulation import events_from_light
 from adv2e.diagnosis.configurations import coupling_of
 from adv2e.effects.hooks import Hooks
