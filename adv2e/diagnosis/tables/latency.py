@@ -32,16 +32,8 @@ def first_crossing(
 ) -> Array:
     """Return the time [s] of the first crossing of the threshold, infinite where there is none.
 
-    Parameters
-    ----------
-    step, threshold : (n,)
-        Size of the step and threshold [ln], above 0.
-    w1 : (n,)
-        Corner of the first pole after the step [rad/s].
-    w2 : float, optional
-        Corner of the second pole [rad/s].
-    slew : float, optional
-        Greatest slope of the first pole's output [ln/s].
+    Of steps and thresholds [ln], above 0, (n,), with the corners of the poles after them [rad/s],
+    and the greatest slope of the first pole's output [ln/s].
     """
     time = np.full(step.shape, np.inf)
     fires = threshold < step

@@ -53,15 +53,12 @@ LEAST_LEVELS = 3
 
 @dataclass(frozen=True)
 class Latencies:
-    """Latencies, a row each.
+    """Latencies, a row each, in the table of that name.
 
     Attributes
     ----------
-    name : str
-        The table's.
     light : (rows,)
         In `unit`; that of the brighter side of the step.
-    unit : str
     latency_us : (rows,)
     error : (rows,)
         Standard error relative to the latency, NaN where the table gives none.
@@ -85,18 +82,7 @@ class Latencies:
 
 @dataclass(frozen=True)
 class Noise:
-    """Rates of noise events, a row each; NaN where a cell is empty.
-
-    Attributes
-    ----------
-    light : (rows,)
-        In `unit`.
-    unit : str
-    rates : mapping of str to (rows,)
-        By column: ``on_rate_hz`` and so on.
-    pixels, duration_s, least_hz : (rows,)
-        NaN where the table gives none.
-    """
+    """Rates of noise events, a row each, by column; NaN where the table gives none."""
 
     light: Array
     unit: str
@@ -114,16 +100,23 @@ def measurements_of(table: Table) -> Latencies | Noise:
     DataError
         No light, neither latency nor rate, both, or a wrong cell; file, line and column are named.
     """
+    there = f"(there: {', '.join(table.columns)})"
     times = [f"latency_{unit}" for unit in TIMES if f"latency_{unit}" in table.columns]
     rates = [name for name in ("on_rate_hz", "off_rate_hz") if name in table.columns]
     if bool(times) == bool(rates):
         raise DataError(
             f"{table.name}: must have either a column latency_us (or _ms, _s) or columns"
-            f" on_rate_hz and off_rate_hz (there: {', '.join(table.columns)})"
+            f" on_rate_hz and off_rate_hz {there}"
         )
     if len(times) > 1:
         raise DataError(f"{table.name}: has {' and '.join(times)}, must have one of them")
-    column = light_column(table)
+    lights = [name for name in LIGHTS if name in table.columns]
+    if len(lights) != 1:
+        raise DataError(
+            f"{table.name}: must have one of the columns {', '.join(LIGHTS)}, has"
+            f" {' and '.join(lights) or 'none'} {there}"
+        )
+    (column,) = lights
     light = table.numbers(column, above=0.0)
     table.require(column, "a number")
     _check_levels(table, light, f"{column}: has")
@@ -141,27 +134,10 @@ def _check_levels(table: Table, light: Array, has: str) -> None:
         )
 
 
-def light_column(table: Table) -> str:
-    """Return the name of the column that gives the light.
-
-    Raises
-    ------
-    DataError
-        There is none, or more than one.
-    """
-    found = [name for name in LIGHTS if name in table.columns]
-    if len(found) != 1:
-        raise DataError(
-            f"{table.name}: must have one of the columns {', '.join(LIGHTS)}, has"
-            f" {' and '.join(found) or 'none'} (there: {', '.join(table.columns)})"
-        )
-    return found[0]
-
-
 def _latencies(table: Table, column: str, light: Array, unit: str) -> Latencies:
     factor = TIMES[column.removeprefix("latency_")]
     table.require(column, "a number")
-    latency = table.numbers(column, above=0.0)
+    latency_us = factor * table.numbers(column, above=0.0)
     contrast = None
     if "contrast_ln" in table.columns:
         table.require("contrast_ln", "a number")
@@ -173,57 +149,48 @@ def _latencies(table: Table, column: str, light: Array, unit: str) -> Latencies:
                 raise table.wrong(k, "polarity", "must be 1 or ON, 0 or OFF")
             polarity[k] = POLARITIES[text.lower()]
     bias = table.texts("bias") if "bias" in table.columns else [""] * len(table)
-    error = _standard_error(table, column) / latency
-    return Latencies(
-        table.name, light, unit, factor * latency, error, contrast, polarity, tuple(bias)
-    )
+    error = _standard_error_us(table) / latency_us
+    return Latencies(table.name, light, unit, latency_us, error, contrast, polarity, tuple(bias))
 
 
-def _standard_error(table: Table, column: str) -> Array:
-    """Return the standard error of each latency in the unit of its column; NaN: not given."""
-    unit = TIMES[column.removeprefix("latency_")]
-    nothing = np.full(len(table), np.nan)
+def _standard_error_us(table: Table) -> Array:
+    """Return the standard error of each latency; NaN: not given."""
 
-    def column_of(what: str) -> tuple[str, Array] | None:
-        for other, factor in TIMES.items():
-            name = f"latency_{what}_{other}"
+    def column_of(what: str) -> tuple[str, Array | None]:
+        for unit, factor in TIMES.items():
+            name = f"latency_{what}_{unit}"
             if name in table.columns:
-                return name, table.numbers(name, at_least=0.0) * (factor / unit)
-        return None
+                return name, table.numbers(name, at_least=0.0) * factor
+        return "", None
 
-    if (error := column_of("error")) is not None:
-        return error[1]
-    lower, upper = column_of("q25"), column_of("q75")
-    if (sd := column_of("sd")) is not None:
-        spread = sd[1]
-    elif lower is not None and upper is not None:
-        (lower_name, low), (upper_name, high) = lower, upper
-        for k in np.flatnonzero(high < low):
+    _, error = column_of("error")
+    if error is not None:
+        return error
+    _, spread = column_of("sd")
+    (lower_name, lower), (upper_name, upper) = column_of("q25"), column_of("q75")
+    if spread is None and lower is not None and upper is not None:
+        for k in np.flatnonzero(upper < lower):
             raise table.wrong(int(k), upper_name, f"must be at least {lower_name}")
-        spread = (high - low) / 1.349  # of a normal distribution
-    else:
-        return nothing
-    if "number" not in table.columns:
-        return nothing
+        spread = (upper - lower) / 1.349  # of a normal distribution
+    if spread is None or "number" not in table.columns:
+        return np.full(len(table), np.nan)
     return spread / np.sqrt(table.numbers("number", at_least=1.0))
 
 
 def _noise(table: Table, light: Array, unit: str) -> Noise:
+    def optional(name: str, **limits: float) -> Array:
+        given = name in table.columns
+        return table.numbers(name, **limits) if given else np.full(len(table), np.nan)
+
     names = [f"{p}_{kind}" for p in ("on", "off") for kind in ("rate_hz", "median_hz", "share")]
-    rates = {}
-    for name in names:
-        if name not in table.columns:
-            continue
-        rates[name] = table.numbers(name, at_least=0.0)
-        if name.endswith("_share"):
-            for k in np.flatnonzero(rates[name] > 1.0):
-                raise table.wrong(int(k), name, "must be a share from 0 to 1")
-    nothing = np.full(len(table), np.nan)
-    pixels = table.numbers("pixels", at_least=1.0) if "pixels" in table.columns else nothing
-    duration = table.numbers("duration_s", above=0.0) if "duration_s" in table.columns else nothing
-    if any(name.endswith("_share") for name in rates) and np.isnan(duration).any():
+    rates = {name: table.numbers(name, at_least=0.0) for name in names if name in table.columns}
+    shares = [name for name in rates if name.endswith("_share")]
+    for name in shares:
+        for k in np.flatnonzero(rates[name] > 1.0):
+            raise table.wrong(int(k), name, "must be a share from 0 to 1")
+    pixels, duration = optional("pixels", at_least=1.0), optional("duration_s", above=0.0)
+    if shares and np.isnan(duration).any():
         raise DataError(f"{table.name}: a share needs the column duration_s, in every row")
-    least = table.numbers("least_hz", above=0.0) if "least_hz" in table.columns else nothing
     told = ~np.all(np.isnan(list(rates.values())), axis=0)
     _check_levels(table, light[told], f"{' and '.join(rates)}: rows with a number have")
-    return Noise(light, unit, rates, pixels, duration, least)
+    return Noise(light, unit, rates, pixels, duration, optional("least_hz", above=0.0))

@@ -42,35 +42,22 @@ _RMS_STEP = 0.02
 
 @dataclass(frozen=True)
 class NoisySources:
-    """What makes noise events in a pixel; rates in Hz, 0 standing for none.
-
-    Attributes
-    ----------
-    leak_hz, photo_leak_hz, shot_hz : float
-    rms : float
-        Photoreceptor noise [ln].
-    noise_step : float
-        Step at which that noise is sampled, in correlation times at white; 0: not sampled.
-    cutoff_hz, dark_cutoff_hz : float
-        Corner of the low-pass at 255 DN and at none.
-    on, off : float
-        Thresholds [ln].
-    dead_time_s : float
-    hot_hz : float
-        Fraction of hot pixels times their rate.
-    """
+    """What makes noise events in a pixel; rates in Hz, 0 standing for none."""
 
     leak_hz: float = 0.0
     photo_leak_hz: float = 0.0
     shot_hz: float = 0.0
     rms: float = 0.0
+    """Photoreceptor noise [ln]."""
     noise_step: float = 0.0
+    """At which that noise is sampled, in correlation times at white; 0: not sampled."""
     cutoff_hz: float = 0.0
     dark_cutoff_hz: float = 0.0
     on: float = 0.2
     off: float = 0.2
     dead_time_s: float = 0.0
     hot_hz: float = 0.0
+    """Fraction of hot pixels times their rate."""
 
 
 @dataclass(frozen=True)
@@ -127,11 +114,7 @@ def _crossings(sources: NoisySources, light: Array) -> tuple[Array, Array]:
 def _tabulated(sources: NoisySources, dead: float, step: float) -> tuple[float, float]:
     """Return ON and OFF events a correlation time, between rms values at which they are kept.
 
-    Parameters
-    ----------
-    sources : NoisySources
-    dead, step : float
-        Dead time, and time between samples, in correlation times.
+    Dead time and time between samples are in correlation times.
     """
     place = np.log(sources.rms) / _RMS_STEP
     below = int(np.floor(place))
