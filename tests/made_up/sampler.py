@@ -12,11 +12,12 @@ from adv2e.config import Config, load_config, to_dict
 from adv2e.config.paths import get_key
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate
-from adv2e.diagnosis.fitting.fit import Fitted, Fitter
+from adv2e.diagnosis.fitting.fitted import Fitted, parted
+from adv2e.diagnosis.fitting.fitter import Fitter
 from adv2e.diagnosis.fitting.library import library
 from adv2e.diagnosis.hints.collect import Hints
 from adv2e.diagnosis.hints.lamps import Lamp
-from adv2e.diagnosis.selection.reference import Reference, parted
+from adv2e.diagnosis.selection.reference import Reference
 from adv2e.diagnosis.selection.search import Search
 from adv2e.diagnosis.statistics.groups import Entry
 from adv2e.diagnosis.statistics.metric import Scale

@@ -11,7 +11,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.fitting.candidates import Candidate
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.prepare import Prepared
 from adv2e.diagnosis.selection.reference import Reference, State
 from adv2e.diagnosis.selection.search import Outcome

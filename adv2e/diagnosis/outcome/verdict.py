@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from adv2e.config import Config, to_dict
 from adv2e.config.paths import get_key
 from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.hints.readouts import DRIFT
 from adv2e.diagnosis.selection.reference import State
 from adv2e.diagnosis.selection.search import PER_LOOK, Outcome

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data import splits
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.selection.reference import MANY, Reference, State
 from adv2e.diagnosis.selection.shortlist import scored
 from adv2e.diagnosis.statistics.metric import Ensemble, shrunk_correlation, whitening

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted, parted
 from adv2e.diagnosis.hints.readouts import EXPOSURE
 from adv2e.diagnosis.selection.acceptance import BORDER, BY_CHANCE, objections, ranked
-from adv2e.diagnosis.selection.reference import Reference, State, parted
+from adv2e.diagnosis.selection.reference import Reference, State
 from adv2e.diagnosis.selection.shortlist import Trial, shortlisted
 from adv2e.diagnosis.statistics.summary import BOTH
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter, neutral_value
-from adv2e.diagnosis.fitting.fit import Fitted, Fitter
+from adv2e.diagnosis.fitting.candidates import FITTED, Candidate, FitParameter, neutral_value
+from adv2e.diagnosis.fitting.fitted import Fitted, parted
+from adv2e.diagnosis.fitting.fitter import Fitter
 from adv2e.diagnosis.statistics.metric import Ensemble, Scale
 from adv2e.diagnosis.statistics.sampler import Sampler
 from adv2e.diagnosis.statistics.summary import BOTH, VIEWS
@@ -50,6 +51,16 @@ class State:
     def names(self) -> tuple[str, ...]:
         """Names of the effects that were added."""
         return tuple(fit.candidate.name for fit in self.fits)
+
+    @property
+    def left(self) -> float:
+        """Share of the residual that is put down to the fit of its effects."""
+        return max((fit.candidate.left for fit in self.fits), default=0.0)
+
+    @property
+    def is_undone(self) -> bool:
+        """Its effects can all be undone in full: no more than usual is put down to their fit."""
+        return self.left <= FITTED
 
     def beyond(self, ground: State) -> tuple[Fitted, ...]:
         """Return the effects that were added to those of another model."""
@@ -192,15 +203,3 @@ class Reference:
     def likelihood(self, state: State, view: int = BOTH) -> float:
         """Return the log likelihood of the recording under a model."""
         return state.ensembles[view].log_likelihood(self.observed[view])
-
-
-def parted(joint: Fitted, fits: tuple[Fitted, ...]) -> tuple[Fitted, ...]:
-    """Return the effects of a joined fit, each with its own point and covariance."""
-    result, start = [], 0
-    for fit in fits:
-        stop = start + len(fit.candidate.parameters)
-        own = slice(start, stop)
-        point, covariance = joint.point[own], joint.covariance[own, own]
-        result.append(Fitted(fit.candidate, fit.base, point, joint.misfit, covariance=covariance))
-        start = stop
-    return tuple(result)

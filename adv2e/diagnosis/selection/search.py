@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from adv2e.diagnosis.data import splits
-from adv2e.diagnosis.fitting.candidates import FITTED, Candidate
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.candidates import Candidate
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.selection.acceptance import CLOSE
 from adv2e.diagnosis.selection.joint_fits import (
     CATCHES_UP,
@@ -64,8 +64,7 @@ class Outcome:
     explained : float
         Share of the declared model's residual that is gone.
     complete : bool
-        Nothing is left for another effect, in either: chance can make it, or it is put down to the
-        fit.
+        Nothing is left for another effect, in either: chance can make it, or it is the fit's.
     rejected : dict
         Last reason for each effect that was not added.
     """
@@ -82,16 +81,6 @@ class Outcome:
         """Effects that cannot be told from one of those that were added."""
         alike = frozenset().union(*self.state.alternatives.values())
         return sorted(alike - set(self.state.names))
-
-
-def _put_down_to_the_fit(state: State) -> float:
-    """Return the share of the residual that is put down to the fit of a model's effects."""
-    return max((fit.candidate.left for fit in state.fits), default=0.0)
-
-
-def _is_undone(state: State) -> bool:
-    """Tell whether a model's effects can all be undone in full: more is not put down to them."""
-    return _put_down_to_the_fit(state) <= FITTED
 
 
 class Search:
@@ -119,10 +108,9 @@ class Search:
 
     def run(self) -> Outcome:
         """Search forward and backward."""
-        state = self.declared
-        told = f"declared model: probability of the residual {self.probability(state):.2g}"
-        self.reference.log(told)
-        state = self._backward(self._forward(state))
+        probability = self.probability(self.declared)
+        self.reference.log(f"declared model: probability of the residual {probability:.2g}")
+        state = self._backward(self._forward(self.declared))
         held = self.reference.rejections.held
         rejected = {name: why for name, why in held.items() if name not in state.names}
         return Outcome(
@@ -163,7 +151,7 @@ class Search:
     def _is_something_left(self, state: State, view: int = BOTH) -> bool:
         if self.probability(state, view) >= PER_LOOK:
             return False
-        return self.explained(state, view) < 1.0 - _put_down_to_the_fit(state)
+        return self.explained(state, view) < 1.0 - state.left
 
     def _is_open(self, state: State) -> bool:
         """Tell whether another effect is looked for.
@@ -173,7 +161,7 @@ class Search:
         """
         if self._is_something_left(state):
             return True
-        return _is_undone(state) and self.probability(state) < _OF_FITS
+        return state.is_undone and self.probability(state) < _OF_FITS
 
     def _may_be_wrong(self, state: State) -> bool:
         """Tell whether another is tried in the place of the first of two effects.
@@ -182,7 +170,7 @@ class Search:
         """
         if len(state.fits) != 2 or self.probability(state) >= PER_LOOK:
             return False
-        return self._is_something_left(state) or _is_undone(state)
+        return self._is_something_left(state) or state.is_undone
 
     def _is_worth_it(self, state: State, grown: State) -> bool:
         """Tell whether an addition that holds takes away enough of what is left.

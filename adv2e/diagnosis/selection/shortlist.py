@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from adv2e.config import Config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.hints.readouts import EXPOSURE
 from adv2e.diagnosis.selection.reference import SOME, Reference, State
 from adv2e.diagnosis.statistics.metric import Ensemble

@@ -8,7 +8,7 @@ from made_up.streams import stream_of
 from adv2e.config import load_config
 from adv2e.config.active_effects import active_hooks
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.fitting.library import library
 from adv2e.diagnosis.hints.readouts import DELAY, Burst, Pulse, pulse_of
 from adv2e.effects.composition import begin

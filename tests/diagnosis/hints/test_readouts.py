@@ -7,7 +7,7 @@ from made_up.streams import stream_of
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.fitting.candidates import Candidate
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.fitting.library import library
 from adv2e.diagnosis.hints.readouts import Readouts, readouts_of
 from adv2e.diagnosis.selection.shortlist import shortlisted

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.fitting.library import library
 from adv2e.diagnosis.hints.readouts import Burst, Pulse
 from adv2e.diagnosis.outcome.findings import about_drifts, finding_of, rejected_of

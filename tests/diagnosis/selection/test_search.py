@@ -21,7 +21,7 @@ from made_up.sampler import (
 
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.fitting.nuisances import THRESHOLDS, thresholds_of
 from adv2e.diagnosis.outcome.detectable import detectable
 from adv2e.diagnosis.outcome.findings import finding_of

@@ -16,7 +16,7 @@ from made_up.sampler import (
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
-from adv2e.diagnosis.fitting.fit import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.statistics.summary import BOTH
 
 VIEW = splits.TRAIN
