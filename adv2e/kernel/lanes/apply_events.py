@@ -21,7 +21,7 @@ def cross(count, ta, length, circuit, lanes):
         seeks = lanes[rows.SEEKS + j]
         found = (lanes[rows.MOVES + j] < 0.5) | (lanes[rows.ERROR + j] <= rows.TOLERANCE)
         tried = lanes[rows.TRIED + j] + 1.0
-        lanes[rows.TRIED + j] = tried
+        lanes[rows.TRIED + j] = 0.0 if found else tried
         failed = rows.STUCK if tried >= _TRIES else seeks
         crossed = found & ((seeks == rows.SEEK_ON) | (seeks == rows.SEEK_OFF))
         place = lanes[rows.PLACE + j]

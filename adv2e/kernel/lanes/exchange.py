@@ -113,6 +113,7 @@ def load(lo, m, ta, length, circuit, state, strip, falls, pixels, lanes):
         place = end if in_pieces else place
         lanes[rows.SEEKS + j] = seeks
         lanes[rows.PLACE + j] = place
+        lanes[rows.TRIED + j] = 0.0
         lanes[rows.MOVES + j] = 0.0
     if circuit.leak_jitter > 0.0:
         for j in range(m):

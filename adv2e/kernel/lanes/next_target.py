@@ -76,4 +76,3 @@ def choose(count, ta, length, circuit, lanes):
         lanes[rows.SEEKS + j] = what
         crosses = ready & ((what == rows.SEEK_ON) | (what == rows.SEEK_OFF))
         lanes[rows.MOVES + j] = 1.0 if crosses else lanes[rows.MOVES + j]
-        lanes[rows.TRIED + j] = 0.0 if crosses else lanes[rows.TRIED + j]

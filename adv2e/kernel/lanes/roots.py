@@ -31,20 +31,23 @@ def guess(lanes, count, length, circuit):
     """
     dark, per_dn = circuit.dark * length, circuit.per_dn * length
     for k in range(count):
+        # loaded before they are chosen from: loads in a branch do not vectorise
+        on, off = lanes[rows.ON + k] + TIE, lanes[rows.OFF + k] + TIE
         s, w = lanes[rows.S + k], lanes[rows.STOP + k] - lanes[rows.S + k]
-        seeks = lanes[rows.SEEKS + k]
-        turn = seeks == rows.TURN
-        level = lanes[rows.ON + k] + TIE if seeks == rows.SEEK_ON else -lanes[rows.OFF + k] - TIE
-        goal = lanes[rows.REFERENCE + k] - lanes[rows.X0 + k] + level
-        lanes[rows.GOAL + k] = 0.0 if turn else goal
         lag_s, lag_p = lanes[rows.LAG_S + k], lanes[rows.LAG_P + k]
-        f0 = lag_s if turn else lanes[rows.AWAY_S + k] - level
-        f1 = lag_p if turn else lanes[rows.AWAY_P + k] - level
-        # the slope of the lag is -w u - dx, that of the distance -w u plus the leak
+        away_s, away_p = lanes[rows.AWAY_S + k], lanes[rows.AWAY_P + k]
         light_s, light_p = lanes[rows.LIGHT_S + k], lanes[rows.LIGHT_P + k]
-        fall, fall_dn = lanes[rows.FALL + k], lanes[rows.FALL_DN + k]
-        drift_s = -lanes[rows.DX + k] if turn else fall + fall_dn * light_s
-        drift_p = -lanes[rows.DX + k] if turn else fall + fall_dn * light_p
+        fall, fall_dn, dx = lanes[rows.FALL + k], lanes[rows.FALL_DN + k], lanes[rows.DX + k]
+        origin = lanes[rows.REFERENCE + k] - lanes[rows.X0 + k]
+        seeks, place = lanes[rows.SEEKS + k], lanes[rows.PLACE + k]
+        turn = seeks == rows.TURN
+        level = on if seeks == rows.SEEK_ON else -off
+        lanes[rows.GOAL + k] = 0.0 if turn else origin + level
+        f0 = lag_s if turn else away_s - level
+        f1 = lag_p if turn else away_p - level
+        # the slope of the lag is -w u - dx, that of the distance -w u plus the leak
+        drift_s = -dx if turn else fall + fall_dn * light_s
+        drift_p = -dx if turn else fall + fall_dn * light_p
         g0 = (drift_s - (dark + per_dn * light_s) * lag_s) * w
         g1 = (drift_p - (dark + per_dn * light_p) * lag_p) * w
         c2 = 3.0 * (f1 - f0) - 2.0 * g0 - g1
@@ -56,7 +59,7 @@ def guess(lanes, count, length, circuit):
             q = t - v / (dv if dv != 0.0 else 1.0)
             t = q if (q > 0.0) & (q < 1.0) else t
         fresh = (lanes[rows.MOVES + k] > 0.5) & (lanes[rows.TRIED + k] < 0.5)
-        lanes[rows.PLACE + k] = s + w * t if fresh else lanes[rows.PLACE + k]
+        lanes[rows.PLACE + k] = s + w * t if fresh else place
 
 
 @inlined
@@ -208,9 +211,10 @@ def refine(lanes, count, length, circuit):
         # the end values are single precision: a root beyond them by that is a root at the end, if
         # the slope there is not that of a second one close by
         inside = (place >= lo - 1e-6) & (place <= hi + 1e-6)
-        from_s = lanes[rows.LAG_S + k] if turn else lanes[rows.AWAY_S + k]
-        to_stop = lanes[rows.LAG_P + k] if turn else lanes[rows.AWAY_P + k]
-        inside &= (dv > 0.0) == (to_stop > from_s)
+        lag_rise = lanes[rows.LAG_P + k] - lanes[rows.LAG_S + k]
+        rise = lanes[rows.AWAY_P + k] - lanes[rows.AWAY_S + k]
+        rise = lag_rise if turn else rise
+        inside &= (dv > 0.0) == (rise > 0.0)
         place = place if place > lo else lo
         place = place if place < hi else hi
         reach = (w0 * (1.0 + abs(t * e)) + abs(d)) * abs(t)

@@ -58,7 +58,7 @@ _STRIDE = STRIP + WIDTH + 8  # rows must not share cache sets
     KIND,  # of the noise event at STOP
     # what it looks for
     SEEKS,
-    TRIED,  # how often
+    TRIED,  # how often in vain
     MOVES,  # 1: the place is a root, guessed and refined; 0: it is given
     GOAL,  # value to be reached
     # what was found

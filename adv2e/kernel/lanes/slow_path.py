@@ -39,7 +39,6 @@ def _seek_root(j, what, length, lanes):
     near = (lanes[rows.STOP + j] - lanes[rows.S + j]) * length <= rows.TOLERANCE
     _seek_given(j, what, lanes[rows.S + j] if beyond else lanes[rows.STOP + j], lanes)
     lanes[rows.MOVES + j] = 0.0 if beyond or near else 1.0
-    lanes[rows.TRIED + j] = 0.0
 
 
 @kernel
