@@ -63,25 +63,8 @@ class Film:
         self._file.close()
 
 
-KEPT = 4
+_KEPT = 4
 """Cells that a sheet holds at most while it does not know the end, for each that it shows."""
-
-
-def stride_of(instants: int, count: int) -> int:
-    """Return how many `instants` lie from one that a sheet of `count` cells holds to the next.
-
-    A power of two, so that those held are among those held before.
-    """
-    stride = 1
-    while instants // stride > KEPT * count:
-        stride *= 2
-    return stride
-
-
-def spread(held: int, count: int) -> list[int]:
-    """Return which of the `held` cells are shown, at most `count`, spread evenly."""
-    shown = min(count, held)
-    return [int((n + 0.5) * held / shown) for n in range(shown)]
 
 
 class Sheet:
@@ -105,14 +88,16 @@ class Sheet:
     def add(self, number: int, cell: Cell) -> None:
         """Take the cell."""
         self._cells[number] = cell
-        self._stride = stride_of(number + 1, self._count)
+        while (number + 1) // self._stride > _KEPT * self._count:
+            self._stride *= 2  # so that those held are among those held before
         self._cells = {n: cell for n, cell in self._cells.items() if self.wanted_from(n) == n}
 
     def finish(self) -> None:
         """Choose the cells and write the picture."""
         cells = list(self._cells.values())
-        shown = [cells[place] for place in spread(len(cells), self._count)]
-        picture = sheet(shown, self._style, self._scale)
+        shown = min(self._count, len(cells))
+        places = [int((n + 0.5) * len(cells) / shown) for n in range(shown)]  # evenly spread
+        picture = sheet([cells[place] for place in places], self._style, self._scale)
         done, data = cv2.imencode(".png", picture[:, :, ::-1])
         if not done:
             raise NotWritten("a .png picture cannot be made of it")
@@ -123,5 +108,5 @@ class Sheet:
         self._cells.clear()
 
 
-Album = Film | Sheet
+PictureOutput = Film | Sheet
 """What takes cells one by one."""

@@ -31,15 +31,15 @@ def palette(style: Style) -> NDArray[np.uint8]:
     """Return 256 colours for pictures in `style`: greys, shades of ON and OFF, a colour cube."""
     grey = np.rint(np.linspace(0, 255, 96))
     shades = np.linspace(0, 1, 32)[:, None]
-    ground = np.array(style.ground, np.float64)
+    background = np.array(style.background, np.float64)
     on, off = (np.array(colour, np.float64) for colour in style.colours)
     red, green, blue = np.meshgrid(
         np.linspace(0, 255, 4), np.linspace(0, 255, 6), np.linspace(0, 255, 4), indexing="ij"
     )
     parts = [
         np.stack([grey] * 3, axis=1),
-        ground + shades * (on - ground),
-        ground + shades * (off - ground),
+        background + shades * (on - background),
+        background + shades * (off - background),
         np.stack([red.ravel(), green.ravel(), blue.ravel()], axis=1),
     ]
     colours: NDArray[np.uint8] = np.rint(np.concatenate(parts)).astype(np.uint8)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from adv2e.errors import OutputError
 from adv2e.files.staging import Staging
-from adv2e.rendering.films import Album, Film, Sheet, check_suffix
+from adv2e.rendering.films import Film, PictureOutput, Sheet, check_suffix
 from adv2e.rendering.output import replacing
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Caption, Timeline, caption
@@ -75,16 +75,16 @@ def open_preview(
     step_us = SHEET_STEP_US if is_sheet else max(1.0, 1e6 * speed / fps)
     style = style or (Style() if is_sheet else Style(window_us=round(step_us)))
     with replacing(path, overwrite, staging) as unfinished:
-        album: Album
+        output: PictureOutput
         if is_sheet:
             shown = count if instants_us is None else len(instants_us)
-            album = Sheet(unfinished, shown, style, scale)
+            output = Sheet(unfinished, shown, style, scale)
         else:
-            album = Film(unfinished, fps, style, scale)
+            output = Film(unfinished, fps, style, scale)
         # closed before the file is removed: Windows keeps open files
-        with closing(album):
+        with closing(output):
             timeline = Timeline(
-                album,
+                output,
                 (width, height),
                 style,
                 step_us=step_us,
@@ -98,4 +98,4 @@ def open_preview(
                 yield timeline
                 if not timeline.finish():
                     raise OutputError(f"{path}: there are no events or frames to draw")
-            album.finish()
+            output.finish()

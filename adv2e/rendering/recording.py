@@ -13,8 +13,7 @@ from tqdm import tqdm
 from adv2e.errors import DataError
 from adv2e.files.distinct import check_distinct
 from adv2e.light.pictures import drawn_frame
-from adv2e.rendering.films import spread, stride_of
-from adv2e.rendering.preview import SHEET_STEP_US, open_preview
+from adv2e.rendering.preview import open_preview
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Caption, Timeline, caption, microseconds
 
@@ -53,7 +52,7 @@ def render_recording(
         Output.
     at_s : sequence of float
         Instants of a sheet [s after the first event or frame]; none: up to `count`, about evenly
-        spaced, the same as :func:`open_preview` takes from a stream.
+        spaced.
     start_s, stop_s : float
         Part to show [s after the first event or frame].
     style, fps, speed, frames, scale, caption, overwrite
@@ -79,15 +78,11 @@ def render_recording(
         until_us = min(until_us, begin_us + round(stop_s * 1e6))
     if first_us >= until_us:
         raise DataError(f"{lasts}, nothing is left from {start_s:g} s on")
-    instants = None
+    instants: list[int] = []
     if Path(path).suffix.lower() == ".png":
         instants = [begin_us + round(time * 1e6) for time in sorted(at_s)]
         if instants and instants[-1] > until_us:
             raise DataError(f"{lasts}, the instant {max(at_s):g} s is after the end")
-        last_us = until_us - 1
-        if not frames and recording.events.size:
-            last_us = min(last_us, int(recording.events["t"][-1]))
-        instants = instants or _instants(first_us, last_us, count)
     elif (until_us - first_us) * 1e-6 * fps / speed > MOST_PICTURES:
         raise DataError(
             f"{lasts}, of which a film has over {MOST_PICTURES:,} pictures; 'adv2e info' tells gaps"
@@ -100,7 +95,8 @@ def render_recording(
         style=style,
         fps=fps,
         speed=speed,
-        instants_us=instants,
+        count=count,
+        instants_us=instants or None,
         start_us=first_us,
         frames=frames,
         scale=scale,
@@ -108,14 +104,6 @@ def render_recording(
         overwrite=overwrite,
     ) as preview:
         _feed(preview, recording, first_us, until_us, frames, progress)
-
-
-def _instants(first_us: int, last_us: int, count: int) -> list[int]:
-    """Return the instants that a sheet chooses that is not told the end before it comes."""
-    instants = max(1, (last_us - first_us) // SHEET_STEP_US)
-    step_us = SHEET_STEP_US * stride_of(instants, count)
-    places = spread(instants * SHEET_STEP_US // step_us, count)
-    return [first_us + (place + 1) * step_us for place in places]
 
 
 def _span_us(recording: Recording) -> tuple[int, int]:

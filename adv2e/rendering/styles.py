@@ -67,7 +67,7 @@ class Style:
             raise UsageError(f"window {self.window_us} us: must be at least 1 us")
 
     @property
-    def ground(self) -> Colour:
+    def background(self) -> Colour:
         """The colour of a pixel without events."""
         return {"black": _BLACK, "grey": _grey_levels(0)}.get(self.name, _WHITE)
 
@@ -124,7 +124,7 @@ def _grey_levels(net: int) -> Colour:
 
 def _last_polarity(events: Events, width: int, height: int, t_us: int, style: Style) -> Picture:
     picture = np.empty((height, width, 3), np.uint8)
-    picture[:] = style.ground
+    picture[:] = style.background
     colours = np.array([style.off, style.on], np.uint8)
     picture[events["y"], events["x"]] = colours[events["p"]]  # of several, the last one stays
     return picture
@@ -144,8 +144,8 @@ def _time_surface(events: Events, width: int, height: int, t_us: int, style: Sty
     age = (t_us - events["t"]) / (style.window_us / 3)
     strength[events["y"], events["x"], 0] = np.exp(-age)
     colour = _last_polarity(events, width, height, t_us, style)
-    ground = np.array(style.ground, np.float64)
-    return np.rint(ground + strength * (colour - ground)).astype(np.uint8)
+    background = np.array(style.background, np.float64)
+    return np.rint(background + strength * (colour - background)).astype(np.uint8)
 
 
 STYLES: dict[str, Callable[[Events, int, int, int, Style], Picture]] = {

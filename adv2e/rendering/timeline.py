@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from adv2e.events import Events, empty_events
 from adv2e.files.backlog import Backlog
-from adv2e.rendering.films import Album
+from adv2e.rendering.films import PictureOutput
 from adv2e.rendering.layout import Cell
 from adv2e.rendering.styles import Picture, Style, draw
 
@@ -32,7 +32,7 @@ def caption(since_us: int, count: int) -> str:
 
 
 class Timeline:
-    """Draws the instants one after the other, and hands them to an album.
+    """Draws the instants one after the other, and hands them to an output.
 
     That an event has come tells that those before it have, and likewise for frames; events and
     frames may come in any order relative to one another.  What is not drawn yet waits, beyond
@@ -40,7 +40,7 @@ class Timeline:
 
     Parameters
     ----------
-    album : Album
+    output : PictureOutput
         Takes the pictures.
     size : (int, int)
         Width and height of the sensor [pixels].
@@ -62,7 +62,7 @@ class Timeline:
 
     def __init__(
         self,
-        album: Album,
+        output: PictureOutput,
         size: tuple[int, int],
         style: Style,
         *,
@@ -73,7 +73,7 @@ class Timeline:
         caption: Caption = caption,
         folder: Path | None = None,
     ) -> None:
-        self._album, self._size, self._style = album, size, style
+        self._output, self._size, self._style = output, size, style
         self._step_us, self._given_us = step_us, instants_us
         self._start_us, self._with_frames, self._caption = start_us, frames, caption
         self._number = 0  # of the instant to draw next
@@ -128,7 +128,7 @@ class Timeline:
             return True
         self._draw_up_to(max(self._last_event_us, self._last_frame_us))
         next_us = self._next_us()
-        to_come = self._album.whole and next_us - self._step_us <= self._last_event_us
+        to_come = self._output.whole and next_us - self._step_us <= self._last_event_us
         if to_come or not self._drawn:
             self._draw(next_us)
         return True
@@ -158,7 +158,7 @@ class Timeline:
     def _next_us(self) -> int:
         """Return the instant to draw next; far off if there is none."""
         assert self._start_us is not None
-        self._number = self._album.wanted_from(self._number)
+        self._number = self._output.wanted_from(self._number)
         if self._given_us is None:
             return self._start_us + round((self._number + 1) * self._step_us)
         return self._given_us[self._number] if self._number < len(self._given_us) else _FAR_OFF
@@ -187,7 +187,7 @@ class Timeline:
         if self._with_frames:
             panels.insert(0, self._frame_at(t_us))
         text = self._caption(t_us - self._start_us, int(events.size))
-        self._album.add(self._number, Cell(tuple(panels), text))
+        self._output.add(self._number, Cell(tuple(panels), text))
         self._drawn += 1
         self._number += 1
 

@@ -99,7 +99,7 @@ def test_film_holds_size_times_and_colours(tmp_path):
     style = Style()
     film = GifWriter(path, 30, palette(style))
     rng = np.random.default_rng(0)
-    choice = np.array([style.on, style.off, style.ground, (0, 0, 0), (128, 128, 128)], np.uint8)
+    choice = np.array([style.on, style.off, style.background, (0, 0, 0), (128, 128, 128)], np.uint8)
     pictures = [choice[rng.integers(0, 5, (13, 31))] for _ in range(6)]
     for picture in pictures:
         film.add(picture)
@@ -117,7 +117,7 @@ def test_palette_has_the_colours_of_the_style():
         style = Style(name=name, on=(1, 200, 3), off=(250, 120, 0))
         colours = palette(style)
         assert colours.shape == (256, 3)
-        for colour in (*style.colours, style.ground, (0, 0, 0), (255, 255, 255)):
+        for colour in (*style.colours, style.background, (0, 0, 0), (255, 255, 255)):
             assert np.any(np.all(colours == colour, axis=1))
 
 

@@ -7,7 +7,7 @@ import pytest
 from adv2e.errors import DataError
 from adv2e.events import empty_events, make_events
 from adv2e.formats.reading import Recording
-from adv2e.rendering import Style, render_recording
+from adv2e.rendering import Style, films, layout, render_recording
 
 EPOCH = 1_470_000_000_000_000  # us
 
@@ -30,19 +30,15 @@ def cells(monkeypatch, tmp_path):
     def render(what, name="out.avi", **more):
         seen = []
 
-        def add(self, number, cell):
+        def compose(cell, *rest):
             frame = int(cell.panels[0][0, 0, 0]) if len(cell.panels) > 1 else None
             seen.append((cell.caption, frame))
-            return add.original(self, number, cell)
+            return original(cell, *rest)
 
-        for kind in ("Film", "Sheet"):
-            with monkeypatch.context() as patch:
-                owner = getattr(__import__("adv2e.rendering.films", fromlist=[kind]), kind)
-                add.original = owner.add
-                if (kind == "Sheet") != name.endswith(".png"):
-                    continue
-                patch.setattr(owner, "add", add)
-                render_recording(what, tmp_path / name, scale=1, **more)
+        original = films.compose if name.endswith("avi") else layout.compose
+        with monkeypatch.context() as patch:
+            patch.setattr(films if name.endswith("avi") else layout, "compose", compose)
+            render_recording(what, tmp_path / name, scale=1, **more)
         return seen
 
     return render

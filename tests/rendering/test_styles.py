@@ -60,12 +60,12 @@ def test_time_surface_fades_with_the_age_of_the_last_event():
 
 
 @pytest.mark.parametrize("style", ["white", "black", "grey", "surface"])
-def test_without_events_all_is_ground(style):
+def test_without_events_all_is_background(style):
     style = Style(name=style)
     picture = draw(make_events([], [], [], []), 3, 2, 0, style)
     assert picture.shape == (2, 3, 3)
     assert picture.dtype == np.uint8
-    assert np.all(picture == np.array(style.ground))
+    assert np.all(picture == np.array(style.background))
 
 
 def test_colours_by_name_and_by_number():

@@ -218,7 +218,7 @@ def test_frames_do_not_wait_for_events_when_it_is_told_that_there_are_none():
     line.no_more_frames()
     line.add_events(at([500_000]))
     assert not line._frames
-    assert len(line._album.cells) == 500
+    assert len(line._output.cells) == 500
 
 
 def test_what_waits_beyond_some_memory_waits_on_disk(monkeypatch, tmp_path):
