@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from adv2e.config.yaml12 import scalar_text
 from adv2e.reports.keys import unit_of
 from adv2e.reports.markup import plain
 from adv2e.reports.quantities import interval_text, native
-from adv2e.reports.result import Diagnosis, Own
+from adv2e.reports.result import Diagnosis
 
 _WIDTH = 100
+
+Comment = Callable[[str], str]
+"""What is said of a key: its unit, and where a value that was not declared is from."""
 
 
 def model_text(diagnosis: Diagnosis) -> str:
@@ -22,7 +24,13 @@ def model_text(diagnosis: Diagnosis) -> str:
     Keys that were added, and nuisances, say so; every key that has a unit names it.
     """
     origins = _origins(diagnosis)
-    lines = list(_lines(native(diagnosis.model), "", 0, _Notes(origins, diagnosis.own)))
+
+    def comment(path: str) -> str:
+        unit = unit_of(path, diagnosis.own)
+        notes = f"{f'[{unit}] ' * bool(unit)}{origins.get(path, '')}"
+        return f"  # {' '.join(plain(notes).split())}" if notes else ""
+
+    lines = list(_lines(native(diagnosis.model), "", 0, comment))
     return "\n".join([*_head(diagnosis), "", *(lines or ["{}"]), ""])
 
 
@@ -57,15 +65,15 @@ def _origins(diagnosis: Diagnosis) -> dict[str, str]:
     return origins
 
 
-def _lines(values: Mapping[str, Any], path: str, depth: int, notes: _Notes) -> Iterator[str]:
+def _lines(values: Mapping[str, Any], path: str, depth: int, comment: Comment) -> Iterator[str]:
     for name, value in values.items():
         full = f"{path}.{name}" if path else name
         start = f"{'  ' * depth}{scalar_text(name)}:"
         if isinstance(value, dict) and value:
-            yield f"{start}{notes.comment(full)}"
-            yield from _lines(value, full, depth + 1, notes)
+            yield f"{start}{comment(full)}"
+            yield from _lines(value, full, depth + 1, comment)
         else:
-            yield f"{start} {_flow(value)}{notes.comment(full)}"
+            yield f"{start} {_flow(value)}{comment(full)}"
 
 
 def _flow(value: Any) -> str:
@@ -76,18 +84,3 @@ def _flow(value: Any) -> str:
     if isinstance(value, list):
         return f"[{', '.join(_flow(item) for item in value)}]"
     return scalar_text(value)
-
-
-@dataclass(frozen=True)
-class _Notes:
-    """What is said of keys: where values that were not declared are from, and units."""
-
-    origins: Mapping[str, str]
-    own: Own
-
-    def comment(self, path: str) -> str:
-        unit = unit_of(path, self.own)
-        notes = [f"[{unit}]"] if unit else []
-        if path in self.origins:
-            notes.append(self.origins[path])
-        return f"  # {' '.join(plain(' '.join(notes)).split())}" if notes else ""

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from adv2e.reports.quantities import native
-from adv2e.reports.result import Diagnosis, Estimate
+from adv2e.reports.result import ROLES, Diagnosis
 
 
 def record(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -27,16 +27,12 @@ def record_text(diagnosis: Diagnosis) -> str:
 
 
 def _fixed(diagnosis: Diagnosis) -> dict[str, Any]:
-    error: dict[str, Any] = {"name": None, "before": None, "after": None, "floor": None}
+    error: dict[str, Any] = dict.fromkeys(("name", *ROLES))
     for row in diagnosis.errors[:1]:
-        values = row.before.value, row.after.value, row.floor.value
-        error = dict(zip(error, (row.name, *values), strict=True))
+        error = {"name": row.name, **{role: getattr(row, role).value for role in ROLES}}
     return {
         "verdict": diagnosis.verdict,
-        "effects": [
-            {"name": one.name, "parameters": one.parameters, "interval": one.interval}
-            for one in diagnosis.effects
-        ],
+        "effects": [vars(one) for one in diagnosis.effects],
         "alternatives": diagnosis.alternatives,
         "nuisances": diagnosis.nuisances,
         "rejected": [{"name": one.name, "reason": one.reason} for one in diagnosis.rejected],
@@ -55,42 +51,23 @@ def _further(diagnosis: Diagnosis) -> dict[str, Any]:
         diagnosis.wording.subject: diagnosis.recording,
         "declared": diagnosis.declared,
         "errors": [
-            {
-                "name": row.name,
-                "before": _estimate(row.before),
-                "after": _estimate(row.after),
-                "floor": _estimate(row.floor),
-            }
+            {"name": row.name, **{role: vars(getattr(row, role)) for role in ROLES}}
             for row in diagnosis.errors
         ],
         "signature_values": [
-            {
-                "name": one.name,
-                "group": one.group,
-                "meaning": one.meaning,
-                "measured": one.measured,
-                "before": one.before,
-                "after": one.after,
-            }
+            {key: value for key, value in vars(one).items() if not key.startswith("z_")}
             for one in diagnosis.signatures
         ],
         "trials": [
             {"name": one.name, "parameters": one.parameters, "held_out": one.held_out}
             for one in diagnosis.rejected
         ],
-        "detectable": [
-            {"name": one.name, "key": one.key, "size": one.size, "unit": one.unit}
-            for one in diagnosis.detectable
-        ],
-        "masked": [{"what": one.what, "share": one.share} for one in diagnosis.masked],
+        "detectable": list(map(vars, diagnosis.detectable)),
+        "masked": list(map(vars, diagnosis.masked)),
         "split": diagnosis.split,
         "notes": diagnosis.notes,
         "facts": diagnosis.facts,
     }
-
-
-def _estimate(estimate: Estimate) -> dict[str, Any]:
-    return {"value": estimate.value, "interval": estimate.interval}
 
 
 def _finite(value: Any) -> Any:

@@ -56,6 +56,10 @@ class Estimate:
     interval: Interval | None = None
 
 
+ROLES = ("before", "after", "floor")
+"""Of the numbers of an error: declared model, model found, draws of that against each other."""
+
+
 @dataclass(frozen=True)
 class ErrorRow:
     """One measure of distance between recording and simulation.
@@ -65,7 +69,6 @@ class ErrorRow:
     name : str
         What it measures, in a few words.
     before, after, floor : Estimate
-        Declared model; model found; independent draws of the model found against each other.
     without_chance : bool
         Of the mean of simulations: what chance makes in each of them does not count.
     """

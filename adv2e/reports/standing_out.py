@@ -1,4 +1,4 @@
-"""What stands out of a residual: of each group of marker statistics, the one farthest off.
+"""What stands out of a residual: of each group of summary statistics, the one farthest off.
 
 Neighbouring statistics of a group tell much the same, so that the groups that stand out, and how,
 say more of what is missing than a list of the largest distances.
@@ -18,17 +18,9 @@ LARGE_Z = 3.0
 
 @dataclass(frozen=True)
 class Standing:
-    """A group of statistics, and what of it stands out.
+    """A group of so many statistics, and how many stand out from the declared model and the other.
 
-    Attributes
-    ----------
-    group : str
-    number : int
-        Its statistics.
-    before, after : int
-        Those that stand out from the declared model, and from the model found.
-    farthest : Signature
-        The one farthest from the model found, if any stands out there, or from the declared one.
+    `farthest` is farthest from the model found, if any stands out there, or from the declared one.
     """
 
     group: str

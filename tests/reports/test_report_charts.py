@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from made_up_diagnosis import everything, strange
 
-from adv2e.reports.charts import paths
 from adv2e.reports.charts.axes import Axis, axis_over, drawable
-from adv2e.reports.charts.curve_chart import curve_chart
+from adv2e.reports.charts.curve_chart import band_path, curve_chart, line_path, points_of
 from adv2e.reports.charts.error_chart import error_chart
 from adv2e.reports.charts.sensor_map import (
     colour_bar,
@@ -73,17 +72,17 @@ def test_axes_reach_down_to_a_zero_that_is_near():
 
 def test_lines_have_gaps_and_lone_points():
     ys = np.array([1.0, 2, NAN, 4, NAN])
-    assert paths.line(np.arange(5.0), ys) == "M0.0 1.0L1.0 2.0M1.0 4.0L5.0 4.0"
-    assert paths.line(np.arange(0.0), np.arange(0.0)) == ""
+    assert line_path(np.arange(5.0), ys) == "M0.0 1.0L1.0 2.0M1.0 4.0L5.0 4.0"
+    assert line_path(np.arange(0.0), np.arange(0.0)) == ""
 
 
 def test_bands_go_round_the_area():
-    path = paths.band(np.array([0.0, 1]), np.array([9.0, 8]), np.array([1.0, 2]))
+    path = band_path(np.array([0.0, 1]), np.array([9.0, 8]), np.array([1.0, 2]))
     assert path == "M0.0 1.0L1.0 2.0L1.0 8.0L0.0 9.0Z"
 
 
 def test_bins_are_steps():
-    xs, ys = paths.points_of(np.array([0.0, 1, 3]), np.array([5.0, 6]))
+    xs, ys = points_of(np.array([0.0, 1, 3]), np.array([5.0, 6]))
     np.testing.assert_array_equal(xs, [0, 1, 1, 3])
     np.testing.assert_array_equal(ys, [5, 5, 6, 6])
 

@@ -12,7 +12,7 @@ from made_up_diagnosis import HOSTILE, everything, nothing, strange
 from adv2e.reports.findings import MARKS
 from adv2e.reports.page import page
 from adv2e.reports.result import ResidualMap, Signature
-from adv2e.reports.separation import SEPARATIONS
+from adv2e.reports.trials import SEPARATIONS
 from adv2e.reports.wording import OF_TABLES
 
 EMPTY = {"br", "img", "meta"}

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e.reports.charts import paths
 from adv2e.reports.charts.axes import (
     LINE_HEIGHT,
     Axis,
@@ -44,8 +43,8 @@ class _Frame:
 
     def line(self, values: Floats) -> str:
         """Return the path of a curve."""
-        xs, ys = paths.points_of(self.x, self.up.place(values))
-        return paths.line(xs, ys)
+        xs, ys = points_of(self.x, self.up.place(values))
+        return line_path(xs, ys)
 
     def band(self, band: Band) -> str:
         """Return the path around a band; ends beyond every number are at the picture's border."""
@@ -53,9 +52,9 @@ class _Frame:
         high = np.where(np.isposinf(band.high), self.up.high, drawable(band.high))
         if self.up.log:
             low = np.where(low <= 0, self.up.low, low)
-        xs, lows = paths.points_of(self.x, self.up.place(low))
-        _, highs = paths.points_of(self.x, self.up.place(high))
-        return paths.band(xs, lows, highs)
+        xs, lows = points_of(self.x, self.up.place(low))
+        _, highs = points_of(self.x, self.up.place(high))
+        return band_path(xs, lows, highs)
 
 
 def curves(given: Sequence[Curve], wording: Wording) -> Markup:
@@ -148,3 +147,41 @@ def _legend(joined: bool, dots: bool) -> Markup:
             parts.append(tag("path", d=f"M{x} 10L{x + 22} 10", class_=f"curve {name}"))
         parts.append(place_text(x + 27, 14, text, class_="label"))
     return join(*parts)
+
+
+def points_of(x: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return the points to join, (n,): those given, or, for borders (n + 1,), corners of steps."""
+    if len(x) == len(values):
+        return x, values
+    return np.repeat(x, 2)[1:-1], np.repeat(values, 2)
+
+
+def line_path(xs: Floats, ys: Floats) -> str:
+    """Return the path through points in the picture; one between gaps becomes a short dash."""
+    return "".join(_joined(x, y) for x, y in _runs(xs, ys))
+
+
+def band_path(xs: Floats, low: Floats, high: Floats) -> str:
+    """Return the closed path around the area from `low` to `high`."""
+    paths = []
+    for x, below, above in _runs(xs, low, high):
+        around = np.concatenate([x, x[::-1]]), np.concatenate([above, below[::-1]])
+        paths.append(f"{_joined(*around)}Z")
+    return "".join(paths)
+
+
+def _runs(xs: Floats, *rows: Floats) -> Iterator[tuple[Floats, ...]]:
+    """Yield the parts between gaps, a lone point as two that are near."""
+    table = np.stack([xs, *rows])
+    there = np.isfinite(table).all(axis=0)
+    edges = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
+    for first, stop in zip(edges[::2], edges[1::2], strict=True):
+        run = table[:, first:stop]
+        if stop - first == 1:
+            run = np.repeat(run, 2, axis=1)
+            run[0] += (-2.0, 2.0)
+        yield tuple(run)
+
+
+def _joined(xs: Floats, ys: Floats) -> str:
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in zip(xs, ys, strict=True))

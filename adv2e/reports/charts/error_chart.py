@@ -11,12 +11,11 @@ from adv2e.reports.charts.axes import LINE_HEIGHT, Axis, place_text, rule, wrapp
 from adv2e.reports.charts.ticks import linear_ticks, tick_labels
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.quantities import estimate_text
-from adv2e.reports.result import ErrorRow, Estimate
+from adv2e.reports.result import ROLES, ErrorRow, Estimate
 
 WIDTH = 720
 _START, _END, _VALUES = 130, 520, 536
 _LINE = 17
-_ROLES = ("before", "after", "floor")
 _SHAPES = {
     "before": "M0 -6L6 0L0 6L-6 0Z",
     "after": "M-5 0A5 5 0 1 1 5 0A5 5 0 1 1 -5 0Z",
@@ -57,7 +56,7 @@ def _row(row: ErrorRow, axis: Axis, y: float) -> tuple[Markup, float]:
     for line in wrapped(row.name, WIDTH):
         y += LINE_HEIGHT
         parts.append(place_text(0, y, line, class_="label name"))
-    for role in _ROLES:
+    for role in ROLES:
         y += _LINE
         estimate: Estimate = getattr(row, role)
         parts.append(place_text(_START - 14, y, role, text_anchor="end"))
