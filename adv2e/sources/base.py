@@ -110,6 +110,10 @@ class Source(ABC):
         elif first.white is not None:
             self.full_scale, self.full_scale_reason = first.white, "as its header says"
 
+    def _note(self, text: str) -> None:
+        if text not in self.notes:  # frames may be read more than once
+            self.notes.append(text)
+
     @property
     def light(self) -> Light:
         """What the numbers of the frames stand for."""
@@ -198,8 +202,8 @@ class Source(ABC):
         if this != first:
             raise DataError(f"{label}: {this}, but the first frame is {first}")
         check_values(image, label)
-        if (pixels.alpha is not None or pixels.composed) and OVER_BLACK not in self.notes:
-            self.notes.append(OVER_BLACK)
+        if pixels.alpha is not None or pixels.composed:
+            self._note(OVER_BLACK)
         if self.largest_read == 0 or self.doubt_of_white(self.largest_read):
             self.largest_read = max(self.largest_read, float(image.max()))
         return pixels

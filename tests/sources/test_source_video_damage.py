@@ -9,7 +9,6 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
-from adv2e.sources.video.choice import Choice
 from adv2e.sources.video.colours import Colours
 
 pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
@@ -137,7 +136,7 @@ def test_errors_that_a_decoder_of_pyav_meets_are_told(tmp_path, monkeypatch):
     place = data.index(b"\0\0\1\xb6") + 100
     data[place : place + 60] = bytes(60)
     path.write_bytes(data)
-    choice = Choice("for a test", Colours())
+    choice = "for a test", Colours()
     monkeypatch.setattr("adv2e.sources.video.source.choose", lambda *_: choice)
     source, frames = read(path)
     assert len(frames) == COUNT

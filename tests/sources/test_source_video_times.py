@@ -10,7 +10,6 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
-from adv2e.sources.video.choice import Choice
 from adv2e.sources.video.colours import Colours
 
 pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
@@ -66,7 +65,7 @@ def test_every_frame_is_at_its_time_when_pyav_decodes(
 ):
     path = written(tmp_path / name, codec, Fraction(25), reordered=reordered)
     expected = times_of(path)
-    choice = Choice("for a test", Colours())
+    choice = "for a test", Colours()
     monkeypatch.setattr("adv2e.sources.video.source.choose", lambda *_: choice)
     assert times_of(path) == expected
     assert len(expected) == COUNT

@@ -70,10 +70,10 @@ def test_headers_state_what_ffmpeg_finds_in_them(tmp_path, name, suffix):
         next(file.decode(video=0))
         found = file.streams.video[0].codec_context
     stream, _ = read_packets(str(path), 48, listed=False)
-    choice = choose(str(path), examine(path), stream)
-    assert choice.colours.transfer == found.color_trc == 16
-    assert choice.colours.primaries == found.color_primaries == 9
-    assert "high dynamic range" in choice.why_pyav
+    why, colours = choose(str(path), examine(path), stream)
+    assert colours.transfer == found.color_trc == 16
+    assert colours.primaries == found.color_primaries == 9
+    assert "high dynamic range" in why
 
 
 @pytest.mark.parametrize(("transfer", "factor"), [(18, 1 / 0.26496), (16, 1 / 0.098338)])

@@ -7,8 +7,6 @@ without PyAV they are read with 8, and that is told.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from adv2e.errors import DataError
 from adv2e.sources.video.colours import HIGH_RANGE, Colours, encoding_of, is_stated
 from adv2e.sources.video.containers import Container
@@ -20,24 +18,10 @@ _COLOURS_TOGETHER, _MOST_TOGETHER = (b"RGB", b"BGR"), bytes([48])
 _MOST_BITS = bytes([32])
 
 
-@dataclass(frozen=True)
-class Choice:
-    """How a video is to be read.
-
-    Attributes
-    ----------
-    why_pyav : str
-        What it has that OpenCV cannot give; empty if it can.
-    colours : Colours
-        What it states of them.
-    """
-
-    why_pyav: str
-    colours: Colours
-
-
-def choose(path: str, container: Container, stream: Stream, pixels: bytes = b"") -> Choice:
-    """Choose by what a video's container and its coded pictures say.
+def choose(
+    path: str, container: Container, stream: Stream, pixels: bytes = b""
+) -> tuple[str, Colours]:
+    """Return what a video has that OpenCV cannot give, or "", and the colours that it states.
 
     Parameters
     ----------
@@ -63,7 +47,7 @@ def choose(path: str, container: Container, stream: Stream, pixels: bytes = b"")
     why = _beyond_opencv(container, stream, colours)
     if not why and not container.opaque and _has_alpha(pixels):
         why = "its pixels could be transparent"
-    return Choice(why, colours[-1])
+    return why, colours[-1]
 
 
 def bits_of(pixels: bytes) -> int:

@@ -149,10 +149,6 @@ class PyavCapture:
         """Code of ITU-T H.273 for the transfer of what was decoded."""
         return int(self._stream.codec_context.color_trc)
 
-    def set(self, name: int, value: float) -> bool:
-        """Change nothing, as there is nothing of OpenCV's that could be changed."""
-        return False
-
     def retrieve(self) -> tuple[bool, NDArray[Any]]:
         """Return the picture grabbed, as BGR or grey, of uint8 or uint16, turned upright."""
         try:

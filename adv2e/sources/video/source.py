@@ -17,7 +17,7 @@ import numpy as np
 
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.sources.base import Source
-from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.frame import Light, Pixels, Shot
 from adv2e.sources.images.opencv import quiet, rgb_of
 from adv2e.sources.times.gaps import gap_doubts
 from adv2e.sources.times.instants import Stamp, seconds
@@ -76,23 +76,19 @@ class VideoSource(Source):
         self._colours = Colours()
         self._packets = self._choose_decoder()
         with self._opened() as capture:
-            self._keep_grey(capture)
             if not any(capture.grab() for _ in range(RETRIES)):
                 raise DataError(f"{path}: no frame in it can be decoded")
             if not (self._pixels or self._why_pyav):  # one is of grey with alpha, of 16 bits
                 raise MissingExtraError(f"{path}: {_NO_TAG}; reading that", "video")
-            self._describe(_load(capture, f"{path}: frame 0"), f"{path}: frame 0")
-            self._first_ns = stamp_of(capture)
             if isinstance(capture, pyav.PyavCapture):
                 # of codecs whose own headers are not read here
                 self._colours = self._colours.completed(Colours(transfer=capture.transfer))
+            self._describe(_load(capture, f"{path}: frame 0"), f"{path}: frame 0", self._meaning())
         self._times = VideoTimes(self._container, self._packets, self._fps)
         if selection.start_s is None and selection.stop_s is None:
             self.count = self._times.expected
-        self._choose_encoding()
-        self._own_clock = not given
         self._given = self._given_times(given)
-        if self._own_clock:
+        if not given:
             self._tell_times()
 
     def _given_times(self, given: GivenTimes) -> Callable[[int], int] | None:
@@ -113,10 +109,9 @@ class VideoSource(Source):
         return None if given.rate is None else given.rate.time_ns
 
     def _check_listed(self, listed: int) -> None:
-        # pictures that cannot stand alone at the start are in the index and never shown
-        sure = self._times.exact and self._first_ns <= self._container.tick_ns
-        if sure and listed == self._times.expected:
+        if listed == self._times.expected:
             return
+        # pictures that cannot stand alone at the start are in the index and never shown
         with self._opened(self._decoders()) as capture:
             count = sum(1 for _ in self._grabbed(capture))
         if listed != count:
@@ -154,8 +149,7 @@ class VideoSource(Source):
             height = int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
         container = self._container
         stream, packets = read_packets(self.path, height, listed=bool(container.stamps_ns))
-        choice = choose(self.path, container, stream, self._pixels)
-        self._why_pyav, self._colours = choice.why_pyav, choice.colours
+        self._why_pyav, self._colours = choose(self.path, container, stream, self._pixels)
         if not self._pixels and not self._why_pyav and pyav.is_installed():
             self._why_pyav = _NO_TAG
         bits = bits_of(self._pixels)
@@ -171,17 +165,11 @@ class VideoSource(Source):
             self.packages = ("av",)
         return packets
 
-    def _keep_grey(self, capture: Capture) -> None:
-        # grey pictures come as stored; conversion would repeat them three times, in 8 bits
-        if not self._why_pyav and self._pixels in (_GREY_8, _GREY_16):
-            capture.set(cv2.CAP_PROP_CONVERT_RGB, 0)
-
-    def _choose_encoding(self) -> None:
+    def _meaning(self) -> Light:
         transfer = self._colours.transfer
-        encoding, self.encoding_reason = encoding_of(transfer)
         if self._pixels in (_GREY_16, _GREY_16[::-1]) and not is_stated(transfer):
-            encoding, self.encoding_reason = "linear", "16-bit grey video"
-        self.encoding = encoding
+            return Light("linear", "16-bit grey video")
+        return Light(*encoding_of(transfer))
 
     def _decoders(self) -> int:
         # each has frames of its own, and handing work over costs more than small frames are worth
@@ -203,6 +191,9 @@ class VideoSource(Source):
         try:
             if not capture.isOpened():
                 raise DataError(f"{self.path}: not a video that can be read, or damaged")
+            if self._pixels in (_GREY_8, _GREY_16):
+                # they come as stored; conversion would repeat them three times, in 8 bits
+                capture.set(cv2.CAP_PROP_CONVERT_RGB, 0)
             yield capture
         finally:
             capture.release()
@@ -218,7 +209,6 @@ class VideoSource(Source):
         clock, given = self._times.clock(in_order=not self._why_pyav), self._given
         stamps: list[int | None] = []
         with self._opened(self._decoders()) as capture:
-            self._keep_grey(capture)
             for number in self._grabbed(capture):
                 # of the frame just grabbed; before the first one it means nothing
                 stamp: int | None = stamp_of(capture)
@@ -231,14 +221,10 @@ class VideoSource(Source):
                 own = None if stamp is None else stamp - (stamps[0] or 0)
                 t_ns = given(number) if given is not None else clock(number, own)
                 if isinstance(capture, pyav.PyavCapture) and capture.has_fields:
-                    self._tell_fields()
+                    self._note(_FIELDS)
                 yield Shot(t_ns, label, partial(_load, capture, label))
             spoilt = capture.spoilt if isinstance(capture, pyav.PyavCapture) else 0
         self._check_end(stamps, spoilt)
-
-    def _tell_fields(self) -> None:
-        if _FIELDS not in self.notes:
-            self.notes.append(_FIELDS)
 
     def _grabbed(self, capture: Capture) -> Iterator[int]:
         """Grab frame after frame, past what cannot be decoded, and yield their numbers."""
@@ -268,10 +254,6 @@ class VideoSource(Source):
         if not self.selection.allow_damaged:
             raise DataError(f"{fault}; --allow-damaged takes those")
         self._note(fault)
-
-    def _note(self, text: str) -> None:
-        if text not in self.notes:  # frames may be read more than once
-            self.notes.append(text)
 
 
 def _load(capture: Capture, label: str) -> Pixels:

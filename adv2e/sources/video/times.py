@@ -53,8 +53,6 @@ class VideoTimes:
         When the pictures are shown as far as that is known, sorted [ns].
     expected : int or None
         How many pictures there are; None where nothing tells.
-    exact : bool
-        An index says so.
     rate : FrameRate or None
         The rate at which all pictures are, where there is one.
     doubts : list of str
@@ -80,7 +78,6 @@ class VideoTimes:
             if container.decoding_times or packets.unstamped:
                 self._grid = container.rate
                 self._find_rate(container, packets, fps)
-        self.exact = packets is None or container.pictures == counted
         self.expected = max(counted, container.pictures or 0) or None
         steps = [after - before for before, after in pairwise(self.shown_ns)]
         if self.rate is not None:
