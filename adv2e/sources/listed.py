@@ -34,16 +34,7 @@ class Timed:
 
 
 def given_shots(given: GivenTimes, pictures: Sequence[Picture], path: Path) -> Timed:
-    """Return the pictures at the times that the user gave.
-
-    Parameters
-    ----------
-    given : GivenTimes
-        A rate or a file.
-    pictures : sequence of Picture
-        Every picture, in order.
-    path : Path
-        Where they are, for messages.
+    """Return the pictures, which are all of `path` in order, at the times that the user gave.
 
     Raises
     ------
@@ -102,20 +93,7 @@ def _other_number(label: str, times: int, frames: int, path: Path) -> DataError:
 class ListedSource(Source):
     """A source whose frames and times are all known before the first is read.
 
-    Parameters
-    ----------
-    path : Path
-        What was opened.
-    kind : str
-        The kind of source.
-    timed : Timed
-        Every frame, in the order of time.
-    selection : Selection
-        Frames wanted.
-    has_clock : bool
-        Times are on a clock of the source's own.
-    light : Light, optional
-        What the numbers stand for, where the kind of source decides and not the image.
+    `light` is what the numbers stand for, where the kind of source decides and not the image.
 
     Raises
     ------

@@ -27,19 +27,10 @@ class Alpha(Enum):
 
 
 def with_alpha(colours: Image, alpha: NDArray[Any], kind: Alpha, most: float, label: str) -> Pixels:
-    """Return the pixels of an image with alpha.
+    """Return the pixels of an image with alpha of the data type of its grey or RGB colours.
 
-    Parameters
-    ----------
-    colours : (rows, columns[, 3]) array
-        Grey or RGB.
-    alpha : (rows, columns) array
-        Of the data type of the colours.
-    kind : Alpha
-    most : float
-        Alpha of pixels that are all there, and white of whole numbers.
-    label : str
-        Name of the file, for messages.
+    `most` is the alpha of pixels that are all there, and white of whole numbers; `label` is the
+    name of the file, for messages.
 
     Raises
     ------

@@ -28,14 +28,7 @@ def is_netpbm(data: bytes) -> bool:
 
 
 def decode(data: bytes, label: str) -> Pixels:
-    """Return the image in the bytes of a file.
-
-    Parameters
-    ----------
-    data : bytes
-        What the file holds.
-    label : str
-        Its name, for messages.
+    """Return the image in the bytes of a file; `label` is its name, for messages.
 
     Raises
     ------

@@ -104,12 +104,7 @@ def read_image(path: Path) -> Pixels:
 def decode_image(data: bytes, label: str) -> Pixels:
     """Return the image in the bytes of a file: upright, grey or RGB, data type as stored.
 
-    Parameters
-    ----------
-    data : bytes
-        What the file holds.
-    label : str
-        Name of the file, for messages; its suffix tells EXR from the rest.
+    `label` is its name, for messages; its suffix tells EXR from the rest.
 
     Raises
     ------
@@ -146,14 +141,9 @@ def decode_image(data: bytes, label: str) -> Pixels:
 
 
 def upright(image: Image, orientation: int) -> Image:
-    """Return an image as it is to be seen.
+    """Return an image as it is to be seen, from one as stored.
 
-    Parameters
-    ----------
-    image : (rows, columns, ...) array
-        As stored.
-    orientation : int
-        Where its first row and first column belong, as Exif counts it, 1 to 8.
+    `orientation` is where its first row and first column belong, as Exif counts it, 1 to 8.
     """
     if orientation >= 5:
         image = np.swapaxes(image, 0, 1)

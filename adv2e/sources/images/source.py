@@ -40,13 +40,8 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     """Return the frames of a folder of images.
 
     Times are those given, else those of the first list found: ``images.txt`` (``t name``, of the
-    Event-Camera Dataset), ``timestamps.txt`` (one time a line, of vid2e), ``info.txt``
-    (``path t_us``, of DVS-Voltmeter), in the folder or beside it.
-
-    Raises
-    ------
-    DataError
-        No images, no times, or images and times that do not fit each other.
+    Event-Camera Dataset), ``timestamps.txt`` (one time a line, of vid2e), ``info.txt`` (``path
+    t_us``, of DVS-Voltmeter), in the folder or beside it.
     """
     pictures = [
         Picture(str(f), str(f.absolute()), partial(read_image, f)) for f in image_files(path)

@@ -26,14 +26,8 @@ _NO_NUMBERS = 1000
 def gap_doubts(times_ns: Sequence[int], label: str) -> list[str]:
     """Return what is to be told of gaps between frames: one line, or none.
 
-    A gap is a step of over a second and three usual ones, or of thirty usual ones.
-
-    Parameters
-    ----------
-    times_ns : sequence of int
-        When the frames are, increasing [ns].
-    label : str
-        What they are the frames of.
+    A gap is a step of over a second and three usual ones, or of thirty usual ones.  `times_ns`
+    increase; `label` is what they are the frames of.
     """
     if len(times_ns) < 3:
         return []
@@ -55,15 +49,7 @@ def gap_doubts(times_ns: Sequence[int], label: str) -> list[str]:
 
 
 def numbering_doubt(paths: Sequence[str], rate: FrameRate) -> str:
-    """Return what is to be told of frames at a constant rate whose numbers have gaps, or "".
-
-    Parameters
-    ----------
-    paths : sequence of str
-        Of the frames, in order.
-    rate : FrameRate
-        The rate that was given.
-    """
+    """Return what is to be told of frames at a rate given whose numbers have gaps, or ""."""
     names = [PurePath(path).name for path in paths]
     for before, after in pairwise(names):
         if before != after and PurePath(before).stem == PurePath(after).stem:

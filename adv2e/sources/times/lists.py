@@ -97,21 +97,19 @@ def parse_list(
 
     Parameters
     ----------
-    text : str
-        The list.
-    label : str
-        Name of the file, for messages.
+    text, label : str
+        The list, and the name of its file, for messages.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
-        What the user says.
+        What the user says of the unit.
     stated, own_step_s
-        What else tells of the unit; see :func:`adv2e.sources.times.units.frame_unit`.
+        What else tells of it; see :func:`adv2e.sources.times.units.frame_unit`.
 
     Raises
     ------
     DataError
         Columns whose meaning is open, a line that is unlike the others or whose time cannot be
-        read, a time that occurs twice, times that do not increase, or an empty list;
-        with the line's number.
+        read, a time that occurs twice, times that do not increase, or an empty list; the text names
+        the line.
     """
     table = table_of(text, label)
     fields = [line.fields[table.time] for line in table.lines]

@@ -18,12 +18,8 @@ from adv2e.sources.times.instants import Stamp
 def member_of(name: str, has: Callable[[str], bool]) -> str | None:
     """Return the file of a folder or zip that a name means, whole or by its end; None: none.
 
-    Parameters
-    ----------
-    name : str
-        Path as a list has it, from any system.
-    has : callable
-        Tells whether there is such a file, from its path below the folder.
+    `name` is a path as a list has it, from any system; `has` tells whether there is such a file,
+    from its path below the folder.
     """
     parts: list[str] = []
     for part in _parts(name):
@@ -50,22 +46,16 @@ def members_of(
     folder: Path | None = None,
     anywhere: bool = False,
 ) -> list[str]:
-    """Return the file that each line of a list means.
+    """Return the file that each line of the list `label` means.
 
     Parameters
     ----------
-    stamps : sequence of Stamp
-        All of them must have names.
-    label : str
-        Name of the list, for messages.
-    has : callable
-        See :func:`member_of`.
+    stamps, label, has
+        Lines that must have names, the list, and what :func:`member_of` asks.
     where : str
         What follows "no image NAME" in messages.
     folder : Path, optional
-        That of the list, which names may lead out of.
-    anywhere : bool
-        Those that do are taken.
+        That of the list, which names may lead out of; `anywhere`: those that do are taken.
 
     Raises
     ------
@@ -98,12 +88,7 @@ def members_of(
 def match(stamps: Sequence[Stamp], paths: Sequence[str], label: str, where: str) -> list[int]:
     """Return the number of the picture that each line means, of pictures at the paths given.
 
-    Parameters
-    ----------
-    stamps, label, where
-        As :func:`members_of`.
-    paths : sequence of str
-        Of the pictures; their last parts are enough where no two are the same.
+    The last parts of the paths are enough where no two are the same.  See :func:`members_of`.
     """
     lasts = [path.rpartition("/")[2] for path in paths]
     unlike = len(set(lasts)) == len(lasts)

@@ -65,18 +65,10 @@ def constant_rate(
 ) -> FrameRate | None:
     """Return the constant frame rate that stamps rounded to a coarse clock stand for, or None.
 
-    The rates tried are the whole numbers and the whole numbers over 1.001 (24000/1001,
-    30000/1001, ...) within 0.2 % of the stated or the mean rate, nearest first, then the stated
-    rate itself.
-
-    Parameters
-    ----------
-    stamps_ns : sequence of int
-        Times of all frames, increasing [ns].
-    stated_hz : float
-        Rate that the container states; 0 if it does not.
-    tolerance_ns : int
-        How far a stamp may lie from its place at the constant rate: one tick of the clock [ns].
+    The rates tried are the whole numbers and the whole numbers over 1.001 (24000/1001, 30000/1001,
+    ...) within 0.2 % of the stated or the mean rate, nearest first, then the stated rate itself, 0
+    if the container states none.  `tolerance_ns` is how far a stamp may lie from its place: one
+    tick of the clock.
     """
     if len(stamps_ns) < 2:
         return None

@@ -23,14 +23,7 @@ def choose(
 ) -> tuple[str, Colours]:
     """Return what a video has that OpenCV cannot give, or "", and the colours that it states.
 
-    Parameters
-    ----------
-    path : str
-        The video, for messages.
-    container : Container
-    stream : Stream
-    pixels : bytes
-        FFmpeg's tag of the kind of pixels.
+    `pixels` is FFmpeg's tag of the kind of pixels.
 
     Raises
     ------

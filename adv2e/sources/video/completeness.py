@@ -18,17 +18,9 @@ def lost_by_time(
 ) -> list[int]:
     """Return those of the expected times at which no picture came, from the first that came on.
 
-    Parameters
-    ----------
-    expected_ns : sequence of int
-        When pictures are shown, sorted [ns].
-    stamps_ns : sequence of int
-        When those that came are shown, from zero where FFmpeg begins to count: at the first
-        expected one, or the first that came [ns].
-    tick_ns : int
-        How far the two may differ [ns].
-    leading : int
-        How many are shown before the first in the file, which FFmpeg may begin to count at.
+    `expected_ns` are when pictures are shown, sorted, `leading` of them before the first in the
+    file; `stamps_ns` when those that came are, from zero where FFmpeg begins to count: at the first
+    expected one, the first in the file, or the first that came.  The two may differ by `tick_ns`.
     """
     if not expected_ns:
         return []
@@ -69,16 +61,10 @@ def _are_second_fields(lost: Sequence[int], came: Sequence[int]) -> bool:
 
 
 def lost_by_count(expected: int, stamps_ns: Sequence[int | None], known_ns: Sequence[int]) -> int:
-    """Return how many pictures are missing where times are those of decoding.
+    """Return how many of the expected pictures are missing where times are those of decoding.
 
-    Parameters
-    ----------
-    expected : int
-        How many pictures there are.
-    stamps_ns : sequence of int or None
-        Stamps of those that came [ns]; FFmpeg has none for those that it held back to the end.
-    known_ns : sequence of int
-        Stamps of all, as far as known, sorted [ns].
+    FFmpeg has no stamps for those that it held back to the end; `known_ns` are those of all, as far
+    as known, sorted.
     """
     missing = expected - len(stamps_ns)
     if missing <= 0:

@@ -105,14 +105,8 @@ _HALF_WRAP_NS = 2**32 * 10**9 // 90_000
 def read_packets(path: str, height: int, *, listed: bool) -> tuple[Stream, Packets | None]:
     """Return what the coded pictures of a video say, and when they are shown.
 
-    Parameters
-    ----------
-    path : str
-        The video; nothing is in it if it cannot be opened.
-    height : int
-        Rows that its container states.
-    listed : bool
-        The container lists the times of its pictures: no more of them are read than say something.
+    Nothing is in one that cannot be opened.  `height` are the rows that its container states;
+    `listed`: it lists the times of its pictures, and no more of them are read than say something.
     """
     findings, clear = Findings(), True
     stamps: list[int] = []

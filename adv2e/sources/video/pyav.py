@@ -77,13 +77,6 @@ class PyavCapture:
         Pictures grabbed in which the decoder met errors, and guessed.
     has_fields : bool
         A picture grabbed so far is two fields.
-
-    Raises
-    ------
-    MissingExtraError
-        PyAV is not installed.
-    DataError
-        It is no video that can be read.
     """
 
     def __init__(self, path: str, why: str, threads: int = 1, matrix: int = UNSTATED) -> None:
@@ -162,18 +155,8 @@ class PyavCapture:
 def codes_of(frame: Any, matrix: int = UNSTATED) -> NDArray[Any]:
     """Return the codes of a frame of PyAV as (rows, columns, 3) BGR, or (rows, columns).
 
-    Where pixels can be transparent, how much of each is there is a fourth number.
-
-    Parameters
-    ----------
-    frame : av.VideoFrame
-    matrix : int
-        Of frames that do not state theirs.
-
-    Returns
-    -------
-    array of uint8 or uint16
-        White is 255 or 65535.
+    White is 255 or 65535.  Where pixels can be transparent, how much of each is there is a fourth
+    number.  `matrix` is that of frames that do not state theirs.
 
     Raises
     ------

@@ -50,22 +50,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> VideoSou
 
 
 class VideoSource(Source):
-    """A video file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    given : GivenTimes
-        Times in place of the file's own.
-    selection : Selection
-        Frames wanted.
-
-    Raises
-    ------
-    DataError
-        If the file is cut short, is no video, or holds no frame.
-    """
+    """A video file; DataError if it is cut short, is no video, or holds no frame."""
 
     def __init__(self, path: Path, given: GivenTimes, selection: Selection) -> None:
         super().__init__(path, "video", selection, has_clock=given.timestamps is not None)

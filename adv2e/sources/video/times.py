@@ -129,11 +129,8 @@ class VideoTimes:
     def clock(self, *, in_order: bool = True) -> Clock:
         """Return a clock for one pass over the frames.
 
-        Parameters
-        ----------
-        in_order : bool
-            Where times are those of decoding, stamps are brought into the order of showing, as
-            OpenCV does.
+        `in_order`: stamps that are those of decoding are brought into the order of showing, as
+        OpenCV does.
         """
         previous = -self._usual_ns
         packets = self._packets

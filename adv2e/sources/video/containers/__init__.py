@@ -34,11 +34,7 @@ _MPEG_VIDEO = b"\x00\x00\x01\xb3"
 def examine(path: Path, *, allow_damaged: bool = False) -> Container:
     """Return what the headers of a video file say; families other than these say nothing.
 
-    Parameters
-    ----------
-    path : Path
-    allow_damaged : bool
-        Damage becomes one of the faults of what is returned.
+    `allow_damaged`: damage becomes one of the faults of what is returned.
 
     Raises
     ------

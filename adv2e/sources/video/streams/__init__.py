@@ -41,12 +41,8 @@ _WITHOUT_FIELDS = (
 def parser_of(name: str, height: int) -> tuple[str, bool, Parser | None]:
     """Return a codec's name, whether it is known how it says that pictures are fields, and by what.
 
-    Parameters
-    ----------
-    name : str
-        The letters by which FFmpeg knows it, in lower case; none for pictures not coded.
-    height : int
-        Rows that the container states.
+    `name` are the letters by which FFmpeg knows it, in lower case, none for pictures not coded;
+    `height` are the rows that the container states.
     """
     if not name:
         return RAW, True, None

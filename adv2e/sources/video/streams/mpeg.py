@@ -114,13 +114,7 @@ _BASELINE, _PROGRESSIVE, _SCAN = 0xC0, 0xC2, 0xDA
 
 
 class MotionJpeg(Parser):
-    """Parser of Motion JPEG.
-
-    Parameters
-    ----------
-    height : int
-        Rows that the container states; a picture of fewer is a field.
-    """
+    """Parser of Motion JPEG: a picture of fewer rows than the container states is a field."""
 
     def __init__(self, height: int) -> None:
         self._height = height
