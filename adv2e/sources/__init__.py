@@ -16,7 +16,7 @@ __all__ = ["Frame", "Source", "open_source"]
 
 VIDEO_SUFFIXES = (
     *(".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts"),
-    *(".wmv", ".flv", ".3gp", ".ogv", ".gif", ".y4m", ".mxf"),
+    *(".wmv", ".flv", ".3gp", ".ogv", ".gif", ".y4m"),
 )
 """Files that are opened as video."""
 

@@ -21,7 +21,7 @@ from adv2e.sources.frame import RECORDED, Light, Pixels, Shot
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.listed import ListedSource, Picture, given_shots, told
 from adv2e.sources.stored import DESCRIPTION, read_light
-from adv2e.sources.times.lists import FrameList, decoded, first_name, parse_list
+from adv2e.sources.times.lists import decoded, first_name, parse_list
 from adv2e.sources.times.names import member_of, members_of
 from adv2e.sources.wanted import GivenTimes, Selection
 
@@ -69,34 +69,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         folder=path if is_folder else None,
         anywhere=given.images_anywhere,
     )
-    pictures = [
-        Picture(
-            files.label(member),
-            str((path / member).absolute()) if is_folder else member,
-            partial(_read_image, files, member),
-        )
-        for member in members
-    ]
-    light = None
-    if files.has(DESCRIPTION):
-        light = read_light(files.read(DESCRIPTION), files.label(DESCRIPTION))
-    return _source(path, label, found, pictures, given, selection, light)
-
-
-def _read_image(files: Members, member: str) -> Pixels:
-    return decode_image(files.read(member), files.label(member))
-
-
-def _source(
-    path: Path,
-    label: str,
-    found: FrameList,
-    pictures: list[Picture],
-    given: GivenTimes,
-    selection: Selection,
-    stored: Light | None,
-) -> ListedSource:
-    light = stored or Light("linear", RECORDED)
+    pictures = [Picture(files.label(m), m, partial(_read_image, files, m)) for m in members]
     if given:
         timed = given_shots(given, pictures, path)
         timed.notes.append(f"{given} replaces the times in {label}")
@@ -104,6 +77,18 @@ def _source(
         pairs = zip(found.stamps, pictures, strict=True)
         shots = [Shot(stamp.t_ns, picture.label, picture.load) for stamp, picture in pairs]
         timed = told(found, label, shots)
+    light = None
+    if files.has(DESCRIPTION):
+        light = read_light(files.read(DESCRIPTION), files.label(DESCRIPTION))
     return ListedSource(
-        path, "davis240c", timed, selection, has_clock=given.fps is None, light=light
+        path,
+        "davis240c",
+        timed,
+        selection,
+        has_clock=given.fps is None,
+        light=light or Light("linear", RECORDED),
     )
+
+
+def _read_image(files: Members, member: str) -> Pixels:
+    return decode_image(files.read(member), files.label(member))

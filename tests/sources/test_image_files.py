@@ -263,16 +263,6 @@ def test_a_tiff_says_its_white_and_whether_it_is_zero(order, big):
     assert decode_image(made.tiff(rows, tags=[(281, made.SHORT, [300])]), "a").white is None
 
 
-def test_bits_that_a_png_states():
-    dark, right = np.array([[0, 16 * 7]]), np.array([[3, 4001]])
-    for rows, white in ((dark, None), (right, 4095), (right * 16, None)):
-        data = made.png(rows, 0, depth=16, chunks=[(b"sBIT", bytes([12]))])
-        assert (decode_image(data, "a").white, decode_image(data, "a").image.max()) == (
-            white,
-            rows.max(),
-        )
-
-
 @pytest.fixture
 def folder(tmp_path):
     def write(*files):

@@ -6,7 +6,6 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources.times.lists import parse_list, read_list
-from adv2e.sources.times.units import UNITS, Unit
 
 
 def read(text, **evidence):
@@ -166,23 +165,6 @@ def test_epoch_times_keep_every_digit():
         1_468_941_032_229_165_635,
         1_468_941_032_229_165_636,
     ]
-
-
-@pytest.mark.parametrize(
-    ("comment", "unit"),
-    [
-        ("# times in ms", "ms"),
-        ("# unit: us", "us"),
-        ("# Timestamps are nanoseconds", "ns"),
-        ("# exposure time in ms", "s"),
-        ("# taken at a time of 5 ms", "s"),
-        ("# it's about time", "s"),
-    ],
-)
-def test_a_comment_may_state_the_unit(comment, unit):
-    times = [10**8 * n / UNITS[unit] for n in (1, 2)]
-    found = read(f"{comment}\n{times[0]}\n{times[1]}\n")
-    assert (times_s(found), found.unit) == ([0.1, 0.2], Unit(unit))
 
 
 def test_endless_numbers_take_no_time_and_are_shown_in_part():

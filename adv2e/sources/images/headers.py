@@ -45,8 +45,6 @@ class Header:
         OpenCV repeats grey three times.
     clear : int, optional
         Grey value of pixels that are not there, in the bits that OpenCV returns.
-    bits : int, optional
-        How many bits of each number the camera gave.
     """
 
     width: int = 0
@@ -55,7 +53,6 @@ class Header:
     alpha: Alpha = Alpha.STRAIGHT
     grey: bool = False
     clear: int | None = None
-    bits: int | None = None
 
 
 def read_header(data: bytes) -> Header:
@@ -86,17 +83,14 @@ def check_size(width: int, height: int, data: bytes, label: str) -> None:
 
 def _png(data: bytes) -> Header:
     width, height, depth, colours = struct.unpack_from(">IIBB", data, 16)
-    pictures, clear, bits = 1, None, None
+    pictures, clear = 1, None
     for kind, content in _png_chunks(data):
         if kind == b"acTL":
             (pictures,) = struct.unpack_from(">I", content)
         elif kind == b"tRNS" and colours == _GREY:
             (clear,) = struct.unpack_from(">H", content)
             clear *= 255 // ((1 << depth) - 1) if depth < 8 else 1
-        elif kind == b"sBIT" and depth == 16:
-            bits = max(content[:1] if colours in (_GREY, _GREY_ALPHA) else content[:3])
-    grey = colours == _GREY_ALPHA
-    return Header(width, height, max(pictures, 1), grey=grey, clear=clear, bits=bits)
+    return Header(width, height, max(pictures, 1), grey=colours == _GREY_ALPHA, clear=clear)
 
 
 def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:

@@ -133,11 +133,9 @@ def decode_image(data: bytes, label: str) -> Pixels:
     elif header.clear is not None:
         there = np.iinfo(colours.dtype).max
         alpha = np.where(colours == header.clear, 0, there).astype(colours.dtype)
-    white = _white_of_bits(colours, header.bits)
     if alpha is None:
-        return Pixels(colours, white=white)
-    most = white or full_scale_of(colours.dtype)
-    return replace(with_alpha(colours, alpha, header.alpha, most, label), white=white)
+        return Pixels(colours)
+    return with_alpha(colours, alpha, header.alpha, full_scale_of(colours.dtype), label)
 
 
 def upright(image: Image, orientation: int) -> Image:
@@ -208,17 +206,6 @@ def _unreadable(label: str) -> DataError:
 
 def _fourth(image: Any) -> Any:
     return image[..., 3] if image.ndim == 3 and image.shape[2] == 4 else None
-
-
-def _white_of_bits(image: Image, bits: int | None) -> float | None:
-    """Return the white of numbers of fewer bits that lie at the lower end of 16, if they do.
-
-    A PNG that states its bits is to have them at the upper end, with zeros below in what is dark;
-    many a camera's software leaves them where they were.
-    """
-    if bits is None or not 0 < bits < 16 or image.max() >> bits:
-        return None
-    return float((1 << bits) - 1) if np.any(image & ((1 << (16 - bits)) - 1)) else None
 
 
 def _is_whole(data: bytes) -> bool:

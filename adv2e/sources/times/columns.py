@@ -39,10 +39,6 @@ _UNITS = {
     **dict.fromkeys(("us", "usec", "µs", "μs", "micros", "microsecond", "microseconds"), "us"),
     **dict.fromkeys(("ns", "nsec", "nanos", "nanosecond", "nanoseconds"), "ns"),
 }
-_SENTENCE = re.compile(
-    r"\b(?:time ?stamps?|times?|units?)\b[^\d]*?(?:\bin|\bare|[:=\[(])\s*([a-zµμ]+)\b"
-)
-"""What a comment says of the unit: 'times in ms', 'unit: us'."""
 _WORDS = re.compile(r"\"[^\"]*\"(?=\s|$)|'[^']*'(?=\s|$)|\S+")
 
 
@@ -66,7 +62,7 @@ class Table:
     time, name : int
         Columns of the times and, if there is one, of the names.
     unit : str or None
-        The unit of the times that heading or comments state.
+        The unit of the times that the heading states.
     """
 
     lines: list[Line]
@@ -122,7 +118,7 @@ def table_of(text: str, label: str) -> Table:
     if len(named) > 1:
         raise _open(lines[0], named, "name of the image", label)
     unit = _unit_of_heading(headings[time]) if headings else None
-    return Table(lines, time, named[0] if named else None, unit or _unit_in(comments))
+    return Table(lines, time, named[0] if named else None, unit)
 
 
 def has_lines(text: str) -> bool:
@@ -233,13 +229,6 @@ def _role(word: str) -> str:
 def _unit_of_heading(word: str) -> str | None:
     parts = re.split(r"[^\wµμ]|_", word.lower())
     return next((_UNITS[part] for part in parts if part in _UNITS), None)
-
-
-def _unit_in(comments: list[str]) -> str | None:
-    """Return the unit that a comment states, where none states another."""
-    about = (_SENTENCE.search(text.lower()) for text in comments if "exposure" not in text.lower())
-    named = {_UNITS[match[1]] for match in about if match and match[1] in _UNITS}
-    return named.pop() if len(named) == 1 else None
 
 
 def _open(line: Line, columns: list[int], what: str, label: str) -> DataError:

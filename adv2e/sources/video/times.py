@@ -1,7 +1,7 @@
 """When the pictures of a video are shown.
 
 Containers differ in what they say.  MP4, Matroska, MPEG-TS and others state when each picture is
-shown.  AVI knows nothing but a rate, and when pictures are decoded; ASF and MXF state times of
+shown.  AVI knows nothing but a rate, and when pictures are decoded; ASF states times of
 decoding; MPEG-PS states a time for some pictures.  FFmpeg passes on what there is, and has nothing
 for the last pictures of those, as they leave the decoder after its last packet.
 """

@@ -23,7 +23,6 @@ _FAMILIES: dict[bytes, Callable[[mmap.mmap, Container], None]] = {
     parts.FLV: parts.flv,
     parts.GIF: parts.gif,
     parts.MPEG_PS: parts.mpeg_ps,
-    parts.MXF: parts.mxf,
     parts.OGG: parts.ogg,
     parts.ASF: parts.asf,
 }

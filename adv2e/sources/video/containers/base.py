@@ -39,7 +39,7 @@ class Container:
     opaque : bool
         No pixel is transparent, whatever kind they are of (GIF).
     readable : bool
-        False where it may state colours that are not read here (MXF, or damaged).
+        False where it may state colours that are not read here (damaged).
     faults : list of str
         What is wrong with the structure, with where.
     doubts : list of str

@@ -1,13 +1,12 @@
-"""Files that are one part after another, without an index: FLV, GIF, MPEG-PS, MXF, Ogg and ASF.
+"""Files that are one part after another, without an index: FLV, GIF, MPEG-PS, Ogg and ASF.
 
 References
 ----------
 .. [1] Adobe, "Flash Video File Format Specification", version 10.1, annex E.
 .. [2] CompuServe, "Graphics Interchange Format, Version 89a": 20 (image), 23 (graphic control).
 .. [3] ISO/IEC 13818-1, 2.5.3 (program stream) and 2.4.3.6 (PES packet); ISO/IEC 11172-1.
-.. [4] SMPTE ST 377-1, "Material Exchange Format (MXF)": 6.3 (KLV coding), 7.1 (partition pack).
-.. [5] RFC 3533, "The Ogg Encapsulation Format Version 0", section 6.
-.. [6] Microsoft, "Advanced Systems Format (ASF) Specification", 01.20.06: 3.2, 5.1, 5.2.
+.. [4] RFC 3533, "The Ogg Encapsulation Format Version 0", section 6.
+.. [5] Microsoft, "Advanced Systems Format (ASF) Specification", 01.20.06: 3.2, 5.1, 5.2.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ from collections.abc import Callable, Iterator
 from adv2e.sources.video.containers.base import Container, DamagedError, cut_short
 
 FLV, GIF, OGG, MPEG_PS = b"FLV", b"GIF8", b"OggS", b"\x00\x00\x01\xba"
-MXF = bytes.fromhex("060e2b34")
 ASF = bytes.fromhex("3026b2758e66cf11a6d900aa0062ce6c")
 """How such files begin."""
 
@@ -134,31 +132,6 @@ def _packet(data: mmap.mmap, place: int) -> int:
     if code < least:
         return 0
     return stuffed + 6 + int.from_bytes(data[place + 4 : place + 6], "big")
-
-
-def mxf(data: mmap.mmap, found: Container) -> None:
-    """Note that times are those of decoding; DamagedError if the parts do not fit each other."""
-    found.decoding_times, found.tick_ns, found.readable = True, 1000, False
-    partition = MXF + bytes.fromhex("020501010d01020101")
-    header_body_footer = 2, 3, 4
-    for place, end in _parts(data, 0, _value):
-        if data[place : place + 13] == partition and data[place + 13] in header_body_footer:
-            (footer,) = struct.unpack_from(">Q", data, end - _value_bytes(data, place)[0] + 24)
-            if footer >= len(data):
-                raise cut_short(footer + 1, len(data))
-
-
-def _value(data: mmap.mmap, place: int) -> int:
-    return 16 + sum(_value_bytes(data, place)) if data[place : place + 4] == MXF else 0
-
-
-def _value_bytes(data: mmap.mmap, place: int) -> tuple[int, int]:
-    """Return the bytes of the value, and those of the number that says so."""
-    first = data[place + 16]
-    if first < 0x80:
-        return first, 1
-    digits = first & 0x7F
-    return int.from_bytes(data[place + 17 : place + 17 + digits], "big"), 1 + digits
 
 
 def ogg(data: mmap.mmap, found: Container) -> None:
