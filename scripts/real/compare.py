@@ -24,9 +24,9 @@ from writing import one_line_errors, output_option, threads_option, write_report
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config, load_config
 from adv2e.config.model import INTERPOLATIONS
-from adv2e.diagnosis.fitting.nuisances import TOLERANCE, match_totals, totals, with_thresholds
+from adv2e.diagnosis.fitting.nuisances import TOLERANCE, match_totals, with_thresholds
 from adv2e.sources.times.instants import seconds
-from real.model import Bench, Judged
+from real.model import Bench, Judged, totals
 from real.recording import halves, read
 from real.table import definitions, markdown, marks, preamble
 

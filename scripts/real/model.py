@@ -15,7 +15,7 @@ from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.fitting.nuisances import match_totals, totals, with_thresholds
+from adv2e.diagnosis.fitting.nuisances import match_totals, with_thresholds
 from adv2e.diagnosis.hints.readouts import Pulse, has_pulse, pulse_of
 from adv2e.diagnosis.simulation.frames import FrameCache, Instants, events_of, is_made_once
 from adv2e.events import Events
@@ -33,6 +33,12 @@ COARSE = Coarseness(solved=4.0)
 """Steps of time where the pixels are solved in steps: the scores see hundreds of microseconds."""
 BEYOND_US = 100_000
 """Frames are simulated to this long after the windows, as a clock offset may need them [us]."""
+
+
+def totals(events: Events) -> tuple[int, int]:
+    """Return the counts of ON and OFF events."""
+    on = int(np.count_nonzero(events["p"]))
+    return on, len(events) - on
 
 
 @dataclass(frozen=True)

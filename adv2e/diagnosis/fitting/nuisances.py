@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis.fitting.candidates import FitParameter
 from adv2e.effects.pixel.thresholds import FLOOR
-from adv2e.events import Events
 
 TOLERANCE = 0.01
 """Totals match to this, relative."""
@@ -30,12 +29,6 @@ THRESHOLDS = tuple(
     FitParameter(f"pixel.thresholds.{name}", FLOOR, LARGEST) for name in ("on", "off")
 )
 """Keys that :func:`fit_thresholds` fits, and a search then refines with what it finds."""
-
-
-def totals(events: Events) -> tuple[int, int]:
-    """Return the counts of ON and OFF events."""
-    on = int(np.count_nonzero(events["p"]))
-    return on, len(events) - on
 
 
 def with_thresholds(config: Config, on: float, off: float) -> Config:

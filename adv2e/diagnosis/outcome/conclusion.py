@@ -10,7 +10,7 @@ from adv2e.diagnosis.configurations import without_coupling
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import Placed
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.outcome.error import Distances, error_rows, of_interpolation
+from adv2e.diagnosis.outcome.error import Errors, error_rows, of_interpolation
 from adv2e.diagnosis.outcome.picture import curves_of, maps_of
 from adv2e.diagnosis.outcome.verdict import verdict_of
 from adv2e.diagnosis.prepare import Prepared
@@ -52,8 +52,8 @@ def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion
 
     measured = test(prepared.evidence.stream)
 
-    def distances(streams: list[Stream]) -> Distances:
-        return Distances.of(measured, list(map(test, streams)))
+    def distances(streams: list[Stream]) -> Errors:
+        return Errors.of(measured, list(map(test, streams)))
 
     kept, declared = outcome.state, search.declared
     before = after = drawn(declared.config)

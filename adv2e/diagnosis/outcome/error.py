@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Distances:
+class Errors:
     """Of the simulations of one model, as parts of the norm of what was measured.
 
     To that, (simulations, scales), and between independent ones, (pairs, scales).
@@ -32,7 +32,7 @@ class Distances:
     between: Array
 
     @classmethod
-    def of(cls, measured: Stream, simulations: Sequence[Stream]) -> Distances:
+    def of(cls, measured: Stream, simulations: Sequence[Stream]) -> Errors:
         """Return those of simulations; not a number if nothing was measured."""
         unit = _norm(measured)
         return cls(
@@ -46,7 +46,7 @@ class Distances:
         return 0.5 * _mean_square(self.between)
 
 
-def error_rows(before: Distances, after: Distances) -> list[ErrorRow]:
+def error_rows(before: Errors, after: Errors) -> list[ErrorRow]:
     """Return the error over all scales, at each scale, and of the mean of simulations.
 
     Random events cost, wherever they come: a model that makes them as the camera does is farther

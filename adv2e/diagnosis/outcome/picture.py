@@ -60,12 +60,7 @@ def curves_of(
 ) -> list[Curve]:
     """Return curves by time, by what the light does, by place, by load.
 
-    Parameters
-    ----------
-    scene : Scene
-    measured : Placed
-    before, after : sequence of Placed
-        Simulations of the declared model and of the model found.
+    `before` and `after` are simulations of the declared model and of the model found.
     """
     drawn = []
     for kind in (*_between_events(), *_by_place(scene), *_by_time(scene, before)):
@@ -224,14 +219,8 @@ def _stamps(same: bool) -> Measure:
 def _rates(scene: Scene, kind: NDArray[Any], classes: int, on: int | None = None) -> Measure:
     """Return rates of classes of places [events a pixel a second], NaN for those none is in.
 
-    Parameters
-    ----------
-    scene : Scene
-    kind : (frame intervals, pixels)
-        Class of each pixel in each frame interval, or nowhere; may be broadcast.
-    classes : int
-    on : int, optional
-        Polarity; default: both.
+    `kind`: of each pixel in each frame interval, (frame intervals, pixels), or nowhere; `on`: of
+    one polarity alone.
     """
     kind = np.broadcast_to(kind, scene.slope.shape)
     weight = np.broadcast_to(scene.seconds[:, None], kind.shape)

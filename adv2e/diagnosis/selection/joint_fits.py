@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data import splits
-from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted, parted
 from adv2e.diagnosis.hints.readouts import EXPOSURE
 from adv2e.diagnosis.selection.acceptance import BORDER, BY_CHANCE, objections, ranked
 from adv2e.diagnosis.selection.reference import Reference, State
-from adv2e.diagnosis.selection.shortlist import Trial, shortlisted
+from adv2e.diagnosis.selection.shortlist import Trial
 from adv2e.diagnosis.statistics.summary import BOTH
 
 Array = NDArray[np.float64]
@@ -72,97 +71,74 @@ def _exposed_as(trial: Trial, fit: Fitted) -> Fitted:
     )
 
 
-@dataclass(frozen=True)
-class JointFits:
-    """Tries effects on top of models."""
+def with_one_more(
+    reference: Reference, state: State, trials: Sequence[Trial], grounds: Sequence[State]
+) -> list[JointFit]:
+    """Return models with one effect more, judged against all `grounds`.
 
-    reference: Reference
-    candidates: list[Candidate]
+    Before its fit has ended, an effect may be behind another for that alone: all that are close
+    are tried.  Others are, one after another, where none of these holds.
+    """
+    made: list[JointFit] = []
+    for trial in trials[:_TRIED]:
+        close = trial.score > trials[0].score - CATCHES_UP
+        if not close and any(not one.objections for one in made):
+            break
+        made.append(with_more(reference, state, [trial], grounds))
+    return made
 
-    def trials(self, state: State, besides: Sequence[str] = ()) -> list[Trial]:
-        """Return the best form of each of the best effects on top of a model, the best first.
 
-        Those named `besides` are not tried, nor those that it has.
-        """
-        best: dict[str, Trial] = {}
-        competing = [one for one in self.candidates if one.name not in besides]
-        for trial in shortlisted(self.reference, state, competing):
-            best.setdefault(trial.name, trial)
-        return list(best.values())
+def with_more(
+    reference: Reference, state: State, added: Sequence[Trial], grounds: Sequence[State]
+) -> JointFit:
+    """Return the model with effects more, fitted to its end and judged against all `grounds`."""
+    before = state.fits
+    for trial in added:
+        before = tuple(_exposed_as(trial, fit) for fit in before)
+    together = (*before, *(trial.fit for trial in added))
+    joint = reference.fitted(together, added[0].ensembles[splits.TRAIN].sd, splits.TRAIN)
+    grown = State(joint.config, parted(joint, together), reference.tried(joint.config))
+    each = (objections(joint, grown, ground, reference) for ground in grounds)
+    against = next(filter(None, each), [])
+    new = grown.beyond(state)
+    told = [
+        f"{fit.candidate.name} {fit.candidate.settings_in(joint.config, fit.point)}" for fit in new
+    ]
+    reference.log(f"  {' and '.join(told)}: {'; '.join(against) or 'holds'}")
+    if against and len(new) == 1:  # of two, nobody knows which it is
+        reference.rejections.add(new[0], "; ".join(against), final=True)
+    return JointFit(grown, against, reference.likelihood(grown, splits.VALIDATION))
 
-    def of_one(
-        self, state: State, trials: Sequence[Trial], grounds: Sequence[State]
-    ) -> list[JointFit]:
-        """Return models with one effect more, judged against all `grounds`.
 
-        Before its fit has ended, an effect may be behind another for that alone: all that are close
-        are tried.  Others are, one after another, where none of these holds.
-        """
-        made: list[JointFit] = []
-        for trial in trials[:_TRIED]:
-            close = trial.score > trials[0].score - CATCHES_UP
-            if not close and any(not one.objections for one in made):
-                break
-            made.append(self.of(state, [trial], grounds))
-        return made
+def best_of(reference: Reference, made: Sequence[JointFit], state: State) -> State | None:
+    """Return the best of the models that hold, fitted to all data but those looked at once.
 
-    def of(self, state: State, added: Sequence[Trial], grounds: Sequence[State]) -> JointFit:
-        """Return the model with effects more, fitted to its end and judged."""
-        reference = self.reference
-        before = state.fits
-        for trial in added:
-            before = tuple(_exposed_as(trial, fit) for fit in before)
-        together = (*before, *(trial.fit for trial in added))
-        joint = reference.fitted(together, added[0].ensembles[splits.TRAIN].sd, splits.TRAIN)
-        fits = parted(joint, together)
-        grown = State(joint.config, fits, reference.tried(joint.config))
-        against: list[str] = []
-        for ground in grounds:
-            against = objections(joint, grown, ground, reference)
-            if against:
-                break
-        new = grown.beyond(state)
-        told = [
-            f"{fit.candidate.name} {fit.candidate.settings_in(joint.config, fit.point)}"
-            for fit in new
-        ]
-        reference.log(f"  {' and '.join(told)}: {'; '.join(against) or 'holds'}")
-        if against and len(new) == 1:  # of two, nobody knows which it is
-            reference.rejections.add(new[0], "; ".join(against), final=True)
-        return JointFit(grown, against, reference.likelihood(grown, splits.VALIDATION))
-
-    def best(self, made: Sequence[JointFit], state: State) -> State | None:
-        """Return the best of the models that hold, fitted to all data but those looked at once.
-
-        Effects of others that do as well are noted as alternatives.
-        """
-        reference = self.reference
-        holding = [
-            reference.settled(one.state.fits, one.state.ensembles[BOTH].sd)
-            for one in made
-            if not one.objections
-        ]
-        if not holding:
-            return None
-        counts = [count_parameters(one.beyond(state)) for one in holding]
-        ranking = ranked(reference, holding, counts)
-        chosen = holding[ranking.best]
-        alike: set[str] = set()
-        for k, one in enumerate(holding):
-            reference.log(
-                f"  {' and '.join(one.names)}, on more data: score {ranking.scores[k]:.0f}"
-            )
-            why = "others explain more"
-            others = [fit for fit in one.fits if fit.candidate.name not in chosen.names]
-            if k in ranking.alike:
-                alike.update(fit.candidate.name for fit in others)
-                why = f"does as well as {chosen.names[-1]}, and cannot be told from it"
-            for fit in others:
-                reference.rejections.add(fit, why, final=True)
-        if not alike:
-            return dataclasses.replace(chosen, alternatives=state.alternatives)
-        alternatives = {**state.alternatives, chosen.names[-1]: frozenset(alike)}
-        return dataclasses.replace(chosen, alternatives=alternatives)
+    Effects of others that do as well are noted as alternatives.
+    """
+    holding = [
+        reference.settled(one.state.fits, one.state.ensembles[BOTH].sd)
+        for one in made
+        if not one.objections
+    ]
+    if not holding:
+        return None
+    counts = [count_parameters(one.beyond(state)) for one in holding]
+    ranking = ranked(reference, holding, counts)
+    chosen = holding[ranking.best]
+    alike: set[str] = set()
+    for k, one in enumerate(holding):
+        reference.log(f"  {' and '.join(one.names)}, on more data: score {ranking.scores[k]:.0f}")
+        why = "others explain more"
+        others = [fit for fit in one.fits if fit.candidate.name not in chosen.names]
+        if k in ranking.alike:
+            alike.update(fit.candidate.name for fit in others)
+            why = f"does as well as {chosen.names[-1]}, and cannot be told from it"
+        for fit in others:
+            reference.rejections.add(fit, why, final=True)
+    alternatives = dict(state.alternatives)
+    if alike:
+        alternatives[chosen.names[-1]] = frozenset(alike)
+    return dataclasses.replace(chosen, alternatives=alternatives)
 
 
 def likely_pairs(

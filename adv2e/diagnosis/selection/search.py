@@ -25,12 +25,14 @@ from adv2e.diagnosis.selection.acceptance import CLOSE
 from adv2e.diagnosis.selection.joint_fits import (
     CATCHES_UP,
     JointFit,
-    JointFits,
+    best_of,
     count_parameters,
     likely_pairs,
+    with_more,
+    with_one_more,
 )
 from adv2e.diagnosis.selection.reference import Reference, State
-from adv2e.diagnosis.selection.shortlist import Trial, scored
+from adv2e.diagnosis.selection.shortlist import Trial, best_forms, scored, shortlisted
 from adv2e.diagnosis.statistics.summary import BOTH
 from adv2e.reports.result import Rejected
 
@@ -54,27 +56,19 @@ _MOST_OF_THE_FIT = 0.5
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where the search ended.
-
-    Attributes
-    ----------
-    state : State
-    probability, test_probability : float
-        Of the residual left, where the search looked, and in the test data.
-    explained : float
-        Share of the declared model's residual that is gone.
-    complete : bool
-        Nothing is left for another effect, in either: chance can make it, or it is the fit's.
-    rejected : dict
-        Last reason for each effect that was not added.
-    """
+    """Where the search ended."""
 
     state: State
     probability: float
+    """Of the residual left, where the search looked."""
     test_probability: float
+    """The same in the test data."""
     explained: float
+    """Share of the declared model's residual that is gone."""
     complete: bool
+    """Nothing is left for another effect, in either: chance can make it, or it is the fit's."""
     rejected: dict[str, Rejected]
+    """Last reason for each effect that was not added."""
 
     @property
     def alternatives(self) -> list[str]:
@@ -84,10 +78,7 @@ class Outcome:
 
 
 class Search:
-    """Looks for effects that a declared model lacks, among those that compete.
-
-    Those of keys that are not known are none: they are fitted with all effects.
-    """
+    """Looks for effects that a declared model lacks; keys not known are fitted with all."""
 
     def __init__(self, reference: Reference, candidates: list[Candidate]) -> None:
         unknown = {parameter.key for parameter in reference.free}
@@ -95,7 +86,6 @@ class Search:
             one for one in candidates if not unknown & {each.key for each in one.parameters}
         ]
         self.reference = reference
-        self.joint_fits = JointFits(reference, self.candidates)
         self.declared = reference.state(reference.declared)
 
     def probability(self, state: State, view: int = BOTH) -> float:
@@ -108,8 +98,8 @@ class Search:
 
     def run(self) -> Outcome:
         """Search forward and backward."""
-        probability = self.probability(self.declared)
-        self.reference.log(f"declared model: probability of the residual {probability:.2g}")
+        chance = self.probability(self.declared)
+        self.reference.log(f"declared model: probability of the residual {chance:.2g}")
         state = self._backward(self._forward(self.declared))
         held = self.reference.rejections.held
         rejected = {name: why for name, why in held.items() if name not in state.names}
@@ -135,17 +125,15 @@ class Search:
             if not self._is_open(state):
                 break
             if len(state.fits) >= MOST_EFFECTS:
-                self.reference.log(
-                    f"something is left beside {MOST_EFFECTS} effects: no more are tried"
-                )
+                left = f"something is left beside {MOST_EFFECTS} effects"
+                self.reference.log(f"{left}: no more are tried")
                 break
             grown = self._grown(state)
             if grown is None or not self._is_worth_it(state, grown):
                 break
             state = grown
-            self.reference.log(
-                f"added {', '.join(state.names)}: probability {self.probability(state):.2g}"
-            )
+            probability = self.probability(state)
+            self.reference.log(f"added {', '.join(state.names)}: probability {probability:.2g}")
         return state
 
     def _is_something_left(self, state: State, view: int = BOTH) -> bool:
@@ -159,9 +147,8 @@ class Search:
         What is small beside an effect may be its fit's, or another effect, which chance makes far
         less often.  Of an effect that cannot be undone in full it is the former all the same.
         """
-        if self._is_something_left(state):
-            return True
-        return state.is_undone and self.probability(state) < _OF_FITS
+        is_unlikely = state.is_undone and self.probability(state) < _OF_FITS
+        return is_unlikely or self._is_something_left(state)
 
     def _may_be_wrong(self, state: State) -> bool:
         """Tell whether another is tried in the place of the first of two effects.
@@ -213,17 +200,17 @@ class Search:
         Where one holds but another that does not explains far more, the one is no name for what is
         missing: it stands in for a part of the other.
         """
-        trials = self.joint_fits.trials(state)
+        trials = self._trials(state)
         # with one of two effects, something still stands out; but the one gains, and is physical
-        made = self.joint_fits.of_one(state, trials, [state])
+        made = with_one_more(self.reference, state, trials, [state])
         physical = [one for one in made if one.physical]
         most = max((one.validated for one in physical), default=-np.inf)
         holding = [one for one in physical if not one.objections]
         if any(one.validated > most - CATCHES_UP for one in holding):
-            return self.joint_fits.best(made, state)
+            return best_of(self.reference, made, state)
         grown = None
         if len(state.fits) + 2 <= _MOST_WITH_TWO:
-            grown = self.joint_fits.best(self._of_two(state, trials, physical), state)
+            grown = best_of(self.reference, self._of_two(state, trials, physical), state)
         if grown is None and holding:
             first = max(physical, key=lambda one: one.validated)
             why = f"holds, but {first.state.names[-1]}, which does not, explains far more"
@@ -231,22 +218,30 @@ class Search:
                 self.reference.rejections.add(one.state.fits[-1], why, final=True)
         return grown
 
+    def _trials(self, state: State, besides: Sequence[str] = ()) -> list[Trial]:
+        """Return effects on top of a model, the best first, each in its best form.
+
+        Those named `besides` are not tried, nor those that it has.
+        """
+        competing = [one for one in self.candidates if one.name not in besides]
+        return best_forms(shortlisted(self.reference, state, competing))
+
     def _of_two(
         self, state: State, trials: Sequence[Trial], physical: Sequence[JointFit]
     ) -> list[JointFit]:
-        """Return models with two effects more, of which none need hold alone.
+        """Return models with two effects more: others on top of the best, and the likeliest pairs.
 
-        Others on top of the best that is physical, and the likeliest pairs.
+        None need hold alone; the best is that of those which are physical.
         """
         made: list[JointFit] = []
         if physical:
             first = max(physical, key=lambda one: one.validated).state
             self.reference.log(f"on trial: {', '.join(first.names)}")
-            made += self.joint_fits.of_one(first, self.joint_fits.trials(first), [first, state])
+            made += with_one_more(self.reference, first, self._trials(first), [first, state])
         had = {frozenset(one.state.names) for one in made}
         for pair in likely_pairs(self.reference, state, trials):
             if frozenset((*state.names, *(one.name for one in pair))) not in had:
-                made.append(self.joint_fits.of(state, pair, [state]))
+                made.append(with_more(self.reference, state, pair, [state]))
         return made
 
     def _backward(self, state: State) -> State:
@@ -270,8 +265,10 @@ class Search:
         held, name = dict(reasons.held), first.candidate.name
         rest = self._without(state, first)
         self.reference.log(f"in the place of {name}:")
-        trials = self.joint_fits.trials(rest, besides=[name])
-        other = self.joint_fits.best(self.joint_fits.of_one(rest, trials, [rest, state]), rest)
+        trials = self._trials(rest, besides=[name])
+        other = best_of(
+            self.reference, with_one_more(self.reference, rest, trials, [rest, state]), rest
+        )
         if other is not None and self._is_better(other, state):
             reasons.add(first, f"does less than {other.names[-1]} in its place", final=True)
             self.reference.log(f"replaced {name} by {other.names[-1]}")
@@ -290,8 +287,8 @@ class Search:
         )
         if better <= worse + CLOSE:
             return False
-        share = self._taken_away(state, other)
-        return self._is_something_left(state) or share >= _MOST_OF_THE_FIT
+        most = self._taken_away(state, other) >= _MOST_OF_THE_FIT
+        return most or self._is_something_left(state)
 
     def _without(self, state: State, fit: Fitted) -> State:
         """Return the model without one of its effects, the others fitted again."""

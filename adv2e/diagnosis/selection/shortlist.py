@@ -84,6 +84,14 @@ def shortlisted(reference: Reference, state: State, candidates: Sequence[Candida
     return trials
 
 
+def best_forms(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the first trial of each effect."""
+    best: dict[str, Trial] = {}
+    for trial in trials:
+        best.setdefault(trial.name, trial)
+    return list(best.values())
+
+
 def _exposed(state: State, candidate: Candidate) -> Config:
     """Return a model with its exposure as a candidate needs it, if that is fitted and not held."""
     fitted = any(one.key == EXPOSURE for fit in state.fits for one in fit.candidate.parameters)

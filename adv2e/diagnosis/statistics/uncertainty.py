@@ -84,14 +84,10 @@ _TAIL = 4.0
 
 @dataclass(frozen=True)
 class FrameError:
-    """Error of each statistic, in every view, that is due to what the frames do not tell.
+    """Error of each statistic that is due to what the frames do not tell, (views, statistics).
 
-    Attributes
-    ----------
-    bias : (views, statistics)
-        By how much simulations exceed what they would be without it, as far as is known.
-    sd : (views, statistics)
-        Uncertainty of that.
+    By how much simulations exceed what they would be without it, as far as is known, and the
+    uncertainty of that.
     """
 
     bias: Array
@@ -130,21 +126,14 @@ class FrameError:
 
 @dataclass(frozen=True)
 class Change:
-    """What frames that tell less change, in compressed deviations of chance.
-
-    Attributes
-    ----------
-    own : (views, statistics)
-        Of each statistic, less what chance makes of it.
-    usual : (views, statistics)
-        Root mean square of those of its group that feel the frames, times how much it does itself.
-    deviation : (views, statistics)
-        Of chance, in the units of the statistics.
-    """
+    """What frames that tell less change, in compressed deviations, (views, statistics)."""
 
     own: Array
+    """Of each statistic, less what chance makes of it."""
     usual: Array
+    """Root mean square of those of its group that feel the frames, times how much it does."""
     deviation: Array
+    """Of chance, in the units of the statistics."""
 
     @classmethod
     def of(cls, plain: Array, less: Array, groups: Sequence[str], least: Array) -> Change:
@@ -164,9 +153,8 @@ class Change:
         Where a statistic happens not to change in the mean, others of its kind tell what to expect.
         """
         doubt = uncertain * np.sqrt((self.own**2 + self.usual**2) / 2.0)
-        return FrameError(
-            self.deviation * expanded(known * self.own), self.deviation * expanded(doubt)
-        )
+        bias, sd = (self.deviation * expanded(part) for part in (known * self.own, doubt))
+        return FrameError(bias, sd)
 
 
 def beyond_chance(differences: Array) -> Array:

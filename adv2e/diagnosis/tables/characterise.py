@@ -14,7 +14,7 @@ from adv2e.diagnosis.tables.latency_problem import LatencyProblem
 from adv2e.diagnosis.tables.measurements import Latencies, measurements_of
 from adv2e.diagnosis.tables.noise_problem import NoiseProblem
 from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, is_key
-from adv2e.diagnosis.tables.selection import FittedSet, Selection, Selector
+from adv2e.diagnosis.tables.selection import Choice, FittedSet, Selector
 from adv2e.diagnosis.tables.table import Table
 from adv2e.errors import DataError
 from adv2e.files.names import shown
@@ -156,13 +156,13 @@ def _intervals(model: FittedSet, selector: Selector) -> dict[str, Interval]:
     return intervals
 
 
-def _alternatives(chosen: Selection) -> list[str]:
+def _alternatives(chosen: Choice) -> list[str]:
     names = dict.fromkeys(name for model in chosen.alternatives for name in model.names)
     others = [name for name in names if name not in chosen.after.names]
     return others or [" + ".join(model.names) for model in chosen.alternatives]
 
 
-def _errors(chosen: Selection, selector: Selector) -> list[ErrorRow]:
+def _errors(chosen: Choice, selector: Selector) -> list[ErrorRow]:
     problem, floors = selector.problem, selector.floors
     held = f"weighted root mean square of ln(measured/predicted) {problem.what}, on light held out"
     rows = [_row(held, chosen.before.error, chosen.after.error, float(np.sqrt(floors.mean())))]
@@ -179,7 +179,7 @@ def _row(name: str, before: float, after: float, floor: float) -> ErrorRow:
     return ErrorRow(name, Estimate(before), Estimate(after), Estimate(floor))
 
 
-def _curves(chosen: Selection, selector: Selector) -> list[Curve]:
+def _curves(chosen: Choice, selector: Selector) -> list[Curve]:
     """Return measured and predicted values over the light, a curve a group of rows."""
     problem, curves = selector.problem, []
     for title, group in problem.groups.items():
@@ -210,7 +210,7 @@ def _band(model: FittedSet, selector: Selector, rows: NDArray[np.int64]) -> Band
     return Band(at(model.point), low, high)
 
 
-def _sentence(chosen: Selection, problem: Problem, selector: Selector) -> str:
+def _sentence(chosen: Choice, problem: Problem, selector: Selector) -> str:
     names = " and ".join(dict.fromkeys(chosen.after.names))
     change = f"held-out error {chosen.before.error:.3g} before, {chosen.after.error:.3g} after"
     if chosen.verdict == "consistent":

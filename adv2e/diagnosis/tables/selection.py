@@ -95,7 +95,7 @@ class FittedSet:
 
 
 @dataclass(frozen=True)
-class Selection:
+class Choice:
     """What came of it; `alternatives`: sets of the same size that fit as well."""
 
     before: FittedSet
@@ -124,14 +124,14 @@ class Selector:
         """What :attr:`FittedSet.errors` would be of the true model, (levels,)."""
         return np.array([self._mean_square(self.problem.error, unit) for unit in self._units])
 
-    def select(self) -> Selection:
+    def select(self) -> Choice:
         """Return the verdict, with all sets tried."""
         candidates, log = self.problem.candidates, self._settings.log
         before = self.fitted(())
         p = self.drawn(before).p
         log(f"declared model: held-out error {before.error:.3f}, p = {p:.3f}")
         if p >= SIGNIFICANT:
-            return Selection(before, before, "consistent", [], [])
+            return Choice(before, before, "consistent", [], [])
         after = before
         tried: list[list[FittedSet]] = []
         for size in range(1, min(MOST_EFFECTS, len(candidates)) + 1):
@@ -149,9 +149,7 @@ class Selector:
             elif size > 1:  # of one only, two may hide each other
                 break
         if after is before or not self._is_believed(after, before):
-            return Selection(
-                before, before, "unexplained", [], _rejected(tried, before, before, [])
-            )
+            return Choice(before, before, "unexplained", [], _rejected(tried, before, before, []))
         alternatives = [
             rival
             for rival in tried[len(after.effects) - 1]
@@ -160,7 +158,7 @@ class Selector:
         verdict: Verdict = "not_identifiable"
         if not alternatives:
             verdict = "explained" if self.drawn(after).p >= SIGNIFICANT else "partly_explained"
-        return Selection(
+        return Choice(
             before, after, verdict, alternatives, _rejected(tried, before, after, alternatives)
         )
 

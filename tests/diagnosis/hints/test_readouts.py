@@ -10,6 +10,7 @@ from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.fitting.library import library
 from adv2e.diagnosis.hints.readouts import Readouts, readouts_of
+from adv2e.diagnosis.selection.joint_fits import with_more
 from adv2e.diagnosis.selection.shortlist import shortlisted
 
 INTERVAL_US = 2000.0
@@ -110,7 +111,7 @@ def best_with_leaps(readouts):
     fit = Fitted(blur, Config(), np.array(blur.scaled((15_500.0,))))
     state = search.reference.state(fit.config, (fit,))
     trial = max(shortlisted(search.reference, state, search.candidates), key=lambda one: one.score)
-    return search.joint_fits.of(state, [trial], [state])
+    return with_more(search.reference, state, [trial], [state])
 
 
 TAU = "readout.frame_coupling.tau_us=300"

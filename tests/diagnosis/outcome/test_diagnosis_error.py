@@ -13,7 +13,7 @@ from adv2e.diagnosis.outcome.error import (
     NAME,
     OF_MEAN,
     PAIRS,
-    Distances,
+    Errors,
     _pairs,
     error_rows,
     of_interpolation,
@@ -25,7 +25,7 @@ AFTER = [random_stream(500, seed) for seed in range(20, 28)]
 
 
 def rows_of(measured, before, after):
-    return error_rows(Distances.of(measured, before), Distances.of(measured, after))
+    return error_rows(Errors.of(measured, before), Errors.of(measured, after))
 
 
 def distance(measured, simulated, whole=None):

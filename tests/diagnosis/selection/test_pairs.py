@@ -11,7 +11,7 @@ from adv2e.diagnosis.selection.acceptance import BY_CHANCE
 from adv2e.diagnosis.selection.acceptance import objections as real_objections
 from adv2e.diagnosis.selection.joint_fits import likely_pairs
 from adv2e.diagnosis.selection.reference import Reference
-from adv2e.diagnosis.selection.shortlist import shortlisted
+from adv2e.diagnosis.selection.shortlist import best_forms, shortlisted
 
 BOTH_MISSING = ["pixel.refractory.period_us=3000", "readout.loss.fraction=0.2"]
 
@@ -22,10 +22,8 @@ def pairs_of(truth, sampler=None):
     observed = sampler.measure(load_config([], truth), RECORDING)
     reference = Reference(sampler, observed, Config())
     declared = reference.state(Config(), ())
-    best = {}
-    for trial in shortlisted(reference, declared, candidates()):
-        best.setdefault(trial.name, trial)
-    pairs = likely_pairs(reference, declared, list(best.values()))
+    trials = best_forms(shortlisted(reference, declared, candidates()))
+    pairs = likely_pairs(reference, declared, trials)
     return [{one.name for one in pair} for pair in pairs]
 
 

@@ -29,6 +29,7 @@ from adv2e.diagnosis.outcome.verdict import verdict_of
 from adv2e.diagnosis.selection import joint_fits as joint_fits_module
 from adv2e.diagnosis.selection.reference import Rejections
 from adv2e.diagnosis.selection.search import LEVEL
+from adv2e.diagnosis.selection.shortlist import best_forms, shortlisted
 from adv2e.diagnosis.statistics.summary import BOTH
 
 
@@ -307,9 +308,9 @@ def test_two_effects_that_hide_one_another_are_found_together():
     sampler.patterns["pixel.refractory.period_us"] = 0.6 * shared + 0.6 * other
     truth = ["pixel.refractory.period_us=4000", "pixel.leak.rate_hz=4"]
     search, outcome = searched(truth, sampler)
-    single = search.joint_fits.of_one(
-        search.declared, search.joint_fits.trials(search.declared), [search.declared]
-    )
+    alone = search.reference, search.declared
+    trials = best_forms(shortlisted(*alone, search.candidates))
+    single = joint_fits_module.with_one_more(*alone, trials, [search.declared])
     assert all(one.objections for one in single)
     assert set(outcome.state.names) == {"refractory", "leak"}
     assert verdict_of(outcome, GONE) == "explained"
