@@ -117,8 +117,7 @@ def measurements_of(table: Table) -> Latencies | Noise:
             f" {' and '.join(lights) or 'none'} {there}"
         )
     (column,) = lights
-    light = table.numbers(column, above=0.0)
-    table.require(column, "a number")
+    light = table.numbers(column, above=0.0, required=True)
     _check_levels(table, light, f"{column}: has")
     if times:
         return _latencies(table, times[0], light, LIGHTS[column])
@@ -136,12 +135,10 @@ def _check_levels(table: Table, light: Array, has: str) -> None:
 
 def _latencies(table: Table, column: str, light: Array, unit: str) -> Latencies:
     factor = TIMES[column.removeprefix("latency_")]
-    table.require(column, "a number")
-    latency_us = factor * table.numbers(column, above=0.0)
+    latency_us = factor * table.numbers(column, above=0.0, required=True)
     contrast = None
     if "contrast_ln" in table.columns:
-        table.require("contrast_ln", "a number")
-        contrast = table.numbers("contrast_ln", above=0.0)
+        contrast = table.numbers("contrast_ln", above=0.0, required=True)
     polarity = np.ones(len(table), dtype=np.int64)
     if "polarity" in table.columns:
         for k, text in enumerate(table.texts("polarity")):
@@ -156,41 +153,35 @@ def _latencies(table: Table, column: str, light: Array, unit: str) -> Latencies:
 def _standard_error_us(table: Table) -> Array:
     """Return the standard error of each latency; NaN: not given."""
 
-    def column_of(what: str) -> tuple[str, Array | None]:
-        for unit, factor in TIMES.items():
-            name = f"latency_{what}_{unit}"
-            if name in table.columns:
-                return name, table.numbers(name, at_least=0.0) * factor
-        return "", None
+    def column_of(what: str) -> tuple[str, Array]:
+        names = {f"latency_{what}_{unit}": factor for unit, factor in TIMES.items()}
+        name = next((name for name in names if name in table.columns), "")
+        return name, table.numbers(name, at_least=0.0) * names.get(name, 1.0)
 
-    _, error = column_of("error")
-    if error is not None:
+    given, error = column_of("error")
+    if given:
         return error
-    _, spread = column_of("sd")
-    (lower_name, lower), (upper_name, upper) = column_of("q25"), column_of("q75")
-    if spread is None and lower is not None and upper is not None:
+    given, spread = column_of("sd")
+    if not given:
+        (lower_name, lower), (upper_name, upper) = column_of("q25"), column_of("q75")
         for k in np.flatnonzero(upper < lower):
             raise table.wrong(int(k), upper_name, f"must be at least {lower_name}")
         spread = (upper - lower) / 1.349  # of a normal distribution
-    if spread is None or "number" not in table.columns:
-        return np.full(len(table), np.nan)
     return spread / np.sqrt(table.numbers("number", at_least=1.0))
 
 
 def _noise(table: Table, light: Array, unit: str) -> Noise:
-    def optional(name: str, **limits: float) -> Array:
-        given = name in table.columns
-        return table.numbers(name, **limits) if given else np.full(len(table), np.nan)
-
     names = [f"{p}_{kind}" for p in ("on", "off") for kind in ("rate_hz", "median_hz", "share")]
     rates = {name: table.numbers(name, at_least=0.0) for name in names if name in table.columns}
     shares = [name for name in rates if name.endswith("_share")]
     for name in shares:
         for k in np.flatnonzero(rates[name] > 1.0):
             raise table.wrong(int(k), name, "must be a share from 0 to 1")
-    pixels, duration = optional("pixels", at_least=1.0), optional("duration_s", above=0.0)
+    pixels = table.numbers("pixels", at_least=1.0)
+    duration = table.numbers("duration_s", above=0.0)
     if shares and np.isnan(duration).any():
         raise DataError(f"{table.name}: a share needs the column duration_s, in every row")
     told = ~np.all(np.isnan(list(rates.values())), axis=0)
     _check_levels(table, light[told], f"{' and '.join(rates)}: rows with a number have")
-    return Noise(light, unit, rates, pixels, duration, optional("least_hz", above=0.0))
+    least = table.numbers("least_hz", above=0.0)
+    return Noise(light, unit, rates, pixels, duration, least)

@@ -56,17 +56,26 @@ class Table:
         return [row[at] for row in self.rows]
 
     def numbers(
-        self, column: str, *, above: float | None = None, at_least: float | None = None
+        self,
+        column: str,
+        *,
+        above: float = -math.inf,
+        at_least: float = -math.inf,
+        required: bool = False,
     ) -> NDArray[np.float64]:
-        """Return a column as numbers, (rows,); an empty cell is NaN.
+        """Return a column as numbers, (rows,); an empty cell, or a column not there, is NaN.
 
         Raises
         ------
         DataError
-            A cell is no finite number, or outside of the range; file, line and column are named.
+            A cell is no finite number, or outside of the range, or empty though `required`; file,
+            line and column are named.
         """
         values = np.full(len(self), np.nan)
-        for k, text in enumerate(self.texts(column)):
+        for k, text in enumerate(self.texts(column) if column in self.columns else []):
+            if not text and required:
+                place = f"{self.name}:{self.lines[k]}"
+                raise DataError(f"{place}: {column}: is empty, must be a number")
             if not text:
                 continue
             try:
@@ -75,9 +84,9 @@ class Table:
                 raise self.wrong(k, column, "must be a number") from None
             if not math.isfinite(value):
                 raise self.wrong(k, column, "must be a finite number, or empty")
-            if above is not None and not value > above:
+            if not value > above:
                 raise self.wrong(k, column, f"must be above {above:g}")
-            if at_least is not None and not value >= at_least:
+            if not value >= at_least:
                 raise self.wrong(k, column, f"must be at least {at_least:g}")
             values[k] = value
         return values
@@ -89,12 +98,6 @@ class Table:
         """Return the error that says `text` of one cell."""
         cell = self.texts(column)[row]
         return DataError(f"{self.name}:{self.lines[row]}: {column}: {text}, got {cell!r}")
-
-    def require(self, column: str, what: str) -> None:
-        """Raise DataError if a cell of the column is empty."""
-        for k, text in enumerate(self.texts(column)):
-            if not text:
-                raise DataError(f"{self.name}:{self.lines[k]}: {column}: is empty, must be {what}")
 
     def kept(self, keep: Sequence[bool]) -> Table:
         """Return the table of the rows where `keep` is true."""
