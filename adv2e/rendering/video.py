@@ -14,8 +14,8 @@ from __future__ import annotations
 import importlib
 import os
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -70,47 +70,14 @@ class _OpenCv:
             self._writer.release()
 
 
-class _Output:
-    """A file for PyAV, which prints what is raised within it or breaks down: errors are kept."""
-
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("wb")
-        self.error: OSError | None = None
-
-    def write(self, data: bytes) -> int:
-        self._do(self._file.write, data)
-        return len(data)
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        return self._do(self._file.seek, offset, whence)
-
-    def tell(self) -> int:
-        return self._do(self._file.tell)
-
-    def close(self) -> None:
-        self._do(self._file.flush)
-        with suppress(OSError):  # said already
-            self._file.close()
-
-    def _do(self, function: Callable[..., int | None], *arguments: Any) -> int:
-        if self.error is None:
-            try:
-                return function(*arguments) or 0
-            except OSError as error:
-                self.error = error
-        return 0
-
-
 class _PyAv:
     """Films in H.264 by PyAV."""
 
     def __init__(self, path: Path, fps: float, width: int, height: int) -> None:
         self._av: Any = importlib.import_module("av")
-        try:
-            self._output = _Output(path)  # by Python, whatever its name
-        except OSError as error:
-            raise NotWritten(f"a video cannot be written there: {error.strerror}") from error
-        self._container: Any = self._av.open(self._output, "w", format="mp4")
+        self._name = ExitStack()
+        name = self._name.enter_context(openable(path))
+        self._container: Any = self._av.open(f"file:{name}", "w", format="mp4")
         rate = Fraction(fps).limit_denominator(1_000_000)
         self._stream: Any = self._container.add_stream("libx264", rate=rate, options=_H264)
         self._stream.width, self._stream.height = width, height
@@ -119,24 +86,22 @@ class _PyAv:
 
     def add(self, picture: Picture) -> None:
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
-        self._container.mux(self._stream.encode(frame))
-        self._check()
+        with _writing():
+            self._container.mux(self._stream.encode(frame))
 
     def close(self) -> None:
-        if self._closed:
-            return
-        self._closed = True
-        try:
-            self._container.mux(self._stream.encode())
-            self._container.close()
-        finally:
-            self._output.close()
-        self._check()
+        if not self._closed:
+            self._closed = True
+            with _writing(), self._name, closing(self._container):
+                self._container.mux(self._stream.encode())
 
-    def _check(self) -> None:
-        error = self._output.error
-        if error is not None:
-            raise NotWritten(f"cannot be written: {error.strerror}") from error
+
+@contextmanager
+def _writing() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise NotWritten(f"a video cannot be written there: {error.strerror}") from error
 
 
 @lru_cache(maxsize=1)
