@@ -33,7 +33,7 @@ def check_distinct(output: str | Path, inputs: Iterable[str | Path]) -> None:
     final = Path(output).resolve()
     for one in inputs:
         there = Path(one).resolve()
-        if final == there or _same(final, there):
+        if are_one(final, there):
             raise OutputError(f"{output}: is the input, which would be lost; choose another name")
         if final in there.parents and final.is_dir():
             raise OutputError(f"{output}: holds the input {one}; choose another name")
@@ -50,20 +50,23 @@ def _is_read_with(path: Path, final: Path) -> bool:
         beside = [f"{path.name}.json", f"{path.stem}_ts.npy", f"{path.stem}.timestamps.txt"]
         if path.suffix == ".txt":
             beside += [*_LISTS, *_OF_RECORDINGS]
-        return any(_same(final, path.with_name(name)) for name in beside)
+        return any(are_one(final, path.with_name(name)) for name in beside)
     lists = [*(path / name for name in (*_LISTS, *_OF_RECORDINGS)), *(above / n for n in _LISTS)]
-    if any(_same(final, file) for file in lists):
+    if any(are_one(final, file) for file in lists):
         return True
     pictures = (file for file in path.rglob("*") if file.suffix.lower() in _PICTURES)
-    found = next((file for file in pictures if _same(final, file)), None)
+    found = next((file for file in pictures if are_one(final, file)), None)
     if found is None or found.parent != path or not (path / _LISTS[0]).is_file():
         return found is not None
     # beside those of a recording may be one that was made of it
     return os.fsencode(found.name) in (path / _LISTS[0]).read_bytes()
 
 
-def _same(final: Path, other: Path) -> bool:
+def are_one(one: Path, other: Path) -> bool:
+    """Tell whether two names lead to one file, also where upper and lower case are the same."""
+    if os.path.normcase(one) == os.path.normcase(other):
+        return True
     try:
-        return final.samefile(other)
+        return one.samefile(other)
     except OSError:
         return False

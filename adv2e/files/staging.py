@@ -14,15 +14,15 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 from types import TracebackType
 
 from adv2e.errors import OutputError
-from adv2e.files.distinct import check_distinct
+from adv2e.files.distinct import are_one, check_distinct
 from adv2e.files.renaming import exchange, move_to_free, sync, sync_one
 from adv2e.files.workspace import Identity, Workspace, identity_of, remove_abandoned
 from adv2e.process import cleanup
@@ -146,7 +146,7 @@ class Staging(cleanup.Unfinished):
         if not above.is_dir():
             raise OutputError(f"{path}: {above} is not a folder")
         for other in self._outputs:
-            if _are_one(final, other.final):
+            if are_one(final, other.final):
                 raise OutputError(f"{path}: is to be two outputs; choose another name")
             if other.final in final.parents or final in other.final.parents:
                 raise OutputError(
@@ -288,11 +288,19 @@ def nearest_there(path: Path) -> Path:
     return next(above for above in path.parents if os.path.lexists(above))
 
 
-def _are_one(one: Path, other: Path) -> bool:
-    """Tell whether two names lead to one file, also where upper and lower case are the same."""
-    if os.path.normcase(one) == os.path.normcase(other):
-        return True
+@contextmanager
+def writing(name: str | Path) -> Iterator[None]:
+    """Make what the system raises in the body, such as that the disk is full, name the output."""
     try:
-        return one.samefile(other)
-    except OSError:
-        return False
+        yield
+    except BrokenPipeError:  # of standard output: nobody reads any more
+        raise
+    except OSError as error:
+        raise OutputError(f"{name}: cannot be written: {_reason(error)}") from error
+
+
+def _reason(error: OSError) -> str:
+    """Return what the system says, which HDF5 wraps in addresses and offsets."""
+    text = error.strerror or str(error)
+    inner = re.search(r"error message = '([^']*)'", text)
+    return inner[1] if inner else text

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
@@ -15,9 +14,8 @@ from typing import Any, ClassVar
 
 from numpy.typing import NDArray
 
-from adv2e.errors import OutputError
 from adv2e.events import Events
-from adv2e.files.staging import Staging
+from adv2e.files.staging import Staging, writing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,11 +102,11 @@ class Sink:
         is_alone: bool,
     ) -> Iterator[Writer]:
         with staging if is_alone else nullcontext(), _closing() as stack:
-            with self._naming():
+            with writing(self._name):
                 staging.prepare()
                 made = writer(stack, *temporary)
             yield made
-            with self._naming():
+            with writing(self._name):
                 made.finish()
                 stack.close()
 
@@ -122,7 +120,7 @@ class Sink:
         BrokenPipeError
             They go to standard output, and nobody reads them any more.
         """
-        with self._naming():
+        with writing(self._name):
             self._writer.write_events(events)
 
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
@@ -132,7 +130,7 @@ class Sink:
         long before the events around it.
         """
         if self.wants_frames:
-            with self._naming():
+            with writing(self._name):
                 self._writer.write_frame(t_ns, image)
 
     def __enter__(self) -> Sink:
@@ -147,16 +145,6 @@ class Sink:
     ) -> None:
         self._open.__exit__(kind, error, trace)
 
-    @contextmanager
-    def _naming(self) -> Iterator[None]:
-        """Name the output in errors of the system, such as a full disk."""
-        try:
-            yield
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            raise OutputError(f"{self._name}: cannot be written: {_reason(error)}") from error
-
 
 @contextmanager
 def _closing() -> Iterator[ExitStack]:
@@ -169,13 +157,6 @@ def _closing() -> Iterator[ExitStack]:
             stack.close()
         raise
     stack.close()
-
-
-def _reason(error: OSError) -> str:
-    """Return what the system says, which HDF5 wraps in addresses and offsets."""
-    text = error.strerror or str(error)
-    inner = re.search(r"error message = '([^']*)'", text)
-    return inner[1] if inner else text
 
 
 def to_json(description: dict[str, Any]) -> str:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from adv2e.errors import OutputError
-from adv2e.files.staging import Staging
-
-_OF_WRITING = (errno.EFBIG, errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EACCES)
+from adv2e.files.staging import Staging, writing
 
 
 class NotWritten(OutputError):
@@ -32,11 +29,8 @@ def replacing(path: Path, overwrite: bool, staging: Staging | None = None) -> It
     with Staging(overwrite) if staging is None else nullcontext(staging) as files:
         part = files.file(path)
         try:
-            files.prepare()
-            yield part
+            with writing(path):
+                files.prepare()
+                yield part
         except NotWritten as error:
             raise OutputError(f"{path}: {error}") from error
-        except OSError as error:
-            if error.errno not in _OF_WRITING:
-                raise
-            raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
