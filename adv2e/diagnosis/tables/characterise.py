@@ -54,8 +54,8 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
     before, after = chosen.before, chosen.after
     found = after.settings
     split = "each light level held out in turn: fitted to all others, judged on it"
-    if problem.judged.any():
-        rows = f"the {problem.judged.sum()} rows where {' and '.join(settings.judge)}"
+    if problem.test.any():
+        rows = f"the {problem.test.sum()} rows where {' and '.join(settings.judge)}"
         split = f"fitted without {rows}, judged there"
     out_of_reach = [Rejected(*one) for one in problem.out_of_reach.items()]
     return Diagnosis(
@@ -95,18 +95,18 @@ def problem_of(
     """Return the model of the table's chosen rows; the errors are those of `characterise`."""
     for condition in settings.where:
         table = table.kept(table.matching(condition, "--where"))
-    judged = np.full(len(table), bool(settings.judge))
+    test = np.full(len(table), bool(settings.judge))
     for condition in settings.judge:
-        judged &= table.matching(condition, "--judge")
-    if settings.judge and not judged.any():
+        test &= table.matching(condition, "--judge")
+    if settings.judge and not test.any():
         raise DataError(f"{table.name}: --judge: no row meets {' and '.join(settings.judge)}")
     data = measurements_of(table)
     problem: LatencyProblem | NoiseProblem
     if isinstance(data, Latencies):
-        problem = LatencyProblem(data, declared, judged, settings)
+        problem = LatencyProblem(data, declared, test, settings)
     else:
-        problem = NoiseProblem(data, declared, judged, settings)
-    rest, unknown = int((~problem.judged).sum()), len(problem.nuisances.parameters)
+        problem = NoiseProblem(data, declared, test, settings)
+    rest, unknown = int((~problem.test).sum()), len(problem.nuisances.parameters)
     if rest <= unknown + 1:
         raise DataError(
             f"{table.name}: {rest} rows are left for fitting {unknown} parameters and an effect;"
@@ -145,7 +145,7 @@ def _findings(model: FittedSet, selector: Selector) -> list[Finding]:
 
 def _intervals(model: FittedSet, selector: Selector) -> dict[str, Interval]:
     """Return 95 % intervals, widened where the model misfits by more than the stated errors."""
-    freedom = int((~selector.problem.judged).sum()) - len(model.point)
+    freedom = int((~selector.problem.test).sum()) - len(model.point)
     factor = max(1.0, (model.misfit / freedom) ** 0.5) if freedom > 0 else 1.0
     apart = selector.drawn(model).logs - model.point
     intervals = {}
@@ -166,7 +166,7 @@ def _errors(chosen: Choice, selector: Selector) -> list[ErrorRow]:
     problem, floors = selector.problem, selector.floors
     held = f"weighted root mean square of ln(measured/predicted) {problem.what}, on light held out"
     rows = [_row(held, chosen.before.error, chosen.after.error, float(np.sqrt(floors.mean())))]
-    levels = np.unique(problem.level[problem.held])
+    levels = np.unique(problem.level[problem.held_out])
     for k, level in enumerate(levels if levels.size > 1 else ()):
         light = float(problem.light[problem.level == level][0])
         at_level = (chosen.before.errors[k], chosen.after.errors[k], floors[k])

@@ -43,7 +43,7 @@ class LatencyProblem(Problem):
     ----------
     data : Latencies
     declared : Declared
-    judged : (rows,) of bool
+    test : (rows,) of bool
     settings : Settings
 
     Raises
@@ -61,10 +61,10 @@ class LatencyProblem(Problem):
     }
 
     def __init__(
-        self, data: Latencies, declared: Declared, judged: NDArray[np.bool_], settings: Settings
+        self, data: Latencies, declared: Declared, test: NDArray[np.bool_], settings: Settings
     ) -> None:
         white = settings.white or float(data.light.max())
-        super().__init__(declared, data.light, data.unit, judged, white)
+        super().__init__(declared, data.light, data.unit, test, white)
         self.measured, self._polarity = np.log(data.latency_us), data.polarity
         self._contrast = np.full(data.light.shape, settings.contrast)
         if data.contrast is not None:
@@ -122,7 +122,7 @@ class LatencyProblem(Problem):
         free = {one.key for one in self.nuisances.parameters}
         for k, (title, rows) in enumerate(self.groups.items()):
             key = self._threshold_key(k)
-            if key in free and self.judged[rows].all():
+            if key in free and self.test[rows].all():
                 raise DataError(
                     f"{name}: --judge takes all rows of {title}: none is left to fit their"
                     f" threshold to; declare {key.partition('[')[0]}, or judge by another column"

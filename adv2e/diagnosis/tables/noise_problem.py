@@ -45,7 +45,7 @@ class NoiseProblem(Problem):
     ----------
     data : Noise
     declared : Declared
-    judged : (rows,) of bool
+    test : (rows,) of bool
     settings : Settings
 
     References
@@ -62,7 +62,7 @@ class NoiseProblem(Problem):
     }
 
     def __init__(
-        self, data: Noise, declared: Declared, judged: NDArray[np.bool_], settings: Settings
+        self, data: Noise, declared: Declared, test: NDArray[np.bool_], settings: Settings
     ) -> None:
         cells = [
             (kind, k)
@@ -72,7 +72,7 @@ class NoiseProblem(Problem):
         self._kinds = [kind for kind, _ in cells]
         rows = np.array([k for _, k in cells])
         white = settings.white or float(data.light.max())
-        super().__init__(declared, data.light[rows], data.unit, judged[rows], white)
+        super().__init__(declared, data.light[rows], data.unit, test[rows], white)
         self.hot_fraction = declared.held(HOT_FRACTION, USUAL_FRACTION) or USUAL_FRACTION
         self._duration = data.duration_s[rows]
         rate = np.array([_rate(data, kind, int(k)) for kind, k in cells])

@@ -26,7 +26,7 @@ class Settings:
     where : sequence of str
         ``COLUMN=VALUE``: only rows that meet all of them.
     judge : sequence of str
-        Rows that meet all of them are kept for judging; none: each light level is held out in turn.
+        Rows that meet all of them are kept for testing; none: each light level is held out in turn.
     white : float, optional
         Light that 255 DN stand for, in the table's unit; default: the highest.
     contrast : float
@@ -118,8 +118,8 @@ class Problem(ABC):
         In `light_unit`; `white` of it is 255 DN.
     level : (n,) of int
         Number of the light level.
-    judged : (n,) of bool
-        Kept for judging, never fitted.
+    test : (n,) of bool
+        Kept for testing, never fitted.
     groups : mapping of str to arrays of int
         Rows that make one curve over the light, by its title.
     nuisances : Candidate
@@ -144,16 +144,16 @@ class Problem(ABC):
     notes: list[str]
 
     def __init__(
-        self, declared: Declared, light: Array, unit: str, judged: NDArray[np.bool_], white: float
+        self, declared: Declared, light: Array, unit: str, test: NDArray[np.bool_], white: float
     ) -> None:
         self.declared, self.light, self.light_unit, self.white = declared, light, unit, white
-        self.judged = judged
+        self.test = test
         self.level = np.unique(light, return_inverse=True)[1].astype(np.int64)
 
     @property
-    def held(self) -> NDArray[np.bool_]:
-        """Rows that errors are told of: those kept for judging, or else all, (n,)."""
-        return self.judged if self.judged.any() else ~self.judged
+    def held_out(self) -> NDArray[np.bool_]:
+        """Rows that errors are told of: those kept for testing, or else all, (n,)."""
+        return self.test if self.test.any() else ~self.test
 
     @abstractmethod
     def predict(self, values: Mapping[str, float]) -> Array:

@@ -64,7 +64,7 @@ class FittedSet:
     joint : Candidate
         What was fitted: nuisances, then the effects.
     point : (parameters,)
-        Fitted to all rows that are not kept for judging, on the scales of the parameters.
+        Fitted to all rows that are not kept for testing, on the scales of the parameters.
     misfit : float
         Sum of squares there.
     errors : (levels,)
@@ -111,12 +111,12 @@ class Selector:
     def __init__(self, problem: Problem, settings: Settings) -> None:
         self.problem, self._settings = problem, settings
         self._drawn: dict[tuple[Candidate, ...], Draws] = {}
-        self._fitted, held = ~problem.judged, problem.held
+        self._train, held = ~problem.test, problem.held_out
         self._units = [held & (problem.level == k) for k in np.unique(problem.level[held])]
         if len(self._units) == 1:  # judged at one level: its rows
             self._units = [np.arange(held.size) == k for k in np.flatnonzero(held)]
         self._folds = [
-            self._fitted if problem.judged.any() else self._fitted & ~unit for unit in self._units
+            self._train if problem.test.any() else self._train & ~unit for unit in self._units
         ]
 
     @property
@@ -180,7 +180,7 @@ class Selector:
 
         Misfits are relative to that which the best leaves, should it be above the stated errors.
         """
-        freedom = max(int(self._fitted.sum()) - len(best.point), 1)
+        freedom = max(int(self._train.sum()) - len(best.point), 1)
         spread = max(1.0, best.misfit / freedom)
         return (rival.misfit - best.misfit) / spread <= LOOK_ALIKE
 
@@ -188,11 +188,11 @@ class Selector:
         """Fit the declared model with `effects`, to all rows and without each level."""
         joint = Candidate.joined([self.problem.nuisances, *effects])
         starts = [np.array(joint.scaled(start)) for start in joint.starts]
-        point, misfit = self._fit(joint, self._fitted, starts)
+        point, misfit = self._fit(joint, self._train, starts)
         errors = np.empty(len(self._units))
         for k, (fold, unit) in enumerate(zip(self._folds, self._units, strict=True)):
             part = point
-            if not self.problem.judged.any():
+            if not self.problem.test.any():
                 part, _ = self._fit(joint, fold, [point, starts[0]])
             gap = self.problem.measured - self.predicted(joint, part)
             errors[k] = self._mean_square(gap, unit)
@@ -216,7 +216,7 @@ class Selector:
         above = 0
         for k in range(count):
             table = ideal + self.problem.error * rng.standard_normal(ideal.size)
-            logs[k], misfit = self._fit(model.joint, self._fitted, [model.point], table, 1e-4)
+            logs[k], misfit = self._fit(model.joint, self._train, [model.point], table, 1e-4)
             above += misfit >= model.misfit
         return Draws(logs, (above + 1) / (count + 1))
 
