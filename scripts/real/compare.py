@@ -24,7 +24,7 @@ from writing import one_line_errors, output_option, threads_option, write_report
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config, load_config
 from adv2e.config.model import INTERPOLATIONS
-from adv2e.diagnosis.fitting.nuisances import TOLERANCE, match_totals, with_thresholds
+from adv2e.diagnosis.fitting.nuisances import TOLERANCE, fit_thresholds
 from adv2e.sources.times.instants import seconds
 from real.model import Bench, Judged, totals
 from real.recording import halves, read
@@ -116,17 +116,16 @@ def _matched(bench: Bench, cases: Sequence[Case], seeds: int) -> str:
 def with_totals(bench: Bench, case: Case, windows: Windows) -> Case:
     """Return the case with thresholds that match the totals in the windows."""
 
-    def count(on: float, off: float) -> tuple[int, int]:
-        config = with_thresholds(case.config, on, off)
+    def made(config: Config) -> tuple[int, int]:
         return totals(bench.made(config, windows, [config.seed], in_full=True)[0])
 
-    shipped, real = case.config.pixel.thresholds, bench.real
+    real = bench.real
     goal = totals(cut(real.events, windows.start, windows.stop))
-    on, off, miss = match_totals(count, (shipped.on, shipped.off), goal)
+    config, miss = fit_thresholds(made, case.config, goal)
+    on, off = config.pixel.thresholds.on, config.pixel.thresholds.off
     _say(f"{real.name}: {case.label}: ON {on:.3f}, OFF {off:.3f}: totals miss by {miss:.1%}")
     mark = " (!)" if miss > TOLERANCE else ""
-    label = f"{case.label}, ON {on:.3f} OFF {off:.3f}{mark}"
-    return Case(label, with_thresholds(case.config, on, off))
+    return Case(f"{case.label}, ON {on:.3f} OFF {off:.3f}{mark}", config)
 
 
 def _section(

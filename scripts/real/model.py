@@ -15,7 +15,7 @@ from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, cut
 from adv2e.config import Config
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.fitting.nuisances import match_totals, with_thresholds
+from adv2e.diagnosis.fitting.nuisances import fit_thresholds
 from adv2e.diagnosis.hints.readouts import Pulse, has_pulse, pulse_of
 from adv2e.diagnosis.simulation.frames import FrameCache, Instants, events_of, is_made_once
 from adv2e.events import Events
@@ -153,12 +153,10 @@ class Bench:
             config = self.pulse.placed(config)
         goal = totals(cut(self.real.events, windows.start, windows.stop))
 
-        def count(on: float, off: float) -> tuple[int, int]:
-            return totals(self.quick(with_thresholds(config, on, off), windows, config.seed))
+        def made(tried: Config) -> tuple[int, int]:
+            return totals(self.quick(tried, windows, tried.seed))
 
-        here = config.pixel.thresholds
-        on, off, _ = match_totals(count, (here.on, here.off), goal, tolerance=tolerance, rounds=5)
-        return with_thresholds(config, on, off)
+        return fit_thresholds(made, config, goal, tolerance=tolerance, rounds=5)[0]
 
     def missed(self, config: Config, windows: Windows) -> float:
         """Return by how much the worse of the two totals misses in the windows, relative."""

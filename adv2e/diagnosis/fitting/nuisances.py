@@ -31,12 +31,6 @@ THRESHOLDS = tuple(
 """Keys that :func:`fit_thresholds` fits, and a search then refines with what it finds."""
 
 
-def with_thresholds(config: Config, on: float, off: float) -> Config:
-    """Return `config` with other thresholds [ln]."""
-    levels = replace(config.pixel.thresholds, on=on, off=off)
-    return replace(config, pixel=replace(config.pixel, thresholds=levels))
-
-
 def thresholds_of(config: Config) -> dict[str, float]:
     """Return the thresholds of a configuration, by key."""
     levels = config.pixel.thresholds
@@ -44,57 +38,52 @@ def thresholds_of(config: Config) -> dict[str, float]:
 
 
 def fit_thresholds(
-    simulate: Callable[[Config], tuple[int, int]], declared: Config, measured: tuple[int, int]
-) -> tuple[Config, float]:
-    """Return the declared model with thresholds that match the totals, and what they miss by.
-
-    As in :func:`match_totals`; `simulate` returns the counts of ON and OFF events of a simulation,
-    over the same pixels and times as those measured.
-    """
-
-    def count(on: float, off: float) -> tuple[int, int]:
-        return simulate(with_thresholds(declared, on, off))
-
-    here = declared.pixel.thresholds
-    on, off, miss = match_totals(count, (here.on, here.off), measured)
-    return with_thresholds(declared, on, off), miss
-
-
-def match_totals(
-    count: Callable[[float, float], tuple[int, int]],
-    start: tuple[float, float],
-    goal: tuple[int, int],
+    simulate: Callable[[Config], tuple[int, int]],
+    declared: Config,
+    measured: tuple[int, int],
     *,
     tolerance: float = TOLERANCE,
     rounds: int = ROUNDS,
-) -> tuple[float, float, float]:
-    """Find the thresholds that give `goal`, by the secant method on logarithms.
+) -> tuple[Config, float]:
+    """Return the declared model with thresholds that match the totals, and what they miss by.
+
+    By the secant method on logarithms.
 
     Parameters
     ----------
-    count : callable
-        Takes ON and OFF thresholds [ln], returns counts of ON and OFF events.
-    start : (float, float)
-        Thresholds to begin with [ln].
-    goal : (int, int)
+    simulate : callable
+        Returns the counts of ON and OFF events of a simulation, over the same pixels and times as
+        those measured.
+    declared : Config
+    measured : (int, int)
         Counts wanted.
     tolerance : float
         The search ends where both totals are this near, relative.
     rounds : int
-        Calls of `count` at most.
+        Simulations at most.
 
     Returns
     -------
-    on, off, miss : float
-        The best thresholds met, and by how much the worse of the two totals misses, relative;
-        above `tolerance` where no thresholds match.
+    config : Config
+        With the best thresholds met.
+    miss : float
+        By how much the worse of the two totals misses, relative; above `tolerance` where no
+        thresholds match.
     """
-    wanted = np.log(np.maximum(goal, 0.5))
-    levels, slope = np.log(start), np.full(2, -1.0)
+    pixel = declared.pixel
+
+    def with_levels(logs: NDArray[Any]) -> Config:
+        on, off = np.exp(logs).tolist()
+        return replace(
+            declared, pixel=replace(pixel, thresholds=replace(pixel.thresholds, on=on, off=off))
+        )
+
+    wanted = np.log(np.maximum(measured, 0.5))
+    levels, slope = np.log([pixel.thresholds.on, pixel.thresholds.off]), np.full(2, -1.0)
     best = np.inf, levels
     before: tuple[NDArray[Any], NDArray[Any]] | None = None
     for _ in range(rounds):
-        miss = np.log(np.maximum(count(*np.exp(levels)), 0.5)) - wanted
+        miss = np.log(np.maximum(simulate(with_levels(levels)), 0.5)) - wanted
         if np.abs(miss).max() < best[0]:
             best = float(np.abs(miss).max()), levels
         if best[0] <= np.log1p(tolerance):
@@ -107,5 +96,4 @@ def match_totals(
         before = levels, miss
         step = np.clip(-miss / slope, -1.0, 1.0)
         levels = np.clip(levels + step, np.log(FLOOR), np.log(LARGEST))
-    on, off = np.exp(best[1])
-    return float(on), float(off), float(np.expm1(best[0]))
+    return with_levels(best[1]), float(np.expm1(best[0]))

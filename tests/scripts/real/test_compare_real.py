@@ -13,7 +13,6 @@ from written_recordings import write_recording
 from adv2e import simulate
 from adv2e.comparison.distances import distances
 from adv2e.config import load_config
-from adv2e.diagnosis.fitting.nuisances import TOLERANCE, match_totals
 from adv2e.events import make_events
 
 WIDTH, HEIGHT, FRAMES = 16, 12, 7
@@ -121,12 +120,6 @@ def test_matching_totals_finds_the_thresholds_the_events_were_made_with(recordin
     assert "match from 0.02 to 0.06 s" in result.stdout
 
 
-def test_totals_that_no_threshold_gives_are_marked():
-    _, _, miss = match_totals(lambda on, off: (int(50 / on), 400), (0.2, 0.2), (100, 200))
-    assert miss == pytest.approx(1.0)
-    assert miss > TOLERANCE
-
-
 def test_events_that_no_threshold_gives_are_marked_in_the_table(tmp_path):
     quiet = np.full((FRAMES, HEIGHT, WIDTH), 90, np.uint8)
     folder = write_recording(tmp_path / "quiet", TIMES, quiet, ideal_events(moving_waves()))
@@ -135,15 +128,6 @@ def test_events_that_no_threshold_gives_are_marked_in_the_table(tmp_path):
     assert first[1].startswith("0 / ")
     assert first[2].startswith("- / 0.")
     assert second[0].endswith("(!) †")
-
-
-def test_totals_that_depend_on_both_thresholds_are_matched():
-    def count(on, off):
-        return int(90_000 * on**-2.2 * off**0.4), int(70_000 * off**-1.1 * on**0.3)
-
-    on, off, miss = match_totals(count, (0.2, 0.2), count(0.63, 0.34))
-    assert miss <= TOLERANCE
-    assert (on, off) == pytest.approx((0.63, 0.34), rel=0.02)
 
 
 def test_still_pixels_keep_away_from_those_that_change():
