@@ -15,7 +15,7 @@ from adv2e.reports.quantities import (
     unit_text,
     value_text,
 )
-from adv2e.reports.result import Diagnosis, Finding, Interval, ListInterval, Own
+from adv2e.reports.result import NO_OWN, Diagnosis, Interval, ListInterval, Own
 from adv2e.reports.tables import Column, table
 
 MARKS = {
@@ -76,43 +76,39 @@ def added(diagnosis: Diagnosis) -> Markup:
         if summary:
             parts.append(tag("p", summary))
         if finding.parameters:
-            parts.append(_parameters(finding, diagnosis.own))
+            caption = f"Parameters of {finding.name}"
+            parts.append(_keys(caption, finding.parameters, finding.interval, diagnosis.own))
     return join(*parts)
 
 
-def _parameters(finding: Finding, own: Own) -> Markup:
-    columns = [
-        Column("key"),
-        Column("value", number=True),
-        Column("95 % interval", number=True),
-        Column("unit"),
-        Column("meaning"),
-    ]
-    rows = []
-    for path, value in finding.parameters.items():
-        interval = finding.interval.get(path)
-        texts = _cell(value, interval), interval_text(interval)
-        unit = unit_text(unit_of(path, own))
-        rows.append((tag("code", path), *texts, unit, meaning_of(path, own)))
-    return table(f"Parameters of {finding.name}", columns, rows)
-
-
-def _cell(value: Any, interval: Interval | ListInterval | None = None) -> Markup | str:
-    """Return a value; a text may take several lines, a number may not."""
-    text = value_text(value, interval)
-    return tag("span", text, class_="text") if isinstance(value, str) else text
+def _keys(
+    caption: str,
+    values: Mapping[str, Any],
+    intervals: Mapping[str, Interval | ListInterval] | None = None,
+    own: Own = NO_OWN,
+) -> Markup:
+    """Return a table of keys with their values, and with intervals where any are known."""
+    columns = [Column("key"), Column("value", number=True)]
+    columns += [Column("95 % interval", number=True)] * (intervals is not None)
+    columns += [Column("unit"), Column("meaning")]
+    rows: list[list[object]] = []
+    for path, value in values.items():
+        interval = (intervals or {}).get(path)
+        text = value_text(value, interval)
+        # a text may take several lines, a number may not
+        shown = tag("span", text, class_="text") if isinstance(value, str) else text
+        rows.append(
+            [tag("code", path), shown, unit_text(unit_of(path, own)), meaning_of(path, own)]
+        )
+        if intervals is not None:
+            rows[-1].insert(2, interval_text(interval))
+    return table(caption, columns, rows)
 
 
 def nuisances(values: Mapping[str, Any]) -> Markup:
     """Return the keys that were fitted because nothing was declared of them."""
-    if not values:
-        return Markup()
-    columns = [Column("key"), Column("value", number=True), Column("unit"), Column("meaning")]
-    rows = [
-        (tag("code", path), _cell(value), unit_text(unit_of(path)), meaning_of(path))
-        for path, value in values.items()
-    ]
-    return table("Keys that were not declared, with fitted values", columns, rows)
+    caption = "Keys that were not declared, with fitted values"
+    return _keys(caption, values) if values else Markup()
 
 
 def notes(texts: Sequence[str]) -> Markup:
