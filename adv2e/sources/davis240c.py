@@ -12,14 +12,15 @@ References
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.files.zips import Members
-from adv2e.sources.frame import RECORDED, Light, Pixels, Shot
+from adv2e.sources.frame import RECORDED, Light, Pixels
 from adv2e.sources.images.opencv import decode_image
-from adv2e.sources.listed import ListedSource, Picture, given_shots, told
+from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.stored import DESCRIPTION, read_light
 from adv2e.sources.times.lists import decoded, first_name, parse_list
 from adv2e.sources.times.names import member_of, members_of
@@ -70,20 +71,16 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         anywhere=given.images_anywhere,
     )
     pictures = [Picture(files.label(m), m, partial(_read_image, files, m)) for m in members]
-    if given:
-        timed = given_shots(given, pictures, path)
-        timed.notes.append(f"{given} replaces the times in {label}")
-    else:
-        pairs = zip(found.stamps, pictures, strict=True)
-        shots = [Shot(stamp.t_ns, picture.label, picture.load) for stamp, picture in pairs]
-        timed = told(found, label, shots)
+    # in their order: which picture a name means is settled
+    unnamed = replace(found, stamps=[replace(stamp, name=None) for stamp in found.stamps])
+    times = timed(given, pictures, path, label, lambda _: unnamed)
     light = None
     if files.has(DESCRIPTION):
         light = read_light(files.read(DESCRIPTION), files.label(DESCRIPTION))
     return ListedSource(
         path,
         "davis240c",
-        timed,
+        times,
         selection,
         has_clock=given.fps is None,
         light=light or Light("linear", RECORDED),

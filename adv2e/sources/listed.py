@@ -33,37 +33,55 @@ class Timed:
     notes: list[str]
 
 
-def given_shots(given: GivenTimes, pictures: Sequence[Picture], path: Path) -> Timed:
-    """Return the pictures, which are all of `path` in order, at the times that the user gave.
+def timed(
+    given: GivenTimes,
+    pictures: Sequence[Picture],
+    path: Path,
+    found: str | None,
+    read_found: Callable[[str], FrameList],
+    missing: str = "",
+) -> Timed:
+    """Return the pictures at the times that the user gave, else at those found beside them.
+
+    Parameters
+    ----------
+    given : GivenTimes
+    pictures : sequence of Picture
+        All of `path`, in order.
+    path : Path
+    found : str or None
+        Name of the list that was found; `read_found` reads what is called so.
+    missing : str
+        What was looked for.
 
     Raises
     ------
     DataError
-        The file cannot be read or has times for other pictures.
+        No times; or a list that cannot be read or does not fit the pictures.
     """
     if (rate := given.rate) is not None:
         shots = [Shot(rate.time_ns(n), p.label, p.load) for n, p in enumerate(pictures)]
         doubt = numbering_doubt([picture.path or "" for picture in pictures], rate)
-        return Timed(shots, [f"{path}: {doubt}"] if doubt else [], [])
-    assert given.timestamps is not None
-    label = str(given.timestamps)
-    timed = listed_shots(
-        read_list(given.timestamps, time_unit=given.time_unit), label, pictures, path
-    )
-    if len(timed.shots) != len(pictures):
-        raise _other_number(label, len(timed.shots), len(pictures), path)
-    return timed
+        result = Timed(shots, [f"{path}: {doubt}"] if doubt else [], [])
+    elif given.timestamps is not None:
+        label = str(given.timestamps)
+        listed = read_list(given.timestamps, time_unit=given.time_unit)
+        result = _listed(listed, label, pictures, path)
+        if len(result.shots) != len(pictures):
+            raise _other_number(label, len(result.shots), len(pictures), path)
+    elif found is not None:
+        return _listed(read_found(found), found, pictures, path)
+    else:
+        raise DataError(
+            f"{path}: when are the frames? give --fps F or --timestamps FILE, or put {missing}"
+        )
+    if found is not None:
+        result.notes.append(f"{given} replaces the times in {found}")
+    return result
 
 
-def listed_shots(found: FrameList, label: str, pictures: Sequence[Picture], path: Path) -> Timed:
-    """Return the pictures that a list of times names, or all in order if it names none.
-
-    Raises
-    ------
-    DataError
-        A picture is missing or named twice, with the line of the list; or a list without names is
-        of another length.
-    """
+def _listed(found: FrameList, label: str, pictures: Sequence[Picture], path: Path) -> Timed:
+    """Return the pictures that a list of times names, or all in order if it names none."""
     stamps, paths = found.stamps, [p.path for p in pictures if p.path is not None]
     if stamps[0].name is not None and paths:
         places = match(stamps, paths, label, f" in {path}")
@@ -71,19 +89,14 @@ def listed_shots(found: FrameList, label: str, pictures: Sequence[Picture], path
         places = list(range(len(pictures)))
     else:
         raise _other_number(label, len(stamps), len(pictures), path)
-    pairs = zip(stamps, places, strict=True)
-    return told(
-        found, label, [Shot(s.t_ns, pictures[at].label, pictures[at].load) for s, at in pairs]
-    )
-
-
-def told(found: FrameList, label: str, shots: list[Shot]) -> Timed:
-    """Return frames timed by a list, with what is to be told of it."""
-    doubts = [f"{label}: {found.unit.doubt}"] if found.unit.doubt else []
+    shots = [
+        Shot(stamp.t_ns, pictures[at].label, pictures[at].load)
+        for stamp, at in zip(stamps, places, strict=True)
+    ]
     notes = [f"times from {label}: {found.columns}"]
     if found.order:
         notes.append(f"{label}: {found.order}")
-    return Timed(shots, doubts, notes)
+    return Timed(shots, [f"{label}: {found.unit.doubt}"] if found.unit.doubt else [], notes)
 
 
 def _other_number(label: str, times: int, frames: int, path: Path) -> DataError:

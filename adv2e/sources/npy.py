@@ -20,7 +20,7 @@ from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
 from adv2e.files.npy import Header, read_array, read_header
 from adv2e.sources.frame import Light, Pixels
-from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
+from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.times.instants import Stamp
 from adv2e.sources.times.lists import FrameList, read_list
 from adv2e.sources.times.units import frame_unit
@@ -39,26 +39,18 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         Not a stack of frames, no times, or another number of times than of frames.
     """
     stack = _open_stack(path)
-    found = _found_times(path)
     pictures = [
         Picture(f"{path}: frame {number}", None, partial(stack.read, number))
         for number in range(stack.count)
     ]
     if not pictures:
         raise DataError(f"{path}: no frames in it; at least two are needed")
-    if given:
-        timed = given_shots(given, pictures, path)
-    elif found is not None:
-        timed = listed_shots(_read_times(found, given), str(found), pictures, path)
-    else:
-        raise DataError(
-            f"{path}: when are the frames? give --fps F or --timestamps FILE, or put"
-            f" {path.stem}_ts.npy or {path.stem}.timestamps.txt beside it"
-        )
-    source = ListedSource(path, "npy", timed, selection, has_clock=given.fps is None, light=_LIGHT)
-    if given and found is not None:
-        source.notes.append(f"{given} replaces the times in {found}")
-    return source
+    beside = f"{path.stem}_ts.npy", f"{path.stem}.timestamps.txt"
+    found = next((f for f in map(path.with_name, beside) if f.is_file()), None)
+    label = None if found is None else str(found)
+    missing = f"{' or '.join(beside)} beside it"
+    times = timed(given, pictures, path, label, partial(_read_times, given), missing)
+    return ListedSource(path, "npy", times, selection, has_clock=given.fps is None, light=_LIGHT)
 
 
 def _open_stack(path: Path) -> _Stack:
@@ -117,12 +109,8 @@ def _read_whole(path: Path) -> NDArray[Any]:
         return read_array(file, os.fstat(file.fileno()).st_size, str(path))
 
 
-def _found_times(path: Path) -> Path | None:
-    beside = (path.with_name(f"{path.stem}_ts.npy"), path.with_name(f"{path.stem}.timestamps.txt"))
-    return next((file for file in beside if file.is_file()), None)
-
-
-def _read_times(file: Path, given: GivenTimes) -> FrameList:
+def _read_times(given: GivenTimes, name: str) -> FrameList:
+    file = Path(name)
     if file.suffix != ".npy":
         return read_list(file, time_unit=given.time_unit)
     try:

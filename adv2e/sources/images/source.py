@@ -8,30 +8,17 @@ from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
-from adv2e.sources.listed import ListedSource, Picture, given_shots, listed_shots
+from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.stored import light_beside
-from adv2e.sources.times.lists import read_list
+from adv2e.sources.times.lists import FrameList, read_list
 from adv2e.sources.wanted import GivenTimes, Selection
 
 LISTS = ("images.txt", "timestamps.txt", "info.txt")
 """Lists of times that are looked for in the folder, then beside it."""
 
 _UNREAD = (
-    *(
-        ".heic",
-        ".heif",
-        ".avif",
-        ".jxl",
-        ".jp2",
-        ".gif",
-        ".pbm",
-        ".pam",
-        ".tga",
-        ".psd",
-        ".dpx",
-        ".cin",
-    ),
-    *(".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
+    *(".heic", ".heif", ".avif", ".jxl", ".jp2", ".gif", ".pbm", ".pam", ".tga", ".psd"),
+    *(".dpx", ".cin", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
 )
 """Still images that are not read: they are not left out without a word."""
 
@@ -51,28 +38,22 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     if len(pictures) == 1:
         pictures[0].load()  # if it holds several, that is what is to be told
     found = _found_list(path)
-    if given:
-        timed = given_shots(given, pictures, path)
-    elif found is not None:
-        timed = listed_shots(
-            read_list(found, time_unit=given.time_unit), str(found), pictures, path
-        )
-        if missing := len(pictures) - len(timed.shots):
-            timed.notes.append(f"{missing} images are not in {found} and are left out")
-    else:
-        raise DataError(
-            f"{path}: when are the frames? give --fps F or --timestamps FILE, or put one of"
-            f" {', '.join(LISTS)} there"
-        )
+    label = None if found is None else str(found)
+    missing = f"one of {', '.join(LISTS)} there"
+    times = timed(given, pictures, path, label, partial(_read, given), missing)
+    if left_out := len(pictures) - len(times.shots):
+        times.notes.append(f"{left_out} images are not in {found} and are left out")
     if unread := _unread(path):
-        timed.notes.append(
+        times.notes.append(
             f"{path}: images that are not read are left out: {len(unread)}, such as {unread[0]}"
         )
-    if given and found is not None:
-        timed.notes.append(f"{given} replaces the times in {found}")
     # the folder may be that of the frames of a recording of ours
     light = light_beside(found.parent) if found is not None and found.name == "images.txt" else None
-    return ListedSource(path, "images", timed, selection, has_clock=given.fps is None, light=light)
+    return ListedSource(path, "images", times, selection, has_clock=given.fps is None, light=light)
+
+
+def _read(given: GivenTimes, name: str) -> FrameList:
+    return read_list(Path(name), time_unit=given.time_unit)
 
 
 def image_files(folder: Path) -> list[Path]:
