@@ -160,14 +160,12 @@ def _decode_tiff(data: bytes, label: str) -> Pixels:
     colours, alpha, white = rgb_of(image), _fourth(image), header.white
     if not is_light(colours.dtype):  # its source refuses it
         return Pixels(colours)
-    usual = full_scale_of(colours.dtype)
-    if white is not None and colours.max() > white:
-        white = None  # it is not what the number says: the largest of the image, perhaps
+    most = white or full_scale_of(colours.dtype)
     if header.inverted:
-        colours = np.asarray((white or usual) - colours).astype(colours.dtype)
+        colours = np.asarray(most - colours).astype(colours.dtype)
     if alpha is None:
         return Pixels(colours, white=white)
-    return replace(with_alpha(colours, alpha, header.alpha, white or usual, label), white=white)
+    return replace(with_alpha(colours, alpha, header.alpha, most, label), white=white)
 
 
 _CUT = re.compile(

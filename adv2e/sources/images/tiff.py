@@ -23,11 +23,10 @@ from adv2e.sources.images.headers import check_size
 
 _WIDTH, _HEIGHT = 256, 257
 _KIND, _BITS, _COLOURS, _DESCRIPTION, _ORIENTATION, _SAMPLES = 254, 258, 262, 270, 274, 277
-_WHITE, _EXTRA, _FORMAT = 281, 338, 339
+_EXTRA, _FORMAT = 338, 339
 _WANTED = (
-    *(_WIDTH, _HEIGHT),
-    *(_KIND, _BITS, _COLOURS, _DESCRIPTION, _ORIENTATION, _SAMPLES),
-    *(_WHITE, _EXTRA, _FORMAT),
+    *(_WIDTH, _HEIGHT, _KIND, _BITS, _COLOURS, _DESCRIPTION, _ORIENTATION, _SAMPLES),
+    *(_EXTRA, _FORMAT),
 )
 _REDUCED, _MASK = 1, 4
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _LOG_L, _LOG_LUV = 0, 1, 2, 32844, 32845
@@ -102,7 +101,8 @@ def examine(data: bytes, label: str) -> Tiff | None:
         raise DataError(f"{label}: floats of which zero is white; write light instead")
     if bits == 8 and samples == 4:
         data = _not_multiplied(data, tags)
-    white = None if floats else _white(tags, bits)
+    # OpenCV moves 10, 12 and 14 bits to the upper end of 16
+    white = float(((1 << bits) - 1) << (16 - bits)) if 8 < bits < 16 else None
     return Tiff(data, white, inverted, _alpha(tags))
 
 
@@ -111,14 +111,6 @@ def orientation(data: bytes) -> int:
     directories = _directories(data, most=1)
     stated = _first(directories[0], _ORIENTATION, 1) if directories else 1
     return stated if 1 <= stated <= 8 else 1
-
-
-def _white(tags: Mapping[int, _Tag], bits: int) -> float | None:
-    whole = (1 << bits) - 1
-    white = min(_first(tags, _WHITE, whole) or whole, whole)
-    if 8 < bits < 16:  # OpenCV moves the bits to the upper end of 16
-        return float(white << (16 - bits))
-    return float(white) if white < whole and bits in (8, 16) else None
 
 
 def _alpha(tags: Mapping[int, _Tag]) -> Alpha:
