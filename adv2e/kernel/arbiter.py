@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.compiled import entry
 
@@ -18,22 +15,9 @@ FREE, HEAD, ROWS, EVENTS = 0, 1, 2, 3
 
 @entry
 def serve(
-    time: NDArray[Any],
-    pixel: NDArray[Any],
-    polarity: NDArray[Any],
-    known: float,
-    row_us: float,
-    event_us: float,
-    columns: int,
-    channel: NDArray[Any],
-    queue: NDArray[Any],
-    asked: NDArray[Any],
-    waiting: NDArray[Any],
-    left: NDArray[Any],
-    out_time: NDArray[Any],
-    out_pixel: NDArray[Any],
-    out_polarity: NDArray[Any],
-) -> int:
+    time, pixel, polarity, known, row_us, event_us, columns, channel, queue, asked, waiting, left,
+    out_time, out_pixel, out_polarity,
+):  # fmt: skip
     """Take events in, and serve rows as long as all requests before their latch are known.
 
     Parameters

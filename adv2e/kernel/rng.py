@@ -55,36 +55,18 @@ def key_of(seed: int) -> np.uint64:
 
 
 @kernel
-def philox(
-    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64
-) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
-    """Philox4x32-10: four 32-bit words (in uint64) from a counter and a key of 32-bit words."""
-    for _ in range(10):
-        p0 = _M0 * c0
-        p1 = _M1 * c2
-        c0 = (p1 >> _32) ^ c1 ^ k0
-        c1 = p1 & _LOW
-        c2 = (p0 >> _32) ^ c3 ^ k1
-        c3 = p0 & _LOW
-        k0 = (k0 + _W0) & _LOW
-        k1 = (k1 + _W1) & _LOW
-    return c0, c1, c2, c3
-
-
-@kernel
-def _round(
-    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64
-) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
+def _round(c0, c1, c2, c3, k0, k1):
     p0 = np.uint64(_M0 * c0)
     p1 = np.uint64(_M1 * c2)
     return (p1 >> _32) ^ c1 ^ k0, p1 & _LOW, (p0 >> _32) ^ c3 ^ k1, p0 & _LOW
 
 
 @inlined
-def _philox_unrolled(
-    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64
-) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
-    """As philox, written out so that a loop over pixels vectorises."""
+def philox(c0, c1, c2, c3, k0, k1):
+    """Philox4x32-10: four 32-bit words (in uint64) from a counter and a key of 32-bit words.
+
+    Written out so that a loop over pixels vectorises.
+    """
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 & _LOW, k1 + _W1 & _LOW)
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _2 & _LOW, k1 + _W1 * _2 & _LOW)
@@ -98,66 +80,58 @@ def _philox_unrolled(
 
 
 @kernel
-def uniforms(seed: np.uint64, stream: int, pixel: int, draw: float) -> tuple[float, float]:
-    """Return two independent uniform numbers in (0, 1), 53 bits each."""
-    s = np.uint64(seed)
-    d = np.uint64(draw)
-    a, b, c, e = philox(
-        np.uint64(pixel) & _LOW, np.uint64(stream), d & _LOW, d >> _32, s & _LOW, s >> _32
-    )
+def _uniforms_of(a, b, c, d):
+    """Two uniform numbers in (0, 1), 53 bits each, from four 32-bit words."""
     scale = 1.0 / 9007199254740992.0
     u = (np.float64(a >> _5) * 67108864.0 + np.float64(b >> _6) + 0.5) * scale
-    v = (np.float64(c >> _5) * 67108864.0 + np.float64(e >> _6) + 0.5) * scale
+    v = (np.float64(c >> _5) * 67108864.0 + np.float64(d >> _6) + 0.5) * scale
     return u, v
 
 
 @kernel
-def normal_of(u: float, v: float) -> float:
+def uniforms(seed, stream, pixel, draw):
+    """Return two independent uniform numbers in (0, 1), 53 bits each."""
+    s, d = np.uint64(seed), np.uint64(draw)
+    pixel, stream = np.uint64(pixel) & _LOW, np.uint64(stream)
+    a, b, c, e = philox(pixel, stream, d & _LOW, d >> _32, s & _LOW, s >> _32)
+    return _uniforms_of(a, b, c, e)
+
+
+@kernel
+def normal_of(u, v):
     """Return the standard normal number of two uniform ones (Box and Muller)."""
     return math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)
 
 
 @kernel
-def normal(seed: np.uint64, stream: int, pixel: int, draw: float) -> float:
-    """Return a standard normal number (Box and Muller)."""
+def normal(seed, stream, pixel, draw):
+    """Return a standard normal number."""
     u, v = uniforms(seed, stream, pixel, draw)
     return normal_of(u, v)
 
 
 @kernel
-def exponential(seed: np.uint64, stream: int, pixel: int, draw: float) -> float:
+def exponential(seed, stream, pixel, draw):
     """Return an exponential number of mean 1."""
     return -math.log(uniforms(seed, stream, pixel, draw)[0])
 
 
 @kernel
-def uniforms_of_pixels(
-    seed: np.uint64, stream: int, first: int, u: NDArray[np.float64], v: NDArray[np.float64]
-) -> None:
+def uniforms_of_pixels(seed, stream, first, u, v):
     """Draw what `uniforms` gives for draw 0 of the pixels first.. into `u` and `v`.
 
     Vectorises, which a loop that goes on to call a logarithm of the C library does not.
     """
     s = np.uint64(seed)
     low, high = s & _LOW, s >> _32
-    none = np.uint64(0)
-    scale = 1.0 / 9007199254740992.0
+    none, stream = np.uint64(0), np.uint64(stream)
     for k in range(u.shape[0]):
-        a, b, c, e = _philox_unrolled(
-            np.uint64(first + k) & _LOW, np.uint64(stream), none, none, low, high
-        )
-        u[k] = (np.float64(a >> _5) * 67108864.0 + np.float64(b >> _6) + 0.5) * scale
-        v[k] = (np.float64(c >> _5) * 67108864.0 + np.float64(e >> _6) + 0.5) * scale
+        a, b, c, e = philox(np.uint64(first + k) & _LOW, stream, none, none, low, high)
+        u[k], v[k] = _uniforms_of(a, b, c, e)
 
 
 @kernel
-def _fill_uniforms(
-    seed: np.uint64,
-    stream: int,
-    pixels: NDArray[np.int64],
-    draws: NDArray[np.int64],
-    out: NDArray[np.float64],
-) -> None:
+def _fill_uniforms(seed, stream, pixels, draws, out):
     for k in range(out.shape[0]):
         out[k] = uniforms(seed, stream, pixels[k], draws[k])[0]
 
@@ -175,13 +149,7 @@ def uniform_array(
 
 
 @kernel
-def _fill_next(
-    seed: np.uint64,
-    stream: int,
-    pixels: NDArray[np.int64],
-    numbers: NDArray[np.int64],
-    out: NDArray[np.float64],
-) -> None:
+def _fill_next(seed, stream, pixels, numbers, out):
     for k in range(out.shape[0]):
         pixel = pixels[k]
         out[k] = uniforms(seed, stream, pixel, numbers[pixel])[0]
@@ -191,14 +159,9 @@ def _fill_next(
 def next_uniforms(
     seed: int, stream: int, pixels: NDArray[np.int64], numbers: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Return the next uniform number in (0, 1) of each of `pixels`, in turn.
+    """Return the next uniform number in (0, 1) of each of `pixels`, as often as they draw.
 
-    Parameters
-    ----------
-    pixels : (n,) int64
-        Pixels, as often as they draw.
-    numbers : (pixels,) int64
-        How often each pixel has drawn before; counted on.
+    `numbers` counts on how often each pixel of all has drawn before.
     """
     out = np.empty(pixels.size)
     _fill_next(key_of(seed), stream, np.ascontiguousarray(pixels), numbers, out)
@@ -211,7 +174,7 @@ _HALF_PI = 0.5 * math.pi
 
 
 @kernel
-def _cos_sin(turns: float) -> tuple[float, float]:
+def _cos_sin(turns):
     """Cosine and sine of 2 pi turns, 0 <= turns <= 1, good to 1e-11, for loops over pixels."""
     quarter = np.floor(4.0 * turns + 0.5)
     t = (4.0 * turns - quarter) * _HALF_PI
@@ -228,22 +191,18 @@ def _cos_sin(turns: float) -> tuple[float, float]:
 
 
 @kernel
-def normals_of_four(
-    seed: np.uint64, stream: int, first: int, count: int, block: int, out: NDArray[np.float64]
-) -> None:
+def normals_of_four(seed, stream, first, count, block, out):
     """Draw four standard normal numbers for each of the pixels first.. into `out`, (4, count..).
 
     One block of Philox and two pairs of Box and Muller a pixel, from uniforms of 32 bits: tails
     end at 6.8.
     """
-    s, d = np.uint64(seed), np.uint64(block)
+    s, d, stream = np.uint64(seed), np.uint64(block), np.uint64(stream)
     low, high, k0, k1 = d & _LOW, d >> _32, s & _LOW, s >> _32
     scale = 1.0 / 4294967296.0
     a, b, c, e = out[0], out[1], out[2], out[3]
     for k in range(count):
-        w0, w1, w2, w3 = _philox_unrolled(
-            np.uint64(first + k) & _LOW, np.uint64(stream), low, high, k0, k1
-        )
+        w0, w1, w2, w3 = philox(np.uint64(first + k) & _LOW, stream, low, high, k0, k1)
         r = math.sqrt(-2.0 * special.log((np.float64(w0) + 0.5) * scale))
         x, y = _cos_sin((np.float64(w1) + 0.5) * scale)
         a[k] = r * x

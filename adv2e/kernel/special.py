@@ -20,7 +20,7 @@ _HALF_ROOT = np.int64(0x3FE6A09E667F3BCD)  # bits of sqrt(1/2)
 
 
 @kernel
-def exp(t: float) -> float:
+def exp(t):
     """e^t for -700 < t < 700; arguments beyond are clamped."""
     t = t if t > -700.0 else -700.0
     t = t if t < 700.0 else 700.0
@@ -34,7 +34,7 @@ def exp(t: float) -> float:
 
 
 @kernel
-def log(v: float) -> float:
+def log(v):
     """Natural logarithm of a positive normal number."""
     bits = np.float64(v).view(np.int64)
     e = np.int64(np.int64(bits - _HALF_ROOT) >> np.int64(52))

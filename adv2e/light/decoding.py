@@ -24,16 +24,8 @@ def decoder_for(
 ) -> LightDecoder:
     """Return the decoder that a configuration asks for.
 
-    Parameters
-    ----------
-    frames : Frames
-        The configuration's section.
-    dtype, colour
-        Of the frames; see :class:`adv2e.effects.frames.encoding.LightDecoder`.
-    auto : str
-        What ``encoding: auto`` means for them.
-    white : float, optional
-        The number that means white in them; default: that of the data type.
+    `auto` is what ``encoding: auto`` means for the frames, `white` their number for white where
+    that is not the one of the data type.
     """
     full_scale = frames.full_scale or white or full_scale_of(dtype)
     return LightDecoder(encoding_for(frames, auto), full_scale, dtype, colour)
@@ -54,14 +46,7 @@ def kernel_table(
 def light_text(light: Light, white: float, frames: Frames | None = None) -> str:
     """Return in one line which light the numbers of frames are taken for, why, and what changes it.
 
-    Parameters
-    ----------
-    light : Light
-        What the source of the frames says of them.
-    white : float
-        The number that means white in them, unless the configuration says another.
-    frames : Frames, optional
-        The configuration's section; default: one that says nothing.
+    `white` is the number that means white, unless the configuration says another.
     """
     frames = frames or Frames()
     if frames.encoding != "auto":

@@ -21,17 +21,7 @@ def _stays(dtype: DTypeLike, eight_bit: bool) -> bool:
 
 
 def picture_white(dtype: DTypeLike, white: float, eight_bit: bool) -> float:
-    """Return the number that means white in the pictures of frames of `dtype`.
-
-    Parameters
-    ----------
-    dtype : dtype
-        Of the frames.
-    white : float
-        Number that means white in the frames.
-    eight_bit : bool
-        Pictures must be of 8 bits.
-    """
+    """Return the number that means white in the pictures of frames in which `white` does."""
     if _stays(dtype, eight_bit):
         return white
     return 255.0 if eight_bit else 65535.0
@@ -40,18 +30,7 @@ def picture_white(dtype: DTypeLike, white: float, eight_bit: bool) -> float:
 def picture_of(
     image: NDArray[Any], alpha: NDArray[Any] | None, decoder: LightDecoder, eight_bit: bool
 ) -> NDArray[Any]:
-    """Return a frame as a picture of 8 or 16 bits, encoded as the frame is.
-
-    Parameters
-    ----------
-    image : (rows, columns[, 3]) array
-    alpha : (rows, columns) array, optional
-        How much of each pixel is there, 0..1.
-    decoder : LightDecoder
-        Of the frames.
-    eight_bit : bool
-        It must be of 8 bits.
-    """
+    """Return a frame as a picture of 8 or 16 bits, encoded as the frame is."""
     picture = image
     if not _stays(image.dtype, eight_bit):
         white = picture_white(image.dtype, decoder.full_scale, eight_bit)

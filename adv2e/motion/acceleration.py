@@ -106,12 +106,7 @@ def bends(
 ) -> tuple[Bend, Bend] | None:
     """Return the bend of the paths of both frames of an interval; None: they are straight.
 
-    Parameters
-    ----------
-    there, back : Motion
-        From the first frame to the second, and from the second to the first.
-    before, after : Side or None
-        From the first frame to the one before it, from the second to the one after it.
+    `before` and `after` are the sides of the first frame and of the second.
     """
     if before is None or after is None or not (_is_like(before.span) and _is_like(after.span)):
         return None

@@ -70,17 +70,9 @@ class Motion:
 
 
 def estimate_motion(a: NDArray[Any], b: NDArray[Any]) -> tuple[Motion, Motion] | None:
-    """Return the motion from `a` to `b` and from `b` to `a`; None where there is none to be found.
+    """Return the motion from `a` to `b` and from `b` to `a`; None where none is to be found.
 
-    Parameters
-    ----------
-    a, b : (rows, columns)
-        Light [DN].
-
-    Returns
-    -------
-    tuple of Motion, or None
-        None for frames smaller than SMALLEST, for frames equal to within 1 %, across a cut.
+    That is for frames smaller than SMALLEST, for frames equal to within 1 %, and across a cut.
     """
     if min(a.shape) < SMALLEST:
         return None

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
-
-from numpy.typing import NDArray
 
 from adv2e.compiled import entry
 from adv2e.motion.warping import cubic
 
 
 @entry
-def spread(u: NDArray[Any], v: NDArray[Any], wide_u: NDArray[Any], wide_v: NDArray[Any]) -> None:
+def spread(u, v, wide_u, wide_v):
     """Fill `wide_u` and `wide_v` with the longest smear that passes over each pixel.
 
-    Parameters
-    ----------
-    u, v : (rows, columns)
-        Columns and rows over which what is at a pixel is smeared, half to either side [px].
+    u, v: columns and rows over which what is at a pixel is smeared, half to either side [px].
     """
     rows, columns = u.shape
     for y in range(rows):
@@ -41,7 +35,7 @@ def spread(u: NDArray[Any], v: NDArray[Any], wide_u: NDArray[Any], wide_v: NDArr
 
 
 @entry
-def smear(light: NDArray[Any], u: NDArray[Any], v: NDArray[Any], out: NDArray[Any]) -> None:
+def smear(light, u, v, out):
     """Fill `out` with the mean of `light` along the smear through each pixel.
 
     Samples stand at the middles of equal parts of half a pixel or less.  Where there is no smear

@@ -9,9 +9,6 @@ is nothing better to know.
 from __future__ import annotations
 
 import math
-from typing import Any
-
-from numpy.typing import NDArray
 
 from adv2e.compiled import entry, kernel
 
@@ -26,7 +23,7 @@ _DIAGONAL = 1.4
 
 
 @kernel
-def _bilinear(image: NDArray[Any], x: float, y: float) -> float:
+def _bilinear(image, x, y):
     rows, columns = image.shape
     x = min(max(x, 0.0), columns - 1.0)
     y = min(max(y, 0.0), rows - 1.0)
@@ -34,12 +31,11 @@ def _bilinear(image: NDArray[Any], x: float, y: float) -> float:
     fx, fy = x - i, y - j
     top = image[j, i] + fx * (image[j, i + 1] - image[j, i])
     bottom = image[j + 1, i] + fx * (image[j + 1, i + 1] - image[j + 1, i])
-    value: float = top + fy * (bottom - top)
-    return value
+    return top + fy * (bottom - top)
 
 
 @kernel
-def cubic(image: NDArray[Any], x: float, y: float) -> float:
+def cubic(image, x, y):
     """Return the light at column `x`, row `y`: Catmull-Rom, overshoot limited.
 
     Bilinear light would lose contrast between pixels and regain it on them, so that every moving
@@ -66,14 +62,11 @@ def cubic(image: NDArray[Any], x: float, y: float) -> float:
     )
     least, most = min(p, q, r, s), max(p, q, r, s)
     slack = 0.25 * (most - least)
-    limited: float = min(max(value, least - slack, 0.0), most + slack)
-    return limited
+    return min(max(value, least - slack, 0.0), most + slack)
 
 
 @entry
-def mismatch(
-    u: NDArray[Any], v: NDArray[Any], here: NDArray[Any], there: NDArray[Any], out: NDArray[Any]
-) -> None:
+def mismatch(u, v, here, there, out):
     """Fill `out` with the absolute difference between each pixel and where it goes."""
     rows, columns = here.shape
     for y in range(rows):
@@ -82,9 +75,7 @@ def mismatch(
 
 
 @entry
-def find_lost(
-    u: NDArray[Any], v: NDArray[Any], ru: NDArray[Any], rv: NDArray[Any], lost: NDArray[Any]
-) -> None:
+def find_lost(u, v, ru, rv, lost):
     """Mark in `lost` the pixels that do not come back with the motion (`ru`, `rv`) there."""
     rows, columns = lost.shape
     for y in range(rows):
@@ -101,9 +92,7 @@ def find_lost(
 
 
 @entry
-def fill_lost(
-    u: NDArray[Any], v: NDArray[Any], lost: NDArray[Any], g: NDArray[Any], distance: NDArray[Any]
-) -> None:
+def fill_lost(u, v, lost, g, distance):
     """Give lost pixels the motion of the one that is nearest over like light, in place.
 
     The length of a path is the change of `g` along it and 0.02 a pixel, found by two pairs of
@@ -135,16 +124,7 @@ def fill_lost(
 
 
 @entry
-def splat(
-    u: NDArray[Any],
-    v: NDArray[Any],
-    p: NDArray[Any],
-    q: NDArray[Any],
-    score: NDArray[Any],
-    fraction: float,
-    best: NDArray[Any],
-    source: NDArray[Any],
-) -> None:
+def splat(u, v, p, q, score, fraction, best, source):
     """Send every pixel `fraction` of its way; `best` and `source` say who arrives.
 
     A pixel arrives at the up to four pixels around its goal; the lowest score wins, the nearer
@@ -173,23 +153,8 @@ def splat(
 
 @entry
 def compose(
-    a: NDArray[Any],
-    b: NDArray[Any],
-    ua: NDArray[Any],
-    va: NDArray[Any],
-    pa: NDArray[Any],
-    qa: NDArray[Any],
-    best_a: NDArray[Any],
-    source_a: NDArray[Any],
-    ub: NDArray[Any],
-    vb: NDArray[Any],
-    pb: NDArray[Any],
-    qb: NDArray[Any],
-    best_b: NDArray[Any],
-    source_b: NDArray[Any],
-    fraction: float,
-    out: NDArray[Any],
-) -> None:
+    a, b, ua, va, pa, qa, best_a, source_a, ub, vb, pb, qb, best_b, source_b, fraction, out
+):
     """Fill `out` with the light at `fraction` of the way from `a` to `b`.
 
     Seen in both frames: blended along the motion.  Seen in one only: from that one.  Not known:

@@ -165,14 +165,8 @@ class PixelArray:
     ) -> Iterator[Events]:
         """Yield the sorted events of a part, not too many at a time.
 
-        Parameters
-        ----------
-        part : Part
-            Frames of light [DN], or of uint8 grey values.
-        table : (256,) float32, optional
-            Light of each grey value [DN].
-        pool : ThreadPoolExecutor, optional
-            Threads to work in; none: the calling one.
+        `table` is the light of each grey value, where its frames are not of light; without a `pool`
+        the calling thread works.
         """
         starts = np.array([self._relative(t) for t in part.times_ns])
         span = starts[-1] - starts[0]

@@ -19,17 +19,9 @@ _YIELDED = 1 << 20
 
 
 class Parted:
-    """Events of a tile, slice of time by slice.
+    """Events of a tile, slice of time by slice: the first `count` of `keys`, in any order.
 
-    Parameters
-    ----------
-    keys : (count or more,)
-        Packed events, in any order.
-    times : (0 or as many,)
-        Their unrounded times [us], where these are kept.
-    count : int
-    per_us : float
-        Slices a microsecond.
+    `times` are their unrounded times, where these are kept; there are `per_us` slices a us.
     """
 
     def __init__(
@@ -52,15 +44,7 @@ def in_order(
 ) -> Iterator[Events]:
     """Yield the events of all tiles, sorted, not many more than a million at a time.
 
-    Parameters
-    ----------
-    parted : sequence of Parted
-    columns : int
-        Of the sensor.
-    t0_us : int
-        What packed times count from.
-    pool : ThreadPoolExecutor, optional
-        Threads to work in; none: the calling one.
+    Packed times count from `t0_us`.
     """
     ends = np.sum([tile.ends for tile in parted], axis=0)
     first = 0

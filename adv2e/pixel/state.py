@@ -33,19 +33,8 @@ def initial_state(
 ) -> NDArray[np.float64]:
     """Return the state of all pixels before the first frame, (rows of the state, pixels).
 
-    Parameters
-    ----------
-    pixel : Pixel
-        The configuration's section.
-    circuit : Circuit
-        What it makes.
-    first : (rows, columns)
-        Light of the first frame [DN].
-    start : float
-        Its time [us].
-    stepping : Stepping, optional
-        Of a circuit that is solved in steps of time.
-    threads : int
+    `first` is the light of the first frame [DN] at `start` us; `stepping` that of a circuit that is
+    solved in steps of time.
     """
     fill = partial(_over_pixels, threads, first.size)
     seed = circuit.seed

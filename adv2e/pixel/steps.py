@@ -90,16 +90,8 @@ def steps_of(
 ) -> int:
     """Return how many steps ``exact`` makes of a straight piece of x.
 
-    Parameters
-    ----------
-    length_us : float
-        Of the piece.
-    circuit : Circuit
-    step_us : float
-        Longest step that resolves what is added.
-    brightest : float
-        Light in the piece, if it is above white [DN].
-    coarseness : Coarseness
+    `step_us` is the longest step that resolves what is added, `brightest` the light in the piece if
+    it is above white [DN].
     """
     solved, added = coarseness
     # without a pole the signal is a line, and so is a leak that does not follow the light
@@ -180,18 +172,8 @@ class Stepping:
     def runs(self, part: Part, frames: Frames, starts: NDArray[np.float64]) -> Iterator[_Planned]:
         """Yield the runs over the intervals of a part, and the events that are injected in each.
 
-        Parameters
-        ----------
-        part : Part
-        frames : Frames
-            Its frames, as the kernel takes them.
-        starts : (intervals + 1,)
-            Ends of the intervals since the origin [us].
-
-        Raises
-        ------
-        ConfigError
-            Thresholds that drift to zero.
+        `starts` are the ends of the intervals since the origin [us].  Raises ConfigError where
+        thresholds drift to zero.
         """
         circuit = self._circuit
         lengths = np.diff(starts)

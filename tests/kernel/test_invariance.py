@@ -7,22 +7,63 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness import EVERYTHING, IN_LANES, STEPPED_FORM, advance, quiet, start
+from harness import EVERYTHING, IN_LANES, advance, quiet, start
 
-from adv2e.config.model import LowPass, Pixel, Thresholds
+from adv2e.config.model import LowPass, Pixel, ResetOvershoot, SlewLimit, Thresholds
+from adv2e.effects.courses import INJECTED_DTYPE, Additions
+from adv2e.pixel import steps as stepping
+
+FRAMES, ROWS, COLUMNS = 19, 48, 70
+ALL = {
+    **EVERYTHING,
+    "slew_limit": SlewLimit(per_s=30.0),
+    "reset_overshoot": ResetOvershoot(fraction=0.2),
+    "thresholds": Thresholds(on=0.2, off=0.25, mismatch=0.03, drift_per_s=2.0),
+}
 
 
-def clip(frames=19, rows=48, columns=70, seed=1):
-    draw = np.random.default_rng(seed)
-    y, x = np.mgrid[:rows, :columns]
+def clip():
+    draw = np.random.default_rng(1)
+    y, x = np.mgrid[:ROWS, :COLUMNS]
     light = [
         60 + 55 * np.sin(0.35 * (x - 1.3 * k)) * np.cos(0.2 * y) + draw.normal(0, 0.5, y.shape)
-        for k in range(frames)
+        for k in range(FRAMES)
     ]
     # float32, as decoded video is; the right half rests for a while
     stack = np.clip(light, 0, 255).astype(np.float32)
-    stack[6:12, :, columns // 2 :] = stack[6, :, columns // 2 :]
+    stack[6:12, :, COLUMNS // 2 :] = stack[6, :, COLUMNS // 2 :]
     return stack
+
+
+def additions():
+    shape = 1.0 + 0.3 * np.sin(np.arange(ROWS * COLUMNS))
+
+    def inject(t0, t1):
+        k = np.arange(np.ceil(t0 / 1e-5), np.ceil(t1 / 1e-5)).astype(np.int64)
+        k = k[(k * 1e-5 >= t0) & (k * 1e-5 < t1)]
+        rows = np.zeros(k.size, INJECTED_DTYPE)
+        rows["t"], rows["x"], rows["y"], rows["p"] = k * 1e-5, k * 31 % COLUMNS, k % ROWS, k % 2
+        return rows
+
+    return Additions(
+        longest_step_us=lambda a, b: 90.0,
+        drive=lambda t: 0.2 * np.sin(700 * t)[:, None] * shape,
+        signal=lambda t: 0.1 * np.sin(1300 * t),
+        on=lambda t: 1 + 0.2 * np.sin(300 * t)[:, None] * shape,
+        inject=inject,
+    )
+
+
+CASES = {
+    "exact": {},
+    "in lanes": IN_LANES,
+    "all": ALL,
+    "all and additions": {**ALL, "additions": additions()},
+    "Euler": {**IN_LANES, "low_pass": LowPass(update="euler")},
+    "K steps and additions": {
+        **ALL, "low_pass": LowPass(update="first_order_hold"), "additions": additions()
+    },
+}  # fmt: skip
 
 
 def times_ns(frames):
@@ -36,19 +77,20 @@ def run(pixel, light, K=10, printed=False, **options):
     return advance(array, light, times, L=3, printed=printed, **split)[0]
 
 
-@pytest.mark.parametrize(
-    "sections", [{}, IN_LANES, STEPPED_FORM, EVERYTHING, {"low_pass": LowPass(update="euler")}]
-)
+@pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("printed", [False, True])
-def test_tiles_chunks_and_threads_change_nothing(sections, printed):
-    light = clip()
+def test_tiles_chunks_and_threads_change_nothing(name, printed, monkeypatch):
+    sections = dict(CASES[name])
+    light, same = clip(), {"printed": printed, "additions": sections.pop("additions", None)}
     pixel = Pixel(**sections)
-    whole = run(pixel, light, printed=printed)
+    whole = run(pixel, light, **same)
     assert len(whole) > 1000
-    for options in ({"tile": 1024}, {"chunk": 1}, {"chunk": 4, "tile": 1024, "threads": 3}):
-        split = run(pixel, light, printed=printed, **options)
-        split = np.sort(split, order=("t", "y", "x", "p"))
-        assert whole.tobytes() == split.tobytes()
+    for options in ({"tile": 2048}, {"chunk": 1}, {"chunk": 4, "tile": 2048, "threads": 3}):
+        split = np.sort(run(pixel, light, **same, **options), order=("t", "y", "x", "p"))
+        assert np.sort(whole, order=("t", "y", "x", "p")).tobytes() == split.tobytes()
+    # as few steps in memory at a time as can be
+    monkeypatch.setattr(stepping, "_VALUES", 1)
+    assert whole.tobytes() == run(pixel, light, **same).tobytes()
 
 
 @pytest.mark.parametrize("sections", [{}, IN_LANES, EVERYTHING])
@@ -60,7 +102,7 @@ def test_exact_does_not_depend_on_K(sections):
 
 
 def test_seed_decides_and_only_noise():
-    light, times = clip(), times_ns(19)
+    light, times = clip(), times_ns(FRAMES)
 
     def events(pixel, seed):
         return advance(start(light, times, pixel, seed=seed), light, times)[0].tobytes()
@@ -68,6 +110,19 @@ def test_seed_decides_and_only_noise():
     assert events(Pixel(), 1) == events(Pixel(), 1)
     assert events(Pixel(), 1) != events(Pixel(), 2)
     assert events(quiet(), 1) == events(quiet(), 2)
+
+
+def test_noise_does_not_depend_on_other_effects():
+    """Events of shot noise and hot pixels come at the same times whatever else is on."""
+    light = np.full((9, 1, 64), 40.0, np.float32)
+    noisy = {key: EVERYTHING[key] for key in ("shot_noise", "hot_pixels")}
+    plain = run(quiet(**noisy), light)
+    assert len(plain) > 20
+    for more in (
+        {"slew_limit": ALL["slew_limit"]},
+        {"reset_overshoot": ResetOvershoot(fraction=0.0)},
+    ):
+        assert run(quiet(**{**noisy, **more}), light).tobytes() == plain.tobytes()
 
 
 def test_events_do_not_run_out_of_room():
@@ -83,15 +138,26 @@ def test_events_do_not_run_out_of_room():
 
 _PLAIN = """
 import numpy as np, sys
-sys.path.insert(0, {tests!r})
+sys.path[:0] = [{tests!r}, {tests!r} + "/kernel"]
 from harness import EVERYTHING, IN_LANES, STEPPED_FORM, advance, start
+from test_invariance import ALL
+from adv2e.effects.courses import Additions
 from adv2e.config.model import Pixel, LowPass
 draw = np.random.default_rng(2)
 light = np.exp(draw.uniform(1, 5.5, (3, 3, 4))).astype(np.float32)
 times = [0, 2_000_000, 4_000_000]
-steps = {{"low_pass": LowPass(update="paper")}}
-for sections in ({{}}, IN_LANES, STEPPED_FORM, EVERYTHING, steps):
-    events, exact = advance(start(light, times, Pixel(**sections), exact_times=True), light, times)
+added = Additions(
+    longest_step_us=lambda a, b: 100.0,
+    drive=lambda t: 0.1 * np.sin(900 * t),
+    on=lambda t: 1 + 9 * t,
+)
+paper = LowPass(update="paper")
+for sections, additions in (
+    ({{}}, None), (IN_LANES, None), (STEPPED_FORM, None), (EVERYTHING, None), (ALL, added),
+    ({{**ALL, "low_pass": paper}}, added),
+):
+    array = start(light, times, Pixel(**sections), exact_times=True, additions=additions)
+    events, exact = advance(array, light, times)
     print(len(events), *(f"{{t:.4f}}" for t in exact), *events["p"], *events["x"], *events["y"])
 """
 

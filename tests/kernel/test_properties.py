@@ -1,14 +1,26 @@
 """What must hold of any stimulus."""
 
 import numpy as np
-from harness import advance, by_pixel, quiet, solve, start
-from hypothesis import given, settings
+from harness import QUIET, advance, by_pixel, quiet, solve, start
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from adv2e.config.model import LogResponse, LowPass, Thresholds
+from adv2e.config.model import (
+    LogResponse,
+    LowPass,
+    Pixel,
+    Refractory,
+    ResetOvershoot,
+    SlewLimit,
+    Thresholds,
+)
+from adv2e.effects.courses import Additions
 from adv2e.kernel import per_pixel
 
 LIGHTS = st.lists(st.floats(0.0, 255.0, width=32), min_size=2, max_size=8)
+MANY = st.lists(
+    st.lists(st.floats(0.0, 255.0, width=32), min_size=3, max_size=3), min_size=2, max_size=6
+)
 INTERVAL_NS = 4_166_667
 
 
@@ -74,3 +86,59 @@ def test_more_light_everywhere_changes_nothing_but_the_corner():
     for a, b in zip(*found, strict=True):
         assert np.array_equal(a[:, 1], b[:, 1])
         assert np.allclose(a[:, 0], b[:, 0], rtol=0, atol=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    light=MANY,
+    fraction=st.floats(-0.9, 0.9),
+    slew=st.floats(1.0, 500.0),
+    drift=st.floats(-5.0, 20.0),
+    dead_us=st.none() | st.floats(1.0, 5000.0),
+)
+def test_whatever_the_light_events_are_in_order_and_apart(light, fraction, slew, drift, dead_us):
+    sections = {
+        "reset_overshoot": ResetOvershoot(fraction=fraction),
+        "slew_limit": SlewLimit(per_s=slew),
+        "thresholds": Thresholds(mismatch=0.0, drift_per_s=drift),
+        "refractory": Refractory(period_us=dead_us) if dead_us else None,
+    }
+    times = np.arange(len(light)) * 0.01
+    span = 1e6 * times[-1]
+    for events in solve(np.array(light), times, Pixel(**{**QUIET, **sections})):
+        t = 1e6 * events[:, 0]
+        assert np.all((t >= 0) & (t <= span + 1e-6))
+        assert np.all(np.diff(t) >= (dead_us or 0.0) - 1e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(light=MANY, slew=st.floats(5.0, 200.0), threshold=st.floats(0.05, 0.5))
+@example(  # ends its ramp within a step, just before an event
+    light=[[255.0, 0, 0], [71.0, 0, 0], [208.0, 0, 0], [8.0, 0, 0]], slew=90.0, threshold=0.19140625
+)
+def test_slew_limit_keeps_events_apart(light, slew, threshold):
+    """No two events of one polarity are nearer than the limit allows, but for 1 us."""
+    times = np.arange(len(light)) * 0.01
+    pixel = quiet(
+        slew_limit=SlewLimit(per_s=slew),
+        thresholds=Thresholds(on=threshold, off=threshold, mismatch=0.0),
+    )
+    for events in solve(np.array(light), times, pixel):
+        passed = threshold * np.cumsum(events[:, 1])
+        assert np.all(np.abs(passed) <= slew * (events[:, 0] + 1e-6))
+        gaps, moved = np.diff(events[:, 0]), np.abs(np.diff(passed))
+        same = events[1:, 1] == events[:-1, 1]
+        assert np.all(moved[same] <= slew * (gaps[same] + 1e-6))
+
+
+@settings(max_examples=40, deadline=None)
+@given(light=MANY, offset=st.floats(-3.0, 3.0))
+def test_a_constant_added_to_the_signal_changes_nothing(light, offset):
+    times = np.arange(len(light)) * 0.01
+    added = Additions(longest_step_us=lambda a, b: 1e3, signal=lambda t: np.full(t.shape, offset))
+    plain = solve(np.array(light), times, quiet(), method="stepped")
+    found = solve(np.array(light), times, quiet(), additions=added)
+    for a, b in zip(found, plain, strict=True):
+        assert np.array_equal(a[:, 1], b[:, 1])
+        # where the signal hardly moves, rounding shows
+        np.testing.assert_allclose(a[:, 0], b[:, 0], atol=1e-6)

@@ -28,22 +28,7 @@ _WHITE = 255.0
 
 
 def check_white(largest: float, label: str, full_scale: float | None) -> None:
-    """Refuse floats that are far above white, unless somebody said what white is.
-
-    Parameters
-    ----------
-    largest : float
-        Of the numbers of a frame.
-    label : str
-        What it is called.
-    full_scale : float, optional
-        Number that is said to mean white.
-
-    Raises
-    ------
-    DataError
-        Naming `label`, the largest number, and the key that says what is white.
-    """
+    """Refuse floats far above white (DataError), unless a `full_scale` was said to be white."""
     if full_scale is None and largest > UNSTATED:
         raise DataError(
             f"{label}: floats up to {largest:g}, where 1 is white; say what is, with"
@@ -58,17 +43,7 @@ _USUAL = 12
 
 
 def doubt_of_white(largest: float, dtype: DTypeLike, label: str) -> str:
-    """Return what is to be told of whole numbers of which none is near white; often nothing.
-
-    Parameters
-    ----------
-    largest : float
-        Of all the numbers.
-    dtype : dtype
-        Theirs.
-    label : str
-        What they are called.
-    """
+    """Return what is to be told of whole numbers of which none is near white; often nothing."""
     whole = 8 * np.dtype(dtype).itemsize
     fitting = [bits for bits in _BITS.get(whole, ()) if largest < 1 << bits]
     if np.dtype(dtype).kind != "u" or not fitting or largest <= 0:
@@ -92,20 +67,9 @@ def check_floats(image: NDArray[Any], label: str, full_scale: float | None) -> N
 def bounded(
     frames: Iterator[tuple[int, NDArray[Any]]], table: NDArray[np.float32] | None
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Yield (t_ns, light) as they come, light and time of each looked at.
+    """Yield (t_ns, light) as they come, light and time of each looked at; names a frame it refuses.
 
-    Parameters
-    ----------
-    frames : iterator of (int, array)
-        Times and light [DN], or grey values for the `table`.
-    table : (256,) array, optional
-        Light of the grey values [DN].
-
-    Raises
-    ------
-    DataError
-        Light that is no finite number from 0 to `BRIGHTEST` times white, or a time beyond what is
-        possible; names the frame.
+    `table`: light [DN] of the values of frames that are not decoded yet.
     """
     harmless = table is not None and float(table.max()) <= BRIGHTEST * _WHITE
     for number, (t_ns, light) in enumerate(frames):

@@ -93,17 +93,7 @@ def encoding_of_images(dtype: DTypeLike, colour: bool) -> str:
 
 
 def decode_values(values: NDArray[Any], encoding: str, full_scale: float) -> NDArray[Any]:
-    """Return DN = 255 light of encoded `values`, element by element, in their own float type.
-
-    Parameters
-    ----------
-    values : array of float32 or float64
-        Encoded values, at or above zero; above `full_scale` they are kept, not clipped.
-    encoding : str
-        Any but ``auto``.
-    full_scale : float
-        The value that means white.
-    """
+    """Return DN = 255 light of encoded values, in their own float type; above white they go on."""
     if encoding == "linear":
         # multiplied first: whole numbers of 0..255 come back as they are
         return np.divide(values * 255.0, full_scale, dtype=values.dtype)
@@ -209,19 +199,9 @@ class LightDecoder:
         return self._tables[0] if self.dtype == np.uint8 and not self.colour else None
 
     def decode(self, image: NDArray[Any], alpha: NDArray[Any] | None = None) -> NDArray[Any]:
-        """Return the light of `image`.
+        """Return the light of an image, luma [DN of 255], float64 for frames of float64.
 
-        Parameters
-        ----------
-        image : array, (rows, columns) or (rows, columns, 3)
-            A frame as read, of the data type and colour given to the constructor.
-        alpha : (rows, columns) array, optional
-            How much of each pixel is there before black, 0..1: its light is multiplied by it.
-
-        Returns
-        -------
-        array, (rows, columns)
-            Linear light, luma [DN of 255]; float32, or float64 when the frame is float64.
+        `alpha` (rows, columns) says how much of each pixel is there before black, 0..1.
         """
         if image.dtype != self.dtype or image.ndim != (3 if self.colour else 2):
             raise ValueError(
@@ -232,14 +212,7 @@ class LightDecoder:
         return light if alpha is None else light * alpha
 
     def over_black(self, image: NDArray[Any], alpha: NDArray[Any]) -> NDArray[Any]:
-        """Return the whole numbers whose light is nearest to that of `image` times `alpha`.
-
-        Parameters
-        ----------
-        image : array of uint8 or uint16, (rows, columns) or (rows, columns, 3)
-        alpha : (rows, columns) array
-            0..1.
-        """
+        """Return the whole numbers whose light is nearest to that of `image` times `alpha`."""
         planes = image if self.colour else image[..., np.newaxis]
         composed = np.empty_like(planes)
         for number, table in enumerate(self._tables):

@@ -69,20 +69,10 @@ _STRIP = 1024
 def means(times: Array, exposure: float) -> Array:
     """Return the matrix that takes light at `times` to its means over exposures about them.
 
-    Parameters
-    ----------
-    times : (n,)
-        Increasing.
-    exposure : float
-        In the unit of `times`.
-
-    Returns
-    -------
-    (n, n)
-        Rows with sum 1 and, as near as it comes, the variance of the exposure: a mixture of the
-        means over light that is constant about each time, and over light that is linear between.
-        Towards both ends the exposures are cut, on both sides alike, to what lies between the first
-        and the last time.
+    Its rows have sum 1 and, as near as it comes, the variance of the exposure: a mixture of the
+    means over light that is constant about each time, and over light that is linear between.
+    Towards both ends the exposures are cut, on both sides alike, to what lies between the first and
+    the last time.
     """
     widths = np.minimum(exposure, 2.0 * np.minimum(times - times[0], times[-1] - times))
     first, last = (times - 0.5 * widths)[:, None], (times + 0.5 * widths)[:, None]
@@ -117,17 +107,9 @@ def _under_hats(at: Array, times: Array) -> Array:
 def sharpened(
     frames: list[NDArray[Any]], times: Array, exposure: float, begin: int, end: int
 ) -> list[NDArray[Any]]:
-    """Return the light at the times begin..end of frames that average it over an exposure.
+    """Return the light at the times begin..end of `frames` that average it over an exposure.
 
-    Parameters
-    ----------
-    frames : list of (rows, columns)
-        The frames of a block with its margins [DN].
-    times : (frames,)
-    exposure : float
-        In the unit of `times`.
-    begin, end : int
-        Which of them are wanted.
+    `frames` and `times` are those of a block with its margins; the exposure is in their unit.
     """
     matrix = means(times, exposure)
     used = matrix > 0.0

@@ -63,12 +63,7 @@ def velocity(
 ) -> tuple[Image, Image] | None:
     """Return columns and rows a unit of time at a frame; None: no motion is known.
 
-    Parameters
-    ----------
-    after, before : Motion or None
-        From the frame to the next and to the one before.
-    span_after, span_before : float
-        Time to them, above 0.
+    `after` and `before` lead from it to the next frame and to the one before, in so much time.
     """
     sides = [
         (motion, span)
@@ -108,15 +103,7 @@ def _known(part: Image, motion: Motion) -> Image:
 
 
 def sharpened(light: NDArray[Any], u: Image, v: Image) -> NDArray[Any]:
-    """Return the light of a frame in which each pixel is smeared over (u, v) pixels.
-
-    Parameters
-    ----------
-    light : (rows, columns)
-        Of the frame [DN].
-    u, v : (rows, columns)
-        Columns and rows over which what is at a pixel is smeared, half to either side.
-    """
+    """Return the light [DN] of a frame in which each pixel is smeared over (u, v) pixels."""
     short = np.hypot(u, v) < _LEAST_PX
     wide_u, wide_v = np.empty_like(u), np.empty_like(v)
     none = np.float32(0.0)

@@ -93,23 +93,12 @@ class ArbiterHooks(Hooks):
         most = events.size + int(self._channel[EVENTS])
         times, pixels = np.empty(most), np.empty(most, np.int64)
         polarities = np.empty(most, np.int8)
+        p = self.parameters
         count = serve(
-            asking_us,
-            pixel,
-            polarity,
-            known_us,
-            self.parameters.row_ns * 1e-3,
-            self.parameters.event_ns * 1e-3,
-            self.view.columns,
-            self._channel,
-            self._queue,
-            self._asked,
-            self._waiting,
-            self._left,
-            times,
-            pixels,
-            polarities,
-        )
+            asking_us, pixel, polarity, known_us, p.row_ns * 1e-3, p.event_ns * 1e-3,
+            self.view.columns, self._channel, self._queue, self._asked, self._waiting, self._left,
+            times, pixels, polarities,
+        )  # fmt: skip
         stamps = np.rint(times[:count]).astype(np.int64) + self._origin_us
         y, x = np.divmod(pixels[:count], self.view.columns)
         return make_events(stamps, x, y, polarities[:count])

@@ -104,18 +104,9 @@ def warp(
     fraction: float,
     bent: tuple[Bend, Bend] | None = None,
 ) -> Array:
-    """Return the light at `fraction` of the way from `a` to `b`.
+    """Return the light at `fraction` of the way from `a` to `b`, above 0 and below 1.
 
-    Parameters
-    ----------
-    a, b : (rows, columns) float32 or float64, C order
-        Light [DN].
-    there, back : Motion
-        From `a` to `b` and from `b` to `a`.
-    fraction : float
-        Above 0 and below 1.
-    bent : tuple of Bend, optional
-        Of the paths of `a` and of `b`; straight without.
+    `there` and `back` lead from `a` to `b` and from `b` to `a`, straight unless they are `bent`.
     """
     out = np.empty_like(a)
     first, second = (None, None) if bent is None else bent

@@ -39,13 +39,7 @@ def instant_ns(start_ns: int, stop_ns: int, step: int, count: int) -> int:
 
 
 def neighbours(frames: Iterable[Timed]) -> Iterator[tuple[Timed, Timed, Beside]]:
-    """Yield each pair of neighbours with what lies beside it; reads one frame ahead.
-
-    Parameters
-    ----------
-    frames : iterable of (int, (rows, columns))
-        Times increase.
-    """
+    """Yield each pair of neighbours with what lies beside it; reads one frame ahead."""
     coming = iter(frames)
     before: Timed | None = None
     first, second = next(coming, None), next(coming, None)

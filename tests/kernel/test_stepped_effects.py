@@ -1,4 +1,4 @@
-"""Effects of the stepping path against plain differences in steps of 1 us."""
+"""Effects of the stepping solver against plain differences in steps of 1 us."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The exact update against the dense ODE: counts equal, every time within 1 us."""
+"""The exact solver against the dense ODE: counts equal, every time within 1 us."""
 
 import math
 from dataclasses import replace

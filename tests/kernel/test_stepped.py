@@ -1,4 +1,4 @@
-"""The stepping path against the solved one, the dense ODE and the slow twin."""
+"""The stepping solver against the exact one, the dense ODE and the slow twin."""
 
 import math
 
@@ -11,7 +11,7 @@ from reference import stimuli
 from reference.agreement import count_and_time_errors
 from reference.circuit import Circuit
 from reference.dense_ode import as_lists, dense_truth
-from test_dense import CIRCUITS, WITH_EFFECTS
+from test_exact_against_ode import CIRCUITS, WITH_EFFECTS
 from test_twin import CASES, check, clock, moving_light
 
 from adv2e.config.model import (
