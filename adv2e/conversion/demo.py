@@ -11,7 +11,7 @@ from adv2e.conversion.pipeline import Summary, convert
 from adv2e.conversion.reading import Reading
 from adv2e.errors import OutputError
 from adv2e.files.names import shown
-from adv2e.files.staging import check_free
+from adv2e.files.staging import Staging
 from adv2e.formats.reading import read_recording
 from adv2e.rendering import Style, render_recording
 from adv2e.rendering.timeline import caption
@@ -87,7 +87,9 @@ def run_demo(
         raise OutputError(f"{folder}: is not a folder")
     clip, events = folder / "clip.avi", folder / "clip.events.h5"
     picture, film = folder / "clip.events.png", folder / "clip.events.mp4"
-    check_free([clip, events, picture, film], overwrite)
+    staging = Staging(overwrite)
+    for output in (clip, events, picture, film):
+        staging.file(output)  # checks, before any work, that it may be written
     scene = Scene()
     size = {"width": WIDTH, "height": HEIGHT}
     write_video(scene, clip, **size, fps=FPS, duration_s=DURATION_S, overwrite=overwrite)

@@ -276,13 +276,6 @@ class Staging(cleanup.Unfinished):
         return not any(workspace.path.exists() for workspace in made)
 
 
-def check_free(outputs: Iterable[Path], overwrite: bool) -> None:
-    """Check before any work that all files may be written; errors are those of :class:`Staging`."""
-    staging = Staging(overwrite)
-    for output in outputs:
-        staging.file(output)
-
-
 def nearest_there(path: Path) -> Path:
     """Return what a file or folder would be made in: the nearest above it that exists."""
     return next(above for above in path.parents if os.path.lexists(above))

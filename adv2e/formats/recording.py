@@ -17,10 +17,6 @@ MOST_COLUMNS = 1 << 16
 """Columns and rows that coordinates of events can name."""
 
 
-def _no_images() -> Iterator[Image | Pixels]:
-    return iter(())
-
-
 @dataclass(frozen=True)
 class Recording:
     """The content of an event file.
@@ -53,7 +49,7 @@ class Recording:
     frame_times_ns: NDArray[np.int64] | None = None
     metadata: dict[str, Any] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
-    images: Callable[[], Iterator[Image | Pixels]] = field(default=_no_images, repr=False)
+    images: Callable[[], Iterator[Image | Pixels]] = field(default=lambda: iter(()), repr=False)
 
     @property
     def light(self) -> Light:

@@ -74,15 +74,10 @@ def _has_only_frames(path: Path) -> bool:
     if path.is_dir():
         return not (path / EVENTS).is_file()
     if path.suffix.lower() == ".zip":
-        names = _members(path)
+        with zip_archive(path) as archive:
+            names = {PurePosixPath(name).name for name in archive.namelist()}
         return "images.txt" in names and EVENTS not in names
     return path.suffix.lower() in (*VIDEO_SUFFIXES, ".npy")
-
-
-def _members(path: Path) -> set[str]:
-    """Return the names of the files in a zip, without folders."""
-    with zip_archive(path) as archive:
-        return {PurePosixPath(name).name for name in archive.namelist()}
 
 
 def _of_recording(recording: Recording) -> dict[str, Any]:
@@ -120,7 +115,7 @@ def _light(light: Light, white: float) -> dict[str, Any]:
 
 
 def _of_source(source: Source) -> dict[str, Any]:
-    times_ns = _times_ns(source)
+    times_ns = np.array([frame.t_ns for frame in source.frames()], np.int64)
     doubt = source.doubt_of_white(source.largest_read)  # known once all frames were read
     return {
         "file": shown(source.path),
@@ -139,10 +134,6 @@ def _of_source(source: Source) -> dict[str, Any]:
         "notes": list(source.notes),
         "metadata": {},
     }
-
-
-def _times_ns(source: Source) -> NDArray[np.int64]:
-    return np.array([frame.t_ns for frame in source.frames()], dtype=np.int64)
 
 
 def describe_times(times_ns: NDArray[np.int64]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import numpy as np
@@ -40,14 +40,6 @@ Its FFV1 is smaller than HuffYUV, but says that it is transparent.
 _H264 = {"preset": "veryfast", "crf": "12", "x264-params": "chroma-qp-offset=-6:mbtree=0"}
 """Colour is finer than usual, so that single pixels stay red and blue; with mbtree, the same
 pictures do not always give the same film."""
-
-
-class _Coder(Protocol):
-    def add(self, picture: Picture) -> None:
-        """Append a picture."""
-
-    def close(self) -> None:
-        """Write what is left and let go of the file."""
 
 
 class _OpenCv:
@@ -124,7 +116,7 @@ class VideoFile:
 
     def __init__(self, path: Path, fps: float) -> None:
         self._path, self._fps = path, fps
-        self._coder: _Coder | None = None
+        self._coder: _OpenCv | _PyAv | None = None
         self._count = 0
 
     def add(self, picture: Picture) -> None:

@@ -22,7 +22,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
@@ -78,6 +78,7 @@ class MonashWriter(Writer):
         # kept aside until the events are all written: the file must not depend on how they come
         self._encoded = stack.enter_context(closing(Backlog(path.parent, limit=0)))
         self._frames: list[tuple[int, tuple[int, ...]]] = []  # times [ns] and shapes
+        self._before: list[int | None] = []  # events before each; None: to be looked up
         pixel = np.int16 if max(request.width, request.height) <= 32767 else np.uint16
         group = self._file.create_group("events")
         self._columns = {
@@ -107,7 +108,7 @@ class MonashWriter(Writer):
         begin = self._size
         self._size += held.size
         self._on += int(np.count_nonzero(held["p"]))
-        self._ends.append(held["t"][-1] / 1e6)
+        self._find_frames(begin, held["t"] / 1e6)
         end = self._size
 
         def take(chunks: list[bytes]) -> None:
@@ -118,6 +119,16 @@ class MonashWriter(Writer):
         self._work.submit(self._compressed, self._buffer, take=take)
         # zeros: the last chunk is stored in full
         self._held, self._buffer = 0, np.zeros(CHUNK, EVENT_DTYPE)
+
+    def _find_frames(self, begin: int, times: NDArray[np.float64]) -> None:
+        """Note how many events are before the frames that have come, up to the end of a chunk."""
+        for t_ns, _ in self._frames[len(self._before) :]:
+            t = t_ns / 1e9
+            if t > times[-1]:
+                break
+            came_late = self._ends and t <= self._ends[-1]
+            self._before.append(None if came_late else begin + int(np.searchsorted(times, t)))
+        self._ends.append(times[-1])
 
     def _compressed(self, events: Events) -> list[bytes]:
         return [
@@ -141,8 +152,7 @@ class MonashWriter(Writer):
         if self._held:
             self._write_chunk()
         self._work.finish()
-        for number, before in enumerate(self._events_before_frames()):
-            t_ns, shape = self._frames[number]
+        for number, (t_ns, shape) in enumerate(self._frames):
             image = self._images.create_dataset(
                 f"image{number:09d}", shape, np.uint8, chunks=shape, **_FILTERS
             )
@@ -151,7 +161,7 @@ class MonashWriter(Writer):
             image.attrs["timestamp"] = np.float64(t_ns / 1e9)
             image.attrs["timestamp_ns"] = np.int64(t_ns)
             image.attrs["type"] = "greyscale" if len(shape) == 2 else "color_bgr"
-            image.attrs["event_idx"] = np.int64(max(before - 1, 0))
+            image.attrs["event_idx"] = np.int64(max(self._events_before(number) - 1, 0))
         self._images.attrs["num_images"] = np.int64(len(self._frames))
         times = self._columns["ts"]
         first, last = (times[0], times[-1]) if self._size else (0.0, 0.0)
@@ -175,14 +185,15 @@ class MonashWriter(Writer):
             }
         )
 
-    def _events_before_frames(self) -> Iterator[int]:
-        """Yield how many events are before each frame."""
-        there, times = -1, np.zeros(0)
-        for t_ns, _ in self._frames:
-            chunk = int(np.searchsorted(self._ends, t_ns / 1e9))
-            if chunk != there:  # it ends at the frame or after it, or is behind the last one
-                there, times = chunk, self._columns["ts"][chunk * CHUNK : (chunk + 1) * CHUNK]
-            yield min(chunk * CHUNK, self._size) + int(np.searchsorted(times, t_ns / 1e9))
+    def _events_before(self, number: int) -> int:
+        """Return how many events are before a frame; those after which it came are read again."""
+        known = self._before[number] if number < len(self._before) else None
+        if known is not None:
+            return known
+        t = self._frames[number][0] / 1e9
+        begin = int(np.searchsorted(self._ends, t)) * CHUNK
+        times = self._columns["ts"][begin : begin + CHUNK]
+        return min(begin, self._size) + int(np.searchsorted(times, t))
 
 
 def _bound_cache(file: h5py.File) -> None:
