@@ -94,8 +94,9 @@ def test_matroska_whose_parts_do_not_fit(examined):
     after = cluster(1, block(1, 0), block(1, 9))
     with pytest.raises(DataError, match="clip: damaged at byte"):
         examined(matroska(tracks(1), cluster(0, large), after))
-    with pytest.raises(DataError, match="clip: damaged at byte"):
-        examined(matroska(tracks(1), bytes(16), after))
+    for filling in (bytes(16), b"\xff" * 16):
+        with pytest.raises(DataError, match="clip: damaged at byte"):
+            examined(matroska(tracks(1), filling, after))
 
 
 def full(kind, *contents, version=0):

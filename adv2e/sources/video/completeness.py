@@ -12,59 +12,18 @@ from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
-
-def lost_by_time(
-    expected_ns: Sequence[int], stamps_ns: Sequence[int], tick_ns: int, leading: int = 0
-) -> list[int]:
-    """Return those of the expected times at which no picture came, from the first that came on.
-
-    `expected_ns` are when pictures are shown, sorted, `leading` of them before the first in the
-    file; `stamps_ns` when those that came are, from zero where FFmpeg begins to count: at the first
-    expected one, the first in the file, or the first that came.  The two may differ by `tick_ns`.
-    """
-    if not expected_ns:
-        return []
-    if not stamps_ns:
-        return list(expected_ns)
-    came = sorted(stamps_ns)
-    within = max(tick_ns, 2000)
-    first = expected_ns[0]
-    offsets = (first, 0, first - came[0], expected_ns[leading] - came[0])
-    attempts = (
-        _lost(expected_ns, [stamp + offset for stamp in came], within) for offset in offsets
-    )
-    return min(attempts, key=len)
+_NEAR_NS = 2000
+"""By so much the two may differ."""
 
 
-def _lost(expected_ns: Sequence[int], came: Sequence[int], within: int) -> list[int]:
-    if not _near(came[0], expected_ns, within):
-        return list(expected_ns)
-    lost = [t for t in expected_ns if t > came[0] + within and not _near(t, came, within)]
-    if len(came) > 2 and lost and _are_second_fields(lost, came):
-        return []
-    return lost
+def lost_pictures(
+    expected: int, stamps_ns: Sequence[int | None], shown_ns: Sequence[int], leading: int = 0
+) -> int:
+    """Return how many of the expected pictures are missing behind the first that came.
 
-
-def _near(t: int, times: Sequence[int], within: int) -> bool:
-    place = bisect_left(times, t)
-    return any(abs(t - times[n]) <= within for n in (place - 1, place) if 0 <= n < len(times))
-
-
-def _are_second_fields(lost: Sequence[int], came: Sequence[int]) -> bool:
-    """Tell whether one picture is missing in the middle of each step, all of one length."""
-    steps = [after - before for before, after in pairwise(came)]
-    usual = median(steps)
-    if any(abs(step - usual) > 0.05 * usual for step in steps):
-        return False
-    middles = {bisect_left(came, t) for t in lost}
-    return len(middles) == len(lost) and len(lost) >= len(came) - 1
-
-
-def lost_by_count(expected: int, stamps_ns: Sequence[int | None], known_ns: Sequence[int]) -> int:
-    """Return how many of the expected pictures are missing where times are those of decoding.
-
-    FFmpeg has no stamps for those that it held back to the end; `known_ns` are those of all, as far
-    as known, sorted.
+    `stamps_ns` are those of the pictures that came; FFmpeg has none for those that it held back to
+    the end.  `shown_ns` are when all are shown on the same clock, as far as known, sorted;
+    `leading` of them are before the first in the file, at which that clock may begin.
     """
     missing = expected - len(stamps_ns)
     if missing <= 0:
@@ -78,8 +37,8 @@ def lost_by_count(expected: int, stamps_ns: Sequence[int | None], known_ns: Sequ
         held += 1
     first = next((stamp for stamp in stamps_ns if stamp is not None), 0)
     # the first comes out late by as many as are held back, and by those that could not be shown
-    leading = max(bisect_left(known_ns, first) - held, 0)
-    return max(missing - leading, 0)
+    before = max(bisect_left(shown_ns, first - _NEAR_NS) - held, leading)
+    return max(missing - before, 0)
 
 
 def _is_even(stamps_ns: Sequence[int | None]) -> bool:

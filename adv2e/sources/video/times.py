@@ -17,7 +17,7 @@ import numpy as np
 
 from adv2e.sources.times.instants import NS_PER_S, seconds
 from adv2e.sources.times.rates import FrameRate, constant_rate, rates_near
-from adv2e.sources.video.completeness import lost_by_count, lost_by_time
+from adv2e.sources.video.completeness import lost_pictures
 from adv2e.sources.video.containers import Container
 from adv2e.sources.video.packets import Packets
 
@@ -113,18 +113,14 @@ class VideoTimes:
 
         Stamps are as FFmpeg counts them, not from the first that came.
         """
-        container, packets = self._container, self._packets
         if self.expected is None:
             return 0
-        if packets is None or (packets.complete and not container.decoding_times):
-            known = [stamp for stamp in stamps_ns if stamp is not None]
-            leading = container.leading if packets is None else packets.leading
-            lost = len(lost_by_time(self.shown_ns, known, container.tick_ns, leading))
-            lost += self.expected - (len(self.shown_ns) if packets is None else packets.count)
-        else:
-            lost = lost_by_count(self.expected, stamps_ns, packets.known_ns)
-        tiny = container.tiny if packets is None else packets.tiny
-        return max(lost - tiny, 0)
+        known = self._packets or self._container
+        shown_ns = self.shown_ns
+        if self._packets is None:  # FFmpeg counts from the first
+            shown_ns = [t_ns - shown_ns[0] for t_ns in shown_ns]
+        lost = lost_pictures(self.expected, stamps_ns, shown_ns, known.leading)
+        return max(lost - known.tiny, 0)
 
     def clock(self, *, in_order: bool = True) -> Clock:
         """Return a clock for one pass over the frames.

@@ -15,6 +15,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from adv2e.sources.times.rates import FrameRate
 from adv2e.sources.video.containers.base import Container, cut_short
 
 
@@ -36,12 +37,14 @@ def examine(data: mmap.mmap, found: Container) -> None:
             header = {name: a for name, a, _ in _chunks(data, begin, stop)}
             at = header.get(b"strh", 0)
             if at and data[at : at + 4] == b"vids":
-                scale, hz = struct.unpack_from("<II", data, at + 20)
+                scale, hz, length = struct.unpack_from("<II4xI", data, at + 20)
                 if not scale or not hz:
                     return
                 found.rate, found.decoding_times = Fraction(hz, scale), True
                 if len(ends) == 1:
                     found.pictures = _listed(data, *ends[0], b"%02d" % number)
+                if length and found.pictures is None:
+                    found.end_ns = FrameRate(found.rate).time_ns(length)
                 return
             number += 1
 

@@ -26,7 +26,7 @@ class Container:
     pictures : int or None
         How many pictures it states, where it lists no times (AVI, GIF).
     end_ns : int or None
-        When the last picture ends, from the first, as the headers state it (ASF) [ns].
+        When the last picture ends, from the first, as the headers state it (ASF, AVI) [ns].
     leading : int
         How many of the pictures are shown before the first in the file.
     tiny : int

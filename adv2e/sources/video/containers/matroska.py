@@ -80,6 +80,8 @@ def _elements(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:
         kind, after = variable(data, place, keep_marker=True)
         size, start = variable(data, after, keep_marker=False)
         unknown = size == (1 << 7 * (start - after)) - 1
+        if unknown and kind not in (_SEGMENT, _CLUSTER):
+            raise DamagedError(f"damaged at byte {place}")
         stop = ends[-1] if unknown else start + size
         if stop > ends[-1]:
             if ends[-1] == len(data):
