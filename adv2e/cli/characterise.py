@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--white",
-    type=options.FiniteNumber(min=0, min_open=True),
+    type=options.POSITIVE,
     metavar="LIGHT",
     help="Light that 255 DN stand for, in the table's unit.  [default: the highest]",
 )
 @click.option(
     "--contrast",
-    type=options.FiniteNumber(min=0, min_open=True),
+    type=options.POSITIVE,
     default=1.0,
     show_default=True,
     metavar="LN",
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--error",
-    type=options.FiniteNumber(min=0, min_open=True),
+    type=options.POSITIVE,
     metavar="SHARE",
     help="Standard error of every row, relative.  [default: from the table]",
 )
@@ -62,14 +62,10 @@ def command(
     config_files: tuple[str, ...],
     sets: tuple[str, ...],
     seed: int,
-    where: tuple[str, ...],
-    judge: tuple[str, ...],
-    white: float | None,
-    contrast: float,
-    error: float | None,
     output: str | None,
     overwrite: bool,
     log: Log,
+    **settings: Any,
 ) -> None:
     """Name the effect that measured latencies or noise rates ask for.
 
@@ -99,16 +95,8 @@ def command(
     if output is not None:
         check_folder(output, overwrite=overwrite, inputs=[table, *options.files_given()])
     declared = read_declared(config_files, sets, seed)
-    settings = Settings(
-        where=where,
-        judge=judge,
-        white=white,
-        contrast=contrast,
-        error=error,
-        seed=seed,
-        log=lambda text: log(text, 1),
-    )
-    found = characterise(read_table(table), declared, settings)
+    chosen = Settings(**settings, seed=seed, log=lambda text: log(text, 1))
+    found = characterise(read_table(table), declared, chosen)
     if output is not None:
         write_reports(found, output, overwrite=overwrite)
     if log.level >= 0:

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from adv2e.cli import options
+from adv2e.cli.options import SECONDS
 
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
     from adv2e.config import Config
-
-SECONDS = options.FiniteNumber(min=0)
 
 
 @click.command("convert")
@@ -33,7 +32,6 @@ SECONDS = options.FiniteNumber(min=0)
 )
 @click.option(
     "--format",
-    "format_",
     metavar="NAME",
     help="Format of the output, where its suffix does not say it.",
 )
@@ -56,19 +54,14 @@ SECONDS = options.FiniteNumber(min=0)
 def command(
     source: str,
     output: str | None,
-    overwrite: bool,
     config: Callable[[], Config],
     threads: int | None,
-    progress: bool,
     log: Log,
     given: dict[str, Any],
     start: float | None,
     stop: float | None,
     t0: str,
-    format_: str | None,
-    layout: str | None,
-    with_frames: bool,
-    preview: str | None,
+    **written: Any,
 ) -> None:
     """Turn a video or frames into events.
 
@@ -90,8 +83,7 @@ def command(
         raise click.UsageError("--fps and --timestamps both give the times of the frames: keep one")
     if given["fps"] is not None and given["time_unit"] is not None:
         raise click.UsageError("--time-unit is for lists of times, which --fps replaces: keep one")
-    if start is not None and stop is not None and stop <= start:
-        raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
+    options.check_part(start, stop)
     from adv2e.conversion.reading import Reading
 
     reading = Reading(source, **given, start_s=start, stop_s=stop, t0=t0, threads=threads)
@@ -103,15 +95,10 @@ def command(
             reading,
             output,
             config=config(),
-            format=format_,
-            layout=layout,
-            with_frames=with_frames,
-            overwrite=overwrite,
-            preview=preview,
-            progress=progress,
             compile_apart=True,
             also_read=options.files_given(),
             log=log,
+            **written,
         )
     if log.level >= 0:
         click.echo(summary.text(), err=output == "-")

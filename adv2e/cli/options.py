@@ -153,6 +153,16 @@ def config_options(body: Body) -> Body:
     return late_config_options(with_config)  # type: ignore[return-value]
 
 
+SECONDS = FiniteNumber(min=0)
+POSITIVE = FiniteNumber(min=0, min_open=True)
+
+
+def check_part(start: float | None, stop: float | None) -> None:
+    """Raise UsageError if --stop is not after --start."""
+    if start is not None and stop is not None and stop <= start:
+        raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
+
+
 def source_options(body: Body) -> Body:
     """Add what says how to read an input with frames.
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from adv2e.cli import options
+from adv2e.cli.options import POSITIVE, SECONDS
 
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
-
-SECONDS = options.FiniteNumber(min=0)
-POSITIVE = options.FiniteNumber(min=0, min_open=True)
 
 
 @click.command("render")
@@ -43,10 +41,17 @@ POSITIVE = options.FiniteNumber(min=0, min_open=True)
     show_default=True,
     help="Recorded seconds a second of film; 0.1 is ten times slower than life.",
 )
-@click.option("--start", type=SECONDS, default=0.0, metavar="S", help="Begin S seconds in.")
-@click.option("--stop", type=SECONDS, metavar="S", help="End S seconds in.")
 @click.option(
-    "--at", "at_s", type=SECONDS, multiple=True, metavar="S", help="Instant of a .png. Repeatable."
+    "--start", "start_s", type=SECONDS, default=0.0, metavar="S", help="Begin S seconds in."
+)
+@click.option("--stop", "stop_s", type=SECONDS, metavar="S", help="End S seconds in.")
+@click.option(
+    "--at",
+    "at_s",
+    type=SECONDS,
+    multiple=True,
+    metavar="S",
+    help="Instant of a .png. Repeatable.",
 )
 @click.option(
     "--count",
@@ -70,22 +75,14 @@ POSITIVE = options.FiniteNumber(min=0, min_open=True)
 def command(
     events: str,
     output: str | None,
-    overwrite: bool,
-    progress: bool,
     log: Log,
     style: str,
     on_color: str,
     off_color: str,
     window: float | None,
-    fps: float,
-    speed: float,
-    start: float,
-    stop: float | None,
-    at_s: tuple[float, ...],
-    count: int,
     frames: bool | None,
-    scale: int | None,
     time_unit: str | None,
+    **shown: Any,
 ) -> None:
     """Draw pictures and films of events.
 
@@ -109,15 +106,14 @@ def command(
     """
     if output is None:
         raise click.UsageError("-o is missing: a .mp4, .webm, .avi, .gif or .png file")
-    if stop is not None and stop <= start:
-        raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
+    options.check_part(shown["start_s"], shown["stop_s"])
     from adv2e.formats.reading import read_recording
     from adv2e.rendering import Style, check_suffix, parse_colour, render_recording
 
     is_film = check_suffix(output) != ".png"
-    if at_s and is_film:
+    if shown["at_s"] and is_film:
         raise click.UsageError("--at is for a .png; --start and --stop choose the part for a film")
-    usual_ms = 1e3 * speed / fps if is_film else 20.0
+    usual_ms = 1e3 * shown["speed"] / shown["fps"] if is_film else 20.0
     chosen = Style(
         name=style,
         on=parse_colour(on_color),
@@ -129,19 +125,5 @@ def command(
         log(f"{events}: {problem}")
     if frames and recording.frame_times_ns is None:
         log(f"{events}: holds no frames to show beside the events")
-    render_recording(
-        recording,
-        output,
-        style=chosen,
-        fps=fps,
-        speed=speed,
-        at_s=at_s,
-        count=count,
-        start_s=start,
-        stop_s=stop,
-        frames=frames is not False,
-        scale=scale,
-        overwrite=overwrite,
-        progress=progress,
-    )
+    render_recording(recording, output, style=chosen, frames=frames is not False, **shown)
     log(f"{output}: written")

@@ -17,20 +17,7 @@ MOST = 200
 
 
 def check_expansion(stated: int, held: int, label: str) -> None:
-    """Refuse what states far more bytes than a file holds for it.
-
-    Parameters
-    ----------
-    stated, held : int
-        Bytes in memory, and in the file.
-    label : str
-        What it is, for messages.
-
-    Raises
-    ------
-    DataError
-        More than 64 MiB, and more than 200 times what is held.
-    """
+    """Raise DataError if something states more than 64 MiB and 200 times the bytes it holds."""
     if stated > FREE and stated > MOST * held:
         raise DataError(
             f"{label}: states {stated:,} bytes and holds {held:,}; what grows more than"

@@ -17,19 +17,8 @@ _UNFIT = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 def shown(name: str | Path) -> str:
     r"""Return a name, or a line that holds names, with escapes for what cannot be shown.
 
-    Parameters
-    ----------
-    name : str or Path
-        Anything, of one line.
+    A byte that is not UTF-8 reads ``\xff``, a line break ``\n``.
 
-    Returns
-    -------
-    str
-        The same for all but odd names, on one line and fit for UTF-8: a byte that is not UTF-8
-        reads ``\xff``, a line break ``\n``.
-
-    Examples
-    --------
     >>> shown("two\nlines")
     'two\\nlines'
     """

@@ -21,15 +21,7 @@ HOT_LISTED = 5
 
 
 def describe_events(events: Events, width: int, height: int) -> dict[str, Any]:
-    """Return counts, span, rates and tick of `events`; None for what a few events cannot tell.
-
-    Parameters
-    ----------
-    events : Events
-        In any order.
-    width, height : int
-        Columns and rows of the sensor.
-    """
+    """Return counts, span, rates and tick of `events`; None for what a few events cannot tell."""
     count, on = len(events), int(np.count_nonzero(events["p"]))
     first = int(events["t"].min()) if count else None
     last = int(events["t"].max()) if count else None
@@ -57,15 +49,7 @@ def tick_us(events: Events) -> int | None:
 
 
 def oddities_of(events: Events, width: int, height: int) -> list[str]:
-    """Return gaps in time and hot pixels, a line each.
-
-    Parameters
-    ----------
-    events : Events
-        Sorted, all inside the sensor.
-    width, height : int
-        Columns and rows of the sensor.
-    """
+    """Return gaps in time and hot pixels of sorted `events`, a line each."""
     if not len(events):
         return []
     return [line for line in (_gaps(events), _hot(events, width, height)) if line]

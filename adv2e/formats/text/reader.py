@@ -57,14 +57,6 @@ def read_text(path: Path, time_unit: str | None = None) -> Recording:
 def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder) -> tuple[int, int] | None:
     """Read all lines of `file` into `builder`; return what the first says of width and height.
 
-    Parameters
-    ----------
-    file : binary file
-        Read from where it stands to its end.
-    label : str
-        Its name, for messages.
-    builder : RecordingBuilder
-
     Raises
     ------
     DataError
