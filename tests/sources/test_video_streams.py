@@ -12,7 +12,7 @@ from coded import write
 
 from adv2e.sources.video.colours import Colours
 from adv2e.sources.video.containers import Container, examine
-from adv2e.sources.video.streams.base import Bits, Findings
+from adv2e.sources.video.streams.base import Bits, Stream
 from adv2e.sources.video.streams.h264 import H264
 from adv2e.sources.video.streams.hevc import Hevc
 from adv2e.sources.video.streams.mpeg import MotionJpeg, Mpeg2, Mpeg4
@@ -69,11 +69,11 @@ def parameters_of_h264(frames_only, colours=None, timing=False, fields_in_frames
 
 
 def found_by(parser, *pictures, header=b""):
-    findings = Findings()
-    parser.header(header, findings)
+    stream = Stream("")
+    parser.header(header, stream)
     for picture in pictures:
-        parser.picture(picture, findings)
-    return findings
+        parser.picture(picture, stream)
+    return stream
 
 
 def slice_of_h264(*field):
@@ -171,10 +171,10 @@ def test_bytes_at_random_end_soon_and_in_no_other_error(make):
             data[place : place + 4] = start
         if number % 3 == 0:
             data[:] = b"\xff" * number + bytes(data)
-        parser, findings = make(), Findings()
+        parser, stream = make(), Stream("")
         for read in (parser.header, parser.picture, parser.picture):
             with contextlib.suppress(IndexError, struct.error):
-                read(bytes(data), findings)
+                read(bytes(data), stream)
     assert time.perf_counter() - began < 5
 
 

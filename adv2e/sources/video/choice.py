@@ -10,8 +10,7 @@ from __future__ import annotations
 from adv2e.errors import DataError
 from adv2e.sources.video.colours import HIGH_RANGE, Colours, encoding_of, is_stated
 from adv2e.sources.video.containers import Container
-from adv2e.sources.video.packets import Stream
-from adv2e.sources.video.streams import RAW
+from adv2e.sources.video.streams import RAW, Stream
 
 _PACKED_ALPHA = (b"BGRA", b"RGBA", b"ARGB", b"ABGR", b"RBA@", b"BRA@", b"@RBA", b"@BRA")
 _COLOURS_TOGETHER, _MOST_TOGETHER = (b"RGB", b"BGR"), bytes([48])

@@ -17,42 +17,15 @@ import cv2
 from numpy.typing import NDArray
 
 from adv2e.sources.images.opencv import quiet
-from adv2e.sources.video.colours import Colours
 from adv2e.sources.video.containers.base import TINY_BYTES
 from adv2e.sources.video.opening import openable
-from adv2e.sources.video.streams import parser_of
-from adv2e.sources.video.streams.base import Findings
+from adv2e.sources.video.streams import Stream, parser_of
 
 if TYPE_CHECKING:
     from adv2e.sources.video.pyav import PyavCapture
 
 RETRIES = 1000
 """How often the next picture may fail to come before that counts as the end."""
-
-
-@dataclass(frozen=True)
-class Stream:
-    """What the coded pictures of a video say of themselves.
-
-    Attributes
-    ----------
-    codec : str
-        Its name, or the four letters by which FFmpeg knows it; ``raw`` for pictures not coded.
-    known : bool
-        It is known how its coded pictures say whether they are fields.
-    clear : bool
-        All of them could be read.
-    interlaced : bool
-        They are fields, or could be.
-    colours : tuple of Colours
-        All that are stated, none twice.
-    """
-
-    codec: str
-    known: bool
-    clear: bool
-    interlaced: bool
-    colours: tuple[Colours, ...]
 
 
 @dataclass(frozen=True)
@@ -108,29 +81,27 @@ def read_packets(path: str, height: int, *, listed: bool) -> tuple[Stream, Packe
     Nothing is in one that cannot be opened.  `height` are the rows that its container states;
     `listed`: it lists the times of its pictures, and no more of them are read than say something.
     """
-    findings, clear = Findings(), True
     stamps: list[int] = []
     tiny = 0
     with quiet(), openable(path) as name:
         capture = cv2.VideoCapture(name, cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1])
         letters = (int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).to_bytes(4, "little")
-        codec, known, parser = parser_of(letters.decode("latin-1").lower().strip("\0 "), height)
+        stream, parser = parser_of(letters.decode("latin-1").lower().strip("\0 "), height)
         try:
             if parser is not None:
                 index = int(capture.get(cv2.CAP_PROP_CODEC_EXTRADATA_INDEX))
                 good, extra = capture.retrieve(flag=index)
-                clear = _read(parser.header, extra if good else None, findings)
+                _read(parser.header, extra.tobytes() if good and extra is not None else b"", stream)
             for data in _pictures(capture):
                 if not listed:
                     stamps.append(stamp_of(capture))
                     tiny += data.size <= TINY_BYTES
-                if parser is not None and clear and not findings.interlaced:
-                    clear = _read(parser.picture, data, findings)
+                if parser is not None and stream.clear and not stream.interlaced:
+                    _read(parser.picture, data.tobytes(), stream)
                 elif listed:
                     break
         finally:
             capture.release()
-    stream = Stream(codec, known, clear, findings.interlaced, tuple(findings.colours))
     return stream, None if listed else arranged(stamps, tiny)
 
 
@@ -146,15 +117,11 @@ def _pictures(capture: cv2.VideoCapture) -> Iterator[NDArray[Any]]:
             yield data
 
 
-def _read(
-    read: Callable[[bytes, Findings], None], data: NDArray[Any] | None, findings: Findings
-) -> bool:
-    """Let a parser read; return False where it cannot."""
+def _read(read: Callable[[bytes, Stream], None], data: bytes, stream: Stream) -> None:
     try:
-        read(b"" if data is None else data.tobytes(), findings)
+        read(data, stream)
     except (IndexError, struct.error):
-        return False
-    return True
+        stream.clear = False
 
 
 def stamp_of(capture: cv2.VideoCapture | PyavCapture) -> int:

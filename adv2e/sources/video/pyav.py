@@ -123,19 +123,13 @@ class PyavCapture:
             return True
         return False
 
-    def get(self, name: int) -> float:
-        """Return what OpenCV calls `name`: time [ms], rate [Hz] or number of frames; 0: unknown."""
-        if name == cv2.CAP_PROP_POS_MSEC:
-            # not the time of decoding: unlike OpenCV's it is that of the picture's own packet
-            if self._frame.pts is None:
-                return 0.0
-            ticks = self._frame.pts - (self._stream.start_time or 0)
-            return float(ticks * 1000 * Fraction(self._stream.time_base))
-        if name == cv2.CAP_PROP_FPS:
-            return float(self._stream.guessed_rate or 0)
-        if name == cv2.CAP_PROP_FRAME_COUNT:
-            return float(self._stream.frames)
-        return 0.0
+    def get(self, _: int) -> float:
+        """Return the time of the picture grabbed, as OpenCV's POS_MSEC [ms]; 0: unknown."""
+        # not the time of decoding: unlike OpenCV's it is that of the picture's own packet
+        if self._frame.pts is None:
+            return 0.0
+        ticks = self._frame.pts - (self._stream.start_time or 0)
+        return float(ticks * 1000 * Fraction(self._stream.time_base))
 
     @property
     def transfer(self) -> int:

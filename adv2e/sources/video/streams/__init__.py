@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from adv2e.sources.video.streams.base import Parser
+from adv2e.sources.video.streams.base import Parser, Stream
 from adv2e.sources.video.streams.h264 import H264
 from adv2e.sources.video.streams.hevc import Hevc
 from adv2e.sources.video.streams.mpeg import MotionJpeg, Mpeg2, Mpeg4
 
-__all__ = ["RAW", "parser_of"]
+__all__ = ["RAW", "Stream", "parser_of"]
 
 RAW = "raw"
 """Name of what is not coded."""
@@ -38,17 +38,17 @@ _WITHOUT_FIELDS = (
 """Codecs whose pictures FFmpeg never flags as fields."""
 
 
-def parser_of(name: str, height: int) -> tuple[str, bool, Parser | None]:
-    """Return a codec's name, whether it is known how it says that pictures are fields, and by what.
+def parser_of(name: str, height: int) -> tuple[Stream, Parser | None]:
+    """Return what is known of a codec, and what reads its coded pictures.
 
     `name` are the letters by which FFmpeg knows it, in lower case, none for pictures not coded;
     `height` are the rows that the container states.
     """
     if not name:
-        return RAW, True, None
+        return Stream(RAW), None
     if name in _JPEG:
-        return "Motion JPEG", True, MotionJpeg(height)
+        return Stream("Motion JPEG"), MotionJpeg(height)
     for codec, (parser, names) in _PARSERS.items():
         if name in names.split():
-            return codec, True, parser()
-    return name, name in _WITHOUT_FIELDS.split(), None
+            return Stream(codec), parser()
+    return Stream(name, known=name in _WITHOUT_FIELDS.split()), None

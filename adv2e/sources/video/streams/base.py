@@ -1,4 +1,4 @@
-"""What is gathered from the coded pictures of a video, and by what."""
+"""What the coded pictures of a video say of themselves, and what reads it."""
 
 from __future__ import annotations
 
@@ -8,17 +8,26 @@ from adv2e.sources.video.colours import Colours
 
 
 @dataclass
-class Findings:
-    """What the coded pictures say; grows as they are read.
+class Stream:
+    """What the coded pictures of a video say of themselves; grows as they are read.
 
     Attributes
     ----------
+    codec : str
+        Its name, or the four letters by which FFmpeg knows it; ``raw`` for pictures not coded.
+    known : bool
+        It is known how its coded pictures say whether they are fields.
+    clear : bool
+        All of them could be read.
     interlaced : bool
         A picture is flagged as two fields, or could be.
     colours : list of Colours
         All that are stated, in the order met, none twice.
     """
 
+    codec: str
+    known: bool = True
+    clear: bool = True
     interlaced: bool = False
     colours: list[Colours] = field(default_factory=list)
 
@@ -34,10 +43,10 @@ class Parser:
     Any of its methods may raise IndexError or struct.error, where bytes are missing.
     """
 
-    def header(self, data: bytes, findings: Findings) -> None:
+    def header(self, data: bytes, stream: Stream) -> None:
         """Read what stands before all pictures, if anything does."""
 
-    def picture(self, data: bytes, findings: Findings) -> None:
+    def picture(self, data: bytes, stream: Stream) -> None:
         """Read one coded picture, or two fields."""
         raise NotImplementedError
 

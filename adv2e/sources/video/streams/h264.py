@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from adv2e.sources.video.streams.base import Bits, Findings, Parser
+from adv2e.sources.video.streams.base import Bits, Parser, Stream
 from adv2e.sources.video.streams.nal import (
     StatedColours,
     messages,
@@ -73,7 +73,7 @@ class H264(Parser):
         self._sequence_of: dict[int, int] = {}
         self._colours = StatedColours()
 
-    def header(self, data: bytes, findings: Findings) -> None:
+    def header(self, data: bytes, stream: Stream) -> None:
         """Read parameter sets: OpenCV repeats them in pictures that all can begin with, no others.
 
         Videos cut from such as have open groups of pictures may have none of these.
@@ -82,7 +82,7 @@ class H264(Parser):
             for unit in _units_of_header(data):
                 self._parameter_set(unit)
 
-    def picture(self, data: bytes, findings: Findings) -> None:
+    def picture(self, data: bytes, stream: Stream) -> None:
         """Read parameter sets and messages up to the first slice, and how that is coded."""
         timing = b""
         for unit in units_of_picture(data):
@@ -93,9 +93,9 @@ class H264(Parser):
                 timing = self._messages(unguarded(unit)[1:]) or timing
             elif kind in _SLICES:
                 with suppress(IndexError):  # without a header it is no picture
-                    self._slice(Bits(unguarded(unit[:_HEADER_BYTES])[1:]), timing, findings)
+                    self._slice(Bits(unguarded(unit[:_HEADER_BYTES])[1:]), timing, stream)
                 break
-        self._colours.tell(findings)
+        self._colours.tell(stream)
 
     def _parameter_set(self, unit: bytes) -> None:
         bits = Bits(unguarded(unit)[1:])
@@ -157,7 +157,7 @@ class H264(Parser):
                 timing = content
         return timing
 
-    def _slice(self, bits: Bits, timing: bytes, findings: Findings) -> None:
+    def _slice(self, bits: Bits, timing: bytes, stream: Stream) -> None:
         """Note fields as FFmpeg does, which goes by the timing of a picture before its coding."""
         bits.ue()
         bits.ue()
@@ -169,7 +169,7 @@ class H264(Parser):
         fields: bool | None = None
         if timing and sequence.timing.structure:
             fields = _timed_as_fields(Bits(timing), sequence.timing)
-        findings.interlaced |= a_field or (sequence.fields_in_frames if fields is None else fields)
+        stream.interlaced |= a_field or (sequence.fields_in_frames if fields is None else fields)
 
 
 def _timed_as_fields(bits: Bits, timing: _Timing) -> bool | None:

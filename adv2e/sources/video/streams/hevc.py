@@ -8,7 +8,7 @@ References
 
 from __future__ import annotations
 
-from adv2e.sources.video.streams.base import Bits, Findings, Parser
+from adv2e.sources.video.streams.base import Bits, Parser, Stream
 from adv2e.sources.video.streams.nal import (
     StatedColours,
     messages,
@@ -30,25 +30,25 @@ class Hevc(Parser):
         self._structure = False
         self._colours = StatedColours()
 
-    def picture(self, data: bytes, findings: Findings) -> None:
+    def picture(self, data: bytes, stream: Stream) -> None:
         """Read parameter sets and messages up to the first slice."""
         for unit in units_of_picture(data):
             kind = unit[0] >> 1 & 63
             if kind == _SPS:
-                self._parameters(Bits(unguarded(unit)[2:]), findings)
+                self._parameters(Bits(unguarded(unit)[2:]), stream)
             elif kind == _SEI:
-                self._messages(unguarded(unit)[2:], findings)
+                self._messages(unguarded(unit)[2:], stream)
             elif kind <= _LAST_SLICE:
                 break
-        self._colours.tell(findings)
+        self._colours.tell(stream)
 
-    def _messages(self, data: bytes, findings: Findings) -> None:
+    def _messages(self, data: bytes, stream: Stream) -> None:
         for kind, content in messages(data):
             self._colours.hear(kind, content)
             if kind == _PICTURE_TIMING and self._structure:
-                findings.interlaced |= content[0] >> 4 in _ONE_FIELD
+                stream.interlaced |= content[0] >> 4 in _ONE_FIELD
 
-    def _parameters(self, bits: Bits, findings: Findings) -> None:
+    def _parameters(self, bits: Bits, stream: Stream) -> None:
         bits.skip(4)
         layers = bits.take(3)
         bits.skip(1)
@@ -83,12 +83,12 @@ class Hevc(Parser):
                 bits.skip(order_bits + 1)
         bits.skip(2)
         if bits.flag():
-            self._usability(bits, findings)
+            self._usability(bits, stream)
 
-    def _usability(self, bits: Bits, findings: Findings) -> None:
+    def _usability(self, bits: Bits, stream: Stream) -> None:
         self._colours.usual = signal(bits)
         bits.skip(1)
-        findings.interlaced |= bits.flag()
+        stream.interlaced |= bits.flag()
         self._structure = bits.flag()
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import struct
 
 from adv2e.sources.video.colours import Colours
-from adv2e.sources.video.streams.base import Bits, Findings, Parser
+from adv2e.sources.video.streams.base import Bits, Parser, Stream
 from adv2e.sources.video.streams.nal import units
 
 _SLICES, _EXTENSION = range(0x01, 0xB0), 0xB5
@@ -30,11 +30,11 @@ class Mpeg2(Parser):
     def __init__(self) -> None:
         self._progressive = True
 
-    def header(self, data: bytes, findings: Findings) -> None:
+    def header(self, data: bytes, stream: Stream) -> None:
         """Read what MP4 and Matroska keep apart."""
-        self.picture(data, findings)
+        self.picture(data, stream)
 
-    def picture(self, data: bytes, findings: Findings) -> None:
+    def picture(self, data: bytes, stream: Stream) -> None:
         """Read extensions up to the first slice of each picture."""
         for unit in units(data):
             if unit[0] in _SLICES:
@@ -49,43 +49,43 @@ class Mpeg2(Parser):
             elif kind == _DISPLAY:
                 bits.skip(3)
                 if bits.flag():
-                    findings.state(Colours(bits.take(8), bits.take(8), bits.take(8)))
+                    stream.state(Colours(bits.take(8), bits.take(8), bits.take(8)))
             elif kind == _CODING and not self._progressive:
                 bits.skip(18)
                 structure = bits.take(2)
                 bits.skip(8)
-                findings.interlaced |= structure != _WHOLE_FRAME or not bits.flag()
+                stream.interlaced |= structure != _WHOLE_FRAME or not bits.flag()
 
 
 class Mpeg4(Parser):
     """Parser of MPEG-4 part 2."""
 
-    def header(self, data: bytes, findings: Findings) -> None:
+    def header(self, data: bytes, stream: Stream) -> None:
         """Read what stands before all pictures."""
-        self.picture(data, findings)
+        self.picture(data, stream)
 
-    def picture(self, data: bytes, findings: Findings) -> None:
+    def picture(self, data: bytes, stream: Stream) -> None:
         """Read headers up to the picture."""
         for unit in units(data):
             if unit[0] == _PICTURE:
                 return
             if unit[0] == _VISUAL_OBJECT:
-                _read_object(Bits(unit[1:]), findings)
+                _read_object(Bits(unit[1:]), stream)
             elif unit[0] in _LAYERS:
-                _read_layer(Bits(unit[1:]), findings)
+                _read_layer(Bits(unit[1:]), stream)
 
 
-def _read_object(bits: Bits, findings: Findings) -> None:
+def _read_object(bits: Bits, stream: Stream) -> None:
     if bits.flag():
         bits.skip(7)
     if bits.take(4) != 1 or not bits.flag():
         return
     bits.skip(4)
     if bits.flag():
-        findings.state(Colours(bits.take(8), bits.take(8), bits.take(8)))
+        stream.state(Colours(bits.take(8), bits.take(8), bits.take(8)))
 
 
-def _read_layer(bits: Bits, findings: Findings) -> None:
+def _read_layer(bits: Bits, stream: Stream) -> None:
     bits.skip(9)
     version = 1
     if bits.flag():
@@ -107,7 +107,7 @@ def _read_layer(bits: Bits, findings: Findings) -> None:
         bits.skip(max((ticks - 1).bit_length(), 1))
     if shape == 0:
         bits.skip(29)
-    findings.interlaced |= bits.flag()
+    stream.interlaced |= bits.flag()
 
 
 _BASELINE, _PROGRESSIVE, _SCAN = 0xC0, 0xC2, 0xDA
@@ -119,13 +119,13 @@ class MotionJpeg(Parser):
     def __init__(self, height: int) -> None:
         self._height = height
 
-    def picture(self, data: bytes, findings: Findings) -> None:
+    def picture(self, data: bytes, stream: Stream) -> None:
         """Read the size of a picture."""
         place = 2
         while data[place] == 0xFF and data[place + 1] != _SCAN:
             marker, size = struct.unpack_from(">xBH", data, place)
             if _BASELINE <= marker <= _PROGRESSIVE:
                 (rows,) = struct.unpack_from(">H", data, place + 5)
-                findings.interlaced |= 4 * rows < 3 * self._height
+                stream.interlaced |= 4 * rows < 3 * self._height
                 return
             place += 2 + size

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from adv2e.sources.video.colours import Colours, is_stated
-from adv2e.sources.video.streams.base import Bits, Findings
+from adv2e.sources.video.streams.base import Bits, Stream
 
 _START = b"\0\0\1"
 _ANY_ASPECT = 255
@@ -83,12 +83,12 @@ class StatedColours:
         if kind == _OTHER_TRANSFER and content:
             self.other_transfer = content[0]
 
-    def tell(self, findings: Findings) -> None:
+    def tell(self, stream: Stream) -> None:
         """Note the colours that count."""
         if is_stated(self.other_transfer):
-            findings.state(replace(self.usual or Colours(), transfer=self.other_transfer))
+            stream.state(replace(self.usual or Colours(), transfer=self.other_transfer))
         elif self.usual is not None:
-            findings.state(self.usual)
+            stream.state(self.usual)
 
 
 def signal(bits: Bits) -> Colours | None:
