@@ -123,33 +123,27 @@ _MOST = 100_000
 """Values of one document."""
 
 
-def _parts(node: yaml.Node) -> list[yaml.Node]:
-    """Return the nodes of the values in a list or mapping."""
-    if isinstance(node, yaml.MappingNode):
-        return [value for _, value in node.value]
-    return list(node.value) if isinstance(node, yaml.SequenceNode) else []
-
-
 class _Builder:
     """Turns YAML nodes into :class:`Value` trees."""
 
     def __init__(self, origin: Origin) -> None:
         self.origin = origin
-        self.done: dict[int, Value] = {}
+        self.count = 0  # of values, those of aliases counted where they stand
         self.open: set[int] = set()
-        self.sizes: dict[int, int] = {}
 
     def place(self, node: yaml.Node) -> Origin:
         return self.origin.at(node.start_mark.line + 1)
 
     def build(self, node: yaml.Node, path: str) -> Value:
         """Return the value of `node`, which stands at the key `path`."""
-        key = id(node)
-        if key in self.done:  # an alias
-            return self.done[key]
-        if key in self.open:
+        self.count += 1
+        if self.count > _MOST:
+            raise self.place(node).complaint(
+                path, f"over {_MOST:,} values, aliases (*) counted where they stand: write fewer"
+            )
+        if id(node) in self.open:
             raise self.place(node).complaint(path, "an alias (*) must not contain itself")
-        self.open.add(key)
+        self.open.add(id(node))
         content: Any
         if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
             content = self.mapping(node, path)
@@ -157,14 +151,9 @@ class _Builder:
             content = [self.build(item, f"{path}[{n}]") for n, item in enumerate(node.value)]
         else:
             content = self.scalar(node, path)
-        self.sizes[key] = size = 1 + sum(self.sizes[id(part)] for part in _parts(node))
-        if size > _MOST:
-            raise self.place(node).complaint(
-                path, f"over {_MOST:,} values, aliases (*) counted where they stand: write fewer"
-            )
+        self.open.discard(id(node))
         text = node.value if isinstance(node, yaml.ScalarNode) else ""
-        self.done[key] = Value(content, self.place(node), text)
-        return self.done[key]
+        return Value(content, self.place(node), text)
 
     def scalar(self, node: yaml.Node, path: str) -> Scalar:
         convert = _SCALARS.get(node.tag)
