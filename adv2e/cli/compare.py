@@ -9,6 +9,8 @@ import click
 from adv2e.cli import options
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from adv2e.cli.options import Log
     from adv2e.comparison.compare import Resimulation
     from adv2e.config import Config
@@ -46,7 +48,7 @@ def command(
     window_s: float | None,
     frames_path: str | None,
     time_unit: str | None,
-    config: Config,
+    config: Callable[[], Config],
     threads: int | None,
     log: Log,
 ) -> None:
@@ -69,13 +71,14 @@ def command(
     from adv2e.formats.reading import read_recording
     from adv2e.sources import open_source
 
+    declared = config()
     ours = read_recording(measured, time_unit=time_unit)
     theirs = read_recording(simulated, time_unit=time_unit)
     source = open_source(frames_path) if frames_path else None
     for doubt in source.doubts if source else []:
         log(doubt)
     times = np.array([frame.t_ns for frame in source.frames()]) if source else None
-    again = _resimulation(ours, source, config, threads, log) if _configured() else None
+    again = _resimulation(ours, source, declared, threads, log) if _configured() else None
     report = compare(ours, theirs, frame_times_ns=times, window_s=window_s, again=again)
     for stream in (ours, theirs):
         for problem in stream.problems:

@@ -10,6 +10,8 @@ from adv2e import __version__
 from adv2e.cli import options
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from adv2e.config import Config
 
 
@@ -43,9 +45,9 @@ def group() -> None:
 
 @group.command()
 @options.config_options
-def show(config: Config) -> None:
+def show(config: Callable[[], Config]) -> None:
     """Print the resolved configuration, with unit and meaning of each key."""
-    _print(config, "resolved configuration")
+    _print(config(), "resolved configuration")
 
 
 @group.command()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @click.command("convert")
 @click.argument("source", metavar="INPUT")
-@options.late_config_options
+@options.config_options
 @options.run_options
 @options.source_options
 @click.option("--start", type=SECONDS, metavar="S", help="Begin S seconds after the first frame.")

@@ -10,6 +10,8 @@ import click
 from adv2e.cli import options
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from adv2e.cli.options import Log
     from adv2e.config import Config
 
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
 def command(
     output: Path,
     overwrite: bool,
-    config: Config,
+    config: Callable[[], Config],
     threads: int | None,
     progress: bool,
     log: Log,
@@ -49,7 +51,7 @@ def command(
     from adv2e.conversion.demo import run_demo
 
     demo = run_demo(
-        output, config, overwrite=overwrite, threads=threads, progress=progress, log=log
+        output, config(), overwrite=overwrite, threads=threads, progress=progress, log=log
     )
     if log.level >= 0:
         click.echo(demo.text())

@@ -9,7 +9,7 @@ import click
 from adv2e.cli import options
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from adv2e.cli.options import Log
     from adv2e.config import Config
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 @options.time_unit_option
 def command(
     recording: str,
-    config: Config,
+    config: Callable[[], Config],
     output: str | None,
     overwrite: bool,
     without: tuple[str, ...],
@@ -74,16 +74,17 @@ def command(
     from adv2e.reports.files import check_folder, write_reports
     from adv2e.reports.summary import summary_text
 
-    check_names(without, names(config))
-    _check_own_names(user_effects(config), names())
+    declared = config()
+    check_names(without, names(declared))
+    _check_own_names(user_effects(declared), names())
     options_given = click.get_current_context().params
     given = options_given["config_files"], options_given["sets"]
     written = written_keys(*given)
-    config = without_user_effects(config, written)
+    declared = without_user_effects(declared, written)
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     check_folder(folder, overwrite=overwrite, inputs=[recording, *options.files_given()])
     evidence = read_evidence(recording, time_unit)
-    if not is_compiled(config.pixel, config.sampling):
+    if not is_compiled(declared.pixel, declared.sampling):
         log(announcement())
     with tqdm(unit="simulation", leave=False, disable=not progress) as bar:
 
@@ -92,7 +93,7 @@ def command(
 
         found = diagnose(
             evidence,
-            config,
+            declared,
             declared_name=names_of(*given) or "the defaults",
             without=without,
             free_thresholds=fit_thresholds,

@@ -99,7 +99,7 @@ def files_given() -> list[str | Path]:
     return [*map(find, given["config_files"]), *given.get("effect_files", ())]
 
 
-def late_config_options(body: Body) -> Body:
+def config_options(body: Body) -> Body:
     """Add -c, --set, --seed and --effect; the command gets ``config``, a function.
 
     It returns the Config.  A command that has other things to begin with calls it after those:
@@ -141,16 +141,6 @@ def late_config_options(body: Body) -> Body:
         return body(*args, config=config, **kw)
 
     return with_config  # type: ignore[return-value]
-
-
-def config_options(body: Body) -> Body:
-    """Add -c, --set, --seed and --effect; the command gets ``config``, a Config."""
-
-    @functools.wraps(body)
-    def with_config(*args: Any, config: Callable[[], Config], **kw: Any) -> Any:
-        return body(*args, config=config(), **kw)
-
-    return late_config_options(with_config)  # type: ignore[return-value]
 
 
 SECONDS = FiniteNumber(min=0)
