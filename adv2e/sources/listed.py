@@ -93,10 +93,7 @@ def _listed(found: FrameList, label: str, pictures: Sequence[Picture], path: Pat
         Shot(stamp.t_ns, pictures[at].label, pictures[at].load)
         for stamp, at in zip(stamps, places, strict=True)
     ]
-    notes = [f"times from {label}: {found.columns}"]
-    if found.order:
-        notes.append(f"{label}: {found.order}")
-    return Timed(shots, [f"{label}: {found.unit.doubt}"] if found.unit.doubt else [], notes)
+    return Timed(shots, *found.told(label))
 
 
 def _other_number(label: str, times: int, frames: int, path: Path) -> DataError:

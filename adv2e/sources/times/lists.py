@@ -45,6 +45,13 @@ class FrameList:
     order: str = ""
     whole: bool = False
 
+    def told(self, label: str) -> tuple[list[str], list[str]]:
+        """Return what is doubtful of the list of a name, and what else is to be told."""
+        notes = [f"times from {label}: {self.columns}"]
+        if self.order:
+            notes.append(f"{label}: {self.order}")
+        return [f"{label}: {self.unit.doubt}"] if self.unit.doubt else [], notes
+
 
 def first_name(path: Path) -> str:
     """Return the name on the first line of a list; "" if lines have none."""

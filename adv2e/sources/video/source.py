@@ -120,9 +120,9 @@ class VideoSource(Source):
         steps = np.diff(self._times.shown_ns)
         own_s = float(np.median(steps)) / 1e9 if steps.size else 1 / self._fps if self._fps else 0
         found = read_list(timestamps, time_unit=time_unit, own_step_s=own_s)
-        self.notes.append(f"times from {timestamps}: {found.columns}")
-        if found.unit.doubt:
-            self.doubts.append(f"{timestamps}: {found.unit.doubt}")
+        doubts, notes = found.told(str(timestamps))
+        self.doubts += doubts
+        self.notes += notes
         return found.stamps
 
     def _choose_decoder(self) -> Packets | None:

@@ -103,7 +103,7 @@ def test_h264_whose_frames_hold_fields():
     [
         *((0, None, False), (1, None, True), (2, None, True), (3, None, True), (4, None, True)),
         *((5, None, False), (6, None, False), (7, None, False), (8, None, False)),
-        *((0, 0, False), (0, 1, True), (0, 2, False), (1, 0, True), (3, 0, False), (3, 1, True)),
+        *((0, 0, False), (0, 1, True), (0, 2, False), (1, 0, True), (3, 0, True), (3, 1, True)),
         *((3, 2, True), (9, None, None)),
     ],
 )

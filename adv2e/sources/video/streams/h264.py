@@ -27,7 +27,7 @@ _SLICES, _SEI, _SPS, _PPS = (1, 2, 5), 6, 7, 8
 _HEADER_BYTES = 32
 """Of a slice: more than what is read of its header takes."""
 _PICTURE_TIMING = 1
-_WHOLE_FRAME, _ONE_FIELD, _LAST_OF_ONE_FRAME, _LAST = 0, (1, 2), 4, 8
+_WHOLE_FRAME, _LAST_OF_ONE_FRAME, _LAST = 0, 4, 8
 _FRAME_SCAN, _FIELD_SCAN = 0, 1
 
 
@@ -58,7 +58,6 @@ class _Timing:
 class _Sequence:
     """What a sequence parameter set says of slices and timing."""
 
-    three_planes_apart: bool = False
     frame_number_bits: int = 0
     frames_only: bool = True
     fields_in_frames: bool = False
@@ -109,7 +108,7 @@ class H264(Parser):
         bits.skip(16)
         number, sequence = bits.ue(), _Sequence()
         if profile in _CHROMA_PROFILES:
-            sequence.three_planes_apart = _read_chroma(bits)
+            _skip_chroma(bits)
         sequence.frame_number_bits = bits.ue() + 4
         order = bits.ue()
         if order == 0:
@@ -164,7 +163,7 @@ class H264(Parser):
         sequence = self._sequences.get(self._sequence_of.get(bits.ue(), -1))
         if sequence is None:
             return  # cannot be decoded, as at the start of a broadcast
-        bits.skip(2 * sequence.three_planes_apart + sequence.frame_number_bits)
+        bits.skip(sequence.frame_number_bits)
         a_field = not sequence.frames_only and bits.flag()
         fields: bool | None = None
         if timing and sequence.timing.structure:
@@ -173,25 +172,20 @@ class H264(Parser):
 
 
 def _timed_as_fields(bits: Bits, timing: _Timing) -> bool | None:
-    """Whether a message of timing makes FFmpeg flag a picture as fields; None: it does not count.
-
-    What is one field after the other, be it of frames, is flagged as the picture before it, which
-    in FFmpeg may be any where several threads decode.
-    """
+    """Whether a message of timing could make FFmpeg flag a picture as fields; None: it is none."""
     bits.skip(timing.skipped_bits)
     structure = bits.take(4)
     if structure > _LAST:
         return None
-    scan = bits.take(2) if structure <= _LAST_OF_ONE_FRAME and bits.flag() else None
-    if structure not in _ONE_FIELD and scan in (_FRAME_SCAN, _FIELD_SCAN):
-        return scan == _FIELD_SCAN
-    return _WHOLE_FRAME < structure <= _LAST_OF_ONE_FRAME
+    of_one_frame = structure <= _LAST_OF_ONE_FRAME
+    scan = bits.take(2) if of_one_frame and bits.flag() else _FRAME_SCAN
+    return scan == _FIELD_SCAN or (of_one_frame and structure != _WHOLE_FRAME)
 
 
-def _read_chroma(bits: Bits) -> bool:
-    """Read past the kind of chroma; return whether its planes are coded apart."""
+def _skip_chroma(bits: Bits) -> None:
     chroma = bits.ue()
-    apart = chroma == 3 and bits.flag()
+    if chroma == 3:
+        bits.skip(1)  # FFmpeg decodes no planes that are coded apart
     bits.ue()
     bits.ue()
     bits.skip(1)
@@ -199,7 +193,6 @@ def _read_chroma(bits: Bits) -> bool:
         for number in range(12 if chroma == 3 else 8):
             if bits.flag():
                 _skip_scaling(bits, 16 if number < 6 else 64)
-    return apart
 
 
 def _skip_scaling(bits: Bits, size: int) -> None:
