@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _COMMENT = re.compile(rb"^[\x00-\x09\x0b-\x20]*#[^\n]*", re.M)
+_PLUS, _MINUS, _POINT, _E, _ZERO, _FIVE, _NINE = b"+-.e059"
+_LOWER = 32  # sets a letter in lower case
 _LONGEST = 1000  # digits of a number
 _MOST = 2**63 // 10 - 1  # that one more digit leaves within 64 bits
 _TENS = 10 ** np.arange(19)
@@ -39,17 +41,17 @@ def parse_lines(block: bytes, decimals: int, *, exact: bool) -> tuple[Numbers, N
     if b"#" in block:
         block = _COMMENT.sub(b"", block)
     data = np.frombuffer(b"\n" + block + b"\n", np.uint8)
-    filled = data > 32
+    filled = data > ord(" ")
     edges = np.flatnonzero(filled[1:] != filled[:-1]) + 1
     begin, end = edges[::2], edges[1::2]
-    fields = np.diff(np.searchsorted(begin, np.flatnonzero(data == 10)))
+    fields = np.diff(np.searchsorted(begin, np.flatnonzero(data == ord("\n"))))
     lines = np.flatnonzero(fields) + 1
     uneven = lines[fields[lines - 1] != 4]
     wrong = int(uneven[0]) if uneven.size else 0
     if wrong:
         lines = lines[lines < wrong]
     begin, end = (edge[: 4 * lines.size].reshape(-1, 4) for edge in (begin, end))
-    marks = np.flatnonzero(filled & (data - np.uint8(48) > 9))
+    marks = np.flatnonzero(filled & (data - np.uint8(_ZERO) > 9))
     columns = np.empty((4, lines.size), np.int64)
     sound = np.empty((2, lines.size), np.bool_)
     columns[0], sound[0] = _numbers(data, marks, begin[:, 0], end[:, 0], decimals, exact)
@@ -78,10 +80,11 @@ def _numbers(
     mine = (owner >= 0) & (marks < end[owner]) if begin.size else np.zeros(marks.size, np.bool_)
     marks, owner = marks[mine], owner[mine]
     mark, before = data[marks], data[marks - 1]
-    is_sign, is_point, is_e = (mark == 43) | (mark == 45), mark == 46, mark | 32 == 101
+    is_sign, is_point = (mark == _PLUS) | (mark == _MINUS), mark == _POINT
+    is_e, after_e = mark | _LOWER == _E, before | _LOWER == _E
     leads = is_sign & (marks == begin[owner])
     good = np.ones(begin.size, np.bool_)
-    good[owner[~(leads | is_point | is_e | (is_sign & (before | 32 == 101)))]] = False
+    good[owner[~(leads | is_point | is_e | (is_sign & after_e))]] = False
     first, point, e = begin.copy(), end.copy(), end.copy()
     first[owner[leads]] += 1
     for place, which in ((point, is_point), (e, is_e)):
@@ -93,12 +96,13 @@ def _numbers(
     digits = e - first - (point < e)
     good &= (digits > 0) & (digits <= _LONGEST)
 
+    # digits that make the whole number: those before the point, moved by the exponent
     kept = point - first + decimals
     powers = np.flatnonzero(good & (e < end))
     if powers.size:
         at = e[powers] + 1
-        below = data[at] == 45
-        at += below | (data[at] == 43)
+        below = data[at] == _MINUS
+        at += below | (data[at] == _PLUS)
         length = end[powers] - at
         good[powers] &= (length > 0) & (length <= 4)
         power = _whole_numbers(data, at, np.minimum(length, 4), end[powers])
@@ -106,21 +110,22 @@ def _numbers(
 
     used = np.where(good, np.clip(kept, 0, digits), 0)
     values = _whole_numbers(data, first, used, point)
+    # digits behind: the first rounds, or all must be zero
     rest = np.flatnonzero(good & (used < digits))
     if rest.size:
         place = first[rest] + used[rest]
         place += place >= point[rest]
         if exact:
-            nonzero = np.cumsum((data > 48) & (data <= 57))
+            nonzero = np.cumsum((data > _ZERO) & (data <= _NINE))
             good[rest] = nonzero[e[rest] - 1] == nonzero[place - 1]
         else:
-            values[rest] += (data[place] >= 53) & (kept[rest] >= 0)
+            values[rest] += (data[place] >= _FIVE) & (kept[rest] >= 0)
     zeros = np.clip(kept - used, 0, 18)
     if zeros.any():
         good &= (values <= (2**63 - 1) // _TENS[zeros]) & ((kept - used <= 18) | (values == 0))
         values *= _TENS[zeros]
     good &= values >= 0
-    return np.where(data[begin] == 45, -values, values), good
+    return np.where(data[begin] == _MINUS, -values, values), good
 
 
 def _whole_numbers(
@@ -136,5 +141,5 @@ def _whole_numbers(
         value = values[some]
         if k >= 18:
             value[(value > _MOST) | (value < 0)] = -1
-        values[some] = value * 10 + (data[place] - np.uint8(48))
+        values[some] = value * 10 + (data[place] - np.uint8(_ZERO))
     return values
