@@ -17,10 +17,8 @@ from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
 from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
 from adv2e.sources.frame import Light
+from adv2e.sources.stored import EVENTS, LIST
 from adv2e.sources.times.rates import Rate
-
-EVENTS = "events.txt"
-"""The file of events in a DAVIS240C folder or zip."""
 
 
 def inspect(
@@ -76,7 +74,7 @@ def _has_only_frames(path: Path) -> bool:
     if path.suffix.lower() == ".zip":
         with zip_archive(path) as archive:
             names = {PurePosixPath(name).name for name in archive.namelist()}
-        return "images.txt" in names and EVENTS not in names
+        return LIST in names and EVENTS not in names
     return path.suffix.lower() in (*VIDEO_SUFFIXES, ".npy")
 
 

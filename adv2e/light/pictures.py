@@ -41,6 +41,13 @@ def picture_of(
     return picture if alpha is None else decoder.over_black(picture, alpha)
 
 
+def eight_bit(image: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:
+    """Return a picture in 8 bits, as layouts store it that hold no more; 16 bit are rounded."""
+    if image.dtype == np.uint8:
+        return image.astype(np.uint8, copy=False)
+    return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+
+
 def drawn(picture: NDArray[Any], white: float) -> NDArray[np.uint8]:
     """Return a picture in the 8 bits of a screen, `white` of it being 255."""
     if picture.dtype == np.uint8 and white == 255.0:

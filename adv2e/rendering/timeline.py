@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from adv2e.events import Events, empty_events
 from adv2e.files.backlog import Backlog
+from adv2e.light.pictures import eight_bit
 from adv2e.rendering.films import PictureOutput
 from adv2e.rendering.layout import Cell
 from adv2e.rendering.styles import Picture, Style, draw
@@ -213,8 +214,7 @@ def microseconds(t_ns: int) -> int:
 
 def _reduced(image: NDArray[Any], size: tuple[int, int]) -> Picture:
     """Return a frame in 8 bits and of `size` (width, height)."""
-    if image.dtype == np.uint16:  # as layouts of 8 bits store it
-        image = ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+    image = eight_bit(image)
     if image.shape[1::-1] != size:
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     return image.astype(np.uint8, copy=False)

@@ -21,19 +21,17 @@ from adv2e.files.zips import Members
 from adv2e.sources.frame import RECORDED, Light, Pixels
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.listed import ListedSource, Picture, timed
-from adv2e.sources.stored import DESCRIPTION, read_light
+from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST, read_light
 from adv2e.sources.times.lists import decoded, first_name, parse_list
 from adv2e.sources.times.names import member_of, members_of
 from adv2e.sources.wanted import GivenTimes, Selection
-
-LIST = "images.txt"
 
 
 def is_recording(folder: Path) -> bool:
     """Tell whether a folder has this layout: a list of images that are in folders below it."""
     if not (folder / LIST).is_file():
         return False
-    if (folder / "events.txt").is_file():
+    if (folder / EVENTS).is_file():
         return True
     name = first_name(folder / LIST)
     return "/" in (member_of(name, lambda member: (folder / member).is_file()) or name)

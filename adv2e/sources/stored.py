@@ -15,8 +15,8 @@ from adv2e.effects.frames.encoding import check_encoding
 from adv2e.errors import ConfigError, DataError
 from adv2e.sources.frame import Light
 
-DESCRIPTION = "adv2e.json"
-"""The file beside a recording that says how it was made."""
+EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
+"""Files of a recording: its events, its frames and their times, and how it was made."""
 
 _REASON = f"as {DESCRIPTION} says"
 

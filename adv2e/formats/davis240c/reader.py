@@ -25,11 +25,10 @@ from adv2e.formats.recording import Recording
 from adv2e.formats.text.reader import read_lines
 from adv2e.sources.frame import Pixels
 from adv2e.sources.images.opencv import decode_image
+from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
 from adv2e.sources.times.columns import has_lines
 from adv2e.sources.times.lists import FrameList, decoded, parse_list
 from adv2e.sources.times.names import members_of
-
-EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
 
 
 def read_davis240c(

@@ -33,6 +33,7 @@ from adv2e.files.backlog import Backlog
 from adv2e.files.staging import Staging
 from adv2e.formats.sink import Request, Writer, to_json
 from adv2e.formats.text.writer import text_blocks
+from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
 from adv2e.sources.times.instants import NS_PER_S
 
 _BLOCK = 1 << 20  # bytes of text deflated at once: the archive must not depend on who calls how
@@ -88,7 +89,7 @@ class FolderWriter(_Davis240cWriter):
         self._folder.mkdir()
         if request.with_frames:
             (self._folder / "images").mkdir()
-        self._events = stack.enter_context((self._folder / "events.txt").open("wb"))
+        self._events = stack.enter_context((self._folder / EVENTS).open("wb"))
 
     def write_events(self, events: Events) -> None:
         """Append events."""
@@ -101,8 +102,8 @@ class FolderWriter(_Davis240cWriter):
     def finish(self) -> None:
         """Write what is left, the list and the description."""
         self._work.finish()
-        (self._folder / "images.txt").write_text("".join(self._lines), "ascii", newline="\n")
-        (self._folder / "adv2e.json").write_text(self._description, "utf-8", newline="\n")
+        (self._folder / LIST).write_text("".join(self._lines), "ascii", newline="\n")
+        (self._folder / DESCRIPTION).write_text(self._description, "utf-8", newline="\n")
 
 
 def _foreign(folder: Path) -> str | None:
@@ -112,7 +113,7 @@ def _foreign(folder: Path) -> str | None:
             for image in sorted(entry.iterdir()):
                 if not image.match("frame_*.png"):
                     return f"images/{image.name}"
-        elif entry.name not in ("events.txt", "images.txt", "adv2e.json"):
+        elif entry.name not in (EVENTS, LIST, DESCRIPTION):
             return entry.name
     return None
 
@@ -127,7 +128,7 @@ class ZipWriter(_Davis240cWriter):
             zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)
         )
         # an archive takes one member at a time: events go straight in, frames wait
-        self._events = stack.enter_context(self._archive.open("events.txt", "w", force_zip64=True))
+        self._events = stack.enter_context(self._archive.open(EVENTS, "w", force_zip64=True))
         self._deflating = OrderedWork(min(1, request.threads - 1))
         stack.callback(self._deflating.abandon)
         self._text = bytearray()
@@ -155,13 +156,13 @@ class ZipWriter(_Davis240cWriter):
         self._deflate(self._text)
         self._deflating.finish()
         self._events.close()
-        self._archive.getinfo("events.txt").external_attr = 0o644 << 16
+        self._archive.getinfo(EVENTS).external_attr = 0o644 << 16
         self._work.finish()
-        self._add("images.txt", "".join(self._lines).encode("ascii"))
+        self._add(LIST, "".join(self._lines).encode("ascii"))
         for number in range(len(self._encoded)):
             data = self._encoded.take().tobytes()
             self._add(f"images/frame_{number:08d}.png", data, zipfile.ZIP_STORED)
-        self._add("adv2e.json", self._description.encode())
+        self._add(DESCRIPTION, self._description.encode())
 
     def _add(self, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
         """Add a member with the time that zip counts from."""

@@ -36,6 +36,7 @@ from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.backlog import Backlog
 from adv2e.formats.compression import compress, compress_shuffled
 from adv2e.formats.sink import Request, Writer, to_json
+from adv2e.light.pictures import eight_bit
 
 CHUNK = 1 << 16
 """Events of a chunk."""
@@ -138,7 +139,7 @@ class MonashWriter(Writer):
 
     def write_frame(self, t_ns: int, image: NDArray[np.uint8 | np.uint16]) -> None:
         """Append a frame."""
-        picture = _eight_bit(image)
+        picture = eight_bit(image)
         picture = picture[..., ::-1].copy() if picture.ndim == 3 else picture.copy()
         self._frames.append((t_ns, picture.shape))
 
@@ -205,10 +206,3 @@ def _bound_cache(file: h5py.File) -> None:
     cache.set_initial_size = True
     cache.initial_size = cache.min_size = cache.max_size = _CACHE_BYTES
     file.id.set_mdc_config(cache)
-
-
-def _eight_bit(image: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:
-    """Return the image as the 8 bit that this layout holds; 16 bit are rounded."""
-    if image.dtype == np.uint8:
-        return image.astype(np.uint8, copy=False)
-    return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)

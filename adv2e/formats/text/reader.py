@@ -20,6 +20,7 @@ from adv2e.errors import DataError
 from adv2e.formats.builder import RecordingBuilder
 from adv2e.formats.recording import Recording
 from adv2e.formats.text.lines import parse_lines
+from adv2e.sources.stored import DESCRIPTION, EVENTS
 from adv2e.sources.times.units import Unit
 from adv2e.ticks import LARGEST_NS, US, check_us
 
@@ -42,8 +43,8 @@ def read_text(path: Path, time_unit: str | None = None) -> Recording:
     """
     builder = RecordingBuilder(path, time_unit)
     beside = [path.with_name(path.name + ".json")]
-    if path.name == "events.txt":
-        beside.append(path.with_name("adv2e.json"))
+    if path.name == EVENTS:
+        beside.append(path.with_name(DESCRIPTION))
     description = next((file for file in beside if file.is_file()), None)
     if description is not None:
         text = description.read_text("utf-8", errors="replace")
