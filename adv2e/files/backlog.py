@@ -72,29 +72,25 @@ class Backlog:
 
     def take(self) -> NDArray[Any]:
         """Remove the first array and return it."""
-        _, item = self._items.popleft()
-        if not isinstance(item, _OnDisk):
-            self._held -= item.nbytes
-            return item
-        assert self._file is not None
-        self._file.seek(item.begin)
-        array: NDArray[Any] = np.empty(item.shape, item.dtype)
-        self._file.readinto(array.view(np.uint8).data)  # type: ignore[attr-defined]
-        self._forget()
+        _, item = self._items[0]
+        if isinstance(item, _OnDisk):
+            assert self._file is not None
+            self._file.seek(item.begin)
+            array: NDArray[Any] = np.empty(item.shape, item.dtype)
+            self._file.readinto(array.view(np.uint8).data)  # type: ignore[attr-defined]
+        else:
+            array = item
+        self.drop()
         return array
 
     def drop(self) -> None:
         """Remove the first array."""
         _, item = self._items.popleft()
-        if isinstance(item, _OnDisk):
-            self._forget()
-        else:
+        if not isinstance(item, _OnDisk):
             self._held -= item.nbytes
-
-    def _forget(self) -> None:
-        """Give the disk back when nothing is left there."""
+            return
         self._on_disk -= 1
-        if not self._on_disk and self._file is not None:
+        if not self._on_disk and self._file is not None:  # give the disk back
             self._file.truncate(0)
             self._end = 0
 

@@ -1,6 +1,7 @@
 """Animated GIF, written picture by picture with one palette for all.
 
-Its codes come from a compiled loop: of all that draws, this alone imports Numba.
+OpenCV's writer takes all pictures at once, and the colours that it chooses are up to 72 levels off
+here.  The codes come from a compiled loop: of all that draws, this alone imports Numba.
 
 References
 ----------
