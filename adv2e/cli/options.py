@@ -157,7 +157,7 @@ def source_options(body: Body) -> Body:
     """Add what says how to read an input with frames.
 
     The command gets ``given``, these by the names that :func:`adv2e.sources.open_source` has for
-    them: fps, as it was written, timestamps, time_unit, images_anywhere and allow_damaged.
+    them: fps, as it was written, timestamps, time_unit and allow_damaged.
     """
 
     @click.option(
@@ -174,18 +174,13 @@ def source_options(body: Body) -> Body:
     )
     @time_unit_option
     @click.option(
-        "--images-anywhere",
-        is_flag=True,
-        help="Let a recording's images.txt name images outside its folder.",
-    )
-    @click.option(
         "--allow-damaged",
         is_flag=True,
         help="Take what can be decoded of a damaged video, and say what is missing.",
     )
     @functools.wraps(body)
     def with_given(*args: Any, **kw: Any) -> Any:
-        names = ("fps", "timestamps", "time_unit", "images_anywhere", "allow_damaged")
+        names = ("fps", "timestamps", "time_unit", "allow_damaged")
         return body(*args, given={name: kw.pop(name) for name in names}, **kw)
 
     return with_given  # type: ignore[return-value]

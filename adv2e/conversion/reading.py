@@ -95,7 +95,7 @@ class Reading:
 
     Parameters
     ----------
-    path, fps, timestamps, start_s, stop_s, t0, time_unit, images_anywhere, allow_damaged
+    path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged
         See :func:`adv2e.sources.open_source`.
     threads : int, optional
         Threads that the whole conversion may compute with; default: all cores.
@@ -108,7 +108,6 @@ class Reading:
         fps: Rate | None = None,
         timestamps: str | Path | None = None,
         time_unit: str | None = None,
-        images_anywhere: bool = False,
         start_s: float | None = None,
         stop_s: float | None = None,
         t0: str = "auto",
@@ -119,8 +118,7 @@ class Reading:
         self.threads = threads or default_threads()
         self.given: dict[str, Any] = {
             "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
-            "time_unit": time_unit, "images_anywhere": images_anywhere,
-            "allow_damaged": allow_damaged,
+            "time_unit": time_unit, "allow_damaged": allow_damaged,
         }  # fmt: skip
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()

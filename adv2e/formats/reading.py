@@ -19,9 +19,7 @@ MOST_PIXELS = 1 << 25
 _SUFFIXES = (".txt", ".zip", ".h5", ".hdf5", ".npz")
 
 
-def read_recording(
-    path: str | Path, *, time_unit: str | None = None, images_anywhere: bool = False
-) -> Recording:
+def read_recording(path: str | Path, *, time_unit: str | None = None) -> Recording:
     """Read an event file, or a folder in the DAVIS240C layout.
 
     Parameters
@@ -31,8 +29,6 @@ def read_recording(
         (layout ``monash``), .npz.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the times; default: see :mod:`adv2e.formats.units`.
-    images_anywhere : bool
-        The ``images.txt`` of a folder may name images outside of it.
 
     Returns
     -------
@@ -50,7 +46,7 @@ def read_recording(
         check_ends(path)
         if not path.exists():
             raise DataError(f"{path}: no such file or folder")
-        recording = _read(path, time_unit, images_anywhere)
+        recording = _read(path, time_unit)
     except OSError as error:
         if machine_complaint(error):
             raise
@@ -76,13 +72,13 @@ def _check_size(recording: Recording) -> None:
     )
 
 
-def _read(path: Path, time_unit: str | None, images_anywhere: bool) -> Recording:
+def _read(path: Path, time_unit: str | None) -> Recording:
     """Read a file or folder by what is imported late, as each needs other libraries."""
     suffix = path.suffix.lower()
     if path.is_dir() or suffix == ".zip":
         from adv2e.formats.davis240c.reader import read_davis240c  # noqa: PLC0415
 
-        return read_davis240c(path, time_unit, images_anywhere=images_anywhere)
+        return read_davis240c(path, time_unit)
     if suffix == ".txt":
         from adv2e.formats.text.reader import read_text  # noqa: PLC0415
 

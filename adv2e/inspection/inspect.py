@@ -27,7 +27,6 @@ def inspect(
     fps: Rate | None = None,
     timestamps: Path | None = None,
     time_unit: str | None = None,
-    images_anywhere: bool = False,
     allow_damaged: bool = False,
 ) -> dict[str, Any]:
     """Return what a recording, an event file or an input with frames holds, ready for JSON.
@@ -38,7 +37,7 @@ def inspect(
         Any file or folder that can be compared or converted.
     fps, timestamps
         Times of frames, see :func:`adv2e.sources.open_source`; for inputs without events.
-    time_unit, images_anywhere
+    time_unit
         See :func:`adv2e.sources.open_source`; for all inputs.
     allow_damaged : bool
         Damage of a video becomes one of the problems.
@@ -61,11 +60,10 @@ def inspect(
             fps=fps,
             timestamps=timestamps,
             time_unit=time_unit,
-            images_anywhere=images_anywhere,
             allow_damaged=allow_damaged,
         )
         return _of_source(source)
-    return _of_recording(read_recording(path, time_unit=time_unit, images_anywhere=images_anywhere))
+    return _of_recording(read_recording(path, time_unit=time_unit))
 
 
 def _has_only_frames(path: Path) -> bool:

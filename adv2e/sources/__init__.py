@@ -37,7 +37,6 @@ def open_source(
     stop_s: float | None = None,
     t0: str = "auto",
     time_unit: str | None = None,
-    images_anywhere: bool = False,
     allow_damaged: bool = False,
 ) -> Source:
     """Open an input with frames.
@@ -58,8 +57,6 @@ def open_source(
         zero: from the first frame wanted.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the times in lists; default: see :mod:`adv2e.sources.times.units`.
-    images_anywhere : bool
-        The ``images.txt`` of a recording may name images outside its folder.
     allow_damaged : bool
         Take what can be decoded of a damaged video, and tell what is missing.
 
@@ -76,7 +73,7 @@ def open_source(
         If the input is missing, of an unknown kind, or wrong.
     """
     listed = Path(timestamps) if timestamps is not None else None
-    given = GivenTimes(fps, listed, time_unit, images_anywhere)
+    given = GivenTimes(fps, listed, time_unit)
     selection = Selection(start_s, stop_s, t0, allow_damaged)
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")

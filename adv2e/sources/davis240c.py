@@ -59,14 +59,11 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         time_unit=None if given else given.time_unit,  # else it is that of the other list
         stated="s" if files.has(DESCRIPTION) else None,
     )
-    is_folder = path.is_dir()
     members = members_of(
         found.stamps,
         label,
         files.has,
-        where=f" in {path}" if is_folder else " in the zip",
-        folder=path if is_folder else None,
-        anywhere=given.images_anywhere,
+        where=f" in {path}" if path.is_dir() else " in the zip",
     )
     pictures = [Picture(files.label(m), m, partial(_read_image, files, m)) for m in members]
     # in their order: which picture a name means is settled

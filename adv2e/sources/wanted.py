@@ -22,8 +22,6 @@ class GivenTimes:
     timestamps : Path, optional
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the times in lists.
-    images_anywhere : bool
-        The list of a recording may name images outside its folder.
 
     Raises
     ------
@@ -34,7 +32,6 @@ class GivenTimes:
     fps: Rate | None = None
     timestamps: Path | None = None
     time_unit: str | None = None
-    images_anywhere: bool = False
 
     def __post_init__(self) -> None:
         if self.time_unit is not None and self.time_unit not in UNITS:

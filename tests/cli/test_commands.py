@@ -53,7 +53,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         *("convert", "frames", "-o", "out.h5", "-c", "ideal", "--set", "sampling.L=3"),
         *("--seed", "7", "--threads", "2", "--overwrite", "--progress", "--start", "0.5"),
         *("--stop", "2", "--t0", "keep", "--timestamps", "t.txt", "--format", "h5"),
-        *("--time-unit", "us", "--images-anywhere"),
+        *("--time-unit", "us"),
         *("--layout", "dsec", "--with-frames", "--preview", "p.gif", "--allow-damaged"),
     )
     assert outcome.status == 0
@@ -63,7 +63,6 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "fps": None,
         "timestamps": Path("t.txt"),
         "time_unit": "us",
-        "images_anywhere": True,
         "start_s": 0.5,
         "stop_s": 2.0,
         "t0": "keep",

@@ -31,10 +31,8 @@ from adv2e.sources.times.lists import FrameList, decoded, parse_list
 from adv2e.sources.times.names import members_of
 
 
-def read_davis240c(
-    path: Path, time_unit: str | None = None, *, images_anywhere: bool = False
-) -> Recording:
-    """Return the recording in a folder or zip; `images_anywhere`: also images outside a folder.
+def read_davis240c(path: Path, time_unit: str | None = None) -> Recording:
+    """Return the recording in a folder or zip.
 
     Raises
     ------
@@ -70,9 +68,7 @@ def read_davis240c(
             listed = _listed(files, time_unit=unit) or listed
         told = listed.unit.doubt, listed.order
         builder.problems += [f"{LIST}: {line}" for line in told if line]
-        folder = path if path.is_dir() else None
-        label = files.label(LIST)
-        names = members_of(listed.stamps, label, files.has, folder=folder, anywhere=images_anywhere)
+        names = members_of(listed.stamps, files.label(LIST), files.has)
         times = np.array([stamp.t_ns for stamp in listed.stamps], np.int64)
 
     def images() -> Iterator[Pixels]:

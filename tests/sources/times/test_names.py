@@ -7,7 +7,7 @@ import pytest
 from adv2e.errors import DataError
 from adv2e.sources import open_source
 from adv2e.sources.times.instants import Stamp
-from adv2e.sources.times.names import leads_out, match, member_of
+from adv2e.sources.times.names import match, member_of
 
 LEFT = ["/data/rec/left/0000.png", "/data/rec/left/0001.png"]
 
@@ -66,16 +66,6 @@ def test_a_name_in_a_recording_means_a_file_below_it(name, member):
     assert member_of(name, {"images/a.png", "b.png"}.__contains__) == member
 
 
-@pytest.mark.parametrize("name", ["../a.png", "a/../../b", "/a", "C:\\a", "\\\\host\\share\\a"])
-def test_names_that_lead_out(name):
-    assert leads_out(name)
-
-
-@pytest.mark.parametrize("name", ["a.png", "a/../b.png", "a..b/c", "..a/b"])
-def test_names_that_stay_inside(name):
-    assert not leads_out(name)
-
-
 # whole inputs
 
 
@@ -119,27 +109,19 @@ def reaching_out(write_images, picture):
 @pytest.mark.parametrize(
     "way", ["../elsewhere/secret.png", "/", "images/../../elsewhere/secret.png"]
 )
-def test_images_outside_a_recording_are_refused_unless_the_user_says_so(
-    adv2e, reaching_out, picture, tmp_path, way
-):
+def test_images_outside_a_recording_are_refused(adv2e, reaching_out, way):
     write, outside = reaching_out
     folder = write(str(outside) if way == "/" else way)
-    with pytest.raises(DataError, match=r"images\.txt line 2: .* --images-anywhere allows that"):
+    with pytest.raises(DataError, match=r"images\.txt line 2: no image .*secret\.png in "):
         open_source(folder)
     told = adv2e("info", folder)
     assert told.status == 1
-    assert "--images-anywhere" in told.err
-
-    last = list(open_source(folder, images_anywhere=True).frames())[-1]
-    assert (last.image == picture(1)).all()
-    assert "frames      2" in adv2e("info", folder, "--images-anywhere").out
-    converted = adv2e("convert", folder, "--images-anywhere", "-o", tmp_path / "a.txt")
-    assert converted.status == 0, converted.err
+    assert "images.txt line 2: no image" in told.err
 
 
 def test_an_absolute_path_that_is_not_there_is_taken_by_its_end(reaching_out):
     write, _ = reaching_out
-    with pytest.raises(DataError, match=r"line 2: /gone/frame_0\.png is not in the folder"):
+    with pytest.raises(DataError, match=r"line 2: no image /gone/frame_0\.png in "):
         open_source(write("/gone/frame_0.png"))
     with pytest.raises(DataError, match=r"line 2: .* is the same picture as .* on line 1"):
         open_source(write("/gone/images/frame_0.png"))
