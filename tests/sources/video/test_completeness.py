@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from adv2e.sources.video.completeness import lost_pictures
+from adv2e.sources.video.times import lost_pictures
 
 MS = 10**6
 AT = [n * 40 * MS for n in range(12)]

@@ -3,7 +3,7 @@
 References
 ----------
 .. [1] ISO/IEC 14496-12, ISO base media file format: boxes; ``mvhd``, ``mdhd``, ``elst``; ``stts``,
-   ``ctts``, ``stsz``, ``stsc``, ``stco``, ``co64``; ``stsd``, ``colr``.
+   ``ctts``, ``stsz``, ``stsc``, ``stco``, ``co64``; ``stsd``; 8.8 (fragments).
 .. [2] Apple, QuickTime File Format: ``colr``, ``fiel``.
 .. [3] VP Codec ISO Media File Format Binding: ``vpcC``.
 """
@@ -20,11 +20,14 @@ from numpy.typing import NDArray
 from adv2e.sources.times.instants import NS_PER_S
 from adv2e.sources.video.colours import Colours
 from adv2e.sources.video.containers.base import TINY_BYTES, Container, DamagedError, cut_short
-from adv2e.sources.video.containers.fragments import check_fragments
 
 FIRST = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
 """Kinds of box that a file can begin with."""
 
+_OF_FRAGMENTS = frozenset(
+    b"ftyp moov moof mdat sidx ssix styp mfra free skip emsg prft uuid udta meta wide pdin".split()
+)
+"""Kinds of box that a file of fragments has, numbered and one after another."""
 _SAMPLE_ENTRY = 86
 """Bytes of the description of pictures before the boxes in it, from its size on."""
 
@@ -52,7 +55,7 @@ def examine(data: mmap.mmap, found: Container) -> None:
     if videos:
         videos[0].describe(found)
     if any(kind in (b"moof", b"sidx") for kind, _, _ in top):
-        check_fragments(data, boxes, found)
+        _check_fragments(data, found)
         return
     end = max((track.end for track in tracks), default=0)
     if end > len(data):
@@ -79,6 +82,39 @@ def boxes(data: mmap.mmap, start: int, end: int) -> Iterator[tuple[bytes, int, i
         stop = start + size if size else end
         yield kind, start + head, stop
         start = stop
+
+
+def _check_fragments(data: mmap.mmap, found: Container) -> None:
+    """Doubt what follows the last one; DamagedError if one is missing or cut."""
+    before, end = None, 0
+    for kind, start, stop in boxes(data, 0, len(data)):
+        if kind not in _OF_FRAGMENTS:
+            break
+        if stop > len(data):
+            raise cut_short(stop, len(data))
+        end = stop
+        if kind == b"moof":
+            number = _number(data, start, stop)
+            if before is not None and number > before + 1:
+                raise DamagedError(f"damaged before byte {start}: fragments are missing")
+            before = number
+    if data.find(b"moof", end) >= 0:
+        raise DamagedError(f"damaged at byte {end}")
+    if end < len(data):
+        found.doubts.append("bytes follow its last box: fragments may be missing")
+
+
+def _number(data: mmap.mmap, start: int, stop: int) -> int:
+    """Return the number of a fragment, whose boxes fill it."""
+    number, end = 0, start
+    for kind, begin, end in boxes(data, start, stop):
+        if kind == b"mfhd":
+            (number,) = struct.unpack_from(">I", data, begin + 4)
+        elif kind == b"traf":
+            _number(data, begin, end)
+    if end != stop:
+        raise DamagedError(f"damaged at byte {end}")
+    return number
 
 
 class _Track:
