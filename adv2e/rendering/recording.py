@@ -110,7 +110,7 @@ def _span_us(recording: Recording) -> tuple[int, int]:
     """Return the time of the first event or frame, and 1 us after the last [us]."""
     times = [recording.events["t"][[0, -1]]] if recording.events.size else []
     if recording.frame_times_ns is not None and recording.frame_times_ns.size:
-        times.append((np.asarray(recording.frame_times_ns)[[0, -1]] + 500) // 1000)
+        times.append(microseconds(np.asarray(recording.frame_times_ns)[[0, -1]]))
     if not times:
         raise DataError(f"{recording.path}: holds no events and no frames")
     return min(int(pair[0]) for pair in times), max(int(pair[1]) for pair in times) + 1

@@ -207,8 +207,8 @@ class Timeline:
         return self._shown
 
 
-def microseconds(t_ns: int) -> int:
-    """Return the time of a frame in the unit of events, rounded as theirs."""
+def microseconds(t_ns: Any) -> Any:
+    """Return times of frames, a number or an array, in the unit of events, rounded as theirs."""
     return (t_ns + 500) // 1000
 
 
