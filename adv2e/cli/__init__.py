@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from adv2e import __version__
-from adv2e.cli.run import flush_stdout, print_any_character, reporting
+from adv2e.cli.exit_status import flush_stdout, print_any_character, reporting
 from adv2e.process.memory import collect_seldom, return_large_blocks
 from adv2e.process.signals import stopping_on_signals
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from adv2e.cli.run import VERBOSITY
+from adv2e.cli.exit_status import VERBOSITY
 from adv2e.files.names import shown
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from processes import running_python
 
-from adv2e.cli.run import Terminated
+from adv2e.cli.exit_status import Terminated
 from adv2e.errors import DataError, MissingExtraError, UsageError
 
 

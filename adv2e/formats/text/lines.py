@@ -133,9 +133,9 @@ def _whole_numbers(
 ) -> Numbers:
     """Return the numbers of so many digits from `first`, over the point; -1: beyond 64 bits."""
     values = np.zeros(first.size, np.int64)
-    some = np.arange(first.size)
+    fewest = int(digits.min(initial=_LONGEST))
     for k in range(int(digits.max(initial=0))):
-        some = some[digits[some] > k]
+        some = slice(None) if k < fewest else np.flatnonzero(digits > k)
         place = first[some] + k
         place += place >= point[some]
         value = values[some]
