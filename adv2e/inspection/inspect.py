@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.files.names import shown
 from adv2e.files.regular import check_ends
-from adv2e.files.zips import zip_archive
+from adv2e.files.zips import Members
 from adv2e.formats.reading import Recording, read_recording
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
@@ -70,9 +70,8 @@ def _has_only_frames(path: Path) -> bool:
     if path.is_dir():
         return not (path / EVENTS).is_file()
     if path.suffix.lower() == ".zip":
-        with zip_archive(path) as archive:
-            names = {PurePosixPath(name).name for name in archive.namelist()}
-        return LIST in names and EVENTS not in names
+        files = Members(path)
+        return bool(files.enter(LIST)) and not files.enter(EVENTS)
     return path.suffix.lower() in (*VIDEO_SUFFIXES, ".npy")
 
 
