@@ -1,4 +1,4 @@
-"""What the headers of PNG, JPEG, WebP and BMP say that OpenCV does not tell, or too late.
+"""What the headers of PNG, JPEG, WebP, BMP, PGM and PPM say that OpenCV does not tell, or too late.
 
 Decoders make room for a picture first and fill it with whatever comes: a JPEG of 600 bytes became
 2.7 GB.  A picture of one colour packs well, so that a small file may hold a large one; up to the
@@ -9,10 +9,12 @@ References
 .. [1] W3C, "Portable Network Graphics (PNG) Specification, third edition".
 .. [2] ITU-T T.81 (JPEG), B.2.2 (frame header).
 .. [3] Google, "WebP Container Specification" and "Specification for WebP Lossless Bitstream".
+.. [4] J. Poskanzer, B. Henderson, "Netpbm format specifications", netpbm.sourceforge.net.
 """
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,6 +29,7 @@ MOST = 100
 
 _GREY, _GREY_ALPHA = 0, 4
 _V3 = 56  # bytes of the first header of BMP that has a mask for alpha
+_RAW_PNM = re.compile(rb"P[56]" + 3 * rb"(?:\s|#[^\n\r]*[\n\r])+([0-9]{1,10})" + rb"\s")
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class Header:
         What a fourth channel is.
     grey : bool
         OpenCV repeats grey three times.
+    white : float, optional
+        Number that means white, where it is not that of the data type.
     clear : int, optional
         Grey value of pixels that are not there, in the bits that OpenCV returns.
     """
@@ -52,6 +57,7 @@ class Header:
     pictures: int = 1
     alpha: Alpha = Alpha.STRAIGHT
     grey: bool = False
+    white: float | None = None
     clear: int | None = None
 
 
@@ -67,6 +73,8 @@ def read_header(data: bytes) -> Header:
         if data[:2] == b"BM":
             (size,) = struct.unpack_from("<I", data, 14)
             return Header(alpha=Alpha.STRAIGHT if size >= _V3 else Alpha.NONE)
+        if stated := _RAW_PNM.match(data):
+            return _pnm(data, stated)
     except (struct.error, IndexError):  # cut short: OpenCV will say so
         pass
     return Header()
@@ -133,3 +141,12 @@ def _webp(data: bytes) -> Header:
             width, height = (n & 0x3FFF for n in struct.unpack_from("<HH", data, at + 14))
         at += 8 + size + size % 2
     return Header(width, height, max(pictures, 1))
+
+
+def _pnm(data: bytes, stated: re.Match[bytes]) -> Header:
+    width, height, most = map(int, stated.groups())
+    samples = width * height * (3 if data[1:2] == b"6" else 1)
+    end = stated.end() + samples * (1 if most < 256 else 2)
+    another = re.match(rb"\s*P[1-7]\s", data[end : end + 16])
+    white = None if most in (255, 65535) else float(most)
+    return Header(width, height, len(data) // end if another else 1, white=white)

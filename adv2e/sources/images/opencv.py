@@ -24,7 +24,7 @@ from adv2e.effects.frames.encoding import full_scale_of, is_light
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.process.standard_error import overhearing
 from adv2e.sources.frame import Image, Pixels
-from adv2e.sources.images import netpbm, tiff
+from adv2e.sources.images import tiff
 from adv2e.sources.images.alpha import Alpha, with_alpha
 from adv2e.sources.images.headers import check_size, read_header
 
@@ -115,8 +115,9 @@ def decode_image(data: bytes, label: str) -> Pixels:
     """
     if label.lower().endswith(".exr"):
         return _decode_exr(data, label)
-    if netpbm.is_netpbm(data):
-        return netpbm.decode(data, label)
+    if re.match(rb"P[12347]\s", data):
+        kinds = "PBM, PAM and plain PGM and PPM"
+        raise DataError(f"{label}: {kinds} are not read; write raw ones, or PNG")
     if tiff.is_tiff(data):
         return _decode_tiff(data, label)
     header = read_header(data)
@@ -133,8 +134,12 @@ def decode_image(data: bytes, label: str) -> Pixels:
     elif header.clear is not None:
         there = np.iinfo(colours.dtype).max
         alpha = np.where(colours == header.clear, 0, there).astype(colours.dtype)
+    white = header.white
+    if white is not None and colours.max() > white:
+        above = f"above the {white:g} that its header states"
+        raise DataError(f"{label}: a number of {colours.max()}, {above}")
     if alpha is None:
-        return Pixels(colours)
+        return Pixels(colours, white=white)
     return with_alpha(colours, alpha, header.alpha, full_scale_of(colours.dtype), label)
 
 
