@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -53,14 +54,8 @@ class Source(ABC):
         file states, and good for showing progress.
     has_clock : bool
         Times are on a clock of the source's own, not counted from its first frame.
-    encoding : str
-        What ``encoding: auto`` means here.
-    encoding_reason : str
-        Why, in a few words.
-    full_scale : float
-        Number that means white.
-    full_scale_reason : str
-        Who says so; empty where the data type does.
+    light : Light
+        What the numbers of the frames stand for; `encoding` and `full_scale` are those of it.
     largest : float or None
         Largest number of the frames that were looked at when it was opened; None: of none.
     largest_read : float
@@ -95,29 +90,24 @@ class Source(ABC):
         """
         image = first.image
         try:
-            self.full_scale = full_scale_of(image.dtype)
+            usual = full_scale_of(image.dtype)
         except DataError as error:
             raise DataError(f"{label}: {error}") from error
         self.height, self.width = image.shape[:2]
         self.dtype = image.dtype
         self.colour = image.ndim == 3
         light = light or light_of_images(image.dtype, colour=self.colour)
-        self.encoding, self.encoding_reason = light.encoding, light.encoding_reason
-        self.full_scale_reason = ""
         self._white_told, self._white_stated = light.full_scale, first.white
-        if light.full_scale is not None:
-            self.full_scale, self.full_scale_reason = light.full_scale, light.full_scale_reason
-        elif first.white is not None:
-            self.full_scale, self.full_scale_reason = first.white, "as its header says"
+        why = light.full_scale_reason
+        if light.full_scale is None and first.white is not None:
+            why = "as its header says"
+        self.full_scale = light.full_scale or first.white or usual
+        self.light = replace(light, full_scale=self.full_scale, full_scale_reason=why)
+        self.encoding = light.encoding
 
     def _note(self, text: str) -> None:
         if text not in self.notes:  # frames may be read more than once
             self.notes.append(text)
-
-    @property
-    def light(self) -> Light:
-        """What the numbers of the frames stand for."""
-        return Light(self.encoding, self.encoding_reason, self.full_scale, self.full_scale_reason)
 
     def doubt_of_white(self, largest: float | None) -> str:
         """Return what is to be told if `largest` is the largest of all numbers; often nothing."""

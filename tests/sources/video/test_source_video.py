@@ -55,7 +55,7 @@ def test_lossless_grey_comes_back_as_stored(write_video, picture, dtype, encodin
     assert (source.dtype, source.colour, source.encoding) == (dtype, False, encoding)
     assert source.full_scale == np.iinfo(dtype).max
     depth = "16-bit grey video" if dtype == np.uint16 else "the video states no transfer"
-    assert (source.encoding_reason, source.notes) == (depth, [])
+    assert (source.light.encoding_reason, source.notes) == (depth, [])
 
 
 def test_threads_that_decode_change_nothing(write_video, colours, monkeypatch):
