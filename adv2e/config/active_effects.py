@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from adv2e.config.model import Config, Frames, Pixel, Readout, Sampling
 from adv2e.config.user_effects import user_effects
@@ -29,12 +29,12 @@ def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
     tick of the time stamps is the last of all.
     """
     extra = [*user_hooks(config), *extra]
-    own = {
+    own: dict[str, Iterable[Hooks]] = {
         "frames": frame_hooks(config.frames, config.sampling),
-        "pixel": _of_pixel(config.pixel),
-        "readout": _of_readout(config.readout, config.frames) if config.readout else [],
+        "pixel": _pixel_hooks(config.pixel),
+        "readout": _readout_hooks(config.readout, config.frames) if config.readout else [],
     }
-    hooks = []
+    hooks: list[Hooks] = []
     for stage in STAGES:
         hooks += [*own[stage], *(hook for hook in extra if hook.stage == stage)]
     if config.readout is not None and config.readout.tick_us > 0:
@@ -42,48 +42,42 @@ def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
     return hooks
 
 
-def frame_hooks(frames: Frames, sampling: Sampling) -> list[Hooks]:
-    """Return the effects on the light of the frames, in signal order."""
-    hooks: list[Hooks] = []
+def frame_hooks(frames: Frames, sampling: Sampling) -> Iterator[Hooks]:
+    """Yield the effects on the light of the frames, in signal order."""
     if frames.clock_drift_ppm:
-        hooks.append(ClockDriftHooks(frames.clock_drift_ppm))
+        yield ClockDriftHooks(frames.clock_drift_ppm)
     if frames.clock_offset_us:
-        hooks.append(ClockOffsetHooks(frames.clock_offset_us))
+        yield ClockOffsetHooks(frames.clock_offset_us)
     if frames.exposure_us and sampling.interpolation == "flow":
         # imported late: few conversions need it, and all would load its compiled loops
         from adv2e.effects.frames.motion_blur import MotionBlurHooks  # noqa: PLC0415
 
-        hooks.append(MotionBlurHooks(frames.exposure_us))
+        yield MotionBlurHooks(frames.exposure_us)
     elif frames.exposure_us:
-        hooks.append(ExposureBlurHooks(frames.exposure_us))
+        yield ExposureBlurHooks(frames.exposure_us)
     # after the frames are sharp: over a pedestal the dark would hardly become so in as many steps
     if frames.black_level_dn or frames.black_depth_dn:
-        hooks.append(BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn))
+        yield BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn)
     if any(frames.shift_px):
-        hooks.append(MisregistrationHooks(frames.shift_px))
+        yield MisregistrationHooks(frames.shift_px)
     if frames.flicker is not None and frames.flicker.depth:
-        hooks.append(FlickerHooks(frames.flicker))
-    return hooks
+        yield FlickerHooks(frames.flicker)
 
 
-def _of_pixel(pixel: Pixel) -> list[Hooks]:
-    hooks: list[Hooks] = []
+def _pixel_hooks(pixel: Pixel) -> Iterator[Hooks]:
     if pixel.dark_current is not None and pixel.dark_current.dn:
-        hooks.append(DarkCurrentHooks(pixel.dark_current))
+        yield DarkCurrentHooks(pixel.dark_current)
     if pixel.dead_pixels is not None and pixel.dead_pixels.fraction:
-        hooks.append(DeadPixelsHooks(pixel.dead_pixels))
-    return hooks
+        yield DeadPixelsHooks(pixel.dead_pixels)
 
 
-def _of_readout(readout: Readout, frames: Frames) -> list[Hooks]:
-    hooks: list[Hooks] = []
+def _readout_hooks(readout: Readout, frames: Frames) -> Iterator[Hooks]:
     if readout.frame_coupling is not None and readout.frame_coupling.amplitude:
-        hooks.append(FrameCouplingHooks(readout.frame_coupling, 0.5 * frames.exposure_us))
+        yield FrameCouplingHooks(readout.frame_coupling, 0.5 * frames.exposure_us)
     if readout.arbiter is not None:
-        hooks.append(ArbiterHooks(readout.arbiter))
+        yield ArbiterHooks(readout.arbiter)
     if readout.loss is not None and readout.loss.fraction:
-        hooks.append(EventLossHooks(readout.loss))
-    return hooks
+        yield EventLossHooks(readout.loss)
 
 
 def user_hooks(config: Config) -> list[Hooks]:
