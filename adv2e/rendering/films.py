@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 
 from adv2e.errors import UsageError
-from adv2e.rendering.gif import GifWriter, palette
 from adv2e.rendering.layout import Cell, compose, default_scale, sheet
 from adv2e.rendering.output import NotWritten
 from adv2e.rendering.styles import Style
 from adv2e.rendering.video import CODES, VideoFile
+
+if TYPE_CHECKING:
+    from adv2e.rendering.gif import GifWriter
 
 SUFFIXES = (*CODES, ".gif", ".png")
 """The kinds of file there are."""
@@ -41,6 +44,8 @@ class Film:
         self._style, self._scale = style, scale
         self._file: VideoFile | GifWriter
         if check_suffix(path) == ".gif":
+            from adv2e.rendering.gif import GifWriter, palette  # noqa: PLC0415 - compiled
+
             self._file = GifWriter(path, fps, palette(style))
         else:
             self._file = VideoFile(path, fps)
