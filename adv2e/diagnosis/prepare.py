@@ -13,9 +13,14 @@ from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.input_checks import check_inputs
 from adv2e.diagnosis.data.scene import Placed, Scene
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.fitting.candidates import Candidate
+from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate
 from adv2e.diagnosis.fitting.library import library
-from adv2e.diagnosis.fitting.nuisances import THRESHOLDS, TOLERANCE, fit_thresholds, thresholds_of
+from adv2e.diagnosis.fitting.nuisances import (
+    TOLERANCE,
+    fit_thresholds,
+    threshold_nuisance,
+    thresholds_of,
+)
 from adv2e.diagnosis.hints.collect import hints_of
 from adv2e.diagnosis.hints.readouts import has_pulse
 from adv2e.diagnosis.selection.reference import Reference
@@ -102,7 +107,7 @@ def prepare(
         declared,
         (frames or none) + (levels or none),
         log,
-        THRESHOLDS if free_thresholds else (),
+        threshold_nuisance(declared) if free_thresholds else NOTHING,
     )
     candidates = [one for one in library(declared, hints) if one.name not in without]
     evidence = replace(evidence, notes=notes)

@@ -189,6 +189,9 @@ class Candidate:
         return values
 
 
+NOTHING = Candidate("", (), ((),))
+"""No effect, or no nuisance."""
+
 _OFF_AT_INFINITY = (
     "pixel.low_pass.cutoff_hz",
     "pixel.low_pass.dark_cutoff_hz",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.fitting.candidates import FitParameter
+from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.effects.pixel.thresholds import FLOOR
 
 TOLERANCE = 0.01
@@ -24,17 +24,19 @@ ROUNDS = 15
 """Simulations at most."""
 LARGEST = 5.0
 """Largest threshold tried [ln]; grey levels of 8 bits span 5.5."""
-
-THRESHOLDS = tuple(
-    FitParameter(f"pixel.thresholds.{name}", FLOOR, LARGEST) for name in ("on", "off")
-)
-"""Keys that :func:`fit_thresholds` fits, and a search then refines with what it finds."""
+_SIGNS = ("on", "off")
 
 
 def thresholds_of(config: Config) -> dict[str, float]:
     """Return the thresholds of a configuration, by key."""
-    levels = config.pixel.thresholds
-    return {one.key: value for one, value in zip(THRESHOLDS, (levels.on, levels.off), strict=True)}
+    return {f"pixel.thresholds.{sign}": getattr(config.pixel.thresholds, sign) for sign in _SIGNS}
+
+
+def threshold_nuisance(fitted: Config) -> Candidate:
+    """Return the keys that :func:`fit_thresholds` fitted, for a search to refine."""
+    levels = thresholds_of(fitted)
+    parameters = (FitParameter(key, FLOOR, LARGEST) for key in levels)
+    return Candidate("", tuple(parameters), (tuple(levels.values()),))
 
 
 def fit_thresholds(

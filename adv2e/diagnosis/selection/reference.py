@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.fitting.candidates import FITTED, Candidate, FitParameter, neutral_value
+from adv2e.diagnosis.fitting.candidates import FITTED, NOTHING, Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted, parted
 from adv2e.diagnosis.fitting.fitter import Fitter
 from adv2e.diagnosis.statistics.metric import Ensemble, Scale
@@ -99,7 +99,7 @@ class Reference:
         Of the statistics.
     log : callable
         Told of each step.
-    free : tuple of FitParameter
+    nuisances : Candidate
         Keys that are not known: fitted with all effects, whatever these are.
     """
 
@@ -110,11 +110,11 @@ class Reference:
         declared: Config,
         error: FrameError | None = None,
         log: Callable[[str], None] = lambda text: None,
-        free: tuple[FitParameter, ...] = (),
+        nuisances: Candidate = NOTHING,
     ) -> None:
         self.sampler, self.observed, self.log = sampler, observed, log
         self.error = error or FrameError.none(observed.shape)
-        self.declared, self.free = declared, free
+        self.declared, self.nuisances = declared, nuisances
         self._resampling, self.rejections = Resampling(sampler, declared), Rejections()
 
     @cached_property
@@ -189,11 +189,11 @@ class Reference:
         return joint
 
     def _joined(self, fits: tuple[Fitted, ...]) -> Fitted:
-        """Return one fit of all effects together, and of the keys that are not known, the last."""
-        unknown = [neutral_value(self.declared, one) for one in self.free]
-        free = Candidate("", self.free, (tuple(unknown),))
-        joint = Candidate.joined([*(fit.candidate for fit in fits), free])
-        point = np.concatenate([*(fit.point for fit in fits), free.scaled(unknown)])
+        """Return one fit of all effects together, and of the nuisances, the last."""
+        nuisances = self.nuisances
+        joint = Candidate.joined([*(fit.candidate for fit in fits), nuisances])
+        start = nuisances.scaled(nuisances.starts[0])
+        point = np.concatenate([*(fit.point for fit in fits), start])
         return Fitted(joint, self.declared, point, reach=_REACH)
 
     def misfit(self, state: State, view: int = BOTH) -> float:

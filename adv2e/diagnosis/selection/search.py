@@ -81,7 +81,7 @@ class Search:
     """Looks for effects that a declared model lacks; keys not known are fitted with all."""
 
     def __init__(self, reference: Reference, candidates: list[Candidate]) -> None:
-        unknown = {parameter.key for parameter in reference.free}
+        unknown = {parameter.key for parameter in reference.nuisances.parameters}
         self.candidates = [
             one for one in candidates if not unknown & {each.key for each in one.parameters}
         ]

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
+from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate, FitParameter
 from adv2e.diagnosis.tables.measurements import Noise
 from adv2e.diagnosis.tables.noise import NoisySources, Rates, noise_rates
 from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, row_errors
@@ -95,7 +95,7 @@ class NoiseProblem(Problem):
             _title(kind): np.array([k for k, at in enumerate(self._kinds) if at == kind])
             for kind in dict.fromkeys(self._kinds)
         }
-        self.nuisances = Candidate("", (), ((),))
+        self.nuisances = NOTHING
         self.candidates = list(self._candidates(rate))
         known = (LEAK, PHOTO_LEAK, SHOT)
         self.neutral = {key: 0.0 for key in known if declared.held(key, None) is None}

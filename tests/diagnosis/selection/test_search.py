@@ -22,7 +22,7 @@ from made_up.sampler import (
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.diagnosis.fitting.fitted import Fitted
-from adv2e.diagnosis.fitting.nuisances import THRESHOLDS, thresholds_of
+from adv2e.diagnosis.fitting.nuisances import threshold_nuisance, thresholds_of
 from adv2e.diagnosis.outcome.detectable import detectable
 from adv2e.diagnosis.outcome.findings import finding_of
 from adv2e.diagnosis.outcome.verdict import verdict_of
@@ -250,7 +250,7 @@ def test_thresholds_that_are_not_known_are_fitted_with_what_is_found():
     wrong = load_config([], ["pixel.thresholds={on: 0.22, off: 0.19}"])
     sampler = MadeUpSampler()
     observed = sampler.measure(load_config([], ["pixel.leak.rate_hz=4"]), RECORDING)
-    search = search_of(sampler, observed, wrong, candidates(), free=THRESHOLDS)
+    search = search_of(sampler, observed, wrong, candidates(), nuisances=threshold_nuisance(wrong))
     outcome = search.run()
     assert outcome.state.names == ("leak",)
     assert outcome.state.config.pixel.leak.rate_hz == pytest.approx(4.0, rel=0.1)
