@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 from typing import Any
@@ -34,11 +34,6 @@ from adv2e.pixel.steps import PRECISE, Coarseness, Stepping
 _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP
 """Pixels of the largest tiles; their events are held twice for a moment."""
-
-
-def thread_count(threads: int | None) -> int:
-    """Return `threads`, or the number of cores this process may use."""
-    return default_threads() if threads is None else max(1, threads)
 
 
 def is_compiled(pixel: Pixel, sampling: Sampling, additions: Additions | None = None) -> bool:
@@ -113,17 +108,17 @@ class PixelArray:
             )
         self.origin_us = t_ns // 1000
         self.circuit = make_circuit(pixel, sampling, seed)
-        self.threads = thread_count(threads)
+        self.threads = default_threads() if threads is None else max(1, threads)
         self.started = False
-        self._driver = driver_of(pixel, self.circuit, additions, method)
-        start, stepped = self._relative(t_ns), self._driver == "run_stepped"
+        start = self._relative(t_ns)
+        stepped = driver_of(pixel, self.circuit, additions, method) == "run_stepped"
+        self._stepping: Stepping | None = None
         if stepped:
             self._stepping = Stepping(
                 self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
                 self.origin_us, start, coarseness,
             )  # fmt: skip
-        stepping = self._stepping if stepped else None
-        self.state = initial_state(pixel, self.circuit, first, start, stepping, self.threads)
+        self.state = initial_state(pixel, self.circuit, first, start, self._stepping, self.threads)
         strips = -(-self.pixels // STRIP)
         self._most = -(-(tile or _TILE) // STRIP)
         # full tiles, and one for each thread that finds the rest, or nothing
@@ -143,18 +138,10 @@ class PixelArray:
         last: NDArray[np.bool_],
         pool: ThreadPoolExecutor | None = None,
     ) -> Events:
-        """Return the sorted events of the intervals between neighbouring frames.
+        """Return the sorted events of the intervals between neighbouring frames of light [DN].
 
-        Parameters
-        ----------
-        frames : (intervals + 1, rows, columns) float32 or float64
-            Light [DN], the first as at the end of the last call; with the printed last interval
-            one more, for the look-ahead.
-        times_ns : (intervals + 1)
-        last : (intervals + 1,) bool
-            See :func:`adv2e.kernel.exact.run_exact`.
-        pool : ThreadPoolExecutor, optional
-            Threads to work in; none: the calling one.
+        The first frame is the last of the call before; for the printed last interval one more
+        follows, to look ahead.  `last`: see :func:`adv2e.kernel.exact.run_exact`.
         """
         before = np.arange(-1, frames.shape[0] - 1)
         part = Part(frames, before, np.ones(before.size, np.float32), times_ns, last)
@@ -177,61 +164,31 @@ class PixelArray:
             )
         frames = frames_of(part.frames, table)
         per_us = order.SLICES / (span + 2.0)
-        advance = self._advance_stepped if self._driver == "run_stepped" else self._advance_whole
-        parted = advance(part, frames, starts, t_base, per_us, pool)
+        parted: list[Parted] = []
+        for how in self._solutions(part, frames, starts):
+            arguments = (
+                frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
+                *how, t_base, self.state,
+            )  # fmt: skip
+            parted += self._by_tiles(arguments, per_us, pool)
         self.started = True
         self._keep_times(parted)
         yield from in_order(parted, self.columns, self.origin_us + t_base, pool)
 
-    def _advance_whole(
-        self,
-        part: Part,
-        frames: Frames,
-        starts: NDArray[Any],
-        t_base: int,
-        per_us: float,
-        pool: ThreadPoolExecutor | None,
-    ) -> list[Parted]:
-        """Return the events of all tiles, solved interval by interval."""
+    def _solutions(
+        self, part: Part, frames: Frames, starts: NDArray[Any]
+    ) -> Iterable[tuple[Any, ...]]:
+        """Return what the solver is told besides, for each call of it."""
+        if self._stepping is not None:
+            return self._stepping.runs(part, frames, starts)
         fastest = max(self.circuit.dark + 255.0 * self.circuit.per_dn, self.circuit.dark)
-        rules = rules_for(np.diff(starts), fastest, self.circuit.dead_time)
-        return self._by_tiles(
-            exact.run_exact,
-            (
-                frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
-                rules, t_base, self.state,
-            ),
-            per_us,
-            pool,
-        )  # fmt: skip
-
-    def _advance_stepped(
-        self,
-        part: Part,
-        frames: Frames,
-        starts: NDArray[Any],
-        t_base: int,
-        per_us: float,
-        pool: ThreadPoolExecutor | None,
-    ) -> list[Parted]:
-        """Return the events of all tiles, in steps of time."""
-        parted = []
-        for steps, injected in self._stepping.runs(part, frames, starts):
-            arguments = (
-                frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
-                steps, injected, t_base, self.state,
-            )  # fmt: skip
-            parted += self._by_tiles(driver.run_stepped, arguments, per_us, pool)
-        return parted
+        return [(rules_for(np.diff(starts), fastest, self.circuit.dead_time),)]
 
     def _by_tiles(
-        self,
-        advance: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        per_us: float,
-        pool: ThreadPoolExecutor | None,
+        self, arguments: tuple[Any, ...], per_us: float, pool: ThreadPoolExecutor | None
     ) -> list[Parted]:
-        """Return the events of all tiles; `advance` is a driver, which finds its tile itself."""
+        """Return the events of all tiles; each call finds its tile itself."""
+        advance: Any = exact.run_exact if self._stepping is None else driver.run_stepped
         claimed = nothing_claimed()
 
         def run(_: int) -> Parted:
