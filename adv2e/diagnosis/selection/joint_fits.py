@@ -1,4 +1,4 @@
-"""Models with effects more, fitted to their end and judged on data that they were not fitted to."""
+"""Models with effects more, fitted to their end and validated on data not used for that."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _exposed_as(trial: Trial, fit: Fitted) -> Fitted:
 def with_one_more(
     reference: Reference, state: State, trials: Sequence[Trial], grounds: Sequence[State]
 ) -> list[JointFit]:
-    """Return models with one effect more, judged against all `grounds`.
+    """Return models with one effect more, validated against all `grounds`.
 
     Before its fit has ended, an effect may be behind another for that alone: all that are close
     are tried.  Others are, one after another, where none of these holds.
@@ -91,7 +91,7 @@ def with_one_more(
 def with_more(
     reference: Reference, state: State, added: Sequence[Trial], grounds: Sequence[State]
 ) -> JointFit:
-    """Return the model with effects more, fitted to its end and judged against all `grounds`."""
+    """Return the model with effects more, fitted to its end and validated against all `grounds`."""
     before = state.fits
     for trial in added:
         before = tuple(_exposed_as(trial, fit) for fit in before)
