@@ -105,8 +105,6 @@ def _resimulation(
     """Return how to simulate the frames of `source`, or of `measured`, again."""
     from adv2e.comparison.compare import Resimulation
     from adv2e.comparison.resimulation import resimulator
-    from adv2e.compiled import announcement
-    from adv2e.conversion.simulation import is_compiled
     from adv2e.errors import DataError
     from adv2e.kernel.rng import LARGEST_SEED
 
@@ -119,7 +117,5 @@ def _resimulation(
             f"{measured.path}: holds no frames to simulate with this configuration; give them with"
             " --frames"
         )
-    if not is_compiled(config):
-        log(announcement())
     simulate_events = resimulator(frames, config, encoding, threads=threads)
     return Resimulation(simulate_events, (config.seed, (config.seed + 1) % (LARGEST_SEED + 1)))

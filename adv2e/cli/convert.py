@@ -84,6 +84,9 @@ def command(
     if given["fps"] is not None and given["time_unit"] is not None:
         raise click.UsageError("--time-unit is for lists of times, which --fps replaces: keep one")
     options.check_part(start, stop)
+    from adv2e.compiled import import_ahead
+
+    import_ahead()
     from adv2e.conversion.reading import Reading
 
     reading = Reading(source, **given, start_s=start, stop_s=stop, t0=t0, threads=threads)
@@ -95,7 +98,6 @@ def command(
             reading,
             output,
             config=config(),
-            compile_apart=True,
             also_read=options.files_given(),
             log=log,
             **written,

@@ -63,14 +63,12 @@ def command(
 
     from tqdm import tqdm
 
-    from adv2e.compiled import announcement
     from adv2e.config import names_of, written_keys
     from adv2e.config.user_effects import user_effects
     from adv2e.diagnosis.configurations import without_user_effects
     from adv2e.diagnosis.data.evidence import read_evidence
     from adv2e.diagnosis.diagnose import diagnose
     from adv2e.diagnosis.fitting.library import names
-    from adv2e.pixel.array import is_compiled
     from adv2e.reports.files import check_folder, write_reports
     from adv2e.reports.summary import summary_text
 
@@ -84,8 +82,6 @@ def command(
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     check_folder(folder, overwrite=overwrite, inputs=[recording, *options.files_given()])
     evidence = read_evidence(recording, time_unit)
-    if not is_compiled(declared.pixel, declared.sampling):
-        log(announcement())
     with tqdm(unit="simulation", leave=False, disable=not progress) as bar:
 
         def count(done: int) -> None:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from adv2e.cli.compiling import compilation_told
 from adv2e.cli.exit_status import VERBOSITY
 from adv2e.files.names import shown
 
@@ -263,7 +264,8 @@ def progress_option(body: Body) -> Body:
         if progress is None:
             quiet = isinstance(kw.get("log"), Log) and kw["log"].level < 0
             progress = not quiet and sys.stderr is not None and sys.stderr.isatty()
-        return body(*args, progress=progress, **kw)
+        with compilation_told(kw.get("log"), progress):
+            return body(*args, progress=progress, **kw)
 
     return with_progress  # type: ignore[return-value]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from adv2e.compiled import entry
+from adv2e.compiled import kernel
 
 
-@entry
+@kernel
 def add_pairs(key: Any, weight: Any, decay: Any, reach: Any, sums: Any) -> None:
     """Add 2 w_i w_j exp(-decay (key_j - key_i)^2) over all pairs i < j within reach.
 

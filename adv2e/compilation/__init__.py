@@ -1,1 +1,1 @@
-"""How compiled code is kept between runs."""
+"""Compiled code: how it is made by Numba, and where it is kept."""

@@ -102,7 +102,6 @@ def run_demo(
             overwrite=overwrite,
             preview=str(film),
             progress=progress,
-            compile_apart=True,
             log=log,
         )
 

@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from adv2e import __version__
 from adv2e.background import OrderedWork
-from adv2e.compiled import announcement
 from adv2e.config import Config, to_dict
 from adv2e.config.active_effects import active_hooks, user_sources
 from adv2e.conversion.reading import Decoding, Reading, Still
-from adv2e.conversion.simulation import events_from_light, is_compiled
+from adv2e.conversion.simulation import events_from_light
 from adv2e.conversion.versions import versions
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
@@ -137,7 +136,6 @@ def convert(
     overwrite: bool = False,
     preview: str | None = None,
     progress: bool = False,
-    compile_apart: bool = False,
     also_read: Iterable[str | Path] = (),
     log: Callable[[str], None] = lambda text: None,
 ) -> Summary:
@@ -157,8 +155,6 @@ def convert(
         Picture or film of the events to write beside.
     progress : bool
         Show a progress bar on stderr.
-    compile_apart : bool
-        Have what is not compiled yet compiled by a process of its own.
     also_read : iterable of str or Path
         Files that `config` is made of, which must not be written over.
     log : callable
@@ -212,10 +208,6 @@ def convert(
             log(doubt)
         hooks = active_hooks(config)
         table = kernel_table(decoder, config.sampling, hooks)
-        if not is_compiled(config):
-            log(announcement())
-            if compile_apart and not user_sources(config):
-                _compile_apart(recording, config, decoder.encoding, name, layout, workers)
         stated = config.frames.full_scale
         stills = reading.stills(
             Decoding(decoder, table is not None, out.wants_frames, stated, not keeps_all_bits)
@@ -248,27 +240,6 @@ def convert(
         events=out.events,
         on=out.on,
         seconds=time.perf_counter() - began,
-    )
-
-
-def _compile_apart(
-    recording: Source,
-    config: Config,
-    encoding: str,
-    format: str,
-    layout: str | None,
-    threads: int,
-) -> None:
-    from adv2e.conversion.compiling import compile_apart  # noqa: PLC0415 - once in the life of a release
-
-    compile_apart(
-        config,
-        dtype=recording.dtype,
-        colour=recording.colour,
-        encoding=encoding,
-        format=format,
-        layout=layout,
-        threads=threads,
     )
 
 

@@ -34,7 +34,6 @@ from adv2e.errors import ConfigError, DataError
 from adv2e.events import Events
 from adv2e.light.decoding import decoder_for, kernel_table
 from adv2e.light.intervals import Intervals, Part
-from adv2e.pixel import array as pixel
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
 from adv2e.sources.frame import check_values
@@ -96,11 +95,6 @@ def simulate(
     images = _checked(chain([first], coming), times, config.frames.full_scale)
     light = images if table is not None else ((t, decoder.decode(image)) for t, image in images)
     yield from events_from_light(light, config, hooks=hooks, threads=threads, table=table)
-
-
-def is_compiled(config: Config) -> bool:
-    """Tell whether the code that a simulation needs has been compiled before."""
-    return pixel.is_compiled(config.pixel, config.sampling, additions_of(active_hooks(config)))
 
 
 def _checked(

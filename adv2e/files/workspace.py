@@ -13,20 +13,15 @@ import os
 import re
 import secrets
 import shutil
-import sys
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
-if sys.platform == "win32":
-    import msvcrt
-else:
-    import fcntl
+from adv2e.files.locks import lock_file
 
 _NAME = re.compile(r"\.adv2e\.[0-9a-f]{8}\.part-?")
 _LOCK, _JOURNAL = "lock", "journal.json"
-_FAR = 1 << 30  # a byte beyond the content: what is locked on Windows cannot be read
 
 Identity = tuple[int, int]
 """What tells a file or folder from all others, by whatever name: device and inode."""
@@ -58,7 +53,9 @@ class Workspace:
             self.path.mkdir(0o700, exist_ok=True)
             with suppress(FileNotFoundError):
                 self._lock = lock.open("xb", buffering=0)
-                self._lock.write(_machine() if _locked(self._lock, wait=True) else b"no locks here")
+                self._lock.write(
+                    _machine() if lock_file(self._lock, wait=True) else b"no locks here"
+                )
 
     def note_placing(
         self, first: tuple[Path, Identity], outputs: Iterable[tuple[str, str, str]]
@@ -114,7 +111,7 @@ def _remove_if_abandoned(path: Path) -> None:
     with file.open("r+b", buffering=0) as lock:
         if (
             _may_be_dead(lock.read())
-            and _locked(lock, wait=False)
+            and lock_file(lock, wait=False)
             and os.path.samestat(os.fstat(lock.fileno()), file.stat())
         ):
             _remove(path, lock)
@@ -174,16 +171,3 @@ def _machine() -> bytes:
     with suppress(OSError):
         start = Path("/proc/sys/kernel/random/boot_id").read_bytes().strip()
     return os.fsencode(name) + b"\n" + start
-
-
-def _locked(file: BinaryIO, *, wait: bool) -> bool:
-    """Lock a file; return False if that cannot be, or without `wait`, if another one has."""
-    with suppress(OSError):
-        if sys.platform == "win32":
-            file.seek(_FAR)
-            msvcrt.locking(file.fileno(), msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK, 1)
-            file.seek(0)
-        else:
-            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        return True
-    return False

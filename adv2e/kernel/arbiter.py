@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adv2e.compiled import entry
+from adv2e.compiled import kernel
 
 NOBODY = -1
 """Mark of a pixel of which no event waits."""
@@ -13,7 +13,7 @@ FREE, HEAD, ROWS, EVENTS = 0, 1, 2, 3
 """Entries of the record of a channel."""
 
 
-@entry
+@kernel
 def serve(
     time, pixel, polarity, known, row_us, event_us, columns, channel, queue, asked, waiting, left,
     out_time, out_pixel, out_polarity,

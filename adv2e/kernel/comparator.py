@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from adv2e.compiled import kernel
+from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.leak import begin_leak_cycle
 from adv2e.kernel.packing import PIXEL_BITS
 
@@ -22,6 +23,7 @@ def fire(i, t, polarity, t_base, circuit, state, keys, times, n):
 
     Past the end of the buffer it is only counted.
     """
+    state, keys, times = borrowed(state, keys, times)
     if circuit.leak_jitter > 0.0:
         begin_leak_cycle(i, circuit, state)
     if n < keys.shape[0]:

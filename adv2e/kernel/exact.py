@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import entry, kernel
+from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, screen, special, static_pixels
 from adv2e.kernel.circuit import EXACT, Circuit
-from adv2e.kernel.event_buffer import tell_where, with_room
+from adv2e.kernel.event_buffer import with_room
 from adv2e.kernel.frames import load
 from adv2e.kernel.lanes import batch, exchange, rows
 from adv2e.kernel.leak import fill_falls
@@ -257,10 +257,10 @@ def _strip(
     return n, keys, times
 
 
-@entry
+@kernel
 def run_exact(
     claimed, most, frames, before, share, starts, begins, last, circuit, rules, t_base,
-    state, scratch, keys, times, places,
+    state, scratch, keys, times,
 ):  # fmt: skip
     """Advance strips that nobody else works on over the intervals between neighbouring frames.
 
@@ -284,12 +284,12 @@ def run_exact(
     rules : Rules
         Quadrature for each interval.
 
-    keys, times, places
-        Room for events; see :class:`adv2e.kernel.event_buffer.Room`.
+    keys, times : (n,)
+        Memory for events; see :mod:`adv2e.kernel.event_buffer`.
 
     Returns
     -------
-    events written
+    events written, keys, times
     """
     n = np.int64(0)
     for _ in range(most):
@@ -300,5 +300,4 @@ def run_exact(
             lo, hi - lo, frames, before, share, starts, circuit, rules, t_base,
             state, scratch, keys, times, n,
         )  # fmt: skip
-    tell_where(keys, times, places)
-    return n
+    return n, keys, times

@@ -6,7 +6,7 @@ The equations are those of :mod:`adv2e.effects.pixel.thresholds` and
 
 from __future__ import annotations
 
-from adv2e.compiled import entry, kernel
+from adv2e.compiled import kernel
 from adv2e.kernel import rng
 
 
@@ -18,7 +18,7 @@ def _fill_normal_levels(seed, stream, first, mean, mismatch, floor, levels, spar
         levels[k] = level if level > floor else floor
 
 
-@entry
+@kernel
 def fill_levels(lo, hi, seed, mean_on, mean_off, mismatch, floor, on, off, spare):
     """Draw the thresholds of the pixels lo..hi into `on` and `off`; `spare` is overwritten."""
     if mismatch > 0.0:
@@ -31,7 +31,7 @@ def fill_levels(lo, hi, seed, mean_on, mean_off, mismatch, floor, on, off, spare
             off[i] = max(mean_off, floor)
 
 
-@entry
+@kernel
 def fill_random_reference(seed, on, off, x, reference):
     """Draw references so that x lies uniformly between the thresholds of each pixel."""
     for i in range(x.shape[0]):

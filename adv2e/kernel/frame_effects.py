@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from adv2e.compiled import entry
+from adv2e.compiled import kernel
 
 
-@entry
+@kernel
 def fill_luma(image, red, green, blue, luma):
     """Set `luma` (pixels,) to the sum of a table for each channel of `image` (pixels, 3).
 
@@ -17,7 +17,7 @@ def fill_luma(image, red, green, blue, luma):
         luma[k] = green[image[k, 1]] + red[image[k, 0]] + blue[image[k, 2]]
 
 
-@entry
+@kernel
 def sharpen(blurred, first, last, weights, norm, iterations, variation, light, mean, factor):
     """Find light from its means over exposures; see :mod:`adv2e.effects.frames.exposure_blur`.
 

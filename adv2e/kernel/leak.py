@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 
-from adv2e.compiled import entry, kernel
+from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, rng
+from adv2e.kernel.borrowing import borrowed
 
 _MOST = 3.0
 """Largest deviation of a period, in standard deviations."""
@@ -54,13 +55,14 @@ def _cut(g):
 @kernel
 def begin_leak_cycle(i, circuit, state):
     """Draw the leak speed of the cycle that now begins."""
+    (state,) = borrowed(state)
     state[per_pixel.LEAK_DRAW, i] += 1
     state[per_pixel.LEAK_FACTOR, i] = _factor(
         circuit.seed, circuit.leak_jitter, i, state[per_pixel.LEAK_DRAW, i]
     )
 
 
-@entry
+@kernel
 def fill_first_factors(seed, jitter, factors):
     """Draw the leak speed of every pixel's first cycle."""
     for i in range(factors.shape[0]):
@@ -85,7 +87,7 @@ def _crossed(to_level, left, noise, corner, speed):
     return corner * noise / speed * passed / math.sqrt(2.0 * math.pi)
 
 
-@entry
+@kernel
 def fill_running(lo, hi, circuit, start, light, level, state):
     """Put the pixels lo..hi somewhere in their leak cycles at `start` [us].
 

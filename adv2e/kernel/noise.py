@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from adv2e.compiled import entry, inlined, kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel, rng
 
 NONE, SHOT, HOT = 0, 1, 2
@@ -73,7 +73,7 @@ def take_noise(i, kind, light, circuit, state):
     return polarity
 
 
-@entry
+@kernel
 def fill_first_candidates(lo, hi, seed, rate, start, times, draws):
     """Draw the first candidate time [us] of the pixels lo..hi; rate in events a us.
 
@@ -86,7 +86,7 @@ def fill_first_candidates(lo, hi, seed, rate, start, times, draws):
         spare[k] = 0.0
 
 
-@entry
+@kernel
 def fill_first_hot_times(seed, fraction, rate, start, times):
     """Choose the hot pixels and draw their first times [us]; the others never fire."""
     for i in range(times.shape[0]):
@@ -95,7 +95,7 @@ def fill_first_hot_times(seed, fraction, rate, start, times):
             times[i] = start + rng.exponential(seed, rng.HOT_TIME, i, 0) / rate
 
 
-@entry
+@kernel
 def fill_first_noise(seed, rms, noise):
     """Draw the noise of every pixel at the start from its stationary distribution."""
     for i in range(noise.shape[0]):

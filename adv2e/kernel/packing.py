@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adv2e.compiled import entry, kernel
+from adv2e.compiled import kernel
 
 PIXEL_BITS = 27
 """Bits of the flat pixel index in a packed event."""
@@ -31,7 +31,7 @@ def _slice_of(key, per_us):
     return part if part < SLICES else SLICES - 1
 
 
-@entry
+@kernel
 def part_by_time(keys, count, per_us, ends, parted):
     """Part `count` packed events into SLICES slices of 1/per_us us each.
 
@@ -54,7 +54,7 @@ def part_by_time(keys, count, per_us, ends, parted):
     ends[0] = 0
 
 
-@entry
+@kernel
 def unpack(keys, columns, t0, events):
     """Fill `events` with what the sorted numbers stand for; t0: time of their base [us]."""
     for k in range(keys.shape[0]):

@@ -226,8 +226,7 @@ def go_through(
 ):  # fmt: skip
     """Advance a strip at rest over the intervals first..last, from where the last call stopped.
 
-    It stops where there is no room left for events.  A function that makes arrays counts references
-    to all that it is given, which costs more than most blocks do.
+    It stops where there is no room left for events.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import intrinsic, kernel
+from adv2e.compiled import extension, kernel
 
 STRIP = 2048
 """Pixels that are handed out together: their scratch rows fit the first two levels of cache."""
@@ -20,28 +20,34 @@ STRIP = 2048
 _LOCK = threading.Lock()
 
 
-def _count_up_plainly(counter):
-    """Do the same where Numba is told not to compile."""
+def _count_up(counter):
+    """Add one to the only entry of an array of int64, as one step among threads.
+
+    Returns what it was before.
+    """
     with _LOCK:
         counter[0] += 1
         return int(counter[0]) - 1
 
 
-@intrinsic(_count_up_plainly)
-def _count_up(_, counter):
-    """Add one to the only entry of an array of int64, as one step among threads.
+@extension
+def _compile_count_up():
+    from numba import types  # noqa: PLC0415 - for the compiler only
+    from numba.extending import intrinsic, overload  # noqa: PLC0415
 
-    Returns what it was before.
-    """
-    from numba.core import types  # noqa: PLC0415 - for the compiler only
+    @intrinsic
+    def add_atomically(_, counter):
+        def generate(context, builder, signature, arguments):
+            entry = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+            one = context.get_constant(types.int64, 1)
+            # nothing but the count passes between the threads: no order of other memory is needed
+            return builder.atomic_rmw("add", entry, one, "monotonic")
 
-    def generate(context, builder, signature, arguments):
-        entry = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        one = context.get_constant(types.int64, 1)
-        # nothing but the count passes between the threads: no order of other memory is needed
-        return builder.atomic_rmw("add", entry, one, "monotonic")
+        return types.int64(counter), generate
 
-    return types.int64(counter), generate
+    @overload(_count_up)
+    def count_up(counter):
+        return lambda counter: add_atomically(counter)  # noqa: PLW0108 - Numba wants a function
 
 
 def nothing_claimed() -> NDArray[np.int64]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from adv2e.compiled import entry
+from adv2e.compiled import kernel
 from adv2e.motion.warping import cubic
 
 
-@entry
+@kernel
 def spread(u, v, wide_u, wide_v):
     """Fill `wide_u` and `wide_v` with the longest smear that passes over each pixel.
 
@@ -34,7 +34,7 @@ def spread(u, v, wide_u, wide_v):
                         wide_u[i, j], wide_v[i, j] = du, dv
 
 
-@entry
+@kernel
 def smear(light, u, v, out):
     """Fill `out` with the mean of `light` along the smear through each pixel.
 

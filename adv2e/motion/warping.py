@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from adv2e.compiled import entry, kernel
+from adv2e.compiled import kernel
 
 ONE_SIDED = 1000.0
 """Least score of a motion whose pixel is seen in its own frame only."""
@@ -65,7 +65,7 @@ def cubic(image, x, y):
     return min(max(value, least - slack, 0.0), most + slack)
 
 
-@entry
+@kernel
 def mismatch(u, v, here, there, out):
     """Fill `out` with the absolute difference between each pixel and where it goes."""
     rows, columns = here.shape
@@ -74,7 +74,7 @@ def mismatch(u, v, here, there, out):
             out[y, x] = abs(here[y, x] - _bilinear(there, x + u[y, x], y + v[y, x]))
 
 
-@entry
+@kernel
 def find_lost(u, v, ru, rv, lost):
     """Mark in `lost` the pixels that do not come back with the motion (`ru`, `rv`) there."""
     rows, columns = lost.shape
@@ -91,7 +91,7 @@ def find_lost(u, v, ru, rv, lost):
                 lost[y, x] = True
 
 
-@entry
+@kernel
 def fill_lost(u, v, lost, g, distance):
     """Give lost pixels the motion of the one that is nearest over like light, in place.
 
@@ -123,7 +123,7 @@ def fill_lost(u, v, lost, g, distance):
                         v[y, x] = v[ny, nx]
 
 
-@entry
+@kernel
 def splat(u, v, p, q, score, fraction, best, source):
     """Send every pixel `fraction` of its way; `best` and `source` say who arrives.
 
@@ -151,7 +151,7 @@ def splat(u, v, p, q, score, fraction, best, source):
                         source[ty, tx] = y * columns + x
 
 
-@entry
+@kernel
 def compose(
     a, b, ua, va, pa, qa, best_a, source_a, ub, vb, pb, qb, best_b, source_b, fraction, out
 ):

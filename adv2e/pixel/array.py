@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e import compiled as jit
 from adv2e.background import default_threads
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.courses import Additions
@@ -19,7 +18,6 @@ from adv2e.errors import DataError
 from adv2e.events import Events, empty_events
 from adv2e.kernel import exact
 from adv2e.kernel import packing as order
-from adv2e.kernel.event_buffer import Room
 from adv2e.kernel.frames import Frames, frames_of
 from adv2e.kernel.packing import PIXEL_BITS, pack_limit_us
 from adv2e.kernel.quadrature import rules_for
@@ -36,18 +34,13 @@ _TILE = 16 * STRIP
 """Pixels of the largest tiles; their events are held twice for a moment."""
 
 
-def is_compiled(pixel: Pixel, sampling: Sampling, additions: Additions | None = None) -> bool:
-    """Tell whether the kernel that this pixel needs has been compiled before."""
-    circuit = make_circuit(pixel, sampling, 0)
-    return jit.is_cached(driver_of(pixel, circuit, additions, "auto"))
-
-
 class _Worker:
     """Memory that one thread works with."""
 
     def __init__(self, stepped: bool, exact_times: bool) -> None:
         self.scratch: Any = driver.scratch() if stepped else exact.scratch()
-        self.room = Room(exact_times)
+        self.keys = np.empty(4096, np.int64)
+        self.times = np.empty(self.keys.size if exact_times else 0)
 
 
 class PixelArray:
@@ -194,9 +187,10 @@ class PixelArray:
         def run(_: int) -> Parted:
             worker = self._workers.get()
             try:
-                room = worker.room
-                n = advance(claimed, self._most, *arguments, worker.scratch, *room.lend())
-                return Parted(room.keys, room.times, n, per_us)
+                n, worker.keys, worker.times = advance(
+                    claimed, self._most, *arguments, worker.scratch, worker.keys, worker.times
+                )
+                return Parted(worker.keys, worker.times, n, per_us)
             finally:
                 self._workers.put(worker)
 

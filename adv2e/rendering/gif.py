@@ -17,7 +17,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import entry
+from adv2e.compiled import kernel
 from adv2e.errors import UsageError
 from adv2e.rendering.styles import Picture, Style
 
@@ -131,7 +131,7 @@ def compress(pixels: NDArray[np.uint8], table: NDArray[np.int32] | None = None) 
     return out[: _lzw(pixels, table, out)].tobytes()
 
 
-@entry
+@kernel
 def _lzw(pixels: NDArray[np.uint8], table: NDArray[np.int32], out: NDArray[np.uint8]) -> int:
     """Fill `out`; return its length.  `table[code*256 + pixel]`: the longer code, or older junk.
 

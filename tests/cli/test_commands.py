@@ -77,7 +77,6 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "overwrite": True,
         "preview": "p.gif",
         "progress": True,
-        "compile_apart": True,
         "also_read": [find("ideal")],
     }
     assert log.level == 0

@@ -1,7 +1,6 @@
 """The cache of compiled code, as seen by processes of their own."""
 
 import ast
-import dataclasses
 import os
 import shutil
 import stat
@@ -13,7 +12,6 @@ import pytest
 
 import adv2e
 from adv2e import compiled as jit
-from adv2e.compilation.machine_code import read_code, write_code
 
 INNER = """
 from adv2e.compiled import kernel
@@ -80,81 +78,6 @@ def test_a_second_process_finds_the_code(start):
     assert said(start(1)) == ["20", "1"]
 
 
-ENTRY = """
-from adv2e.inner import inner
-from adv2e.compiled import entry, kernel
-
-@entry
-def first(numbers):
-    total = 0.0
-    for k in range(numbers.shape[0]):
-        total += inner(numbers[k])
-    return total
-
-@entry
-def ends(numbers):
-    return len(numbers), numbers[-1], len(numbers) > 3
-
-@entry
-def itself(numbers):
-    return numbers
-
-@kernel
-def caller(numbers):
-    return -first(numbers)
-"""
-REST = "3", "2.0", "False", "True", "0.0", "1.0", "2.0"
-ENTER = """
-import sys
-import numpy as np
-from adv2e.first import caller, ends, first, itself
-print(first(np.arange(3.0)), "numba" in sys.modules)
-if len(sys.argv) > 1:
-    print(caller(np.arange(3.0)), *ends(np.arange(3.0)), "numba" in sys.modules)
-    print(*itself(np.arange(3.0)))
-"""
-
-
-def test_an_entry_is_called_without_numba_once_its_code_is_there(package, start, tmp_path):
-    (package / "first.py").write_text(ENTRY)
-    assert said(start(code=ENTER)) == ["6.0", "True"]
-    assert said(start(code=ENTER)) == ["6.0", "False"]
-    for _ in range(2):  # other compiled code calls it, and some of it only Numba can call
-        assert said(start(1, code=ENTER)) == ["6.0", "False", "-6.0", *REST]
-    (code,) = tmp_path.glob("cache/**/adv2e.first.first-*.code")
-    os.truncate(code, code.stat().st_size - 1)
-    assert said(start(code=ENTER)) == ["6.0", "True"]
-    assert said(start(code=ENTER)) == ["6.0", "False"]
-    (package / "inner.py").write_text(INNER.replace("x + 1", "x + 2"))
-    assert said(start(code=ENTER)) == ["9.0", "True"]
-
-
-@pytest.mark.parametrize(
-    "changed",
-    [
-        ("library.enable_object_caching()", "library.no_longer_there()"),
-        ("compilers._FunctionCompiler", "compilers.NoLongerThere"),
-        ('types.float64: "d",', ""),
-    ],
-)
-def test_another_numba_goes_its_own_way(package, start, changed):
-    (package / "first.py").write_text(ENTRY)
-    translation = package / "compilation" / "translation.py"
-    text = translation.read_text()
-    assert changed[0] in text
-    translation.write_text(text.replace(*changed))
-    for _ in range(2):
-        assert said(start(1, code=ENTER)) == ["6.0", "True", "-6.0", *REST]
-
-
-def test_code_that_calls_what_is_not_there_is_not_loaded(package, start, tmp_path):
-    (package / "first.py").write_text(ENTRY)
-    assert said(start(code=ENTER)) == ["6.0", "True"]
-    (code,) = tmp_path.glob("cache/**/adv2e.first.first-*.code")
-    write_code(code, dataclasses.replace(read_code(code), needed=("nowhere_to_be_found",)))
-    assert said(start(code=ENTER)) == ["6.0", "True"]
-
-
 def test_a_read_only_installation_is_served_and_not_touched(package, start):
     before = {path: path.stat().st_mtime_ns for path in package.rglob("*")}
     for path in (*before, package):
@@ -187,12 +110,55 @@ def test_a_file_cut_short_is_made_again(start, tmp_path, kept):
     assert said(start(1)) == ["20", "1"]
 
 
-def test_a_folder_that_cannot_be_written_to_is_no_error(start, tmp_path):
+@pytest.mark.skipif(os.name != "posix", reason="modes of POSIX")
+def test_without_a_trusted_folder_code_is_compiled_and_not_kept(start, tmp_path):
     said(start(1))
-    (folder,) = tmp_path.glob("cache/**/numba")
-    shutil.rmtree(folder)
-    folder.write_text("in the way")
-    assert said(start(1)) == ["20", "0"]
+    (tmp_path / "cache" / "adv2e").chmod(0o777)
+    before = sorted(tmp_path.rglob("*"))
+    assert said(start(1, HOME=os.devnull)) == ["20", "0"]
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+WATCH = """
+from numba import config
+from adv2e import compiled
+from adv2e.outer import outer
+before = config.CACHE_DIR
+seen = []
+with compiled.watched(seen.append):
+    outer(1)
+    outer(2)
+assert config.CACHE_DIR == before
+print(*(one.__name__ for one in seen), len(compiled.parts_of(seen[0])) if seen else 0)
+"""
+
+
+def test_whoever_watches_is_told_of_what_is_compiled_and_numba_stays_as_it_was(start):
+    assert said(start(code=WATCH)) == ["outer", "inner", "2"]
+    assert said(start(code=WATCH)) == ["0"]
+
+
+HELD = """
+import sys, time
+from adv2e.files.locks import lock_file
+with open(sys.argv[1], "ab", buffering=0) as file:
+    assert lock_file(file, wait=True)
+    print("held", flush=True)
+    time.sleep(100)
+"""
+
+
+def test_compiling_waits_for_another_process_that_does(start, tmp_path):
+    said(start(1))
+    (folder,) = tmp_path.glob("cache/adv2e/kernels-*")
+    holder = start(folder / "lock", code=HELD)
+    assert holder.stdout.readline() == "held\n"
+    waiting = start(1.5)
+    with pytest.raises(subprocess.TimeoutExpired):
+        waiting.wait(4)
+    holder.kill()  # the lock goes with it
+    holder.communicate()
+    assert said(waiting) == ["25.0", "0"]
 
 
 def test_code_is_compiled_again_when_what_it_calls_has_changed(package, start):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from adv2e.compiled import entry, kernel
+from adv2e.compiled import kernel
 
 
 @kernel
@@ -22,7 +22,7 @@ def _interval(t: int, lag: float, times: Any, k: int) -> int:
     return k
 
 
-@entry
+@kernel
 def sum_slopes(
     t: Any, pixel: Any, on: Any, cell: Any, times: Any, lags: Any, slope: Any, at: Any, sums: Any
 ) -> None:
@@ -39,7 +39,7 @@ def sum_slopes(
             sums[j, c] += sign * slope[n, k]
 
 
-@entry
+@kernel
 def sum_slopes_beside(
     t: Any,
     pixel: Any,
@@ -70,7 +70,7 @@ def sum_slopes_beside(
                 sums[2 * j + 1, part[i]] += sign * (slope[n + width, k] - slope[n - width, k])
 
 
-@entry
+@kernel
 def count_gaps(
     t: Any, pixel: Any, part: Any, width: int, borders: Any, near: Any, gaps: Any, rows: Any
 ) -> None:
@@ -94,7 +94,7 @@ def count_gaps(
                         rows[part[i], m, 1] += 1.0
 
 
-@entry
+@kernel
 def since_neighbours(t: Any, pixel: Any, on: Any, width: int, last: Any, since: Any) -> None:
     """Find how long ago the latest event of the four neighbouring pixels was.
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import entry, kernel
+from adv2e.compiled import kernel
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.staging import Staging
 from adv2e.formats.sink import Request, Writer, to_json
@@ -47,7 +47,7 @@ def _fill_prefix(prefix: Any, negative: bool, seconds: int) -> int:
     return length
 
 
-@entry
+@kernel
 def format_lines(
     t: Any, x: Any, y: Any, p: Any, numbers: Any, lengths: Any, triples: Any, prefix: Any, out: Any
 ) -> int:

@@ -16,10 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import entry, kernel
+from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, rng
+from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.circuit import EXACT
-from adv2e.kernel.event_buffer import tell_where, with_room
+from adv2e.kernel.event_buffer import with_room
 from adv2e.kernel.frames import load
 from adv2e.kernel.leak import leak_over
 from adv2e.kernel.stepped import events, rows, signal
@@ -217,26 +218,45 @@ def _screen_step(lo, count, n, m, end, h, circuit, run, strip):
 
 
 @kernel
-def _fire_step(
-    lo, n, m, ta, h, share, t_base, circuit, run, injected, state, scratch, keys, times, number
+def _fire_gathered(
+    c, count, lo, m, ta, h, share, t_base, circuit, run, injected, state, strip, pixels, keys,
+    times, number,
 ):  # fmt: skip
-    """Fire the events of step m of a run, which begins at ta us."""
-    strip, pixels, leak = scratch.strip, scratch.pixels, leak_over(h, circuit)
-    for c in range(events.gather(n, strip, pixels)):
+    """Fire the events of pixels c to count of those that may fire, while there is room.
+
+    Returns the first pixel that is not done, and the number of events so far.
+    """
+    run, injected, state, strip = borrowed(run, injected, state, strip)
+    pixels, keys, times = borrowed(pixels, keys, times)
+    leak = leak_over(h, circuit)
+    while c < count and number + _ROOM <= keys.shape[0]:
         k = pixels[c]
         i = lo + k
         levels = (
             _level(run.on, m, i), _level(run.on, m + 1, i),
             _level(run.off, m, i), _level(run.off, m + 1, i),
         )  # fmt: skip
-        whole = False
-        while not whole:
-            if number + _ROOM > keys.shape[0]:
-                keys, times = with_room(keys, times, number, number + _ROOM)
-            number, whole = events.fire_step(
-                k, i, ta, h, leak, levels, share, t_base, circuit, injected, state, strip, keys,
-                times, number,
-            )  # fmt: skip
+        number, whole = events.fire_step(
+            k, i, ta, h, leak, levels, share, t_base, circuit, injected, state, strip, keys, times,
+            number,
+        )  # fmt: skip
+        c += whole
+    return c, number
+
+
+@kernel
+def _fire_step(
+    lo, n, m, ta, h, share, t_base, circuit, run, injected, state, scratch, keys, times, number
+):  # fmt: skip
+    """Fire the events of step m of a run, which begins at ta us."""
+    strip, pixels = scratch.strip, scratch.pixels
+    c, count = 0, events.gather(n, strip, pixels)
+    while c < count:
+        keys, times = with_room(keys, times, number, number + _ROOM)
+        c, number = _fire_gathered(
+            c, count, lo, m, ta, h, share, t_base, circuit, run, injected, state, strip, pixels,
+            keys, times, number,
+        )  # fmt: skip
     return number, keys, times
 
 
@@ -246,6 +266,8 @@ def _strip(
     scratch, keys, times, number,
 ):  # fmt: skip
     """Advance one strip over a run."""
+    frames, before, share, starts, last = borrowed(frames, before, share, starts, last)
+    run, injected, state, scratch = borrowed(run, injected, state, scratch)
     strip = scratch.strip
     n = -(-count // 16) * 16
     _open(lo, count, n, circuit, run, injected, state, strip)
@@ -293,10 +315,10 @@ def _strip(
     return number, keys, times
 
 
-@entry
+@kernel
 def run_stepped(
     claimed, most, frames, before, share, starts, begins, last, circuit, run, injected, t_base,
-    state, scratch, keys, times, places,
+    state, scratch, keys, times,
 ):  # fmt: skip
     """Advance strips that nobody else works on over a run.
 
@@ -313,5 +335,4 @@ def run_stepped(
                 s, count, frames, before, share, starts, begins, last, circuit, run, injected,
                 t_base, state, scratch, keys, times, number,
             )  # fmt: skip
-    tell_where(keys, times, places)
-    return number
+    return number, keys, times

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel
+from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.circuit import EXACT
 from adv2e.kernel.comparator import TIE, fire
 from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
@@ -56,6 +57,7 @@ def injected_of(
 @kernel
 def watch(k, i, circuit, injected, state, strip):
     """Rows of the screen for pixel k of a strip, i of the state."""
+    injected, state, strip = borrowed(injected, state, strip)
     hold = state[per_pixel.HOLD, i]
     if hold >= 0.0:
         on, off, due = per_pixel.NEVER, per_pixel.NEVER, hold
@@ -226,6 +228,7 @@ def fire_step(
     likewise; share: of its piece that the step takes.  Returns the number of events so far, and
     whether there was room for all; if not, the next call goes on.
     """
+    injected, state, strip, keys, times = borrowed(injected, state, strip, keys, times)
     on0, on1, off0, off1 = levels
     tb = ta + h
     s = strip[rows.FROM + k]

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from adv2e.compiled import entry, kernel
+from adv2e.compiled import kernel
 from adv2e.kernel import special
 from adv2e.kernel.circuit import EULER, PAPER, ZERO_ORDER_HOLD
 from adv2e.kernel.stepped import rows
@@ -30,7 +30,7 @@ _NODES, _WEIGHTS = (0.5 * v for v in np.polynomial.legendre.leggauss(12))
 _NODES = _NODES + 0.5
 
 
-@entry
+@kernel
 def log_of_light(frame, circuit, x):
     """Log intensity of light [DN], (pixels,)."""
     knee_dn = circuit.slope * circuit.knee

@@ -1,0 +1,152 @@
+"""A folder in which compiled code is kept between runs, by this user alone.
+
+Whoever can write what is loaded as code runs as the user.  So a folder counts only if it is the
+user's own and nobody else may write to it.  Damaged code may do anything: a manifest holds the
+digest of every file, and what differs from it is removed before anything is loaded.
+
+Numba numbers the files of a function, so two processes that write at once could take the code of
+one signature for that of another.  Whoever reads or writes holds :meth:`CodeCache.lock`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import stat
+import sys
+import tempfile
+import time
+import weakref
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from adv2e.files.locks import lock_file, unlock_file
+
+_UNUSED_S = 30 * 24 * 3600.0
+_USE_NOTED_S = 24 * 3600.0
+_ROOM_BYTES = 64 << 20  # the code of all kernels, for several kinds of frames
+_MANIFEST, _LOCK, _USED = "manifest.json", "lock", "used"
+
+
+class CodeCache:
+    """A folder for compiled code.
+
+    Parameters
+    ----------
+    name : str
+        Of the folder, for the code of one state of the sources.
+
+    Attributes
+    ----------
+    folder : Path or None
+        None: there is none to be trusted or written to.
+    why_not : str
+        Why there is none.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.folder: Path | None = None
+        self.why_not = ""
+        self._file: BinaryIO | None = None
+        for base in _bases():
+            wrong = self._open(base / "adv2e", base / "adv2e" / name)
+            if not wrong:
+                self.folder, self.why_not = (base / "adv2e" / name).resolve(), ""
+                _note_use(self.folder)
+                break
+            self.why_not = self.why_not or wrong
+
+    def _open(self, base: Path, folder: Path) -> str:
+        """Make the folder if need be; return why code is not to be kept in it, or nothing."""
+        try:
+            base.parent.mkdir(parents=True, exist_ok=True)
+            for place in (base, folder):
+                place.mkdir(mode=0o700, exist_ok=True)
+                # of a link, who laid it, and what it leads to
+                if not (_is_ours(place.lstat()) and _is_ours(place.stat())):
+                    return f"{place} belongs to another user"
+                if os.name == "posix" and place.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+                    return f"others may write to {place} (chmod go-w would mend it)"
+            tempfile.TemporaryFile(dir=folder).close()  # what is read-only says so
+            if shutil.disk_usage(folder).free < _ROOM_BYTES:
+                return f"{folder}: less than {_ROOM_BYTES >> 20} MiB are free"
+            self._file = (folder / _LOCK).open("ab", buffering=0)
+            weakref.finalize(self, self._file.close)
+            if not lock_file(self._file, wait=True):
+                return f"{folder}: its file system knows no locks"
+        except OSError as error:
+            return f"{base}: {error.strerror or error}"
+        try:
+            _remove_unknown(folder)
+        finally:
+            unlock_file(self._file)
+        return ""
+
+    def lock(self) -> None:
+        """Wait until no other process reads or writes here."""
+        if self._file is not None:
+            lock_file(self._file, wait=True)
+
+    def unlock(self) -> None:
+        """Let others read and write."""
+        if self._file is not None:
+            unlock_file(self._file)
+
+    def note_files(self) -> None:
+        """Write the manifest of all that is there, under the lock."""
+        if self.folder is None:
+            return
+        with suppress(OSError):  # what is not listed is compiled again
+            part = self.folder / f"{_MANIFEST}.part"
+            part.write_text(json.dumps(_digests(self.folder), indent=0), encoding="utf-8")
+            part.replace(self.folder / _MANIFEST)
+
+
+def _bases() -> list[Path]:
+    """Return where the folder may lie, the best first."""
+    told = [os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME")]
+    if sys.platform == "win32":
+        told.append(os.environ.get("LOCALAPPDATA"))
+    home = Path(os.path.expanduser("~"))  # noqa: PTH111 - Path.home() raises where there is none
+    cache = home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+    return [*map(Path, filter(None, told)), cache]
+
+
+def _is_ours(status: os.stat_result) -> bool:
+    return os.name != "posix" or status.st_uid == os.geteuid()
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    """Return the digest of each file of code, by its name below `folder`."""
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.glob("*/*"))
+    }
+
+
+def _remove_unknown(folder: Path) -> None:
+    """Remove every file of code that is not as the manifest says."""
+    listed: object = None
+    with suppress(OSError, ValueError):
+        listed = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
+    known = listed if isinstance(listed, dict) else {}
+    for name, digest in _digests(folder).items():
+        if known.get(name) != digest:
+            (folder / name).unlink()
+
+
+def _note_use(folder: Path) -> None:
+    """Remember that the code in `folder` is in use; once a day, remove what nobody has used."""
+    now = time.time()
+    with suppress(OSError):  # of no matter to whoever wants to compute
+        noted = folder / _USED
+        if noted.exists() and now - noted.stat().st_mtime < _USE_NOTED_S:
+            return
+        noted.touch()
+        for other in folder.parent.glob("kernels-*"):
+            last = max(path.stat().st_mtime for path in (other, *other.glob(_USED)))
+            if now - last > _UNUSED_S:
+                shutil.rmtree(other, ignore_errors=True)
