@@ -8,6 +8,9 @@ from typing import Any
 
 from adv2e import compiled
 
+_MANY = 20
+"""Functions that take long enough to be worth a line: a solver has twice as many and more."""
+
 
 @contextmanager
 def compilation_told(log: Callable[[str], None] | None, progress: bool) -> Iterator[None]:
@@ -22,10 +25,13 @@ def compilation_told(log: Callable[[str], None] | None, progress: bool) -> Itera
     """
     known: set[Callable[..., Any]] = set()
     bar: Any = None
+    is_said = log is None
 
     def told(function: Callable[..., Any]) -> None:
-        nonlocal bar
-        if not known and log is not None:
+        nonlocal bar, is_said
+        parts = compiled.parts_of(function)
+        if not is_said and log is not None and len(parts) >= _MANY:
+            is_said = True
             lost = compiled.code_cache().why_not
             when = f"in every run, as it cannot be kept: {lost}" if lost else "once"
             log(f"compiling the pixel's kernel ({when}; about a minute)")
@@ -33,7 +39,7 @@ def compilation_told(log: Callable[[str], None] | None, progress: bool) -> Itera
             from tqdm import tqdm
 
             bar = tqdm(desc="compiling", unit="function", leave=False)
-        known.update(compiled.parts_of(function))
+        known.update(parts)
         if bar is not None:
             bar.total = len(known)
             bar.update()
