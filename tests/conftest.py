@@ -8,9 +8,12 @@ from collections.abc import Iterator
 from types import ModuleType
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 from adv2e.cli import main
+from adv2e.config import load_config
+from adv2e.conversion.simulation import simulate
 from adv2e.process.memory import collect_seldom
 
 collect_seldom()  # to search the compiler's objects for cycles took a fourteenth of the run
@@ -28,6 +31,16 @@ def _no_test_hangs() -> Iterator[None]:
     signal.alarm(LONGEST_S)
     yield
     signal.alarm(0)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _solvers_are_compiled() -> None:
+    """Compile both solvers, if need be: tests look at all that a command says, and at its time."""
+    frames = np.zeros((3, 4, 5), np.uint8)
+    for form in ("exact", "paper"):
+        config = load_config([], [f"pixel.low_pass.update={form}"])
+        for _ in simulate(frames, [0.0, 0.1, 0.2], config, threads=1):
+            pass
 
 
 class Outcome(NamedTuple):

@@ -43,6 +43,7 @@ def compilation_told(log: Callable[[str], None] | None, progress: bool) -> Itera
         if bar is not None:
             bar.total = len(known)
             bar.update()
+            bar.refresh()
 
     with compiled.watched(told):
         try:
