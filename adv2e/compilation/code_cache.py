@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from adv2e.files.locks import lock_file, unlock_file
+from adv2e.files.workspace import is_ours
 
 _UNUSED_S = 30 * 24 * 3600.0
 _USE_NOTED_S = 24 * 3600.0
@@ -66,7 +67,7 @@ class CodeCache:
             for place in (base, folder):
                 place.mkdir(mode=0o700, exist_ok=True)
                 # of a link, who laid it, and what it leads to
-                if not (_is_ours(place.lstat()) and _is_ours(place.stat())):
+                if not (is_ours(place.lstat()) and is_ours(place.stat())):
                     return f"{place} belongs to another user"
                 if os.name == "posix" and place.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH):
                     return f"others may write to {place} (chmod go-w would mend it)"
@@ -113,10 +114,6 @@ def _bases() -> list[Path]:
     home = Path(os.path.expanduser("~"))  # noqa: PTH111 - Path.home() raises where there is none
     cache = home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
     return [*map(Path, filter(None, told)), cache]
-
-
-def _is_ours(status: os.stat_result) -> bool:
-    return os.name != "posix" or status.st_uid == os.geteuid()
 
 
 def _digests(folder: Path) -> dict[str, str]:

@@ -99,7 +99,9 @@ def remove_abandoned(folder: Path) -> None:
         found = [entry for entry in os.scandir(folder) if _NAME.fullmatch(entry.name)]
         for entry in found:
             with suppress(OSError):
-                if entry.is_dir(follow_symlinks=False) and _is_ours(entry):
+                if entry.is_dir(follow_symlinks=False) and is_ours(
+                    entry.stat(follow_symlinks=False)
+                ):
                     _remove_if_abandoned(Path(entry.path))
 
 
@@ -154,8 +156,9 @@ def identity_of(path: Path) -> Identity | None:
     return status.st_dev, status.st_ino
 
 
-def _is_ours(entry: os.DirEntry[str]) -> bool:
-    return os.name != "posix" or entry.stat(follow_symlinks=False).st_uid == os.geteuid()
+def is_ours(status: os.stat_result) -> bool:
+    """Tell whether a file or folder of this status belongs to this user."""
+    return os.name != "posix" or status.st_uid == os.geteuid()
 
 
 def _may_be_dead(told: bytes) -> bool:
