@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import typing
 from dataclasses import MISSING, dataclass, field
+from functools import cache
 from typing import Any
 
 from adv2e.errors import ConfigError
@@ -108,6 +110,9 @@ def subsection(default: Any, *, meaning: str) -> Any:
 class Section:
     """A section of the configuration: checks the declared ranges of its keys.
 
+    A whole number where any number may stand becomes a ``float``: compiled code is made anew for
+    each type that it meets.
+
     Raises
     ------
     ConfigError
@@ -116,8 +121,32 @@ class Section:
     """
 
     def __post_init__(self) -> None:
+        numbers = _numbers_of(type(self))  # type: ignore[arg-type] # takes it for an object of it
         for item in dataclasses.fields(self):
+            value = getattr(self, item.name)
+            if item.name in numbers:
+                try:
+                    value = _as_floats(value)
+                except OverflowError:
+                    raise ConfigError(f"{item.name}: too large a number: {value}") from None
+                object.__setattr__(self, item.name, value)
             declared: Parameter = item.metadata["parameter"]
-            wrong = declared.complaint(getattr(self, item.name))
+            wrong = declared.complaint(value)
             if wrong:
                 raise ConfigError(f"{item.name}: {wrong}")
+
+
+@cache
+def _numbers_of(section: type[Any]) -> frozenset[str]:
+    """Return the names of the keys that hold numbers with a fraction, or tuples of them."""
+    hints = typing.get_type_hints(section)
+    return frozenset(
+        name for name, kind in hints.items() if kind is float or float in typing.get_args(kind)
+    )
+
+
+def _as_floats(value: Any) -> Any:
+    """Return a whole number, or those in a tuple, as float; anything else as it is."""
+    if isinstance(value, tuple):
+        return tuple(map(_as_floats, value))
+    return float(value) if type(value) is int else value

@@ -141,12 +141,7 @@ def _tuple(key: Key, value: Value) -> tuple[Any, ...]:
 
 def _scalar(key: Key, value: Value) -> Any:
     content = value.content
-    if key.kind is float and type(content) is int:
-        try:
-            return float(content)
-        except OverflowError:
-            raise value.origin.complaint(key.path, f"too large a number: {value}") from None
-    if type(content) is key.kind:
+    if type(content) is key.kind or (key.kind is float and type(content) is int):
         return content
     wanted = _NAMES[key.kind]
     if key.about.choices is not None:

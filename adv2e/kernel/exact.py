@@ -198,7 +198,9 @@ def _rest_strip(
     lo, count, first, last, starts, circuit, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
     """Advance one strip over the intervals first..last: no light changes, no lag is left."""
-    b, f, j, m, s = 0, first, 0, 0, 0.0
+    # numbers of one type from the start: a function is compiled anew for a constant
+    none = np.int64(0)
+    b, f, j, m, s = none, first, none, none, 0.0
     while b < count:
         n, b, f, j, m, s = static_pixels.go_through(
             lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, scratch.strip,
@@ -224,7 +226,7 @@ def _strip(
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     intervals = starts.shape[0] - 1
     settled, resting = screen.is_settled(strip), False
-    f = 0
+    f = np.int64(0)
     while f < intervals:
         still = _rests(frames, f, before, share, lo, count)
         if not still:

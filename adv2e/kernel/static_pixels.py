@@ -238,7 +238,7 @@ def go_through(
     -------
     number of events, b, f, j, m, s: b >= count at the end; else j < m
     """
-    start = starts[0]
+    start, none = starts[0], np.int64(0)
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     while b < count:
         i, size = lo + b, min(BLOCK, count - b)
@@ -252,7 +252,7 @@ def go_through(
             if due == last:
                 b, f = b + BLOCK, first
                 continue
-            f, j, s = due, 0, 0.0
+            f, j, s = due, none, 0.0
         ta, length, end = starts[f], starts[f + 1] - starts[f], _f(starts[f + 1] - start)
         if m == 0:
             m = flag_block(b, size, end, strip, index)
@@ -266,5 +266,5 @@ def go_through(
         if j < m:
             break
         _go_on(b, m, end, strip, index)
-        f, m = f + 1, 0
+        f, m = f + 1, none
     return n, b, f, j, m, s

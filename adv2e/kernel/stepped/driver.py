@@ -250,7 +250,7 @@ def _fire_step(
 ):  # fmt: skip
     """Fire the events of step m of a run, which begins at ta us."""
     strip, pixels = scratch.strip, scratch.pixels
-    c, count = 0, events.gather(n, strip, pixels)
+    c, count = np.int64(0), events.gather(n, strip, pixels)
     while c < count:
         keys, times = with_room(keys, times, number, number + _ROOM)
         c, number = _fire_gathered(
