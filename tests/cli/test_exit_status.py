@@ -236,7 +236,7 @@ def test_a_signal_ends_it_tidily(tmp_path, work, name, status):
     with running_python(script, cwd=tmp_path, text=True) as process:
         assert process.stdout.readline() == "ready\n"
         process.send_signal(getattr(signal, name))
-        _, err = process.communicate(timeout=20)
+        _, err = process.communicate(timeout=120)
     assert process.returncode == status
     assert (
         err
@@ -262,7 +262,7 @@ def test_a_signal_while_the_program_is_imported_is_as_quiet(tmp_path, name, stat
     with running_python(code, text=True) as process:
         assert process.stdout.readline() == "ready\n"
         process.send_signal(getattr(signal, name))
-        _, err = process.communicate(timeout=20)
+        _, err = process.communicate(timeout=120)
     assert process.returncode == status
     assert err in ("adv2e: interrupted\n", "adv2e: stopped by SIGTERM\n")
 

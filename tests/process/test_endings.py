@@ -47,7 +47,7 @@ def test_a_signal_ends_a_conversion_without_a_trace(long_stack, tmp_path, name, 
     with started(long_stack, target / "out.txt", "--threads", threads) as process:
         wait_until(lambda: any(map(is_long, target.glob(".adv2e.*/*.txt"))), seconds=60)
         process.send_signal(getattr(signal, name))
-        _, err = process.communicate(timeout=20)
+        _, err = process.communicate(timeout=120)
     assert process.returncode == status, err
     assert len(err.splitlines()) == 1
     assert list(target.iterdir()) == []
@@ -100,7 +100,7 @@ def test_a_signal_ends_a_conversion_in_the_midst_of_compiled_code(tmp_path, thre
         )
         time.sleep(1.0)
         process.send_signal(signal.SIGTERM)
-        assert process.wait(timeout=20) == 143
+        assert process.wait(timeout=120) == 143
     assert sorted(path.name for path in tmp_path.iterdir()) == ["stack.npy", "times.txt"]
 
 
@@ -110,7 +110,7 @@ def test_an_interrupt_ends_a_conversion_whose_reader_has_stopped_reading(long_st
         assert process.stdout.read(100).startswith(b"0.0")
         time.sleep(1)  # the pipe is full by now
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=20) == 130
+        assert process.wait(timeout=120) == 130
 
 
 @pytest.mark.parametrize("name", ["out.txt", "out.h5", "out.zip", "out"])
