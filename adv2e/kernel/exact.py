@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, screen, special, static_pixels
+from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.circuit import EXACT, Circuit
 from adv2e.kernel.event_buffer import with_room
 from adv2e.kernel.frames import load
@@ -217,6 +218,8 @@ def _strip(
     state, scratch, keys, times, n,
 ):  # fmt: skip
     """Advance one strip of the exact circuit over all intervals."""
+    frames, before, share, starts = borrowed(frames, before, share, starts)
+    rules, state, scratch = borrowed(rules, state, scratch)
     strip = scratch.strip
     light = strip[screen.LIGHT_1 : screen.LIGHT_1 + count]
     floor = 0.0 if circuit.slope > 0.0 else circuit.floor
