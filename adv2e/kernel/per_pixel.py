@@ -22,7 +22,7 @@ ROWS = 17
     LEAK_DRAW,
     NOISE,
     NOISE_DRAW,
-    FIRST,  # signal behind the first pole, as the stepping path keeps it
+    FIRST,  # signal behind the first pole, as the stepped solver keeps it
     SECOND,  # the same behind the second pole
     BEYOND,  # where the reference goes beyond the signal at the end of the dead time
 ) = range(ROWS)

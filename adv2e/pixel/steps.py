@@ -1,4 +1,4 @@
-"""Steps of the stepping path, and what is added to the pixels at them.
+"""Steps of the stepped solver, and what is added to the pixels at them.
 
 How long a step of ``exact`` may be follows from what :mod:`adv2e.kernel.stepped.signal` leaves out.
 The cubic through values and slopes at both ends of a step of h departs from the signal by at most
@@ -116,7 +116,7 @@ def steps_of(
 
 
 class Stepping:
-    """Runs of the stepping path through a recording.
+    """Runs of the stepped solver through a recording.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from adv2e.config import load_config
 from adv2e.diagnosis.data.evidence import read_evidence
 from adv2e.diagnosis.diagnose import diagnose
 
-SIZE, SECONDS, FPS = (32, 24), 0.4, 400.0
+SIZE, SECONDS, FPS = (32, 24), 0.25, 400.0
 
 
 def diagnosis_of(hidden, seed, folder):

@@ -1,4 +1,4 @@
-"""Rows of the stepping path: one flat float64 array, a strip of pixels in each row.
+"""Rows of the stepped solver: one flat float64 array, a strip of pixels in each row.
 
 Names that end in 0 and 1 are values at the start and at the end of a step.
 """
