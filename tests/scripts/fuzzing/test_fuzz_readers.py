@@ -71,8 +71,8 @@ LINE = b"adv2e: error: a.png: damaged\n"
 def test_what_ends_badly_is_seen(tmp_path, monkeypatch, action, wrong):
     monkeypatch.setattr(running, "_command", lambda _: action())
     monkeypatch.setattr(running, "_virtual_bytes", lambda: 1 << 46)  # this process holds much
-    wall_s = 3.0 if wrong == "too slow" else 60.0
-    found = running.run([], tmp_path, Limits(cpu_s=0.5, wall_s=wall_s, mib=200))
+    cpu_s, wall_s = (0.5, 3.0) if wrong == "too slow" else (20.0, 60.0)
+    found = running.run([], tmp_path, Limits(cpu_s=cpu_s, wall_s=wall_s, mib=200))
     assert wrong in found.wrong if wrong else not found.wrong, found
 
 
