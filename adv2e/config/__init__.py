@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import reduce
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from adv2e.config.build import Key, all_keys, build, keys_of
 from adv2e.config.files import read, shipped
 from adv2e.config.merge import merge, parse_set
 from adv2e.config.model import Config
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
-from adv2e.config.user_effects import config_class
+from adv2e.config.user_effects import config_class, user_effects
 from adv2e.config.yaml12 import Origin, Value, key_text
+from adv2e.errors import ConfigError
 from adv2e.files.names import shown
 
 if TYPE_CHECKING:
@@ -35,9 +36,13 @@ __all__ = [
 ]
 
 
+Written: TypeAlias = "str | Path | Mapping[str, Any] | Config"
+"""What says a configuration: a YAML file, the name of a shipped one, keys and values, or one."""
+
+
 def load_config(
-    files: Sequence[str | Path] = (),
-    sets: Sequence[str] = (),
+    files: Written | Sequence[Written] | None = (),
+    sets: str | Sequence[str] = (),
     seed: int | None = None,
     effects: Sequence[type[Hooks]] = (),
 ) -> Config:
@@ -45,15 +50,16 @@ def load_config(
 
     Parameters
     ----------
-    files : sequence of str or Path
-        YAML files or names of shipped configurations (:func:`shipped`).
-    sets : sequence of str
+    files : str, Path, mapping, Config, or a sequence of them, optional
+        YAML files, names of shipped configurations (:func:`shipped`), mappings of the same keys,
+        and configurations, which say all keys.
+    sets : str or sequence of str
         Single values, as in ``pixel.low_pass.cutoff_hz=100``.
     seed : int, optional
         Seed of all random numbers.
     effects : sequence of classes, optional
         Effects of your own (:class:`adv2e.effects.hooks.Hooks`); each is on, and has a section
-        ``user.<name>``.
+        ``user.<name>``.  Those of a configuration among `files` come before them.
 
     Raises
     ------
@@ -61,17 +67,63 @@ def load_config(
         A file is missing or wrong; the text names file, line, key and what would be right.
     UsageError
         One of `sets` is wrong.
+
+    Examples
+    --------
+    >>> from adv2e import load_config
+    >>> config = load_config("davis346")
+    >>> quiet = load_config(config, "pixel.shot_noise=null")
+    >>> quiet.pixel.shot_noise is None
+    True
+    >>> load_config({"pixel": {"thresholds": {"on": 0.3}}}).pixel.thresholds.on
+    0.3
     """
-    return build(config_class(effects), _merged(files, sets, seed))
+    layers = _listed(files)
+    own = [effect for layer in layers if isinstance(layer, Config) for effect in _own(layer)]
+    added = [effect for effect in effects if effect not in own]
+    sets = [sets] if isinstance(sets, str) else sets
+    return build(config_class([*dict.fromkeys(own), *added]), _merged(layers, sets, seed))
 
 
-def _merged(files: Sequence[str | Path], sets: Sequence[str], seed: int | None = None) -> Value:
+def _own(config: Config) -> Iterable[type[Hooks]]:
+    return user_effects(config).values()
+
+
+def _listed(files: Written | Sequence[Written] | None) -> Sequence[Written]:
+    if files is None:
+        return ()
+    if isinstance(files, Sequence) and not isinstance(files, str):
+        return files
+    return [files]
+
+
+def _layer(written: Written) -> Value:
+    """Return the tree of what says a configuration.
+
+    Raises
+    ------
+    ConfigError
+        As :func:`adv2e.config.files.read`, or it is something else.
+    """
+    if isinstance(written, Config):
+        return _tree(to_dict(written), Origin())
+    if isinstance(written, Mapping):
+        return _tree(written, Origin())
+    if isinstance(written, (str, Path)):
+        return read(written)
+    raise ConfigError(
+        "a configuration is a file, the name of a shipped one, a mapping or a Config, got"
+        f" {type(written).__name__}"
+    )
+
+
+def _merged(files: Sequence[Written], sets: Sequence[str], seed: int | None = None) -> Value:
     """Return what `files`, `sets` and `seed` say, later ones on top."""
     over = [parse_set(text) for text in sets]  # what is wrong on the command line comes first
     if seed is not None:
         origin = Origin("--seed", on_command_line=True)
         over.append(Value({"seed": Value(seed, origin)}, origin))
-    return reduce(merge, [*map(read, files), *over], Value({}))
+    return reduce(merge, [*map(_layer, files), *over], Value({}))
 
 
 def names_of(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> str:

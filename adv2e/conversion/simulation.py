@@ -5,32 +5,34 @@ Example
 >>> import numpy as np
 >>> from adv2e import Config, simulate
 >>> frames = [np.full((4, 6), dn, np.uint8) for dn in (20, 40, 80, 160)]
+>>> events = np.concatenate(list(simulate(frames, 100)))  # 100 frames a second
 >>> times = [0.0, 0.01, 0.02, 0.03]  # seconds
->>> sum(len(events) for events in simulate(frames, times, Config())) > 0
+>>> sum(map(len, simulate(frames, times, Config()))) == len(events) > 0
 True
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import threading
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import nullcontext
-from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.background import worker_pool
+from adv2e.config import Config, Written, load_config
 from adv2e.config.active_effects import active_hooks
-from adv2e.config.model import Config
 from adv2e.effects.composition import additions_of, begin, map_events, overrides
 from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images
 from adv2e.effects.hooks import Hooks
 from adv2e.effects.reorder_buffer import InOrder
-from adv2e.errors import ConfigError, DataError
+from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.light.decoding import decoder_for, kernel_table
 from adv2e.light.intervals import Intervals, Part
@@ -39,11 +41,15 @@ from adv2e.pixel.steps import PRECISE, Coarseness
 from adv2e.sources.frame import check_values
 from adv2e.ticks import check_time
 
+_SLOWEST_HZ, _FASTEST_HZ = 1e-3, 1e9
+_FAR_APART_S = 10.0
+"""Frames so far apart are told: times in ms or us look like that."""
+
 
 def simulate(
     frames: Iterable[NDArray[Any]],
-    times: Iterable[float],
-    config: Config | None = None,
+    times: Iterable[float] | float,
+    config: Written | Sequence[Written] | None = None,
     *,
     effects: Sequence[Hooks] = (),
     threads: int | None = None,
@@ -55,9 +61,9 @@ def simulate(
     frames : iterable of (rows, columns) or (rows, columns, 3) arrays
         uint8, uint16, float32 or float64; colour as RGB.  `frames.encoding: auto` means linear
         here, except for 8-bit colour, which is taken as sRGB.
-    times : iterable of float
-        Time of each frame [s], increasing.
-    config : Config, optional
+    times : iterable of float, or float
+        Time of each frame [s], increasing; or so many frames a second, the first at 0.
+    config : Config, or what :func:`adv2e.load_config` takes, optional
         Default: the shipped ``adv2e.yaml``.
     effects : sequence of Hooks, optional
         Effects of your own, besides those of the configuration.
@@ -73,16 +79,17 @@ def simulate(
     ------
     DataError
         Fewer than two frames, times that do not increase, frames of different sizes or types, NaN,
-        another number of times than frames where both have a length.
+        another number of times than frames where both have a length, a rate that cannot be.
     ConfigError
-        `config` is none.
+        As :func:`adv2e.load_config`.
+
+    Warns
+    -----
+    UserWarning
+        The second frame comes so late that the times are hardly in seconds.
     """
-    config = Config() if config is None else config
-    if not isinstance(config, Config):
-        raise ConfigError(
-            "config: must be a Config, as adv2e.load_config returns it, got"
-            f" {type(config).__name__}"
-        )
+    config = config if isinstance(config, Config) else load_config(config)
+    instants = _instants(times)
     if isinstance(frames, Sized) and isinstance(times, Sized) and len(frames) != len(times):
         raise DataError(f"{len(times)} times for {len(frames)} frames")
     hooks = active_hooks(config, effects)
@@ -92,9 +99,32 @@ def simulate(
         raise DataError("no frames: at least two are needed")
     decoder = _decoder_for(np.asarray(first), config)
     table = kernel_table(decoder, config.sampling, hooks)
-    images = _checked(chain([first], coming), times, config.frames.full_scale)
+    images = _checked(itertools.chain([first], coming), instants, config.frames.full_scale)
     light = images if table is not None else ((t, decoder.decode(image)) for t, image in images)
     yield from events_from_light(light, config, hooks=hooks, threads=threads, table=table)
+
+
+def _instants(times: Any) -> Iterable[float]:
+    """Return the time of each frame [s], which are given, or their rate is."""
+    if isinstance(times, Iterable) and not isinstance(times, (str, bytes)):
+        return times
+    if not isinstance(times, (int, float, np.number)):
+        raise DataError(f"times: must be the time of each frame [s] or a rate [Hz], got {times!r}")
+    rate_hz = float(times)
+    if not _SLOWEST_HZ <= rate_hz <= _FASTEST_HZ:
+        raise DataError(
+            f"times: a rate must be from {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz, got {rate_hz:g}"
+        )
+    return (number / rate_hz for number in itertools.count())
+
+
+def _tell_far_apart(apart_s: float) -> None:
+    if apart_s >= _FAR_APART_S:
+        warnings.warn(
+            f"the second frame comes {apart_s:g} s after the first: times are in seconds; divide"
+            " milliseconds by 1e3, microseconds by 1e6",
+            stacklevel=2,
+        )
 
 
 def _checked(
@@ -103,6 +133,7 @@ def _checked(
     """Yield time [ns] and numbers of each frame."""
     coming = iter(times)
     first: NDArray[Any] | None = None
+    began_s = 0.0
     for number, frame in enumerate(frames):
         label, image, time = f"frame {number}", np.asarray(frame), next(coming, None)
         if time is None:
@@ -111,6 +142,10 @@ def _checked(
         if not math.isfinite(t_s):
             raise DataError(f"{label}: its time is {t_s}, must be a number of seconds")
         check_time(t_s * 1e9, label)
+        if number == 0:
+            began_s = t_s
+        elif number == 1:
+            _tell_far_apart(t_s - began_s)
         first = image if first is None else first
         if image.shape != first.shape or image.dtype != first.dtype:
             raise DataError(

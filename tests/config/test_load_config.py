@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import doctest
 
 import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adv2e import config as package
 from adv2e.config import Config, from_dict, load_config, to_annotated_yaml, to_dict, to_yaml
 from adv2e.config.build import build
 from adv2e.config.model import Pixel, Sampling
@@ -44,6 +46,45 @@ def message(kind, *args, **kwargs):
 
 def test_nothing_given_is_the_defaults():
     assert load_config() == Config()
+
+
+def test_examples_in_the_documentation():
+    result = doctest.testmod(package)
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+def test_one_file_name_mapping_or_configuration_needs_no_list(write):
+    path = write("pixel:\n  thresholds:\n    on: 0.3\n")
+    config = Config(pixel=Pixel(thresholds=Thresholds(on=0.3)))
+    assert load_config(path) == load_config(str(path)) == config
+    assert load_config({"pixel": {"thresholds": {"on": 0.3}}}) == config
+    assert load_config(config) == config
+    assert load_config("davis346") == load_config(["davis346"])
+    assert load_config(None) == Config()
+
+
+def test_layers_of_all_kinds_lie_one_over_another(write):
+    path = write("pixel: {thresholds: {off: 0.4, mismatch: 0.1}}")
+    under = Config(seed=3, pixel=Pixel(thresholds=Thresholds(on=0.5, off=0.5)))
+    over = {"pixel": {"thresholds": {"mismatch": 0}}}
+    config = load_config([under, path, over], "pixel.leak=null")
+    assert config.pixel.thresholds == Thresholds(on=0.5, off=0.4, mismatch=0.0)
+    assert (config.seed, config.pixel.leak) == (3, None)
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"pixel": {"leek": 1}}, "pixel.leek: unknown key (value 1), did you mean 'leak'?"),
+        ({"pixel.leak": None}, "each part by itself: pixel: {leak: ...}"),
+        ({"pixel": {"thresholds": {"on": "0.3"}}}, "must be a number"),
+        (3, "a configuration is a file, the name of a shipped one, a mapping or a Config, got int"),
+        ([{}, 3], "a mapping or a Config, got int"),
+    ],
+)
+def test_what_is_no_configuration_is_told(given, text):
+    assert text in message(ConfigError, given)
 
 
 def test_keys_left_out_keep_their_defaults(write):

@@ -2,6 +2,7 @@
 
 import doctest
 import tracemalloc
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -113,9 +114,37 @@ def test_bad_input_is_one_clear_line(images, at, text):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("config", ["ideal", {"pixel": {"leak": None, "shot_noise": None}}])
+def test_a_configuration_is_whatever_load_config_takes(config):
+    events = run(frames(), times(), config)
+    assert events.tobytes() == run(frames(), times(), adv2e.load_config(config)).tobytes()
+    assert events.tobytes() != run(frames(), times()).tobytes()
+
+
 def test_a_configuration_must_be_one():
-    with pytest.raises(ConfigError, match=r"must be a Config, as adv2e\.load_config .* got dict"):
-        run(frames(), times(), {"pixel": None})
+    with pytest.raises(ConfigError, match="a mapping or a Config, got int"):
+        run(frames(), times(), 3)
+
+
+@pytest.mark.parametrize("rate", [30, 30.0, np.float32(30)])
+def test_a_number_is_a_rate(rate):
+    assert run(iter(frames()), rate).tobytes() == run(frames(), times()).tobytes()
+
+
+@pytest.mark.parametrize("rate", [0, -30, 1e10, np.inf, np.nan, "30", None])
+def test_a_rate_that_cannot_be_is_refused(rate):
+    with pytest.raises(DataError, match=r"^times: "):
+        run(frames(), rate)
+
+
+@pytest.mark.parametrize(("unit", "apart"), [(1e3, "33.3333"), (1e5, "3333.33")])
+def test_times_that_are_hardly_in_seconds_are_told(unit, apart):
+    coming = adv2e.simulate(frames(), [unit * t for t in times()])
+    with (
+        pytest.warns(UserWarning, match=f"second frame comes {apart} s after the first: times are"),
+        suppress(DataError),  # too long between frames, at last
+    ):
+        next(coming)
 
 
 def test_memory_does_not_grow_with_length():

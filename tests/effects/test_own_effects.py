@@ -181,6 +181,14 @@ def test_its_configuration_survives_text_and_is_one_of_ours(load, tmp_path):
     assert dataclasses.replace(config, seed=5).user == config.user
 
 
+def test_a_configuration_brings_its_effects_along(load):
+    dim, drift = load(DIM + DRIFT)
+    config = load_config((), ["user.dim.share=0.7"], effects=[dim])
+    assert load_config(config) == config
+    both = load_config([config, {"seed": 5}], "user.drive_drift={per_s: 2.0}", effects=[dim, drift])
+    assert (both.seed, both.user.dim.share, both.user.drive_drift.per_s) == (5, 0.7, 2.0)
+
+
 def test_each_number_of_a_list_is_fitted_by_itself(load):
     effects = load(fitted("tuple[float, float, float]"))
     declared = load_config((), ["user.a=null"], effects=effects)
