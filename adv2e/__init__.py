@@ -10,22 +10,43 @@ from __future__ import annotations
 
 __version__ = "0.1.0"
 
-__all__ = ["Config", "__version__", "load_config", "simulate"]
+__all__ = [
+    "EVENT_DTYPE",
+    "Config",
+    "__version__",
+    "load_config",
+    "read_events",
+    "simulate",
+    "write_events",
+]
 
 TYPE_CHECKING = False  # as in `typing`, which takes longer to import than all else here
 if TYPE_CHECKING:
     from adv2e.config import Config, load_config
     from adv2e.conversion.simulation import simulate
+    from adv2e.events import EVENT_DTYPE
+    from adv2e.formats.reading import read_events
+    from adv2e.formats.writing import write_events
+
+_HOMES = {
+    "EVENT_DTYPE": "adv2e.events",
+    "Config": "adv2e.config",
+    "load_config": "adv2e.config",
+    "read_events": "adv2e.formats.reading",
+    "simulate": "adv2e.conversion.simulation",
+    "write_events": "adv2e.formats.writing",
+}
 
 
 def __getattr__(name: str) -> object:
     """Import the public names on first use, so that ``adv2e --help`` stays instant."""
-    if name in ("Config", "load_config"):
-        from adv2e import config  # noqa: PLC0415
+    if name not in _HOMES:
+        raise AttributeError(f"module 'adv2e' has no attribute {name!r}")
+    from importlib import import_module  # noqa: PLC0415
 
-        return getattr(config, name)
-    if name == "simulate":
-        from adv2e.conversion.simulation import simulate  # noqa: PLC0415
+    return getattr(import_module(_HOMES[name]), name)
 
-        return simulate
-    raise AttributeError(f"module 'adv2e' has no attribute {name!r}")
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return __all__

@@ -11,7 +11,7 @@ from camera.settings import BENCH, merged
 from adv2e import load_config, simulate
 from adv2e.comparison.smoothed_error import smoothed_errors
 from adv2e.events import EVENT_DTYPE
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 
 SIZE, DURATION_S, FAST_HZ = (24, 18), 0.3, 4000.0
 SCENE = patchwork(SIZE, seed=6, speed=1.5)
@@ -95,7 +95,7 @@ def test_noise_and_mismatch_leave_as_many_events(tmp_path):
 def test_the_package_reads_what_the_camera_writes(tmp_path):
     camera = Camera(SCENE, size=SIZE, duration_s=0.05, fps=500.0, seed=3)
     camera.record(tmp_path / "one.zip")
-    recording = read_recording(tmp_path / "one.zip")
+    recording = read_events(tmp_path / "one.zip")
     assert (recording.width, recording.height) == SIZE
     assert not recording.problems
     assert np.array_equal(np.sort(recording.events["t"]), np.sort(measured(camera)["t"]))

@@ -8,7 +8,7 @@ import pytest
 
 from adv2e import simulate
 from adv2e.errors import DataError
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.sources import open_source
 from adv2e.ticks import LARGEST_NS, NS, US, S, to_ticks
 
@@ -75,7 +75,7 @@ def hdf5(path, t_s, stamp=0.0):
 def test_no_event_file_gives_a_wrong_time(tmp_path, write, t_s):
     path = write(tmp_path / "a", t_s)
     with pytest.raises(DataError) as caught:
-        read_recording(path)
+        read_events(path)
     assert str(caught.value).startswith(f"{path}")
     if write is text:
         assert "line 5" in str(caught.value)
@@ -83,7 +83,7 @@ def test_no_event_file_gives_a_wrong_time(tmp_path, write, t_s):
 
 def test_stamps_of_images(tmp_path):
     with pytest.raises(DataError, match=r"image0: timestamp: a time of 1e\+13 s"):
-        read_recording(hdf5(tmp_path / "a", 0.2, stamp=1e13))
+        read_events(hdf5(tmp_path / "a", 0.2, stamp=1e13))
 
 
 @pytest.mark.parametrize("t_s", FAR)

@@ -68,12 +68,12 @@ def command(
     import numpy as np
 
     from adv2e.comparison.compare import compare
-    from adv2e.formats.reading import read_recording
+    from adv2e.formats.reading import read_events
     from adv2e.sources import open_source
 
     declared = config()
-    ours = read_recording(measured, time_unit=time_unit)
-    theirs = read_recording(simulated, time_unit=time_unit)
+    ours = read_events(measured, time_unit=time_unit)
+    theirs = read_events(simulated, time_unit=time_unit)
     source = open_source(frames_path) if frames_path else None
     for doubt in source.doubts if source else []:
         log(doubt)

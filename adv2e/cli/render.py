@@ -107,7 +107,7 @@ def command(
     if output is None:
         raise click.UsageError("-o is missing: a .mp4, .webm, .avi, .gif or .png file")
     options.check_part(shown["start_s"], shown["stop_s"])
-    from adv2e.formats.reading import read_recording
+    from adv2e.formats.reading import read_events
     from adv2e.rendering import Style, check_suffix, parse_colour, render_recording
 
     is_film = check_suffix(output) != ".png"
@@ -120,7 +120,7 @@ def command(
         off=parse_colour(off_color),
         window_us=max(1, round(1e3 * (window or usual_ms))),
     )
-    recording = read_recording(events, time_unit=time_unit)
+    recording = read_events(events, time_unit=time_unit)
     for problem in recording.problems:
         log(f"{events}: {problem}")
     if frames and recording.frame_times_ns is None:

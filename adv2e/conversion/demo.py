@@ -12,7 +12,7 @@ from adv2e.conversion.reading import Reading
 from adv2e.errors import OutputError
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.rendering import Style, render_recording
 from adv2e.rendering.timeline import caption
 from adv2e.synthetic import Scene
@@ -109,7 +109,7 @@ def run_demo(
         doing = "at rest" if scene.speed(since_us * 1e-6) < _RESTS else "moving"
         return f"{caption(since_us, count)} in {WINDOW_US // 1000} ms, {doing}"
 
-    recording = read_recording(events)
+    recording = read_events(events)
     render_recording(
         recording,
         picture,

@@ -11,7 +11,7 @@ from adv2e.files.regular import check_ends
 from adv2e.formats.recording import Recording
 from adv2e.process.machine import machine_complaint
 
-__all__ = ["Recording", "read_recording"]
+__all__ = ["Recording", "read_events"]
 
 MOST_PIXELS = 1 << 25
 """Pixels of the largest sensor: 8192x4096."""
@@ -19,7 +19,7 @@ MOST_PIXELS = 1 << 25
 _SUFFIXES = (".txt", ".zip", ".h5", ".hdf5", ".npz")
 
 
-def read_recording(path: str | Path, *, time_unit: str | None = None) -> Recording:
+def read_events(path: str | Path, *, time_unit: str | None = None) -> Recording:
     """Read an event file, or a folder in the DAVIS240C layout.
 
     Parameters

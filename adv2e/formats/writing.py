@@ -14,8 +14,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from adv2e.background import default_threads
-from adv2e.errors import UsageError
+from adv2e.errors import DataError, UsageError
+from adv2e.events import Events, is_sorted, make_events, sort_events
 from adv2e.files.staging import Staging
 from adv2e.formats.sink import Request, Sink, Writer
 
@@ -92,6 +96,88 @@ def open_sink(
     )
     files = Staging(overwrite) if staging is None else staging
     return Sink(_writer(path, name), request, files, is_alone=staging is None)
+
+
+def write_events(
+    path: str | Path,
+    events: Events,
+    size: tuple[int, int],
+    *,
+    metadata: dict[str, Any] | None = None,
+    overwrite: bool = False,
+) -> None:
+    """Write events to a file, whose suffix tells the format, or to a folder.
+
+    Parameters
+    ----------
+    path : str or Path
+        Output: .txt, .h5, .zip (DAVIS240C), or a folder in that layout.
+    events : structured array, (n,)
+        With the fields t [us], x, y, p, in any order of time; sorted ones are written as they are.
+    size : (int, int)
+        Width and height of the sensor [pixels].
+    metadata : dict, optional
+        What JSON can hold; stored inside, or in ``<path>.json`` beside a text file.
+    overwrite : bool
+        Replace, at the end, what exists.
+
+    Raises
+    ------
+    DataError
+        The array has other fields, or an event lies outside the sensor.
+    OutputError
+        Unknown suffix; the output exists already, or cannot be made.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from adv2e import read_events, write_events
+    >>> from adv2e.events import make_events
+    >>> events = make_events(t=[10, 20], x=[0, 3], y=[0, 2], p=[1, 0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_events(Path(folder, "a.h5"), events, (4, 3))
+    ...     recording = read_events(Path(folder, "a.h5"))
+    >>> recording.events["t"].tolist(), recording.width, recording.height
+    ([10, 20], 4, 3)
+    """
+    width, height = size
+    ours = _sorted_inside(np.asarray(events), width, height)
+    with open_sink(
+        path, width=width, height=height, metadata=dict(metadata or {}), overwrite=overwrite
+    ) as sink:
+        sink.write_events(ours)
+
+
+def _sorted_inside(events: NDArray[Any], width: int, height: int) -> Events:
+    """Return events of our type, sorted.
+
+    Raises
+    ------
+    DataError
+        See :func:`write_events`.
+    """
+    held = events.dtype.names or ()
+    if events.ndim != 1 or not {"t", "x", "y", "p"} <= set(held):
+        raise DataError(
+            f"events: must be a structured array, (n,), with the fields t, x, y, p, got"
+            f" {events.dtype} {events.shape}"
+        )
+    for name in ("t", "x", "y"):
+        if events[name].dtype.kind not in "iu":
+            raise DataError(
+                f"events: {name} must be whole numbers, t in microseconds, got {events[name].dtype}"
+            )
+    for name, most in (("x", width), ("y", height)):
+        outside = np.flatnonzero((events[name] < 0) | (events[name] >= most))
+        if outside.size:
+            number = int(outside[0])
+            raise DataError(
+                f"events: number {number} has {name} {events[name][number]}, outside a sensor of"
+                f" {width}x{height} pixels"
+            )
+    made = make_events(*(events[name] for name in ("t", "x", "y", "p")))
+    return made if is_sorted(made) else sort_events(made)
 
 
 def _writer(path: Path, name: str) -> type[Writer]:

@@ -12,7 +12,7 @@ from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.files.names import shown
 from adv2e.files.regular import check_ends
 from adv2e.files.zips import Members
-from adv2e.formats.reading import Recording, read_recording
+from adv2e.formats.reading import Recording, read_events
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
 from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
@@ -63,7 +63,7 @@ def inspect(
             allow_damaged=allow_damaged,
         )
         return _of_source(source)
-    return _of_recording(read_recording(path, time_unit=time_unit))
+    return _of_recording(read_events(path, time_unit=time_unit))
 
 
 def _has_only_frames(path: Path) -> bool:

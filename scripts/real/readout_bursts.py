@@ -23,7 +23,7 @@ from writing import one_line_errors, table
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.hints.readouts import Pulse, pulse_of
 from adv2e.errors import DataError
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 
 COLUMNS = (
     "recording", "events", "frames apart [ms]", "ON in bursts", "OFF in bursts",
@@ -49,7 +49,7 @@ def rows_of(path: str, interval_ms: float | None) -> list[list[str]]:
     DataError
         It has no frames, and nobody says how far they would be apart.
     """
-    recording = read_recording(path)
+    recording = read_events(path)
     events, times_ns = recording.events, recording.frame_times_ns
     if times_ns is not None and len(times_ns) > 1:
         times_s = 1e-9 * times_ns

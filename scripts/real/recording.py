@@ -17,7 +17,7 @@ from adv2e.config import Config
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.sources import Frame, Source, open_source
 
 STILL_DN = 2.0
@@ -99,7 +99,7 @@ def read(folder: str) -> Real:
     DataError
         It has no frames or no events, is damaged, or its events cover no frame interval.
     """
-    recording = read_recording(folder)
+    recording = read_events(folder)
     source = open_source(folder)
     if (source.width, source.height) != (recording.width, recording.height):
         raise DataError(

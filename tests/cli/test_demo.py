@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adv2e.conversion import demo as module
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.synthetic import Scene
 from adv2e.synthetic.clips import write_video
 
@@ -33,7 +33,7 @@ def test_makes_clip_events_picture_and_film_and_says_what(adv2e, small, tmp_path
     for name in FILES:
         assert str(folder / name) in outcome.out
         assert (folder / name).stat().st_size > 1000
-    recording = read_recording(folder / "clip.events.h5")
+    recording = read_events(folder / "clip.events.h5")
     events = recording.events
     assert (recording.width, recording.height) == (64, 48)
     assert f"{events.size:,} events" in outcome.out
@@ -56,7 +56,7 @@ def test_makes_clip_events_picture_and_film_and_says_what(adv2e, small, tmp_path
     assert outcome.status == 1
     assert "clip.avi: exists already; --overwrite replaces it" in outcome.err
     assert adv2e("demo", "-o", folder, "-q", "--threads", 1, "--overwrite").out == ""
-    assert np.array_equal(read_recording(folder / "clip.events.h5").events, events)
+    assert np.array_equal(read_events(folder / "clip.events.h5").events, events)
     assert sorted(path.name for path in folder.iterdir()) == [*FILES, "mine.txt"]
 
 

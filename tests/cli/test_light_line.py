@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 
 FRAMES = np.arange(6 * 24 * 32).reshape(6, 24, 32) % 251
 COLOUR = np.repeat(FRAMES[..., np.newaxis], 3, axis=-1)
@@ -83,7 +83,7 @@ def test_every_source_says_its_light_and_the_key_that_changes_it(adv2e, tmp_path
     assert expected in lines[0]
     assert "frames.encoding" in lines[0]
     assert len(lines[0]) <= 100
-    assert read_recording(output).metadata["source"]["light"] == lines[0].removeprefix("light: ")
+    assert read_events(output).metadata["source"]["light"] == lines[0].removeprefix("light: ")
     report = json.loads(adv2e("info", source, *times, "--json").out)["frames"]
     assert expected in report["light"]
     assert expected.startswith(f"{report['encoding']}, white {report['full_scale']:g}")

@@ -9,7 +9,7 @@ import pytest
 
 from adv2e.comparison.floor import half_split
 from adv2e.comparison.windows import Windows, frame_windows, span_of
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 
 FOLDER = os.environ.get("ADV2E_REAL_DATA")
 
@@ -23,7 +23,7 @@ FOLDER = os.environ.get("ADV2E_REAL_DATA")
     ],
 )
 def test_the_floor_of_a_recording_is_the_known_one(name, intervals, known):
-    recording = read_recording(Path(FOLDER) / name)
+    recording = read_events(Path(FOLDER) / name)
     every = frame_windows(recording.frame_times_ns, [span_of(recording.events)])
     windows = Windows(every.kind, every.used[-intervals:], every.total)
     found = half_split(recording.events, windows, recording.width, recording.height)

@@ -22,7 +22,7 @@ from adv2e.conversion import pipeline as conversion
 from adv2e.conversion.simulation import events_from_light
 from adv2e.events import empty_events
 from adv2e.files.names import shown
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_the_same_events_in_every_format(adv2e, folder, tmp_path):
         outcome = adv2e("convert", folder, "-o", output, "--seed", "3")
         assert outcome.status == 0, outcome.err
         assert "events" in outcome.out
-    events = [read_recording(path).events for path in outputs]
+    events = [read_events(path).events for path in outputs]
     assert len(events[0]) > 300
     # on the recording's own clock
     assert events[0]["t"][0] > 100_000_000
@@ -63,14 +63,14 @@ def test_the_same_events_in_every_format(adv2e, folder, tmp_path):
         assert other.tobytes() == events[0].tobytes()
     # the whole recording: frames at their times
     for path in outputs[2:]:
-        times = read_recording(path).frame_times_ns
+        times = read_events(path).frame_times_ns
         assert list(times) == [100_000_000_000 + 40_000_000 * k for k in range(5)]
 
 
 def test_files_say_how_they_were_made(adv2e, folder, tmp_path):
     for name in ("a.txt", "a.h5", "a.zip", "a"):
         adv2e("convert", folder, "-o", tmp_path / name, "--seed", "7", "--set", "pixel.leak=null")
-    metadata = [read_recording(tmp_path / name).metadata for name in ("a.h5", "a.zip", "a")]
+    metadata = [read_events(tmp_path / name).metadata for name in ("a.h5", "a.zip", "a")]
     metadata.append(json.loads((tmp_path / "a.txt.json").read_text()))
     for record in metadata:
         assert record["seed"] == 7
@@ -115,7 +115,7 @@ def test_start_and_stop_and_preview(adv2e, video, tmp_path):
         "--preview", preview,
     )  # fmt: skip
     assert outcome.status == 0, outcome.err
-    t = read_recording(tmp_path / "a.txt").events["t"]
+    t = read_events(tmp_path / "a.txt").events["t"]
     assert t.min() >= 66_000
     assert t.max() <= 134_000
     assert cv2.imread(str(preview)) is not None
@@ -287,7 +287,7 @@ def test_what_lies_beside_the_input_and_is_not_read_may_be_written_over(adv2e, f
         (folder / name).write_bytes(b"of before")
     more = ["--preview", folder / "preview.png", "--overwrite"]
     assert adv2e("convert", folder, "-o", folder / "events.h5", *more).status == 0
-    assert len(read_recording(folder / "events.h5").events) > 300
+    assert len(read_events(folder / "events.h5").events) > 300
 
 
 @pytest.mark.parametrize("existing", [False, True])
@@ -363,7 +363,7 @@ def test_any_name_that_the_system_takes(adv2e, video, tmp_path, name):
         target, preview = folder / f"{name}{suffix}", folder / f"{name}{suffix}.gif"
         outcome = adv2e("convert", clip, "-o", target, "--preview", preview)
         assert (outcome.status, len(outcome.out.splitlines())) == (0, 2), outcome.err
-        recording = read_recording(target)
+        recording = read_events(target)
         assert len(recording.events) > 300
         told = recording.metadata["source"]["name"]
         assert told == shown(clip.name)
@@ -428,7 +428,7 @@ def test_what_is_written_is_done_though_nothing_can_be_said(video, tmp_path, std
         )
     assert done.returncode == 0
     assert b"events" in done.stdout
-    assert len(read_recording(target).events) > 300
+    assert len(read_events(target).events) > 300
 
 
 def test_floats_far_above_white_are_told_before_any_work(adv2e, tmp_path):
@@ -469,7 +469,7 @@ def test_late_times_stay_exact_to_the_microsecond(adv2e, tmp_path, begin_s, name
     expected = np.concatenate(list(events_from_light(light, load_config(), threads=1)))
     assert expected["t"].min() >= begin_s * 10**6
     assert expected["t"].max() > begin_s * 10**6 + 60_000
-    assert read_recording(tmp_path / name).events.tobytes() == expected.tobytes()
+    assert read_events(tmp_path / name).events.tobytes() == expected.tobytes()
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "flow"])
@@ -487,7 +487,7 @@ def test_grey_frames_make_the_events_of_their_light(adv2e, tmp_path, L, interpol
     light = [(k * 10**8, frame.astype(np.float32)) for k, frame in enumerate(frames)]
     expected = np.concatenate(list(events_from_light(light, load_config([], sets), threads=1)))
     assert expected.size > 1000
-    assert read_recording(tmp_path / "a.txt").events.tobytes() == expected.tobytes()
+    assert read_events(tmp_path / "a.txt").events.tobytes() == expected.tobytes()
 
 
 @pytest.mark.parametrize("count", [0, 1, 100, 101, 1000])

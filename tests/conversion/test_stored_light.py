@@ -11,7 +11,7 @@ import pytest
 from adv2e.comparison.resimulation import resimulator
 from adv2e.config import load_config
 from adv2e.diagnosis.data.evidence import read_evidence
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.light.decoding import decoder_for
 from adv2e.sources import open_source
 
@@ -96,7 +96,7 @@ def test_converted_again_a_recording_gives_the_same_events(adv2e, made, tmp_path
     outcome = adv2e("convert", source, *told, *QUIET, "-o", tmp_path / layout)
     assert outcome.status == 0, outcome.err
     assert adv2e("convert", tmp_path / layout, *QUIET, "-o", tmp_path / "again.h5").status == 0
-    first, again = read_recording(tmp_path / layout), read_recording(tmp_path / "again.h5")
+    first, again = read_events(tmp_path / layout), read_events(tmp_path / "again.h5")
     assert first.events.size > 1000
     assert again.events.tobytes() == first.events.tobytes()
     # one simulation more, as comparisons make it
@@ -109,7 +109,7 @@ def test_frames_in_hdf5_have_the_light_that_they_had_but_for_8_bits(adv2e, made,
     source, told = made(name)
     output = tmp_path / "rec.h5"
     assert adv2e("convert", source, *told, *QUIET, "--with-frames", "-o", output).status == 0
-    stored = read_recording(output)
+    stored = read_events(output)
     config = load_config([], [word for word in told if "=" in word])
     opened = open_source(source, fps=25 if "--fps" in told else None)
     decoder = decoder_for(
@@ -130,7 +130,7 @@ def test_floats_are_stored_with_a_white_of_their_own(adv2e, tmp_path):
     source = save(tmp_path / "a.npy", moving(255, np.float32))
     adv2e("convert", source, "--set", "frames.full_scale=255", *QUIET, "-o", tmp_path / "a.zip")
     adv2e("convert", tmp_path / "a.zip", *QUIET, "-o", tmp_path / "b.h5")
-    first, again = read_recording(tmp_path / "a.zip"), read_recording(tmp_path / "b.h5")
+    first, again = read_events(tmp_path / "a.zip"), read_events(tmp_path / "b.h5")
     assert first.metadata["source"]["full_scale"] == 255
     assert first.metadata["frames"] == {"encoding": "linear", "full_scale": 65535}
     assert abs(again.events.size - first.events.size) < 0.01 * first.events.size
@@ -161,7 +161,7 @@ def test_recordings_written_before_that_was_stored_tell_the_encoding(adv2e, made
     del description["frames"]
     file.write_text(json.dumps(description))
     assert open_source(tmp_path / "rec").encoding == "srgb"
-    assert read_recording(tmp_path / "rec").encoding == "srgb"
+    assert read_events(tmp_path / "rec").encoding == "srgb"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.inspection.inspect import inspect
 from adv2e.sources import open_source
 
@@ -47,7 +47,7 @@ def test_a_member_that_fills_the_memory(tmp_path, name):
     path = bomb(tmp_path / "a.zip", name)
     assert path.stat().st_size < 1 << 20
     with pytest.raises(DataError, match=rf"a\.zip: {name}: states 314,572,800 bytes"):
-        list(read_recording(path).images())
+        list(read_events(path).images())
     if name.startswith("images"):
         with pytest.raises(DataError, match=rf"a\.zip: {name}: states 314,572,800 bytes"):
             list(open_source(path).frames())
@@ -57,7 +57,7 @@ def test_an_array_that_fills_the_memory(tmp_path):
     path = tmp_path / "a.npz"
     np.savez_compressed(path, x=[1], y=[1], p=[1], t=np.zeros(HUGE >> 3))
     with pytest.raises(DataError, match=r"a\.npz: t\.npy: states 314,572,928 bytes"):
-        read_recording(path)
+        read_events(path)
 
 
 def test_an_array_that_is_not_there(tmp_path):
@@ -69,7 +69,7 @@ def test_an_array_that_is_not_there(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.npz", "a") as made:
         made.writestr("t.npy", file.getvalue())
     with pytest.raises(DataError, match=r"a\.npz: t: cut short: it holds 0 bytes"):
-        read_recording(tmp_path / "a.npz")
+        read_events(tmp_path / "a.npz")
 
 
 @pytest.mark.parametrize("part", [0.0, 0.02, 0.3, 0.6, 0.9, 0.99])
@@ -81,7 +81,7 @@ def test_archives_cut_short(tmp_path, part, kind):
     else:
         np.savez_compressed(path, t_us=[1, 2], x=[1, 1], y=[1, 1], p=[1, 0])
     path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
-    for read in (read_recording, inspect, open_source):
+    for read in (read_events, inspect, open_source):
         with pytest.raises(DataError, match=rf"a\.{kind}"):
             read(path)
 
@@ -95,7 +95,7 @@ def test_an_archive_cut_short_after_it_was_opened(tmp_path):
             made.writestr(name, data)
         for n in range(2):
             made.writestr(f"images/{n}.png", cv2.imencode(".png", noise[n])[1].tobytes())
-    recording, source = read_recording(path), open_source(path)
+    recording, source = read_events(path), open_source(path)
     with path.open("r+b") as file:
         file.truncate(80_000)
     with pytest.raises(DataError, match=r"a\.zip"):

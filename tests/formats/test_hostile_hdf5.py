@@ -10,7 +10,7 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.formats.monash.reader import COLUMNS
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 
 VALUES = {"events/ts": [0.1, 0.2, 0.3], "events/xs": [1, 2, 0], "events/ys": [0, 1, 1],
           "events/ps": [1, 0, 1]}  # fmt: skip
@@ -103,7 +103,7 @@ def test_what_is_elsewhere_is_refused_by_name(tmp_path, name, make, message):
     secret = whole(tmp_path / "secret.h5")
     path = changed(tmp_path / "a.h5", name, make(name, secret))
     with pytest.raises(DataError) as caught:
-        list(read_recording(path).images())
+        list(read_events(path).images())
     assert str(caught.value).startswith(f"{path}: {name}: ")
     assert message in str(caught.value)
 
@@ -114,7 +114,7 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import test_hostile_hdf5 as made
 from adv2e.errors import DataError
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 
 folder = Path(sys.argv[2])
 secret = made.whole(folder / "secret.h5")
@@ -122,7 +122,7 @@ for make in (made.virtual, made.virtual_of_itself):
     for number, name in enumerate([*made.COLUMNS, "images/image000000000"]):
         path = made.changed(folder / f"{make.__name__}{number}.h5", name, make(name, secret))
         try:
-            list(read_recording(path).images())
+            list(read_events(path).images())
         except DataError as error:
             said = str(error)
             assert said.startswith(f"{path}: {name}: is a virtual dataset"), said
@@ -159,8 +159,8 @@ def test_soft_links_within_the_file_are_followed(tmp_path):
         file["columns/x"] = np.array(VALUES["events/xs"])
         file["events/xs"] = h5py.SoftLink("/again/x")
         file["again"] = h5py.SoftLink("columns")
-    assert read_recording(path).events.tobytes() == (
-        read_recording(whole(tmp_path / "b.h5")).events.tobytes()
+    assert read_events(path).events.tobytes() == (
+        read_events(whole(tmp_path / "b.h5")).events.tobytes()
     )
 
 
@@ -172,7 +172,7 @@ def test_images_that_are_none(tmp_path, image):
     name = "images/image000000000"
     path = changed(tmp_path / "a.h5", name, lambda file: file.__setitem__(name, image))
     with pytest.raises(DataError, match="image000000000 is no image"):
-        list(read_recording(path).images())
+        list(read_events(path).images())
 
 
 def test_an_image_of_many_numbers_that_were_never_written(tmp_path):
@@ -183,7 +183,7 @@ def test_an_image_of_many_numbers_that_were_never_written(tmp_path):
 
     path = changed(tmp_path / "a.h5", name, change)
     with pytest.raises(DataError, match="states 1,099,511,627,776 bytes and holds 0"):
-        list(read_recording(path).images())
+        list(read_events(path).images())
 
 
 def test_a_dataset_in_place_of_the_group_of_images(tmp_path):
@@ -192,7 +192,7 @@ def test_a_dataset_in_place_of_the_group_of_images(tmp_path):
         del file["images"]
         file.create_dataset("images", (1 << 40,), "f8", chunks=(1 << 16,))
     with pytest.raises(DataError, match="images is a dataset, must be a group"):
-        read_recording(path)
+        read_events(path)
 
 
 @pytest.mark.parametrize("packed", [False, True])
@@ -207,4 +207,4 @@ def test_events_of_which_nothing_is_there(tmp_path, packed):
             if packed:
                 made[:] = np.zeros(count, "i1")
     with pytest.raises(DataError, match="more than 200-fold is not read"):
-        read_recording(path)
+        read_events(path)

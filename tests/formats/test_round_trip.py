@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.events import make_events, sort_events
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink
 
 EPOCH_US = 1_468_941_032_229_165
@@ -48,7 +48,7 @@ def test_events_and_geometry_survive(stream):
         for name in NAMES:
             path = Path(folder) / name
             write(path, events, width, height)
-            recording = read_recording(path)
+            recording = read_events(path)
 
             assert np.array_equal(recording.events, events)
             assert recording.events.dtype == events.dtype
@@ -61,7 +61,7 @@ def test_corners_at_epoch_times_with_nothing_to_complain_of(tmp_path, name):
     events = make_events(t, [0, 345, 0, 345], [0, 0, 259, 259], [1, 0, 0, 1])
     write(tmp_path / name, events, 346, 260)
 
-    recording = read_recording(tmp_path / name)
+    recording = read_events(tmp_path / name)
 
     assert np.array_equal(recording.events, events)
     assert recording.problems == []
@@ -78,21 +78,21 @@ def test_many_blocks_and_chunks(tmp_path, name):
     events = sort_events(make_events(t, x, y, rng.integers(0, 2, count)))
     write(tmp_path / name, events, 346, 260)
 
-    assert np.array_equal(read_recording(tmp_path / name).events, events)
+    assert np.array_equal(read_events(tmp_path / name).events, events)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_metadata_survive(tmp_path, name):
     write(tmp_path / name, make_events([1], [0], [0], [1]), 4, 3)
 
-    assert read_recording(tmp_path / name).metadata == {**METADATA, "width": 4, "height": 3}
+    assert read_events(tmp_path / name).metadata == {**METADATA, "width": 4, "height": 3}
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_events_keep_their_geometry(tmp_path, name):
     write(tmp_path / name, make_events([], [], [], []), 4, 3)
 
-    recording = read_recording(tmp_path / name)
+    recording = read_events(tmp_path / name)
 
     assert (recording.width, recording.height, recording.events.size) == (4, 3, 0)
     assert recording.problems == ["no events"]
@@ -109,7 +109,7 @@ def test_frames_survive(tmp_path, name, colour):
     ]
     write(tmp_path / name, make_events([1], [0], [0], [1]), 4, 3, frames)
 
-    recording = read_recording(tmp_path / name)
+    recording = read_events(tmp_path / name)
 
     assert recording.frame_times_ns.tolist() == [t_ns for t_ns, _ in frames]
     for _ in range(2):  # as often as asked
@@ -123,7 +123,7 @@ def test_sixteen_bit_frames_survive_as_png(tmp_path, name):
     image = np.arange(12, dtype=np.uint16).reshape(3, 4) * 5000
     write(tmp_path / name, make_events([1], [0], [0], [1]), 4, 3, [(0, image)])
 
-    (frame,) = read_recording(tmp_path / name).frames()
+    (frame,) = read_events(tmp_path / name).frames()
 
     assert frame.image.dtype == np.uint16
     assert np.array_equal(frame.image, image)

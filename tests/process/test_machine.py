@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.images import opencv
 
@@ -49,7 +49,7 @@ def test_readers_leave_it_as_it_is(tmp_path, monkeypatch, suffix, error):
     for name in ("zipfile.ZipFile", "h5py.File", "adv2e.formats.text.reader.parse_lines"):
         monkeypatch.setattr(name, fail)
     with pytest.raises(type(error), match=str(error)):
-        read_recording(path)
+        read_events(path)
 
 
 def test_an_image_for_which_memory_is_short(monkeypatch):

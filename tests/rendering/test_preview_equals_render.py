@@ -15,7 +15,7 @@ from adv2e.conversion.pipeline import convert
 from adv2e.conversion.reading import Reading
 from adv2e.errors import OutputError
 from adv2e.events import empty_events, make_events
-from adv2e.formats.reading import Recording, read_recording
+from adv2e.formats.reading import Recording, read_events
 from adv2e.rendering import Style, open_preview, render_recording
 from adv2e.rendering.timeline import Timeline
 from adv2e.synthetic import Scene
@@ -120,7 +120,7 @@ def test_preview_of_a_conversion_is_what_render_makes_of_its_file(clip, tmp_path
                 with_frames=True,
                 preview=str(made),
             )
-        render_recording(read_recording(output), expected)
+        render_recording(read_events(output), expected)
         assert made.read_bytes() == expected.read_bytes()
 
 

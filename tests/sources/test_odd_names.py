@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from adv2e.files.names import shown
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.rendering.gif import GifWriter, palette
 from adv2e.rendering.styles import Style
 from adv2e.sources import open_source
@@ -129,7 +129,7 @@ def test_recording_as_folder_and_zip(write_images, picture, odd):
             archive.write(file, file.relative_to(folder).as_posix())
     assert times_and_images(open_source(folder)) == times_and_images(open_source(packed))
     for path in (folder, packed):
-        assert read_recording(path).events["t"].tolist() == [1, 1_250_000]
+        assert read_events(path).events["t"].tolist() == [1, 1_250_000]
 
 
 @pytest.mark.parametrize("suffix", ["txt", "h5", "npz"])
@@ -139,14 +139,14 @@ def test_events(adv2e, odd, tmp_path, suffix):
     plain = tmp_path / f"plain.{suffix if suffix != 'npz' else 'h5'}"
     done = adv2e("convert", tmp_path / "stack.npy", "--fps", "100", "-o", plain)
     assert done.status == 0, done.err
-    expected = read_recording(plain).events
+    expected = read_events(plain).events
     assert expected.size
     path = odd.parent / f"{odd.name}.{suffix}"
     if suffix == "npz":
         np.savez(tmp_path / "plain.npz", **{name: expected[name] for name in "txyp"})
         plain = tmp_path / "plain.npz"
     shutil.copy(plain, path)
-    assert np.array_equal(read_recording(path).events, expected)
+    assert np.array_equal(read_events(path).events, expected)
     told = adv2e("info", path)
     assert told.status == 0, told.err
     assert shown(path) in told.out
@@ -161,7 +161,7 @@ def test_conversion_gives_the_same_events_and_stores_a_name(adv2e, write_video, 
         out = plain.parent / f"{number}.h5"
         done = adv2e("convert", source, "-o", out)
         assert done.status == 0, done.err
-        written.append(read_recording(out))
+        written.append(read_events(out))
     assert np.array_equal(written[0].events, written[1].events)
     assert written[0].events.size
     assert written[1].metadata["source"]["name"] == shown(path.name)

@@ -16,7 +16,7 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.files.names import shown
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.light.decoding import decoder_for
 from adv2e.reports.result import Masked
 
@@ -141,7 +141,7 @@ class Evidence:
 
 
 def read_evidence(path: str | Path, time_unit: str | None = None) -> Evidence:
-    """Read a recording that holds frames and events; its unit as :func:`read_recording` has it.
+    """Read a recording that holds frames and events; its unit as :func:`read_events` has it.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def read_evidence(path: str | Path, time_unit: str | None = None) -> Evidence:
         not overlap in time; frames are out of order, not all alike, or of another size than the
         events.
     """
-    recording = read_recording(path, time_unit=time_unit)
+    recording = read_events(path, time_unit=time_unit)
     if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
         raise DataError(f"{path}: holds no frames, from which the events could be simulated")
     frames, times = [], []

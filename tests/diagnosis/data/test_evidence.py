@@ -193,14 +193,14 @@ def test_frames_out_of_order(adv2e, tmp_path):
 def test_frames_of_another_size_than_the_events_say(adv2e, record, monkeypatch):
     from adv2e.diagnosis.data import evidence
 
-    read = evidence.read_recording
+    read = evidence.read_events
 
     def wider(path, **options):
         recording = read(path, **options)
         object.__setattr__(recording, "width", 50)
         return recording
 
-    monkeypatch.setattr(evidence, "read_recording", wider)
+    monkeypatch.setattr(evidence, "read_events", wider)
     assert "frames have 12x8 pixels, events 50x8" in complaint(adv2e, record())
 
 

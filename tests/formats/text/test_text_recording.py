@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.formats.text.lines import parse_lines
 
 
@@ -13,7 +13,7 @@ def read(tmp_path):
     def from_text(text, name="e.txt"):
         content = text if isinstance(text, bytes) else text.encode()
         (tmp_path / name).write_bytes(content)
-        return read_recording(tmp_path / name)
+        return read_events(tmp_path / name)
 
     return from_text
 
@@ -197,7 +197,7 @@ def test_metadata_of_a_folder_hold_for_its_events_file(tmp_path):
     (tmp_path / "events.txt").write_text("0.5 1 2 1\n")
     (tmp_path / "adv2e.json").write_text('{"width": 240, "height": 180}')
 
-    recording = read_recording(tmp_path / "events.txt")
+    recording = read_events(tmp_path / "events.txt")
 
     assert (recording.width, recording.height, recording.problems) == (240, 180, [])
 
@@ -206,7 +206,7 @@ def test_broken_metadata_are_a_problem_not_an_error(tmp_path):
     (tmp_path / "e.txt").write_text("0.5 1 2 1\n")
     (tmp_path / "e.txt.json").write_text("{")
 
-    recording = read_recording(tmp_path / "e.txt")
+    recording = read_events(tmp_path / "e.txt")
 
     assert recording.metadata == {}
     assert "e.txt.json: not a JSON mapping, ignored" in recording.problems[0]

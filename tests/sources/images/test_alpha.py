@@ -11,7 +11,7 @@ import pytest
 
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.sources import open_source
 from adv2e.sources.frame import OVER_BLACK
 from adv2e.sources.images.opencv import decode_image
@@ -199,7 +199,7 @@ def test_a_fade_by_alpha_alone_makes_the_same_events_in_all_formats(adv2e, fadin
         outcome = adv2e("convert", fading(name, encode), "--fps", "50", *QUIET, *output)
         assert outcome.status == 0, outcome.err
         assert outcome.err.splitlines().count(OVER_BLACK) == 1
-        events.append(read_recording(tmp_path / "a.h5").events)
+        events.append(read_events(tmp_path / "a.h5").events)
     assert events[0].size > 500
     assert not events[0]["p"].any()
     assert all(other.tobytes() == events[0].tobytes() for other in events[1:])
@@ -218,13 +218,13 @@ def test_grey_fades_in_light_whether_or_not_the_kernel_decodes_it(adv2e, tmp_pat
     outcome = adv2e("convert", folder, *told)
     assert outcome.status == 0, outcome.err
     # ln(255/32) in steps of 0.2
-    assert read_recording(tmp_path / "a.h5").events.size == 16 * int(np.log(255 / 32) / 0.2)
+    assert read_events(tmp_path / "a.h5").events.size == 16 * int(np.log(255 / 32) / 0.2)
 
 
 def test_frames_are_stored_as_they_are_seen(adv2e, fading, tmp_path):
     source = fading("png", ENCODERS["png"])
     assert adv2e("convert", source, "--fps", "50", "-o", tmp_path / "rec.zip").status == 0
-    stored = read_recording(tmp_path / "rec.zip")
+    stored = read_events(tmp_path / "rec.zip")
     frames = zip(open_source(source, fps=50).frames(), stored.frames(), strict=True)
     decoder = LightDecoder("srgb", 255, np.uint8, True)
     for frame, kept in frames:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError, UsageError
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 from adv2e.sources import open_source
 
 PER_S = {"s": 1, "ms": 1000, "us": 10**6, "ns": 10**9}
@@ -83,7 +83,7 @@ def test_frames_and_events_of_a_recording_are_in_one_unit(recording, unit):
     events = sorted(f"{n * 150 * PER_S[unit] // 10**6:020d}" for n in range(500))
     folder = recording(listed(unit, 40, 4, whole=True), events)
     frames_ns = [0, 25_000_000, 50_000_000, 75_000_000]
-    found = read_recording(folder)
+    found = read_events(folder)
     assert found.frame_times_ns.tolist() == frames_ns
     assert abs(int(found.events["t"].max()) - 499 * 150) < 1000
     assert any(f"taken as {unit}" in problem for problem in found.problems)
@@ -94,14 +94,14 @@ def test_frames_and_events_of_a_recording_are_in_one_unit(recording, unit):
 
 def test_a_unit_given_is_that_of_the_list_without_points(recording):
     folder = recording(listed("us", 40, 4, whole=True), ["0.001", "0.07"])
-    found = read_recording(folder, time_unit="ms")
+    found = read_events(folder, time_unit="ms")
     assert found.frame_times_ns.tolist() == [0, 25 * 10**9, 50 * 10**9, 75 * 10**9]
     assert found.events["t"].tolist() == [1000, 70_000]
 
 
 def test_a_unit_given_is_that_of_both(recording):
     folder = recording(["0.0", "0.5", "1.5", "2.5"], ["1.5", "2.25"])
-    found = read_recording(folder, time_unit="ms")
+    found = read_events(folder, time_unit="ms")
     assert found.frame_times_ns.tolist() == [0, 500_000, 1_500_000, 2_500_000]
     assert found.events["t"].tolist() == [1500, 2250]
     assert found.problems == []
@@ -122,7 +122,7 @@ def test_a_unit_given_is_that_of_both(recording):
 def test_a_unit_given_for_events_in_text(tmp_path, unit, text, t_us):
     path = tmp_path / "e.txt"
     path.write_text(text)
-    assert read_recording(path, time_unit=unit).events["t"].tolist() == [t_us]
+    assert read_events(path, time_unit=unit).events["t"].tolist() == [t_us]
 
 
 def test_slow_frames_that_we_wrote_are_in_seconds(recording, adv2e, tmp_path):
@@ -194,7 +194,7 @@ EVENTS_US = np.arange(1000) * 137
     ],
 )
 def test_event_files_are_read_by_the_same_rule(tmp_path, write, t, name, told):
-    found = read_recording(write(tmp_path / ("a.npz" if write is npz else "a.h5"), t))
+    found = read_events(write(tmp_path / ("a.npz" if write is npz else "a.h5"), t))
     begin = 1_468_941_032 * 10**6 if t.max() > 1e9 else 0
     assert np.array_equal(found.events["t"], EVENTS_US + begin)
     doubts = [problem for problem in found.problems if "no unit is stated" in problem]
@@ -205,32 +205,32 @@ def test_event_files_are_read_by_the_same_rule(tmp_path, write, t, name, told):
 def test_a_unit_given_for_event_files(tmp_path, write):
     path = write(tmp_path / ("a.npz" if write is npz else "a.h5"), np.array([1000, 2000]))
     for unit, rate in PER_S.items():
-        found = read_recording(path, time_unit=unit)
+        found = read_events(path, time_unit=unit)
         assert found.events["t"].tolist() == [10**9 // rate, 2 * 10**9 // rate]
         assert not any("no unit" in problem for problem in found.problems)
 
 
 @pytest.mark.parametrize(("name", "scale"), [("t_s", 1e6), ("t_ms", 1e3), ("t_ns", 1e-3)])
 def test_a_column_may_state_its_unit(tmp_path, name, scale):
-    found = read_recording(npz(tmp_path / "a.npz", [1000, 2000], name))
+    found = read_events(npz(tmp_path / "a.npz", [1000, 2000], name))
     assert found.events["t"].tolist() == [1000 * scale, 2000 * scale]
     assert not any("no unit" in problem for problem in found.problems)
 
 
 def test_images_in_hdf5_tell_the_unit_of_events_beside_them(tmp_path):
     path = hdf5(tmp_path / "a.h5", EVENTS_US / 1000, [0.0, 40.0, 80.0, 120.0])
-    found = read_recording(path)
+    found = read_events(path)
     assert found.frame_times_ns.tolist() == [0, 40_000_000, 80_000_000, 120_000_000]
     assert np.array_equal(found.events["t"], EVENTS_US)
     assert "images: no unit is stated: times 40 apart are taken as ms" in found.problems[0]
     ours = hdf5(tmp_path / "b.h5", [0.1, 90.0], [0.0, 40.0, 80.0], adv2e='{"adv2e": "1"}')
-    assert read_recording(ours).frame_times_ns.tolist() == [0, 40 * 10**9, 80 * 10**9]
+    assert read_events(ours).frame_times_ns.tolist() == [0, 40 * 10**9, 80 * 10**9]
 
 
 def test_events_and_frames_that_share_no_time_are_told(tmp_path):
     def problems(*stamps):
         path = hdf5(tmp_path / "a.h5", EVENTS_US / 1e6, stamps)
-        return [one for one in read_recording(path).problems if "another unit" in one]
+        return [one for one in read_events(path).problems if "another unit" in one]
 
     assert problems(0.0, 0.04, 0.08) == []
     assert problems(5.0, 5.04, 5.08) == [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.formats.reading import read_recording
+from adv2e.formats.reading import read_events
 
 EVENTS = "0.1 0 0 1\n0.2 2 1 0\n"
 
@@ -57,14 +57,14 @@ def davis(request, tmp_path):
 
 def error_of(path):
     with pytest.raises(DataError) as info:
-        list(read_recording(path).frames())
+        list(read_events(path).frames())
     assert str(info.value).startswith(str(path))
     assert "\n" not in str(info.value)
     return str(info.value)
 
 
 def test_davis240c_recording(davis):
-    recording = read_recording(davis(recording_files()))
+    recording = read_events(davis(recording_files()))
 
     assert recording.layout == "davis240c"
     assert recording.events.tolist() == [(100_000, 0, 0, 1), (200_000, 2, 1, 0)]
@@ -75,13 +75,13 @@ def test_davis240c_recording(davis):
 
 
 def test_geometry_of_davis240c_is_that_of_its_images(davis):
-    recording = read_recording(davis({**recording_files(), "events.txt": b"0.1 0 0 1\n"}))
+    recording = read_events(davis({**recording_files(), "events.txt": b"0.1 0 0 1\n"}))
 
     assert (recording.width, recording.height) == (3, 2)
 
 
 def test_davis240c_without_images(davis):
-    recording = read_recording(davis({"events.txt": EVENTS.encode()}))
+    recording = read_events(davis({"events.txt": EVENTS.encode()}))
 
     assert recording.frame_times_ns is None
     assert (recording.width, recording.height) == (3, 2)
@@ -100,7 +100,7 @@ def test_listed_image_that_is_missing_is_named_with_its_line(davis):
 )
 def test_whole_times_of_frames_are_told_with_their_unit(davis, late, unit_ns, told):
     listed = f"{late} images/b.png\n0 images/a.png\n".encode()
-    recording = read_recording(davis({**recording_files(), "images.txt": listed}))
+    recording = read_events(davis({**recording_files(), "images.txt": listed}))
     assert recording.frame_times_ns.tolist() == [0, late * unit_ns]
     problems = [one for one in recording.problems if one.startswith("images.txt")]
     assert f"are taken as {told} (" in problems[0]
@@ -130,7 +130,7 @@ def test_zip_without_events_is_refused(tmp_path):
 def test_zip_of_one_text_file_is_text(tmp_path):
     path = write_zip(tmp_path / "a.zip", {"urban.txt": b"240 180\n" + EVENTS.encode()})
 
-    recording = read_recording(path)
+    recording = read_events(path)
 
     assert (recording.layout, recording.width, recording.height) == ("text", 240, 180)
     assert recording.events.size == 2
@@ -190,7 +190,7 @@ def write_monash(path, ts, xs, ys, ps, images=(), **attributes):
 def test_monash_polarity(tmp_path, ps):
     path = write_monash(tmp_path / "a.h5", [0.1, 0.2], [0, 2], [0, 1], ps)
 
-    recording = read_recording(path)
+    recording = read_events(path)
 
     assert recording.layout == "monash"
     assert recording.events.tolist() == [(100_000, 0, 0, 1), (200_000, 2, 1, 0)]
@@ -201,13 +201,13 @@ def test_monash_times_are_rounded_to_microseconds(tmp_path):
     ts = [4.99999987e-05, 0.0038109999, (epoch - 1) / 1e6, epoch / 1e6]
     path = write_monash(tmp_path / "a.h5", ts, [0] * 4, [0] * 4, [1] * 4)
 
-    assert read_recording(path).events["t"].tolist() == [50, 3811, epoch - 1, epoch]
+    assert read_events(path).events["t"].tolist() == [50, 3811, epoch - 1, epoch]
 
 
 def test_monash_whole_numbers_are_microseconds(tmp_path):
     path = write_monash(tmp_path / "a.h5", np.array([7, 9]), [0, 0], [0, 0], [1, 1])
 
-    recording = read_recording(path)
+    recording = read_events(path)
 
     assert recording.events["t"].tolist() == [7, 9]
     assert recording.problems[0].startswith("no unit is stated: times are taken as us;")
@@ -216,7 +216,7 @@ def test_monash_whole_numbers_are_microseconds(tmp_path):
 def test_monash_geometry_is_height_then_width(tmp_path):
     path = write_monash(tmp_path / "a.h5", [0.1], [0], [0], [1], sensor_resolution=(180, 240))
 
-    recording = read_recording(path)
+    recording = read_events(path)
 
     assert (recording.width, recording.height, recording.problems) == (240, 180, [])
 
@@ -224,7 +224,7 @@ def test_monash_geometry_is_height_then_width(tmp_path):
 def test_monash_geometry_of_the_first_image(tmp_path):
     images = [(0.5, np.zeros((180, 240), np.uint8))]
 
-    recording = read_recording(write_monash(tmp_path / "a.h5", [0.1], [0], [0], [1], images))
+    recording = read_events(write_monash(tmp_path / "a.h5", [0.1], [0], [0], [1], images))
 
     assert (recording.width, recording.height) == (240, 180)
 
@@ -234,7 +234,7 @@ def test_monash_images(tmp_path):
     bgr[0, 0] = (1, 2, 3)
     images = [(0.25, np.full((2, 3), 7, np.uint8)), (0.5, bgr), (0.75, bgr[..., :1])]
 
-    recording = read_recording(write_monash(tmp_path / "a.h5", [0.1], [0], [0], [1], images))
+    recording = read_events(write_monash(tmp_path / "a.h5", [0.1], [0], [0], [1], images))
 
     first, second, third = recording.frames()
     assert recording.frame_times_ns.tolist() == [250_000_000, 500_000_000, 750_000_000]
@@ -246,7 +246,7 @@ def test_monash_images(tmp_path):
 def test_monash_without_events(tmp_path):
     path = write_monash(tmp_path / "a.h5", np.zeros(0), np.zeros(0, int), np.zeros(0, int), [])
 
-    assert read_recording(path).problems == ["no events"]
+    assert read_events(path).problems == ["no events"]
 
 
 @pytest.mark.parametrize(
@@ -312,7 +312,7 @@ def write_npz(path, **arrays):
 def test_npz_times(tmp_path, name, t):
     path = write_npz(tmp_path / "a.npz", **{name: t}, x=[0, 1], y=[1, 0], p=[1, -1])
 
-    recording = read_recording(path)
+    recording = read_events(path)
 
     assert recording.layout == "npz"
     assert recording.events.tolist() == [(100, 0, 1, 1), (200, 1, 0, 0)]
@@ -322,7 +322,7 @@ def test_npz_of_a_structured_array(tmp_path):
     table = np.zeros(2, [("x", "<i2"), ("y", "<i2"), ("t", "<i8"), ("p", "?")])
     table["t"], table["x"] = [5, 6], [7, 8]
 
-    recording = read_recording(write_npz(tmp_path / "a.npz", events=table))
+    recording = read_events(write_npz(tmp_path / "a.npz", events=table))
 
     assert recording.events["t"].tolist() == [5, 6]
     assert recording.events["x"].tolist() == [7, 8]
@@ -331,7 +331,7 @@ def test_npz_of_a_structured_array(tmp_path):
 def test_npz_geometry(tmp_path):
     path = write_npz(tmp_path / "a.npz", t_us=[1], x=[0], y=[0], p=[1], width=304, height=240)
 
-    recording = read_recording(path)
+    recording = read_events(path)
 
     assert (recording.width, recording.height, recording.problems) == (304, 240, [])
 
