@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import types
 import typing
 from dataclasses import MISSING, dataclass, field
 from functools import cache
@@ -106,6 +107,53 @@ def subsection(default: Any, *, meaning: str) -> Any:
     return field(default_factory=default, metadata=metadata)
 
 
+@dataclass(frozen=True)
+class Kind:
+    """What the type of a key says."""
+
+    kind: type
+    """int, float, str, bool, tuple or the class of a section."""
+    optional: bool
+    """Whether the value may be None."""
+    parts: tuple[type, ...] = ()
+    """Of a tuple: the kind of each part."""
+
+    def with_floats(self, value: Any) -> Any:
+        """Return `value` with floats for whole numbers, by itself or in a tuple, that may be any.
+
+        Raises
+        ------
+        OverflowError
+            No float is so large.
+        """
+        if self.kind is float and type(value) is int:
+            return float(value)
+        if isinstance(value, tuple) and len(value) == len(self.parts):
+            of_parts = zip(self.parts, value, strict=True)
+            return tuple(Kind(kind, False).with_floats(part) for kind, part in of_parts)
+        return value
+
+
+@cache
+def kinds_of(section: type[Any]) -> dict[str, Kind]:
+    """Return what the types of a section's keys say, by name.
+
+    Raises
+    ------
+    NameError, TypeError, ValueError
+        A type is not known, or is more than one type or None.
+    """
+    kinds = {}
+    for name, hint in typing.get_type_hints(section).items():
+        kind, optional = hint, False
+        if isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union:
+            (kind,) = (part for part in typing.get_args(kind) if part is not type(None))
+            optional = True
+        parts = typing.get_args(kind) if typing.get_origin(kind) is tuple else ()
+        kinds[name] = Kind(tuple if parts else kind, optional, parts)
+    return kinds
+
+
 @dataclass(frozen=True, kw_only=True)
 class Section:
     """A section of the configuration: checks the declared ranges of its keys.
@@ -121,32 +169,15 @@ class Section:
     """
 
     def __post_init__(self) -> None:
-        numbers = _numbers_of(type(self))  # type: ignore[arg-type] # takes it for an object of it
+        kinds = kinds_of(type(self))  # type: ignore[arg-type] # takes it for an object of it
         for item in dataclasses.fields(self):
-            value = getattr(self, item.name)
-            if item.name in numbers:
-                try:
-                    value = _as_floats(value)
-                except OverflowError:
-                    raise ConfigError(f"{item.name}: too large a number: {value}") from None
-                object.__setattr__(self, item.name, value)
+            given = getattr(self, item.name)
+            try:
+                value = kinds[item.name].with_floats(given)
+            except OverflowError:
+                raise ConfigError(f"{item.name}: too large a number: {given}") from None
+            object.__setattr__(self, item.name, value)
             declared: Parameter = item.metadata["parameter"]
             wrong = declared.complaint(value)
             if wrong:
                 raise ConfigError(f"{item.name}: {wrong}")
-
-
-@cache
-def _numbers_of(section: type[Any]) -> frozenset[str]:
-    """Return the names of the keys that hold numbers with a fraction, or tuples of them."""
-    hints = typing.get_type_hints(section)
-    return frozenset(
-        name for name, kind in hints.items() if kind is float or float in typing.get_args(kind)
-    )
-
-
-def _as_floats(value: Any) -> Any:
-    """Return a whole number, or those in a tuple, as float; anything else as it is."""
-    if isinstance(value, tuple):
-        return tuple(map(_as_floats, value))
-    return float(value) if type(value) is int else value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -79,14 +79,11 @@ def load_config(
     0.3
     """
     layers = _listed(files)
-    own = [effect for layer in layers if isinstance(layer, Config) for effect in _own(layer)]
+    configs = (layer for layer in layers if isinstance(layer, Config))
+    own = {effect: None for config in configs for effect in user_effects(config).values()}
     added = [effect for effect in effects if effect not in own]
     sets = [sets] if isinstance(sets, str) else sets
-    return build(config_class([*dict.fromkeys(own), *added]), _merged(layers, sets, seed))
-
-
-def _own(config: Config) -> Iterable[type[Hooks]]:
-    return user_effects(config).values()
+    return build(config_class([*own, *added]), _merged(layers, sets, seed))
 
 
 def _listed(files: Written | Sequence[Written] | None) -> Sequence[Written]:

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import types
-import typing
 from collections.abc import Iterator
 from dataclasses import MISSING
 from typing import Any, TypeVar
@@ -16,7 +14,7 @@ from typing import Any, TypeVar
 from adv2e.config.model import Config
 from adv2e.config.yaml12 import Value, scalar_text
 from adv2e.errors import Adv2eError, ConfigError
-from adv2e.parameters import Parameter, Section
+from adv2e.parameters import Parameter, Section, kinds_of
 
 AnySection = TypeVar("AnySection", bound=Section)
 
@@ -51,20 +49,15 @@ class Key:
 
 def keys_of(section: type[Section], path: str = "") -> tuple[Key, ...]:
     """Return the keys that the class `section`, which stands at `path`, declares itself."""
-    hints = typing.get_type_hints(section)
+    kinds = kinds_of(section)  # type: ignore[arg-type] # takes it for an object of it
     keys = []
     for item in dataclasses.fields(section):
-        kind, optional = hints[item.name], False
-        if isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union:
-            (kind,) = (part for part in typing.get_args(kind) if part is not type(None))
-            optional = True
-        parts = typing.get_args(kind) if typing.get_origin(kind) is tuple else ()
-        kind = tuple if parts else kind
+        of = kinds[item.name]
         default = item.default
         if item.default_factory is not MISSING:
             default = item.default_factory()
         full = f"{path}.{item.name}" if path else item.name
-        keys.append(Key(full, item.metadata["parameter"], kind, optional, default, parts))
+        keys.append(Key(full, item.metadata["parameter"], of.kind, of.optional, default, of.parts))
     return tuple(keys)
 
 

@@ -39,9 +39,10 @@ from adv2e.light.intervals import Intervals, Part
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
 from adv2e.sources.frame import check_values
+from adv2e.sources.times.instants import NS_PER_S
+from adv2e.sources.times.rates import FrameRate, parse_rate
 from adv2e.ticks import check_time
 
-_SLOWEST_HZ, _FASTEST_HZ = 1e-3, 1e9
 _FAR_APART_S = 10.0
 """Frames so far apart are told: times in ms or us look like that."""
 
@@ -110,12 +111,11 @@ def _instants(times: Any) -> Iterable[float]:
         return times
     if not isinstance(times, (int, float, np.number)):
         raise DataError(f"times: must be the time of each frame [s] or a rate [Hz], got {times!r}")
-    rate_hz = float(times)
-    if not _SLOWEST_HZ <= rate_hz <= _FASTEST_HZ:
-        raise DataError(
-            f"times: a rate must be from {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz, got {rate_hz:g}"
-        )
-    return (number / rate_hz for number in itertools.count())
+    try:
+        rate = FrameRate(parse_rate(str(times)))
+    except ValueError as error:
+        raise DataError(f"times: a rate {error}") from None
+    return (rate.time_ns(number) / NS_PER_S for number in itertools.count())
 
 
 def _tell_far_apart(apart_s: float) -> None:

@@ -27,13 +27,17 @@ class Everything(Section):
     share: float = parameter(1, unit="-", meaning="a number", at_most=2)
     limit: float | None = parameter(None, unit="-", meaning="a number or none")
     place: tuple[float, float] = parameter((0, 0), unit="px", meaning="two numbers")
+    mixed: tuple[int, float] = parameter((2, 2), unit="-", meaning="one of each")
     count: int = parameter(3, unit="-", meaning="a whole number")
     on: bool = parameter(True, unit="-", meaning="a switch")
 
 
 def test_whole_numbers_become_floats_where_any_number_may_stand():
     made = Everything(limit=4, place=(1, 2.5))
-    assert repr(made) == "Everything(share=1.0, limit=4.0, place=(1.0, 2.5), count=3, on=True)"
+    assert (
+        repr(made)
+        == "Everything(share=1.0, limit=4.0, place=(1.0, 2.5), mixed=(2, 2.0), count=3, on=True)"
+    )
     assert Everything().limit is None
 
 
