@@ -26,7 +26,7 @@ COMMANDS = {
     "diagnose": "Find what a recording holds that its simulation lacks.",
     "characterise": "Name the effect that tables of latency or noise ask for.",
     "config": "Show or check configurations, with the meaning of each key.",
-    "effects": "List the effects, their equations, parameters and sources.",
+    "effects": "List the effects, or explain one with its equation.",
     "demo": "Make a sample clip, convert it and render the events.",
 }
 """Name of each command, which is also its module's, and what it does in one line."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+import textwrap
 from dataclasses import MISSING
 from typing import TYPE_CHECKING
 
@@ -13,14 +13,22 @@ if TYPE_CHECKING:
     from adv2e.config import Key
     from adv2e.effects import Effect
 
+_WIDTH = 100
+
 
 @click.command("effects")
 @click.argument("name", required=False)
 def command(name: str | None) -> None:
-    """List the effects, their equations, parameters and sources.
+    """List the effects, or explain one with its equation.
 
-    Without NAME: all of them, by stage in signal order. With NAME: physics, equation, references,
-    and each parameter with unit, default, range and source.
+    Without NAME, this lists all effects in the order in which they act on the signal, with their
+    keys in the configuration. With NAME, it explains one effect: its equation, each parameter with
+    unit, default, range and source, and the literature.
+
+    \b
+    Examples:
+      adv2e effects
+      adv2e effects low_pass
     """
     if name is None:
         _list()
@@ -43,10 +51,18 @@ def _list() -> None:
         if effects:
             click.echo(f"{stage}: {meaning}")
         for effect in effects:
-            paths = ", ".join(key.path for key in _keys(effect))
-            parts = f" (a diagnosis also tells {', '.join(effect.told_as)})"
-            click.echo(f"  {effect.name:<20} {effect.summary()}{parts * bool(effect.told_as)}")
-            click.echo(f"  {'':<20} {paths}")
+            parts = f" (in a diagnosis also: {', '.join(effect.told_as)})"
+            _wrapped(f"{effect.name:<20} ", f"{effect.summary()}{parts * bool(effect.told_as)}")
+            _wrapped(" " * 21, ", ".join(key.path for key in _keys(effect)))
+
+
+def _wrapped(begin: str, text: str) -> None:
+    """Print `text` behind `begin`, both indented, in lines that fit a terminal."""
+    indent = " " * (2 + len(begin))
+    lines = textwrap.wrap(
+        text, _WIDTH, initial_indent=f"  {begin}", subsequent_indent=indent, break_on_hyphens=False
+    )
+    click.echo("\n".join(lines))
 
 
 def _keys(effect: Effect) -> list[Key]:
@@ -63,39 +79,38 @@ def _keys(effect: Effect) -> list[Key]:
 
 def _page(effect: Effect) -> None:
     from adv2e.config import all_keys
-    from adv2e.config.yaml12 import scalar_text
 
-    click.echo(effect.text())
-    click.echo("\nParameters\n----------")
-    rows = [("key", "unit", "default", "range", "source")]
-    keys = _keys(effect)
-    for key in keys:
-        default = "must be given" if key.default is MISSING else scalar_text(key.default)
-        source = key.about.source or "-"
-        rows.append((key.path, key.about.unit or "-", default, _range(key), source))
-    widths = [max(len(row[n]) for row in rows) for n in range(4)]
-    for number, row in enumerate(rows):
-        click.echo(_line(row, widths))
-        if number:
-            click.echo(f"    {keys[number - 1].about.meaning}")
+    text, heading, references = effect.text().partition("References\n")
+    click.echo(f"{text}Parameters\n----------")
+    for key in _keys(effect):
+        _parameter(key)
     for key in all_keys():
         if key.path in effect.paths and key.is_section and key.optional:
             state = "off" if key.default is None else "on"
             click.echo(f"\nBy default the effect is {state}; {key.path}: null switches it off.")
+    click.echo(f"\n{heading}{references}")
 
 
-def _line(row: Sequence[str], widths: Sequence[int]) -> str:
-    cells = [f"{cell:<{width}}" for cell, width in zip(row, widths, strict=False)]
-    return "  ".join([*cells, row[-1]]).rstrip()
+def _parameter(key: Key) -> None:
+    """Print a key with its unit, default, range, meaning and source."""
+    from adv2e.config.yaml12 import scalar_text
+
+    unit = f" [{key.about.unit}]" if key.about.unit not in ("", "-") else ""
+    default = "no default" if key.default is MISSING else f"default {scalar_text(key.default)}"
+    click.echo(f"{key.path}{unit}")
+    _wrapped("  ", key.about.meaning)
+    _wrapped("  ", ", ".join(filter(None, (default, *_range(key)))))
+    if key.about.source:
+        _wrapped("  ", f"source: {key.about.source}")
 
 
-def _range(key: Key) -> str:
+def _range(key: Key) -> list[str]:
     about = key.about
     if about.choices is not None:
-        return " | ".join(about.choices)
+        return [f"one of {' | '.join(about.choices)}"]
     limits = (
         ("above", about.above),
         ("at least", about.at_least),
         ("at most", about.at_most),
     )
-    return ", ".join(f"{word} {limit:g}" for word, limit in limits if limit is not None) or "-"
+    return [f"{word} {limit:g}" for word, limit in limits if limit is not None]

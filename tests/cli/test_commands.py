@@ -204,12 +204,24 @@ def test_an_effect_has_a_page_with_physics_parameters_and_references(adv2e, effe
     outcome = adv2e("effects", effect.name)
     assert outcome.status == 0
     assert outcome.out.startswith(effect.summary())
-    assert "References\n----------\n.. [1] " in outcome.out
+    assert "References\n----------\n[1] " in outcome.out
     keys = [key for key in all_keys() if key.path.startswith(tuple(effect.paths))]
     for key in keys:
         if not key.is_section:
-            assert f"\n{key.path} " in outcome.out
-            assert key.about.meaning in outcome.out
+            assert re.search(rf"^{re.escape(key.path)}(?: \[.+\])?$", outcome.out, re.MULTILINE)
+            assert key.about.meaning in " ".join(outcome.out.split())
+
+
+@pytest.mark.parametrize("name", ["", *(effect.name for effect in EFFECTS)])
+def test_effects_are_told_in_plain_characters_that_fit_a_terminal(adv2e, name):
+    out = adv2e("effects", *filter(None, [name])).out
+    assert out.isascii()
+    assert not re.search(r"[`\\$]|\.\. |\]_|\^\{|_\{|====", out)
+    assert max(map(len, out.splitlines())) <= 100
+
+
+def test_an_equation_stands_in_a_line_of_its_own(adv2e):
+    assert "\n    dy/dt = 2 pi f(t) (x - y)," in adv2e("effects", "low_pass").out
 
 
 @pytest.mark.parametrize("name", names())
@@ -219,10 +231,12 @@ def test_every_name_that_a_diagnosis_tells_has_a_page(adv2e, name):
 
 def test_the_page_gives_unit_default_range_and_source(adv2e):
     out = adv2e("effects", "low_pass").out
-    assert re.search(r"^pixel\.low_pass\.cutoff_hz +Hz +300\.0 +above 0 +v2e default$", out, re.M)
+    corner = r"^pixel\.low_pass\.cutoff_hz \[Hz\]\n    corner .*\n    default 300\.0, above 0\n"
+    assert re.search(corner + "    source: v2e default$", out, re.M)
     assert "By default the effect is on" in out
     out = adv2e("effects", "source_follower").out
-    assert re.search(r"^pixel\.source_follower\.cutoff_hz +Hz +must be given +above 0 ", out, re.M)
+    assert re.search(r"^pixel\.source_follower\.cutoff_hz \[Hz\]$", out, re.M)
+    assert "\n    no default, above 0\n" in out
     assert "By default the effect is off" in out
 
 

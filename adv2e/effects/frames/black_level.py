@@ -1,24 +1,28 @@
-r"""Black level: a constant that the numbers in the frames lack.
+"""Black level: a constant that the numbers in the frames lack.
 
-.. math:: DN = \max\left(DN_{frame} + b - k \left(1 - e^{-d / 1.5}\right),\; 0\right)
+    DN = max(DN_frame + b - k (1 - exp(-d/1.5)), 0)
 
-with DN_frame the decoded light of the frame [DN of 255] and b = ``frames.black_level_dn``, added
-after decoding (linear light), before the logarithm.  Frames show max(DN - b, 0) where their
-pedestal was subtracted too far (b above 0); b below 0 takes a pedestal away that is still in them.
-In the dark it decides the contrast: at 5 DN, b = 5 halves it.
+DN_frame    decoded, linear light of the frame [DN of 255]
+b           frames.black_level_dn
+k           frames.black_depth_dn
+d           distance to the nearest pixel that is not clipped at 0 [px]; infinite for those pixels
+
+The constant is added after decoding and before the logarithm.  If b is above 0, the camera has
+subtracted too large a pedestal, and its frames show max(DN - b, 0).  If b is below 0, a pedestal is
+still in the frames and is taken away.  The black level decides the contrast in the dark: at 5 DN,
+b = 5 halves it.
 
 Light that the frames show as 0 may have been anything from 0 to b.  With k = 0 it counts as b.
-Else it falls by up to k = ``frames.black_depth_dn`` from the border of what is clipped to its
-middle, as edges go on falling behind the clip; d is the distance to the nearest pixel that is not
-clipped [px], and infinite for those.
+Else it falls by up to k from the border of the clipped area to its middle, because edges go on
+falling behind the clip.
 
 References
 ----------
-.. [1] A. El Gamal, H. Eltoukhy, "CMOS image sensors", IEEE Circuits and Devices Magazine 21(3),
-   2005, doi:10.1109/MCD.2005.1438751 (dark current, pedestal).
-.. [2] R. W. Baldwin, M. Almatrafi, V. Asari, K. Hirakawa, "Event Probability Mask (EPM) and Event
-   Denoising Convolutional Neural Network (EDnCNN) for Neuromorphic Cameras", CVPR 2020,
-   arXiv:2003.08282 (fits one offset of the frames to the events).
+[1] A. El Gamal, H. Eltoukhy, "CMOS image sensors", IEEE Circuits and Devices Magazine 21(3), 2005,
+    doi:10.1109/MCD.2005.1438751 (dark current, pedestal).
+[2] R. W. Baldwin, M. Almatrafi, V. Asari, K. Hirakawa, "Event Probability Mask (EPM) and Event
+    Denoising Convolutional Neural Network (EDnCNN) for Neuromorphic Cameras", CVPR 2020,
+    arXiv:2003.08282 (fits one offset of the frames to the events).
 """
 
 from __future__ import annotations

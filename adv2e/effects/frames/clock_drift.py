@@ -1,16 +1,19 @@
-r"""Clock drift: the clock of the frames does not run as fast as that of the events.
+"""Clock drift: the clock of the frames does not run as fast as that of the events.
 
-.. math:: t = s_0 + (s - s_0)\,(1 + \rho)
+    t = s0 + (s - s0) (1 + rho)
 
-with s the stamp of a frame, s_0 that of the first one simulated, t the time on the camera's clock,
-the one of the events, and rho = ``frames.clock_drift_ppm`` 1e-6: above 0, the clock of the frames
-is slow.  The drift comes first, a clock offset on top.  Frames are moved before anything else, so
-events come out on the camera's clock.
+s           stamp of a frame
+s0          stamp of the first frame simulated
+t           time on the camera's clock, which is the clock of the events
+rho         frames.clock_drift_ppm / 1e6
+
+If rho is above 0, the clock of the frames is slow.  The drift comes first, a clock offset is added
+to it.  Frames are moved before anything else, so events come out on the camera's clock.
 
 References
 ----------
-.. [1] D. L. Mills, "Internet time synchronization: the network time protocol", IEEE Transactions on
-   Communications 39(10), 1991, doi:10.1109/26.103043 (quartz clocks: 10 to 100 ppm).
+[1] D. L. Mills, "Internet time synchronization: the network time protocol", IEEE Transactions on
+    Communications 39(10), 1991, doi:10.1109/26.103043 (quartz clocks: 10 to 100 ppm).
 """
 
 from __future__ import annotations

@@ -1,18 +1,20 @@
-r"""Clock offset: the frames are stamped late or early against the events.
+"""Clock offset: the frames are stamped late or early against the events.
 
-.. math:: t = s + d
+    t = s + d
 
-with s the stamp of a frame, t the time on the camera's clock, the one of the events, and d =
-``frames.clock_offset_us``: above 0, stamps are early and the events belonging to a frame come
-later than it says.  Frames are moved before anything else, so events come out on the camera's
-clock.  Usual causes: stamps of the start or end of an exposure in place of its middle, or a
-computer's clock.
+s           stamp of a frame
+t           time on the camera's clock, which is the clock of the events
+d           frames.clock_offset_us
+
+If d is above 0, stamps are early: the events of a frame come later than it says.  Frames are moved
+before anything else, so events come out on the camera's clock.  Usual causes are stamps of the
+start or end of an exposure instead of its middle, and the clock of a computer.
 
 References
 ----------
-.. [1] J. Delmerico, T. Cieslewski, H. Rebecq, M. Faessler, D. Scaramuzza, "Are We Ready for
-   Autonomous Drone Racing? The UZH-FPV Drone Racing Dataset", ICRA 2019,
-   doi:10.1109/ICRA.2019.8793887 (offsets between clocks are estimated).
+[1] J. Delmerico, T. Cieslewski, H. Rebecq, M. Faessler, D. Scaramuzza, "Are We Ready for Autonomous
+    Drone Racing? The UZH-FPV Drone Racing Dataset", ICRA 2019, doi:10.1109/ICRA.2019.8793887
+    (offsets between clocks are estimated).
 """
 
 from __future__ import annotations

@@ -1,30 +1,32 @@
-r"""Encoding of the frames: how their numbers stand for light.
+"""Encoding of the frames: how their numbers stand for light.
 
-======== ====================================================================================
-linear   light = value
-srgb     light = value/12.92 up to 0.04045, ((value + 0.055)/1.055)^2.4 above [1]_
-bt709    light = value/4.5 below 4.5 d, ((value + e - 1)/e)^(1/0.45) above [2]_
-gamma:g  light = value^g
-hlg      light = value^2/3 up to 0.5, (exp((value - c)/a) + b)/12 above [3]_
-pq       light = (max(value^(1/m2) - c1, 0) / (c2 - c3 value^(1/m2)))^(1/m1) [3]_
-======== ====================================================================================
+linear      light = value
+srgb        light = value/12.92                              up to 0.04045
+                    ((value + 0.055)/1.055)^2.4              above [1]
+bt709       light = value/4.5                                below 4.5 d
+                    ((value + e - 1)/e)^(1/0.45)             above [2]
+gamma:g     light = value^g
+hlg         light = value^2/3                                up to 0.5
+                    (exp((value - c)/a) + b)/12              above [3]
+pq          light = (max(value^(1/m2) - c1, 0) / (c2 - c3 value^(1/m2)))^(1/m1) [3]
 
-with value and light in 0..1 of full scale; a = 0.17883277, b = 1 - 4a, c = 0.5 - a ln(4a);
-m1 = 2610/16384, m2 = 2523/32, c1 = 3424/4096, c2 = 2413/128, c3 = 2392/128; e = 1.0993 and
-d = 0.0181 to as many digits as make the curve smooth (1.099 and 0.018 leave a step at 0.081).
+Value and light are in 0..1 of full scale.  The constants are
+a = 0.17883277, b = 1 - 4a, c = 0.5 - a ln(4a); m1 = 2610/16384, m2 = 2523/32, c1 = 3424/4096,
+c2 = 2413/128, c3 = 2392/128; e = 1.0993 and d = 0.0181 to as many digits as make the curve smooth
+(1.099 and 0.018 leave a step at 0.081).
 
-bt709 and hlg are the inverse of what a camera does to the light (OETF), so that light is that of
-the scene; BT.601 and BT.2020 have the curve of BT.709.  pq is light of a display (EOTF), whose
-10000 cd/m^2 are white here: what was made for a display of 1000 reaches a tenth of it.
+bt709 and hlg are the inverse of what a camera does to the light (OETF), so the light is that of
+the scene.  BT.601 and BT.2020 have the curve of BT.709.  pq is the light of a display (EOTF).  Its
+10000 cd/m^2 are white here, so a film made for a display of 1000 cd/m^2 reaches a tenth of white.
 
-Colour is decoded first, each channel by itself, and then weighed to luma in linear light
-(0.2126 R + 0.7152 G + 0.0722 B, whatever the primaries).  The pixel is told DN = 255 light.
+Each colour channel is decoded by itself.  Then the channels are weighed to luma in linear light:
+0.2126 R + 0.7152 G + 0.0722 B, whatever the primaries.  The pixel sees DN = 255 light.
 
 References
 ----------
-.. [1] IEC 61966-2-1:1999 (sRGB).
-.. [2] Recommendation ITU-R BT.709-6 (luma weights; opto-electronic transfer).
-.. [3] Recommendation ITU-R BT.2100-2, tables 4 (PQ, as SMPTE ST 2084) and 5 (HLG).
+[1] IEC 61966-2-1:1999 (sRGB).
+[2] Recommendation ITU-R BT.709-6 (luma weights; opto-electronic transfer).
+[3] Recommendation ITU-R BT.2100-2, tables 4 (PQ, as SMPTE ST 2084) and 5 (HLG).
 """
 
 from __future__ import annotations

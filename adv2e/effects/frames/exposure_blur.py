@@ -1,41 +1,41 @@
-r"""Exposure blur: a frame is the mean of the light over its exposure, the events are sharp.
+"""Exposure blur: a frame is the mean of the light over its exposure, the events are sharp.
 
-.. math:: DN_{frame}(t) = \frac{1}{T} \int_{t - T/2}^{t + T/2} DN(\tau)\, d\tau
+    DN_frame(t) = 1/T * integral of DN(s) ds from t - T/2 to t + T/2
 
-with T = ``frames.exposure_us`` and t the time of the frame, the middle of its exposure.  The pixel
-sees the light itself, so what the exposure took away is put back: the light at the times of the
-frames is sought whose means are the frames.  Changes faster than 1/T are not in the frames and
-cannot come back; noise of the frames grows with what does.  Between the frames light is linear in
-time here; where it is interpolated along the motion, :mod:`adv2e.effects.frames.motion_blur` takes
-the place of this module.
+T           frames.exposure_us
+t           time of the frame, the middle of its exposure
 
-With B the matrix of the mean over the exposure, its rows having sum 1 and the variance T^2/12 of
-the exposure, fifty steps of the Richardson-Lucy iteration [1]_, [2]_ are taken from the frames
-themselves, with total variation in time to hold down what noise and ringing would make [3]_,
+The pixel sees the light itself, so what the exposure took away is put back.  This module seeks the
+light at the times of the frames whose means are the frames.  Changes faster than 1/T are not in the
+frames and cannot come back.  Noise of the frames grows with what does come back.  Between the
+frames the light is linear in time here.  Where frames are interpolated along the motion, the module
+motion_blur takes the place of this one.
 
-.. math::
+B is the matrix of the mean over the exposure: its rows have sum 1 and the variance T^2/12 of the
+exposure.  Fifty steps of the Richardson-Lucy iteration [1, 2] start from the frames themselves.
+Total variation in time holds down noise and ringing [3]:
 
-    y \leftarrow \frac{y}{1 - \lambda\, \Delta_k g} \cdot
-    \frac{B^T (DN_{frame} / B y)}{B^T 1}, \qquad
-    g_k = \frac{d_k}{\sqrt{d_k^2 + \epsilon^2}}, \quad
-    d_k = 2\, \frac{y_{k+1} - y_k}{y_{k+1} + y_k},
+    y   <-  y / (1 - lambda (g_k - g_(k-1))) * B'(DN_frame / B y) / B'1
+    g_k  =  d_k / sqrt(d_k^2 + epsilon^2)
+    d_k  =  2 (y_(k+1) - y_k) / (y_(k+1) + y_k)
 
-lambda = 0.004, epsilon = 0.02: contrast from frame to frame, as the pixel sees it.  Light stays
-positive, and edges that passed within the exposure come back as steps.  It goes through the
-sequence in blocks, each solved with a margin of at least two exposures before and behind it.
+B' is B transposed, lambda = 0.004, epsilon = 0.02; d_k is the contrast from frame k to the next, as
+the pixel sees it.  Light stays positive, and edges that passed within the exposure come back as
+steps.  The sequence is solved in blocks, each with a margin of at least two exposures before and
+behind it.
 
 References
 ----------
-.. [1] W. H. Richardson, "Bayesian-Based Iterative Method of Image Restoration", JOSA 62(1), 1972,
-   doi:10.1364/JOSA.62.000055.
-.. [2] L. B. Lucy, "An iterative technique for the rectification of observed distributions",
-   Astronomical Journal 79, 1974, doi:10.1086/111605.
-.. [3] N. Dey, L. Blanc-Feraud, C. Zimmer, P. Roux, Z. Kam, J.-C. Olivo-Marin, J. Zerubia,
-   "Richardson-Lucy Algorithm with Total Variation Regularization for 3D Confocal Microscope
-   Deconvolution", Microscopy Research and Technique 69(4), 2006, doi:10.1002/jemt.20294.
-.. [4] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency
-   Global Shutter Spatiotemporal Vision Sensor", IEEE JSSC 49(10), 2014,
-   doi:10.1109/JSSC.2014.2342715 (frames integrate, events do not).
+[1] W. H. Richardson, "Bayesian-Based Iterative Method of Image Restoration", JOSA 62(1), 1972,
+    doi:10.1364/JOSA.62.000055.
+[2] L. B. Lucy, "An iterative technique for the rectification of observed distributions",
+    Astronomical Journal 79, 1974, doi:10.1086/111605.
+[3] N. Dey, L. Blanc-Feraud, C. Zimmer, P. Roux, Z. Kam, J.-C. Olivo-Marin, J. Zerubia,
+    "Richardson-Lucy Algorithm with Total Variation Regularization for 3D Confocal Microscope
+    Deconvolution", Microscopy Research and Technique 69(4), 2006, doi:10.1002/jemt.20294.
+[4] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency Global
+    Shutter Spatiotemporal Vision Sensor", IEEE JSSC 49(10), 2014, doi:10.1109/JSSC.2014.2342715
+    (frames integrate, events do not).
 """
 
 from __future__ import annotations

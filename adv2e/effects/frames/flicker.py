@@ -1,18 +1,21 @@
-r"""Flicker: light of lamps on the mains, of which the frames know nothing.
+"""Flicker: light of lamps on the mains, of which the frames know nothing.
 
-.. math:: DN' = DN\,(1 + m \sin(2\pi f t + \varphi))
+    DN' = DN (1 + m sin(2 pi f t + phi))
 
-with t on the camera's clock [s], f = ``frequency_hz`` that of the light (twice the mains for a lamp
-without rectifier), m = ``depth``, phi = ``phase_rad``.  It swings many times
-from frame to frame, so it is not put on the frames but on the light between them; logarithm, corner
-of the low-pass, leak and shot noise all see it.  Light that other effects give (dark current) is
-taken to swing with it.
+t           time on the camera's clock [s]
+f           frequency_hz, that of the light: twice the mains for a lamp without rectifier
+m           depth
+phi         phase_rad
+
+The light swings many times from frame to frame, so the swing is put on the light between the
+frames.  Logarithm, corner of the low-pass, leak and shot noise all see it.  Light that other
+effects add (dark current) swings with it.
 
 References
 ----------
-.. [1] Z. Wang, D. Yuan, Y. Ng, R. Mahony, "A Linear Comb Filter for Event Flicker Removal",
-   ICRA 2022, arXiv:2205.08090 (100 or 120 Hz).
-.. [2] IEEE Std 1789-2015, doi:10.1109/IEEESTD.2015.7118618 (depth: 1 to 40 per cent).
+[1] Z. Wang, D. Yuan, Y. Ng, R. Mahony, "A Linear Comb Filter for Event Flicker Removal", ICRA 2022,
+    arXiv:2205.08090 (100 or 120 Hz).
+[2] IEEE Std 1789-2015, doi:10.1109/IEEESTD.2015.7118618 (depth: 1 to 40 per cent).
 """
 
 from __future__ import annotations

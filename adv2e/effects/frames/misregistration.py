@@ -1,22 +1,24 @@
-r"""Misregistration: the picture in the frames lies beside the one that the event pixels see.
+"""Misregistration: the picture in the frames lies beside the one that the event pixels see.
 
-.. math:: DN(x, y) = DN_{frame}(x + d_x,\; y + d_y)
+    DN(x, y) = DN_frame(x + dx, y + dy)
 
-with (d_x, d_y) = ``frames.shift_px``, how far the picture in the frames lies to the right of, and
-below, where the event pixels see it [px].  Parts of a pixel are interpolated by quintic splines
-through the logarithm of the light, which is what the pixel responds to: contrast moves as it is,
-and dark pixels beside bright ones stay above zero.  Edges do not ring: between two pixels the
-logarithm goes no farther beyond theirs than a parabola with four times the curvature that both of
-them have.  Light below 0.05 DN counts as that.  What lies beyond the outermost pixels is not known:
-they are repeated, with half of the slope there where parts of a pixel are asked for.
+dx, dy      frames.shift_px: how far the picture in the frames lies to the right of, and below,
+            where the event pixels see it [px]
+
+Parts of a pixel are interpolated by quintic splines through the logarithm of the light, which is
+what the pixel responds to.  Contrast moves as it is, and dark pixels beside bright ones stay above
+zero.  Edges do not ring: between two pixels the logarithm goes no farther beyond theirs than a
+parabola with four times the curvature that both of them have.  Light below 0.05 DN counts as 0.05
+DN.  What lies beyond the outermost pixels is not known.  These are repeated, and half of the slope
+there goes on where parts of a pixel are asked for.
 
 References
 ----------
-.. [1] M. Unser, A. Aldroubi, M. Eden, "B-spline signal processing: Part I - Theory", IEEE
-   Transactions on Signal Processing 41(2), 1993, doi:10.1109/78.193220.
-.. [2] A. Suresh, H. T. Huynh, "Accurate monotonicity-preserving schemes with Runge-Kutta time
-   stepping", Journal of Computational Physics 136(1), 1997, doi:10.1006/jcph.1997.5745 (limits that
-   leave peaks as they are).
+[1] M. Unser, A. Aldroubi, M. Eden, "B-spline signal processing: Part I - Theory", IEEE Transactions
+    on Signal Processing 41(2), 1993, doi:10.1109/78.193220.
+[2] A. Suresh, H. T. Huynh, "Accurate monotonicity-preserving schemes with Runge-Kutta time
+    stepping", Journal of Computational Physics 136(1), 1997, doi:10.1006/jcph.1997.5745 (limits
+    that leave peaks as they are).
 """
 
 from __future__ import annotations

@@ -1,32 +1,35 @@
-r"""Exposure blur of what moves: a frame smears it along its way, the events see it sharp.
+"""Exposure blur of what moves: a frame smears it along its way, the events see it sharp.
 
-.. math:: DN_{frame}(x) = \frac{1}{T} \int_{-T/2}^{T/2} DN(x - v \tau)\, d\tau
+    DN_frame(x) = 1/T * integral of DN(x - v s) ds from -T/2 to T/2
 
-with T = ``frames.exposure_us`` and v the velocity at the time of the frame, the middle of its
-exposure.  This takes the place of :mod:`adv2e.effects.frames.exposure_blur` where frames are
-interpolated along the motion.  That module puts back what frames tell of changes in time, and so
-nothing where the exposure is shorter than the frame interval; this one what they tell of motion.
+T           frames.exposure_us
+v           velocity at the time of the frame, the middle of its exposure
+
+This takes the place of the module exposure_blur where frames are interpolated along the motion.
+That module puts back what frames tell of changes in time, so it puts back nothing where the
+exposure is shorter than the frame interval.  This one puts back what frames tell of motion.
 
 Velocity comes from the optical flow to the frames before and after, as the slope of a path through
-all three (:mod:`adv2e.motion.acceleration`); from one of them where the other does not
-show the pixel; and from the slower where the two differ by more than half, as of what was hit
-meanwhile.  It holds for all pixels over which what moves was smeared, the longest smear first.
+all three (adv2e.motion.acceleration).  Where one of the frames does not show the pixel, it comes
+from the other.  Where the two differ by more than half, as when something was hit meanwhile, the
+slower one is taken.  A velocity holds for all pixels over which what moves was smeared, the longest
+smear first.
 
-With B the mean along the smear through each pixel, which is its own transpose but for changes of v
-from pixel to pixel, ten steps of the Richardson-Lucy iteration are taken from the frame itself,
+B is the mean along the smear through each pixel.  It is its own transpose but for changes of v from
+pixel to pixel.  Ten steps of the Richardson-Lucy iteration start from the frame itself:
 
-.. math:: y \leftarrow y \cdot B \left( DN_{frame} / B y \right).
+    y  <-  y * B (DN_frame / B y)
 
-Light stays positive, and the same to the last bit where nothing moves.  What is finer than the
-smear is not in the frame and cannot come back, and noise of the frames grows with what does; what
-moves too fast for the flow to be found stays blurred.
+Light stays positive, and stays the same to the last bit where nothing moves.  What is finer than
+the smear is not in the frame and cannot come back, and noise of the frames grows with what does
+come back.  What moves too fast for the flow to be found stays blurred.
 
 References
 ----------
-.. [1] W. H. Richardson, "Bayesian-Based Iterative Method of Image Restoration", JOSA 62(1), 1972,
-   doi:10.1364/JOSA.62.000055.
-.. [2] Y.-W. Tai, P. Tan, M. S. Brown, "Richardson-Lucy Deblurring for Scenes under a Projective
-   Motion Path", IEEE TPAMI 33(8), 2011, doi:10.1109/TPAMI.2010.222 (a path for every pixel).
+[1] W. H. Richardson, "Bayesian-Based Iterative Method of Image Restoration", JOSA 62(1), 1972,
+    doi:10.1364/JOSA.62.000055.
+[2] Y.-W. Tai, P. Tan, M. S. Brown, "Richardson-Lucy Deblurring for Scenes under a Projective Motion
+    Path", IEEE TPAMI 33(8), 2011, doi:10.1109/TPAMI.2010.222 (a path for every pixel).
 """
 
 from __future__ import annotations

@@ -1,17 +1,18 @@
-r"""Dark current: a constant light that the frames know nothing of.
+"""Dark current: a constant light that the frames know nothing of.
 
-.. math:: DN' = DN + d
+    DN' = DN + d
 
-with d = ``dn`` [DN of 255].  The photodiode cannot tell dark current from photocurrent: logarithm,
-corner of the low-pass, leak by light and shot noise all see the sum.  It bounds contrast and lag in
-the dark.
+d           dn [DN of 255]
+
+The photodiode cannot tell dark current from photocurrent: logarithm, corner of the low-pass, leak
+by light and shot noise all see the sum.  It bounds contrast and lag in the dark.
 
 References
 ----------
-.. [1] R. Graca, B. McReynolds, T. Delbruck, "Shining light on the DVS pixel: A tutorial and
-   discussion about biasing and optimization", CVPR Workshops 2023, arXiv:2304.04706.
-.. [2] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
-   sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848 (doubles every 6 to 8 degrees).
+[1] R. Graca, B. McReynolds, T. Delbruck, "Shining light on the DVS pixel: A tutorial and discussion
+    about biasing and optimization", CVPR Workshops 2023, arXiv:2304.04706.
+[2] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
+    sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848 (doubles every 6 to 8 degrees).
 """
 
 from __future__ import annotations

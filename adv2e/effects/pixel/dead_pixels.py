@@ -1,12 +1,12 @@
 """Dead pixels: a few pixels never fire.
 
-Each pixel is dead with probability ``fraction``, drawn once from seed and pixel.  Nothing comes
-from it, whatever its light; events of a dead pixel do not reach the readout.
+Each pixel is dead with the probability given by fraction, drawn once from seed and pixel.  Nothing
+comes from it, whatever its light.  Events of a dead pixel do not reach the readout.
 
 References
 ----------
-.. [1] EMVA Standard 1288, release 4.0, 2021, https://www.emva.org/standards-technology/emva-1288
-   (defect pixels).
+[1] EMVA Standard 1288, release 4.0, 2021, https://www.emva.org/standards-technology/emva-1288
+    (defect pixels).
 """
 
 from __future__ import annotations

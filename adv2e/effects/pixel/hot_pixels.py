@@ -1,13 +1,13 @@
 """Hot pixels: a few pixels fire ON by themselves, whatever the light.
 
-Each pixel is hot with probability ``fraction``, drawn once; a hot pixel fires Poisson ON events at
-``rate_hz``.
+Each pixel is hot with the probability given by fraction, drawn once.  A hot pixel fires Poisson ON
+events at rate_hz.
 
 References
 ----------
-.. [1] D. Joubert et al., "Event camera simulator improvements via characterized parameters",
-   Frontiers in Neuroscience 15, 2021, doi:10.3389/fnins.2021.702765 (measured noise: one pixel in
-   a hundred carries a third to a half of the ON noise in bright light).
+[1] D. Joubert et al., "Event camera simulator improvements via characterized parameters", Frontiers
+    in Neuroscience 15, 2021, doi:10.3389/fnins.2021.702765 (measured noise: one pixel in a hundred
+    carries a third to a half of the ON noise in bright light).
 """
 
 from __future__ import annotations

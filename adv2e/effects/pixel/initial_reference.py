@@ -1,22 +1,23 @@
-r"""What each pixel remembers when the first frame comes.
+"""What each pixel remembers when the first frame comes.
 
-``running``: the scene has rested before a camera that was on.  Leak has gone on in it, and every
-pixel is somewhere in its leak cycle, of which :mod:`adv2e.effects.pixel.leak` tells; without leak
-this is ``settled``.  ``settled``: all pixels remember the first frame, as right after a reset of
-the whole sensor.  By leak alone, they fire together a whole period later.  ``random``: the scene
-moved before, as in a piece of a longer recording, and each pixel may be anywhere on its way to its
-next event:
+running     The scene has rested before a camera that was on.  Leak has gone on in it, and every
+            pixel is somewhere in its leak cycle (see the effect leak).  Without leak this is
+            settled.
+settled     All pixels remember the first frame, as right after a reset of the whole sensor.  By
+            leak alone, they fire together a whole period later.
+random      The scene moved before, as in a piece of a longer recording.  Each pixel may be anywhere
+            on its way to its next event:
 
-.. math:: x - x_{ref} \sim U(-\theta_{OFF},\ \theta_{ON})
+    x - x_ref is uniform between -C_off and C_on
 
-with x the log intensity of the first frame, and the pixel's own thresholds.  The choice shows
-in the first events of each pixel, and in the phases of its leak.
+x is the log intensity of the first frame; C_on and C_off are the pixel's own thresholds.  The
+choice shows in the first events of each pixel, and in the phases of its leak.
 
 References
 ----------
-.. [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
-   contrast vision sensor", IEEE J. Solid-State Circuits 43(2), 2008,
-   doi:10.1109/JSSC.2007.914337 (the pixel remembers the light of its last event).
+[1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
+    contrast vision sensor", IEEE J. Solid-State Circuits 43(2), 2008, doi:10.1109/JSSC.2007.914337
+    (the pixel remembers the light of its last event).
 """
 
 from __future__ import annotations

@@ -1,41 +1,45 @@
-r"""Leak of the memorised reference: regular ON events of a pixel at rest.
+"""Leak of the memorised reference: regular ON events of a pixel at rest.
 
-The reset switch leaks, so the reference falls,
+    dr/dt = -(R0 + R1 DN/255) C_on xi
 
-.. math:: \dot r = -(R_0 + R_1\,DN / 255)\, C_{on}\, \xi
+r           reference, which falls as the reset switch leaks
+R0          rate_hz
+R1          photo_rate_hz
+DN          the unfiltered light
+C_on        the pixel's own ON threshold
+xi          1/(1 + jitter g), drawn anew after each event of the pixel; g is normal and cut
+            symmetrically, so that the mean period stays
 
-with R_0 = ``rate_hz``, R_1 = ``photo_rate_hz``, DN the unfiltered light and C_on that pixel's own
-ON threshold, so that a pixel at rest fires at R = R_0 + R_1 DN/255.  ``jitter`` is the relative
-standard deviation of the time between two leak events: xi is drawn anew after each event of the
-pixel, as 1/(1 + jitter g) with g normal and cut symmetrically, so that the mean period T = 1/R
-stays.
+A pixel at rest fires at the rate R = R0 + R1 DN/255, with the mean period T = 1/R.  The jitter is
+the relative standard deviation of the time between two leak events.
 
-Every event of the pixel takes the reference anew, so that beside noise events of rate N only the
-leak events come that had a whole period without any:
+Every event of the pixel takes the reference anew.  Beside noise events of rate N, only the leak
+events come that had a whole period without any noise event.  Their rate is
 
-.. math:: \frac{N}{e^{N/R} - 1}
+    N / (exp(N/R) - 1)
 
-Of 0.1 Hz that is 0.04 Hz beside 0.16 Hz of noise, and next to nothing beside 1 Hz.
+Of 0.1 Hz that leaves 0.04 Hz beside 0.16 Hz of noise, and next to nothing beside 1 Hz.
 
-A camera has run before it records (``initial_reference: running``).  A pixel has seen the light of
-the first frame for long, and is anywhere in its cycle, which is the dead time d and then the period
-T, unless a noise event ends it.  The age a of the cycle is drawn from
+A camera has run before it records (initial_reference: running).  A pixel has seen the light of the
+first frame for long and is anywhere in its cycle: the dead time d and then the period T, unless a
+noise event ends it.  The age a of the cycle is drawn from a density proportional to
 
-.. math:: p(a, T) \propto p(T) \begin{cases} 1 & a < d \\ e^{-N(a - d)} & d < a < d + T \end{cases}
+    p(T)                        for a < d
+    p(T) exp(-N (a - d))        for d < a < d + T
 
-in which long cycles are met more often than they begin; the reference lies (a - d)/T of a threshold
-below the signal.  Beside photoreceptor noise of standard deviation sigma and corner w, cycles end
-early, at the rate (Kramers) w z exp(-z^2/2)/sqrt(2 pi) at z sigma below the threshold.
+Long cycles are met more often than they begin.  The reference lies (a - d)/T of a threshold below
+the signal.  Beside photoreceptor noise of standard deviation sigma and corner w, cycles end early,
+at the rate w z exp(-z^2/2) / sqrt(2 pi) at z sigma below the threshold (Kramers) [3, 4].
 
 References
 ----------
-.. [1] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
-   sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848.
-.. [2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
-   CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (0.1 Hz, jitter 10 %).
-.. [3] D. R. Cox, "Renewal theory", Methuen, 1962, chapter 5 (age of the cycle that is under way).
-.. [4] H. A. Kramers, "Brownian motion in a field of force and the diffusion model of chemical
-   reactions", Physica 7(4), 1940, doi:10.1016/S0031-8914(40)90098-2.
+[1] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
+    sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848.
+[2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Workshops
+    2021, doi:10.1109/CVPRW53098.2021.00144 (0.1 Hz, jitter 10 %).
+[3] D. R. Cox, "Renewal theory", Methuen, 1962, chapter 5 (age of the cycle that is under way).
+[4] H. A. Kramers, "Brownian motion in a field of force and the diffusion model of chemical
+    reactions", Physica 7(4), 1940, doi:10.1016/S0031-8914(40)90098-2.
 """
 
 from __future__ import annotations

@@ -1,18 +1,21 @@
-r"""Logarithmic response of the photoreceptor, with a linear foot in the dark.
+"""Logarithmic response of the photoreceptor, with a linear foot in the dark.
 
-.. math:: x = \ln(DN) \quad (DN \ge k), \qquad x = DN \, \ln(k) / k \quad (DN < k)
+    x = ln(DN)          for DN >= k
+    x = DN ln(k)/k      for DN < k
 
-with DN = 255 light / full scale and k = ``linear_below``.  With ``linear_below: 0`` the response is
-the pure logarithm of max(DN, ``floor``).  The foot keeps one grey level of a nearly black frame
-from counting as a large contrast.  Its slope, ln(k)/k, equals that of the logarithm at the knee
-only for k = e; at k = 20 it is three times steeper just below the knee than just above it.  DN are
-linear light: on video that was decoded from sRGB, 20 DN is code 80 of 255, and a third of a usual
-picture would lie on the foot, with up to three times the contrast.  The default is therefore e.
+DN          255 light / full scale
+k           linear_below; with 0 the response is the pure logarithm of max(DN, floor)
+
+The foot keeps one grey level of a nearly black frame from counting as a large contrast.  Its slope,
+ln(k)/k, equals that of the logarithm at the knee only for k = e.  At k = 20 it is three times
+steeper just below the knee than just above it.  DN are linear light: on video that was decoded from
+sRGB, 20 DN is code 80 of 255, and a third of a usual picture would lie on the foot, with up to
+three times the contrast.  The default is therefore e.
 
 References
 ----------
-.. [1] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
-   CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (lin-log map at 20 DN).
+[1] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Workshops
+    2021, doi:10.1109/CVPRW53098.2021.00144 (lin-log map at 20 DN).
 """
 
 from __future__ import annotations

@@ -1,33 +1,33 @@
-r"""Photoreceptor low-pass: first order, corner following the light.
+"""Photoreceptor low-pass: first order, corner following the light.
 
-.. math:: \dot y = 2\pi f(t)\,(x - y), \qquad f = f_d + (f_c - f_d)\,DN / 255
+    dy/dt = 2 pi f(t) (x - y),    f = f_d + (f_c - f_d) DN/255
 
-with x the log intensity, f_c = ``cutoff_hz``, f_d = ``dark_cutoff_hz`` and DN the light that x
-stands for.  x is linear in time between neighbouring (interpolated) frames.
+x           log intensity, linear in time between neighbouring (interpolated) frames
+y           output
+f_c         cutoff_hz
+f_d         dark_cutoff_hz
+DN          the light that x stands for
 
-``update`` chooses how the equation is solved:
+The key update chooses how the equation is solved.  The steps below take y over one of K steps of a
+frame interval, in which x goes from x0 to x1.  a is 2 pi f times the length of the step.
 
-``exact``
-    the equation itself; event times are roots of its solution.  K plays no part.
-``first_order_hold``
-    K steps; Y <- E Y + (q - E) x0 + (1 - q) x1 with a the mean rate of the step times its length,
-    E = e^-a, q = (1 - E)/a: exact for a constant corner and a linear input.
-``zero_order_hold``
-    K steps; Y <- e^-a Y + (1 - e^-a) x1, a from the light at the end of the step.
-``euler``
-    K steps; Y <- (1 - eps) Y + eps x1, eps = min(1, a): v2e's update.
-``paper``
-    K steps; Y <- e^-a Y + a x1, as ADV2E prints it.  Its gain at rest is a/(1 - e^-a), not 1, so
-    it makes events of its own where the brightness changes.
+exact               The equation itself: event times are roots of its solution.  K plays no part.
+first_order_hold    y <- E y + (q - E) x0 + (1 - q) x1 with E = exp(-a), q = (1 - E)/a, and a of
+                    the mean f of the step.  It is exact for a constant corner and a linear input.
+zero_order_hold     y <- exp(-a) y + (1 - exp(-a)) x1, a from the light at the end of the step.
+euler               y <- (1 - eps) y + eps x1 with eps = min(1, a): the update of v2e.
+paper               y <- exp(-a) y + a x1, as ADV2E prints it.  Its gain at rest is
+                    a/(1 - exp(-a)), not 1, so it makes events of its own where the brightness
+                    changes.
 
 References
 ----------
-.. [1] X. Jiang, F. Zhou, J. Lin, "ADV2E: Bridging the Gap Between Analogue Circuit and Discrete
-   Frames in the Video-to-Events Simulator", 2024 (filter and continuity sampling).
-.. [2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
-   CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (300 Hz; (I + 20)/275 of it).
-.. [3] L. B. Jackson, "A correction to impulse invariance", IEEE Signal Processing Letters 7(10),
-   2000, doi:10.1109/97.870677 (why the printed update has the wrong gain).
+[1] X. Jiang, F. Zhou, J. Lin, "ADV2E: Bridging the Gap Between Analogue Circuit and Discrete Frames
+    in the Video-to-Events Simulator", 2024 (filter and continuity sampling).
+[2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Workshops
+    2021, doi:10.1109/CVPRW53098.2021.00144 (300 Hz; (I + 20)/275 of it).
+[3] L. B. Jackson, "A correction to impulse invariance", IEEE Signal Processing Letters 7(10), 2000,
+    doi:10.1109/97.870677 (why the printed update has the wrong gain).
 """
 
 from __future__ import annotations

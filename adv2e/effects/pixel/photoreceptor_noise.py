@@ -1,18 +1,23 @@
-r"""Photoreceptor noise: white noise on the drive, band-limited by the low-pass itself.
+"""Photoreceptor noise: white noise on the drive, band-limited by the low-pass itself.
 
-.. math:: dn = -w\,n\,dt + \sqrt{2 w}\,\sigma\,dW, \qquad w = 2\pi f(t)
+    dn = -w n dt + sqrt(2 w) sigma dW,    w = 2 pi f(t)
 
-n adds to the filtered signal; sigma = ``rms`` is its standard deviation at every brightness, and
-its correlation time is that of the low-pass.  Noise events of one pixel therefore mostly alternate
-in polarity, which Poisson events do not.  The process is sampled exactly at steps of at most
-``step`` of the shortest correlation time, that at white, and is linear between them.
+n           noise, added to the filtered signal
+sigma       rms: standard deviation of n, the same at every brightness
+f           corner of the low-pass
+W           Wiener process
+
+The correlation time of the noise is that of the low-pass.  Noise events of one pixel therefore
+mostly alternate in polarity, which Poisson events do not.  The process is sampled exactly and is
+linear between the samples.  Samples are at most step times the shortest correlation time apart,
+which is the one at white.
 
 References
 ----------
-.. [1] R. Graca, T. Delbruck, "Unraveling the paradox of intensity-dependent DVS pixel noise",
-   International Image Sensor Workshop 2021, arXiv:2109.08640.
-.. [2] D. T. Gillespie, "Exact numerical simulation of the Ornstein-Uhlenbeck process and its
-   integral", Physical Review E 54, 1996, doi:10.1103/PhysRevE.54.2084.
+[1] R. Graca, T. Delbruck, "Unraveling the paradox of intensity-dependent DVS pixel noise",
+    International Image Sensor Workshop 2021, arXiv:2109.08640.
+[2] D. T. Gillespie, "Exact numerical simulation of the Ornstein-Uhlenbeck process and its
+    integral", Physical Review E 54, 1996, doi:10.1103/PhysRevE.54.2084.
 """
 
 from __future__ import annotations

@@ -1,15 +1,16 @@
 """Refractory period: after each event the pixel is dead for a while, then takes its reference anew.
 
-In the dead time nothing fires and noise draws are lost; at its end the reference is the signal of
-that moment, as the reset switch of the real pixel opens then.  With ``refractory: null`` the
-reference moves by the threshold at a signal event and to the signal at a noise event.
+In the dead time nothing fires and noise draws are lost.  At its end the reference is the signal of
+that moment, as the reset switch of the real pixel opens then.  With refractory: null there is no
+dead time: the reference moves by the threshold at a signal event and to the signal at a noise
+event.
 
 References
 ----------
-.. [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
-   contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337.
-.. [2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
-   CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (0.5 ms).
+[1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
+    contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337.
+[2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Workshops
+    2021, doi:10.1109/CVPRW53098.2021.00144 (0.5 ms).
 """
 
 from __future__ import annotations

@@ -1,20 +1,24 @@
-r"""Overshoot of the reset: the new reference lies beyond the signal, or short of it.
+"""Overshoot of the reset: the new reference lies beyond the signal, or short of it.
 
-.. math:: r = y + p\,\varepsilon\,C_p
+    r = y + p eps C_p
 
-y is the signal at the end of the dead time, p = 1 or -1 the polarity of the event, C_p its
-threshold and eps = ``fraction``: the charge that the reset switch injects when it opens.  Without
-dead time the reference moves by p C_p (1 + eps) at a signal event.  After an event the next one of
-the same polarity needs (1 + eps) of the threshold, one of the other polarity (1 - eps), whatever
-the speed of the change.  Every event resets, those of noise too.
+r           the new reference
+y           signal at the end of the dead time
+p           polarity of the event, 1 or -1
+C_p         its threshold
+eps         fraction: the charge that the reset switch injects when it opens
+
+Without dead time the reference moves by p C_p (1 + eps) at a signal event.  After an event the next
+one of the same polarity needs (1 + eps) of the threshold, one of the other polarity (1 - eps),
+whatever the speed of the change.  Every event resets, those of noise too.
 
 References
 ----------
-.. [1] M. Yang, S.-C. Liu, T. Delbruck, "A dynamic vision sensor with 1 % temporal contrast
-   sensitivity and in-pixel asynchronous delta modulator for event encoding", IEEE JSSC 50(9), 2015,
-   doi:10.1109/JSSC.2015.2425886 (charge injected at reset).
-.. [2] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
-   contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337 (reset switch).
+[1] M. Yang, S.-C. Liu, T. Delbruck, "A dynamic vision sensor with 1 % temporal contrast sensitivity
+    and in-pixel asynchronous delta modulator for event encoding", IEEE JSSC 50(9), 2015,
+    doi:10.1109/JSSC.2015.2425886 (charge injected at reset).
+[2] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
+    contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337 (reset switch).
 """
 
 from __future__ import annotations

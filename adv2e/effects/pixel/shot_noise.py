@@ -1,24 +1,26 @@
-r"""Shot noise as a point process: background events that fall with brightness.
+"""Shot noise as a point process: background events that fall with brightness.
 
-Poisson events at the total rate
+    R(t) = R_s (1 - 0.75 DN/255)
 
-.. math:: R(t) = R_s\,(1 - 0.75\,DN / 255)
+R           rate of the events, a Poisson process; half of them are ON, half OFF
+R_s         rate_hz
+DN          the unfiltered light
 
-with R_s = ``rate_hz`` and DN the unfiltered light; half of them ON, half OFF.  Candidates come at
-the constant rate R_s from a stream of each pixel's own and are thinned by the light.
+Candidates come at the constant rate R_s from a stream of each pixel's own and are thinned by the
+light [1, 2].
 
-The fall is that within one image.  From scene to scene noise falls with the light itself: of one
-sensor [3]_ it was 12 Hz at 0.1 lux (ON 6.9, OFF 5.2) and twice 0.004 Hz at 161 lux (OFF; most ON
-events were leak).  The default is for good light; a scene in dim light needs 1 to 10 Hz.
+The fall is that within one image.  From scene to scene, noise falls with the light itself: one
+sensor [3] had 12 Hz at 0.1 lux (ON 6.9, OFF 5.2) and twice 0.004 Hz at 161 lux (OFF; most ON events
+were leak).  The default is for good light.  A scene in dim light needs 1 to 10 Hz.
 
 References
 ----------
-.. [1] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
-   CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (rate falls to a quarter at white).
-.. [2] P. A. W. Lewis, G. S. Shedler, "Simulation of nonhomogeneous Poisson processes by thinning",
-   Naval Research Logistics Quarterly 26(3), 1979, doi:10.1002/nav.3800260304.
-.. [3] D. Joubert et al., "Event camera simulator improvements via characterized parameters",
-   Frontiers in Neuroscience 15, 2021, doi:10.3389/fnins.2021.702765 (files of noise).
+[1] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Workshops
+    2021, doi:10.1109/CVPRW53098.2021.00144 (rate falls to a quarter at white).
+[2] P. A. W. Lewis, G. S. Shedler, "Simulation of nonhomogeneous Poisson processes by thinning",
+    Naval Research Logistics Quarterly 26(3), 1979, doi:10.1002/nav.3800260304.
+[3] D. Joubert et al., "Event camera simulator improvements via characterized parameters", Frontiers
+    in Neuroscience 15, 2021, doi:10.3389/fnins.2021.702765 (files of noise).
 """
 
 from __future__ import annotations

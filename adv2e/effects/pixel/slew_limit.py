@@ -1,19 +1,20 @@
-r"""Limited slew rate of the photoreceptor.
+"""Limited slew rate of the photoreceptor.
 
-.. math:: |\dot y| \le s
+    |dy/dt| <= s
 
-y is the output of the first pole (:mod:`adv2e.effects.pixel.low_pass`), s = ``per_s`` what its bias
-current can charge the load with.  The pole follows its equation as long as it asks for less;
-beyond, its output is a ramp.  Large steps of the light are then late by more the larger they are,
-small ones are not.
+y           output of the first pole (the effect low_pass)
+s           per_s: what its bias current can charge the load with
+
+The pole follows its equation as long as that asks for less.  Beyond, its output is a ramp.  Large
+steps of the light are then late, by more the larger they are; small steps are not.
 
 References
 ----------
-.. [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
-   contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337 (photoreceptor and
-   its buffer, both biased by fixed currents).
-.. [2] P. R. Gray, P. J. Hurst, S. H. Lewis, R. G. Meyer, "Analysis and Design of Analog Integrated
-   Circuits", 5th ed., Wiley 2009, section 9.6 (slew rate: bias current over capacitance).
+[1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
+    contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337 (photoreceptor and
+    its buffer, both biased by fixed currents).
+[2] P. R. Gray, P. J. Hurst, S. H. Lewis, R. G. Meyer, "Analysis and Design of Analog Integrated
+    Circuits", 5th ed., Wiley 2009, section 9.6 (slew rate: bias current over capacitance).
 """
 
 from __future__ import annotations

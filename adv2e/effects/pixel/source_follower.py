@@ -1,15 +1,18 @@
-r"""Source follower behind the photoreceptor: a second pole, the same at every brightness.
+"""Source follower behind the photoreceptor: a second pole, the same at every brightness.
 
-.. math:: \dot z = 2\pi f_s\,(y - z)
+    dz/dt = 2 pi f_s (y - z)
 
-y is the output of the photoreceptor low-pass; the comparator sees z.  With ``exact`` y is a cubic
-in each step of time, in the K-step forms of the low-pass a straight line: for either the second
-pole is solved exactly.
+y           output of the photoreceptor low-pass
+z           what the comparator sees
+f_s         cutoff_hz
+
+With low_pass.update: exact, y is a cubic in each step of time; with the forms of K steps it is a
+straight line.  For either, the second pole is solved exactly.
 
 References
 ----------
-.. [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
-   contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337.
+[1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
+    contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337.
 """
 
 from __future__ import annotations

@@ -1,17 +1,20 @@
-r"""Drift of the contrast thresholds, as biases and temperature change.
+"""Drift of the contrast thresholds, as biases and temperature change.
 
-.. math:: C(t) = C\,(1 + d\,t)
+    C(t) = C (1 + d t)
 
-for both thresholds of every pixel, with d = ``pixel.thresholds.drift_per_s`` and t the time since
-the first frame.  The leak keeps its speed, which is set by the thresholds at the start.
+C           threshold, ON or OFF, of any pixel
+d           pixel.thresholds.drift_per_s
+t           time since the first frame
+
+The leak keeps its speed, which the thresholds at the start set.
 
 References
 ----------
-.. [1] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
-   sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848.
-.. [2] R. Graca, B. McReynolds, T. Delbruck, "Shining light on the DVS pixel: a tutorial and
-   discussion about biasing and optimization", CVPR Workshops 2023, arXiv:2304.04706 (thresholds
-   follow from biases).
+[1] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision
+    sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848.
+[2] R. Graca, B. McReynolds, T. Delbruck, "Shining light on the DVS pixel: a tutorial and discussion
+    about biasing and optimization", CVPR Workshops 2023, arXiv:2304.04706 (thresholds follow from
+    biases).
 """
 
 from __future__ import annotations

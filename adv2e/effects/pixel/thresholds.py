@@ -1,18 +1,21 @@
-r"""Contrast thresholds, with frozen mismatch between pixels.
+"""Contrast thresholds, with frozen mismatch between pixels.
 
 A pixel fires ON where its signal has risen by C_on above the reference, OFF where it has fallen by
-C_off below it.  Each pixel has its own two levels, drawn once:
+C_off below it.  Each pixel has its own two thresholds, drawn once:
 
-.. math:: C_{px} = \max(0.01,\; C + \sigma z_{px}), \qquad z \sim N(0, 1)
+    C_pixel = max(0.01, C + sigma z),    z normal with mean 0 and variance 1
 
-ON and OFF independent of each other.
+C           on or off
+sigma       mismatch
+
+ON and OFF are drawn independently of each other.
 
 References
 ----------
-.. [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
-   contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337 (mismatch 2.1 %).
-.. [2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events",
-   CVPR Workshops 2021, doi:10.1109/CVPRW53098.2021.00144 (sigma 0.03, floor 0.01).
+[1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal
+    contrast vision sensor", IEEE JSSC 43(2), 2008, doi:10.1109/JSSC.2007.914337 (mismatch 2.1 %).
+[2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Workshops
+    2021, doi:10.1109/CVPRW53098.2021.00144 (sigma 0.03, floor 0.01).
 """
 
 from __future__ import annotations

@@ -1,23 +1,25 @@
 """Arbiter: events wait for their row to be read out.
 
-One channel serves the rows one after another: when it is free it takes the row that has waited
-longest, needs ``row_ns`` to select it, latches all requests that the row then has, and sends them
-out from left to right, one each ``event_ns``.  Events are stamped as they leave.  A pixel whose
-event still waits cannot ask again: its further events are lost, which is how the readout saturates,
-at columns / (row_ns + columns event_ns) events a nanosecond and below.  The pixel does not know
-that it waits: its dead time runs from the event.
+One channel serves the rows one after another.  When it is free it takes the row that has waited
+longest.  It needs row_ns to select the row, latches all requests that the row then has, and sends
+them out from left to right, one each event_ns.  Events are stamped as they leave.
 
-Events come in whole microseconds, services do not: when within its own an event asks is drawn, for
-the n-th of a pixel.  Asking on the microsecond, all would be rounded alike as they leave (with 4.5
-us in all, to even numbers), and of those that ask together the uppermost row would always be first.
+A pixel whose event still waits cannot ask again: its further events are lost.  So the readout
+saturates, at columns / (row_ns + columns event_ns) events a nanosecond and below.  The pixel does
+not know that it waits: its dead time runs from the event.
+
+Events come in whole microseconds, services do not.  When within its own microsecond an event asks
+is drawn, for the n-th event of a pixel.  If all asked on the microsecond, all would be rounded
+alike as they leave (with 4.5 us in all, to even numbers), and of those that ask together the
+uppermost row would always be first.
 
 References
 ----------
-.. [1] K. A. Boahen, "Point-to-point connectivity between neuromorphic chips using address events",
-   IEEE TCAS II 47(5), 2000, doi:10.1109/82.842110.
-.. [2] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency
-   Global Shutter Spatiotemporal Vision Sensor", IEEE JSSC 49(10), 2014,
-   doi:10.1109/JSSC.2014.2342715 (12 million events a second).
+[1] K. A. Boahen, "Point-to-point connectivity between neuromorphic chips using address events",
+    IEEE TCAS II 47(5), 2000, doi:10.1109/82.842110.
+[2] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency Global
+    Shutter Spatiotemporal Vision Sensor", IEEE JSSC 49(10), 2014, doi:10.1109/JSSC.2014.2342715 (12
+    million events a second).
 """
 
 from __future__ import annotations

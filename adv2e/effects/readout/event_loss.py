@@ -1,12 +1,13 @@
 """Event loss: events that the readout drops at random.
 
-Each event is lost with probability ``fraction``, whatever happens to the others: the simplest model
-of full buffers between sensor and computer.  The n-th event of a pixel has a draw of its own.
+Each event is lost with the probability given by fraction, whatever happens to the others.  This is
+the simplest model of full buffers between sensor and computer.  The n-th event of a pixel has a
+draw of its own.
 
 References
 ----------
-.. [1] G. Gallego et al., "Event-based Vision: A Survey", IEEE TPAMI 44(1), 2022, arXiv:1904.08405
-   (bandwidth of the readout).
+[1] G. Gallego et al., "Event-based Vision: A Survey", IEEE TPAMI 44(1), 2022, arXiv:1904.08405
+    (bandwidth of the readout).
 """
 
 from __future__ import annotations

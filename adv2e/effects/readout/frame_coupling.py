@@ -1,31 +1,34 @@
-r"""Frame coupling: the readout of a frame disturbs the event pixels of the same sensor.
+"""Frame coupling: the readout of a frame disturbs the event pixels of the same sensor.
 
-.. math::
+    d(t) = A sum over frames of (l(t - t_f) - l(t - t_f - w))
+    l(s) = exp(-s/tau) for s > 0, else 0
 
-    d(t) = A \sum_f \left( l(t - t_f) - l(t - t_f - w) \right), \qquad
-    l(s) = e^{-s/\tau} \text{ for } s > 0, \text{ else } 0
+d           disturbance, added to the signal of all pixels behind all poles
+A           amplitude [ln]
+tau         tau_us
+w           width_us: the signal leaps back so long after it leapt; with 0 it only decays
+t_f         time at which a frame was read out: the end of its exposure, and delay_us more, or less
+            if that is below 0
 
-is added to the signal of all pixels behind all poles, with A = ``amplitude`` [ln], tau = ``tau_us``
-and t_f the times at which frames were read out: the end of each exposure, that is the time of the
-frame on the camera's clock (after clock offset and drift) plus half of ``frames.exposure_us``, and
-``delay_us`` more, or less if that is below 0.  With w = ``width_us`` the signal leaps back so long
-after it leapt; where that is 0, it only decays.
+The end of an exposure is the time of the frame on the camera's clock (after clock offset and drift)
+plus half of frames.exposure_us.
 
-All pixels that are within A of a threshold fire at the leap, and others when the signal leaps back:
-of a DAVIS240C that watches a scene in motion these are a tenth of all events, ON in the 0.4 ms
-before each frame, OFF in about a millisecond after it.
+All pixels that are within A of a threshold fire at the leap, and others when the signal leaps back.
+When a DAVIS240C watches a scene in motion, these are a tenth of all events: ON in the 0.4 ms before
+each frame, OFF in about a millisecond after it.
 
 The pixels are at rest at the first frame: there is no leap before it.  A leap is a rise over
-``rise_us``, or if that is 0 over a twelfth of tau, or of w where that is shorter; it is the longest
-step of time there.  Then it decays: nothing shows before it, and its height is met.  A line through
-a step of a twelfth of tau of the decay is off by A/1152; intervals that begin when no more than
-that is left, 7 tau after a leap has risen, take the steps that they would without it.
+rise_us.  If that is 0, it is a rise over a twelfth of tau, or of w where that is shorter.  The rise
+is the longest step of time there.  Then it decays: nothing shows before the leap, and its height is
+met.  A line through a step of a twelfth of tau of the decay is off by A/1152.  Intervals that begin
+when no more than that is left, 7 tau after a leap has risen, take the steps that they would without
+it.
 
 References
 ----------
-.. [1] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency
-   Global Shutter Spatiotemporal Vision Sensor", IEEE JSSC 49(10), 2014,
-   doi:10.1109/JSSC.2014.2342715 (frames and events of one photodiode).
+[1] C. Brandli, R. Berner, M. Yang, S.-C. Liu, T. Delbruck, "A 240 x 180 130 dB 3 us Latency Global
+    Shutter Spatiotemporal Vision Sensor", IEEE JSSC 49(10), 2014, doi:10.1109/JSSC.2014.2342715
+    (frames and events of one photodiode).
 """
 
 from __future__ import annotations

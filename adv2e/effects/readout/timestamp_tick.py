@@ -1,16 +1,17 @@
-r"""Timestamp tick: the clock that stamps the events is coarser than a microsecond.
+"""Timestamp tick: the clock that stamps the events is coarser than a microsecond.
 
-.. math:: t' = q\,\lceil t / q \rceil
+    t' = q ceil(t/q)
 
-with q = ``readout.tick_us``: an event gets the next tick, never an earlier one.  0 leaves the
-microseconds as they are.  Ticks are multiples of q since time zero of the camera's clock, rounded
-to microseconds.
+q           readout.tick_us
+
+An event gets the next tick, never an earlier one.  With q = 0 the microseconds stay as they are.
+Ticks are multiples of q since time zero of the camera's clock, rounded to microseconds.
 
 References
 ----------
-.. [1] E. Mueggler, H. Rebecq, G. Gallego, T. Delbruck, D. Scaramuzza, "The Event-Camera Dataset and
-   Simulator", IJRR 36(2), 2017, doi:10.1177/0278364917691115 (stamps as drivers and messages give
-   them).
+[1] E. Mueggler, H. Rebecq, G. Gallego, T. Delbruck, D. Scaramuzza, "The Event-Camera Dataset and
+    Simulator", IJRR 36(2), 2017, doi:10.1177/0278364917691115 (stamps as drivers and messages give
+    them).
 """
 
 from __future__ import annotations
