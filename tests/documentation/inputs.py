@@ -1,0 +1,119 @@
+"""What the commands of a document find in their folder: small files under the text's names.
+
+A recording here has so few pixels and frames that a diagnosis of it takes seconds.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable, Iterable
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import cv2
+import numpy as np
+from camera import Camera, patchwork
+from camera.catalogue import cases
+from pictures import picture
+
+from adv2e.synthetic import Scene
+from adv2e.synthetic.clips import write_video
+
+FRAMES = 12
+
+
+def video(path: Path) -> None:
+    """Make a film of the demonstration's scene."""
+    write_video(Scene(), path, width=32, height=24, duration_s=FRAMES / 30.0)
+
+
+def images(path: Path) -> None:
+    """Make a folder of images."""
+    path.mkdir()
+    for k in range(FRAMES):
+        cv2.imwrite(str(path / f"frame_{k:04d}.png"), picture(k))
+
+
+def listed_images(path: Path) -> None:
+    """Make a folder with a list of times and names, and the images in a folder below it."""
+    path.mkdir()
+    images(path / "rgb")
+    lines = (f"{1e9 + k / 30:.6f} rgb/frame_{k:04d}.png\n" for k in range(FRAMES))
+    (path / "images.txt").write_text("".join(lines), "ascii")
+
+
+def stack(path: Path) -> None:
+    """Make a file of NumPy."""
+    np.save(path, np.stack([picture(k) for k in range(FRAMES)]))
+
+
+def recording(path: Path) -> None:
+    """Make a recording with too long a dead time, and what is declared of it."""
+    _copy(_recorded("refractory"), path)
+
+
+def echoing(path: Path) -> None:
+    """Make a recording with events that come twice, and what is declared of it."""
+    _copy(_recorded("echo"), path)
+
+
+def _copy(made: Path, path: Path) -> None:
+    shutil.copy(made, path)
+    declared = made.with_suffix(".declared.yaml")
+    shutil.copy(declared, path.with_suffix(".declared.yaml"))
+    shutil.copy(declared, path.with_name("declared.yaml"))
+
+
+@cache
+def _recorded(effect: str) -> Path:
+    path = Path(mkdtemp(prefix="adv2e-documents-")) / f"{effect}.zip"
+    size = (24, 16)
+    Camera(
+        patchwork(size, seed=4), hidden=next(cases(effect, size="large")).hidden, size=size,
+        duration_s=0.3, fps=400.0, seed=4, step_us=50.0,
+    ).record(path)  # fmt: skip
+    return path
+
+
+def latencies(path: Path) -> None:
+    """Make a table of latencies of two cameras."""
+    head = "camera,bias,polarity,irradiance_W_m2,latency_us,latency_error_us\n"
+    rows = (
+        f"CAM{camera},0,{polarity},{light},{1.0 / light + 30.0 + camera:.1f},2\n"
+        for camera in (1, 2)
+        for polarity in ("ON", "OFF")
+        for light in (0.005, 0.01, 0.05, 0.2, 0.4)
+    )
+    path.write_text(head + "".join(rows), "ascii")
+
+
+def noise_rates(path: Path) -> None:
+    """Make a table of rates of noise."""
+    rows = ("0.1,7.0,5.0,2500,8.2", "161,0.14,0.004,2500,17.4", "3000,0.23,0.001,2500,19.9")
+    head = "illuminance_lux,on_rate_hz,off_rate_hz,pixels,duration_s"
+    path.write_text("\n".join([head, *rows, ""]), "ascii")
+
+
+INPUTS: dict[str, Callable[[Path], None]] = {
+    "clip.mp4": video,
+    "phone.mp4": video,
+    "frames/": images,
+    "sequence/": listed_images,
+    "clip.npy": stack,
+    "recording.zip": recording,
+    "measured.zip": recording,
+    "echo.zip": echoing,
+    "latency.csv": latencies,
+    "noise.csv": noise_rates,
+}
+"""What may be named by any document, and what makes it."""
+
+
+def make_inputs(folder: Path, texts: Iterable[str]) -> None:
+    """Put into `folder` what `texts` name."""
+    text = "\n".join(texts)
+    for name, make in INPUTS.items():
+        if re.search(rf"(?<![\w./-]){re.escape(name)}(?![\w.-])", text):
+            make(folder / name)

@@ -1,0 +1,168 @@
+"""The commands and the examples of each document run, in their order, in one folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from adv2e.config import load_config
+from adv2e.conversion import demo
+from adv2e.diagnosis import prepare
+from adv2e.diagnosis.fitting.library import names
+from documentation.documents import ROOT, Block, Command, Document, documents
+from documentation.inputs import make_inputs
+from documentation.where import elsewhere
+
+DOCUMENTS = {document.name: document for document in documents()}
+
+RIVALS = {"refractory", "event_loss", "shot_noise"}
+"""The effects that compete in diagnoses here, besides those of the user's own: all take minutes."""
+
+_SHELL = re.compile(r"[|<>;&$*\n]")
+
+_ENDS = {0, 141}
+"""Exit statuses: done; and of a pipe whose reader had enough."""
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch, tmp_path):
+    every = prepare.library
+
+    def library(declared, hints):
+        built_in = {*names()} - RIVALS
+        return [one for one in every(declared, hints) if one.name not in built_in]
+
+    monkeypatch.setattr(prepare, "library", library)
+    for name, value in {"WIDTH": 64, "HEIGHT": 48, "DURATION_S": 0.5}.items():
+        monkeypatch.setattr(demo, name, value)
+    monkeypatch.setattr(demo, "INSTANTS_S", (0.2, 0.4))
+    monkeypatch.chdir(tmp_path)
+
+
+def run_in_shell(text: str) -> str:
+    """Run a command as a user would; return what it said if it failed."""
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    done = subprocess.run(
+        ["bash", "-e", "-o", "pipefail", "-c", text.replace("scripts/", f"{ROOT}/scripts/")],
+        env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    return "" if done.returncode in _ENDS else done.stdout + done.stderr or "it failed"
+
+
+def run_command(command: Command, adv2e) -> None:
+    """Run a command, or let it be where it is run elsewhere or needs what is not here."""
+    if elsewhere(command) or command.needs:
+        return
+    if command.text.startswith("adv2e ") and not _SHELL.search(command.text):
+        outcome = adv2e(*shlex.split(command.text)[1:])
+        failed = "" if outcome.status == 0 else outcome.err or "it failed"
+    else:
+        failed = run_in_shell(command.text)
+    assert not failed, f"{command}\n{failed}"
+
+
+def run_block(block: Block, adv2e) -> None:
+    """Run what stands in a block, or write the file that it is."""
+    if block.language == "bash":
+        for command in block.commands():
+            run_command(command, adv2e)
+        return
+    if block.file:
+        Path(block.file).write_text(block.text, "utf-8")
+    if block.language == "yaml":
+        path = Path(block.file or "example.yaml")
+        path.write_text(block.text, "utf-8")
+        load_config([path])
+    if block.language == "python":
+        code = compile(block.text, f"{block.document}:{block.line}", "exec")
+        if not block.file and not block.needs:
+            exec(code, {"__name__": "__main__"})
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_all_that_a_document_shows_runs(name, adv2e, tmp_path):
+    document = DOCUMENTS[name]
+    make_inputs(tmp_path, (block.text for block in document.blocks if block.language != "text"))
+    for block in document.blocks:
+        run_block(block, adv2e)
+
+
+def only_looked_at(document: Document) -> list[Command]:
+    """Return the commands of which no more than the options is tried."""
+    return [one for one in document.commands() if (one.needs or one.inline) and not elsewhere(one)]
+
+
+def words_of(command: Command) -> list[list[str]]:
+    """Return the words of each call of adv2e or of a script in a command."""
+    calls = re.split(r"[|;\n]|&&|\bdo\b", command.text)
+    words = (shlex.split(re.sub(r"[<>].*", "", call)) for call in calls)
+    return [one for one in words if one and re.match(r"(adv2e|python|scripts/.*)$", one[0])]
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_options_of_what_is_not_run_are_right(name, adv2e):
+    for command in only_looked_at(DOCUMENTS[name]):
+        assert words_of(command), f"{command}: neither adv2e nor a script, so it must be run"
+        for words in words_of(command):
+            if words[0] == "adv2e":
+                outcome = adv2e(*words[1:], "--help")
+                assert outcome.status == 0, f"{command}\n{outcome.err}"
+                assert outcome.out.startswith("Usage: ")
+
+
+_HELPS = """
+import json, os, runpy, sys
+usual = sys.path[1:]
+for place, *words in json.load(sys.stdin):
+    for name, module in [*sys.modules.items()]:
+        if (getattr(module, "__file__", None) or "").startswith(os.path.abspath("scripts")):
+            del sys.modules[name]
+    sys.path[:] = [os.path.dirname(os.path.abspath(words[0])), *usual]
+    sys.argv = [*words, "--help"]
+    try:
+        runpy.run_path(words[0], run_name="__main__")
+    except SystemExit as end:
+        assert not end.code, place
+"""
+"""One process for all, as importing the package takes longer than all else."""
+
+
+def test_options_of_scripts_that_are_not_run_are_right():
+    calls = [
+        [str(command), *words[words[0] == "python" :]]
+        for document in DOCUMENTS.values()
+        for command in only_looked_at(document)
+        for words in words_of(command)
+        if words[0] != "adv2e"
+    ]
+    done = subprocess.run(
+        [sys.executable, "-c", _HELPS], input=json.dumps(calls),
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("Usage: ") == len(calls)
+
+
+def test_an_option_that_is_unknown_is_an_error_beside_help(adv2e):
+    assert adv2e("convert", "clip.mp4", "--fsp", "240", "--help").status == 2
+    command = Command("a document", 1, "adv2e effects nonesuch --help")
+    assert elsewhere(command) is None
+    with pytest.raises(AssertionError, match="a document:1: adv2e convert --fsp 3"):
+        run_command(Command("a document", 1, "adv2e convert --fsp 3"), adv2e)
+
+
+def test_a_command_has_all_of_its_lines():
+    text = "adv2e a \\\n    -o b  # of two lines\n\nfor f in *.mp4; do\n  adv2e c $f\ndone\n"
+    block = Block("a document", 10, "bash", text + "adv2e d  # needs a recording of yours\n")
+    assert [(one.line, one.text, one.needs) for one in block.commands()] == [
+        (11, "adv2e a -o b", ""),
+        (14, "for f in *.mp4; do\n  adv2e c $f\ndone", ""),
+        (17, "adv2e d", "needs a recording of yours"),
+    ]
