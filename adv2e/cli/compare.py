@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from adv2e.cli import options
+from adv2e.cli import completion, options
+from adv2e.cli.commands import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,9 +19,9 @@ if TYPE_CHECKING:
     from adv2e.sources import Source
 
 
-@click.command("compare")
-@click.argument("measured", metavar="MEASURED")
-@click.argument("simulated", metavar="SIMULATED")
+@click.command("compare", cls=Command)
+@click.argument("measured", metavar="MEASURED", shell_complete=completion.files)
+@click.argument("simulated", metavar="SIMULATED", shell_complete=completion.files)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, with the value of each window.")
 @click.option(
     "--window",
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     "--frames",
     "frames_path",
     metavar="INPUT",
+    shell_complete=completion.files,
     help="Frames for the intervals and the floor of two seeds, on the clock of MEASURED."
     "  [default: those in MEASURED]",
 )

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import click
+from click.shell_completion import CompletionItem
 
 from adv2e import __version__
-from adv2e.cli import options
+from adv2e.cli import completion, options
+from adv2e.cli.commands import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,11 +20,20 @@ if TYPE_CHECKING:
 class _ShowByDefault(click.Group):
     """A group whose options without a command belong to ``show``."""
 
+    command_class = Command
+
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put ``show`` in front where no command is named."""
-        if not args or (args[0].startswith("-") and args[0] not in ctx.help_option_names):
+        """Put ``show`` in front where no command is named; a shell asks which there are."""
+        none = not args and not ctx.resilient_parsing
+        if none or (args and args[0].startswith("-") and args[0] not in ctx.help_option_names):
             args = ["show", *args]
         return super().parse_args(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Offer the commands, or the options of ``show``."""
+        if incomplete.startswith("-"):
+            return show.shell_complete(ctx, incomplete)
+        return super().shell_complete(ctx, incomplete)
 
 
 @click.group("config", cls=_ShowByDefault)
@@ -59,7 +70,7 @@ def defaults() -> None:
 
 
 @group.command()
-@click.argument("file")
+@click.argument("file", metavar="FILE", shell_complete=completion.configurations)
 @options.effect_option
 def check(file: str, effect_files: tuple[str, ...]) -> None:
     """Check a configuration file: exit status 0 if it is right, 1 if not."""

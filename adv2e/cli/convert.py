@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from adv2e.cli import options
+from adv2e.cli import completion, options
+from adv2e.cli.commands import Command
 from adv2e.cli.options import SECONDS
 
 if TYPE_CHECKING:
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
     from adv2e.config import Config
 
 
-@click.command("convert")
-@click.argument("source", metavar="INPUT")
+@click.command("convert", cls=Command)
+@click.argument("source", metavar="INPUT", shell_complete=completion.files)
 @options.config_options
 @options.run_options
 @options.source_options
@@ -33,11 +34,13 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     metavar="NAME",
+    shell_complete=completion.formats,
     help="Format of the output, where its suffix does not say it.",
 )
 @click.option(
     "--layout",
     metavar="NAME",
+    shell_complete=completion.layouts,
     help="Layout of an HDF5 output.  [default: monash]",
 )
 @click.option(
@@ -48,6 +51,7 @@ if TYPE_CHECKING:
 @click.option(
     "--preview",
     metavar="FILE",
+    shell_complete=completion.files,
     help="Also draw frames and events, as 'adv2e render' does: .mp4 or .webm plays in browsers,"
     " .gif everywhere, .avi (without loss) in VLC; .png is a sheet.",
 )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from adv2e.cli import options
+from adv2e.cli.commands import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from adv2e.config import Config
 
 
-@click.command("demo")
+@click.command("demo", cls=Command)
 @click.option(
     "-o",
     "--output",

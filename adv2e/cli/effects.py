@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from adv2e.cli import completion
+from adv2e.cli.commands import Command
+
 if TYPE_CHECKING:
     from adv2e.config import Key
     from adv2e.effects import Effect
@@ -16,8 +19,8 @@ if TYPE_CHECKING:
 _WIDTH = 100
 
 
-@click.command("effects")
-@click.argument("name", required=False)
+@click.command("effects", cls=Command)
+@click.argument("name", metavar="NAME", required=False, shell_complete=completion.effects)
 def command(name: str | None) -> None:
     """List the effects, or explain one with its equation.
 
@@ -33,14 +36,14 @@ def command(name: str | None) -> None:
     if name is None:
         _list()
         return
-    from adv2e.effects import EFFECTS
+    from adv2e.effects import named
 
-    named = {name: effect for effect in EFFECTS for name in (effect.name, *effect.told_as)}
-    if name not in named:
-        near = difflib.get_close_matches(name, named, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(named)}"
+    known = named()
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(known)}"
         raise click.UsageError(f"no effect '{name}', {hint}")
-    _page(named[name])
+    _page(known[name])
 
 
 def _list() -> None:

@@ -114,6 +114,8 @@ def _as_signalled() -> Iterator[None]:
 def _click_text(error: click.ClickException) -> str:
     text = " ".join(error.format_message().split()).rstrip(".")
     if isinstance(error, click.UsageError) and error.ctx is not None:
+        if isinstance(error, click.MissingParameter) and isinstance(error.param, click.Argument):
+            text += f": {' '.join(error.ctx.get_usage().split()[1:])}"
         text += f" (see '{error.ctx.command_path} --help')"
     return text
 

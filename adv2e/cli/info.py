@@ -8,10 +8,11 @@ from typing import Any
 import click
 
 from adv2e.cli import options
+from adv2e.cli.commands import Command
 
 
-@click.command("info")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.command("info", cls=Command)
+@click.argument("file", metavar="FILE", type=click.Path(path_type=Path, readable=False))
 @click.option("--json", "as_json", is_flag=True, help="Print JSON; all keys are always there.")
 @options.source_options
 @options.verbosity_options

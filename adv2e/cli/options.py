@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from adv2e.cli import completion
 from adv2e.cli.compiling import compilation_told
 from adv2e.cli.exit_status import VERBOSITY
 from adv2e.files.names import shown
@@ -77,6 +78,7 @@ def effect_option(body: Body) -> Body:
         "--effect",
         "effect_files",
         metavar="FILE.py",
+        shell_complete=completion.files,
         multiple=True,
         help="Effects of your own; their parameters are user.NAME in the configuration."
         " Repeatable.",
@@ -113,6 +115,7 @@ def config_options(body: Body) -> Body:
         "config_files",
         metavar="FILE",
         multiple=True,
+        shell_complete=completion.configurations,
         help="Configuration: a YAML file or the name of a shipped one (see 'adv2e config --help')."
         " Repeatable; later ones win, key by key.",
     )
@@ -121,6 +124,7 @@ def config_options(body: Body) -> Body:
         "sets",
         metavar="KEY=VALUE",
         multiple=True,
+        shell_complete=completion.keys,
         help="Set one key, such as pixel.low_pass.cutoff_hz=100 or pixel.leak=null. Repeatable.",
     )
     @click.option("--seed", type=SEED, metavar="N", help="Seed of all random numbers, below 2^64.")
@@ -201,7 +205,12 @@ def output_options(body: Body) -> Body:
     """Add -o and --overwrite; the command gets ``output`` (or None) and ``overwrite``."""
     body = click.option("--overwrite", is_flag=True, help="Replace an output that exists.")(body)
     return click.option(
-        "-o", "--output", metavar="OUT", help="Where to write.", callback=_not_empty
+        "-o",
+        "--output",
+        metavar="OUT",
+        shell_complete=completion.files,
+        callback=_not_empty,
+        help="Where to write.",
     )(body)
 
 

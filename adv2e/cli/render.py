@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from adv2e.cli import options
+from adv2e.cli import completion, options
+from adv2e.cli.commands import Command
 from adv2e.cli.options import POSITIVE, SECONDS
 
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
 
 
-@click.command("render")
-@click.argument("events", metavar="EVENTS")
+@click.command("render", cls=Command)
+@click.argument("events", metavar="EVENTS", shell_complete=completion.files)
 @options.output_options
 @options.progress_option
 @options.verbosity_options

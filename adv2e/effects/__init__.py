@@ -80,3 +80,8 @@ EFFECTS = (
     Effect("readout", "timestamp_tick", ("readout.tick_us",)),
 )
 """All effects, in signal order."""
+
+
+def named() -> dict[str, Effect]:
+    """Return the effects by all of their names."""
+    return {name: effect for effect in EFFECTS for name in (effect.name, *effect.told_as)}

@@ -20,8 +20,9 @@ from adv2e.diagnosis.fitting.library import names
 from adv2e.effects import EFFECTS, STAGES
 
 
-def test_version(adv2e):
-    assert adv2e("--version") == (0, f"adv2e {package.__version__}\n", "")
+@pytest.mark.parametrize("option", ["--version", "-V"])
+def test_version(adv2e, option):
+    assert adv2e(option) == (0, f"adv2e {package.__version__}\n", "")
 
 
 def test_help_lists_every_command_with_a_line(adv2e):

@@ -89,8 +89,8 @@ def test_vv_shows_no_traceback_of_a_mistake_of_the_user(adv2e, pipeline):
 @pytest.mark.parametrize(
     ("args", "said"),
     [
-        (["convert"], "Missing argument 'INPUT' (see 'adv2e convert --help')"),
-        (["convert", "a", "b"], "unexpected extra argument (b)"),
+        (["convert"], "Missing argument 'INPUT': adv2e convert [OPTIONS] INPUT (see 'adv2e conv"),
+        (["compare", "a"], "Missing argument 'SIMULATED': adv2e compare [OPTIONS] MEASURED SIMU"),
         (["convert", "a", "--bogus"], "No such option"),
         (["convert", "a", "--threads", "0"], "Invalid value for '--threads': 0"),
         (["convert", "a", "--threads", "-2"], "Invalid value for '--threads': -2"),

@@ -1,0 +1,78 @@
+"""A command that says what to do instead where it is given one argument too many."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+from click.core import ParameterSource
+
+from adv2e.errors import UsageError
+
+
+class Command(click.Command):
+    """A command whose extra arguments become a hint: an output without -o, or further inputs."""
+
+    allow_extra_args = True
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments; raise UsageError, with what to type instead, if some are left."""
+        given = list(args)
+        extra = super().parse_args(ctx, args)
+        if extra and not ctx.resilient_parsing:
+            raise UsageError(_hint(ctx, given, extra))
+        return extra
+
+
+def _hint(ctx: click.Context, given: Sequence[str], extra: Sequence[str]) -> str:
+    """Return what to type instead of `given`, of which `extra` is too much."""
+    arguments = [item for item in ctx.command.params if isinstance(item, click.Argument)]
+    typed, _, _ = ctx.command.make_parser(ctx).parse_args(list(given))
+    taken = [typed[item.name] for item in arguments]
+    has_output = ctx.get_parameter_source("output") is ParameterSource.COMMANDLINE
+    is_output = len(extra) == 1 and "output" in ctx.params and not has_output
+    if is_output and not (taken and _is_another(extra[0], taken[0])):
+        at = _last(given, extra[0])
+        whole = [*ctx.command_path.split(), *given[:at], "-o", *given[at:]]
+        return f"put -o before the output: {shlex.join(whole)}"
+    if len(arguments) == 1:
+        options = [] if has_output else _without(given, [*taken, *extra])
+        if ctx.info_name == "render" and not has_output:  # it makes nothing without
+            options.append('-o "$f.mp4"')
+        body = " ".join([ctx.command_path, '"$f"', *options])
+        loop = f"for f in {_pattern([*taken, *extra])}; do {body}; done"
+        return f"{ctx.info_name} takes one {arguments[0].metavar} at a time; for several: {loop}"
+    return f"unexpected argument '{extra[0]}': {' '.join(ctx.command.get_usage(ctx).split()[1:])}"
+
+
+def _is_another(path: str, first: str) -> bool:
+    """Tell whether `path` is one more input like the first, rather than an output."""
+    from adv2e.sources import VIDEO_SUFFIXES
+
+    kinds = Path(path).suffix.lower(), Path(first).suffix.lower()
+    alike = kinds[0] == kinds[1] and Path(path).exists()
+    return alike or all(kind in VIDEO_SUFFIXES for kind in kinds)
+
+
+def _pattern(paths: Sequence[str]) -> str:
+    """Return what a shell finds the paths by: a pattern if they are of one kind and place."""
+    kinds = {(str(Path(path).parent), Path(path).suffix) for path in paths}
+    folder, suffix = kinds.pop()
+    if kinds or not suffix:
+        return shlex.join(paths)
+    return f"*{suffix}" if folder == "." else f"{shlex.quote(folder)}/*{suffix}"
+
+
+def _without(given: Sequence[str], left_out: Sequence[str]) -> list[str]:
+    """Return the options among the arguments, quoted."""
+    rest = list(given)
+    for text in left_out:
+        del rest[_last(rest, text)]
+    return [shlex.quote(text) for text in rest]
+
+
+def _last(given: Sequence[str], text: str) -> int:
+    """Return where `text` stands last: before that it may be the value of an option."""
+    return len(given) - 1 - given[::-1].index(text)

@@ -1,0 +1,59 @@
+"""What a shell offers when Tab is pressed: file names, and names that this program knows.
+
+Options offer themselves, and so do those that have choices.  What is asked here imports no more
+than it must: somebody waits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import click
+from click.shell_completion import CompletionItem
+
+Offer = list[CompletionItem]
+
+
+def starting(names: Iterable[str], incomplete: str) -> Offer:
+    """Return those of the names that begin with what was typed."""
+    return [CompletionItem(name) for name in names if name.startswith(incomplete)]
+
+
+def files(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
+    """Let the shell offer files and folders."""
+    return [CompletionItem(incomplete, type="file")]
+
+
+def configurations(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
+    """Offer the shipped configurations; where none begins so, files."""
+    from adv2e.config.files import shipped
+
+    return starting(shipped(), incomplete) or files(ctx, param, incomplete)
+
+
+def keys(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
+    """Offer the keys of a configuration."""
+    from adv2e.config import all_keys
+
+    return starting((f"{key.path}=" for key in all_keys() if not key.is_section), incomplete)
+
+
+def effects(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
+    """Offer the effects that have a page, by all of their names."""
+    from adv2e.effects import named
+
+    return starting(named(), incomplete)
+
+
+def formats(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
+    """Offer the formats that can be written."""
+    from adv2e.formats.writing import FORMATS
+
+    return starting(FORMATS, incomplete)
+
+
+def layouts(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
+    """Offer the layouts of HDF5 files."""
+    from adv2e.formats.writing import LAYOUTS
+
+    return starting(LAYOUTS, incomplete)
