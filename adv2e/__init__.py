@@ -1,9 +1,30 @@
-"""Video or image sequences in, event-camera (DVS) events out.
+"""Turn video into the events of an event camera (DVS), and compare them with real recordings.
 
-The package simulates the pixel of a dynamic vision sensor: frames are interpolated, taken to the
-logarithm, passed through a first-order low-pass whose corner follows the brightness, and compared
-with thresholds, with noise (Jiang, Zhou, Lin: "ADV2E: Bridging the Gap Between Analogue Circuit
-and Discrete Frames in the Video-to-Events Simulator").
+============  ====================================================================================
+simulate      frames in memory -> events, chunk by chunk
+convert       video, folder of images or recording -> a file of events
+load_config   a configuration from files, names, mappings and single keys; its type is Config
+read_events   a file of events -> Recording (events, sensor size, frames if there are any)
+write_events  events -> a file
+voxel_grid    events -> (bins, rows, columns), as networks take them
+render        events -> pictures and films
+diagnose      a real recording -> the effect that its simulation lacks
+EVENT_DTYPE   the record of an event: t [us], x, y, p (1 ON, 0 OFF)
+============  ====================================================================================
+
+The method is that of Jiang, Zhou, Lin: "ADV2E: Bridging the Gap Between Analogue Circuit and
+Discrete Frames in the Video-to-Events Simulator".
+
+Examples
+--------
+>>> import numpy as np
+>>> import adv2e
+>>> frames = [np.full((180, 240), dn, np.uint8) for dn in (20, 40, 80, 160)]
+>>> events = np.concatenate(list(adv2e.simulate(frames, 100)))  # 100 frames a second
+>>> events.dtype == adv2e.EVENT_DTYPE
+True
+>>> adv2e.voxel_grid(events, 5, (240, 180)).shape
+(5, 180, 240)
 """
 
 from __future__ import annotations
@@ -14,26 +35,38 @@ __all__ = [
     "EVENT_DTYPE",
     "Config",
     "__version__",
+    "convert",
+    "diagnose",
     "load_config",
     "read_events",
+    "render",
     "simulate",
+    "voxel_grid",
     "write_events",
 ]
 
 TYPE_CHECKING = False  # as in `typing`, which takes longer to import than all else here
 if TYPE_CHECKING:
+    from adv2e.comparison.grids import voxel_grid
     from adv2e.config import Config, load_config
+    from adv2e.conversion.convert import convert
     from adv2e.conversion.simulation import simulate
+    from adv2e.diagnosis.recordings import diagnose
     from adv2e.events import EVENT_DTYPE
     from adv2e.formats.reading import read_events
     from adv2e.formats.writing import write_events
+    from adv2e.rendering.render import render
 
 _HOMES = {
     "EVENT_DTYPE": "adv2e.events",
     "Config": "adv2e.config",
+    "convert": "adv2e.conversion.convert",
+    "diagnose": "adv2e.diagnosis.recordings",
     "load_config": "adv2e.config",
     "read_events": "adv2e.formats.reading",
+    "render": "adv2e.rendering.render",
     "simulate": "adv2e.conversion.simulation",
+    "voxel_grid": "adv2e.comparison.grids",
     "write_events": "adv2e.formats.writing",
 }
 

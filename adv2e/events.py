@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.errors import DataError
+
 EVENT_DTYPE = np.dtype([("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
 """The record type of every event array in the package."""
 
@@ -39,6 +41,46 @@ def make_events(t: Any, x: Any, y: Any, p: Any) -> Events:
     events["t"], events["x"], events["y"] = t, x, y
     events["p"] = np.asarray(p) > 0
     return events
+
+
+def checked_events(events: Any, width: int, height: int) -> Events:
+    """Return events that somebody made as a sorted array of ``EVENT_DTYPE``.
+
+    Parameters
+    ----------
+    events : structured array, (n,)
+        With the fields t [us], x, y, p of whole numbers, in any order of time.
+    width, height : int
+        Size of the sensor [pixels].
+
+    Raises
+    ------
+    DataError
+        The array has other fields, or an event lies outside the sensor; the text names the first.
+    """
+    events = np.asarray(events)
+    held = events.dtype.names or ()
+    if events.ndim != 1 or not {"t", "x", "y", "p"} <= set(held):
+        raise DataError(
+            f"events: must be a structured array, (n,), with the fields t, x, y, p, got"
+            f" {events.dtype} {events.shape}"
+        )
+    for name in ("t", "x", "y"):
+        if events[name].dtype.kind not in "iu":
+            raise DataError(
+                f"events: {name} must be whole numbers, t in microseconds, got {events[name].dtype}"
+            )
+    for name, most in (("x", width), ("y", height)):
+        outside = np.flatnonzero((events[name] < 0) | (events[name] >= most))
+        if outside.size:
+            number = int(outside[0])
+            raise DataError(
+                f"events: number {number} has {name} {events[name][number]}, outside a sensor of"
+                f" {width}x{height} pixels"
+            )
+    if events.dtype != EVENT_DTYPE:
+        events = make_events(*(events[name] for name in ("t", "x", "y", "p")))
+    return events if is_sorted(events) else sort_events(events)
 
 
 def pixels_of(events: Events, columns: int) -> NDArray[np.int64]:

@@ -95,10 +95,10 @@ def command(
 
     reading = Reading(source, **given, start_s=start, stop_s=stop, t0=t0, threads=threads)
     with reading:  # it reads while all else that is needed is imported
-        from adv2e.conversion.pipeline import convert
+        from adv2e.conversion.pipeline import convert_reading
 
         gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
-        summary = convert(
+        summary = convert_reading(
             reading,
             output,
             config=config(),

@@ -43,6 +43,7 @@ def command(
     """Make a sample clip, convert it and render the events.
 
     The clip is a textured scene with disks of high contrast that moves, rests, moves and rests.
+    Beside it, recording.zip and declared.yaml are made for a first 'adv2e diagnose'.
 
     \b
     Examples:

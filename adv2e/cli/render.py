@@ -109,18 +109,11 @@ def command(
         raise click.UsageError("-o is missing: a .mp4, .webm, .avi, .gif or .png file")
     options.check_part(shown["start_s"], shown["stop_s"])
     from adv2e.formats.reading import read_events
-    from adv2e.rendering import Style, check_suffix, parse_colour, render_recording
+    from adv2e.rendering import render_recording
+    from adv2e.rendering.render import chosen_style
 
-    is_film = check_suffix(output) != ".png"
-    if shown["at_s"] and is_film:
-        raise click.UsageError("--at is for a .png; --start and --stop choose the part for a film")
-    usual_ms = 1e3 * shown["speed"] / shown["fps"] if is_film else 20.0
-    chosen = Style(
-        name=style,
-        on=parse_colour(on_color),
-        off=parse_colour(off_color),
-        window_us=max(1, round(1e3 * (window or usual_ms))),
-    )
+    about = {name: shown[name] for name in ("fps", "speed", "at_s")}
+    chosen = chosen_style(output, style, on_color, off_color, window_ms=window, **about)
     recording = read_events(events, time_unit=time_unit)
     for problem in recording.problems:
         log(f"{events}: {problem}")

@@ -114,9 +114,9 @@ def _window_distances(
     parts: Sequence[Events], window: Window, width: int, height: int
 ) -> dict[str, float | None]:
     """Return the grid measures between two of `parts`, relative to a third or the first."""
-    grids = [voxel_grid(part, window, BINS, width, height) for part in parts]
-    counts = [voxel_grid(part, window, 1, width, height) for part in parts]
-    own_a, own_b = (voxel_grid(part, own_window(part), BINS, width, height) for part in parts[:2])
+    grids = [voxel_grid(part, BINS, (width, height), window) for part in parts]
+    counts = [voxel_grid(part, 1, (width, height), window) for part in parts]
+    own_a, own_b = (voxel_grid(part, BINS, (width, height), own_window(part)) for part in parts[:2])
     which = 2 if len(parts) > 2 else 0
     apart, apart_1 = grids[0] - grids[1], counts[0] - counts[1]
     return {

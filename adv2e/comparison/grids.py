@@ -17,8 +17,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.comparison.windows import Window
-from adv2e.events import Events
+from adv2e.comparison.windows import Window, cut
+from adv2e.errors import DataError
+from adv2e.events import Events, checked_events, pixels_of
 
 Grid = NDArray[np.float64]
 """(bins, rows, columns)."""
@@ -33,26 +34,55 @@ def signs(events: Events) -> NDArray[np.float64]:
     return np.where(events["p"] > 0, 1.0, -1.0)
 
 
-def voxel_grid(events: Events, window: Window, bins: int, width: int, height: int) -> Grid:
-    """Return the signed grid of `events`, bilinear in time.
+def voxel_grid(
+    events: Events, bins: int, size: tuple[int, int], window: Window | None = None
+) -> Grid:
+    """Return the signed grid of events: ON counts +1, OFF -1, shared by the two nearest bins.
 
     Parameters
     ----------
-    events : Events
-        All of them inside `window`.
-    window : (first, last)
-        Times that stand for the middles of the first and of the last bin [us].
+    events : (n,) array of EVENT_DTYPE
+        In any order.  Events outside the window are left out.
     bins : int
         Number of bins; with 1 all events weigh the same.
-    width, height : int
-        Columns and rows of the sensor.
+    size : (int, int)
+        Width and height of the sensor [pixels].
+    window : (int, int), optional
+        Times of the middles of the first and of the last bin [us], which belong to the window.
+        Default: times of the first and the last event, as E2VID has it.
+
+    Returns
+    -------
+    (bins, height, width) array of float64
+
+    Raises
+    ------
+    DataError
+        There is no bin, the window ends before it begins, or an event lies outside the sensor.
+
+    Examples
+    --------
+    >>> from adv2e import voxel_grid
+    >>> from adv2e.events import make_events
+    >>> events = make_events(t=[0, 25, 100], x=[0, 1, 2], y=[0, 0, 1], p=[1, 1, 0])
+    >>> voxel_grid(events, 3, (3, 2))[:, 0]
+    array([[1. , 0.5, 0. ],
+           [0. , 0.5, 0. ],
+           [0. , 0. , 0. ]])
     """
-    first, last = window
+    width, height = size
+    events = checked_events(events, width, height)
+    first, last = own_window(events) if window is None else window
+    if bins < 1:
+        raise DataError(f"voxel grid: {bins} bins, at least 1 is needed")
+    if last < first:
+        raise DataError(f"voxel grid: the window ends at {last} us, before it begins at {first} us")
+    events = cut(events, first, last + 1)
     place = (bins - 1) * (events["t"] - first) / ((last - first) or 1)
     lower = np.minimum(place.astype(np.int64), max(bins - 2, 0))
     share = place - lower
     pixels = width * height
-    cell = (lower * height + events["y"]) * width + events["x"]
+    cell = lower * pixels + pixels_of(events, width)
     sign = signs(events)
     grid: Grid = np.bincount(cell, sign * (1.0 - share), bins * pixels).astype(
         np.float64, copy=False

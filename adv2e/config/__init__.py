@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from adv2e.config.build import Key, all_keys, build, keys_of
-from adv2e.config.files import read, shipped
+from adv2e.config.files import find, read, shipped
 from adv2e.config.merge import merge, parse_set
 from adv2e.config.model import Config
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
@@ -24,6 +24,7 @@ __all__ = [
     "Config",
     "Key",
     "all_keys",
+    "files_among",
     "from_dict",
     "keys_of",
     "load_config",
@@ -82,8 +83,11 @@ def load_config(
     configs = (layer for layer in layers if isinstance(layer, Config))
     own = {effect: None for config in configs for effect in user_effects(config).values()}
     added = [effect for effect in effects if effect not in own]
-    sets = [sets] if isinstance(sets, str) else sets
-    return build(config_class([*own, *added]), _merged(layers, sets, seed))
+    return build(config_class([*own, *added]), _merged(layers, _texts(sets), seed))
+
+
+def _texts(sets: str | Sequence[str]) -> Sequence[str]:
+    return [sets] if isinstance(sets, str) else sets
 
 
 def _listed(files: Written | Sequence[Written] | None) -> Sequence[Written]:
@@ -92,6 +96,11 @@ def _listed(files: Written | Sequence[Written] | None) -> Sequence[Written]:
     if isinstance(files, Sequence) and not isinstance(files, str):
         return files
     return [files]
+
+
+def files_among(files: Written | Sequence[Written] | None) -> list[Path]:
+    """Return the files that :func:`load_config` reads for `files`."""
+    return [find(one) for one in _listed(files) if isinstance(one, (str, Path))]
 
 
 def _layer(written: Written) -> Value:
@@ -123,12 +132,18 @@ def _merged(files: Sequence[Written], sets: Sequence[str], seed: int | None = No
     return reduce(merge, [*map(_layer, files), *over], Value({}))
 
 
-def names_of(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> str:
+def names_of(files: Written | Sequence[Written] | None = (), sets: str | Sequence[str] = ()) -> str:
     """Return what a configuration was made from, for people: names without folders, and keys."""
-    return shown(", ".join([*(Path(name).name for name in files), *sets]))
+    names = (
+        Path(one).name if isinstance(one, (str, Path)) else f"a {type(one).__name__}"
+        for one in _listed(files)
+    )
+    return shown(", ".join([*names, *_texts(sets)]))
 
 
-def written_keys(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> dict[str, Any]:
+def written_keys(
+    files: Written | Sequence[Written] | None = (), sets: str | Sequence[str] = ()
+) -> dict[str, Any]:
     """Return the keys that `files` and `sets` write, by path, with what they say; no lists.
 
     A section without keys is one itself.
@@ -138,7 +153,7 @@ def written_keys(files: Sequence[str | Path] = (), sets: Sequence[str] = ()) -> 
     ConfigError, UsageError
         As :func:`load_config`.
     """
-    return dict(_scalars(_merged(files, sets), ""))
+    return dict(_scalars(_merged(_listed(files), _texts(sets)), ""))
 
 
 def _scalars(tree: Value, path: str) -> Iterator[tuple[str, Any]]:

@@ -189,7 +189,20 @@ class Readout(Section):
 
 @dataclass(frozen=True, kw_only=True)
 class Config(Section):
-    """Everything that decides which events come out."""
+    """Everything that decides which events come out.
+
+    :func:`adv2e.load_config` makes one, from the defaults, names, files, mappings and single keys,
+    and changes one.  Values are attributes; ``adv2e config show`` tells what each key means.
+
+    Examples
+    --------
+    >>> from adv2e import Config, load_config
+    >>> Config() == load_config()
+    True
+    >>> config = load_config("davis346", "pixel.thresholds.on=0.3")
+    >>> config.pixel.thresholds.on
+    0.3
+    """
 
     seed: int = parameter(
         0, unit="-", meaning="seed of all random numbers", at_least=0, at_most=rng.LARGEST_SEED

@@ -1,4 +1,4 @@
-"""The demonstration: a sample clip, its events, a picture and a film of them."""
+"""The demonstration: a sample clip, its events, a picture and a film, and a sample recording."""
 
 from __future__ import annotations
 
@@ -7,16 +7,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from adv2e.conversion.pipeline import Summary, convert
+import numpy as np
+
+from adv2e import __version__
+from adv2e.config import load_config
+from adv2e.conversion.pipeline import Summary, convert_reading
 from adv2e.conversion.reading import Reading
+from adv2e.conversion.simulation import simulate
 from adv2e.errors import OutputError
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
 from adv2e.formats.reading import read_events
+from adv2e.formats.writing import open_sink
 from adv2e.rendering import Style, render_recording
 from adv2e.rendering.timeline import caption
 from adv2e.synthetic import Scene
-from adv2e.synthetic.clips import write_video
+from adv2e.synthetic.clips import frame_times, write_video
+from adv2e.synthetic.scene import RAMP_S
 
 if TYPE_CHECKING:
     from adv2e.config import Config
@@ -32,6 +39,20 @@ WINDOW_US = 10_000
 
 _RESTS = 1e-6  # speed below which the scene rests
 
+RECORDING_SIZE, RECORDING_FPS, RECORDING_S = (32, 24), 500.0, 0.6
+"""The sample recording: width and height, frames a second, length [s]."""
+
+DECLARED = """\
+# What is known of the camera that made recording.zip: the defaults of adv2e, and that its frames
+# come so fast that none need to be made between them. One thing about it is not known.
+sampling: {L: 1}
+"""
+
+UNDECLARED = "pixel.refractory.period_us=4000"
+"""What the sample recording's camera has and nobody declares."""
+
+_RECORDING_SEED = 2  # another chip, and other noise, than a simulation of the declared model has
+
 
 @dataclass(frozen=True)
 class Demo:
@@ -41,6 +62,8 @@ class Demo:
     events: Path
     picture: Path
     film: Path
+    recording: Path
+    declared: Path
     summary: Summary
 
     def text(self) -> str:
@@ -61,6 +84,9 @@ class Demo:
                 f"picture  {shown(self.picture)}",
                 "         frames and, at their right, events: ON red, OFF blue",
                 f"film     {shown(self.film)}",
+                f"sample   {shown(self.recording)}",
+                "         a recording to diagnose, simulated with a dead time that"
+                f" {shown(self.declared.name)} does not declare",
                 "",
                 "Look at the picture first. Then try: adv2e convert VIDEO --preview events.mp4",
             )
@@ -76,7 +102,7 @@ def run_demo(
     progress: bool = False,
     log: Callable[[str], None] = lambda text: None,
 ) -> Demo:
-    """Make clip, events, picture and film in `folder`.
+    """Make clip, events, picture, film and a sample recording in `folder`.
 
     Raises
     ------
@@ -88,13 +114,14 @@ def run_demo(
     clip, events = folder / "clip.avi", folder / "clip.events.h5"
     picture, film = folder / "clip.events.png", folder / "clip.events.mp4"
     staging = Staging(overwrite)
-    for output in (clip, events, picture, film):
+    sample, declared = folder / "recording.zip", folder / "declared.yaml"
+    for output in (clip, events, picture, film, sample, declared):
         staging.file(output)  # checks, before any work, that it may be written
     scene = Scene()
     size = {"width": WIDTH, "height": HEIGHT}
     write_video(scene, clip, **size, fps=FPS, duration_s=DURATION_S, overwrite=overwrite)
     with Reading(str(clip), threads=threads) as reading:
-        summary = convert(
+        summary = convert_reading(
             reading,
             str(events),
             config=config,
@@ -118,4 +145,31 @@ def run_demo(
         caption=describe,
         overwrite=overwrite,
     )
-    return Demo(clip, events, picture, film, summary)
+    _record(sample, declared, overwrite)
+    return Demo(clip, events, picture, film, sample, declared, summary)
+
+
+def _record(sample: Path, declared: Path, overwrite: bool) -> None:
+    """Write a recording of a fast scene, by a camera that is not quite as declared."""
+    (width, height), scene = RECORDING_SIZE, Scene(speed=1.5)
+    times = frame_times(RECORDING_FPS, RECORDING_S)
+    frames = [
+        np.rint(scene.light(RAMP_S / 2 + t_s, width, height) * 257).astype(np.uint16)
+        for t_s in times
+    ]
+    with Staging(overwrite) as staging:
+        text = staging.file(declared)
+        config = load_config([], ["sampling.L=1", UNDECLARED], _RECORDING_SEED)
+        with open_sink(
+            sample,
+            width=width,
+            height=height,
+            metadata={"adv2e": __version__},
+            with_frames=True,
+            staging=staging,
+        ) as sink:
+            text.write_text(DECLARED, "utf-8")
+            for t_s, frame in zip(times, frames, strict=True):
+                sink.write_frame(round(t_s * 1e9), frame)
+            for chunk in simulate(frames, times, config):
+                sink.write_events(chunk)

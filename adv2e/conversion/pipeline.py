@@ -58,6 +58,7 @@ class Summary:
     events: int
     on: int
     seconds: float
+    notes: tuple[str, ...] = ()
 
     def text(self) -> str:
         """Return the summary as two lines for people."""
@@ -125,7 +126,7 @@ def default_output(source: str) -> str:
     return f"{name if path.is_dir() else Path(name).stem}.events.h5"
 
 
-def convert(
+def convert_reading(
     reading: Reading,
     output: str | None,
     *,
@@ -138,6 +139,7 @@ def convert(
     progress: bool = False,
     also_read: Iterable[str | Path] = (),
     log: Callable[[str], None] = lambda text: None,
+    doubt: Callable[[str], None] | None = None,
 ) -> Summary:
     """Convert one video, image sequence or recording to events.
 
@@ -157,8 +159,8 @@ def convert(
         Show a progress bar on stderr.
     also_read : iterable of str or Path
         Files that `config` is made of, which must not be written over.
-    log : callable
-        Takes lines for people.
+    log, doubt : callable
+        Take lines for people; `doubt` those that ask for a look, by default `log`.
 
     Raises
     ------
@@ -166,6 +168,7 @@ def convert(
         For anything wrong with input or output; then no output file is left.
     """
     began = time.perf_counter()
+    doubt = doubt or log
     recording, workers = reading.source, reading.threads
     if recording.largest is not None and recording.dtype.kind == "f":
         check_white(recording.largest, recording.path, config.frames.full_scale)
@@ -204,8 +207,8 @@ def convert(
         work = stack.enter_context(OrderedWork(int(beside), limit=BEHIND_BYTES, count=BEHIND_TASKS))
         out = _Output(sink, seen, white, work)
         told = _doubt_of_white(recording, recording.largest, config)
-        for doubt in filter(None, (*recording.doubts, told)):
-            log(doubt)
+        for text in filter(None, (*recording.doubts, told)):
+            doubt(text)
         hooks = active_hooks(config)
         table = kernel_table(decoder, config.sampling, hooks)
         stated = config.frames.full_scale
@@ -229,8 +232,10 @@ def convert(
     if told:
         largest = f"{recording.path}: whole numbers up to {recording.largest_read:g} came"
         found = "" if found else f"{largest}: what was said of white does not hold"
-    for note in filter(None, (*recording.notes, found)):
+    for note in recording.notes:
         log(note)
+    if found:
+        doubt(found)
     return Summary(
         output=target,
         width=recording.width,

@@ -1,15 +1,4 @@
-"""From light to events: the pixel array fed with interpolated frames, in bounded memory.
-
-Example
--------
->>> import numpy as np
->>> from adv2e import Config, simulate
->>> frames = [np.full((4, 6), dn, np.uint8) for dn in (20, 40, 80, 160)]
->>> events = np.concatenate(list(simulate(frames, 100)))  # 100 frames a second
->>> times = [0.0, 0.01, 0.02, 0.03]  # seconds
->>> sum(map(len, simulate(frames, times, Config()))) == len(events) > 0
-True
-"""
+"""From light to events: the pixel array fed with interpolated frames, in bounded memory."""
 
 from __future__ import annotations
 
@@ -88,6 +77,16 @@ def simulate(
     -----
     UserWarning
         The second frame comes so late that the times are hardly in seconds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from adv2e import simulate
+    >>> frames = [np.full((4, 6), dn, np.uint8) for dn in (20, 40, 80, 160)]
+    >>> events = np.concatenate(list(simulate(frames, 100)))  # 100 frames a second
+    >>> times = [0.0, 0.01, 0.02, 0.03]  # seconds
+    >>> sum(map(len, simulate(frames, times, "adv2e"))) == len(events) > 0
+    True
     """
     config = config if isinstance(config, Config) else load_config(config)
     instants = _instants(times)

@@ -20,7 +20,7 @@ _SUFFIXES = (".txt", ".zip", ".h5", ".hdf5", ".npz")
 
 
 def read_events(path: str | Path, *, time_unit: str | None = None) -> Recording:
-    """Read an event file, or a folder in the DAVIS240C layout.
+    r"""Read an event file, or a folder in the DAVIS240C layout.
 
     Parameters
     ----------
@@ -40,6 +40,20 @@ def read_events(path: str | Path, *, time_unit: str | None = None) -> Recording:
     DataError
         No such file, an unknown format, or content that cannot be read; the text names the file,
         and the line where there are lines.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from adv2e import read_events
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "events.txt")
+    ...     _ = path.write_text("0.000001 3 2 1\n0.000250 0 0 0\n")
+    ...     recording = read_events(path)
+    >>> recording.events["t"].tolist(), recording.events["p"].tolist()
+    ([1, 250], [1, 0])
+    >>> recording.width, recording.height, recording.frame_times_ns is None
+    (4, 3, True)
     """
     path = Path(path)
     try:

@@ -14,12 +14,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from adv2e.background import default_threads
-from adv2e.errors import DataError, UsageError
-from adv2e.events import Events, is_sorted, make_events, sort_events
+from adv2e.errors import UsageError
+from adv2e.events import Events, checked_events
 from adv2e.files.staging import Staging
 from adv2e.formats.sink import Request, Sink, Writer
 
@@ -142,42 +139,11 @@ def write_events(
     ([10, 20], 4, 3)
     """
     width, height = size
-    ours = _sorted_inside(np.asarray(events), width, height)
+    ours = checked_events(events, width, height)
     with open_sink(
         path, width=width, height=height, metadata=dict(metadata or {}), overwrite=overwrite
     ) as sink:
         sink.write_events(ours)
-
-
-def _sorted_inside(events: NDArray[Any], width: int, height: int) -> Events:
-    """Return events of our type, sorted.
-
-    Raises
-    ------
-    DataError
-        See :func:`write_events`.
-    """
-    held = events.dtype.names or ()
-    if events.ndim != 1 or not {"t", "x", "y", "p"} <= set(held):
-        raise DataError(
-            f"events: must be a structured array, (n,), with the fields t, x, y, p, got"
-            f" {events.dtype} {events.shape}"
-        )
-    for name in ("t", "x", "y"):
-        if events[name].dtype.kind not in "iu":
-            raise DataError(
-                f"events: {name} must be whole numbers, t in microseconds, got {events[name].dtype}"
-            )
-    for name, most in (("x", width), ("y", height)):
-        outside = np.flatnonzero((events[name] < 0) | (events[name] >= most))
-        if outside.size:
-            number = int(outside[0])
-            raise DataError(
-                f"events: number {number} has {name} {events[name][number]}, outside a sensor of"
-                f" {width}x{height} pixels"
-            )
-    made = make_events(*(events[name] for name in ("t", "x", "y", "p")))
-    return made if is_sorted(made) else sort_events(made)
 
 
 def _writer(path: Path, name: str) -> type[Writer]:

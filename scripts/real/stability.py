@@ -70,7 +70,7 @@ def compare_halved(
     changes, tiles = [], []
 
     def grid(events: Events, window: tuple[int, int]) -> NDArray[Any]:
-        return smoothed(voxel_grid(cut(events, *window), window, _BINS, width, height))
+        return smoothed(voxel_grid(cut(events, *window), _BINS, (width, height), window))
 
     for window in windows.used:
         a, b = (grid(one, window) for one in whole)

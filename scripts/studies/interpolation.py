@@ -141,7 +141,7 @@ def distance(true: Events, made: Events, times_ns: list[int], setup: Setup) -> f
 
 
 def _grid(stream: Events, window: tuple[int, int], setup: Setup) -> Grid:
-    return smoothed(voxel_grid(cut(stream, *window), window, BINS, setup.width, setup.height))
+    return smoothed(voxel_grid(cut(stream, *window), BINS, (setup.width, setup.height), window))
 
 
 def nearest_ms(of: Events, among: Events, width: int) -> float:

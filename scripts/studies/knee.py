@@ -182,7 +182,7 @@ class Reference:
 
     def _grid(self, events: Events, window: int) -> Grid:
         edges = self.windows[window]
-        return voxel_grid(cut(events, *edges), edges, BINS, self.setup.width, self.setup.height)
+        return voxel_grid(cut(events, *edges), BINS, (self.setup.width, self.setup.height), edges)
 
     def _distance(self, events: Events) -> float:
         """Return the distance of all windows at once: false events at rest count, too."""

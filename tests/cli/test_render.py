@@ -74,7 +74,7 @@ def test_frames_are_shown_unless_not_wanted(adv2e, recording, tmp_path):
         (["-o", "out.mov"], "out.mov: a film ends in"),
         (["-o", "out.png", "--on-color", "rouge"], "colour 'rouge'"),
         (["-o", "out.png", "--style", "pink"], "'pink'"),
-        (["-o", "out.mp4", "--at", "1"], "--at is for a .png"),
+        (["-o", "out.mp4", "--at", "1"], "out.mp4: instants (--at) are for a .png"),
         (["-o", "out.mp4", "--start", "2", "--stop", "1"], "--stop 1 must be after --start 2"),
         (["-o", "out.gif", "--fps", "60"], "at most 50"),
         (["-o", "out.png", "--window", "0"], "--window"),

@@ -23,9 +23,9 @@ def test_each_measure_is_that_of_its_definition(random_events):
     found = distances(a, b, WINDOWS, *SIZE)
     for n, window in enumerate(WINDOWS.used):
         parts = cut(a, *window), cut(b, *window)
-        g = [voxel_grid(part, window, 5, *SIZE) for part in parts]
-        own = [voxel_grid(part, own_window(part), 5, *SIZE) for part in parts]
-        one = [voxel_grid(part, window, 1, *SIZE) for part in parts]
+        g = [voxel_grid(part, 5, SIZE, window) for part in parts]
+        own = [voxel_grid(part, 5, SIZE, own_window(part)) for part in parts]
+        one = [voxel_grid(part, 1, SIZE, window) for part in parts]
         expected = {
             "bins_shared_window": norm(g[0] - g[1]),
             "bins_own_span": norm(own[0] - own[1]),

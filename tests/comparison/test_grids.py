@@ -7,7 +7,7 @@ from scipy import ndimage
 from adv2e.comparison.grids import own_window, smoothed, voxel_grid, z_scored
 from adv2e.events import empty_events, make_events
 
-WIDTH, HEIGHT = 12, 9
+WIDTH, HEIGHT = SIZE = 12, 9
 
 
 def slow_grid(events, window, bins):
@@ -27,18 +27,18 @@ def slow_grid(events, window, bins):
 def test_the_grid_is_that_of_the_definition(events, bins):
     window = (0, 100_000)
     np.testing.assert_allclose(
-        voxel_grid(events, window, bins, WIDTH, HEIGHT), slow_grid(events, window, bins), atol=1e-12
+        voxel_grid(events, bins, SIZE, window), slow_grid(events, window, bins), atol=1e-12
     )
 
 
 def test_the_grid_holds_every_event_once(events):
-    grid = voxel_grid(events, own_window(events), 5, WIDTH, HEIGHT)
+    grid = voxel_grid(events, 5, SIZE, own_window(events))
     assert grid.sum() == pytest.approx(2 * events["p"].sum() - len(events))
 
 
 def test_first_and_last_event_fill_first_and_last_bin():
     events = make_events([10, 30], [1, 2], [3, 4], [1, 0])
-    grid = voxel_grid(events, own_window(events), 5, WIDTH, HEIGHT)
+    grid = voxel_grid(events, 5, SIZE, own_window(events))
     assert grid[0, 3, 1] == 1
     assert grid[4, 4, 2] == -1
     assert np.abs(grid).sum() == 2
@@ -46,7 +46,7 @@ def test_first_and_last_event_fill_first_and_last_bin():
 
 def test_events_of_a_single_time_fall_into_the_first_bin():
     events = make_events([7, 7], [1, 2], [3, 4], [1, 1])
-    grid = voxel_grid(events, own_window(events), 5, WIDTH, HEIGHT)
+    grid = voxel_grid(events, 5, SIZE, own_window(events))
     assert grid[0].sum() == 2
     assert not grid[1:].any()
 
@@ -56,19 +56,19 @@ def test_epoch_times_keep_their_microseconds(events):
     later["t"] += 1_468_941_032_229_165
     start = 1_468_941_032_229_165
     np.testing.assert_array_equal(
-        voxel_grid(events, (0, 100_000), 5, WIDTH, HEIGHT),
-        voxel_grid(later, (start, start + 100_000), 5, WIDTH, HEIGHT),
+        voxel_grid(events, 5, SIZE, (0, 100_000)),
+        voxel_grid(later, 5, SIZE, (start, start + 100_000)),
     )
 
 
 def test_no_events_make_an_empty_grid():
     none = empty_events()
-    assert voxel_grid(none, own_window(none), 5, WIDTH, HEIGHT).shape == (5, HEIGHT, WIDTH)
+    assert voxel_grid(none, 5, SIZE, own_window(none)).shape == (5, HEIGHT, WIDTH)
     assert not z_scored(np.zeros((5, HEIGHT, WIDTH))).any()
 
 
 def test_z_score_is_taken_over_the_cells_that_are_not_zero(events):
-    grid = voxel_grid(events[:200], (0, 100_000), 5, WIDTH, HEIGHT)
+    grid = voxel_grid(events[:200], 5, SIZE, (0, 100_000))
     filled = grid != 0
     assert 0 < filled.sum() < grid.size
     scored = z_scored(grid)
@@ -84,7 +84,7 @@ def test_z_score_of_equal_cells_is_zero_rather_than_nan():
 
 
 def test_smoothing_is_a_3x3_gaussian_of_sigma_1_with_nothing_outside(events):
-    grid = voxel_grid(events, (0, 100_000), 5, WIDTH, HEIGHT)
+    grid = voxel_grid(events, 5, SIZE, (0, 100_000))
     y, x = np.mgrid[-1:2, -1:2]
     weights = np.exp(-(x**2 + y**2) / 2)
     weights /= weights.sum()

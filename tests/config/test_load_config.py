@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import doctest
 
 import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adv2e import config as package
 from adv2e.config import Config, from_dict, load_config, to_annotated_yaml, to_dict, to_yaml
 from adv2e.config.build import build
 from adv2e.config.model import Pixel, Sampling
@@ -46,12 +44,6 @@ def message(kind, *args, **kwargs):
 
 def test_nothing_given_is_the_defaults():
     assert load_config() == Config()
-
-
-def test_examples_in_the_documentation():
-    result = doctest.testmod(package)
-    assert result.attempted > 0
-    assert result.failed == 0
 
 
 def test_one_file_name_mapping_or_configuration_needs_no_list(write):

@@ -1,6 +1,5 @@
 """The Python entry point, and the stages between source and kernel."""
 
-import doctest
 import tracemalloc
 from contextlib import suppress
 
@@ -11,7 +10,6 @@ from harness import quiet
 import adv2e
 from adv2e.config import Config
 from adv2e.config.model import Frames, Sampling
-from adv2e.conversion import simulation
 from adv2e.errors import ConfigError, DataError
 from adv2e.events import is_sorted, sort_events
 from adv2e.light import intervals
@@ -32,12 +30,6 @@ def times(count=7, start=0.0):
 
 def run(images, at, config=None, **options):
     return np.concatenate(list(adv2e.simulate(images, at, config or Config(), **options)))
-
-
-def test_example_in_the_documentation():
-    result = doctest.testmod(simulation)
-    assert result.attempted > 0
-    assert result.failed == 0
 
 
 def test_sorted_and_the_same_for_any_chunk_and_thread_count(monkeypatch):

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import doctest
-
 import numpy as np
 import pytest
 
 import adv2e
 from adv2e.errors import DataError, OutputError
 from adv2e.events import make_events, sort_events
-from adv2e.formats import writing
 
 
 def events():
     rng = np.random.default_rng(1)
     t = rng.integers(0, 10**6, 500)
     return make_events(t, rng.integers(0, 40, 500), rng.integers(0, 30, 500), t % 2)
-
-
-def test_examples_in_the_documentation():
-    result = doctest.testmod(writing)
-    assert result.attempted > 0
-    assert result.failed == 0
 
 
 @pytest.mark.parametrize("name", ["a.txt", "a.h5", "a.zip", "a"])

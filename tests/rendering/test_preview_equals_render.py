@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.config import load_config
-from adv2e.conversion.pipeline import convert
+from adv2e.conversion.pipeline import convert_reading
 from adv2e.conversion.reading import Reading
 from adv2e.errors import OutputError
 from adv2e.events import empty_events, make_events
@@ -113,7 +113,7 @@ def test_preview_of_a_conversion_is_what_render_makes_of_its_file(clip, tmp_path
     for target, preview in (("out.zip", "film.avi"), ("out.h5", "sheet.png")):
         output, made, expected = (tmp_path / name for name in (target, preview, "_" + preview))
         with Reading(str(clip), threads=threads) as reading:
-            convert(
+            convert_reading(
                 reading,
                 str(output),
                 config=load_config([], sets),
@@ -138,7 +138,7 @@ def test_a_scene_at_rest_is_drawn_while_it_lasts(tmp_path, monkeypatch):
     times = np.arange(500) / 1000
     np.save(tmp_path / "still_ts.npy", times)
     with Reading(str(tmp_path / "still.npy"), threads=1) as reading:
-        convert(
+        convert_reading(
             reading,
             str(tmp_path / "out.txt"),
             config=load_config(["ideal"]),

@@ -1,0 +1,130 @@
+"""A whole conversion in one call: what ``adv2e convert`` does."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from adv2e.config import Written, files_among, load_config
+from adv2e.conversion.pipeline import Summary, convert_reading
+from adv2e.conversion.reading import Reading
+from adv2e.errors import UsageError
+from adv2e.sources.times.rates import Rate
+
+
+def convert(
+    source: str | Path,
+    output: str | Path | None = None,
+    config: Written | Sequence[Written] | None = None,
+    *,
+    fps: Rate | None = None,
+    timestamps: str | Path | None = None,
+    time_unit: str | None = None,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    t0: str = "auto",
+    allow_damaged: bool = False,
+    format: str | None = None,
+    layout: str | None = None,
+    with_frames: bool = False,
+    overwrite: bool = False,
+    preview: str | Path | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+) -> Summary:
+    """Convert a video, a folder of images or a recording to a file of events.
+
+    Parameters
+    ----------
+    source : str or Path
+        Video, folder of images, DAVIS240C recording, or .npy stack of frames.
+    output : str or Path, optional
+        File or folder to write; the suffix gives the format: .h5, .txt, .zip, or none for a
+        DAVIS240C folder.  Default: ``<stem>.events.h5`` in the current folder.
+    config : Config, or what :func:`adv2e.load_config` takes, optional
+    fps : str or number, optional
+        Frames a second, such as 30 or "30000/1001".
+    timestamps : str or Path, optional
+        List of the times of the frames, one a line.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times in lists.
+    start_s, stop_s : float, optional
+        Part to convert [s after the first frame].
+    t0 : {'auto', 'zero', 'keep'}
+        Time of the first frame: zero, or as on the source's clock; auto: keep where it has one.
+    allow_damaged : bool
+        Take what can be decoded of a damaged video.
+    format, layout : str, optional
+        Format of the output where its suffix does not say it, and layout of HDF5.
+    with_frames : bool
+        Store the frames in HDF5, too.
+    overwrite : bool
+        Replace, at the end, an output that exists.
+    preview : str or Path, optional
+        Picture or film of the events to write beside.
+    threads : int, optional
+        Default: all cores.  The events do not depend on it.
+    progress : bool
+        Show a progress bar on stderr.
+
+    Returns
+    -------
+    Summary
+        Counts, sizes, and what was noted, such as how light was decoded (`notes`).
+
+    Raises
+    ------
+    DataError, ConfigError, OutputError, UsageError
+        What is wrong with the input, the configuration, the output, or the arguments.
+
+    Warns
+    -----
+    UserWarning
+        Something about the input is in doubt, such as the unit of its times.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import numpy as np
+    >>> from adv2e import convert
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> clip = os.path.join(folder.name, "clip.npy")
+    >>> np.save(clip, np.repeat(np.array([20, 40, 80, 160], np.uint8), 32 * 24).reshape(4, 24, 32))
+    >>> done = convert(clip, os.path.join(folder.name, "clip.h5"), "davis346", fps=100)
+    >>> (done.width, done.height, done.frames, done.events > 0)
+    (32, 24, 4, True)
+    >>> folder.cleanup()
+    """
+    notes: list[str] = []
+    ready = load_config(config)
+    if fps is not None and timestamps is not None:
+        raise UsageError("fps and timestamps both give the times of the frames: keep one")
+    reading = Reading(
+        str(source),
+        fps=fps,
+        timestamps=timestamps,
+        time_unit=time_unit,
+        start_s=start_s,
+        stop_s=stop_s,
+        t0=t0,
+        allow_damaged=allow_damaged,
+        threads=threads,
+    )
+    with reading:
+        summary = convert_reading(
+            reading,
+            None if output is None else str(output),
+            config=ready,
+            format=format,
+            layout=layout,
+            with_frames=with_frames,
+            overwrite=overwrite,
+            preview=None if preview is None else str(preview),
+            progress=progress,
+            also_read=files_among(config),
+            log=notes.append,
+            doubt=lambda text: warnings.warn(text, stacklevel=5),
+        )
+    return replace(summary, notes=tuple(notes))

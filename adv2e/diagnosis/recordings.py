@@ -1,0 +1,106 @@
+"""A diagnosis in one call, from files to a report: what ``adv2e diagnose`` does."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from pathlib import Path
+
+from adv2e.config import Config, Written, files_among, load_config, names_of, written_keys
+from adv2e.config.user_effects import user_effects
+from adv2e.diagnosis.configurations import without_user_effects
+from adv2e.diagnosis.data.evidence import read_evidence
+from adv2e.diagnosis.diagnose import diagnose as diagnose_evidence
+from adv2e.diagnosis.fitting.library import names
+from adv2e.errors import UsageError
+from adv2e.reports.files import check_folder, write_reports
+from adv2e.reports.result import Diagnosis
+
+
+def diagnose(
+    recording: str | Path,
+    declared: Written | Sequence[Written] | None = None,
+    *,
+    output: str | Path | None = None,
+    without: Sequence[str] = (),
+    fit_thresholds: bool = False,
+    time_unit: str | None = None,
+    overwrite: bool = False,
+    threads: int | None = None,
+) -> Diagnosis:
+    """Find what a recording holds that its simulation lacks.
+
+    It takes minutes, as the recording is simulated some thousand times.
+
+    Parameters
+    ----------
+    recording : str or Path
+        Frames and events on one clock: a DAVIS240C folder or zip, or HDF5.
+    declared : Config, or what :func:`adv2e.load_config` takes, optional
+        What is known of the camera.
+    output : str or Path, optional
+        Folder for report.html, report.json and model.yaml.  Default: none is written.
+    without : sequence of str
+        Effects that are not to be tried.
+    fit_thresholds : bool
+        The contrast thresholds are not known: they are fitted first.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times in lists.
+    overwrite : bool
+        Replace the folder of an earlier report.
+    threads : int, optional
+        Default: all cores.  The result does not depend on it.
+
+    Returns
+    -------
+    Diagnosis
+        Among others `verdict`, `sentence`, `effects`, `errors`, and `model`, the configuration
+        found, which :func:`adv2e.load_config` takes.
+
+    Raises
+    ------
+    DataError, ConfigError, OutputError, UsageError
+        What is wrong with the recording, the configuration, the folder, or the arguments.
+
+    Examples
+    --------
+    >>> from adv2e import diagnose, load_config
+    >>> found = diagnose("recording.zip", "declared.yaml")
+    >>> found.verdict, [effect.name for effect in found.effects]
+    ('explained', ['refractory'])
+    >>> dead_time = load_config(found.model).pixel.refractory.period_us
+    """
+    config = load_config(declared)
+    check_names(without, names(config))
+    check_own_names(config)
+    config = without_user_effects(config, written_keys(declared))
+    if output is not None:
+        check_folder(output, overwrite=overwrite, inputs=[recording, *files_among(declared)])
+    found = diagnose_evidence(
+        read_evidence(recording, time_unit),
+        config,
+        declared_name=names_of(declared) or "the defaults",
+        without=without,
+        free_thresholds=fit_thresholds,
+        threads=threads,
+    )
+    if output is not None:
+        write_reports(found, output, overwrite=overwrite)
+    return found
+
+
+def check_names(without: Sequence[str], known: Sequence[str]) -> None:
+    """Raise UsageError for an effect that is not known."""
+    for name in without:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean '{near[0]}'?" if near else f"one of {', '.join(known)}"
+            raise UsageError(f"--without {name}: no such effect, {hint}")
+
+
+def check_own_names(config: Config) -> None:
+    """Raise UsageError for an effect of the user's own that has the name of a built-in one."""
+    known = names()
+    for name in user_effects(config):
+        if name in known:
+            raise UsageError(f"--effect: {name}: a built-in effect has that name; choose another")
