@@ -14,7 +14,7 @@ import pytest
 
 from adv2e.config import load_config
 from adv2e.conversion import demo
-from adv2e.diagnosis import prepare
+from adv2e.diagnosis import diagnose, prepare
 from adv2e.diagnosis.fitting.library import names
 from documentation.documents import ROOT, Block, Command, Document, documents
 from documentation.inputs import make_inputs
@@ -24,6 +24,11 @@ DOCUMENTS = {document.name: document for document in documents()}
 
 RIVALS = {"refractory", "event_loss", "shot_noise"}
 """The effects that compete in diagnoses here, besides those of the user's own: all take minutes."""
+
+FOUND = {
+    "adv2e/effects/README.md": ("again", "echo", {"user.echo.share": 0.3}),
+}
+"""Folder of a diagnosis that a document makes, the effect that it names, and what it fits."""
 
 _SHELL = re.compile(r"[|<>;&$*\n]")
 
@@ -40,6 +45,8 @@ def _small(monkeypatch, tmp_path):
         return [one for one in every(declared, hints) if one.name not in built_in]
 
     monkeypatch.setattr(prepare, "library", library)
+    # how large effects must be to be seen would take as many simulations again
+    monkeypatch.setattr(diagnose, "detectable", lambda *given: [])
     for name, value in {"WIDTH": 64, "HEIGHT": 48, "DURATION_S": 0.5}.items():
         monkeypatch.setattr(demo, name, value)
     monkeypatch.setattr(demo, "INSTANTS_S", (0.2, 0.4))
@@ -92,6 +99,13 @@ def test_all_that_a_document_shows_runs(name, adv2e, tmp_path):
     make_inputs(tmp_path, (block.text for block in document.blocks if block.language != "text"))
     for block in document.blocks:
         run_block(block, adv2e)
+    if name in FOUND:
+        folder, effect, values = FOUND[name]
+        report = json.loads((tmp_path / folder / "report.json").read_text("utf-8"))
+        assert report["verdict"] == "explained"
+        assert [one["name"] for one in report["effects"]] == [effect]
+        parameters = report["effects"][0]["parameters"]
+        assert {key: parameters[key] for key in values} == pytest.approx(values, rel=0.1)
 
 
 def only_looked_at(document: Document) -> list[Command]:

@@ -1,0 +1,48 @@
+"""The document on effects lists those that there are, and its example does what it says."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adv2e.effects import EFFECTS
+from documentation.documents import ROOT, Document
+
+DOCUMENT = Document.read(ROOT / "adv2e" / "effects" / "README.md")
+(EXAMPLE,) = (block.text for block in DOCUMENT.blocks if block.file == "echo.py")
+
+
+def test_all_effects_are_listed_in_their_order():
+    text = "\n".join(line for _, line in DOCUMENT.prose)
+    rows = re.findall(r"^\| `(\w+)` \| `([\w.]+)` \| .+\. \|$", text, flags=re.MULTILINE)
+    assert [name for name, _ in rows] == [effect.name for effect in EFFECTS]
+    for (_, key), effect in zip(rows, EFFECTS, strict=True):
+        assert key in effect.paths
+
+
+def test_effect_of_ones_own_runs(adv2e, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("echo.py").write_text(EXAMPLE)
+    levels = np.tile(np.array([20, 40, 80, 160, 80, 40], np.uint8), 3)
+    np.save("clip.npy", np.repeat(levels, 12 * 9).reshape(18, 9, 12))
+    given = ("convert", "clip.npy", "--fps", "200", "-q", "--effect", "echo.py")
+    events = {}
+    for share in ("0", "0.25"):
+        outcome = adv2e(*given, "-o", f"{share}.txt", "--set", f"user.echo.share={share}")
+        assert outcome == (0, "", "")
+        events[share] = Path(f"{share}.txt").read_text("ascii").splitlines()
+    assert len(events["0.25"]) / len(events["0"]) == pytest.approx(1.25, abs=0.05)
+    assert set(events["0"]) < set(events["0.25"])
+    times = [float(line.split()[0]) for line in events["0.25"]]
+    assert times == sorted(times)
+    kept = json.loads(Path("0.25.txt.json").read_text("utf-8"))
+    assert kept["config"]["user"] == {"echo": {"share": 0.25, "delay_us": 5000.0}}
+    (source,) = kept["effects"]
+    digest = hashlib.sha256(EXAMPLE.encode()).hexdigest()
+    assert source == {"name": "echo", "file": "echo.py", "sha256": digest}
+    assert "delay_us: 5000.0" in adv2e("config", "show", "--effect", "echo.py").out
