@@ -103,4 +103,4 @@ def command(
         click.echo(summary_text(found))
         click.echo(details_text(found))
         if output is not None:
-            click.echo(shown(f"written: {Path(output) / 'report.html'}, report.json, model.yaml"))
+            click.echo(shown(f"report: {Path(output) / 'report.html'}"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import click
@@ -9,7 +10,7 @@ import click
 from adv2e.cli import options
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from adv2e.cli.options import Log
     from adv2e.config import Config
@@ -61,14 +62,13 @@ def command(
     """
     from pathlib import Path
 
-    from tqdm import tqdm
-
     from adv2e.config import names_of, written_keys
     from adv2e.config.user_effects import user_effects
     from adv2e.diagnosis.configurations import without_user_effects
     from adv2e.diagnosis.data.evidence import read_evidence
     from adv2e.diagnosis.diagnose import diagnose
     from adv2e.diagnosis.fitting.library import names
+    from adv2e.files.names import shown
     from adv2e.reports.files import check_folder, write_reports
     from adv2e.reports.summary import summary_text
 
@@ -81,12 +81,9 @@ def command(
     declared = without_user_effects(declared, written)
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     check_folder(folder, overwrite=overwrite, inputs=[recording, *options.files_given()])
-    evidence = read_evidence(recording, time_unit)
-    with tqdm(unit="simulation", leave=False, disable=not progress) as bar:
-
-        def count(done: int) -> None:
-            bar.update(done - bar.n)
-
+    with _stages(progress) as tell:
+        tell("reading the recording", 0)
+        evidence = read_evidence(recording, time_unit)
         found = diagnose(
             evidence,
             declared,
@@ -94,12 +91,33 @@ def command(
             without=without,
             free_thresholds=fit_thresholds,
             threads=threads,
-            progress=count,
+            written=written,
+            progress=lambda now: tell(now.stage, now.simulations),
             log=lambda text: log(text, 1),
         )
     write_reports(found, folder, overwrite=overwrite)
     for line in summary_text(found).splitlines():
         log(line)
+    log(shown(f"report: {folder / 'report.html'}"))
+
+
+@contextmanager
+def _stages(shown: bool) -> Iterator[Callable[[str, int], None]]:
+    """Show a stage and the number of simulations done; how many there will be, nobody knows."""
+    from tqdm import tqdm
+
+    layout = "{desc}: {n_fmt} simulations in {elapsed}"
+    with tqdm(bar_format=layout, leave=False, disable=not shown) as bar:
+        last = ""
+
+        def tell(stage: str, simulations: int) -> None:
+            nonlocal last
+            bar.update(simulations - bar.n)
+            if stage != last:
+                bar.set_description_str(stage)
+                last = stage
+
+        yield tell
 
 
 def check_names(without: Sequence[str], known: Sequence[str]) -> None:

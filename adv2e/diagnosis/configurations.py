@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Collection, Mapping
+import sys
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from adv2e.config import Config, from_dict, to_dict
-from adv2e.config.paths import set_key
+from adv2e.config.paths import get_key, set_key
 from adv2e.config.user_effects import user_effects
 from adv2e.effects.readout.frame_coupling import FrameCoupling
-from adv2e.reports.keys import known_keys
-from adv2e.reports.result import Own
+from adv2e.reports.keys import Own, known_keys
 
 
 def with_keys(config: Config, keys: Mapping[str, Any]) -> Config:
@@ -57,7 +57,30 @@ def own_of(config: Config) -> Own:
             name: (inspect.getdoc(effect) or "").partition("\n")[0]
             for name, effect in effects.items()
         },
+        {name: path for name, effect in effects.items() if (path := _file_of(effect))},
     )
+
+
+def _file_of(effect: type) -> str:
+    """Return where an effect is written, as it was named; nothing where that is no file."""
+    return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "")
+
+
+def declared_of(config: Config, keys: Iterable[str]) -> dict[str, Any]:
+    """Return what a configuration holds of some keys, by path; None where their section is off."""
+    values = to_dict(config)
+    return {key: get_key(values, key) for key in keys}
+
+
+def defaults_of(held: Mapping[str, Any], written: Collection[str] | None) -> list[str]:
+    """Return those keys that nobody wrote, as far as `written` tells: it does not name lists."""
+    if written is None:
+        return []
+    return [
+        key
+        for key, value in held.items()
+        if key not in written and value is not None and not isinstance(value, (list, tuple))
+    ]
 
 
 def as_found(config: Config) -> dict[str, Any]:

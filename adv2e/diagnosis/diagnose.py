@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import closing
 
 from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.config import Config
-from adv2e.diagnosis.configurations import as_found, own_of
+from adv2e.diagnosis.configurations import as_found, declared_of, defaults_of, own_of
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.fitting.nuisances import thresholds_of
@@ -22,10 +22,11 @@ from adv2e.diagnosis.outcome.findings import (
     rejected_of,
     signatures_of,
 )
-from adv2e.diagnosis.outcome.verdict import sentence_of
-from adv2e.diagnosis.prepare import prepare
+from adv2e.diagnosis.outcome.verdict import remark_of
+from adv2e.diagnosis.prepare import DECLARED, prepare
 from adv2e.diagnosis.selection.search import Search
 from adv2e.diagnosis.simulation.affordable import affordable
+from adv2e.diagnosis.simulation.progress import Progress
 from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.reports.result import Diagnosis
 
@@ -36,10 +37,11 @@ def diagnose(
     *,
     declared_name: str = "the configuration given",
     without: Sequence[str] = (),
+    written: Collection[str] | None = None,
     free_thresholds: bool = False,
     sizes: bool = True,
     threads: int | None = None,
-    progress: Callable[[int], None] = lambda done: None,
+    progress: Callable[[Progress], None] = lambda now: None,
     log: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
     """Find what the declared model of a recording lacks.
@@ -55,6 +57,9 @@ def diagnose(
         Its file, for the report.
     without : sequence of str
         Effects that the library is to do without.
+    written : collection of str, optional
+        Dotted keys that somebody wrote into `declared`, so that the report tells them from the
+        program's defaults; default: it does not.
     free_thresholds : bool
         Whether thresholds are not known: they are fitted first, as a nuisance.
     sizes : bool
@@ -63,7 +68,8 @@ def diagnose(
     threads : int, optional
         Simulations at a time; default: all cores.  The result does not depend on it.
     progress : callable
-        Called with the number of simulations done.
+        Called with a :class:`~adv2e.diagnosis.simulation.progress.Progress`, the stage and the
+        number of simulations done, at each new stage and after each simulation.
     log : callable
         Takes lines for people.
 
@@ -73,8 +79,9 @@ def diagnose(
         Too few events are left of a recording that would take too long.
     """
     began = time.perf_counter()
-    evidence = affordable(evidence, declared)
+    evidence, given = affordable(evidence, declared), declared
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
+        simulator.begin(DECLARED)
         prepared = prepare(evidence, declared, simulator, without, free_thresholds, log)
         evidence, reference = prepared.evidence, prepared.reference
         declared = reference.declared
@@ -82,16 +89,19 @@ def diagnose(
         outcome = search.run()
         found = conclude(prepared, search, outcome)
         kept = found.kept
+        effects = [
+            finding_of(fit, evidence.width * evidence.height, kept.config) for fit in kept.fits
+        ]
+        nuisances = thresholds_of(kept.config) if free_thresholds else {}
+        held = declared_of(given, [*nuisances, *(key for one in effects for key in one.parameters)])
         return Diagnosis(
             verdict=found.verdict,
-            sentence=sentence_of(found.verdict, kept, outcome, declared),
+            remark=remark_of(found.verdict, outcome),
             recording=evidence.name,
             declared=declared_name,
-            effects=[
-                finding_of(fit, evidence.width * evidence.height, kept.config) for fit in kept.fits
-            ],
+            effects=effects,
             alternatives=outcome.alternatives if kept.fits else [],
-            nuisances=thresholds_of(kept.config) if free_thresholds else {},
+            nuisances=nuisances,
             rejected=rejected_of(outcome, kept, search.candidates),
             errors=found.errors,
             global_p_before=search.probability(search.declared, splits.TEST),
@@ -120,6 +130,8 @@ def diagnose(
             },
             own=own_of(declared),
             input_checks=evidence.notes,
+            declared_values=held,
+            defaults=defaults_of(held, written),
         )
 
 

@@ -35,6 +35,9 @@ from adv2e.diagnosis.statistics.uncertainty import (
     between_levels,
 )
 
+DECLARED = "simulating the declared model"
+"""The first stage."""
+
 _MATCHING_SEED = 9_999
 
 
@@ -77,6 +80,7 @@ def prepare(
     notes = [*evidence.notes]
     notes += check_inputs(Placed.of(evidence.stream, scene), scene, evidence.light(declared))
     if free_thresholds:
+        simulator.begin("matching the thresholds to the numbers of events")
 
         def counts(stream: Stream) -> tuple[int, int]:
             train = scene.split.chosen(stream, splits.TRAIN)
@@ -91,6 +95,7 @@ def prepare(
         log(f"thresholds that match the totals: {thresholds_of(declared)}")
         if miss > TOLERANCE:
             notes.append(f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}")
+        simulator.begin(DECLARED)
     streams = simulator.streams(declared, PILOT_SEEDS)
     statistics = SummaryStatistics(scene, streams)
     by_seed = dict(zip(PILOT_SEEDS, streams, strict=True))
@@ -108,6 +113,7 @@ def prepare(
         (frames or none) + (levels or none),
         log,
         threshold_nuisance(declared) if free_thresholds else NOTHING,
+        simulator.begin,
     )
     candidates = [one for one in library(declared, hints) if one.name not in without]
     evidence = replace(evidence, notes=notes)

@@ -49,7 +49,7 @@ def write_reports(diagnosis: Diagnosis, folder: str | Path, *, overwrite: bool =
         `folder` exists and is not to be replaced, holds other things than a report, or cannot be
         written.
     """
-    texts = (page(diagnosis), record_text(diagnosis), model_text(diagnosis))
+    texts = (page(diagnosis, folder), record_text(diagnosis), model_text(diagnosis))
     try:
         with Staging(overwrite) as staging:
             unfinished = staging.folder(Path(folder), _foreign)

@@ -1,114 +1,126 @@
-"""Sections of the page on what was found: verdict, errors, what was added, nuisances, notes."""
+"""Sections of the page on what was found: finding, error, next steps, values, notes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from adv2e.reports.charts.error_chart import error_chart
+from adv2e.reports.headline import declared_text
 from adv2e.reports.keys import meaning_of, summary_of, unit_of
+from adv2e.reports.labels import heading_of
 from adv2e.reports.markup import Markup, join, tag
-from adv2e.reports.quantities import (
-    estimate_text,
-    interval_text,
-    probability_text,
-    unit_text,
-    value_text,
-)
-from adv2e.reports.result import NO_OWN, Diagnosis, Interval, ListInterval, Own
+from adv2e.reports.next_steps import next_steps
+from adv2e.reports.quantities import interval_text, probability_text, unit_text, value_text
+from adv2e.reports.result import Diagnosis, Interval, ListInterval
 from adv2e.reports.tables import Column, table
 
 MARKS = {
-    "consistent": ("✓", "Consistent", "nothing is missing from the declared model"),
-    "explained": ("✓", "Explained", "what was added accounts for the residual"),
-    "partly_explained": ("◐", "Partly explained", "some of the residual remains"),
-    "not_identifiable": ("≟", "Not identifiable", "several effects explain the residual as well"),
-    "unexplained": ("✗", "Unexplained", "nothing in the library accounts for the residual"),
+    "consistent": ("✓", "Consistent"),
+    "explained": ("✓", "Explained"),
+    "partly_explained": ("◐", "Partly explained"),
+    "not_identifiable": ("≟", "Not identifiable"),
+    "unexplained": ("✗", "Unexplained"),
 }
-"""Sign, word and meaning of each verdict."""
+"""Sign and word of each verdict."""
 
 
-def verdict(diagnosis: Diagnosis) -> Markup:
-    """Return the verdict in a sentence, marked by sign, word and colour."""
-    sign, word, meaning = MARKS[diagnosis.verdict]
+def finding(diagnosis: Diagnosis) -> Markup:
+    """Return the finding in a sentence, and the verdict marked by sign, word and colour."""
+    sign, word = MARKS[diagnosis.verdict]
     badge = tag("span", tag("span", sign, aria_hidden="true"), f" {word}", class_="badge")
     return tag(
         "div",
-        tag("p", badge, tag("span", f" {meaning}", class_="note")),
         tag("p", diagnosis.sentence, class_="sentence"),
+        tag("p", badge, f" {diagnosis.remark}"),
         class_=f"verdict {diagnosis.verdict}",
     )
 
 
-def errors(diagnosis: Diagnosis) -> Markup:
-    """Return the errors before and after, beside the floor, as a picture and a table."""
-    names = ("measure", "before", "after", "floor")
-    columns = [Column(name, number=name != "measure") for name in names]
-    rows = [
-        (row.name, estimate_text(row.before), estimate_text(row.after), estimate_text(row.floor))
-        for row in diagnosis.errors
-    ]
-    parts: list[Markup] = []
-    if rows:
-        parts.append(tag("figure", error_chart(diagnosis.errors)))
-        given = any(row.before.interval or row.after.interval for row in diagnosis.errors)
-        caption = f"Errors on held-out data{', with 95 % intervals' if given else ''}"
-        parts.append(table(caption, columns, rows))
+def main_error(diagnosis: Diagnosis) -> Markup:
+    """Return the error before and after, beside its floor: that which ``report.json`` gives."""
+    parts: list[object] = []
+    for row in diagnosis.errors[:1]:
+        lines = f" Lines: {diagnosis.wording.intervals}." if row.before.interval else ""
+        about = f"Error: {row.name}. Floor: {diagnosis.wording.floor}.{lines}"
+        heading = "Error on data that was not used for fitting (0 would be the same events)"
+        parts.append(tag("figcaption", heading))
+        parts += [error_chart(row), tag("p", about, class_="note")]
     before, after = (
-        tag("strong", f"p {probability_text(p)}")
+        tag("strong", f"p {probability_text(p)}", class_="line")
         for p in (diagnosis.global_p_before, diagnosis.global_p_after)
     )
-    lead = "Probability of a residual as large if nothing were missing: "
-    parts.append(tag("p", lead, before, " before, ", after, " after."))
-    roles = "Before: the declared model. After: the model found. Floor: "
-    parts.append(tag("p", f"{roles}{diagnosis.wording.floor}.", class_="note"))
-    return join(*parts)
+    chance = "Would chance alone make differences as large as these? Before: "
+    parts.append(tag("p", chance, before, ", after: ", after, ".", class_="note"))
+    return tag("figure", *parts, class_="main")
+
+
+def other_errors(diagnosis: Diagnosis) -> Markup:
+    """Return the other measures of error."""
+    return join(
+        *(
+            tag("figure", tag("figcaption", row.name), error_chart(row))
+            for row in diagnosis.errors[1:]
+        )
+    )
+
+
+def what_next(diagnosis: Diagnosis, folder: str | Path) -> Markup:
+    """Return what to do with the finding, with lines to copy."""
+    parts = []
+    for step in next_steps(diagnosis, folder):
+        parts.append(tag("p", step.text))
+        if step.line:
+            parts.append(tag("pre", tag("code", step.line), class_="copy"))
+    return tag("div", tag("h2", "What to do next"), *parts, class_="next")
 
 
 def added(diagnosis: Diagnosis) -> Markup:
-    """Return what was added to the declared model."""
-    if not diagnosis.effects:
-        return tag("p", "Nothing.")
+    """Return the effects that were found, with their values and the declared ones."""
     parts = []
-    for finding in diagnosis.effects:
-        summary = summary_of(finding.name, list(finding.parameters), diagnosis.own)
-        parts.append(tag("h3", finding.name))
+    for one in diagnosis.effects:
+        summary = summary_of(one.name, list(one.parameters), diagnosis.own)
+        parts.append(tag("h3", heading_of(one.name)))
         if summary:
             parts.append(tag("p", summary))
-        if finding.parameters:
-            caption = f"Parameters of {finding.name}"
-            parts.append(_keys(caption, finding.parameters, finding.interval, diagnosis.own))
+        if one.parameters:
+            caption = f"Values of {one.name}"
+            parts.append(_keys(caption, one.parameters, diagnosis, one.interval))
     return join(*parts)
 
 
 def _keys(
     caption: str,
     values: Mapping[str, Any],
+    diagnosis: Diagnosis,
     intervals: Mapping[str, Interval | ListInterval] | None = None,
-    own: Own = NO_OWN,
 ) -> Markup:
     """Return a table of keys with their values, and with intervals where any are known."""
-    columns = [Column("key"), Column("value", number=True)]
+    columns = [Column("key"), Column("found", number=True)]
     columns += [Column("95 % interval", number=True)] * (intervals is not None)
-    columns += [Column("unit"), Column("meaning")]
+    columns += [Column("declared", number=True), Column("unit"), Column("meaning")]
     rows: list[list[object]] = []
     for path, value in values.items():
         interval = (intervals or {}).get(path)
-        text = value_text(value, interval)
-        # a text may take several lines, a number may not
-        shown = tag("span", text, class_="text") if isinstance(value, str) else text
-        rows.append(
-            [tag("code", path), shown, unit_text(unit_of(path, own)), meaning_of(path, own)]
-        )
-        if intervals is not None:
-            rows[-1].insert(2, interval_text(interval))
+        unit, meaning = unit_of(path, diagnosis.own), meaning_of(path, diagnosis.own)
+        row = [tag("code", path), _value(value, interval)]
+        row += [interval_text(interval)] * (intervals is not None)
+        row += [declared_text(diagnosis, path), unit_text(unit), meaning]
+        rows.append(row)
     return table(caption, columns, rows)
 
 
-def nuisances(values: Mapping[str, Any]) -> Markup:
+def _value(value: Any, interval: Sequence[Any] | None) -> object:
+    """Return a value; a text may take several lines, a number may not."""
+    text = value_text(value, interval)
+    return tag("span", text, class_="text") if isinstance(value, str) else text
+
+
+def nuisances(diagnosis: Diagnosis) -> Markup:
     """Return the keys that were fitted because nothing was declared of them."""
-    caption = "Keys that were not declared, with fitted values"
-    return _keys(caption, values) if values else Markup()
+    values = diagnosis.nuisances
+    return _keys("Keys that were not declared", values, diagnosis) if values else Markup()
 
 
 def notes(texts: Sequence[str]) -> Markup:
@@ -118,6 +130,8 @@ def notes(texts: Sequence[str]) -> Markup:
 
 def facts(given: Mapping[str, str]) -> Markup:
     """Return the small things."""
-    columns = [Column("what"), Column("value")]
-    rows = list(given.items())
-    return table("Sizes, seeds, times and versions", columns, rows) if rows else Markup()
+    return (
+        tag("p", "; ".join(f"{what}: {value}" for what, value in given.items()))
+        if given
+        else Markup()
+    )

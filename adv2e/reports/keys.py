@@ -3,11 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from adv2e.config import Config, all_keys
 from adv2e.effects import EFFECTS
 from adv2e.parameters import Parameter
-from adv2e.reports.result import NO_OWN, Own
+
+
+@dataclass(frozen=True)
+class Own:
+    """What is declared of effects of the user's own.
+
+    Attributes
+    ----------
+    keys : mapping of str to Parameter
+        Their keys, by path.
+    summaries : mapping of str to str
+        What each effect is, by name.
+    files : mapping of str to str
+        Where each effect is written, by name.
+    """
+
+    keys: Mapping[str, Parameter] = field(default_factory=dict)
+    summaries: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+
+
+NO_OWN = Own()
 
 
 def known_keys(section: type[Config] = Config) -> Mapping[str, Parameter]:

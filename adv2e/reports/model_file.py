@@ -39,7 +39,7 @@ def _head(diagnosis: Diagnosis) -> list[str]:
     texts = [
         f"Model found by {wording.command} in {diagnosis.recording},"
         f" on top of {diagnosis.declared}: {diagnosis.verdict}.",
-        diagnosis.sentence,
+        f"{diagnosis.sentence} {diagnosis.remark}",
         "Keys marked 'added' belong to effects that the declared model lacked; those marked"
         f" 'nuisance' were not declared and were fitted; all others are {wording.others}.",
     ]

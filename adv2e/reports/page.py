@@ -2,41 +2,47 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from adv2e.reports import findings, residual, trials
 from adv2e.reports.charts.curve_chart import curves
-from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.markup import Markup, tag
 from adv2e.reports.result import Diagnosis
 from adv2e.reports.style import STYLE
 
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 _UNFOLD = (
     "addEventListener('beforeprint', () =>"
-    " document.querySelectorAll('details').forEach(part => part.open = true))"
+    " document.querySelectorAll('details.paper').forEach(part => part.open = true))"
 )
-"""On paper nothing is folded away."""
+"""What matters is not folded away on paper; the rest is left out there."""
 
 
-def page(diagnosis: Diagnosis) -> str:
+def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
     """Return the page as HTML: UTF-8, no loads from elsewhere, the same bytes every time.
 
-    Sections that hold nothing are left out.
+    Its first screen holds the finding, the error, and what to do next; `folder` is where
+    ``model.yaml`` lies.  Sections that hold nothing are left out.
     """
-    pictures = curves(diagnosis.curves, diagnosis.wording), residual.maps(diagnosis.maps)
+    found = diagnosis
     sections = {
-        "Error before and after": findings.errors(diagnosis),
-        "What was added": findings.added(diagnosis),
-        "What explains it as well": trials.alternatives(diagnosis),
-        "What stands out": residual.groups(diagnosis.signatures),
-        "The residual before and after": join(*pictures),
-        "Signatures": residual.signatures(diagnosis.signatures),
-        "What was rejected": trials.rejected(diagnosis.rejected, diagnosis.own),
-        "What could have been seen": residual.detectable(diagnosis.detectable),
-        "Data": residual.data(diagnosis),
-        "Nuisances": findings.nuisances(diagnosis.nuisances),
-        "Notes": findings.notes(diagnosis.notes),
-        "Facts": findings.facts(diagnosis.facts),
+        "What was found": findings.added(found),
+        "Effects that fit as well": trials.alternatives(found),
+        "Where recording and simulation differ": residual.groups(found),
+        "Curves of recording and simulation": curves(found.curves, found.wording),
+        "Values that were not declared and were fitted": findings.nuisances(found),
+        "Notes on the recording": findings.notes(found.notes),
     }
-    title = f"{diagnosis.wording.title} {diagnosis.recording}"
+    folded = {
+        "Pixels with too many or too few events": (residual.maps(found.maps), True),
+        "Effects that were tried and not added": (trials.rejected(found), True),
+        "Which data were used": (residual.data(found), True),
+        "Other measures of the error": (findings.other_errors(found), False),
+        "All statistics that were compared": (residual.signatures(found.signatures), False),
+        "How large an effect must be to be seen": (residual.detectable(found.detectable), False),
+        "Sizes, seeds, times and versions": (findings.facts(found.facts), True),
+    }
+    title = f"{found.wording.title} {found.recording}"
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
@@ -48,13 +54,26 @@ def page(diagnosis: Diagnosis) -> str:
     main = tag(
         "main",
         tag("h1", title),
-        tag("p", "Declared model: ", diagnosis.declared, class_="note"),
-        findings.verdict(diagnosis),
+        tag("p", "Declared model: ", found.declared, class_="note"),
+        findings.finding(found),
+        findings.main_error(found),
+        findings.what_next(found, folder),
         *(
             tag("section", tag("h2", heading), content)
             for heading, content in sections.items()
             if content
         ),
+        *(
+            _folded(heading, content, on_paper=on_paper)
+            for heading, (content, on_paper) in folded.items()
+            if content
+        ),
     )
     document = tag("html", head, tag("body", main, tag("script", Markup(_UNFOLD))), lang="en")
     return f"<!DOCTYPE html>\n{document}\n"
+
+
+def _folded(heading: str, content: Markup, *, on_paper: bool) -> Markup:
+    """Return a section that opens when its heading is clicked."""
+    summary = tag("summary", tag("h2", heading))
+    return tag("details", summary, content, class_="paper" if on_paper else "screen")

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from adv2e.reports.result import Estimate
+if TYPE_CHECKING:
+    from adv2e.reports.result import Estimate
 
 NOTHING = "-"
 """Stands where there is no number."""
+
+_LARGER = {"us": ((1e6, "s"), (1e3, "ms")), "ns": ((1e6, "ms"), (1e3, "µs"))}
+"""From which number on another unit is easier to read, the largest first."""
 
 _LARGE, _SMALL = 6, -4
 """Decimal exponents from which, and below which, numbers are written with an exponent."""
@@ -38,6 +42,15 @@ def number_text(value: float, digits: int = 3) -> str:
         return f"{value:,.{max(0, digits - 1 - exponent)}f}"
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
     return f"{mantissa}e{int(power)}"
+
+
+def alike_texts(values: Sequence[float], digits: int = 3) -> list[str]:
+    """Return numbers to compare: all to the place of the last digit of the largest."""
+    sizes = [abs(value) for value in values if math.isfinite(value) and value]
+    if not sizes:
+        return [number_text(value) for value in values]
+    place = min(_exponent(max(sizes), digits) - digits + 1, 0)
+    return [_to_place(value, place) for value in values]
 
 
 def short_text(value: float, digits: int = 4) -> str:
@@ -74,6 +87,43 @@ def interval_text(interval: Sequence[Any] | None) -> str:
         return f"{value_text(low)} to {value_text(high)}"
     place = _place((low, high))
     return f"{_to_place(low, place)} to {_to_place(high, place)}"
+
+
+def readable(path: str, value: Any, unit: str) -> tuple[float, str]:
+    """Return a factor and a unit in which `value`, that of a key in `unit`, is easy to read.
+
+    Long times are in larger units, and shares in percent.
+    """
+    if unit == "" and path.endswith("fraction"):
+        return 100.0, "%"
+    value = native(value)
+    if isinstance(value, (int, float)):
+        for least, larger in _LARGER.get(unit, ()):
+            if abs(value) >= least:
+                return 1.0 / least, larger
+    return 1.0, unit_text(unit)
+
+
+def scaled(value: Any, factor: float) -> Any:
+    """Return a number, or each of a list, times `factor`; anything else as it is."""
+    value = native(value)
+    if isinstance(value, list):
+        return [scaled(item, factor) for item in value]
+    if factor == 1.0 or isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    return factor * value
+
+
+def beside(value: Any, interval: Sequence[Any] | None) -> str:
+    """Return `value` with as many decimals as one with that interval has, or more."""
+    text = value_text(value)
+    place = None
+    if interval is not None and isinstance(native(value), (int, float)) and "e" not in text:
+        place = _place(interval)
+    if place is None or place >= 0:
+        return text
+    whole, _, decimals = text.partition(".")
+    return f"{whole}.{decimals.ljust(-place, '0')}"
 
 
 def estimate_text(estimate: Estimate) -> str:
@@ -116,12 +166,12 @@ def _exponent(value: float, digits: int) -> int:
 def _place(interval: Sequence[float]) -> int | None:
     """Return the decimal place to which a value with that interval is given: 0 for ones.
 
-    Half the interval then has one or two digits.
+    Half the interval is then 2 to 20 units of that place.
     """
     half = (interval[1] - interval[0]) / 2
     if not (math.isfinite(half) and half > 0):
         return None
-    return math.floor(math.log10(half / 5))
+    return math.floor(math.log10(half / 2))
 
 
 def _to_place(value: float, place: int | None) -> str:

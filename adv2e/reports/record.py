@@ -48,8 +48,10 @@ def _fixed(diagnosis: Diagnosis) -> dict[str, Any]:
 def _further(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "sentence": diagnosis.sentence,
+        "remark": diagnosis.remark,
         diagnosis.wording.subject: diagnosis.recording,
         "declared": diagnosis.declared,
+        "declared_values": diagnosis.declared_values,
         "errors": [
             {"name": row.name, **{role: vars(getattr(row, role)) for role in ROLES}}
             for row in diagnosis.errors

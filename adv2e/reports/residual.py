@@ -9,14 +9,26 @@ import numpy as np
 
 from adv2e.reports.charts.sensor_map import CLIP_SD, Map, colour_bar, map_image
 from adv2e.reports.markup import Markup, join, tag
-from adv2e.reports.quantities import NOTHING, number_text, percent_text, short_text, unit_text
+from adv2e.reports.quantities import (
+    NOTHING,
+    alike_texts,
+    number_text,
+    percent_text,
+    short_text,
+    unit_text,
+)
 from adv2e.reports.result import Detectable, Diagnosis, ResidualMap, Signature
 from adv2e.reports.standing_out import LARGE_Z, standing_out
 from adv2e.reports.tables import SHOWN, Column, table
 
+_GROUPS = 6
+"""Groups that are not folded away."""
+
 
 def maps(given: Sequence[ResidualMap]) -> Markup:
     """Return the maps before and after, side by side."""
+    if not given:
+        return Markup()
     parts = []
     for one in given:
         pictures = [
@@ -25,12 +37,13 @@ def maps(given: Sequence[ResidualMap]) -> Markup:
         ]
         parts.append(tag("h3", one.title))
         parts.append(tag("div", *pictures, class_="side"))
-        note = (
-            "Measured minus simulated, in standard deviations: red where more was measured, blue"
-            f" where less, from {-CLIP_SD:g} or less to {CLIP_SD:g} or more; grey where masked."
-        )
-        parts.append(tag("figure", colour_bar(), tag("figcaption", note, class_="note")))
-    return join(*parts)
+    note = (
+        "Measured minus simulated, in standard deviations (sd) of chance: red where more was"
+        f" measured, blue where less, from {-CLIP_SD:g} or less to {CLIP_SD:g} or more; grey:"
+        " pixels that were left out."
+    )
+    scale = tag("figure", colour_bar(), tag("figcaption", note, class_="note"))
+    return tag("div", *parts, scale, class_="maps")
 
 
 def _map(title: str, model: str, values: Map) -> Markup:
@@ -45,21 +58,21 @@ def _map(title: str, model: str, values: Map) -> Markup:
     return tag("figure", caption, image)
 
 
-def groups(given: Sequence[Signature]) -> Markup:
+def groups(diagnosis: Diagnosis) -> Markup:
     """Return what stands out, by group of statistics: what an effect that is missing has to do."""
-    if not given:
+    if not diagnosis.signatures:
         return Markup()
-    found = standing_out(given)
+    left = diagnosis.verdict in ("unexplained", "partly_explained")
+    found = standing_out(diagnosis.signatures, left=left)
     if not found:
-        return tag("p", f"No statistic is {LARGE_Z:g} deviations or more off.")
-    columns = [Column("group"), Column("farthest off")] + [
+        return tag("p", f"No number differs by more than {LARGE_Z:g} standard deviations.")
+    columns = [Column("what")] + [
         Column(name, number=True)
-        for name in ("measured", "before", "after", "beyond before", "beyond after")
+        for name in ("measured", "before", "after", "far off before", "far off after")
     ]
     rows = [
         (
-            one.group,
-            one.farthest.meaning,
+            join(one.group, tag("span", one.farthest.meaning, class_="meaning long")),
             *_values(one.farthest),
             f"{one.before} of {one.number}",
             f"{one.after} of {one.number}",
@@ -67,11 +80,12 @@ def groups(given: Sequence[Signature]) -> Markup:
         for one in found
     ]
     lead = (
-        "Of each group of summary statistics the one farthest off, as measured and as simulated,"
-        f" and how many are beyond ±{LARGE_Z:g} deviations. What is missing has to do all of it;"
-        " the curves and maps show when and where."
+        "Many numbers were compared, in groups. Each row shows the number of a group that differs"
+        " most: as measured, and as simulated before (declared model) and after (model found)."
+        f" Far off: how many of the group differ by more than {LARGE_Z:g} standard deviations."
     )
-    return join(tag("p", lead), table("Groups of statistics, on held-out data", columns, rows))
+    caption = "Groups of numbers, on data that was not used for fitting"
+    return join(tag("p", lead), table(caption, columns, rows, folded_from=_GROUPS))
 
 
 def signatures(given: Sequence[Signature]) -> Markup:
@@ -102,13 +116,13 @@ def _rank(signature: Signature) -> tuple[float, float]:
 
 def _signature(one: Signature) -> tuple[object, ...]:
     name = join(
-        tag("span", one.name, title=one.meaning), tag("span", one.meaning, class_="meaning")
+        tag("span", one.name, title=one.meaning), tag("span", one.meaning, class_="meaning long")
     )
     return name, one.group, *_values(one), _z(one.z_before), _z(one.z_after)
 
 
 def _values(one: Signature) -> list[str]:
-    return [number_text(value) for value in (one.measured, one.before, one.after)]
+    return alike_texts((one.measured, one.before, one.after))
 
 
 def _z(z: float) -> Markup | str:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.parameters import Parameter
+from adv2e.reports.headline import sentence_of
+from adv2e.reports.keys import NO_OWN, Own
 from adv2e.reports.wording import OF_RECORDINGS, Wording
 
 Verdict = Literal["consistent", "explained", "partly_explained", "not_identifiable", "unexplained"]
@@ -172,33 +173,14 @@ class Masked:
 
 
 @dataclass(frozen=True)
-class Own:
-    """What is declared of effects of the user's own.
-
-    Attributes
-    ----------
-    keys : mapping of str to Parameter
-        Their keys, by path.
-    summaries : mapping of str to str
-        What each effect is, by name.
-    """
-
-    keys: Mapping[str, Parameter] = field(default_factory=dict)
-    summaries: Mapping[str, str] = field(default_factory=dict)
-
-
-NO_OWN = Own()
-
-
-@dataclass(frozen=True)
 class Diagnosis:
     """Everything that a diagnosis found.
 
     Attributes
     ----------
     verdict : str
-    sentence : str
-        The verdict for people.
+    remark : str
+        What the verdict says besides :attr:`sentence`.
     recording, declared : str
         Names of the inputs.
     effects : list of Finding
@@ -231,10 +213,14 @@ class Diagnosis:
         Those of the notes that are on the recording itself, such as what may be wrong with it.
     wording : Wording
         What the reports call things.
+    declared_values : mapping
+        What the declared model holds of each key that was fitted, by path; None: it is off.
+    defaults : collection of str
+        Those of these keys that nobody wrote: the program's defaults stand for them.
     """
 
     verdict: Verdict
-    sentence: str
+    remark: str
     recording: str
     declared: str
     effects: list[Finding]
@@ -256,3 +242,10 @@ class Diagnosis:
     own: Own = NO_OWN
     input_checks: Sequence[str] = ()
     wording: Wording = OF_RECORDINGS
+    declared_values: Mapping[str, Any] = field(default_factory=dict)
+    defaults: Collection[str] = ()
+
+    @property
+    def sentence(self) -> str:
+        """The finding in one sentence, with its numbers."""
+        return sentence_of(self)

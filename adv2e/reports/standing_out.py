@@ -9,8 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from adv2e.reports.result import Signature
+if TYPE_CHECKING:
+    from adv2e.reports.result import Signature
+
 
 LARGE_Z = 3.0
 """Distances in standard deviations from here on stand out."""
@@ -30,32 +33,28 @@ class Standing:
     farthest: Signature
 
 
-def standing_out(signatures: Sequence[Signature]) -> list[Standing]:
+def standing_out(signatures: Sequence[Signature], *, left: bool = True) -> list[Standing]:
     """Return the groups of which a statistic stands out from either model, the farthest first.
 
-    Those that stand out from the model found come before the others.
+    Those that stand out from the model found come before the others, unless nothing is `left`.
     """
     groups: dict[str, list[Signature]] = {}
     for one in signatures:
         groups.setdefault(one.group, []).append(one)
-    found = [_standing(group, members) for group, members in groups.items()]
-    return sorted((one for one in found if one.before or one.after), key=_rank)
+    found = [_standing(group, members, left) for group, members in groups.items()]
+    return [one for _, one in sorted(found, key=lambda pair: pair[0]) if one.before or one.after]
 
 
-def _standing(group: str, members: Sequence[Signature]) -> Standing:
+def _standing(
+    group: str, members: Sequence[Signature], left: bool
+) -> tuple[tuple[bool, float], Standing]:
+    """Return the group, after what it is ranked by."""
     before = sum(_size(one.z_before) > LARGE_Z for one in members)
     after = sum(_size(one.z_after) > LARGE_Z for one in members)
-    farthest = max(members, key=lambda one: _distance(one, after))
-    return Standing(group, len(members), before, after, farthest)
-
-
-def _rank(one: Standing) -> tuple[bool, float]:
-    return not one.after, -_distance(one.farthest, one.after)
-
-
-def _distance(one: Signature, after: int) -> float:
-    """Return the distance from the model found if `after` stand out there, else from declared."""
-    return _size(one.z_after if after else one.z_before)
+    of_found = left and after > 0
+    distances = [_size(one.z_after if of_found else one.z_before) for one in members]
+    farthest = members[distances.index(max(distances))]
+    return (not of_found, -max(distances)), Standing(group, len(members), before, after, farthest)
 
 
 def _size(z: float) -> float:

@@ -23,8 +23,9 @@ body {
   margin: 0; background: var(--paper); color: var(--ink);
   font: 15px/1.5 system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif;
 }
-main { max-width: 960px; margin: 0 auto; padding: 24px 20px 48px; }
-h1 { font-size: 1.35rem; margin: 0; overflow-wrap: anywhere; }
+main { max-width: 960px; margin: 0 auto; padding: 20px 20px 48px; }
+h1 { font-size: 1.2rem; margin: 0; overflow-wrap: anywhere; }
+h1 + .note { margin: 0; }
 h2 {
   font-size: 1.2rem; margin: 2.2em 0 0.5em; padding-bottom: 0.2em;
   border-bottom: 1px solid var(--line);
@@ -36,7 +37,7 @@ td, th { overflow-wrap: break-word; }
 code { font: 0.92em ui-monospace, "SF Mono", Menlo, Consolas, monospace; }
 .note, .meaning { color: var(--soft); font-size: 0.87rem; }
 .verdict {
-  margin: 16px 0; padding: 12px 18px; background: var(--panel);
+  margin: 12px 0; padding: 8px 18px; background: var(--panel);
   border-left: 6px solid var(--mark); border-radius: 4px;
 }
 .consistent, .explained { --mark: var(--good); }
@@ -44,9 +45,14 @@ code { font: 0.92em ui-monospace, "SF Mono", Menlo, Consolas, monospace; }
 .unexplained { --mark: var(--poor); }
 .badge {
   color: var(--mark); border: 2px solid var(--mark); border-radius: 999px;
-  padding: 1px 12px; font-weight: 700; white-space: nowrap;
+  padding: 1px 12px; margin-right: 6px; font-weight: 700; white-space: nowrap;
 }
-.sentence { font-size: 1.4rem; line-height: 1.35; font-weight: 600; margin: 0.4em 0; }
+.sentence { font-size: 1.4rem; line-height: 1.35; font-weight: 600; margin: 0.3em 0; }
+.next h2 { margin-top: 1em; }
+.copy {
+  margin: 6px 0; padding: 8px 12px; background: var(--panel); border: 1px solid var(--line);
+  border-radius: 4px; white-space: pre-wrap; overflow-wrap: anywhere; user-select: all;
+}
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; margin: 10px 0 16px; font-size: 0.9rem; }
 caption { text-align: left; color: var(--soft); padding: 4px 0; }
@@ -62,9 +68,35 @@ td.number, th.number { padding-left: 10px; }
 td { min-width: 3em; }
 .number .text { white-space: normal; overflow-wrap: anywhere; }
 .meaning, .line { display: block; font-weight: 400; }
+.long { min-width: 22em; }
 .line { white-space: nowrap; }
+strong.line { display: inline; font-weight: 700; }
 .large { color: var(--before); white-space: nowrap; }
 details > summary { cursor: pointer; padding: 6px 0; color: var(--after); }
+summary h2 { display: inline; border: 0; margin: 0; padding: 0; }
+main > details { border-bottom: 1px solid var(--line); margin-top: 6px; padding: 4px 0; }
+section + details { margin-top: 2em; }
+.bars { display: grid; gap: 7px; margin: 6px 0; }
+.bar {
+  display: grid; grid-template-columns: 15.5em 1fr 11.5em; gap: 2px 10px; align-items: center;
+}
+.bar .role { font-size: 0.9rem; }
+.bar .role strong { color: var(--role); }
+.bar .number { text-align: left; }
+.track { position: relative; height: 16px; }
+.fill { position: absolute; inset: 0 auto 0 0; background: var(--role); opacity: 0.55; }
+.whisker { position: absolute; top: 7px; height: 2px; min-width: 2px; background: var(--ink); }
+.legend {
+  display: flex; flex-wrap: wrap; gap: 4px 18px; margin: 8px 0; padding: 0; list-style: none;
+  font-size: 0.87rem;
+}
+.swatch { display: inline-block; width: 24px; margin-right: 6px; vertical-align: middle; }
+.swatch { border-top: 2px solid var(--role); }
+.swatch.before { border-top-style: dashed; }
+.swatch.shaded {
+  height: 12px; border: 0; background: linear-gradient(90deg, var(--before), var(--after));
+  opacity: 0.3;
+}
 figure { margin: 0; min-width: 0; overflow-x: auto; }
 figcaption { font-size: 0.9rem; font-weight: 600; margin: 6px 0; }
 figcaption.note { font-weight: 400; }
@@ -72,16 +104,9 @@ figcaption.note { font-weight: 400; }
 .side { gap: 18px 24px; align-items: start; margin: 10px 0; }
 img.map { width: 100%; height: auto; image-rendering: pixelated; display: block; }
 svg { display: block; width: 100%; max-width: 560px; height: auto; }
-svg.wide { max-width: 100%; min-width: 560px; }
 svg text { font-size: 11px; fill: var(--soft); }
 svg .label { fill: var(--ink); }
-svg text.number { font-size: 12px; fill: var(--ink); }
-svg .name {
-  font-size: 12.5px; font-weight: 600;
-  paint-order: stroke; stroke: var(--paper); stroke-width: 5px; stroke-linejoin: round;
-}
 svg .grid { stroke: var(--line); stroke-width: 0.7; }
-svg .one { stroke: var(--soft); stroke-width: 1; stroke-dasharray: 2 3; }
 svg .axis { stroke: var(--soft); stroke-width: 1; }
 .before { --role: var(--before); }
 .after { --role: var(--after); }
@@ -92,13 +117,41 @@ svg .curve { fill: none; stroke: var(--role); stroke-width: 1.6; stroke-linejoin
 svg .curve.before { stroke-dasharray: 5 3; }
 svg .curve.measured { stroke-width: 2.2; }
 svg .dot { fill: var(--role); }
-svg .whisker { stroke: var(--role); stroke-width: 1.6; }
+@media screen and (max-width: 600px) {
+  main { padding: 12px 12px 32px; }
+  .verdict { padding: 6px 12px; }
+  .sentence { font-size: 1.15rem; }
+  .bar { grid-template-columns: 1fr auto; }
+  .bar .track { grid-column: 1 / -1; grid-row: 2; }
+  /* rows of tables become blocks, a line for each cell */
+  thead { display: none; }
+  .long { min-width: 0; }
+  table, caption, tbody, tr, th, td { display: block; }
+  tr { padding: 6px 0; border-bottom: 1px solid var(--line); }
+  th, td { border: 0; padding: 1px 0; }
+  td, td.number, .number + td:not(.number) { display: flex; gap: 12px; padding-left: 0; }
+  td.number { text-align: left; white-space: normal; }
+  td::before { content: attr(data-label); flex: 0 0 7.5em; color: var(--soft); }
+}
 @media print {
-  body { font-size: 10.5pt; }
-  main { max-width: none; padding: 0; }
-  h2, h3, figcaption, caption { break-after: avoid; }
-  figure, tr, .verdict { break-inside: avoid; }
+  @page { size: A4; margin: 14mm; }
+  body { font-size: 9.5pt; line-height: 1.35; }
+  main, p { max-width: none; }
+  main { padding: 0; }
+  h2 { margin-top: 1.2em; }
+  h2, h3, figcaption, caption, summary { break-after: avoid; }
+  figure, tr, .verdict, .next { break-inside: avoid; }
   .side { grid-template-columns: 1fr 1fr; }
-  svg, img { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
+  thead { break-after: avoid; }
+  th, td { padding-top: 3px; padding-bottom: 3px; }
+  .long { min-width: 16em; }
+  .maps { display: grid; grid-template-columns: 1fr 1fr; gap: 0 24px; }
+  .maps > h3 { grid-row: 1; }
+  .maps > .side { grid-row: 2; }
+  .maps > figure { grid-column: 1 / -1; }
+  details.screen { display: none; }
+  svg, img, .bars, .swatch, .verdict {
+    print-color-adjust: exact; -webkit-print-color-adjust: exact;
+  }
 }
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
+from adv2e.reports.headline import declared_text
 from adv2e.reports.keys import unit_of
 from adv2e.reports.markup import plain
 from adv2e.reports.quantities import interval_text, number_text, probability_text, value_text
@@ -17,17 +18,19 @@ _MOST_CHECKS = 2
 
 
 def summary_text(diagnosis: Diagnosis) -> str:
-    """Return verdict, effects, error and p before and after: some 15 lines of :data:`WIDTH`.
+    """Return finding, verdict, effects, error and p before and after: at most some 15 lines.
 
     Where there are more parameters than that, it says how many.  Where nothing is named, it says
-    what stands out most.  What may be wrong with the recording comes last.
+    what differs most.  What may be wrong with the recording comes last.
     """
-    lines = _wrapped(f"{diagnosis.verdict}: {diagnosis.sentence}", 4)
+    lines = _wrapped(diagnosis.sentence, 3)
+    verdict = diagnosis.verdict.replace("_", " ")
+    lines += [f"  {line}" for line in _wrapped(f"{verdict}: {diagnosis.remark}", 2)]
     lines += _parameters(diagnosis)
     if diagnosis.verdict == "unexplained":
         lines += _standing(diagnosis)
     if diagnosis.alternatives:
-        lines += _wrapped(f"as well: {', '.join(diagnosis.alternatives)}", 2)
+        lines += _wrapped(f"or instead: {', '.join(diagnosis.alternatives)}", 1)
     for row in diagnosis.errors[:1]:
         lines += _error(row)
         if row.after.value > row.before.value:  # by random events, if it is right
@@ -76,6 +79,8 @@ def _parameters(diagnosis: Diagnosis) -> list[str]:
             text += unit_of(path, diagnosis.own)
             if interval is not None:
                 text = f"{text.rstrip()} ({interval_text(interval)})"
+            if path in diagnosis.declared_values:
+                text = f"{text.rstrip()}, declared {declared_text(diagnosis, path)}"
             lines += [f"  {line}" for line in _wrapped(text, 2)]
     if len(lines) <= _MOST_PARAMETERS:
         return lines
@@ -84,8 +89,9 @@ def _parameters(diagnosis: Diagnosis) -> list[str]:
 
 
 def _standing(diagnosis: Diagnosis) -> list[str]:
+    """Return what differs most besides what the sentence names."""
     lines = []
-    for one in standing_out(diagnosis.signatures)[:_MOST_STANDING]:
+    for one in standing_out(diagnosis.signatures)[1:_MOST_STANDING]:
         measured, expected = (
             number_text(value) for value in (one.farthest.measured, one.farthest.after)
         )

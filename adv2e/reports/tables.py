@@ -56,7 +56,13 @@ def _one(caption: str, columns: Sequence[Column], rows: Sequence[Sequence[object
 
 def _row(columns: Sequence[Column], row: Sequence[object]) -> Markup:
     cells = [
-        tag("td" if number else "th", cell, scope=None if number else "row", class_=_class(column))
+        tag(
+            "td" if number else "th",
+            cell,
+            scope=None if number else "row",
+            class_=_class(column),
+            data_label=column.heading if number else None,
+        )
         for number, (column, cell) in enumerate(zip(columns, row, strict=True))
     ]
     return tag("tr", *cells)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from adv2e.reports.keys import summary_of, unit_of
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.quantities import NOTHING, number_text, unit_text, value_text
-from adv2e.reports.result import NO_OWN, Diagnosis, Finding, Own, Rejected
+from adv2e.reports.result import Diagnosis, Finding, Rejected
 from adv2e.reports.tables import SHOWN, Column, table
 
 SEPARATIONS = {
@@ -82,11 +80,12 @@ def _paths(diagnosis: Diagnosis) -> dict[str, list[str]]:
     return paths
 
 
-def rejected(given: Sequence[Rejected], own: Own = NO_OWN) -> Markup:
+def rejected(diagnosis: Diagnosis) -> Markup:
     """Return what was tried and not added, and why."""
+    given = diagnosis.rejected
     if not given:
         return Markup()
-    columns = [Column("effect"), Column("why not"), Column("tried with")]
+    columns = [Column("effect, and the values it was tried with"), Column("why not")]
     caption = "Effects tried and not added"
     judged = any(one.held_out is not None for one in given)
     if judged:  # none is where each is fitted much worse than what was added
@@ -95,10 +94,10 @@ def rejected(given: Sequence[Rejected], own: Own = NO_OWN) -> Markup:
     rows = []
     for one in given:
         tried = [
-            f"{path} = {value_text(value)} {unit_text(unit_of(path, own))}".rstrip()
+            f"{path} = {value_text(value)} {unit_text(unit_of(path, diagnosis.own))}".rstrip()
             for path, value in one.parameters.items()
         ]
-        lines = [tag("span", text, class_="line") for text in tried or [NOTHING]]
+        lines = [tag("span", text, class_="meaning") for text in tried]
         held_out = NOTHING if one.held_out is None else number_text(one.held_out)
-        rows.append((one.name, one.reason, join(*lines), *[held_out] * judged))
+        rows.append((join(one.name, *lines), one.reason, *[held_out] * judged))
     return table(caption, columns, rows, folded_from=SHOWN)

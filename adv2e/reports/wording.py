@@ -19,6 +19,8 @@ class Wording:
         What the input is; its key in ``report.json``.
     floor : str
         What the floor of the errors is.
+    intervals : str
+        What the lines on the bars of the errors show.
     bands : str
         What the bands of a curve show.
     others : str
@@ -29,6 +31,7 @@ class Wording:
     command: str
     subject: str
     floor: str
+    intervals: str
     bands: str
     others: str
 
@@ -37,7 +40,8 @@ OF_RECORDINGS = Wording(
     title="Diagnosis of",
     command="adv2e diagnose",
     subject="recording",
-    floor="independent draws of the model found against each other: as near as it comes to itself",
+    floor="two simulations of the model found against each other; no model comes nearer",
+    intervals="the middle 95 % of simulations",
     bands="the middle 95 % of simulations",
     others="as declared",
 )
@@ -47,6 +51,7 @@ OF_TABLES = Wording(
     command="adv2e characterise",
     subject="table",
     floor="the standard errors of the table's rows",
+    intervals="the middle 95 %",
     bands="the middle 95 % of fits to tables drawn from the model",
     others="as declared; what was not is off, or its default where a table cannot show it",
 )

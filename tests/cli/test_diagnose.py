@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from adv2e.diagnosis.data import evidence
 from adv2e.diagnosis.fitting.library import names
 from adv2e.diagnosis.outcome import conclusion
 from adv2e.diagnosis.selection import reference, shortlist
+from adv2e.diagnosis.simulation.progress import Progress
 from adv2e.formats.writing import open_sink
 from adv2e.reports import files, summary
 
@@ -25,6 +27,7 @@ TRIED = ("refractory", "leak", "event_loss")
 WITHOUT = [part for name in names() if name not in TRIED for part in ("--without", name)]
 SIZE, DEAD_US = (32, 24), 20_000.0
 SUMMARY = ["two lines of", "  summary"]
+REPORT = "report: a.diagnosis/report.html"
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +77,11 @@ def test_a_missing_effect_is_named_whatever_the_threads(adv2e, recordings, short
     for threads in (1, 2):
         out = tmp_path / str(threads)
         made, err = found(adv2e, recordings, "dead", out, "--threads", threads)
-        assert f"{made['verdict']}: The declared model is wrong in refractory" in err
+        first, *_, last = err.splitlines()
+        assert re.match(r"Dead time: (19\.\d|20(\.\d)?) ms \(", first)
+        assert ", declared 0.5" in first
+        assert made["sentence"] == first
+        assert last == f"report: {out / 'report.html'}"
         reports.append(made)
     for made in reports:
         assert made["facts"].pop("time taken")
@@ -106,6 +113,7 @@ def test_a_missing_effect_is_named_whatever_the_threads(adv2e, recordings, short
 def test_a_camera_as_declared_is_consistent(adv2e, recordings, short, tmp_path):
     made, err = found(adv2e, recordings, "none", tmp_path / "out")
     assert made["verdict"] == "consistent"
+    assert err.startswith("Nothing is missing that these data show: the error of the")
     assert "consistent: The recording is what the declared model makes" in err
     assert (made["effects"], made["alternatives"], made["nuisances"]) == ([], [], {})
     assert made["error"]["before"] == made["error"]["after"]
@@ -237,8 +245,9 @@ def made_up(monkeypatch, tmp_path):
     def diagnose(recording, config, *, progress, log, **options):
         calls.append({"recording": recording, "config": config, **options})
         log("a step")
-        progress(3)
-        progress(10)
+        steps = ("simulating", 0), ("simulating", 3), ("searching", 3), ("judging", 10)
+        for step in steps:
+            progress(Progress(*step))
 
     monkeypatch.setattr(evidence, "read_evidence", read)
     monkeypatch.setattr(whole, "diagnose", diagnose)
@@ -263,7 +272,8 @@ def test_options_arrive(adv2e, made_up, tmp_path):
     assert call["config"].pixel.refractory.period_us == 7.0
     assert call["config"].seed == 4
     assert str(folder) == "a.diagnosis"
-    assert outcome.err.endswith("two lines of\n  summary\n")
+    assert call["written"]["pixel.refractory.period_us"] == 7
+    assert outcome.err.endswith("two lines of\n  summary\nreport: a.diagnosis/report.html\n")
 
 
 TWICE = """
@@ -314,7 +324,7 @@ def test_own_effects_need_names_of_their_own(adv2e, made_up):
 
 @pytest.mark.parametrize(
     ("options", "lines"),
-    [([], SUMMARY), (["-v"], ["a step", *SUMMARY]), (["-q"], [])],
+    [([], [*SUMMARY, REPORT]), (["-v"], ["a step", *SUMMARY, REPORT]), (["-q"], [])],
 )
 def test_what_is_said(adv2e, made_up, options, lines):
     outcome = adv2e("diagnose", "a.zip", *options)
@@ -322,7 +332,14 @@ def test_what_is_said(adv2e, made_up, options, lines):
     assert (outcome.status, outcome.out, said) == (0, "", lines)
 
 
-def test_progress_counts_simulations(adv2e, made_up):
+def test_progress_names_stages_and_counts_simulations_without_a_total(adv2e, made_up):
     outcome = adv2e("diagnose", "a.zip", "--progress", "-q")
     assert outcome.status == 0
-    assert "simulation" in outcome.err
+    shown = re.findall(r"(\w[\w ]*): (\d+) simulations in", outcome.err)
+    assert shown[0] == ("reading the recording", "0")
+    stages = list(dict.fromkeys(stage for stage, _ in shown))
+    assert stages == ["reading the recording", "simulating", "searching", "judging"]
+    counts = [int(count) for _, count in shown]
+    assert counts == sorted(counts)
+    assert "/" not in outcome.err
+    assert "%" not in outcome.err

@@ -134,8 +134,7 @@ def everything() -> Diagnosis:
     """Return a diagnosis that has something of all."""
     return Diagnosis(
         verdict="explained",
-        sentence="The declared model lacks a dead time of 6.0 ms: pixels do not fire twice within"
-        " it, at any brightness.",
+        remark="With this change nothing is left that these data show.",
         recording="office_zigzag.zip",
         declared="declared.yaml",
         effects=[
@@ -197,6 +196,12 @@ def everything() -> Diagnosis:
         notes=["Interpolation between frames changes the error by at most 0.04."],
         model=MODEL,
         facts={"sensor": "346x260", "simulations": "412", "version": "0.1.0", "seed": "3"},
+        declared_values={
+            "pixel.refractory.period_us": 500.0,
+            "pixel.low_pass.cutoff_hz": 300.0,
+            "pixel.thresholds.on": 0.2,
+        },
+        defaults=["pixel.low_pass.cutoff_hz"],
     )
 
 
@@ -205,7 +210,7 @@ def nothing() -> Diagnosis:
     return replace(
         everything(),
         verdict="consistent",
-        sentence="Nothing is missing.",
+        remark="The recording is what the declared model makes.",
         effects=[],
         alternatives=[],
         nuisances={},
@@ -222,6 +227,7 @@ def nothing() -> Diagnosis:
         notes=[],
         model={},
         facts={},
+        declared_values={},
     )
 
 
@@ -243,7 +249,7 @@ def strange() -> Diagnosis:
     return replace(
         everything(),
         verdict="not_identifiable",
-        sentence=HOSTILE,
+        remark=HOSTILE,
         recording=HOSTILE,
         declared=HOSTILE,
         effects=[
@@ -282,6 +288,7 @@ def strange() -> Diagnosis:
         masked=[Masked(HOSTILE, nan)],
         split=HOSTILE,
         notes=[HOSTILE],
+        declared_values={path: [np.float32(0.1), nan], "pixel.leak.rate_hz": None},
         model={"pixel": {"thresholds": {"on": np.float32(0.25)}, "leak": None}},
         facts={HOSTILE: HOSTILE},
     )

@@ -13,7 +13,13 @@ from hypothesis.extra import numpy as hnp
 from made_up_diagnosis import everything, strange
 
 from adv2e.reports.charts.axes import Axis, axis_over, drawable
-from adv2e.reports.charts.curve_chart import band_path, curve_chart, line_path, points_of
+from adv2e.reports.charts.curve_chart import (
+    band_path,
+    curve_chart,
+    curves,
+    line_path,
+    points_of,
+)
 from adv2e.reports.charts.error_chart import error_chart
 from adv2e.reports.charts.sensor_map import (
     colour_bar,
@@ -21,13 +27,14 @@ from adv2e.reports.charts.sensor_map import (
     map_image,
 )
 from adv2e.reports.result import Band, Curve, ErrorRow, Estimate
+from adv2e.reports.wording import OF_RECORDINGS
 
 NAN = np.nan
 ANY = hnp.arrays(np.float64, st.integers(0, 8), elements=st.floats())
 
 
 def path_of(svg, class_):
-    """Return the points of the last path of that class, behind that of the legend, in runs."""
+    """Return the points of the last path of that class, in runs."""
     *_, data = re.findall(rf'<path d="([^"]*)" class="{class_}">', svg)
     runs = re.findall(r"M([^MZ]*)", data)
     return [[tuple(map(float, point.split())) for point in run.split("L")] for run in runs]
@@ -108,7 +115,7 @@ def test_curves_lie_where_their_values_are():
     first, last = path_of(svg, "curve measured")
     assert first[0][1] == pytest.approx(height(1), abs=0.2)
     assert last[0][1] == pytest.approx(height(3), abs=0.2)
-    assert svg.count("<circle") == 2 + 1  # and the one of the legend
+    assert svg.count("<circle") == 2
 
 
 def test_repeated_measurements_are_points_without_a_line():
@@ -117,7 +124,7 @@ def test_repeated_measurements_are_points_without_a_line():
     other = Band(band.middle, band.low, np.full(3, 4.0))
     svg = curve_chart(Curve("t", "x", "y", x, measured, band, other))
     assert 'class="curve measured"' not in svg
-    assert svg.count("<circle") == 2 + 1  # and the one of the legend
+    assert svg.count("<circle") == 2
     title = re.search("<title>(.*)</title>", svg)[1]
     assert "Of 2 measured values 1 lie in the band of the declared model, 2 in" in title
 
@@ -125,13 +132,14 @@ def test_repeated_measurements_are_points_without_a_line():
 def test_bands_that_reach_zero_end_at_the_bottom_of_a_logarithm():
     values = np.array([10.0, 10])
     band = Band(values, np.array([0.0, 1]), values * 2)
+    other = Band(values, np.array([1.0, 1]), values * 2)
     svg = curve_chart(
-        Curve("t", "x", "y", np.array([1.0, 2]), values, band, band, y_log=True)
+        Curve("t", "x", "y", np.array([1.0, 2]), values, other, band, y_log=True)
     )  # fmt: skip
     (area,) = path_of(svg, "band after")
     bottoms = sorted((y for _, y in area), reverse=True)
     assert bottoms[0] > bottoms[1] > bottoms[2]
-    axis = re.search(r'<line x1="58.0" y1="([\d.]+)" x2="446.0" y2="\1" class="axis">', svg)
+    axis = re.search(r'<line x1="58.0" y1="([\d.]+)" x2="346.0" y2="\1" class="axis">', svg)
     assert bottoms[0] == pytest.approx(float(axis[1]), abs=0.1)
 
 
@@ -146,28 +154,80 @@ def test_any_curve_can_be_drawn(values, bins, x_log, y_log):
     assert "inf" not in svg
 
 
-def test_errors_are_drawn_relative_to_the_one_before():
+def widths(chart):
+    """Return the width of each role's bar, in percent."""
+    bars = re.findall(r'<div class="bar (\w+)">(.*?)</div>', chart)
+    found = {role: re.search(r'class="fill" style="width:([\d.]+)%"', bar) for role, bar in bars}
+    return {role: bar and float(bar[1]) for role, bar in found.items()}
+
+
+def test_bars_of_errors_are_as_long_as_the_errors_are_large():
     row = ErrorRow("e", Estimate(200.0, (180.0, 230.0)), Estimate(50.0), Estimate(40.0))
-    svg = error_chart([row])
-    labels = texts(svg, "middle")
-    zero, one = labels["0"][0], labels["1"][0]
-    mark = r'transform="translate\(([\d.]+) [\d.]+\)" class="dot (\w+)"'
-    places = {role: float(x) for x, role in re.findall(mark, svg)}
-    assert places["before"] == pytest.approx(one, abs=0.1)
-    assert places["after"] == pytest.approx(zero + (one - zero) / 4, abs=0.1)
-    assert places["floor"] == pytest.approx(zero + (one - zero) / 5, abs=0.1)
-    assert svg.count('class="whisker before"') == 3
-    assert "200 (180 to 230)" in svg
+    chart = error_chart(row)
+    per_cent = 230.0 / 100.0
+    wanted = {"before": 200.0, "after": 50.0, "floor": 40.0}
+    assert widths(chart) == {
+        role: pytest.approx(size / per_cent, abs=0.1) for role, size in wanted.items()
+    }
+    whisker = r'class="whisker" style="left:([\d.]+)%;width:([\d.]+)%"'
+    left, width = re.search(whisker, chart).groups()
+    assert float(left) == pytest.approx(180.0 / per_cent, abs=0.1)
+    assert float(width) == pytest.approx(50.0 / per_cent, abs=0.1)
+    assert chart.count('class="whisker"') == 1
+    assert "200 (180 to 230)" in chart
 
 
-def test_errors_without_scale_are_given_as_numbers_only():
-    nothing = ErrorRow("n", Estimate(0.0), Estimate(2.5), Estimate(NAN))
-    assert error_chart([nothing]) == ""
-    svg = error_chart([*everything().errors, nothing])
-    assert "not drawn" in svg
-    assert "2.5" in svg
+def test_errors_that_are_no_length_are_given_as_numbers_only():
+    chart = error_chart(ErrorRow("n", Estimate(0.0), Estimate(2.5), Estimate(NAN)))
+    assert widths(chart) == {"before": None, "after": 100.0, "floor": None}
     wild = ErrorRow("w", Estimate(1e-300, (-1.0, np.inf)), Estimate(1e300), Estimate(-1.0))
-    assert "inf" not in error_chart([wild]).replace("to inf", "")
+    assert widths(error_chart(wild)) == {"before": 0.0, "after": 100.0, "floor": None}
+    assert not re.search(r"style=\"[^\"]*(nan|inf)", error_chart(wild))
+
+
+def drawn(given):
+    """Return the titles of the curves that are shown, and of those that are folded away."""
+    shown, _, folded = curves(given, OF_RECORDINGS).partition("<details")
+    return [re.findall("<figcaption>(.*?)</figcaption>", part) for part in (shown, folded)]
+
+
+def flat(title, apart):
+    """Return a curve of three points that are `apart` half widths from the declared band."""
+    x, middle = np.arange(3.0), np.full(3, 10.0)
+    near, far = Band(middle, middle - 2, middle + 2), middle + 2 * apart
+    return Curve(title, "x", "y", x, far, near, Band(far, far - 1, far + 1))
+
+
+def test_curves_that_differ_most_are_shown_and_the_others_folded():
+    given = [flat(f"c{k}", k) for k in range(6)]
+    assert drawn(given) == [["c5", "c4", "c3", "c2"], ["c1", "c0"]]
+    assert drawn(given[:4]) == [["c3", "c2", "c1", "c0"], []]
+
+
+def test_of_curves_of_one_kind_the_others_come_later():
+    given = [flat("a, ON", 9), flat("a, OFF", 8), flat("b", 3), flat("c", 2), flat("d", 1)]
+    assert drawn(given) == [["a, ON", "b", "c", "d"], ["a, OFF"]]
+
+
+def test_a_curve_that_is_not_known_is_no_reason_to_show_it():
+    unknown = replace(flat("unknown", 1), measured=np.full(3, NAN))
+    assert drawn([unknown, *(flat(f"c{k}", 1) for k in range(4))])[1] == ["unknown"]
+
+
+def test_the_legend_says_what_lines_and_bands_are():
+    legend = curves([flat("c", 1)], OF_RECORDINGS).partition("</ul>")[0]
+    for text in ("measured", "declared model", "model found", "the middle 95 % of simulations"):
+        assert text in legend
+    assert "greyish where both overlap" in legend
+
+
+def test_of_one_model_one_band_is_drawn():
+    curve = flat("c", 1)
+    text = curves([replace(curve, after=curve.before)], OF_RECORDINGS)
+    assert "model found" not in text.partition("</ul>")[0]
+    assert "overlap" not in text
+    assert 'class="band before"' in text
+    assert 'class="band after"' not in text
 
 
 def test_all_pictures_of_odd_values_hold_numbers_only():

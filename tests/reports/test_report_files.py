@@ -191,12 +191,13 @@ def test_the_summary_is_short(make):
 
 def test_the_summary_says_the_result():
     assert summary_text(everything()).splitlines() == [
-        "explained: The declared model lacks a dead time of 6.0 ms: pixels do not fire twice within"
-        " it, at",
-        "  any brightness.",
-        "  refractory: pixel.refractory.period_us = 6,010 us (5,500 to 6,500)",
-        "  low_pass: pixel.low_pass.cutoff_hz = 187 Hz (172 to 204)",
-        "as well: reset_overshoot",
+        "Dead time: 6.0 ms (5.5 to 6.5), declared 0.5 ms; low-pass of the photoreceptor: corner at"
+        " white",
+        "  187 Hz (172 to 204), declared 300 Hz (default); or instead: overshoot of the reset.",
+        "  explained: With this change nothing is left that these data show.",
+        "  refractory: pixel.refractory.period_us = 6,000 us (5,500 to 6,500), declared 500",
+        "  low_pass: pixel.low_pass.cutoff_hz = 187 Hz (172 to 204), declared 300 (default)",
+        "or instead: reset_overshoot",
         "error 1.38 -> 0.312 (floor 0.270): distance of the streams smoothed in time (mean of 2,"
         " 10, 50 and",
         "  100 ms)",
@@ -234,7 +235,7 @@ def test_the_summary_counts_what_it_leaves_out():
     many = replace(
         diagnosis,
         effects=diagnosis.effects * 9,
-        sentence="word " * 300,
+        remark="word " * 300,
         alternatives=["alternative"] * 60,
     )
     lines = summary_text(many).splitlines()

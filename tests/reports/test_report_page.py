@@ -107,20 +107,73 @@ def test_headings_come_in_order(full):
     headings = Outline(full).headings
     assert headings[0] == ("h1", "Diagnosis of office_zigzag.zip")
     assert [text for level, text in headings if level == "h2"] == [
-        "Error before and after",
-        "What was added",
-        "What explains it as well",
-        "What stands out",
-        "The residual before and after",
-        "Signatures",
-        "What was rejected",
-        "What could have been seen",
-        "Data",
-        "Nuisances",
-        "Notes",
-        "Facts",
+        "What to do next",
+        "What was found",
+        "Effects that fit as well",
+        "Where recording and simulation differ",
+        "Curves of recording and simulation",
+        "Values that were not declared and were fitted",
+        "Notes on the recording",
+        "Pixels with too many or too few events",
+        "Effects that were tried and not added",
+        "Which data were used",
+        "Other measures of the error",
+        "All statistics that were compared",
+        "How large an effect must be to be seen",
+        "Sizes, seeds, times and versions",
     ]
-    assert ("h3", "refractory") in headings
+    assert ("h3", "Dead time (refractory)") in headings
+
+
+def test_the_first_screen_holds_finding_error_and_next_step(full):
+    first, section, _ = full.partition("<section")
+    assert section
+    assert "<details" not in first
+    assert everything().sentence in Outline(f"{first}</main></body></html>").text
+    places = [first.index(part) for part in ("sentence", 'class="bars"', "What to do next")]
+    assert places == sorted(places)
+    assert first.count('class="bars"') == 1
+    assert everything().errors[0].name in first
+
+
+def test_other_errors_are_folded_away(full):
+    heading = full.index(">Other measures of the error<")
+    _, *others = (match.start() for match in re.finditer('class="bars"', full))
+    assert len(others) == len(everything().errors) - 1
+    assert all(full.rindex("<details", 0, place) < heading < place for place in others)
+    assert "<details open" not in full
+
+
+def test_the_line_to_copy_names_the_folder():
+    copied = '<pre class="copy"><code>adv2e convert -c some/where/model.yaml VIDEO</code></pre>'
+    assert copied in page(everything(), "some/where")
+
+
+def test_values_stand_beside_the_declared_ones(full):
+    for path, value in (
+        ("pixel.refractory.period_us", "500"),
+        ("pixel.low_pass.cutoff_hz", "300 (default)"),
+        ("pixel.thresholds.on", "0.2"),
+    ):
+        row = re.search(f"<code>{re.escape(path)}</code>.*?</tr>", full)[0]
+        assert f'data-label="declared">{value}</td>' in row
+    off = page(replace(everything(), declared_values={"pixel.refractory.period_us": None}))
+    assert 'data-label="declared">off</td>' in off
+
+
+def test_every_cell_has_its_heading_for_narrow_screens(full):
+    assert full.count("<td") == full.count('data-label="') > 50
+
+
+def test_paper_holds_what_matters(full):
+    kinds = re.findall(r'<details class="(\w+)"><summary><h2>([^<]*)', full)
+    assert {heading for kind, heading in kinds if kind == "screen"} == {
+        "Other measures of the error",
+        "All statistics that were compared",
+        "How large an effect must be to be seen",
+    }
+    assert "details.paper" in full[full.index("<script>") :]
+    assert "details.screen { display: none; }" in full
 
 
 def test_the_page_says_what_was_found(full):
@@ -128,12 +181,12 @@ def test_the_page_says_what_was_found(full):
     for part in (
         everything().sentence,
         "1.38 (1.31 to 1.46)",
-        "0.312 (0.290 to 0.340)",
+        "0.31 (0.29 to 0.34)",
         "p < 0.001",
         "p = 0.34",
         "Refractory period: after each event the pixel is dead",
         "pixel.refractory.period_us",
-        "6,010",
+        "6,000",
         "5,500 to 6,500",
         "µs",
         "dead time after an event",
@@ -156,7 +209,11 @@ def test_the_page_of_a_table_holds_what_a_table_can_show():
     empty = {name: [] for name in ("signatures", "maps", "detectable", "masked")}
     outline = Outline(page(replace(everything(), **empty, wording=OF_TABLES)))
     assert outline.headings[0] == ("h1", "Characterisation of office_zigzag.zip")
-    absent = ("What stands out", "Signatures", "What could have been seen")
+    absent = (
+        "Where recording and simulation differ",
+        "All statistics that were compared",
+        "How large an effect must be to be seen",
+    )
     assert not {text for _, text in outline.headings} & set(absent)
     for part in ("no line in the spectrum beyond chance", "Blocks of 0.5 s", "standard errors"):
         assert part in outline.text
@@ -165,7 +222,7 @@ def test_the_page_of_a_table_holds_what_a_table_can_show():
 @pytest.mark.parametrize("verdict", MARKS)
 def test_every_verdict_has_a_sign_and_a_word(verdict):
     text = page(replace(everything(), verdict=verdict))
-    sign, word, _ = MARKS[verdict]
+    sign, word = MARKS[verdict]
     assert f'class="verdict {verdict}"' in text
     assert f'<span aria-hidden="true">{sign}</span> {word}</span>' in text
 
@@ -175,7 +232,7 @@ def test_signs_of_unlike_verdicts_differ():
 
 
 def signature_names(text):
-    section = text[text.index(">Signatures<") : text.index(">What was rejected<")]
+    section = text[text.index(">All statistics that") : text.index(">How large an effect")]
     return re.findall(r'<span title="[^"]*">([^<]*)</span>', section), section
 
 

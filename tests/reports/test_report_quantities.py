@@ -8,12 +8,16 @@ from hypothesis import strategies as st
 from adv2e.reports.keys import meaning_of, summary_of, unit_of
 from adv2e.reports.markup import join, markup, plain, tag
 from adv2e.reports.quantities import (
+    alike_texts,
+    beside,
     estimate_text,
     interval_text,
     native,
     number_text,
     percent_text,
     probability_text,
+    readable,
+    scaled,
     short_text,
     value_text,
 )
@@ -44,11 +48,11 @@ def test_numbers_have_three_digits_or_all_whole_ones(value, text):
 @pytest.mark.parametrize(
     ("value", "interval", "text", "ends"),
     [
-        (6012.34, (5503.0, 6498.0), "6,010", "5,500 to 6,500"),
+        (6012.34, (5503.0, 6498.0), "6,000", "5,500 to 6,500"),
         (1.3842, (1.312, 1.461), "1.38", "1.31 to 1.46"),
-        (0.3124, (0.2904, 0.3401), "0.312", "0.290 to 0.340"),
-        (0.0004, (-0.31, 0.29), "0.00", "-0.31 to 0.29"),
-        (-0.0004, (-0.31, 0.29), "0.00", "-0.31 to 0.29"),
+        (0.3124, (0.2904, 0.3401), "0.31", "0.29 to 0.34"),
+        (0.0004, (-0.31, 0.29), "0.0", "-0.3 to 0.3"),
+        (-0.0004, (-0.31, 0.29), "0.0", "-0.3 to 0.3"),
         (2.5e9, (2.4e9, 2.6e9), "2.50e9", "2.40e9 to 2.60e9"),
         (5, (5, 5), "5", "5 to 5"),
         (np.float64(3.25), (0.0, float("inf")), "3.25", "0 to inf"),
@@ -58,6 +62,45 @@ def test_values_have_the_digits_that_the_interval_warrants(value, interval, text
     assert value_text(value, interval) == text
     assert interval_text(interval) == ends
     assert estimate_text(Estimate(value, interval)) == f"{text} ({ends})"
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "unit", "readable_unit", "text"),
+    [
+        ("pixel.refractory.period_us", 4003.7, "us", "ms", "4.004"),
+        ("pixel.refractory.period_us", 400.3, "us", "µs", "400.3"),
+        ("frames.clock_offset_us", -2.5e6, "us", "s", "-2.5"),
+        ("readout.arbiter.row_ns", 12_500, "ns", "µs", "12.5"),
+        ("readout.loss.fraction", 0.052, "", "%", "5.2"),
+        ("frames.shift_px", [0.5, -0.25], "px", "px", "[0.5, -0.25]"),
+        ("frames.encoding", "linear", "", "", "linear"),
+        ("pixel.leak.rate_hz", 5000.0, "Hz", "Hz", "5,000"),
+    ],
+)
+def test_units_are_those_that_are_easy_to_read(path, value, unit, readable_unit, text):
+    factor, better = readable(path, value, unit)
+    assert (better, value_text(scaled(value, factor))) == (readable_unit, text)
+
+
+@pytest.mark.parametrize(
+    ("value", "interval", "text"),
+    [
+        (0.5, (3.97, 4.04), "0.50"),
+        (0.512345, (3.9, 4.4), "0.5123"),
+        (500, (3970, 4040), "500"),
+        (2, (3.97, 4.04), "2.00"),
+        ([0.5, 0.1], ([0.1, 0.2], [0.3, 0.4]), "[0.5, 0.1]"),
+        ("linear", None, "linear"),
+    ],
+)
+def test_declared_values_have_as_many_decimals_as_the_fitted_one_beside(value, interval, text):
+    assert beside(value, interval) == text
+
+
+def test_numbers_to_compare_end_at_the_same_place():
+    assert alike_texts((0.924, -0.000155, 0.91612)) == ["0.924", "0.000", "0.916"]
+    assert alike_texts((114.2, 711.3, float("nan"))) == ["114", "711", "-"]
+    assert alike_texts((0.0, 0.0, 0.0)) == ["0", "0", "0"]
 
 
 def test_values_of_other_kinds():
@@ -85,7 +128,7 @@ def test_texts_are_near_the_number(value, digits):
 def test_values_with_intervals_are_off_by_little_of_the_interval(value, one, other):
     low, high = sorted((one, other))
     text = float(value_text(value, (low, high)).replace(",", ""))
-    assert abs(text - value) <= max(0.06 * (high - low), 1e-3 * abs(value)) + 1e-300
+    assert abs(text - value) <= max(0.13 * (high - low), 1e-3 * abs(value)) + 1e-300
 
 
 def test_probabilities_and_shares():

@@ -87,6 +87,9 @@ def test_the_record_says_what_was_found():
         "z_before": -38.0,
         "z_after": None,
     }
+    assert report["sentence"] == everything().sentence
+    assert report["remark"] == everything().remark
+    assert report["declared_values"]["pixel.refractory.period_us"] == 500.0
     assert [row["name"] for row in report["errors"]] == [row.name for row in everything().errors]
     assert report["errors"][1]["after"] == {"value": 121.0, "interval": [115.0, 127.0]}
     assert [one["size"] for one in report["detectable"]] == [740.0, 0.31, 0.052, None]

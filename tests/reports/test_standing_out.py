@@ -49,22 +49,28 @@ def test_groups_that_still_stand_out_come_first_the_farthest_before_the_others()
 def test_nothing_stands_out_of_chance():
     quiet = [signature(f"s{k}", "g", 0.9 * k, -0.9 * k) for k in range(4)]
     assert standing_out(quiet) == []
-    assert "No statistic is 3 deviations or more off." in groups(quiet)
+    text = groups(replace(everything(), signatures=quiet))
+    assert "No number differs by more than 3 standard deviations." in text
 
 
 def test_the_page_tells_how_each_group_stands_out():
-    text = groups(SIGNATURES)
+    text = groups(replace(everything(), verdict="unexplained", signatures=SIGNATURES))
     assert text.index("what e1 means") < text.index("what c1 means") < text.index("what b2 means")
     assert "what c2 means" not in text
     assert "2 of 2" in text
     assert "345" in text
 
 
+def test_where_nothing_is_left_the_page_tells_what_differed():
+    text = groups(replace(everything(), verdict="explained", signatures=SIGNATURES))
+    assert text.index("what c2 means") < text.index("what b2 means") < text.index("what a1 means")
+    assert "what c1 means" not in text
+
+
 @pytest.mark.parametrize("verdict", ["unexplained", "partly_explained", "consistent"])
 def test_the_summary_tells_it_where_nothing_is_named(verdict):
     text = summary_text(replace(everything(), verdict=verdict, effects=[], signatures=SIGNATURES))
     lines = [
-        "  e: what e1 means: 12.0, expected 67.0",
         "  c: what c1 means: 12.0, expected 67.0",
         "  b: what b2 means: 12.0, expected 67.0",
     ]
@@ -75,6 +81,6 @@ def test_the_summary_tells_it_where_nothing_is_named(verdict):
 def test_the_summary_stays_short_where_much_stands_out():
     long = [signature("word " * 60, f"group {k} " * 20, 9.0, 9.0) for k in range(9)]
     unexplained = replace(everything(), verdict="unexplained", effects=[], signatures=long)
-    lines = summary_text(replace(unexplained, sentence="word " * 300)).splitlines()
+    lines = summary_text(replace(unexplained, remark="word " * 300)).splitlines()
     assert len(lines) < 15
     assert max(map(len, lines)) <= 100

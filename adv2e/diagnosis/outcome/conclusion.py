@@ -43,6 +43,7 @@ class Conclusion:
 def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion:
     """Look at the test data, and decide."""
     scene, simulator = prepared.scene, prepared.reference.sampler.simulator
+    simulator.begin("judging on data not used so far")
 
     def test(stream: Stream) -> Stream:
         return scene.split.chosen(stream, splits.TEST)

@@ -37,6 +37,7 @@ def detectable(
     is tried in the next round.  Where no size within the physical range would have been seen, or
     none was settled on, there is none.
     """
+    reference.begin("finding what could have been seen")
     mildest: dict[str, Candidate] = {}
     for candidate in candidates:
         if candidate.parameters:

@@ -1,17 +1,11 @@
-"""What the end of a search says of the recording: the verdict, and a sentence for it."""
+"""What the end of a search says of the recording: the verdict, and what it says."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
-from adv2e.config import Config, to_dict
-from adv2e.config.paths import get_key
-from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
-from adv2e.diagnosis.fitting.fitted import Fitted
-from adv2e.diagnosis.hints.readouts import DRIFT
-from adv2e.diagnosis.selection.reference import State
 from adv2e.diagnosis.selection.search import PER_LOOK, Outcome
+from adv2e.reports.labels import label_of
 from adv2e.reports.result import ErrorRow, Verdict
 
 _PARTLY = 0.8
@@ -66,60 +60,29 @@ def _too_near(error: ErrorRow) -> bool:
     return after is not None and floor is not None and after[1] < floor[0]
 
 
-def sentence_of(verdict: Verdict, kept: State, outcome: Outcome, declared: Config) -> str:
-    """Return the verdict on the model that is reported, the declared one if none, in a sentence."""
+def remark_of(verdict: Verdict, outcome: Outcome) -> str:
+    """Return what a verdict says besides the effects that were found and their values."""
     if verdict == "consistent":
-        return (
-            "The recording is what the declared model makes: nothing is missing that can be seen."
-        )
+        return "The recording is what the declared model makes."
     only_test = outcome.probability >= PER_LOOK
+    where = " in the test data" * only_test
+    share = f"{outcome.explained:.0%} of the difference"
     if verdict == "unexplained" and only_test and not outcome.state.fits:
         return (
             "Nothing is missing in the data for training and validation, but in the test data"
-            f" something is, which chance makes {outcome.test_probability:.0e} times."
+            f" something is: chance makes such a difference {outcome.test_probability:.0e} times."
         )
-    if verdict == "unexplained" and outcome.complete:
-        return (
-            "Something is missing in the declared model that no effect known explains:"
-            f" {' and '.join(outcome.state.names)} would account for every statistic, but not for"
-            " where and when events come."
-        )
+    if verdict == "unexplained" and not outcome.state.fits:
+        return "No effect that was tried makes the model better by more than chance."
     if verdict == "unexplained":
-        best = " and ".join(outcome.state.names)
-        most = f" (at most {outcome.explained:.0%} of it: {best})" if best else ""
-        return f"Something is missing in the declared model that no effect known explains{most}."
-    wrong = f"The declared model {_wrong(kept.fits, declared)}"
+        best = " and ".join(map(label_of, outcome.state.names))
+        if outcome.complete:
+            return f"The nearest is {best}: numbers of events are then right, their times are not."
+        return f"The nearest is {best}: it would explain {share}, too little to be named."
     if verdict == "partly_explained":
-        return (
-            f"{wrong}; that explains {outcome.explained:.0%} of the"
-            f" residual, and something is left{' in the test data' * only_test}."
-        )
+        return f"This explains {share}; something is left{where}."
     if verdict == "not_identifiable":
-        others = ", ".join(outcome.alternatives)
-        return f"{wrong}, or as well {others}."
+        return "These data cannot tell these effects apart."
     if min(outcome.probability, outcome.test_probability) < PER_LOOK:
-        share = f"{outcome.explained:.1%}"
-        return f"{wrong}; that explains {share} of the residual."
-    return f"{wrong}; with what was fitted, nothing is left that can be seen."
-
-
-def _wrong(fits: Sequence[Fitted], declared: Config) -> str:
-    """Return what the declared model lacks, and what it has, but otherwise."""
-    told = []
-    for there, what in ((False, "lacks"), (True, "is wrong in")):
-        names = [fit.candidate.name for fit in fits if _has(declared, fit.candidate) is there]
-        if names:
-            told.append(f"{what} {' and '.join(names)}")
-    return " and ".join(told)
-
-
-def _has(declared: Config, candidate: Candidate) -> bool:
-    """Tell whether a configuration has an effect already, of whatever size."""
-    values = (neutral_value(declared, parameter) for parameter in candidate.parameters)
-    held = to_dict(declared)
-    # how fast the clock of the frames is, a pulse tells besides
-    besides = (key for key, _ in candidate.extra if key != DRIFT)
-    others = (get_key(held, key) for key in besides)
-    return any(value != 0.0 and math.isfinite(value) for value in values) or any(
-        value is not None and value != 0.0 for value in others
-    )
+        return f"This explains {outcome.explained:.1%} of the difference."
+    return "With this change nothing is left that these data show."

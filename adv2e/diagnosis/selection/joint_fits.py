@@ -92,6 +92,7 @@ def with_more(
     reference: Reference, state: State, added: Sequence[Trial], grounds: Sequence[State]
 ) -> JointFit:
     """Return the model with effects more, fitted to its end and validated against all `grounds`."""
+    reference.begin(f"searching: fitting {' and '.join(trial.name for trial in added)}")
     before = state.fits
     for trial in added:
         before = tuple(_exposed_as(trial, fit) for fit in before)
@@ -115,6 +116,7 @@ def best_of(reference: Reference, made: Sequence[JointFit], state: State) -> Sta
 
     Effects of others that do as well are noted as alternatives.
     """
+    reference.begin("searching: comparing the best")
     holding = [
         reference.settled(one.state.fits, one.state.ensembles[BOTH].sd)
         for one in made

@@ -101,6 +101,8 @@ class Reference:
         Told of each step.
     nuisances : Candidate
         Keys that are not known: fitted with all effects, whatever these are.
+    begin : callable
+        Told of each stage, in a few words.
     """
 
     def __init__(
@@ -111,8 +113,9 @@ class Reference:
         error: FrameError | None = None,
         log: Callable[[str], None] = lambda text: None,
         nuisances: Candidate = NOTHING,
+        begin: Callable[[str], None] = lambda stage: None,
     ) -> None:
-        self.sampler, self.observed, self.log = sampler, observed, log
+        self.sampler, self.observed, self.log, self.begin = sampler, observed, log, begin
         self.error = error or FrameError.none(observed.shape)
         self.declared, self.nuisances = declared, nuisances
         self._resampling, self.rejections = Resampling(sampler, declared), Rejections()

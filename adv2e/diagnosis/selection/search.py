@@ -292,6 +292,7 @@ class Search:
 
     def _without(self, state: State, fit: Fitted) -> State:
         """Return the model without one of its effects, the others fitted again."""
+        self.reference.begin(f"searching: is {fit.candidate.name} needed")
         rest = tuple(other for other in state.fits if other is not fit)
         without = self.reference.settled(rest, state.ensembles[BOTH].sd)
         alike = {name: of for name, of in state.alternatives.items() if name in without.names}

@@ -42,6 +42,7 @@ def shortlisted(reference: Reference, state: State, candidates: Sequence[Candida
     left = [one for one in candidates if one.name not in state.names]
     if not left:
         return []
+    reference.begin(f"searching: trying {len({one.name for one in left})} effects")
     fitter = reference.fitter(splits.TRAIN, state.config, rough=True)
     fits = fitter.at_best_starts(left, state.config, (1, 2))
     for one in left:

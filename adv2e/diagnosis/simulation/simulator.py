@@ -15,6 +15,7 @@ from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.simulation.affordable import FINE
 from adv2e.diagnosis.simulation.frames import FrameCache, Instants, events_of
+from adv2e.diagnosis.simulation.progress import Progress
 from adv2e.effects.frames.misregistration import shifted
 from adv2e.pixel.steps import Coarseness
 
@@ -29,20 +30,26 @@ _ROUGH = Coarseness(5.0, 2.5)
 class Simulator:
     """Turns configurations into streams, in threads: a simulation in each.
 
-    `progress` is called with the number of simulations done.
+    `progress` is told of each stage that begins and of each simulation that is done.
     """
 
     def __init__(
         self,
         evidence: Evidence,
         threads: int,
-        progress: Callable[[int], None] = lambda done: None,
+        progress: Callable[[Progress], None] = lambda now: None,
     ) -> None:
         self._evidence, self._threads, self._progress = evidence, threads, progress
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
         self._frames, self._counting = FrameCache(), threading.Lock()
         self._light: Callable[[Config], Instants] = self._recorded
-        self.done = 0
+        self.done, self._stage = 0, ""
+
+    def begin(self, stage: str) -> None:
+        """Tell what the simulations that follow are for."""
+        with self._counting:
+            self._stage = stage
+            self._progress(Progress(stage, self.done))
 
     def of(self, evidence: Evidence) -> Simulator:
         """Return the same for another recording; nobody is told of its progress."""
@@ -75,7 +82,7 @@ class Simulator:
         )
         with self._counting:
             self.done += 1
-            self._progress(self.done)
+            self._progress(Progress(self._stage, self.done))
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
 

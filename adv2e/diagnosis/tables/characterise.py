@@ -13,7 +13,7 @@ from adv2e.config.paths import set_key
 from adv2e.diagnosis.tables.latency_problem import LatencyProblem
 from adv2e.diagnosis.tables.measurements import Latencies, measurements_of
 from adv2e.diagnosis.tables.noise_problem import NoiseProblem
-from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, is_key
+from adv2e.diagnosis.tables.problem import Array, Declared, Settings, is_key
 from adv2e.diagnosis.tables.selection import Choice, FittedSet, Selector
 from adv2e.diagnosis.tables.table import Table
 from adv2e.errors import DataError
@@ -57,13 +57,14 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
     if problem.test.any():
         rows = f"the {problem.test.sum()} rows where {' and '.join(settings.judge)}"
         split = f"fitted without {rows}, judged there"
+    effects = _findings(after, selector)
     out_of_reach = [Rejected(*one) for one in problem.out_of_reach.items()]
     return Diagnosis(
         verdict=chosen.verdict,
-        sentence=_sentence(chosen, problem, selector),
+        remark=_remark(chosen, selector),
         recording=shown(table.name),
         declared=declared.name,
-        effects=_findings(after, selector),
+        effects=effects,
         alternatives=_alternatives(chosen),
         nuisances={one.key: found[one.key] for one in problem.nuisances.parameters},
         rejected=[*chosen.rejected, *out_of_reach],
@@ -86,6 +87,9 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
             "adv2e": __version__,
         },
         wording=OF_TABLES,
+        declared_values={
+            key: declared.written.get(key) for one in effects for key in one.parameters
+        },
     )
 
 
@@ -210,19 +214,15 @@ def _band(model: FittedSet, selector: Selector, rows: NDArray[np.int64]) -> Band
     return Band(at(model.point), low, high)
 
 
-def _sentence(chosen: Choice, problem: Problem, selector: Selector) -> str:
-    names = " and ".join(dict.fromkeys(chosen.after.names))
-    change = f"held-out error {chosen.before.error:.3g} before, {chosen.after.error:.3g} after"
+def _remark(chosen: Choice, selector: Selector) -> str:
+    change = f"error on light held out: {chosen.before.error:.3g} before"
+    change += f", {chosen.after.error:.3g} after"
     if chosen.verdict == "consistent":
-        return f"Nothing is missing: the declared model fits the {problem.what} within its errors."
+        return "The declared model fits the table within its errors."
     if chosen.verdict == "unexplained":
-        return (
-            f"Something is missing, and no effect of the library accounts for it ({change}; a"
-            f" constant: {selector.constant:.3g})."
-        )
+        return f"No effect does better than a constant ({change}, {selector.constant:.3g} with it)."
     if chosen.verdict == "not_identifiable":
-        others = " or ".join(" and ".join(model.names) for model in chosen.alternatives)
-        return f"Either {names} is missing or {others}: the table cannot tell ({change})."
+        return f"The table cannot tell these effects apart ({change})."
     if chosen.verdict == "partly_explained":
-        return f"Missing: {names}; more than the errors of the table remains ({change})."
-    return f"Missing: {names} ({change})."
+        return f"More than the errors of the table is left ({change})."
+    return f"What is left is within the errors of the table ({change})."

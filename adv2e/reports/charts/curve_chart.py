@@ -14,23 +14,21 @@ from adv2e.reports.charts.axes import (
     axis_over,
     draw_axes,
     drawable,
-    place_text,
     wrapped,
 )
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.result import Band, Curve
 from adv2e.reports.wording import Wording
 
-WIDTH, _PLOT_HEIGHT = 460, 200
-_LEFT, _RIGHT, _LEGEND = 58, 14, 22
+WIDTH, _PLOT_HEIGHT = 360, 160
+_LEFT, _RIGHT = 58, 14
 _FEW_POINTS = 40
 """Up to as many, points of a line are marked."""
 
-_LEGENDS = (
-    ("measured", "measured", 4),
-    ("before", "before (declared model)", 104),
-    ("after", "after (model found)", 290),
-)
+_SHOWN = 4
+"""Curves that are not folded away."""
+_FARTHEST = 20.0
+"""Half widths of a band beyond which a value is no farther off."""
 
 
 @dataclass(frozen=True)
@@ -58,12 +56,62 @@ class _Frame:
 
 
 def curves(given: Sequence[Curve], wording: Wording) -> Markup:
-    """Return the curves, side by side where there is room, and what their bands are."""
+    """Return the curves side by side, under their legend: those that differ most, the rest folded.
+
+    They differ by how far the recording is from the declared model's band.
+    """
     if not given:
         return Markup()
+    ranked = _ranked(given)
+    key = _legend(wording, two=any(not _is_one(curve) for curve in given))
+    parts: list[Markup] = [key, _side_by_side(ranked[:_SHOWN])]
+    rest = ranked[_SHOWN:]
+    if rest:
+        summary = tag("summary", f"{len(rest)} more curves, which differ less")
+        parts.append(tag("details", summary, key, _side_by_side(rest), class_="screen"))
+    return join(*parts)
+
+
+def _ranked(given: Sequence[Curve]) -> list[Curve]:
+    """Return the curves that differ most first; of those of one kind, the others come later."""
+    seen: dict[str, int] = {}
+    turns: list[tuple[int, int, Curve]] = []
+    for curve in sorted(given, key=lambda curve: -_unlike(curve)):
+        kind = curve.title.partition(",")[0]
+        turns.append((seen.setdefault(kind, 0), len(turns), curve))
+        seen[kind] += 1
+    return [curve for *_, curve in sorted(turns, key=lambda turn: turn[:2])]
+
+
+def _side_by_side(given: Sequence[Curve]) -> Markup:
     figures = [tag("figure", tag("figcaption", curve.title), curve_chart(curve)) for curve in given]
-    note = tag("p", f"Bands: {wording.bands}.", class_="note")
-    return join(tag("div", *figures, class_="side"), note)
+    return tag("div", *figures, class_="side")
+
+
+def _is_one(curve: Curve) -> bool:
+    """Tell whether both models are the same: nothing was found, and one is drawn."""
+    pairs = zip(vars(curve.before).values(), vars(curve.after).values(), strict=True)
+    return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
+
+
+def _unlike(curve: Curve) -> float:
+    """Return how far measured values are from the declared model, in half widths of its band."""
+    band = curve.before
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        half = 0.5 * (drawable(band.high) - drawable(band.low))
+        apart = np.abs(drawable(curve.measured) - drawable(band.middle)) / half
+    known = apart[~np.isnan(apart)]
+    return float(np.minimum(known, _FARTHEST).mean()) if len(known) else 0.0
+
+
+def _legend(wording: Wording, *, two: bool) -> Markup:
+    """Return what the lines and bands of all curves are."""
+    entries = [("measured", "measured"), ("before", "before: the declared model")]
+    if two:
+        entries.append(("after", "after: the model found"))
+    items = [tag("li", tag("span", class_=f"swatch {name}"), text) for name, text in entries]
+    band = f"shaded: {wording.bands}{', greyish where both overlap' * two}"
+    return tag("ul", *items, tag("li", tag("span", class_="swatch shaded"), band), class_="legend")
 
 
 def curve_chart(curve: Curve) -> Markup:
@@ -74,7 +122,7 @@ def curve_chart(curve: Curve) -> Markup:
     """
     x_label = wrapped(curve.x_label, WIDTH - _LEFT)
     y_label = wrapped(curve.y_label, WIDTH)
-    top = _LEGEND + 14 + len(y_label) * LINE_HEIGHT
+    top = 14 + len(y_label) * LINE_HEIGHT
     bottom = top + _PLOT_HEIGHT
     frame = _frame_of(curve, top, bottom)
     if frame is None:
@@ -84,17 +132,19 @@ def curve_chart(curve: Curve) -> Markup:
     dots = len(frame.x) == len(measured) and (len(measured) <= _FEW_POINTS or not joined)
     content = [
         tag("title", _description(curve)),
-        _legend(joined, dots),
         draw_axes(frame.across, frame.up, x_label, y_label),
     ]
-    for name, band in (("before", curve.before), ("after", curve.after)):
+    models = [("before", curve.before), ("after", curve.after)]
+    if _is_one(curve):
+        models.pop()
+    for name, band in models:
         content.append(tag("path", d=frame.band(band), class_=f"band {name}"))
     if joined:
         content.append(tag("path", d=frame.line(measured), class_="curve measured"))
     if dots:
         ys = frame.up.place(measured)
         content += [_dot(x, y, joined) for x, y in zip(frame.x, ys, strict=True)]
-    for name, band in (("after", curve.after), ("before", curve.before)):
+    for name, band in reversed(models):
         content.append(tag("path", d=frame.line(drawable(band.middle)), class_=f"curve {name}"))
     height = bottom + 26 + len(x_label) * LINE_HEIGHT
     return tag("svg", *content, viewBox=f"0 0 {WIDTH} {height}", role="img")
@@ -134,19 +184,6 @@ def _dot(x: float, y: float, joined: bool) -> Markup:
         return Markup()
     r = 2.5 if joined else 3.5
     return tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=r, class_="dot measured")
-
-
-def _legend(joined: bool, dots: bool) -> Markup:
-    parts = []
-    for name, text, x in _LEGENDS:
-        if name != "measured":
-            parts.append(tag("rect", x=x, y=4, width=22, height=12, class_=f"band {name}"))
-        elif dots:
-            parts.append(_dot(x + 11, 10, joined))
-        if joined or name != "measured":
-            parts.append(tag("path", d=f"M{x} 10L{x + 22} 10", class_=f"curve {name}"))
-        parts.append(place_text(x + 27, 14, text, class_="label"))
-    return join(*parts)
 
 
 def points_of(x: Floats, values: Floats) -> tuple[Floats, Floats]:

@@ -1,94 +1,55 @@
-"""The errors before and after, beside the floor, as a picture (SVG): dots and intervals."""
+"""The errors before and after, beside the floor, as bars that are as wide as the page."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
-from adv2e.reports.charts.axes import LINE_HEIGHT, Axis, place_text, rule, wrapped
-from adv2e.reports.charts.ticks import linear_ticks, tick_labels
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.quantities import estimate_text
 from adv2e.reports.result import ROLES, ErrorRow, Estimate
 
-WIDTH = 720
-_START, _END, _VALUES = 130, 520, 536
-_LINE = 17
-_SHAPES = {
-    "before": "M0 -6L6 0L0 6L-6 0Z",
-    "after": "M-5 0A5 5 0 1 1 5 0A5 5 0 1 1 -5 0Z",
-    "floor": "M-4.5 -4.5H4.5V4.5H-4.5Z",
+MEANINGS = {
+    "before": "declared model",
+    "after": "model found",
+    "floor": "chance alone",
 }
+"""What each bar is of."""
 
 
-def error_chart(rows: Sequence[ErrorRow]) -> Markup:
-    """Return one row a measure: error before, after, and floor, relative to the one before.
+def error_chart(row: ErrorRow) -> Markup:
+    """Return a bar of each role of an error, from zero on, with its interval and its number.
 
-    Measures have units of their own, so that only shares compare; the numbers stand beside them.
+    What is not finite, or below zero, has no bar.
     """
-    largest = max((_largest(row) for row in rows if _has_scale(row)), default=math.nan)
-    if math.isnan(largest):
-        return Markup()
-    axis = Axis(0.0, 1.04 * largest, _START, _END)
-    parts, y = [], 6.0
-    for row in rows:
-        row_parts, y = _row(row, axis, y)
-        parts.append(row_parts)
-    ticks = linear_ticks(axis.low, axis.high)
-    grid = []
-    for tick, label in zip(ticks, tick_labels(ticks), strict=True):
-        x = axis.at(tick)
-        grid.append(rule(x, 6, x, y + 4, "one" if tick == 1 else "grid"))
-        grid.append(place_text(x, y + 18, label, text_anchor="middle"))
-    middle = (_START + _END) / 2
-    caption = "error relative to that of the declared model"
-    grid.append(place_text(middle, y + 36, caption, text_anchor="middle", class_="label"))
-    title = tag("title", "Errors before and after, and floor; the numbers stand below")
-    view = f"0 0 {WIDTH} {y + 44:.0f}"
-    return tag("svg", title, *grid, *parts, viewBox=view, role="img", class_="wide")
+    given: dict[str, Estimate] = {role: getattr(row, role) for role in ROLES}
+    ends = [number for one in given.values() for number in (one.value, *(one.interval or ()))]
+    longest = max((end for end in ends if math.isfinite(end)), default=0.0)
+    bars = [
+        tag(
+            "div",
+            tag("span", tag("strong", role), f" {MEANINGS[role]}", class_="role"),
+            tag("span", _bar(one, longest), class_="track", aria_hidden="true"),
+            tag("span", estimate_text(one), class_="number"),
+            class_=f"bar {role}",
+        )
+        for role, one in given.items()
+    ]
+    return tag("div", *bars, class_="bars")
 
 
-def _row(row: ErrorRow, axis: Axis, y: float) -> tuple[Markup, float]:
-    """Return one measure and where the next begins."""
+def _bar(estimate: Estimate, longest: float) -> Markup:
     parts = []
-    for line in wrapped(row.name, WIDTH):
-        y += LINE_HEIGHT
-        parts.append(place_text(0, y, line, class_="label name"))
-    for role in ROLES:
-        y += _LINE
-        estimate: Estimate = getattr(row, role)
-        parts.append(place_text(_START - 14, y, role, text_anchor="end"))
-        parts.append(place_text(_VALUES, y, estimate_text(estimate), class_="number"))
-        if _has_scale(row):
-            parts.append(_mark(estimate, row.before.value, axis, y - 4, role))
-    if not _has_scale(row):
-        parts.append(place_text(_START, y - _LINE, "not drawn: there is no error before"))
-    return join(*parts), y + 12
-
-
-def _mark(estimate: Estimate, unit: float, axis: Axis, y: float, role: str) -> Markup:
-    parts = []
-    if estimate.interval is not None and np.isfinite(estimate.interval).all():
-        ends = [axis.at(min(max(0.0, end / unit), axis.high)) for end in estimate.interval]
-        parts.append(rule(ends[0], y, ends[1], y, f"whisker {role}"))
-        parts += [rule(end, y - 4, end, y + 4, f"whisker {role}") for end in ends]
-    if 0 <= estimate.value / unit <= axis.high:
-        place = f"translate({axis.at(estimate.value / unit):.1f} {y:.1f})"
-        parts.append(tag("path", d=_SHAPES[role], transform=place, class_=f"dot {role}"))
+    if math.isfinite(estimate.value) and estimate.value > 0.0 and longest > 0.0:
+        width = f"width:{_percent(estimate.value, longest)}"
+        parts.append(tag("span", class_="fill", style=width))
+    if parts and estimate.interval is not None and np.isfinite(estimate.interval).all():
+        low, high = (max(end, 0.0) for end in estimate.interval)
+        place = f"left:{_percent(low, longest)};width:{_percent(high - low, longest)}"
+        parts.append(tag("span", class_="whisker", style=place))
     return join(*parts)
 
 
-def _has_scale(row: ErrorRow) -> bool:
-    """Tell whether the error before can be the unit of the others."""
-    return math.isfinite(row.before.value) and row.before.value > 0
-
-
-def _largest(row: ErrorRow) -> float:
-    """Return the largest number to be drawn, relative to the error before."""
-    shares = [1.0]
-    for estimate in (row.before, row.after, row.floor):
-        numbers = (estimate.value, *(estimate.interval or ()))
-        shares += [number / row.before.value for number in numbers]
-    return max(share for share in shares if math.isfinite(share))
+def _percent(part: float, whole: float) -> str:
+    return f"{100.0 * part / whole:.1f}%"

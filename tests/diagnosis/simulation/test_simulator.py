@@ -13,6 +13,7 @@ from adv2e.diagnosis.configurations import with_keys
 from adv2e.diagnosis.data.evidence import Evidence, RunIn
 from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.hints.lamps import lamps_of
+from adv2e.diagnosis.simulation.progress import Progress
 from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.diagnosis.statistics.sampler import Sampler
 from adv2e.diagnosis.statistics.summary import SummaryStatistics
@@ -86,11 +87,15 @@ def test_both_seeds_decide(simulator):
 def test_every_simulation_is_counted():
     told = []
     simulator = Simulator(EVIDENCE, 4, told.append)
+    simulator.begin("searching")
     config = load_config([], LINEAR)
     in_threads = simulator.map(lambda seed: simulator.stream(config, seed), range(12))
     simulator.close()
     assert simulator.done == 12
-    assert told == list(range(1, 13))
+    simulator.begin("judging")
+    numbers = [*range(13), 12]
+    stages = ["searching"] * 13 + ["judging"]
+    assert told == [Progress(*pair) for pair in zip(stages, numbers, strict=True)]
     alone = Simulator(EVIDENCE, 1)
     for seed, stream in enumerate(in_threads):
         np.testing.assert_array_equal(stream.t, alone.stream(config, seed).t)
