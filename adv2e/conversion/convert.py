@@ -125,6 +125,6 @@ def convert(
             progress=progress,
             also_read=files_among(config),
             log=notes.append,
-            doubt=lambda text: warnings.warn(text, stacklevel=5),
+            doubt=lambda text: warnings.warn(text, stacklevel=4),
         )
     return replace(summary, notes=tuple(notes))

@@ -5,6 +5,7 @@ import pytest
 from scipy import ndimage
 
 from adv2e.comparison.grids import own_window, smoothed, voxel_grid, z_scored
+from adv2e.errors import DataError
 from adv2e.events import empty_events, make_events
 
 WIDTH, HEIGHT = SIZE = 12, 9
@@ -91,3 +92,35 @@ def test_smoothing_is_a_3x3_gaussian_of_sigma_1_with_nothing_outside(events):
     for k in range(5):
         expected = ndimage.convolve(grid[k], weights, mode="constant")
         np.testing.assert_allclose(smoothed(grid)[k], expected, atol=1e-12)
+
+
+def test_without_a_window_it_is_that_of_the_events_in_any_order(events):
+    expected = voxel_grid(events, 5, SIZE, own_window(events))
+    np.testing.assert_array_equal(voxel_grid(events, 5, SIZE), expected)
+    shuffled = np.random.default_rng(1).permutation(events)
+    np.testing.assert_allclose(voxel_grid(shuffled, 5, SIZE), expected, atol=1e-12)
+
+
+def test_events_outside_the_window_are_left_out_and_its_ends_belong_to_it():
+    events = make_events([9, 10, 20, 21], [0, 1, 2, 3], [0, 0, 0, 0], [1, 1, 1, 1])
+    grid = voxel_grid(events, 2, (4, 1), (10, 20))
+    np.testing.assert_array_equal(grid[:, 0], [[0, 1, 0, 0], [0, 0, 1, 0]])
+
+
+@pytest.mark.parametrize(
+    ("bins", "size", "window", "text"),
+    [
+        (0, (4, 1), None, "0 bins, at least 1 is needed"),
+        (5, (3, 1), None, "number 1 has x 3, outside a sensor of 3x1 pixels"),
+        (5, (4, 1), (9, 8), "the window ends at 8 us, before it begins at 9 us"),
+    ],
+)
+def test_a_grid_that_cannot_be(bins, size, window, text):
+    events = make_events([0, 10], [0, 3], [0, 0], [1, 1])
+    with pytest.raises(DataError, match=text):
+        voxel_grid(events, bins, size, window)
+
+
+def test_an_array_without_fields_is_refused():
+    with pytest.raises(DataError, match="structured array"):
+        voxel_grid(np.zeros((3, 4)), 5, SIZE)
