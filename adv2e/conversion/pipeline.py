@@ -103,6 +103,7 @@ class _Output:
 
     def add(self, events: Events) -> None:
         """Write events."""
+        self.events += events.size
         for piece in _pieces(events):
             self._work.submit(self._write_events, piece)
 
@@ -112,7 +113,6 @@ class _Output:
             self._preview.add_frame(t_ns, drawn(picture, self._white))
 
     def _write_events(self, events: Events) -> None:
-        self.events += events.size
         self.on += int(np.count_nonzero(events["p"]))
         self._sink.write_events(events)
         if self._preview is not None:
@@ -215,8 +215,10 @@ def convert_reading(
         stills = reading.stills(
             Decoding(decoder, table is not None, out.wants_frames, stated, not keeps_all_bits)
         )
+        if progress:
+            stills = _shown(stills, recording.count, out, stack)
         chunks = events_from_light(
-            out.light_of(_progress(stills, recording.count, progress)),
+            out.light_of(stills),
             config,
             hooks=hooks,
             threads=workers,
@@ -303,10 +305,22 @@ def _pieces(events: Events) -> Iterator[Events]:
         yield events[begin : begin + size].copy()
 
 
-def _progress(stills: Iterator[Still], count: int | None, shown: bool) -> Iterable[Still]:
-    """Return the frames, with a progress bar on stderr if it is to be shown."""
-    if not shown:
-        return stills
+def _shown(
+    stills: Iterator[Still], count: int | None, out: _Output, stack: ExitStack
+) -> Iterator[Still]:
+    """Return the frames, with a bar on stderr that shows how many, and how many events so far.
+
+    The bar goes with the `stack`: a line that tells an error does not follow it.
+    """
     from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and most runs in scripts need none
 
-    return tqdm(stills, total=count, unit="frame", leave=False)
+    bar = stack.enter_context(tqdm(total=count, unit=" frames", leave=False))
+
+    def counted() -> Iterator[Still]:
+        for still in stills:
+            bar.set_postfix_str(f"{out.events:,} events", refresh=False)
+            bar.update()
+            yield still
+            del still  # with its picture
+
+    return counted()

@@ -4,17 +4,20 @@ import errno
 import importlib.metadata
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import threading
 import zlib
+from functools import partial
 from pathlib import Path
 
 import cv2
 import h5py
 import numpy as np
 import pytest
+import tqdm
 from pictures import picture
 
 from adv2e.config import load_config, names_of
@@ -542,7 +545,25 @@ def test_one_thread_computes_where_one_is_asked_for(
         assert len(names) == 1
 
 
-def test_progress_counts_the_frames(adv2e, video, tmp_path):
-    outcome = adv2e("convert", video, "-o", tmp_path / "a.h5", "--progress")
+@pytest.mark.parametrize(("part", "total"), [([], 6), (["--start", "0.03", "--stop", "0.1"], 3)])
+def test_progress_counts_the_frames_wanted(adv2e, video, tmp_path, part, total):
+    outcome = adv2e("convert", video, "-o", tmp_path / "a.h5", "--progress", *part)
     assert outcome.status == 0
-    assert "6/6" in outcome.err or "/6 [" in outcome.err
+    assert f"/{total} [" in outcome.err
+
+
+def test_progress_counts_the_events(adv2e, video, tmp_path, monkeypatch):
+    monkeypatch.setattr("tqdm.tqdm", partial(tqdm.tqdm, mininterval=0))  # every frame is shown
+    outcome = adv2e("convert", video, "-o", tmp_path / "a.txt", "--progress", "--threads", "1")
+    told = [int(n.replace(",", "")) for n in re.findall(r" ([\d,]+) events\]", outcome.err)]
+    assert told == sorted(told)
+    assert 0 < told[-1] <= len((tmp_path / "a.txt").read_text().splitlines())
+
+
+def test_a_failure_is_told_in_a_line_of_its_own(adv2e, tmp_path):
+    frames = np.full((3, 6, 8), 0.5, np.float32)
+    frames[2, 0, 0] = np.nan
+    np.save(tmp_path / "a.npy", frames)
+    outcome = adv2e("convert", tmp_path / "a.npy", "--fps", "30", "--progress", "-o", "-")
+    assert outcome.status == 1
+    assert re.search(r"\r *\radv2e: error: .*frame 2.*\n$", outcome.err)

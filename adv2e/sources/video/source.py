@@ -6,6 +6,7 @@ through it without decoding: how many there are, and what is known of their time
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -70,11 +71,10 @@ class VideoSource(Source):
                 self._colours = self._colours.completed(Colours(transfer=capture.transfer))
             self._describe(_load(capture, f"{path}: frame 0"), f"{path}: frame 0", self._meaning())
         self._times = VideoTimes(self._container, self._packets, self._fps)
-        if selection.start_s is None and selection.stop_s is None:
-            self.count = self._times.expected
         self._given = self._given_times(given)
         if not given:
             self._tell_times()
+        self.count = self._count()
 
     def _given_times(self, given: GivenTimes) -> Callable[[int], int] | None:
         """Return the times that replace those in the file: a function of a frame's number."""
@@ -92,6 +92,20 @@ class VideoSource(Source):
                 f"{self.path}: --time-unit is for lists of times; this video has its own"
             )
         return None if given.rate is None else given.rate.time_ns
+
+    def _count(self) -> int | None:
+        """Return how many frames are wanted, as far as the file and the times given tell."""
+        count, shown_ns, rate = self._times.expected, self._times.shown_ns, self._times.rate
+        time_ns = self._given or (rate.time_ns if rate else None)
+        if count is None or (self.selection.start_ns == 0 and self.selection.stop_s is None):
+            return count
+        if time_ns is None:
+            if len(shown_ns) < count:
+                return None
+            time_ns = shown_ns.__getitem__
+        first_ns, numbers = time_ns(0), range(self._listed or count)
+        begin = bisect_left(numbers, first_ns + self.selection.start_ns, key=time_ns)
+        return bisect_right(numbers, first_ns + self.selection.stop_ns, key=time_ns) - begin
 
     def _check_listed(self, listed: int) -> None:
         if listed == self._times.expected:

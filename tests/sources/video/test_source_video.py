@@ -170,8 +170,24 @@ def test_selection_reads_no_further_than_asked(write_video, colours):
     frames = list(source.frames())
     assert [frame.t_ns for frame in frames] == [n * 40_000_000 for n in range(2, 6)]
     assert np.array_equal(frames[0].image, colours[2])
-    assert source.count is None
+    assert source.count == 4
     assert times_of(open_source(path, start_s=0.08, stop_s=0.2, t0="zero"))[0] == 0
+
+
+@pytest.mark.parametrize(("suffix", "codec"), [("avi", "FFV1"), ("mkv", "FFV1"), ("mp4", "mp4v")])
+@pytest.mark.parametrize("given", [None, "fps", "timestamps"])
+@pytest.mark.parametrize("part", [(0.0, 0.44), (0.08, 0.2), (0.1, None), (0.05, 0.17), (0.3, 9.0)])
+def test_frames_of_a_part_are_counted_before_they_are_read(
+    write_video, tmp_path, smooth, suffix, codec, given, part
+):
+    path = write_video(f"clip.{suffix}", smooth, codec=codec)
+    if given == "timestamps":
+        (tmp_path / "times.txt").write_text("".join(f"{7 + n * n * 1e-3}\n" for n in range(30)))
+    times = {"fps": {"fps": 100}, "timestamps": {"timestamps": tmp_path / "times.txt"}}
+    if given == "fps":
+        part = (part[0] / 4, part[1] and part[1] / 4)
+    source = open_source(path, start_s=part[0], stop_s=part[1], **times.get(given, {}))
+    assert source.count == len(times_of(source))
 
 
 def test_start_behind_the_end_says_how_long_the_video_is(write_video, colours):
