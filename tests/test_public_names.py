@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import doctest
-import importlib
 import pydoc
-import shutil
 import subprocess
 import sys
 
 import pytest
-from camera import Camera, patchwork
 
 import adv2e
-from adv2e.diagnosis import prepare
-from adv2e.diagnosis.fitting.library import names
-from adv2e.diagnosis.outcome import conclusion
-from adv2e.diagnosis.selection import reference, shortlist
 
 NAMES = sorted(set(adv2e.__all__) - {"__version__", "EVENT_DTYPE"})  # those that have docstrings
 
@@ -45,36 +38,12 @@ def examples(thing, name):
 
 @pytest.mark.parametrize("name", sorted({*NAMES, "adv2e"} - {"diagnose"}))
 def test_the_example_of_each_works(name, tmp_path, monkeypatch):
+    """That of diagnose takes long: it is run where a diagnosis is made, in tests/cli."""
     monkeypatch.chdir(tmp_path)
     thing = adv2e if name == "adv2e" else getattr(adv2e, name)
     runner = doctest.DocTestRunner()
     for test in examples(thing, name):
         assert not runner.run(test).failed
-
-
-def test_the_example_of_diagnose_works(tmp_path, monkeypatch):
-    """With fewer simulations than a diagnosis to be believed, and fewer effects that compete."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(reference, "MANY", 40)
-    for module in (reference, shortlist):
-        monkeypatch.setattr(module, "SOME", 16)
-    monkeypatch.setattr(prepare, "PILOT_SEEDS", range(10_000, 10_004))
-    monkeypatch.setattr(conclusion, "DRAWS", 4)
-    Camera(
-        patchwork((32, 24), seed=6), hidden={"pixel": {"refractory": {"period_us": 20_000.0}}},
-        size=(32, 24), duration_s=0.3, fps=400.0, step_us=50.0,
-    ).record(tmp_path / "recording.zip")  # fmt: skip
-    shutil.move("recording.declared.yaml", "declared.yaml")
-    home = importlib.import_module("adv2e.diagnosis.recordings")
-    without = [name for name in names() if name not in ("refractory", "leak", "event_loss")]
-    real = home.diagnose_evidence
-    monkeypatch.setattr(
-        home, "diagnose_evidence", lambda *a, **kw: real(*a, **{**kw, "without": without})
-    )
-    runner = doctest.DocTestRunner()
-    for test in examples(adv2e.diagnose, "diagnose"):
-        assert not runner.run(test, clear_globs=False).failed
-        assert 15_000 < test.globs["dead_time"] < 25_000
 
 
 def test_another_name_is_an_attribute_error():

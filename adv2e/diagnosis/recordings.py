@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+
+from tqdm import tqdm
 
 from adv2e.config import Config, Written, files_among, load_config, names_of, written_keys
 from adv2e.config.user_effects import user_effects
@@ -27,6 +30,7 @@ def diagnose(
     time_unit: str | None = None,
     overwrite: bool = False,
     threads: int | None = None,
+    progress: bool = False,
 ) -> Diagnosis:
     """Find what a recording holds that its simulation lacks.
 
@@ -50,6 +54,8 @@ def diagnose(
         Replace the folder of an earlier report.
     threads : int, optional
         Default: all cores.  The result does not depend on it.
+    progress : bool
+        Show the stage and the number of simulations on stderr.
 
     Returns
     -------
@@ -70,23 +76,81 @@ def diagnose(
     ('explained', ['refractory'])
     >>> dead_time = load_config(found.model).pixel.refractory.period_us
     """
-    config = load_config(declared)
-    check_names(without, names(config))
-    check_own_names(config)
-    config = without_user_effects(config, written_keys(declared))
-    if output is not None:
-        check_folder(output, overwrite=overwrite, inputs=[recording, *files_among(declared)])
-    found = diagnose_evidence(
-        read_evidence(recording, time_unit),
-        config,
-        declared_name=names_of(declared) or "the defaults",
+    return diagnose_file(
+        recording,
+        load_config(declared),
+        name=names_of(declared),
+        written=written_keys(declared),
+        also_read=files_among(declared),
+        output=output,
         without=without,
-        free_thresholds=fit_thresholds,
+        fit_thresholds=fit_thresholds,
+        time_unit=time_unit,
+        overwrite=overwrite,
         threads=threads,
+        progress=progress,
     )
+
+
+def diagnose_file(
+    recording: str | Path,
+    declared: Config,
+    *,
+    name: str,
+    written: Collection[str],
+    also_read: Iterable[str | Path],
+    output: str | Path | None,
+    without: Sequence[str],
+    fit_thresholds: bool,
+    time_unit: str | None,
+    overwrite: bool,
+    threads: int | None,
+    progress: bool,
+    log: Callable[[str], None] = lambda text: None,
+) -> Diagnosis:
+    """Do what :func:`diagnose` does, with a configuration that was loaded.
+
+    `name` and `written` are what it was made from and the keys that somebody wrote; `also_read` are
+    files that must not be written over; `log` takes lines for people.
+    """
+    check_names(without, names(declared))
+    _check_own_names(declared)
+    declared = without_user_effects(declared, written)
+    if output is not None:
+        check_folder(output, overwrite=overwrite, inputs=[recording, *also_read])
+    with _stages(progress) as tell:
+        tell("reading the recording", 0)
+        found = diagnose_evidence(
+            read_evidence(recording, time_unit),
+            declared,
+            declared_name=name or "the defaults",
+            without=without,
+            free_thresholds=fit_thresholds,
+            threads=threads,
+            written=written,
+            progress=lambda now: tell(now.stage, now.simulations),
+            log=log,
+        )
     if output is not None:
         write_reports(found, output, overwrite=overwrite)
     return found
+
+
+@contextmanager
+def _stages(shown: bool) -> Iterator[Callable[[str, int], None]]:
+    """Show a stage and the number of simulations done; how many there will be, nobody knows."""
+    layout = "{desc}: {n_fmt} simulations in {elapsed}"
+    with tqdm(bar_format=layout, leave=False, disable=not shown) as bar:
+        last = ""
+
+        def tell(stage: str, simulations: int) -> None:
+            nonlocal last
+            bar.update(simulations - bar.n)
+            if stage != last:
+                bar.set_description_str(stage)
+                last = stage
+
+        yield tell
 
 
 def check_names(without: Sequence[str], known: Sequence[str]) -> None:
@@ -98,7 +162,7 @@ def check_names(without: Sequence[str], known: Sequence[str]) -> None:
             raise UsageError(f"--without {name}: no such effect, {hint}")
 
 
-def check_own_names(config: Config) -> None:
+def _check_own_names(config: Config) -> None:
     """Raise UsageError for an effect of the user's own that has the name of a built-in one."""
     known = names()
     for name in user_effects(config):

@@ -1,6 +1,7 @@
 """``adv2e diagnose``: options, exit status, and whole runs on a tiny recording."""
 
 import dataclasses
+import doctest
 import json
 import re
 import shutil
@@ -11,16 +12,17 @@ import pytest
 from camera import Camera, patchwork
 from camera.settings import BENCH
 
+import adv2e as package
 from adv2e import load_config, simulate
-from adv2e.diagnosis import diagnose as whole
 from adv2e.diagnosis import prepare
-from adv2e.diagnosis.data import evidence
+from adv2e.diagnosis import recordings as whole
 from adv2e.diagnosis.fitting.library import names
 from adv2e.diagnosis.outcome import conclusion
 from adv2e.diagnosis.selection import reference, shortlist
 from adv2e.diagnosis.simulation.progress import Progress
 from adv2e.formats.writing import open_sink
-from adv2e.reports import files, summary
+from adv2e.reports import summary
+from adv2e.reports.files import write_reports
 
 FILES = ["model.yaml", "report.html", "report.json"]
 TRIED = ("refractory", "leak", "event_loss")
@@ -72,24 +74,49 @@ def found(adv2e, recordings, name, out, *options):
     return json.loads((out / "report.json").read_text("utf-8")), err
 
 
-def test_a_missing_effect_is_named_whatever_the_threads(adv2e, recordings, short, tmp_path):
+@pytest.fixture
+def example(recordings, monkeypatch):
+    """Run the example of ``adv2e.diagnose``, with few effects that compete; returns its names."""
+
+    def run():
+        (test,) = doctest.DocTestFinder(recurse=False).find(package.diagnose, "diagnose")
+        assert not doctest.DocTestRunner().run(test, clear_globs=False).failed
+        return test.globs
+
+    usual = whole.diagnose_file
+    few = {"without": [name for name in names() if name not in TRIED], "threads": 2}
+    monkeypatch.setattr(whole, "diagnose_file", lambda *a, **kw: usual(*a, **{**kw, **few}))
+    return run
+
+
+def test_a_missing_effect_is_named_by_the_command_and_in_python_whatever_the_threads(
+    adv2e, recordings, short, example, tmp_path, monkeypatch
+):
+    shutil.copy(recordings / "dead.zip", tmp_path / "recording.zip")
+    shutil.copy(recordings / "dead.declared.yaml", tmp_path / "declared.yaml")
+    monkeypatch.chdir(tmp_path)
+    given = ("recording.zip", "-c", "declared.yaml", "-o", "by_command", *WITHOUT)
+    outcome = adv2e("diagnose", *given, "--threads", 1)
+    assert (outcome.status, outcome.out) == (0, "")
+    in_python = example()
+    assert in_python["dead_time"] == pytest.approx(DEAD_US, rel=0.05)
+    write_reports(in_python["found"], "in_python")
+
     reports = []
-    for threads in (1, 2):
-        out = tmp_path / str(threads)
-        made, err = found(adv2e, recordings, "dead", out, "--threads", threads)
-        first, *_, last = err.splitlines()
-        assert re.match(r"Dead time: (19\.\d|20(\.\d)?) ms \(", first)
-        assert ", declared 0.5" in first
-        assert made["sentence"] == first
-        assert last == f"report: {out / 'report.html'}"
-        reports.append(made)
-    for made in reports:
-        assert made["facts"].pop("time taken")
+    for folder in ("by_command", "in_python"):
+        assert sorted(path.name for path in Path(folder).iterdir()) == FILES
+        reports.append(json.loads(Path(folder, "report.json").read_text("utf-8")))
+        assert reports[-1]["facts"].pop("time taken")
     assert json.dumps(reports[0]) == json.dumps(reports[1])
-    first = (tmp_path / "1" / "model.yaml").read_bytes()
-    assert first == (tmp_path / "2" / "model.yaml").read_bytes()
+    model = Path("by_command/model.yaml").read_bytes()
+    assert model == Path("in_python/model.yaml").read_bytes()
 
     made = reports[0]
+    first, *_, last = outcome.err.splitlines()
+    assert re.match(r"Dead time: (19\.\d|20(\.\d)?) ms \(", first)
+    assert ", declared 0.5" in first
+    assert made["sentence"] == first
+    assert last == f"report: {Path('by_command/report.html')}"
     assert made["verdict"] in ("explained", "partly_explained")
     (effect,) = made["effects"]
     assert effect["name"] == "refractory"
@@ -103,7 +130,7 @@ def test_a_missing_effect_is_named_whatever_the_threads(adv2e, recordings, short
     assert error["after"] < 1.3 * error["floor"]
     assert made["global_p"]["before"] < 1e-6 < made["global_p"]["after"]
     assert {one["name"] for one in made["rejected"]} <= set(TRIED) - {"refractory"}
-    model = load_config([tmp_path / "1" / "model.yaml"])
+    model = load_config(["by_command/model.yaml"])
     assert model.pixel.refractory.period_us == pytest.approx(effect["parameters"][key], rel=1e-3)
     declared = load_config([recordings / "dead.declared.yaml"])
     held = dataclasses.replace(model.pixel, refractory=declared.pixel.refractory)
@@ -249,9 +276,9 @@ def made_up(monkeypatch, tmp_path):
         for step in steps:
             progress(Progress(*step))
 
-    monkeypatch.setattr(evidence, "read_evidence", read)
-    monkeypatch.setattr(whole, "diagnose", diagnose)
-    monkeypatch.setattr(files, "write_reports", write)
+    monkeypatch.setattr(whole, "read_evidence", read)
+    monkeypatch.setattr(whole, "diagnose_evidence", diagnose)
+    monkeypatch.setattr(whole, "write_reports", write)
     monkeypatch.setattr(summary, "summary_text", lambda found: "\n".join(SUMMARY))
     monkeypatch.chdir(tmp_path)
     return calls
