@@ -8,6 +8,7 @@ import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
+from adv2e.cli.reading import reading_told
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 @options.time_unit_option
 @options.config_options
 @options.threads_option
+@options.progress_option
 @options.verbosity_options
 def command(
     measured: str,
@@ -52,6 +54,7 @@ def command(
     time_unit: str | None,
     config: Callable[[], Config],
     threads: int | None,
+    progress: bool,
     log: Log,
 ) -> None:
     """Measure how far two event streams are apart.
@@ -74,8 +77,10 @@ def command(
     from adv2e.sources import open_source
 
     declared = config()
-    ours = read_events(measured, time_unit=time_unit)
-    theirs = read_events(simulated, time_unit=time_unit)
+    with reading_told(measured, progress) as told:
+        ours = read_events(measured, time_unit=time_unit, progress=told)
+    with reading_told(simulated, progress) as told:
+        theirs = read_events(simulated, time_unit=time_unit, progress=told)
     source = open_source(frames_path) if frames_path else None
     for doubt in source.doubts if source else []:
         log(doubt)

@@ -9,14 +9,18 @@ import click
 
 from adv2e.cli import options
 from adv2e.cli.commands import Command
+from adv2e.cli.reading import reading_told
 
 
 @click.command("info", cls=Command)
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path, readable=False))
 @click.option("--json", "as_json", is_flag=True, help="Print JSON; all keys are always there.")
 @options.source_options
+@options.progress_option
 @options.verbosity_options
-def command(file: Path, as_json: bool, given: dict[str, Any], log: options.Log) -> None:
+def command(
+    file: Path, as_json: bool, given: dict[str, Any], progress: bool, log: options.Log
+) -> None:
     """Say what a recording or event file holds.
 
     Tells geometry, span, counts and rates of the events, the frames, which program and seed made
@@ -32,7 +36,8 @@ def command(file: Path, as_json: bool, given: dict[str, Any], log: options.Log) 
     from adv2e.inspection.inspect import inspect
 
     log(f"reading {file}", 1)
-    report = inspect(file, **given)
+    with reading_told(file, progress) as told:
+        report = inspect(file, **given, progress=told)
     if as_json:
         import json
 

@@ -9,6 +9,7 @@ import click
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 from adv2e.cli.options import POSITIVE, SECONDS
+from adv2e.cli.reading import reading_told
 
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
@@ -82,6 +83,7 @@ def command(
     off_color: str,
     window: float | None,
     frames: bool | None,
+    progress: bool,
     time_unit: str | None,
     **shown: Any,
 ) -> None:
@@ -114,10 +116,12 @@ def command(
 
     about = {name: shown[name] for name in ("fps", "speed", "at_s")}
     chosen = chosen_style(output, style, on_color, off_color, window_ms=window, **about)
-    recording = read_events(events, time_unit=time_unit)
+    with reading_told(events, progress) as told:
+        recording = read_events(events, time_unit=time_unit, progress=told)
     for problem in recording.problems:
         log(f"{events}: {problem}")
     if frames and recording.frame_times_ns is None:
         log(f"{events}: holds no frames to show beside the events")
-    render_recording(recording, output, style=chosen, frames=frames is not False, **shown)
+    shown.update(style=chosen, frames=frames is not False, progress=progress)
+    render_recording(recording, output, **shown)
     log(f"{output}: written")

@@ -95,6 +95,12 @@ class Members:
         """Return what a file is called in messages."""
         return str(self.path / name) if self._archive is None else f"{self.path}: {self._top}{name}"
 
+    def size(self, name: str) -> int:
+        """Return how many bytes a file holds, or states."""
+        if self._archive is None:
+            return (self.path / name).stat().st_size
+        return self._archive.getinfo(self._top + name).file_size
+
     @contextmanager
     def open(self, name: str) -> Iterator[IO[bytes]]:
         """Open a file; what is wrong with it, when it is opened or read, is a DataError."""

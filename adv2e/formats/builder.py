@@ -26,6 +26,9 @@ _APART = 300
 
 Column = NDArray[Any]
 
+Progress = Callable[[int, int], None]
+"""Is told how much of a file was read, and of how much: bytes, or events."""
+
 
 class RecordingBuilder:
     """Collects what a file holds, then sorts and judges it.
@@ -36,9 +39,13 @@ class RecordingBuilder:
         The file, or folder.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the times, as the user says.
+    progress : callable, optional
+        Is told how far the reading is.
 
     Attributes
     ----------
+    progress : callable
+        For the reader to tell.
     problems : list of str
         What is doubtful and what was done about it.
     description : dict
@@ -51,7 +58,10 @@ class RecordingBuilder:
         What the file says: that of times that we wrote.
     """
 
-    def __init__(self, path: Path, time_unit: str | None = None) -> None:
+    def __init__(
+        self, path: Path, time_unit: str | None = None, progress: Progress | None = None
+    ) -> None:
+        self.progress = progress or (lambda done, total: None)
         self.problems: list[str] = []
         self.description: dict[str, Any] = {}
         self.geometry: tuple[int, int] | None = None

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.files.npy import read_array
 from adv2e.files.zips import open_member, zip_archive
-from adv2e.formats.builder import RecordingBuilder
+from adv2e.formats.builder import Progress, RecordingBuilder
 from adv2e.formats.recording import Recording, described_geometry
 from adv2e.ticks import US, to_ticks
 
@@ -39,16 +39,15 @@ _NAMES = {
 _BEYOND = 1 << 31
 
 
-def read_npz(path: Path, time_unit: str | None = None) -> Recording:
-    """Return the recording in a NumPy archive.
+def read_npz(path: Path, builder: RecordingBuilder) -> Recording:
+    """Return the recording in a NumPy archive; `builder` is a new one.
 
     Raises
     ------
     DataError
         Not such an archive, a column is missing, or columns differ in length.
     """
-    arrays = _load(path)
-    builder = RecordingBuilder(path)
+    arrays = _load(path, builder.progress)
     if "adv2e" in arrays:
         builder.describe(str(arrays["adv2e"]), f"{path}: adv2e", "the file")
     columns = _columns(path, arrays)
@@ -63,20 +62,23 @@ def read_npz(path: Path, time_unit: str | None = None) -> Recording:
     if t.dtype.kind not in "iuf":
         raise DataError(f"{path}: {name} must hold numbers, not {t.dtype}")
     stated = name[2:] if name.startswith("t_") else None
-    builder.time_unit, builder.stated_unit = time_unit or stated, None
+    builder.time_unit, builder.stated_unit = builder.time_unit or stated, None
     unit = builder.unit_of_events(t, x, y, builder.geometry, whole=t.dtype.kind != "f")
     builder.add(to_ticks(t, unit.ns, US, f"{path}: {name}"), x, y, p)
     return builder.finish("npz")
 
 
-def _load(path: Path) -> dict[str, NDArray[Any]]:
+def _load(path: Path, progress: Progress) -> dict[str, NDArray[Any]]:
     arrays = {}
     with zip_archive(path, "a NumPy archive") as archive:
+        total, done = sum(member.file_size for member in archive.infolist()), 0
         for member in archive.infolist():
             name, suffix = member.filename[:-4], member.filename[-4:]
             if suffix == ".npy":
                 with open_member(archive, member) as file:
                     arrays[name] = read_array(file, member.file_size, f"{path}: {name}")
+            done += member.file_size
+            progress(done, total)
     return arrays
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.files.regular import check_ends
+from adv2e.formats.builder import Progress, RecordingBuilder
 from adv2e.formats.recording import Recording
 from adv2e.process.machine import machine_complaint
 
@@ -19,7 +20,9 @@ MOST_PIXELS = 1 << 25
 _SUFFIXES = (".txt", ".zip", ".h5", ".hdf5", ".npz")
 
 
-def read_events(path: str | Path, *, time_unit: str | None = None) -> Recording:
+def read_events(
+    path: str | Path, *, time_unit: str | None = None, progress: Progress | None = None
+) -> Recording:
     r"""Read an event file, or a folder in the DAVIS240C layout.
 
     Parameters
@@ -29,6 +32,8 @@ def read_events(path: str | Path, *, time_unit: str | None = None) -> Recording:
         (layout ``monash``), .npz.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the times; default: see :mod:`adv2e.formats.units`.
+    progress : callable, optional
+        Is called now and then with two numbers: how much was read, and of how much.
 
     Returns
     -------
@@ -60,7 +65,7 @@ def read_events(path: str | Path, *, time_unit: str | None = None) -> Recording:
         check_ends(path)
         if not path.exists():
             raise DataError(f"{path}: no such file or folder")
-        recording = _read(path, time_unit)
+        recording = _read(path, RecordingBuilder(path, time_unit, progress))
     except OSError as error:
         if machine_complaint(error):
             raise
@@ -86,25 +91,25 @@ def _check_size(recording: Recording) -> None:
     )
 
 
-def _read(path: Path, time_unit: str | None) -> Recording:
+def _read(path: Path, builder: RecordingBuilder) -> Recording:
     """Read a file or folder by what is imported late, as each needs other libraries."""
     suffix = path.suffix.lower()
     if path.is_dir() or suffix == ".zip":
         from adv2e.formats.davis240c.reader import read_davis240c  # noqa: PLC0415
 
-        return read_davis240c(path, time_unit)
+        return read_davis240c(path, builder)
     if suffix == ".txt":
         from adv2e.formats.text.reader import read_text  # noqa: PLC0415
 
-        return read_text(path, time_unit)
+        return read_text(path, builder)
     if suffix in (".h5", ".hdf5"):
         from adv2e.formats.monash.reader import read_hdf5  # noqa: PLC0415
 
-        return read_hdf5(path, time_unit)
+        return read_hdf5(path, builder)
     if suffix == ".npz":
         from adv2e.formats.npz import read_npz  # noqa: PLC0415
 
-        return read_npz(path, time_unit)
+        return read_npz(path, builder)
     raise DataError(
         f"{path}: unknown suffix '{suffix}', must be one of {', '.join(_SUFFIXES)}"
         " or a DAVIS240C folder"

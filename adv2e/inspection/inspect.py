@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ def inspect(
     timestamps: Path | None = None,
     time_unit: str | None = None,
     allow_damaged: bool = False,
+    progress: Callable[[int, int | None], None] | None = None,
 ) -> dict[str, Any]:
     """Return what a recording, an event file or an input with frames holds, ready for JSON.
 
@@ -41,6 +43,9 @@ def inspect(
         See :func:`adv2e.sources.open_source`; for all inputs.
     allow_damaged : bool
         Damage of a video becomes one of the problems.
+    progress : callable, optional
+        Is called now and then with two numbers: how much was read, and of how much, where that is
+        known.
 
     Returns
     -------
@@ -62,8 +67,8 @@ def inspect(
             time_unit=time_unit,
             allow_damaged=allow_damaged,
         )
-        return _of_source(source)
-    return _of_recording(read_events(path, time_unit=time_unit))
+        return _of_source(source, progress or (lambda done, total: None))
+    return _of_recording(read_events(path, time_unit=time_unit, progress=progress))
 
 
 def _has_only_frames(path: Path) -> bool:
@@ -109,8 +114,12 @@ def _light(light: Light, white: float) -> dict[str, Any]:
     }
 
 
-def _of_source(source: Source) -> dict[str, Any]:
-    times_ns = np.array([frame.t_ns for frame in source.frames()], np.int64)
+def _of_source(source: Source, progress: Callable[[int, int | None], None]) -> dict[str, Any]:
+    times: list[int] = []
+    for frame in source.frames():
+        times.append(frame.t_ns)
+        progress(len(times), source.count)
+    times_ns = np.array(times, np.int64)
     doubt = source.doubt_of_white(source.largest_read)  # known once all frames were read
     return {
         "file": shown(source.path),

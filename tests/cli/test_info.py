@@ -116,3 +116,28 @@ def test_a_broken_zip_is_one_line_and_status_1(adv2e, tmp_path):
     assert status == 1
     assert err.count("\n") == 1
     assert "a.zip" in err
+
+
+def test_progress_is_told_apart_from_what_is_found(adv2e, event_file):
+    told = adv2e("info", event_file, "--progress", "--json")
+    assert json.loads(told.out) == json.loads(adv2e("info", event_file, "--json").out)
+    assert "reading clip.events.h5: " in told.err
+    assert "sorting and counting: 100%" in told.err
+    assert adv2e("info", event_file).err == ""  # as standard error is no terminal
+
+
+def test_progress_counts_the_frames_of_a_source(adv2e, images):
+    err = adv2e("info", images, "--fps", "50", "--progress").err
+    assert "reading clip: " in err
+    assert "100%" in err
+
+
+@pytest.mark.parametrize("command", ["compare", "render"])
+def test_other_commands_tell_the_reading_too(adv2e, event_file, command):
+    more = {
+        "compare": [event_file, "--window", "0.0005"],
+        "render": ["-o", event_file.with_suffix(".png")],
+    }[command]
+    outcome = adv2e(command, event_file, *more, "--progress")
+    assert outcome.status == 0
+    assert "sorting and counting: 100%" in outcome.err

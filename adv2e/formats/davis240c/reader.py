@@ -31,8 +31,8 @@ from adv2e.sources.times.lists import FrameList, decoded, parse_list
 from adv2e.sources.times.names import members_of
 
 
-def read_davis240c(path: Path, time_unit: str | None = None) -> Recording:
-    """Return the recording in a folder or zip.
+def read_davis240c(path: Path, builder: RecordingBuilder) -> Recording:
+    """Return the recording in a folder or zip; `builder` is a new one.
 
     Raises
     ------
@@ -53,7 +53,6 @@ def read_davis240c(path: Path, time_unit: str | None = None) -> Recording:
                 " file"
             )
         (name,) = found
-    builder = RecordingBuilder(path, time_unit)
     if files.has(DESCRIPTION):
         text = files.read(DESCRIPTION).decode("utf-8-sig", "replace")
         builder.describe(text, files.label(DESCRIPTION), DESCRIPTION)
@@ -61,7 +60,7 @@ def read_davis240c(path: Path, time_unit: str | None = None) -> Recording:
     if listed is not None and len(listed.stamps) > 1:
         builder.note_frames(listed.unit, whole=listed.whole)
     with files.open(name) as file:
-        geometry = read_lines(file, files.label(name), builder)
+        geometry = read_lines(file, files.size(name), files.label(name), builder)
     times, names = None, []
     if listed is not None:
         if unit := builder.unit_of_frames(whole=listed.whole):

@@ -29,8 +29,8 @@ COLUMNS = ("events/ts", "events/xs", "events/ys", "events/ps")
 _PART = 1 << 20  # events read at once
 
 
-def read_hdf5(path: Path, time_unit: str | None = None) -> Recording:
-    """Return the recording in a file of this layout.
+def read_hdf5(path: Path, builder: RecordingBuilder) -> Recording:
+    """Return the recording in a file of this layout; `builder` is a new one.
 
     Raises
     ------
@@ -40,12 +40,11 @@ def read_hdf5(path: Path, time_unit: str | None = None) -> Recording:
     """
     with hdf5.opened(path) as file:
         if all(hdf5.find(file, name) is not None for name in COLUMNS):
-            return _read(path, file, time_unit)
+            return _read(path, file, builder)
     raise DataError(f"{path}: unknown HDF5 layout, must be monash (datasets {', '.join(COLUMNS)})")
 
 
-def _read(path: Path, file: h5py.File, time_unit: str | None) -> Recording:
-    builder = RecordingBuilder(path, time_unit)
+def _read(path: Path, file: h5py.File, builder: RecordingBuilder) -> Recording:
     if "adv2e" in file.attrs:
         text = str(file.attrs["adv2e"])
         builder.describe(text, f"{path}: attribute adv2e", "the attribute adv2e")
@@ -84,6 +83,7 @@ def _read_events(path: Path, file: h5py.File, builder: RecordingBuilder) -> None
     for begin in range(0, columns[0].size, _PART):
         t, x, y, p = (column[begin : begin + _PART] for column in columns)
         builder.add(to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, _signs(p))
+        builder.progress(begin + t.size, columns[0].size)
 
 
 def _signs(p: NDArray[Any]) -> NDArray[np.int8]:

@@ -31,8 +31,8 @@ _SIZE = re.compile(rb"0{0,9}[1-9][0-9]{0,4}")
 _DECIMAL_TIME = re.compile(rb"^[\x00-\x09\x0b-\x20]*(?!#)[^\x00-\x20.eE]*[.eE]", re.M)
 
 
-def read_text(path: Path, time_unit: str | None = None) -> Recording:
-    """Return the recording in a text file of events.
+def read_text(path: Path, builder: RecordingBuilder) -> Recording:
+    """Return the recording in a text file of events; `builder` is a new one.
 
     ``<name>.json`` beside it, or ``adv2e.json`` beside an ``events.txt``, tells the geometry.
 
@@ -41,7 +41,6 @@ def read_text(path: Path, time_unit: str | None = None) -> Recording:
     DataError
         A line that cannot be read.
     """
-    builder = RecordingBuilder(path, time_unit)
     beside = [path.with_name(path.name + ".json")]
     if path.name == EVENTS:
         beside.append(path.with_name(DESCRIPTION))
@@ -50,13 +49,17 @@ def read_text(path: Path, time_unit: str | None = None) -> Recording:
         text = description.read_text("utf-8", errors="replace")
         builder.describe(text, str(description), description.name)
     with path.open("rb") as file:
-        geometry = read_lines(file, str(path), builder)
+        geometry = read_lines(file, path.stat().st_size, str(path), builder)
     builder.state(geometry, "the first line")
     return builder.finish("text")
 
 
-def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder) -> tuple[int, int] | None:
+def read_lines(
+    file: IO[bytes], size: int, label: str, builder: RecordingBuilder
+) -> tuple[int, int] | None:
     """Read all lines of `file` into `builder`; return what the first says of width and height.
+
+    `size` is that of the file [bytes], for telling the progress.
 
     Raises
     ------
@@ -83,6 +86,7 @@ def read_lines(file: IO[bytes], label: str, builder: RecordingBuilder) -> tuple[
             check_us(t[late[:1]], f"{label} line {before + lines[late[0]]}")
         builder.add(*columns)
         before += block.count(b"\n")
+        builder.progress(file.tell(), size)
     return geometry
 
 

@@ -1,0 +1,34 @@
+"""How far the reading of a file is, on standard error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_SHARE = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
+
+
+@contextmanager
+def reading_told(
+    path: str | Path, progress: bool
+) -> Iterator[Callable[[int, int | None], None] | None]:
+    """Yield what is to be told of how much was read, and of how much, for a bar; None for none.
+
+    Once all is read, events are still to be sorted and counted, which the bar then says.
+    """
+    if not progress:
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(desc=f"reading {Path(path).name}", unit=" frames", leave=False) as bar:
+
+        def told(done: int, total: int | None) -> None:
+            if total is not None:
+                bar.total, bar.bar_format = total, _SHARE
+            bar.update(done - bar.n)
+            if done == total:
+                bar.set_description_str("sorting and counting")
+
+        yield told
