@@ -44,15 +44,17 @@ def main_error(diagnosis: Diagnosis) -> Markup:
     for row in diagnosis.errors[:1]:
         lines = f" Lines: {diagnosis.wording.intervals}." if row.before.interval else ""
         about = f"Error: {row.name}. Floor: {diagnosis.wording.floor}.{lines}"
-        heading = "Error on data that was not used for fitting (0 would be the same events)"
+        heading = "Error on data not used for fitting (0: the same events)"
         parts.append(tag("figcaption", heading))
-        parts += [error_chart(row), tag("p", about, class_="note")]
+        parts += [error_chart(row, changed=bool(diagnosis.effects)), tag("p", about, class_="note")]
     before, after = (
         tag("strong", f"p {probability_text(p)}", class_="line")
         for p in (diagnosis.global_p_before, diagnosis.global_p_after)
     )
-    chance = "Would chance alone make differences as large as these? Before: "
-    parts.append(tag("p", chance, before, ", after: ", after, ".", class_="note"))
+    chance: list[object] = ["Would chance alone make differences as large as these? ", before]
+    if diagnosis.effects:
+        chance += [" before, ", after, " after"]
+    parts.append(tag("p", *chance, ".", class_="note"))
     return tag("figure", *parts, class_="main")
 
 
@@ -60,7 +62,11 @@ def other_errors(diagnosis: Diagnosis) -> Markup:
     """Return the other measures of error."""
     return join(
         *(
-            tag("figure", tag("figcaption", row.name), error_chart(row))
+            tag(
+                "figure",
+                tag("figcaption", row.name),
+                error_chart(row, changed=bool(diagnosis.effects)),
+            )
             for row in diagnosis.errors[1:]
         )
     )

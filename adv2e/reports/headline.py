@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from adv2e.reports.keys import unit_of
 from adv2e.reports.labels import label_of, part_of
 from adv2e.reports.quantities import (
+    alike_texts,
     beside,
     interval_text,
     number_text,
@@ -85,7 +86,7 @@ def _errors(found: Diagnosis) -> str:
     """Say how far the recording is from simulations, and these from one another."""
     for row in found.errors[:1]:
         near, floor = (number_text(one.value) for one in (row.before, row.floor))
-        return f": the error of the declared model is {near}, its floor {floor}"
+        return f": the error of the declared model is {near}, and chance alone makes {floor}"
     return ""
 
 
@@ -93,7 +94,6 @@ def _most(found: Diagnosis) -> str:
     """Say what differs most from the model, in numbers."""
     for one in standing_out(found.signatures)[:1]:
         far = one.farthest
-        measured, expected = (number_text(value) for value in (far.measured, far.after))
-        text = f"what differs most is the {far.meaning}: {measured} measured, {expected} simulated"
-        return f"; {text}"
+        measured, expected = alike_texts((far.measured, far.after))
+        return f"; most different is: {far.meaning}, {measured} measured, {expected} simulated"
     return _errors(found)

@@ -62,9 +62,9 @@ def _own_effect(found: Diagnosis) -> Step:
     why = ""
     for one in standing_out(found.signatures)[:1]:
         if one.after:
-            why = f"; it has to change what differs most, the {one.farthest.meaning}"
-    text = "Write the effect that you suspect as a class of your own, and let it compete"
-    return Step(f"{text}{why}:", _OWN_EFFECT)
+            why = f" What differs most ({one.group}) is what it has to change."
+    text = "Write the effect that you suspect as a class of your own, and let it compete."
+    return Step(f"{text}{why}", _OWN_EFFECT)
 
 
 def _separate(found: Diagnosis) -> Step:

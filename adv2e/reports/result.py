@@ -186,7 +186,7 @@ class Diagnosis:
     effects : list of Finding
         In the order in which they were added.
     alternatives : list of str
-        Effects that explain the residual as well.
+        Effects that fit the data as well.
     nuisances : mapping
         Keys that were not declared, with their fitted values.
     rejected : list of Rejected

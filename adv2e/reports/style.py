@@ -100,7 +100,7 @@ section + details { margin-top: 2em; }
 figure { margin: 0; min-width: 0; overflow-x: auto; }
 figcaption { font-size: 0.9rem; font-weight: 600; margin: 6px 0; }
 figcaption.note { font-weight: 400; }
-.side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(400px, 100%), 1fr)); }
+.side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(340px, 100%), 1fr)); }
 .side { gap: 18px 24px; align-items: start; margin: 10px 0; }
 img.map { width: 100%; height: auto; image-rendering: pixelated; display: block; }
 svg { display: block; width: 100%; max-width: 560px; height: auto; }
@@ -118,7 +118,8 @@ svg .curve.before { stroke-dasharray: 5 3; }
 svg .curve.measured { stroke-width: 2.2; }
 svg .dot { fill: var(--role); }
 @media screen and (max-width: 600px) {
-  main { padding: 12px 12px 32px; }
+  main { padding: 10px 12px 32px; }
+  h1 { font-size: 1rem; }
   .verdict { padding: 6px 12px; }
   .sentence { font-size: 1.15rem; }
   .bar { grid-template-columns: 1fr auto; }

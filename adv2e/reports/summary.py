@@ -7,7 +7,13 @@ import textwrap
 from adv2e.reports.headline import declared_text
 from adv2e.reports.keys import unit_of
 from adv2e.reports.markup import plain
-from adv2e.reports.quantities import interval_text, number_text, probability_text, value_text
+from adv2e.reports.quantities import (
+    alike_texts,
+    interval_text,
+    number_text,
+    probability_text,
+    value_text,
+)
 from adv2e.reports.result import Diagnosis, ErrorRow
 from adv2e.reports.standing_out import standing_out
 
@@ -92,9 +98,7 @@ def _standing(diagnosis: Diagnosis) -> list[str]:
     """Return what differs most besides what the sentence names."""
     lines = []
     for one in standing_out(diagnosis.signatures)[1:_MOST_STANDING]:
-        measured, expected = (
-            number_text(value) for value in (one.farthest.measured, one.farthest.after)
-        )
-        text = f"{one.group}: {one.farthest.meaning}: {measured}, expected {expected}"
+        measured, expected = alike_texts((one.farthest.measured, one.farthest.after))
+        text = f"{one.farthest.meaning}: {measured} measured, {expected} simulated"
         lines += [f"  {line}" for line in _wrapped(text, 2)]
     return lines

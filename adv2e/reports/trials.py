@@ -58,7 +58,7 @@ def alternatives(diagnosis: Diagnosis) -> Markup:
     paths = _paths(diagnosis)
     rows = []
     for name in dict.fromkeys(names):
-        role = "explains it as well" if name in diagnosis.alternatives else "in the model found"
+        role = "fits as well" if name in diagnosis.alternatives else "in the model found"
         heading = join(name, tag("span", role, class_="meaning"))
         summary = summary_of(name, paths.get(name, []), diagnosis.own)
         rows.append((heading, summary, SEPARATIONS.get(name, "not known")))
@@ -67,7 +67,7 @@ def alternatives(diagnosis: Diagnosis) -> Markup:
         "These data do not tell the following effects apart; recordings of the kind in the last"
         " column would."
     )
-    caption = "Effects that explain the residual, and the recordings that would separate them"
+    caption = "Effects that fit these data as well, and the recordings that would tell them apart"
     return join(tag("p", lead), table(caption, columns, rows))
 
 

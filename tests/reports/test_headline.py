@@ -79,18 +79,18 @@ def test_alternatives_are_named_in_the_sentence():
 def test_where_nothing_is_missing_the_sentence_gives_the_error():
     told = found("consistent", effects=[]).sentence
     assert told == (
-        "Nothing is missing that these data show: the error of the declared model is 1.38, its"
-        " floor 0.270."
+        "Nothing is missing that these data show: the error of the declared model is 1.38, and"
+        " chance alone makes 0.270."
     )
     assert found("consistent", effects=[], errors=[]).sentence.endswith("these data show.")
 
 
 def test_what_is_not_explained_is_told_by_what_differs_most():
     told = found("unexplained", effects=[]).sentence
-    assert told.startswith("Something is missing that no known effect explains; what differs most")
-    assert told.endswith(": 0.710 measured, 0.660 simulated.")
+    assert told.startswith("Something is missing that no known effect explains; most different")
+    assert told.endswith(", 0.710 measured, 0.660 simulated.")
     told = found("unexplained", effects=[], signatures=[]).sentence
-    assert told.endswith("explains: the error of the declared model is 1.38, its floor 0.270.")
+    assert told.endswith("model is 1.38, and chance alone makes 0.270.")
 
 
 @pytest.mark.parametrize("name", [*names(), "a_users_own"])
@@ -134,10 +134,10 @@ def test_where_something_is_left_the_next_step_is_an_own_effect_and_why():
     assert "--effect my_effect.py" in own.line
     (own,) = next_steps(found("unexplained", effects=[]), "found")
     assert own.line == "adv2e diagnose RECORDING -c DECLARED.yaml --effect my_effect.py"
-    assert "it has to change what differs most, the " in own.text
+    assert "What differs most (order) is what it has to change." in own.text
     quiet = [Signature("s", "g", "m", 1.0, 1.0, 1.0, 0.0, 0.0)]
     (own,) = next_steps(found("unexplained", effects=[], signatures=quiet), "found")
-    assert "it has to change" not in own.text
+    assert "has to change" not in own.text
 
 
 def test_what_may_be_wrong_with_the_recording_is_checked_before_an_effect_is_written():

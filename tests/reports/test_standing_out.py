@@ -71,10 +71,10 @@ def test_where_nothing_is_left_the_page_tells_what_differed():
 def test_the_summary_tells_it_where_nothing_is_named(verdict):
     text = summary_text(replace(everything(), verdict=verdict, effects=[], signatures=SIGNATURES))
     lines = [
-        "  c: what c1 means: 12.0, expected 67.0",
-        "  b: what b2 means: 12.0, expected 67.0",
+        "  what c1 means: 12.0 measured, 67.0 simulated",
+        "  what b2 means: 12.0 measured, 67.0 simulated",
     ]
-    told = [line for line in text.splitlines() if "expected" in line]
+    told = [line for line in text.splitlines() if line.startswith("  what ")]
     assert told == (lines if verdict == "unexplained" else [])
 
 

@@ -70,6 +70,6 @@ class Split:
         """Say how the data are divided."""
         shares = ", ".join(f"{name} {self.share(k):.0%}" for k, name in enumerate(NAMES))
         return (
-            f"tiles of pixels crossed with {self.segments} segments of time, pixels and time shared"
+            f"the sensor was divided into tiles and the time into {self.segments} segments, shared"
             f" out as: {shares}; the test data were looked at once, at the end"
         )

@@ -13,7 +13,7 @@ from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_norms
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.reports.result import ErrorRow, Estimate
 
-NAME = "distance of the signed streams, smoothed in time"
+NAME = "distance of measured and simulated events (ON +1, OFF -1), smoothed in time"
 OF_MEAN = "the same from the mean of simulations, without the chance of each"
 PAIRS = 20
 """Pairs of independent draws that the floor is the mean of."""

@@ -85,21 +85,21 @@ def about_frames(prepared: Prepared) -> list[str]:
         )
     else:
         doubt = prepared.between_frames.doubt(chance, BOTH)
-        made_up = "what interpolation makes up between the frames"
+        made_up = "the light between the frames, which is interpolated,"
         text = _uncertain(made_up, doubt, "frames left out")
         unresolved = ": the frames hardly resolve the motion" if doubt > 1.0 else ""
         notes.append(text + unresolved)
     if prepared.between_levels is not None:
         doubt = prepared.between_levels.doubt(chance, BOTH)
-        untold = "what frames do not tell between the levels of their numbers"
+        untold = "the light between two levels of the frames' numbers"
         notes.append(_uncertain(untold, doubt, "frames of coarser levels"))
     return notes
 
 
 def _uncertain(what: str, doubt: float, told_by: str) -> str:
     return (
-        f"{what} leaves statistics uncertain by {doubt:.2g} times what chance does (root mean"
-        f" square), as simulations with {told_by} tell"
+        f"{what} makes the numbers compared uncertain, {doubt:.2g} times as much as chance does"
+        f" (root mean square; found by simulations with {told_by})"
     )
 
 

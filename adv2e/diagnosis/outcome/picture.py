@@ -89,7 +89,7 @@ def maps_of(
 
     return [
         ResidualMap(
-            f"{name} events: measured less expected, in deviations of chance",
+            f"{name} events: measured minus simulated",
             excess_of(on, before),
             excess_of(on, after),
         )
@@ -166,7 +166,7 @@ def _by_time(scene: Scene, before: Sequence[Placed]) -> Iterator[_Axes]:
         title, label = f"Place between two frames, {text}", "place [% of the frame interval]"
         yield _Axes(title, label, "events", _PHASES, _phases(scene, moving))
     borders_s = np.linspace(0.0, float(scene.seconds.sum()), 25)
-    yield _Axes("Course", "time [s]", _PER_SENSOR, borders_s, _course(scene, borders_s))
+    yield _Axes("Events over time", "time [s]", _PER_SENSOR, borders_s, _course(scene, borders_s))
 
 
 def row_borders(scene: Scene) -> Array:

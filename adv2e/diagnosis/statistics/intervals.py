@@ -38,8 +38,7 @@ def intervals(*, at_rest: bool = False) -> Group:
     entries = numbers(
         (
             f"{pair} after {text}{where}",
-            f"events{where} that follow the one before in their pixel after {text},"
-            f" {pair.replace('-', ' then ')}",
+            f"pairs of events of a pixel{where}, {text} apart, {pair.replace('-', ' then ')}",
         )
         for text in _bins_text(borders_ms)
         for pair in _PAIRS
@@ -62,8 +61,7 @@ def runs() -> Group:
     entries = numbers(
         (
             f"{place} {p} event of a run",
-            f"{p} events that are the {place} of a run without the other polarity and without a gap"
-            " of 50 ms",
+            f"{p} events that are the {place} of their polarity in a row, without a gap of 50 ms",
         )
         for place in _PLACES
         for p in POLARITIES
@@ -86,8 +84,7 @@ def neighbours() -> Group:
     entries = numbers(
         (
             f"{text} after a neighbour's {kind}",
-            f"events {text} after the latest event of {kind} polarity in the four neighbouring"
-            " pixels",
+            f"events {text} after the last event of the {kind} polarity in the four pixels beside",
         )
         for kind in ("other", "same")
         for text in _bins_text(_NEIGHBOURS_MS)

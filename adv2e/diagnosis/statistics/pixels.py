@@ -13,22 +13,22 @@ _SILENT = Entry(
     "silent pixels", "number of pixels that should have fired and did not", is_number=True
 )
 _ENTRIES = [
-    Entry("spread of ON", "variance of ON events from pixel to pixel over the expected"),
-    Entry("spread of OFF", "variance of OFF events from pixel to pixel over the expected"),
-    Entry("ON with OFF", "how excess of ON goes with excess of OFF in a pixel"),
-    Entry("ON persists", "how excess of ON in one half of the time returns in the other"),
-    Entry("OFF persists", "how excess of OFF in one half of the time returns in the other"),
-    Entry("ON becomes OFF", "how excess of ON in one half goes with OFF in the other"),
-    Entry("loudest pixels", "logarithm of one and the mean excess of the loudest hundredth"),
-    Entry("loudest pixel", "logarithm of one and the excess of the loudest pixel"),
+    Entry("spread of ON", "spread of ON events over the pixels, relative to that expected"),
+    Entry("spread of OFF", "spread of OFF events over the pixels, relative to that expected"),
+    Entry("ON with OFF", "whether pixels with too many ON events have too many OFF events"),
+    Entry("ON persists", "whether pixels with too many ON events have them all the time"),
+    Entry("OFF persists", "whether pixels with too many OFF events have them all the time"),
+    Entry("ON becomes OFF", "whether too many ON events are followed or preceded by too many OFF"),
+    Entry("loudest pixels", "surplus of events in the busiest hundredth of the pixels (log)"),
+    Entry("loudest pixel", "surplus of events in the busiest pixel (log)"),
     _SILENT,
-    Entry("rows", "logarithm of the variance of the mean excess of a row"),
-    Entry("columns", "logarithm of the variance of the mean excess of a column"),
-    Entry("beside", "how excess goes with that of the pixel beside"),
-    Entry("below", "how excess goes with that of the pixel below"),
-    Entry("towards the corners", "excess towards the corners, ON and OFF"),
-    Entry("left to right", "excess towards the right"),
-    Entry("top to bottom", "excess towards the bottom"),
+    Entry("rows", "differences of whole rows in their number of events (log)"),
+    Entry("columns", "differences of whole columns in their number of events (log)"),
+    Entry("beside", "whether pixels with too many events lie beside one another"),
+    Entry("below", "whether pixels with too many events lie below one another"),
+    Entry("towards the corners", "surplus of events towards the corners of the sensor"),
+    Entry("left to right", "surplus of events towards the right of the sensor"),
+    Entry("top to bottom", "surplus of events towards the bottom of the sensor"),
 ]
 
 

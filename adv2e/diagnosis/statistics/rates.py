@@ -58,7 +58,7 @@ def course(start_us: float, stop_us: float) -> Group:
         cell = (step * 2 + (placed.speed != STILL)) * 2 + placed.stream.on
         return counts(placed.part, cell, _COURSE * 4)
 
-    return Group("course in time", 0.6, entries, count)
+    return Group("events over time", 0.6, entries, count)
 
 
 def rate_hz(scene: Scene, simulations: Sequence[Placed]) -> Array:
@@ -89,8 +89,8 @@ def load(rate_hz: Array) -> Group:
     entries = numbers(
         (
             f"{p} events, load {k + 1}/{_LOADS}",
-            f"{p} events at times when the declared model's rate over the whole sensor is in part"
-            f" {k + 1} of {_LOADS}",
+            f"{p} events in part {k + 1} of {_LOADS} of the times, from times of few events on the"
+            " whole sensor to times of many",
         )
         for k in range(_LOADS)
         for p in POLARITIES
@@ -107,8 +107,8 @@ def phase(scene: Scene) -> Group:
     entries = [
         Entry(
             f"{p} events, {where}, {k * 10}-{k * 10 + 10} % after a frame",
-            f"number of {p} events {where} in that part of the time between frames, less a tenth of"
-            " all of them, in deviations of chance",
+            f"number of {p} events {where} from {k * 10} to {k * 10 + 10} % of the time between two"
+            " frames, less a tenth of all, in standard deviations",
         )
         for k in range(_PHASES)
         for where in _MOTION
@@ -125,4 +125,4 @@ def phase(scene: Scene) -> Group:
         number = raw.reshape(_PHASES, 4)
         return excess(number, number.sum(axis=0) / _PHASES).ravel()
 
-    return Group("place between frames", 0.6, entries, count, values)
+    return Group("time since the last frame", 0.6, entries, count, values)

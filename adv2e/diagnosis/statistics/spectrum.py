@@ -47,10 +47,10 @@ def spectrum(scene: Scene) -> Group:
     entries = [
         Entry(
             f"line in the {kind} rate, {low}-{high} Hz",
-            f"strongest line of the {kind} rate between {low} and {high} Hz over what is beside"
-            " it, as a logarithm",
+            f"how far the strongest frequency from {low} to {high} Hz stands out in the rate of"
+            f" {of} events (log)",
         )
-        for kind in ("total", "signed")
+        for kind, of in (("total", "all"), ("signed", "ON less OFF"))
         for low, high in _BANDS_HZ
     ]
 
@@ -66,4 +66,4 @@ def spectrum(scene: Scene) -> Group:
             [line[band].max() if band.any() else 0.0 for line in lines for band in bands]
         )
 
-    return Group("lines in the rate", 0.2, entries, count, values)
+    return Group("frequencies in the rate", 0.2, entries, count, values)

@@ -35,7 +35,7 @@ _BIN_OF = np.searchsorted(_BIN_BORDERS_US[1:-1], np.arange(int(_BIN_BORDERS_US[-
 def ticks() -> Group:
     """Return shares of stamps that are whole multiples of a time."""
     entries = [
-        Entry(f"stamps on {tick} us", f"share of stamps that are multiples of {tick} us")
+        Entry(f"stamps on {tick} us", f"share of time stamps that are multiples of {tick} us")
         for tick in TICKS_US
     ]
 
@@ -44,21 +44,23 @@ def ticks() -> Group:
         number = counts(placed.part, placed.stream.t % TICKS_US[-1], TICKS_US[-1])
         return np.concatenate([number.sum(axis=1)[:, None], number @ _ON_TICK], axis=1)
 
-    return Group("ticks of the stamps", 0.001, entries, count, lambda raw: share(raw[1:], raw[0]))
+    return Group(
+        "steps of the time stamps", 0.001, entries, count, lambda raw: share(raw[1:], raw[0])
+    )
 
 
 def gaps() -> Group:
     """Return times between neighbours in the whole stream, and how often they share a row."""
     bins = [f"{a}-{b} us" for a, b in zip((0, *_GAPS_US), _GAPS_US, strict=False)]
     entries = numbers(
-        (f"next after {gap}", f"events {gap} after any other")
+        (f"next after {gap}", f"events {gap} after the event before, of any pixel")
         for gap in (*bins, f">= {_GAPS_US[-1]} us")
     )
     entries += [
         Entry(
             f"same row within {n} us",
-            f"share of events that are less than {n} us after one of their own row, of those so"
-            " soon after any",
+            f"share that follows an event of its own row, of events less than {n} us after the one"
+            " before",
         )
         for n in _NEAR_US
     ]
@@ -77,7 +79,7 @@ def gaps() -> Group:
         number, near = raw[: len(_GAPS_US) + 1], raw[len(_GAPS_US) + 1 :]
         return np.concatenate([stabilised(number), (near[1::2] + 0.5) / (near[::2] + 1.0)])
 
-    return Group("neighbours in the stream", 0.002, entries, count, values)
+    return Group("time between events of the sensor", 0.002, entries, count, values)
 
 
 def row_gaps() -> Group:
@@ -88,8 +90,8 @@ def row_gaps() -> Group:
     entries = [
         Entry(
             f"{100 * q:g} % of gaps between rows",
-            f"logarithm of the time in us that {100 * q:g} % of events follow the one before in the"
-            " stream sooner than, of those that follow one of another row",
+            f"time from one row to the next that {100 * q:g} % of such times are shorter than (log"
+            " us)",
         )
         for q in _QUANTILES
     ]
@@ -110,4 +112,4 @@ def row_gaps() -> Group:
         gap = _BIN_BORDERS_US[k] + in_bin * np.diff(_BIN_BORDERS_US)[k]
         return np.asarray(np.log(np.maximum(gap, 0.5)))
 
-    return Group("gaps between rows", 0.02, entries, count, values)
+    return Group("time between rows", 0.02, entries, count, values)

@@ -46,13 +46,17 @@ class Slopes:
         return np.concatenate([number, by_part.reshape(splits.COUNT, -1)], axis=1)
 
 
+def _when(lag_ms: float) -> str:
+    """Say when a time before an event is."""
+    return f"{abs(lag_ms):g} ms {'after' if lag_ms < 0.0 else 'before'}"
+
+
 def lag(slopes: Slopes) -> Group:
     """Return the mean change of light before an event, in its direction, by brightness."""
     entries = [
         Entry(
             f"change {lag:g} ms before, {light}",
-            f"mean change of log light {lag:g} ms before an event in its direction, bounded to 1,"
-            f" in {light} places",
+            f"mean change of log light {_when(lag)} an event, in its direction, in {light} places",
         )
         for lag in LAGS_MS
         for light in LIGHT_NAMES
@@ -74,7 +78,7 @@ def drift(slopes: Slopes) -> Group:
     entries = [
         Entry(
             f"lag {b:g} less {a:g} ms, time {k + 1}/{segments}",
-            f"mean change of log light {b:g} ms before an event less that at {a:g} ms, in part"
+            f"mean change of log light {_when(b)} an event less that {_when(a)} it, in part"
             f" {k + 1} of {segments} of the time",
         )
         for a, b in _PAIRS_MS
@@ -88,19 +92,19 @@ def drift(slopes: Slopes) -> Group:
         sums = raw[segments:].reshape(len(_PAIRS_MS), 2, segments)
         return share(sums[:, 1] - sums[:, 0], raw[:segments]).ravel()
 
-    return Group("course of the lag", 0.002, entries, count, values)
+    return Group("lag over time", 0.002, entries, count, values)
 
 
 def shift(slopes: Slopes) -> Group:
     """Return whether the change that makes events lies beside them."""
     entries = [
         Entry(
-            f"change {side} of the event, {lag:g} ms before",
-            f"mean change of log light one pixel {side} of an event less that on the other side,"
-            f" {lag:g} ms before it, in its direction",
+            f"change {name} of the event, {lag:g} ms before",
+            f"mean change of log light one pixel {side} an event less that on its other side,"
+            f" {_when(lag)} it, in its direction",
         )
         for lag in _BESIDE_MS
-        for side in ("right", "below")
+        for name, side in (("right", "right of"), ("below", "below"))
     ]
     lags = 1e3 * np.array(_BESIDE_MS)
 
@@ -119,4 +123,4 @@ def shift(slopes: Slopes) -> Group:
     def values(raw: Array) -> Array:
         return share(raw[1:], raw[0])
 
-    return Group("place of the change", 0.002, entries, count, values)
+    return Group("place where the light changes", 0.002, entries, count, values)

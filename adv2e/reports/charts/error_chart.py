@@ -10,7 +10,7 @@ from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.quantities import estimate_text
 from adv2e.reports.result import ROLES, ErrorRow, Estimate
 
-MEANINGS = {
+_MEANINGS = {
     "before": "declared model",
     "after": "model found",
     "floor": "chance alone",
@@ -18,18 +18,20 @@ MEANINGS = {
 """What each bar is of."""
 
 
-def error_chart(row: ErrorRow) -> Markup:
+def error_chart(row: ErrorRow, *, changed: bool = True) -> Markup:
     """Return a bar of each role of an error, from zero on, with its interval and its number.
 
-    What is not finite, or below zero, has no bar.
+    What is not finite, or below zero, has no bar.  `changed`: the model found is not the declared
+    one.
     """
+    meanings = _MEANINGS if changed else {**_MEANINGS, "after": "the same model"}
     given: dict[str, Estimate] = {role: getattr(row, role) for role in ROLES}
     ends = [number for one in given.values() for number in (one.value, *(one.interval or ()))]
     longest = max((end for end in ends if math.isfinite(end)), default=0.0)
     bars = [
         tag(
             "div",
-            tag("span", tag("strong", role), f" {MEANINGS[role]}", class_="role"),
+            tag("span", tag("strong", role), f" {meanings[role]}", class_="role"),
             tag("span", _bar(one, longest), class_="track", aria_hidden="true"),
             tag("span", estimate_text(one), class_="number"),
             class_=f"bar {role}",

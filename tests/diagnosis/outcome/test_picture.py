@@ -96,7 +96,7 @@ def test_rates_are_per_pixel_and_second():
 
 
 def test_the_course_is_a_rate_of_the_whole_sensor():
-    curve = CURVES["Course"]
+    curve = CURVES["Events over time"]
     assert curve.x[0] == 0.0
     assert curve.x[-1] == pytest.approx(STOP_US * 1e-6)
     assert np.sum(curve.measured * np.diff(curve.x)) == pytest.approx(len(MEASURED.stream))
