@@ -44,7 +44,7 @@ def main_error(diagnosis: Diagnosis) -> Markup:
     for row in diagnosis.errors[:1]:
         lines = f" Lines: {diagnosis.wording.intervals}." if row.before.interval else ""
         about = f"Error: {row.name}. Floor: {diagnosis.wording.floor}.{lines}"
-        heading = "Error on data not used for fitting (0: the same events)"
+        heading = "Error on data that was not used for fitting"
         parts.append(tag("figcaption", heading))
         parts += [error_chart(row, changed=bool(diagnosis.effects)), tag("p", about, class_="note")]
     before, after = (

@@ -28,17 +28,17 @@ def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
     sections = {
         "What was found": findings.added(found),
         "Effects that fit as well": trials.alternatives(found),
-        "Where recording and simulation differ": residual.groups(found),
-        "Curves of recording and simulation": curves(found.curves, found.wording),
+        "What differs most": residual.groups(found),
+        "Curves: measured and simulated": curves(found.curves, found.wording),
         "Values that were not declared and were fitted": findings.nuisances(found),
-        "Notes on the recording": findings.notes(found.notes),
+        "Notes": findings.notes(found.notes),
     }
     folded = {
         "Pixels with too many or too few events": (residual.maps(found.maps), True),
         "Effects that were tried and not added": (trials.rejected(found), True),
         "Which data were used": (residual.data(found), True),
         "Other measures of the error": (findings.other_errors(found), False),
-        "All statistics that were compared": (residual.signatures(found.signatures), False),
+        "All numbers that were compared": (residual.signatures(found.signatures), False),
         "How large an effect must be to be seen": (residual.detectable(found.detectable), False),
         "Sizes, seeds, times and versions": (findings.facts(found.facts), True),
     }

@@ -92,7 +92,7 @@ def signatures(given: Sequence[Signature]) -> Markup:
     """Return the summary statistics, the most telling ones first."""
     if not given:
         return Markup()
-    columns = [Column("signature"), Column("group")] + [
+    columns = [Column("number"), Column("group")] + [
         Column(name, number=True) for name in ("measured", "before", "after", "z before", "z after")
     ]
     rows = [_signature(one) for one in sorted(given, key=_rank)]
@@ -102,7 +102,7 @@ def signatures(given: Sequence[Signature]) -> Markup:
         "z: distance of the recording from the simulations, in their standard deviations. Beyond"
         f" ±{LARGE_Z:g} (marked ▲ or ▼): {far} of {len(given)} before, {still} after."
     )
-    caption = "Summary statistics on held-out data, by their distance before"
+    caption = "Numbers on data that was not used for fitting, those that differed most first"
     return join(tag("p", lead), table(caption, columns, rows, folded_from=SHOWN))
 
 
@@ -142,8 +142,8 @@ def detectable(given: Sequence[Detectable]) -> Markup:
     columns = [Column("effect"), Column("key"), Column("size", number=True), Column("unit")]
     rows = [(one.name, tag("code", one.key), _size(one.size), unit_text(one.unit)) for one in given]
     caption = (
-        "Values of a key from which on an effect would have been seen about 8 times in 10;"
-        f" {NOTHING}: none within the physical range, or not told by as many simulations"
+        "An effect of this size would have been seen about 8 times in 10;"
+        f" {NOTHING}: no size that is physical would, or the simulations made do not tell"
     )
     return table(caption, columns, rows, folded_from=2 * SHOWN)
 

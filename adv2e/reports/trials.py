@@ -89,8 +89,8 @@ def rejected(diagnosis: Diagnosis) -> Markup:
     caption = "Effects tried and not added"
     judged = any(one.held_out is not None for one in given)
     if judged:  # none is where each is fitted much worse than what was added
-        columns.append(Column("misfit with it", number=True))
-        caption += "; misfit on held-out data relative to that before"
+        columns.append(Column("difference left", number=True))
+        caption += "; 1 is the difference that the declared model leaves, on other data"
     rows = []
     for one in given:
         tried = [

@@ -96,10 +96,10 @@ def test_texts_are_shown_as_they_are():
 def test_misfits_have_a_column_where_any_is_known(full):
     held = everything()
     assert any(one.held_out is not None for one in held.rejected)
-    assert "misfit with it" in Outline(full).texts
+    assert "difference left" in Outline(full).texts
     bare = replace(held, rejected=[replace(one, held_out=None) for one in held.rejected])
     texts = Outline(page(bare)).texts
-    assert "misfit with it" not in texts
+    assert "difference left" not in texts
     assert "Effects tried and not added" in texts
 
 
@@ -110,15 +110,15 @@ def test_headings_come_in_order(full):
         "What to do next",
         "What was found",
         "Effects that fit as well",
-        "Where recording and simulation differ",
-        "Curves of recording and simulation",
+        "What differs most",
+        "Curves: measured and simulated",
         "Values that were not declared and were fitted",
-        "Notes on the recording",
+        "Notes",
         "Pixels with too many or too few events",
         "Effects that were tried and not added",
         "Which data were used",
         "Other measures of the error",
-        "All statistics that were compared",
+        "All numbers that were compared",
         "How large an effect must be to be seen",
         "Sizes, seeds, times and versions",
     ]
@@ -169,7 +169,7 @@ def test_paper_holds_what_matters(full):
     kinds = re.findall(r'<details class="(\w+)"><summary><h2>([^<]*)', full)
     assert {heading for kind, heading in kinds if kind == "screen"} == {
         "Other measures of the error",
-        "All statistics that were compared",
+        "All numbers that were compared",
         "How large an effect must be to be seen",
     }
     assert "details.paper" in full[full.index("<script>") :]
@@ -210,8 +210,8 @@ def test_the_page_of_a_table_holds_what_a_table_can_show():
     outline = Outline(page(replace(everything(), **empty, wording=OF_TABLES)))
     assert outline.headings[0] == ("h1", "Characterisation of office_zigzag.zip")
     absent = (
-        "Where recording and simulation differ",
-        "All statistics that were compared",
+        "What differs most",
+        "All numbers that were compared",
         "How large an effect must be to be seen",
     )
     assert not {text for _, text in outline.headings} & set(absent)
@@ -232,7 +232,7 @@ def test_signs_of_unlike_verdicts_differ():
 
 
 def signature_names(text):
-    section = text[text.index(">All statistics that") : text.index(">How large an effect")]
+    section = text[text.index(">All numbers that") : text.index(">How large an effect")]
     return re.findall(r'<span title="[^"]*">([^<]*)</span>', section), section
 
 
