@@ -44,6 +44,11 @@ def listed_images(path: Path) -> None:
     (path / "images.txt").write_text("".join(lines), "ascii")
 
 
+def times(path: Path) -> None:
+    """Make a list of times of the images of `images`."""
+    path.write_text("".join(f"{k / 240:.6f}\n" for k in range(FRAMES)), "ascii")
+
+
 def stack(path: Path) -> None:
     """Make a file of NumPy."""
     np.save(path, np.stack([picture(k) for k in range(FRAMES)]))
@@ -101,6 +106,7 @@ INPUTS: dict[str, Callable[[Path], None]] = {
     "phone.mp4": video,
     "frames/": images,
     "sequence/": listed_images,
+    "times.txt": times,
     "clip.npy": stack,
     "recording.zip": recording,
     "measured.zip": recording,
