@@ -37,11 +37,12 @@ def images(path: Path) -> None:
 
 
 def listed_images(path: Path) -> None:
-    """Make a folder with a list of times and names, and the images in a folder below it."""
+    """Make a folder with lists of times and names, and the images in a folder below it."""
     path.mkdir()
     images(path / "rgb")
-    lines = (f"{1e9 + k / 30:.6f} rgb/frame_{k:04d}.png\n" for k in range(FRAMES))
-    (path / "images.txt").write_text("".join(lines), "ascii")
+    lines = "".join(f"{1e9 + k / 30:.6f} rgb/frame_{k:04d}.png\n" for k in range(FRAMES))
+    (path / "images.txt").write_text(lines, "ascii")
+    (path / "rgb.txt").write_text(f"# color images\n# timestamp filename\n{lines}", "ascii")
 
 
 def times(path: Path) -> None:
@@ -57,6 +58,13 @@ def stack(path: Path) -> None:
 def recording(path: Path) -> None:
     """Make a recording with too long a dead time, and what is declared of it."""
     _copy(_recorded("refractory"), path)
+
+
+def demonstration(path: Path) -> None:
+    """Make a folder with what the demonstration makes: a clip, a recording, what is declared."""
+    path.mkdir()
+    video(path / "clip.avi")
+    recording(path / "recording.zip")
 
 
 def echoing(path: Path) -> None:
@@ -77,7 +85,7 @@ def _recorded(effect: str) -> Path:
     size = (24, 16)
     Camera(
         patchwork(size, seed=4), hidden=next(cases(effect, size="large")).hidden, size=size,
-        duration_s=0.3, fps=400.0, seed=4, step_us=50.0,
+        duration_s=0.2, fps=300.0, seed=4, step_us=50.0,
     ).record(path)  # fmt: skip
     return path
 
@@ -106,6 +114,7 @@ INPUTS: dict[str, Callable[[Path], None]] = {
     "phone.mp4": video,
     "frames/": images,
     "sequence/": listed_images,
+    "demo/": demonstration,
     "times.txt": times,
     "clip.npy": stack,
     "recording.zip": recording,
@@ -121,5 +130,6 @@ def make_inputs(folder: Path, texts: Iterable[str]) -> None:
     """Put into `folder` what `texts` name."""
     text = "\n".join(texts)
     for name, make in INPUTS.items():
-        if re.search(rf"(?<![\w./-]){re.escape(name)}(?![\w.-])", text):
+        end = "" if name.endswith("/") else r"(?![\w.-])"
+        if re.search(rf"(?<![\w./-]){re.escape(name)}{end}", text):
             make(folder / name)

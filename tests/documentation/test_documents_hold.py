@@ -53,6 +53,8 @@ def test_every_command_stands_where_it_is_checked(name):
     texts = [block.text for block in document.blocks if block.language == "text"]
     lines = [line for _, line in document.prose] + "".join(texts).splitlines()
     assert not [line for line in lines if looks_like_one.match(line)]
+    # nor may one go on in the next line, where it would be missed
+    assert not [line for _, line in document.prose if line.count("`") % 2]
 
 
 @each

@@ -14,7 +14,7 @@ import pytest
 
 from adv2e.config import load_config
 from adv2e.conversion import demo
-from adv2e.diagnosis import diagnose, prepare
+from adv2e.diagnosis import prepare
 from adv2e.diagnosis.fitting.library import names
 from documentation.documents import ROOT, Block, Command, Document, documents
 from documentation.inputs import make_inputs
@@ -22,10 +22,11 @@ from documentation.where import elsewhere
 
 DOCUMENTS = {document.name: document for document in documents()}
 
-RIVALS = {"refractory", "event_loss", "shot_noise"}
+RIVALS = {"refractory", "event_loss"}
 """The effects that compete in diagnoses here, besides those of the user's own: all take minutes."""
 
 FOUND = {
+    "adv2e/diagnosis/README.md": ("found", "refractory", {"pixel.refractory.period_us": 1e4}),
     "adv2e/effects/README.md": ("again", "echo", {"user.echo.share": 0.3}),
 }
 """Folder of a diagnosis that a document makes, the effect that it names, and what it fits."""
@@ -45,8 +46,6 @@ def _small(monkeypatch, tmp_path):
         return [one for one in every(declared, hints) if one.name not in built_in]
 
     monkeypatch.setattr(prepare, "library", library)
-    # how large effects must be to be seen would take as many simulations again
-    monkeypatch.setattr(diagnose, "detectable", lambda *given: [])
     for name, value in {"WIDTH": 64, "HEIGHT": 48, "DURATION_S": 0.5}.items():
         monkeypatch.setattr(demo, name, value)
     monkeypatch.setattr(demo, "INSTANTS_S", (0.2, 0.4))
