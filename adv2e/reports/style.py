@@ -68,7 +68,8 @@ td.number, th.number { padding-left: 10px; }
 td { min-width: 3em; }
 .number .text { white-space: normal; overflow-wrap: anywhere; }
 .meaning, .line { display: block; font-weight: 400; }
-.long { min-width: 22em; }
+.long { min-width: 15em; }
+thead th.number { white-space: normal; }
 .line { white-space: nowrap; }
 strong.line { display: inline; font-weight: 700; }
 .large { color: var(--before); white-space: nowrap; }
@@ -145,7 +146,7 @@ svg .dot { fill: var(--role); }
   .side { grid-template-columns: 1fr 1fr; }
   thead { break-after: avoid; }
   th, td { padding-top: 3px; padding-bottom: 3px; }
-  .long { min-width: 16em; }
+  .long { min-width: 11em; }
   .maps { display: grid; grid-template-columns: 1fr 1fr; gap: 0 24px; }
   .maps > h3 { grid-row: 1; }
   .maps > .side { grid-row: 2; }

@@ -199,7 +199,7 @@ def flat(title, apart):
 
 
 def test_curves_that_differ_most_are_shown_and_the_others_folded():
-    given = [flat(f"c{k}", k) for k in range(6)]
+    given = [flat(f"c{k}", 2 + k) for k in range(6)]
     assert drawn(given) == [["c5", "c4", "c3", "c2"], ["c1", "c0"]]
     assert drawn(given[:4]) == [["c3", "c2", "c1", "c0"], []]
 
@@ -209,9 +209,16 @@ def test_of_curves_of_one_kind_the_others_come_later():
     assert drawn(given) == [["a, ON", "b", "c", "d"], ["a, OFF"]]
 
 
+def test_what_chance_makes_is_no_reason_to_show_a_curve():
+    wide = flat("wide", 1)
+    wide = replace(wide, before=Band(wide.before.middle, wide.measured - 99, wide.measured + 99))
+    wide = replace(wide, measured=wide.measured + 50)
+    assert drawn([wide, *(flat(f"c{k}", 1.5) for k in range(4))])[1] == ["wide"]
+
+
 def test_a_curve_that_is_not_known_is_no_reason_to_show_it():
     unknown = replace(flat("unknown", 1), measured=np.full(3, NAN))
-    assert drawn([unknown, *(flat(f"c{k}", 1) for k in range(4))])[1] == ["unknown"]
+    assert drawn([unknown, *(flat(f"c{k}", 2) for k in range(4))])[1] == ["unknown"]
 
 
 def test_the_legend_says_what_lines_and_bands_are():

@@ -80,8 +80,8 @@ def shortlisted(reference: Reference, state: State, candidates: Sequence[Candida
         reference.rejections.add(trial.fit, "others explain more")
     for fit in dropped:
         share = 1.0 - fit.misfit / nothing
-        what = f"explains {share:.0%} of the difference" if share > 0 else "explains nothing"
-        reference.rejections.add(fit, f"{what}, others explain more")
+        why = f"explains {share:.0%} of the difference, others explain more"
+        reference.rejections.add(fit, why if share >= 0.005 else "explains nothing")
     return trials
 
 

@@ -27,8 +27,6 @@ _FEW_POINTS = 40
 
 _SHOWN = 4
 """Curves that are not folded away."""
-_FARTHEST = 20.0
-"""Half widths of a band beyond which a value is no farther off."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ class _Frame:
 def curves(given: Sequence[Curve], wording: Wording) -> Markup:
     """Return the curves side by side, under their legend: those that differ most, the rest folded.
 
-    They differ by how far the recording is from the declared model's band.
+    They differ by how far the recording is from the declared model, where that is no chance.
     """
     if not given:
         return Markup()
@@ -95,13 +93,12 @@ def _is_one(curve: Curve) -> bool:
 
 
 def _unlike(curve: Curve) -> float:
-    """Return how far measured values are from the declared model, in half widths of its band."""
-    band = curve.before
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        half = 0.5 * (drawable(band.high) - drawable(band.low))
-        apart = np.abs(drawable(curve.measured) - drawable(band.middle)) / half
-    known = apart[~np.isnan(apart)]
-    return float(np.minimum(known, _FARTHEST).mean()) if len(known) else 0.0
+    """Return the share of a curve by which it is beside the declared model, outside its band."""
+    middle, measured = drawable(curve.before.middle), drawable(curve.measured)
+    outside = (measured < curve.before.low) | (measured > curve.before.high)
+    size = float(np.nansum(np.maximum(np.abs(measured), np.abs(middle))))
+    apart = float(np.nansum(np.where(outside, np.abs(measured - middle), 0.0)))
+    return apart / size if 0.0 < size < np.inf else 0.0
 
 
 def _legend(wording: Wording, *, two: bool) -> Markup:
