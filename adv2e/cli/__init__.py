@@ -22,12 +22,12 @@ from adv2e.process.signals import stopping_on_signals
 
 COMMANDS = {
     "convert": "Turn a video or frames into events.",
-    "info": "Say what a recording or event file holds.",
-    "render": "Draw pictures and films of events.",
-    "compare": "Measure how far two event streams are apart.",
+    "info": "Show what a video, a recording or an event file holds.",
+    "render": "Make pictures and films of events.",
+    "compare": "Measure how much two event streams differ.",
     "diagnose": "Find what a recording holds that its simulation lacks.",
     "characterise": "Name the effect that tables of latency or noise ask for.",
-    "config": "Show or check configurations, with the meaning of each key.",
+    "config": "Show or check a configuration, and explain its keys.",
     "effects": "List the effects, or explain one with its equation.",
     "demo": "Make a sample clip, convert it and render the events.",
 }
@@ -128,7 +128,12 @@ def _memory_of_a_command() -> Iterator[None]:
 )
 @click.version_option(__version__, "-V", "--version", message="%(prog)s %(version)s")
 def main() -> None:
-    """Turn video or image sequences into event-camera (DVS) events.
+    """Turn a video or a sequence of images into the events of an event camera (DVS).
 
-    'adv2e COMMAND --help' describes a command. A first try: 'adv2e demo'.
+    \b
+    First steps:
+      adv2e demo                                    makes a clip and converts it
+      adv2e convert clip.mp4                        converts a video of yours
+      adv2e render clip.events.h5 -o events.mp4     shows its events as a film
+      adv2e convert --help                          explains one command
     """

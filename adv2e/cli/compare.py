@@ -23,22 +23,24 @@ if TYPE_CHECKING:
 @click.command("compare", cls=Command)
 @click.argument("measured", metavar="MEASURED", shell_complete=completion.files)
 @click.argument("simulated", metavar="SIMULATED", shell_complete=completion.files)
-@click.option("--json", "as_json", is_flag=True, help="Print JSON, with the value of each window.")
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print JSON, with the distances in each window."
+)
 @click.option(
     "--window",
     "window_s",
     type=options.FiniteNumber(min=1e-6),
     metavar="S",
-    help="Compare windows of S seconds."
-    "  [default: frame intervals; 0.05 where MEASURED has no frames]",
+    help="Compare in windows of S seconds.  [default: from frame to frame; 0.05 if MEASURED has no"
+    " frames]",
 )
 @click.option(
     "--frames",
     "frames_path",
     metavar="INPUT",
     shell_complete=completion.files,
-    help="Frames for the intervals and the floor of two seeds, on the clock of MEASURED."
-    "  [default: those in MEASURED]",
+    help="Take the frames from INPUT, on the clock of MEASURED. They set the windows, and are what"
+    " is simulated.  [default: the frames in MEASURED]",
 )
 @options.time_unit_option
 @options.config_options
@@ -57,18 +59,20 @@ def command(
     progress: bool,
     log: Log,
 ) -> None:
-    """Measure how far two event streams are apart.
-
-    MEASURED and SIMULATED are event files of one size and on one clock. Every distance is printed
-    with its definition and with the same distance between two halves of the measured events, which
-    is about what chance alone makes. With -c, --set or --seed, and frames, also with the distance
-    between two simulations of that configuration that differ in their seed.
+    """Measure how much two event streams differ.
 
     \b
     Examples:
       adv2e compare urban.zip urban_simulated.h5
       adv2e compare urban.zip urban_simulated.h5 -c davis240c --json
       adv2e compare measured.txt simulated.txt --window 0.02
+
+    MEASURED and SIMULATED are event files of one sensor size and on one clock. The command prints
+    several distances between them, each with its definition. Beside each stands the distance
+    between two halves of the measured events, which is about what chance alone makes.
+
+    With a configuration (-c, --set or --seed) and frames, the command also simulates the frames
+    twice, with two seeds, and prints the distance between these two simulations.
     """
     import numpy as np
 

@@ -38,10 +38,7 @@ class _ShowByDefault(click.Group):
 
 @click.group("config", cls=_ShowByDefault)
 def group() -> None:
-    """Show or check configurations, with the meaning of each key.
-
-    A configuration is YAML; keys it leaves out keep their defaults, and null switches an effect
-    off. Without a command: show.
+    """Show or check a configuration, and explain its keys.
 
     \b
     Examples:
@@ -49,7 +46,10 @@ def group() -> None:
       adv2e config check mine.yaml
       adv2e convert clip.mp4 -c mine.yaml
 
-    Shipped, to be used by name: adv2e (the defaults), paper, v2e, vid2e, ideal, davis240c,
+    A configuration is a YAML file. Keys that it leaves out keep their defaults. The value null
+    switches an effect off. 'adv2e config' alone is 'adv2e config show'.
+
+    These are shipped, and used by name: adv2e (the defaults), paper, v2e, vid2e, ideal, davis240c,
     davis346.
     """
 
@@ -57,13 +57,13 @@ def group() -> None:
 @group.command()
 @options.config_options
 def show(config: Callable[[], Config]) -> None:
-    """Print the resolved configuration, with unit and meaning of each key."""
+    """Print the configuration that -c and --set make, each key explained."""
     _print(config(), "resolved configuration")
 
 
 @group.command()
 def defaults() -> None:
-    """Print the default configuration, with unit and meaning of each key."""
+    """Print the default configuration, each key explained."""
     from adv2e.config import load_config
 
     _print(load_config(), "defaults")
@@ -73,7 +73,7 @@ def defaults() -> None:
 @click.argument("file", metavar="FILE", shell_complete=completion.configurations)
 @options.effect_option
 def check(file: str, effect_files: tuple[str, ...]) -> None:
-    """Check a configuration file: exit status 0 if it is right, 1 if not."""
+    """Check a configuration file. The exit status is 0 if it is right, 1 if not."""
     from adv2e.config import load_config
 
     load_config([file], effects=options.own_effects(effect_files))

@@ -19,41 +19,42 @@ if TYPE_CHECKING:
 
 @click.command("convert", cls=Command)
 @click.argument("source", metavar="INPUT", shell_complete=completion.files)
-@options.config_options
 @options.run_options
+@options.config_options
 @options.source_options
 @click.option("--start", type=SECONDS, metavar="S", help="Begin S seconds after the first frame.")
-@click.option("--stop", type=SECONDS, metavar="S", help="End S seconds after the first frame.")
+@click.option("--stop", type=SECONDS, metavar="S", help="Stop S seconds after the first frame.")
 @click.option(
     "--t0",
     type=click.Choice(["auto", "zero", "keep"]),
     default="auto",
     show_default=True,
-    help="Time of the first frame: zero, or as on the source's clock; auto: keep where it has one.",
+    help="Where times begin. zero: at the first frame converted. keep, auto: as on the input's own"
+    " clock; if it has none, at the input's first frame.",
 )
 @click.option(
     "--format",
     metavar="NAME",
     shell_complete=completion.formats,
-    help="Format of the output, where its suffix does not say it.",
+    help="Write this format, whatever the suffix: txt, zip, folder or h5.",
 )
 @click.option(
     "--layout",
     metavar="NAME",
     shell_complete=completion.layouts,
-    help="Layout of an HDF5 output.  [default: monash]",
+    help="Layout of an HDF5 output: monash.  [default: monash]",
 )
 @click.option(
     "--with-frames",
     is_flag=True,
-    help="Store the input frames in HDF5 too; DAVIS240C folders and zips always hold them.",
+    help="Store the frames, too, in an HDF5 output. DAVIS240C outputs always hold them.",
 )
 @click.option(
     "--preview",
     metavar="FILE",
     shell_complete=completion.files,
-    help="Also draw frames and events, as 'adv2e render' does: .mp4 or .webm plays in browsers,"
-    " .gif everywhere, .avi (without loss) in VLC; .png is a sheet.",
+    help="Also draw the frames beside the events, as 'adv2e render' does: a film (.mp4, .webm,"
+    " .gif, .avi) or a sheet of pictures (.png).",
 )
 def command(
     source: str,
@@ -69,19 +70,26 @@ def command(
 ) -> None:
     """Turn a video or frames into events.
 
-    INPUT is a video file, a folder of images, a DAVIS240C recording (a folder or zip with
-    images.txt) or a .npy stack of frames (frames, rows, columns[, 3]).
-
-    The suffix of OUT gives the format: .txt, .h5, or .zip for a DAVIS240C recording; a path
-    without suffix is one in a folder, '-' streams text to standard output. Without -o the events
-    go to <stem>.events.h5 in the current folder.
-
     \b
     Examples:
       adv2e convert clip.mp4
       adv2e convert clip.mp4 -o clip.txt -c davis346 --set pixel.leak=null
       adv2e convert frames/ --fps 240 -o events.h5 --with-frames
       adv2e convert urban.zip -o urban_simulated --preview urban.mp4
+
+    INPUT is a video file, a folder of images, a DAVIS240C recording (a folder or zip with
+    images.txt) or a .npy stack of frames, grey (frames, rows, columns) or colour (with a fourth
+    axis, of 3).
+
+    Without -o, the events go to <stem>.events.h5 in the current folder. The suffix of OUT chooses
+    the format:
+
+    \b
+      .h5          HDF5
+      .txt         text, a line for each event: seconds x y polarity
+      .zip         a DAVIS240C recording: events.txt, images.txt and the frames
+      no suffix    the same in a folder
+      -            text to standard output
     """
     if given["fps"] is not None and given["timestamps"] is not None:
         raise click.UsageError("--fps and --timestamps both give the times of the frames: keep one")

@@ -14,24 +14,24 @@ from adv2e.cli.reading import reading_told
 
 @click.command("info", cls=Command)
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path, readable=False))
-@click.option("--json", "as_json", is_flag=True, help="Print JSON; all keys are always there.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, always with the same keys.")
 @options.source_options
 @options.progress_option
 @options.verbosity_options
 def command(
     file: Path, as_json: bool, given: dict[str, Any], progress: bool, log: options.Log
 ) -> None:
-    """Say what a recording or event file holds.
-
-    Tells geometry, span, counts and rates of the events, the frames, which program and seed made
-    the file where it says so, and what is odd: disorder, repeated events, gaps, hot pixels. A video
-    is read to its end.
+    """Show what a video, a recording or an event file holds.
 
     \b
     Examples:
       adv2e info urban.zip
       adv2e info clip.events.h5 --json
       adv2e info clip.mp4
+
+    This prints the size, the time span, and the counts and rates of the events and the frames. It
+    names the program and the seed that made the file, if the file does. It reports problems: events
+    out of order, repeated events, gaps, hot pixels. It reads a video to its end.
     """
     from adv2e.inspection.inspect import inspect
 

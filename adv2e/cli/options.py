@@ -80,7 +80,7 @@ def effect_option(body: Body) -> Body:
         metavar="FILE.py",
         shell_complete=completion.files,
         multiple=True,
-        help="Effects of your own; their parameters are user.NAME in the configuration."
+        help="Add effects of your own. Their parameters are user.NAME in the configuration."
         " Repeatable.",
     )(body)
 
@@ -116,8 +116,8 @@ def config_options(body: Body) -> Body:
         metavar="FILE",
         multiple=True,
         shell_complete=completion.configurations,
-        help="Configuration: a YAML file or the name of a shipped one (see 'adv2e config --help')."
-        " Repeatable; later ones win, key by key.",
+        help="Configuration: a YAML file or a shipped name, such as davis346 (see 'adv2e config"
+        " --help'). Repeatable: a later one wins, key by key.",
     )
     @click.option(
         "--set",
@@ -125,9 +125,15 @@ def config_options(body: Body) -> Body:
         metavar="KEY=VALUE",
         multiple=True,
         shell_complete=completion.keys,
-        help="Set one key, such as pixel.low_pass.cutoff_hz=100 or pixel.leak=null. Repeatable.",
+        help="Set one key, such as pixel.low_pass.cutoff_hz=100. null switches an effect off:"
+        " pixel.leak=null. Repeatable.",
     )
-    @click.option("--seed", type=SEED, metavar="N", help="Seed of all random numbers, below 2^64.")
+    @click.option(
+        "--seed",
+        type=SEED,
+        metavar="N",
+        help="Seed of all random numbers. The same seed gives the same events.",
+    )
     @effect_option
     @functools.wraps(body)
     def with_config(
@@ -169,13 +175,13 @@ def source_options(body: Body) -> Body:
         "--fps",
         metavar="F",
         callback=_rate,
-        help="Frames a second, such as 30 or 30000/1001.",
+        help="Take the frames at F a second, such as 240 or 30000/1001, whatever the input says.",
     )
     @click.option(
         "--timestamps",
         type=click.Path(path_type=Path),
         metavar="FILE",
-        help="Times of the frames, one a line.",
+        help="Read the times of the frames from FILE, one a line.",
     )
     @time_unit_option
     @click.option(
@@ -196,8 +202,8 @@ def time_unit_option(body: Body) -> Body:
     return click.option(
         "--time-unit",
         type=click.Choice(["s", "ms", "us", "ns"]),
-        help="Unit of the times in lists and event files.  [default: what the file says, else told"
-        " from the times, with a line where that leaves doubt]",
+        help="Unit of the times in lists and event files.  [default: what the file says; else a"
+        " guess, and a line that tells it]",
     )(body)
 
 
@@ -210,7 +216,7 @@ def output_options(body: Body) -> Body:
         metavar="OUT",
         shell_complete=completion.files,
         callback=_not_empty,
-        help="Where to write.",
+        help="File or folder to write.",
     )(body)
 
 
@@ -229,8 +235,8 @@ def threads_option(body: Body) -> Body:
         "--threads",
         type=click.IntRange(min=1),
         metavar="N",
-        help="Threads to compute with; the result is the same for any number."
-        "  [default: all cores this process may use]",
+        help="Compute with N threads. The result is the same for any N.  [default: all cores that"
+        " this process may use]",
     )(body)
 
 
@@ -241,14 +247,14 @@ def verbosity_options(body: Body) -> Body:
         ctx.meta[VERBOSITY] = count
         return count
 
-    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+    @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
     @click.option(
         "-v",
         "--verbose",
         count=True,
         is_eager=True,
         callback=remember,
-        help="Say more; -vv: also tracebacks.",
+        help="Print more. -vv also prints tracebacks.",
     )
     @functools.wraps(body)
     def with_log(*args: Any, quiet: bool, verbose: int, **kw: Any) -> Any:

@@ -25,53 +25,77 @@ if TYPE_CHECKING:
     type=click.Choice(["white", "black", "grey", "surface"]),
     default="white",
     show_default=True,
-    help="Colours on white or black; grey: net count, as v2e; surface: fading with age.",
+    help="white, black: coloured events on that ground. grey: the net count of events, as v2e draws"
+    " it. surface: colours that fade with age.",
 )
-@click.option("--on-color", default="red", show_default=True, help="Name or #rrggbb.")
-@click.option("--off-color", default="blue", show_default=True, help="Name or #rrggbb.")
+@click.option(
+    "--on-color",
+    default="red",
+    show_default=True,
+    metavar="COLOR",
+    help="Colour of ON events: a name or #rrggbb.",
+)
+@click.option(
+    "--off-color",
+    default="blue",
+    show_default=True,
+    metavar="COLOR",
+    help="Colour of OFF events: a name or #rrggbb.",
+)
 @click.option(
     "--window",
     type=POSITIVE,
     metavar="MS",
-    help="Length of what one picture shows.  [default: in a film, up to the one before; else 20]",
+    help="A picture shows the events of the last MS milliseconds.  [default: in a film, those since"
+    " the picture before; in a .png 20]",
 )
-@click.option("--fps", type=POSITIVE, default=30.0, show_default=True, help="Pictures a second.")
+@click.option(
+    "--fps",
+    type=POSITIVE,
+    default=30.0,
+    show_default=True,
+    metavar="F",
+    help="Pictures a second of a film.",
+)
 @click.option(
     "--speed",
     type=POSITIVE,
     default=1.0,
     show_default=True,
-    help="Recorded seconds a second of film; 0.1 is ten times slower than life.",
+    metavar="X",
+    help="Speed of a film: 1 is real time, 0.1 is ten times slower.",
 )
 @click.option(
     "--start", "start_s", type=SECONDS, default=0.0, metavar="S", help="Begin S seconds in."
 )
-@click.option("--stop", "stop_s", type=SECONDS, metavar="S", help="End S seconds in.")
+@click.option("--stop", "stop_s", type=SECONDS, metavar="S", help="Stop S seconds in.")
 @click.option(
     "--at",
     "at_s",
     type=SECONDS,
     multiple=True,
     metavar="S",
-    help="Instant of a .png. Repeatable.",
+    help="Show this instant in a .png. Repeatable.",
 )
 @click.option(
     "--count",
     type=click.IntRange(min=1, max=100),
     default=6,
     show_default=True,
-    help="Instants of a .png without --at, about evenly spaced.",
+    metavar="N",
+    help="Show N instants in a .png, about evenly spaced, if there is no --at.",
 )
 @click.option(
     "--beside/--no-beside",
     "frames",
     default=None,
-    help="Show the frames at the left of the events.  [default: if there are frames]",
+    help="Show the frames to the left of the events.  [default: if there are frames]",
 )
 @click.option(
     "--scale",
     type=click.IntRange(min=1, max=32),
-    help="Repeat pixels so often.  [default: panels about 640 pixels wide]",
+    metavar="N",
+    help="Draw each pixel N times as wide and high.  [default: panels about 640 pixels wide]",
 )
 @options.time_unit_option
 def command(
@@ -87,25 +111,25 @@ def command(
     time_unit: str | None,
     **shown: Any,
 ) -> None:
-    """Draw pictures and films of events.
-
-    EVENTS is a file of events (.txt, .h5, .hdf5, .npz) or a recording (DAVIS240C folder or zip).
-    The suffix of OUT says what to make; times are counted from the first event or frame.
-
-    \b
-      .mp4    film for browsers and slides: H.264 with the extra 'video' (PyAV), which plays
-              everywhere; without it VP9, which plays in Chrome, Edge, Firefox and VLC, and takes
-              twenty times as long to write
-      .webm   film for browsers (VP8): Chrome, Edge, Firefox, Safari from 14.1 on, VLC
-      .gif    film for everything that shows pictures, at most 50 pictures a second
-      .avi    film without any loss (HuffYUV): VLC, mpv, ffmpeg; no browser
-      .png    sheet of one or several instants
+    """Make pictures and films of events.
 
     \b
     Examples:
       adv2e render clip.events.h5 -o events.mp4
       adv2e render clip.events.h5 -o slow.gif --start 0.2 --stop 0.4 --speed 0.1
       adv2e render urban.zip -o urban.png --at 1.5 --at 2.5 --window 10 --style grey
+
+    EVENTS is a file of events (.txt, .h5, .hdf5, .npz) or a recording (a DAVIS240C folder or zip).
+    Times are counted from its first event or frame. The suffix of OUT chooses what is made:
+
+    \b
+      .mp4    a film for browsers and slides. With the extra 'video' (PyAV) it is H.264 and plays
+              everywhere. Without, it is VP9, plays in Chrome, Edge, Firefox and VLC, and takes
+              twenty times as long to write.
+      .webm   a film (VP8) for Chrome, Edge, Firefox, VLC, and Safari from 14.1 on
+      .gif    a film for everything that shows pictures, at most 50 pictures a second
+      .avi    a film without any loss (HuffYUV) for VLC, mpv and ffmpeg, but for no browser
+      .png    a sheet of one or several pictures
     """
     if output is None:
         raise click.UsageError("-o is missing: a .mp4, .webm, .avi, .gif or .png file")

@@ -18,6 +18,7 @@ from adv2e.config.files import find
 from adv2e.config.model import Pixel
 from adv2e.diagnosis.fitting.library import names
 from adv2e.effects import EFFECTS, STAGES
+from adv2e.formats.writing import FORMATS, LAYOUTS
 
 
 @pytest.mark.parametrize("option", ["--version", "-V"])
@@ -47,6 +48,21 @@ def test_the_help_of_every_command_can_be_shown(adv2e, name):
     outcome = adv2e(name, "--help")
     assert outcome.status == 0
     assert outcome.out.startswith(f"Usage: adv2e {name}")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_examples_in_the_help_stand_line_by_line(adv2e, command):
+    lines = adv2e(command, "--help").out.splitlines()
+    assert "  Examples:" in lines
+    assert max(map(len, lines)) <= 100
+    assert any(line.startswith(f"    adv2e {command}") for line in lines)
+
+
+def test_the_help_of_convert_names_what_can_be_written(adv2e):
+    out = " ".join(adv2e("convert", "--help").out.split())
+    named = re.search(r"Write this format, whatever the suffix: ([a-z0-9, ]+)\.", out)
+    assert re.split(", | or ", named[1]) == list(FORMATS)
+    assert f"Layout of an HDF5 output: {', '.join(LAYOUTS)}. [default: {LAYOUTS[0]}]" in out
 
 
 def test_convert_passes_its_options_on(adv2e, pipeline):

@@ -105,10 +105,3 @@ def test_missing_recording(adv2e, tmp_path):
     assert outcome.status == 1
     assert "absent.h5" in outcome.err
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("command", ["render", "demo"])
-def test_examples_in_the_help_stand_line_by_line(adv2e, command):
-    lines = adv2e(command, "--help").out.splitlines()
-    assert "  Examples:" in lines
-    assert any(line.startswith(f"    adv2e {command}") for line in lines)
