@@ -78,6 +78,6 @@ def pipeline(monkeypatch):
         module.calls.append((reading, output, options))
         return module.ending()
 
-    module.convert = convert
+    module.convert_reading = convert
     monkeypatch.setitem(sys.modules, "adv2e.conversion.pipeline", module)
     return module

@@ -169,7 +169,7 @@ def convert(*args, **options):
         {work}
     finally:
         staging.discard()
-pipeline.convert = convert
+pipeline.convert_reading = convert
 sys.modules["adv2e.conversion.pipeline"] = pipeline
 from adv2e.cli import main
 main(["convert", "clip.mp4"])
