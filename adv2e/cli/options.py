@@ -28,8 +28,15 @@ if TYPE_CHECKING:
 
 Body = TypeVar("Body", bound=Callable[..., Any])
 
+
+class WholeNumber(click.IntRange):
+    """A whole number in a range, called so in errors."""
+
+    name = "whole number"
+
+
 # adv2e.kernel.rng.LARGEST_SEED, without the time that importing it takes
-SEED = click.IntRange(0, (1 << 64) - 1)
+SEED = WholeNumber(0, (1 << 64) - 1)
 
 
 @dataclass(frozen=True)
@@ -233,7 +240,7 @@ def threads_option(body: Body) -> Body:
     """Add --threads; the command gets ``threads``, None standing for every core it may use."""
     return click.option(
         "--threads",
-        type=click.IntRange(min=1),
+        type=WholeNumber(min=1),
         metavar="N",
         help="Compute with N threads. The result is the same for any N.  [default: all cores that"
         " this process may use]",

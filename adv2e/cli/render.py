@@ -79,7 +79,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--count",
-    type=click.IntRange(min=1, max=100),
+    type=options.WholeNumber(min=1, max=100),
     default=6,
     show_default=True,
     metavar="N",
@@ -93,7 +93,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--scale",
-    type=click.IntRange(min=1, max=32),
+    type=options.WholeNumber(min=1, max=32),
     metavar="N",
     help="Draw each pixel N times as wide and high.  [default: panels about 640 pixels wide]",
 )

@@ -65,9 +65,9 @@ class Summary:
         share = f"{100 * self.on / self.events:.1f} % ON" if self.events else "no events"
         rate = self.events / self.duration_s / (self.width * self.height)
         return (
-            f"{shown(self.output)}: {self.events:,} events ({share}) of {self.width}x{self.height}"
-            f" pixels over {self.duration_s:.3f} s\n"
-            f"{rate:.2f} events a pixel a second; {self.frames} frames in {self.seconds:.1f} s"
+            f"{shown(self.output)}: {self.events:,} events ({share}) from {self.frames} frames of"
+            f" {self.width}x{self.height} pixels, over {self.duration_s:.3f} s\n"
+            f"{rate:.2f} events a pixel a second; made in {self.seconds:.1f} s"
         )
 
 
@@ -229,7 +229,8 @@ def convert_reading(
             out.add(events)
             del events  # or they would stay while the next ones are made
     # at the end: an error is to be the only line
-    log(f"light: {light_text(recording.light, recording.full_scale, config.frames)}")
+    taken = light_text(recording.light, recording.full_scale, config.frames)
+    log(f"frames are {taken}")
     found = _doubt_of_white(recording, recording.largest_read, config)
     if told:
         largest = f"{recording.path}: whole numbers up to {recording.largest_read:g} came"

@@ -11,6 +11,7 @@ from adv2e.files.regular import check_ends
 from adv2e.formats.builder import Progress, RecordingBuilder
 from adv2e.formats.recording import Recording
 from adv2e.process.machine import machine_complaint
+from adv2e.sources import VIDEO_SUFFIXES
 
 __all__ = ["Recording", "read_events"]
 
@@ -110,6 +111,8 @@ def _read(path: Path, builder: RecordingBuilder) -> Recording:
         from adv2e.formats.npz import read_npz  # noqa: PLC0415
 
         return read_npz(path, builder)
+    if suffix in VIDEO_SUFFIXES:
+        raise DataError(f"{path}: is a video and holds no events; make some: adv2e convert {path}")
     raise DataError(
         f"{path}: unknown suffix '{suffix}', must be one of {', '.join(_SUFFIXES)}"
         " or a DAVIS240C folder"

@@ -175,8 +175,8 @@ class Source(ABC):
         if self.selection.start_s is None and self.selection.stop_s is None:
             return DataError(f"{self.path}: {found}; at least two are needed")
         return DataError(
-            f"{self.path}: --start and --stop leave {found} of those read up to"
-            f" {seconds(span_ns)} s; at least two are needed"
+            f"{self.path}: --start and --stop leave {found}, and at least two are needed; frames"
+            f" were read up to {seconds(span_ns)} s"
         )
 
     def _frame(self, shot: Shot, t_ns: int) -> Frame:

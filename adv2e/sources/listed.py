@@ -73,7 +73,8 @@ def timed(
         return _listed(read_found(found), found, pictures, path)
     else:
         raise DataError(
-            f"{path}: when are the frames? give --fps F or --timestamps FILE, or put {missing}"
+            f"{path}: no times of its frames are known: give --fps F or --timestamps FILE, or put"
+            f" {missing}"
         )
     if found is not None:
         result.notes.append(f"{given} replaces the times in {found}")

@@ -95,7 +95,7 @@ def test_vv_shows_no_traceback_of_a_mistake_of_the_user(adv2e, pipeline):
         (["convert", "a", "--threads", "0"], "Invalid value for '--threads': 0"),
         (["convert", "a", "--threads", "-2"], "Invalid value for '--threads': -2"),
         (["convert", "a", "--seed", "-1"], "Invalid value for '--seed'"),
-        (["convert", "a", "--seed", "1.5"], "Invalid value for '--seed'"),
+        (["convert", "a", "--seed", "1.5"], "'--seed': '1.5' is not a valid whole number"),
         (["convert", "a", "--seed", str(2**64)], "in the range 0<=x<=18446744073709551615"),
         (["convert", "a", "--set", f"seed={2**64}"], "must be at most 18446744073709551615, got 1"),
         (["compare", "a", "b", "--seed", "9" * 400], "in the range 0<=x<=18446744073709551615"),

@@ -8,6 +8,8 @@ import pytest
 
 from adv2e.formats.reading import read_events
 
+TAKEN = "frames are "
+
 FRAMES = np.arange(6 * 24 * 32).reshape(6, 24, 32) % 251
 COLOUR = np.repeat(FRAMES[..., np.newaxis], 3, axis=-1)
 
@@ -78,12 +80,12 @@ def test_every_source_says_its_light_and_the_key_that_changes_it(adv2e, tmp_path
     source, output = write(tmp_path / "in", frames), tmp_path / "out.h5"
     times = () if name in ("video", "recording") else ("--fps", "10")
     outcome = adv2e("convert", source, *times, "-o", output)
-    lines = [line for line in outcome.err.splitlines() if line.startswith("light: ")]
+    lines = [line for line in outcome.err.splitlines() if line.startswith(TAKEN)]
     assert len(lines) == 1
     assert expected in lines[0]
     assert "frames.encoding" in lines[0]
     assert len(lines[0]) <= 100
-    assert read_events(output).metadata["source"]["light"] == lines[0].removeprefix("light: ")
+    assert read_events(output).metadata["source"]["light"] == lines[0].removeprefix(TAKEN)
     report = json.loads(adv2e("info", source, *times, "--json").out)["frames"]
     assert expected in report["light"]
     assert expected.startswith(f"{report['encoding']}, white {report['full_scale']:g}")
@@ -96,7 +98,7 @@ def test_what_the_configuration_says_is_told_as_such(adv2e, tmp_path):
     keys = ("--set", "frames.encoding=gamma:2.2", "--set", "frames.full_scale=4095")
     outcome = adv2e("convert", source, "--fps", "10", *keys, "-o", tmp_path / "out.h5")
     line = "gamma:2.2, white 4095 (as frames.encoding says; white as frames.full_scale says)"
-    assert outcome.err.splitlines() == [f"light: {line}"]
+    assert outcome.err.splitlines() == [f"{TAKEN}{line}"]
 
 
 def test_our_own_recordings_say_it_too(adv2e, tmp_path):

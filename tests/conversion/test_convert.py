@@ -28,7 +28,7 @@ def test_it_does_what_the_command_does(clip, adv2e, tmp_path):
     assert (tmp_path / "a.txt.json").read_bytes() == (tmp_path / "b.txt.json").read_bytes()
     assert done.events == len(package.read_events("a.txt").events) > 100
     assert (done.frames, done.output) == (4, str(tmp_path / "b.txt"))
-    assert any(note.startswith("light: linear, white 255") for note in done.notes)
+    assert any(note.startswith("frames are linear, white 255") for note in done.notes)
 
 
 def test_the_default_output_is_that_of_the_command(clip):
@@ -43,7 +43,7 @@ def test_a_doubt_is_a_warning_and_no_note(clip, tmp_path):
     with pytest.warns(UserWarning, match=r"times\.txt: .*ms") as told:
         done = adv2e.convert(clip, "a.txt", timestamps="times.txt")
     assert told[0].filename == __file__
-    assert all("light: " in note or "times " in note for note in done.notes)
+    assert all("frames are " in note or "times " in note for note in done.notes)
 
 
 def test_what_cannot_be(clip):

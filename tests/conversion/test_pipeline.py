@@ -567,3 +567,12 @@ def test_a_failure_is_told_in_a_line_of_its_own(adv2e, tmp_path):
     outcome = adv2e("convert", tmp_path / "a.npy", "--fps", "30", "--progress", "-o", "-")
     assert outcome.status == 1
     assert re.search(r"\r *\radv2e: error: .*frame 2.*\n$", outcome.err)
+
+
+def test_the_summary_counts_in_sentences(adv2e, video, tmp_path):
+    out = adv2e("convert", video, "-o", tmp_path / "a.txt").out
+    assert re.fullmatch(
+        r".*a\.txt: [\d,]+ events \(\d+\.\d % ON\) from 6 frames of 32x24 pixels, over 0\.167 s\n"
+        r"[\d.]+ events a pixel a second; made in \d+\.\d s\n",
+        out,
+    )

@@ -162,6 +162,15 @@ def test_unknown_suffix_lists_what_exists(tmp_path):
     assert "unknown suffix '.xyz', must be one of .txt" in error_of(tmp_path / "a.xyz")
 
 
+def test_a_video_is_to_be_converted_first(tmp_path):
+    (tmp_path / "a.mp4").write_bytes(b"")
+
+    told = error_of(tmp_path / "a.mp4")
+    assert told.endswith(
+        f"is a video and holds no events; make some: adv2e convert {tmp_path / 'a.mp4'}"
+    )
+
+
 # HDF5, written here with plain h5py
 
 

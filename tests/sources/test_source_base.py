@@ -108,7 +108,7 @@ def test_impossible_options_are_usage_errors(stack, options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"start_s": 0.9}, "--start and --stop leave a single frame .* 0.9 s"),
+        ({"start_s": 0.9}, "--start and --stop leave a single frame, .* 0.9 s"),
         ({"start_s": 3}, "--start and --stop leave no frames"),
         ({"start_s": 0.41, "stop_s": 0.49}, "--start and --stop leave no frames"),
     ],
