@@ -43,15 +43,17 @@ RECORDING_SIZE, RECORDING_FPS, RECORDING_S = (32, 24), 500.0, 0.6
 """The sample recording: width and height, frames a second, length [s]."""
 
 DECLARED = """\
-# What is known of the camera that made recording.zip: the defaults of adv2e, and that its frames
-# come so fast that none need to be made between them. One thing about it is not known.
-sampling: {L: 1}
+# What is known of the camera that made recording.zip. One of these numbers is wrong.
+sampling: {L: 1}                       # frames come so fast that none are made between them
+pixel:
+  thresholds: {"on": 0.2, "off": 0.2}  # [ln]
+  refractory: {period_us: 500}         # dead time after an event
 """
 
 UNDECLARED = "pixel.refractory.period_us=4000"
-"""What the sample recording's camera has and nobody declares."""
+"""What the camera of the sample recording really has."""
 
-_RECORDING_SEED = 2  # another chip, and other noise, than a simulation of the declared model has
+_RECORDING_SEED = 12  # another chip, and other noise, than a simulation of the declared model has
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,8 @@ class Demo:
                 "         frames and, at their right, events: ON red, OFF blue",
                 f"film     {shown(self.film)}",
                 f"sample   {shown(self.recording)}",
-                "         a recording to diagnose, simulated with a dead time that"
-                f" {shown(self.declared.name)} does not declare",
+                "         a recording to diagnose: one number in"
+                f" {shown(self.declared.name)} is wrong",
                 "",
                 "Look at the picture first. Then try: adv2e convert VIDEO --preview events.mp4",
             )

@@ -9,9 +9,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
-README_IS_CHECKED = False
-"""Whether the README is held to all that is demanded here, as the other documents are."""
-
 LANGUAGES = {"bash", "python", "yaml", "text", "bibtex"}
 """What a block may hold.  A text is what a command prints."""
 
@@ -157,7 +154,6 @@ class Document:
 
 def documents() -> list[Document]:
     """Return all documents, the README first."""
-    paths = [*(ROOT / "adv2e").rglob("README.md"), *(ROOT / "scripts").rglob("README.md")]
-    if README_IS_CHECKED:
-        paths.append(ROOT / "README.md")
+    below = [path for top in ("adv2e", "scripts") for path in (ROOT / top).rglob("README.md")]
+    paths = [ROOT / "README.md", *below]
     return [Document.read(path) for path in sorted(paths, key=lambda p: (len(p.parts), p))]

@@ -18,6 +18,8 @@ from camera import Camera, patchwork
 from camera.catalogue import cases
 from pictures import picture
 
+from adv2e.config import load_config
+from adv2e.conversion.demo import run_demo
 from adv2e.synthetic import Scene
 from adv2e.synthetic.clips import write_video
 
@@ -61,10 +63,8 @@ def recording(path: Path) -> None:
 
 
 def demonstration(path: Path) -> None:
-    """Make a folder with what the demonstration makes: a clip, a recording, what is declared."""
-    path.mkdir()
-    video(path / "clip.avi")
-    recording(path / "recording.zip")
+    """Make what ``scripts/demo`` makes: a clip and its events, a recording, what is declared."""
+    run_demo(path, load_config())
 
 
 def echoing(path: Path) -> None:
@@ -110,11 +110,11 @@ def noise_rates(path: Path) -> None:
 
 
 INPUTS: dict[str, Callable[[Path], None]] = {
+    "demo/": demonstration,
     "clip.mp4": video,
     "phone.mp4": video,
     "frames/": images,
     "sequence/": listed_images,
-    "demo/": demonstration,
     "times.txt": times,
     "clip.npy": stack,
     "recording.zip": recording,

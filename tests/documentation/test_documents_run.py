@@ -26,6 +26,7 @@ RIVALS = {"refractory", "event_loss"}
 """The effects that compete in diagnoses here, besides those of the user's own: all take minutes."""
 
 FOUND = {
+    "README.md": ("found", "refractory", {"pixel.refractory.period_us": 4e3}),
     "adv2e/diagnosis/README.md": ("found", "refractory", {"pixel.refractory.period_us": 1e4}),
     "adv2e/effects/README.md": ("again", "echo", {"user.echo.share": 0.3}),
 }
@@ -46,7 +47,8 @@ def _small(monkeypatch, tmp_path):
         return [one for one in every(declared, hints) if one.name not in built_in]
 
     monkeypatch.setattr(prepare, "library", library)
-    for name, value in {"WIDTH": 64, "HEIGHT": 48, "DURATION_S": 0.5}.items():
+    smaller = {"WIDTH": 64, "HEIGHT": 48, "DURATION_S": 0.5, "RECORDING_S": 0.3}
+    for name, value in smaller.items():
         monkeypatch.setattr(demo, name, value)
     monkeypatch.setattr(demo, "INSTANTS_S", (0.2, 0.4))
     monkeypatch.chdir(tmp_path)
