@@ -89,6 +89,12 @@ def example(recordings, monkeypatch):
     return run
 
 
+def told(progress):
+    """Return the stages that were shown, each once, and the numbers of simulations."""
+    shown = re.findall(r"(\w[\w: ]*): (\d+) simulations in", progress)
+    return list(dict.fromkeys(stage for stage, _ in shown)), [int(count) for _, count in shown]
+
+
 def test_a_missing_effect_is_named_by_the_command_and_in_python_whatever_the_threads(
     adv2e, recordings, short, example, tmp_path, monkeypatch
 ):
@@ -96,7 +102,7 @@ def test_a_missing_effect_is_named_by_the_command_and_in_python_whatever_the_thr
     shutil.copy(recordings / "dead.declared.yaml", tmp_path / "declared.yaml")
     monkeypatch.chdir(tmp_path)
     given = ("recording.zip", "-c", "declared.yaml", "-o", "by_command", *WITHOUT)
-    outcome = adv2e("diagnose", *given, "--threads", 1)
+    outcome = adv2e("diagnose", *given, "--threads", 1, "--progress")
     assert (outcome.status, outcome.out) == (0, "")
     in_python = example()
     assert in_python["dead_time"] == pytest.approx(DEAD_US, rel=0.05)
@@ -112,7 +118,15 @@ def test_a_missing_effect_is_named_by_the_command_and_in_python_whatever_the_thr
     assert model == Path("in_python/model.yaml").read_bytes()
 
     made = reports[0]
-    first, *_, last = outcome.err.splitlines()
+    progress, _, end = outcome.err.rpartition("\r")
+    stages, counts = told(progress)
+    assert stages[:2] == ["reading the recording", "simulating the declared model"]
+    assert stages[-2:] == ["judging on data not used so far", "finding what could have been seen"]
+    assert "searching: fitting refractory" in stages[2:-2]
+    assert all(stage.startswith("searching: ") for stage in stages[2:-2])
+    assert counts == sorted(counts)
+    assert 300 < counts[-1] <= int(made["facts"]["simulations"])  # the last are not shown
+    first, *_, last = end.splitlines()
     assert re.match(r"Dead time: (19\.\d|20(\.\d)?) ms \(", first)
     assert ", declared 0.5" in first
     assert made["sentence"] == first
@@ -362,11 +376,9 @@ def test_what_is_said(adv2e, made_up, options, lines):
 def test_progress_names_stages_and_counts_simulations_without_a_total(adv2e, made_up):
     outcome = adv2e("diagnose", "a.zip", "--progress", "-q")
     assert outcome.status == 0
-    shown = re.findall(r"(\w[\w ]*): (\d+) simulations in", outcome.err)
-    assert shown[0] == ("reading the recording", "0")
-    stages = list(dict.fromkeys(stage for stage, _ in shown))
+    stages, counts = told(outcome.err)
     assert stages == ["reading the recording", "simulating", "searching", "judging"]
-    counts = [int(count) for _, count in shown]
+    assert counts[0] == 0
     assert counts == sorted(counts)
     assert "/" not in outcome.err
     assert "%" not in outcome.err
