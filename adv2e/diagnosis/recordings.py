@@ -119,7 +119,6 @@ def diagnose_file(
     if output is not None:
         check_folder(output, overwrite=overwrite, inputs=[recording, *also_read])
     with _stages(progress) as tell:
-        tell("reading the recording", 0)
         found = diagnose_evidence(
             read_evidence(recording, time_unit),
             declared,
@@ -140,8 +139,8 @@ def diagnose_file(
 def _stages(shown: bool) -> Iterator[Callable[[str, int], None]]:
     """Show a stage and the number of simulations done; how many there will be, nobody knows."""
     layout = "{desc}: {n_fmt} simulations in {elapsed}"
-    with tqdm(bar_format=layout, leave=False, disable=not shown) as bar:
-        last = ""
+    last = "reading the recording"
+    with tqdm(desc=last, bar_format=layout, leave=False, disable=not shown) as bar:
 
         def tell(stage: str, simulations: int) -> None:
             nonlocal last

@@ -66,22 +66,22 @@ def groups(diagnosis: Diagnosis) -> Markup:
     found = standing_out(diagnosis.signatures, left=left)
     if not found:
         return tag("p", f"No number differs by more than {LARGE_Z:g} standard deviations.")
-    columns = [Column("what")] + [
-        Column(name, number=True)
-        for name in ("measured", "before", "after", "far off before", "far off after")
-    ]
-    rows = [
-        (
-            join(one.group, tag("span", one.farthest.meaning, class_="meaning long")),
-            *_values(one.farthest),
-            f"{one.before} of {one.number}",
-            f"{one.after} of {one.number}",
-        )
-        for one in found
-    ]
+    names = ["measured", "before", "after", "far off before", "far off after"]
+    if not diagnosis.effects:  # both are the declared model
+        names = ["measured", "simulated", "far off"]
+    columns = [Column("what"), *(Column(name, number=True) for name in names)]
+    rows = []
+    for one in found:
+        name = join(one.group, tag("span", one.farthest.meaning, class_="meaning long"))
+        values = _values(one.farthest)
+        far = [f"{number} of {one.number}" for number in (one.before, one.after)]
+        rows.append([name, *values, *far] if diagnosis.effects else [name, *values[:2], far[0]])
+    models = ": before with the declared model, after with the model found" * bool(
+        diagnosis.effects
+    )
     lead = (
         "Many numbers were compared, in groups. Each row shows the number of a group that differs"
-        " most: as measured, and as simulated before (declared model) and after (model found)."
+        f" most, as measured and as simulated{models}."
         f" Far off: how many of the group differ by more than {LARGE_Z:g} standard deviations."
     )
     caption = "Groups of numbers, on data that was not used for fitting"

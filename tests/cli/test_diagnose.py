@@ -118,19 +118,19 @@ def test_a_missing_effect_is_named_by_the_command_and_in_python_whatever_the_thr
     assert model == Path("in_python/model.yaml").read_bytes()
 
     made = reports[0]
-    progress, _, end = outcome.err.rpartition("\r")
-    stages, counts = told(progress)
+    stages, counts = told(outcome.err)
     assert stages[:2] == ["reading the recording", "simulating the declared model"]
     assert stages[-2:] == ["judging on data not used so far", "finding what could have been seen"]
     assert "searching: fitting refractory" in stages[2:-2]
     assert all(stage.startswith("searching: ") for stage in stages[2:-2])
     assert counts == sorted(counts)
     assert 300 < counts[-1] <= int(made["facts"]["simulations"])  # the last are not shown
-    first, *_, last = end.splitlines()
+    lines = [line for line in re.split(r"[\r\n]+ *", outcome.err) if line]
+    first = lines[-len(summary.summary_text(in_python["found"]).splitlines()) - 1]
     assert re.match(r"Dead time: (19\.\d|20(\.\d)?) ms \(", first)
     assert ", declared 0.5" in first
     assert made["sentence"] == first
-    assert last == f"report: {Path('by_command/report.html')}"
+    assert lines[-1] == f"report: {Path('by_command/report.html')}"
     assert made["verdict"] in ("explained", "partly_explained")
     (effect,) = made["effects"]
     assert effect["name"] == "refractory"

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -59,6 +60,14 @@ def test_the_page_tells_how_each_group_stands_out():
     assert "what c2 means" not in text
     assert "2 of 2" in text
     assert "345" in text
+
+
+def test_where_nothing_was_found_one_model_is_shown():
+    nothing = replace(everything(), verdict="unexplained", effects=[], signatures=SIGNATURES)
+    text = groups(nothing)
+    headings = re.findall('<th scope="col"[^>]*>([^<]*)', text)
+    assert headings == ["what", "measured", "simulated", "far off"]
+    assert "model found" not in text
 
 
 def test_where_nothing_is_left_the_page_tells_what_differed():

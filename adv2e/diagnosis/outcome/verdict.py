@@ -73,7 +73,7 @@ def remark_of(verdict: Verdict, outcome: Outcome) -> str:
             f" something is: chance makes such a difference {outcome.test_probability:.0e} times."
         )
     if verdict == "unexplained" and not outcome.state.fits:
-        return "No effect that was tried makes the model better by more than chance."
+        return "Every effect that was tried leaves too much, or makes something else wrong."
     if verdict == "unexplained":
         best = " and ".join(map(label_of, outcome.state.names))
         if outcome.complete:
