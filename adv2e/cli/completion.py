@@ -45,6 +45,13 @@ def effects(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offe
     return starting(named(), incomplete)
 
 
+def library(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
+    """Offer the effects that a diagnosis looks for."""
+    from adv2e.diagnosis.fitting.library import names
+
+    return starting(names(), incomplete)
+
+
 def formats(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
     """Offer the formats that can be written."""
     from adv2e.formats.writing import FORMATS

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from adv2e.cli import options
+from adv2e.cli import completion, options
+from adv2e.cli.commands import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
     from adv2e.config import Config
 
 
-@click.command("diagnose")
-@click.argument("recording", metavar="RECORDING")
+@click.command("diagnose", cls=Command)
+@click.argument("recording", metavar="RECORDING", shell_complete=completion.files)
 @options.config_options
 @options.run_options
 @click.option(
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     "without",
     multiple=True,
     metavar="EFFECT",
+    shell_complete=completion.library,
     help="Leave an effect out of the library. Repeatable.",
 )
 @click.option(

@@ -54,6 +54,10 @@ def offered(adv2e, monkeypatch):
         ),
         ("adv2e effects ", [name for item in EFFECTS for name in (item.name, *item.told_as)]),
         ("adv2e effects refr", ["refractory"]),
+        (
+            "adv2e diagnose rec.zip --without thr",
+            ["thresholds", "threshold_mismatch", "threshold_drift"],
+        ),
         ("adv2e render a.h5 --style s", ["surface"]),
         ("adv2e nothing ", list(COMMANDS)),
     ],
@@ -68,7 +72,12 @@ def test_names_are_offered(offered, line, names):
         *("adv2e convert ", "adv2e convert cl", "adv2e info ", "adv2e render ", "adv2e compare a "),
         *("adv2e convert a.mp4 -o ", "adv2e convert a.mp4 --preview ", "adv2e convert -c mine"),
         *("adv2e convert --effect ", "adv2e convert --timestamps ", "adv2e demo -o "),
-        *("adv2e compare a b --frames ", "adv2e config check mine"),
+        *(
+            "adv2e diagnose ",
+            "adv2e characterise ",
+            "adv2e compare a b --frames ",
+            "adv2e config check mine",
+        ),
     ],
 )
 def test_files_are_left_to_the_shell(offered, line):

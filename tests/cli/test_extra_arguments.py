@@ -40,6 +40,7 @@ def hint(adv2e, pipeline, *args):
         ("convert frames1 out", "convert frames1 -o out"),
         ("render a.h5 out.mp4", "render a.h5 -o out.mp4"),
         ("demo folder", "demo -o folder"),
+        ("diagnose rec.zip out", "diagnose rec.zip -o out"),
     ],
 )
 def test_an_output_is_put_behind_its_option(adv2e, pipeline, given, meant):

@@ -192,7 +192,9 @@ def test_frames_of_a_part_are_counted_before_they_are_read(
 
 def test_start_behind_the_end_says_how_long_the_video_is(write_video, colours):
     source = open_source(write_video("clip.avi", colours), start_s=3)
-    with pytest.raises(DataError, match=r"clip\.avi: --start and --stop leave no frames, .* 0.44 s"):
+    with pytest.raises(
+        DataError, match=r"clip\.avi: --start and --stop leave no frames, .* 0.44 s"
+    ):
         times_of(source)
 
 
