@@ -31,10 +31,9 @@ def maps(given: Sequence[ResidualMap]) -> Markup:
         return Markup()
     parts = []
     for one in given:
-        pictures = [
-            _map(one.title, "before (declared model)", one.before),
-            _map(one.title, "after (model found)", one.after),
-        ]
+        pictures = [_map(one.title, "before (declared model)", one.before)]
+        if not np.array_equal(one.before, one.after, equal_nan=True):
+            pictures.append(_map(one.title, "after (model found)", one.after))
         parts.append(tag("h3", one.title))
         parts.append(tag("div", *pictures, class_="side"))
     note = (

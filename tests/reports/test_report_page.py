@@ -265,6 +265,12 @@ def test_maps_of_usual_sensors_keep_the_page_small():
     assert len(text.encode()) < 2_000_000
 
 
+def test_of_one_model_one_map_is_shown(full):
+    (one,) = everything().maps
+    same = page(replace(everything(), maps=[replace(one, after=one.before)]))
+    assert full.count("<img") - same.count("<img") == 1
+
+
 def test_the_same_diagnosis_gives_the_same_page(full):
     assert page(everything()) == full
 
