@@ -136,4 +136,6 @@ def main() -> None:
       adv2e convert clip.mp4                        converts a video of yours
       adv2e render clip.events.h5 -o events.mp4     shows its events as a film
       adv2e convert --help                          explains one command
+
+    Tab completion in bash: eval "$(_ADV2E_COMPLETE=bash_source adv2e)"
     """

@@ -48,8 +48,8 @@ def _frames(frames: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if frames["count"]:
         yield "frame span", _span(frames["first_ns"], frames["last_ns"])
     if frames["rate_hz"]:
-        shortest, longest = frames["shortest_interval_ms"], frames["longest_interval_ms"]
-        steps = f"{shortest:.6g}" + (f" to {longest:.6g}" if longest > shortest else "")
+        ends = [f"{frames[f'{end}_interval_ms']:.6g}" for end in ("shortest", "longest")]
+        steps = " to ".join(dict.fromkeys(ends))  # once, if they differ by rounding alone
         yield "frame rate", f"{frames['rate_hz']:.6g} Hz, intervals of {steps} ms"
     if "light" in frames:
         yield "light", frames["light"]

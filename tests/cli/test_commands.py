@@ -29,6 +29,7 @@ def test_version(adv2e, option):
 def test_help_lists_every_command_with_a_line(adv2e):
     outcome = adv2e("--help")
     assert outcome.status == 0
+    assert '_ADV2E_COMPLETE=bash_source adv2e)"\n' in outcome.out
     for name, line in COMMANDS.items():
         assert re.search(rf"^  {name} +{re.escape(line)}$", outcome.out, re.MULTILINE)
 

@@ -83,6 +83,16 @@ def test_frames_alone_are_told_as_text(adv2e, images):
     assert "frame rate  50 Hz, intervals of 20 ms" in out
 
 
+def test_intervals_that_rounding_alone_makes_different_are_one(adv2e, images):
+    out = adv2e("info", images, "--fps", "300").out
+    assert "frame rate  300 Hz, intervals of 3.33333 ms" in out
+    (images / "times.txt").write_text("0\n0.25\n1\n")
+    assert (
+        "intervals of 250 to 750 ms"
+        in adv2e("info", images, "--timestamps", images / "times.txt").out
+    )
+
+
 def test_a_recording_folder_with_events_is_told_with_both(adv2e, images):
     images.rename(images.parent / "images")
     folder = images.parent / "real"
