@@ -9,8 +9,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
-LANGUAGES = {"bash", "python", "yaml", "text", "bibtex"}
-"""What a block may hold.  A text is what a command prints."""
+LANGUAGES = {"bash", "python", "yaml", "text", "csv", "bibtex"}
+"""What a block may hold.  A text is what the commands before it print."""
 
 _FENCE = re.compile(r"^ *```(.*)$")
 _NEEDS = re.compile(r"\s# (needs .*)$")

@@ -54,34 +54,45 @@ def _small(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
 
 
-def run_in_shell(text: str) -> str:
-    """Run a command as a user would; return what it said if it failed."""
+def run_in_shell(command: Command) -> str:
+    """Run a command as a user would; return what it said."""
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    text = command.text.replace("scripts/", f"{ROOT}/scripts/")
     done = subprocess.run(
-        ["bash", "-e", "-o", "pipefail", "-c", text.replace("scripts/", f"{ROOT}/scripts/")],
+        ["bash", "-e", "-o", "pipefail", "-c", text],
         env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    return "" if done.returncode in _ENDS else done.stdout + done.stderr or "it failed"
+    assert done.returncode in _ENDS, f"{command}\n{done.stdout}{done.stderr}"
+    return done.stdout + done.stderr
 
 
-def run_command(command: Command, adv2e) -> None:
-    """Run a command, or let it be where it is run elsewhere or needs what is not here."""
+def run_command(command: Command, adv2e) -> str:
+    """Run a command, and return what it said, unless it is run elsewhere or needs more."""
     if elsewhere(command) or command.needs:
-        return
-    if command.text.startswith("adv2e ") and not _SHELL.search(command.text):
-        outcome = adv2e(*shlex.split(command.text)[1:])
-        failed = "" if outcome.status == 0 else outcome.err or "it failed"
-    else:
-        failed = run_in_shell(command.text)
-    assert not failed, f"{command}\n{failed}"
+        return ""
+    if not command.text.startswith("adv2e ") or _SHELL.search(command.text):
+        return run_in_shell(command)
+    outcome = adv2e(*shlex.split(command.text)[1:])
+    assert outcome.status == 0, f"{command}\n{outcome.err}"
+    return outcome.out + outcome.err
 
 
-def run_block(block: Block, adv2e) -> None:
-    """Run what stands in a block, or write the file that it is."""
+def shape(text: str) -> str:
+    """Return a text without its numbers, and in one line."""
+    return re.sub(r"\d[\d,.]*", "0", " ".join(text.split()))
+
+
+def run_block(block: Block, adv2e, said: str) -> str:
+    """Run what stands in a block, write the file that it is, or compare it with what was `said`.
+
+    A text is what the commands of the block before print, with other numbers: recordings are
+    smaller here.  Returns what its own commands said.
+    """
     if block.language == "bash":
-        for command in block.commands():
-            run_command(command, adv2e)
-        return
+        return "\n".join(run_command(command, adv2e) for command in block.commands())
+    if block.language == "text":
+        for line in block.text.splitlines() if said.strip() else []:
+            assert shape(line) in shape(said), f"{block.document}:{block.line}: {line}\n{said}"
     if block.file:
         Path(block.file).write_text(block.text, "utf-8")
     if block.language == "yaml":
@@ -92,14 +103,15 @@ def run_block(block: Block, adv2e) -> None:
         code = compile(block.text, f"{block.document}:{block.line}", "exec")
         if not block.file and not block.needs:
             exec(code, {"__name__": "__main__"})
+    return ""
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_all_that_a_document_shows_runs(name, adv2e, tmp_path):
-    document = DOCUMENTS[name]
+    document, said = DOCUMENTS[name], ""
     make_inputs(tmp_path, (block.text for block in document.blocks if block.language != "text"))
     for block in document.blocks:
-        run_block(block, adv2e)
+        said = run_block(block, adv2e, said)
     if name in FOUND:
         folder, effect, values = FOUND[name]
         report = json.loads((tmp_path / folder / "report.json").read_text("utf-8"))
@@ -171,6 +183,13 @@ def test_an_option_that_is_unknown_is_an_error_beside_help(adv2e):
     assert elsewhere(command) is None
     with pytest.raises(AssertionError, match="a document:1: adv2e convert --fsp 3"):
         run_command(Command("a document", 1, "adv2e convert --fsp 3"), adv2e)
+
+
+def test_a_text_is_what_was_printed_but_for_its_numbers(adv2e):
+    block = Block("a document", 1, "text", "dead time: 4.00 ms,\n  declared 0.5\n")
+    run_block(block, adv2e, "seen\ndead time: 12.1 ms, declared 1,000\n")
+    with pytest.raises(AssertionError, match="a document:1:   declared "):
+        run_block(block, adv2e, "dead time: 12.1 ms, as declared\n")
 
 
 def test_a_command_has_all_of_its_lines():
