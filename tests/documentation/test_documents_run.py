@@ -47,10 +47,11 @@ def _small(monkeypatch, tmp_path):
         return [one for one in every(declared, hints) if one.name not in built_in]
 
     monkeypatch.setattr(prepare, "library", library)
-    smaller = {"WIDTH": 64, "HEIGHT": 48, "DURATION_S": 0.5, "RECORDING_S": 0.3}
+    smaller = {"WIDTH": 64, "HEIGHT": 48, "DURATION_S": 0.5, "RECORDING_S": 0.2}
     for name, value in smaller.items():
         monkeypatch.setattr(demo, name, value)
     monkeypatch.setattr(demo, "INSTANTS_S", (0.2, 0.4))
+    monkeypatch.setattr("adv2e.rendering.films.default_scale", lambda width: 2)
     monkeypatch.chdir(tmp_path)
 
 
