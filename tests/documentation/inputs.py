@@ -8,9 +8,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable, Iterable
-from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
 
 import cv2
 import numpy as np
@@ -59,7 +57,7 @@ def stack(path: Path) -> None:
 
 def recording(path: Path) -> None:
     """Make a recording with too long a dead time, and what is declared of it."""
-    _copy(_recorded("refractory"), path)
+    _record("refractory", path)
 
 
 def demonstration(path: Path) -> None:
@@ -69,25 +67,16 @@ def demonstration(path: Path) -> None:
 
 def echoing(path: Path) -> None:
     """Make a recording with events that come twice, and what is declared of it."""
-    _copy(_recorded("echo"), path)
+    _record("echo", path)
 
 
-def _copy(made: Path, path: Path) -> None:
-    shutil.copy(made, path)
-    declared = made.with_suffix(".declared.yaml")
-    shutil.copy(declared, path.with_suffix(".declared.yaml"))
-    shutil.copy(declared, path.with_name("declared.yaml"))
-
-
-@cache
-def _recorded(effect: str) -> Path:
-    path = Path(mkdtemp(prefix="adv2e-documents-")) / f"{effect}.zip"
+def _record(effect: str, path: Path) -> None:
     size = (24, 16)
     Camera(
         patchwork(size, seed=4), hidden=next(cases(effect, size="large")).hidden, size=size,
         duration_s=0.2, fps=300.0, seed=4, step_us=50.0,
     ).record(path)  # fmt: skip
-    return path
+    shutil.copy(path.with_suffix(".declared.yaml"), path.with_name("declared.yaml"))
 
 
 def latencies(path: Path) -> None:
@@ -118,7 +107,6 @@ INPUTS: dict[str, Callable[[Path], None]] = {
     "times.txt": times,
     "clip.npy": stack,
     "recording.zip": recording,
-    "measured.zip": recording,
     "echo.zip": echoing,
     "latency.csv": latencies,
     "noise.csv": noise_rates,
