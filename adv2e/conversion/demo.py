@@ -90,7 +90,9 @@ class Demo:
                 "         a recording to diagnose: one number in"
                 f" {shown(self.declared.name)} is wrong",
                 "",
-                "Look at the picture first. Then try: adv2e convert VIDEO --preview events.mp4",
+                "Look at the picture first. Then convert a video of yours, and find that number:",
+                "  adv2e convert VIDEO --preview events.mp4",
+                f"  adv2e diagnose {shown(self.recording)} -c {shown(self.declared)} -o found",
             )
         )
 

@@ -29,6 +29,13 @@ def video(path: Path) -> None:
     write_video(Scene(), path, width=32, height=24, duration_s=FRAMES / 30.0)
 
 
+def videos(path: Path) -> None:
+    """Make a folder of films."""
+    path.mkdir()
+    for name in ("one.mp4", "two.mp4"):
+        video(path / name)
+
+
 def images(path: Path) -> None:
     """Make a folder of images."""
     path.mkdir()
@@ -102,6 +109,7 @@ INPUTS: dict[str, Callable[[Path], None]] = {
     "demo/": demonstration,
     "clip.mp4": video,
     "phone.mp4": video,
+    "videos/": videos,
     "frames/": images,
     "sequence/": listed_images,
     "times.txt": times,
