@@ -18,7 +18,7 @@ from adv2e.diagnosis import prepare
 from adv2e.diagnosis.fitting.library import names
 from documentation.documents import ROOT, Block, Command, Document, documents
 from documentation.inputs import make_inputs
-from documentation.where import elsewhere
+from documentation.where import elsewhere, is_run
 
 DOCUMENTS = {document.name: document for document in documents()}
 
@@ -69,7 +69,7 @@ def run_in_shell(command: Command) -> str:
 
 def run_command(command: Command, adv2e) -> str:
     """Run a command, and return what it said, unless it is run elsewhere or needs more."""
-    if elsewhere(command) or command.needs:
+    if not is_run(command):
         return ""
     if not command.text.startswith("adv2e ") or _SHELL.search(command.text):
         return run_in_shell(command)
@@ -113,6 +113,9 @@ def test_all_that_a_document_shows_runs(name, adv2e, tmp_path):
     make_inputs(tmp_path, (block.text for block in document.blocks if block.language != "text"))
     for block in document.blocks:
         said = run_block(block, adv2e, said)
+    for command in document.commands():
+        if command.inline:
+            run_command(command, adv2e)
     if name in FOUND:
         folder, effect, values = FOUND[name]
         report = json.loads((tmp_path / folder / "report.json").read_text("utf-8"))
@@ -124,7 +127,7 @@ def test_all_that_a_document_shows_runs(name, adv2e, tmp_path):
 
 def only_looked_at(document: Document) -> list[Command]:
     """Return the commands of which no more than the options is tried."""
-    return [one for one in document.commands() if (one.needs or one.inline) and not elsewhere(one)]
+    return [one for one in document.commands() if not is_run(one) and not elsewhere(one)]
 
 
 def words_of(command: Command) -> list[list[str]]:

@@ -28,16 +28,20 @@ def elsewhere(command: Command) -> str | None:
     return next(found, None)
 
 
+def is_run(command: Command) -> bool:
+    """Tell whether a command is run from the text; one within a sentence only if it is no work."""
+    quick = not command.inline or command.text.startswith("adv2e effects ")
+    return quick and not command.needs and elsewhere(command) is None
+
+
 def where(command: Command) -> str:
     """Return where a command is run, for people."""
     other = elsewhere(command)
     if other:
         return other
-    if command.inline:
-        return f"{HERE}: its options alone"
-    if command.needs:
-        return f"{HERE}: its options alone; {command.needs}"
-    return HERE
+    if is_run(command):
+        return HERE
+    return "; ".join(filter(None, (f"{HERE}: its options alone", command.needs)))
 
 
 def table() -> str:
