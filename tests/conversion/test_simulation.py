@@ -152,8 +152,9 @@ def test_memory_does_not_grow_with_length():
             tracemalloc.stop()
 
     peak(100)  # loads what is compiled
-    short, long = peak(20), peak(100)
-    assert long[1] < 1.1 * short[1]
+    # the least of several: what else in this process ends meanwhile does not count
+    short, long = (min(peak(count)[1] for _ in range(3)) for count in (20, 100))
+    assert long < 1.1 * short
 
 
 def test_every_chunk_is_sorted_and_follows_the_one_before():
