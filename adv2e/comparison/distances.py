@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e.comparison.grids import Grid, own_window, smoothed, voxel_grid, z_scored
+from adv2e.comparison.grids import Grid, own_window, signed_grid, smoothed, z_scored
 from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_errors
 from adv2e.comparison.windows import Window, Windows, cut, holding_events
 from adv2e.events import Events
@@ -114,9 +114,11 @@ def _window_distances(
     parts: Sequence[Events], window: Window, width: int, height: int
 ) -> dict[str, float | None]:
     """Return the grid measures between two of `parts`, relative to a third or the first."""
-    grids = [voxel_grid(part, BINS, (width, height), window) for part in parts]
-    counts = [voxel_grid(part, 1, (width, height), window) for part in parts]
-    own_a, own_b = (voxel_grid(part, BINS, (width, height), own_window(part)) for part in parts[:2])
+    grids = [signed_grid(part, BINS, (width, height), window) for part in parts]
+    counts = [signed_grid(part, 1, (width, height), window) for part in parts]
+    own_a, own_b = (
+        signed_grid(part, BINS, (width, height), own_window(part)) for part in parts[:2]
+    )
     which = 2 if len(parts) > 2 else 0
     apart, apart_1 = grids[0] - grids[1], counts[0] - counts[1]
     return {

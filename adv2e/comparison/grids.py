@@ -77,7 +77,12 @@ def voxel_grid(
         raise DataError(f"voxel grid: {bins} bins, at least 1 is needed")
     if last < first:
         raise DataError(f"voxel grid: the window ends at {last} us, before it begins at {first} us")
-    events = cut(events, first, last + 1)
+    return signed_grid(cut(events, first, last + 1), bins, size, (first, last))
+
+
+def signed_grid(events: Events, bins: int, size: tuple[int, int], window: Window) -> Grid:
+    """Return what :func:`voxel_grid` does, of events that lie inside the window and the sensor."""
+    (width, height), (first, last) = size, window
     place = (bins - 1) * (events["t"] - first) / ((last - first) or 1)
     lower = np.minimum(place.astype(np.int64), max(bins - 2, 0))
     share = place - lower
