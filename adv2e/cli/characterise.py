@@ -16,23 +16,8 @@ if TYPE_CHECKING:
 
 @click.command("characterise", cls=Command)
 @click.argument("table", metavar="TABLE", shell_complete=completion.files)
-@click.option(
-    "-c",
-    "--config",
-    "config_files",
-    metavar="FILE",
-    multiple=True,
-    shell_complete=completion.configurations,
-    help="What is known of the camera: every key written there is held. Repeatable.",
-)
-@click.option(
-    "--set",
-    "sets",
-    metavar="KEY=VALUE",
-    multiple=True,
-    shell_complete=completion.keys,
-    help="Declare one key.",
-)
+@options.files_option("What is known of the camera: every key written there is held. Repeatable.")
+@options.sets_option("Declare one key.")
 @click.option("--seed", type=options.SEED, default=0, metavar="N", help="Seed of the drawn tables.")
 @click.option(
     "--where", metavar="COL=VALUE", multiple=True, help="Use only such rows. Repeatable: all hold."

@@ -109,6 +109,31 @@ def files_given() -> list[str | Path]:
     return [*map(find, given["config_files"]), *given.get("effect_files", ())]
 
 
+def files_option(text: str) -> Callable[[Body], Body]:
+    """Return what adds -c, explained by `text`; the command gets ``config_files``, a tuple."""
+    return click.option(
+        "-c",
+        "--config",
+        "config_files",
+        metavar="FILE",
+        multiple=True,
+        shell_complete=completion.configurations,
+        help=text,
+    )
+
+
+def sets_option(text: str) -> Callable[[Body], Body]:
+    """Return what adds --set, explained by `text`; the command gets ``sets``, a tuple."""
+    return click.option(
+        "--set",
+        "sets",
+        metavar="KEY=VALUE",
+        multiple=True,
+        shell_complete=completion.keys,
+        help=text,
+    )
+
+
 def config_options(body: Body) -> Body:
     """Add -c, --set, --seed and --effect; the command gets ``config``, a function.
 
@@ -116,24 +141,13 @@ def config_options(body: Body) -> Body:
     configurations know of all effects, and importing these takes its time.
     """
 
-    @click.option(
-        "-c",
-        "--config",
-        "config_files",
-        metavar="FILE",
-        multiple=True,
-        shell_complete=completion.configurations,
-        help="Configuration: a YAML file or a shipped name, such as davis346 (see 'adv2e config"
-        " --help'). Repeatable: a later one wins, key by key.",
+    @files_option(
+        "Configuration: a YAML file or a shipped name, such as davis346 (see 'adv2e config"
+        " --help'). Repeatable: a later one wins, key by key."
     )
-    @click.option(
-        "--set",
-        "sets",
-        metavar="KEY=VALUE",
-        multiple=True,
-        shell_complete=completion.keys,
-        help="Set one key, such as pixel.low_pass.cutoff_hz=100. null switches an effect off:"
-        " pixel.leak=null. Repeatable.",
+    @sets_option(
+        "Set one key, such as pixel.low_pass.cutoff_hz=100. null switches an effect off:"
+        " pixel.leak=null. Repeatable."
     )
     @click.option(
         "--seed",
