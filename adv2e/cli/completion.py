@@ -54,13 +54,13 @@ def library(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offe
 
 def formats(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
     """Offer the formats that can be written."""
-    from adv2e.formats.writing import FORMATS
+    from adv2e.formats.registry import names
 
-    return starting(FORMATS, incomplete)
+    return starting(names(), incomplete)
 
 
 def layouts(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
     """Offer the layouts of HDF5 files."""
-    from adv2e.formats.writing import LAYOUTS
+    from adv2e.formats import registry
 
-    return starting(LAYOUTS, incomplete)
+    return starting(registry.layouts(), incomplete)

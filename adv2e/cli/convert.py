@@ -11,6 +11,7 @@ import click
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 from adv2e.cli.options import SECONDS
+from adv2e.formats import registry
 
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
@@ -36,13 +37,14 @@ if TYPE_CHECKING:
     "--format",
     metavar="NAME",
     shell_complete=completion.formats,
-    help="Write this format, whatever the suffix: txt, zip, folder or h5.",
+    help=f"Write this format, whatever the suffix: {', '.join(registry.names())}.",
 )
 @click.option(
     "--layout",
     metavar="NAME",
     shell_complete=completion.layouts,
-    help="Layout of an HDF5 output: monash.  [default: monash]",
+    help=f"Layout of an HDF5 output: {', '.join(registry.layouts())}."
+    f"  [default: {registry.layouts()[0]}]",
 )
 @click.option(
     "--with-frames",

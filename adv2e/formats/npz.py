@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.files.npy import read_array
 from adv2e.files.zips import open_member, zip_archive
-from adv2e.formats.builder import Progress, RecordingBuilder
-from adv2e.formats.recording import Recording, described_geometry
+from adv2e.formats.event_file import EventFile, Facts, Progress, described_geometry
 from adv2e.ticks import US, to_ticks
 
 _NAMES = {
@@ -39,17 +38,17 @@ _NAMES = {
 _BEYOND = 1 << 31
 
 
-def read_npz(path: Path, builder: RecordingBuilder) -> Recording:
-    """Return the recording in a NumPy archive; `builder` is a new one.
+def open_npz(path: Path, facts: Facts) -> EventFile:
+    """Open a NumPy archive, and read it.
 
     Raises
     ------
     DataError
         Not such an archive, a column is missing, or columns differ in length.
     """
-    arrays = _load(path, builder.progress)
+    arrays = _load(path, facts.progress)
     if "adv2e" in arrays:
-        builder.describe(str(arrays["adv2e"]), f"{path}: adv2e", "the file")
+        facts.describe(str(arrays["adv2e"]), f"{path}: adv2e", "the file")
     columns = _columns(path, arrays)
     x, y, p = (_whole(path, *columns[name]) for name in ("x", "y", "polarity"))
     sizes: dict[str, Any] = {
@@ -57,15 +56,15 @@ def read_npz(path: Path, builder: RecordingBuilder) -> Recording:
         for name in ("width", "height")
         if name in arrays and arrays[name].size == 1
     }
-    builder.state(described_geometry(sizes), "the file")
+    facts.state(described_geometry(sizes), "the file")
     name, t = columns["time"]
     if t.dtype.kind not in "iuf":
         raise DataError(f"{path}: {name} must hold numbers, not {t.dtype}")
     stated = name[2:] if name.startswith("t_") else None
-    builder.time_unit, builder.stated_unit = builder.time_unit or stated, None
-    unit = builder.unit_of_events(t, x, y, builder.geometry, whole=t.dtype.kind != "f")
-    builder.add(to_ticks(t, unit.ns, US, f"{path}: {name}"), x, y, p)
-    return builder.finish("npz")
+    facts.time_unit, facts.stated_unit = facts.time_unit or stated, None
+    unit = facts.unit_of_events(t, x, y, facts.geometry, whole=t.dtype.kind != "f")
+    ticks = to_ticks(t, unit.ns, US, f"{path}: {name}")
+    return EventFile("npz", facts, lambda: iter([(ticks, x, y, p)]))
 
 
 def _load(path: Path, progress: Progress) -> dict[str, NDArray[Any]]:

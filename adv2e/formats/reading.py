@@ -2,23 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.files.regular import check_ends
-from adv2e.formats.builder import Progress, RecordingBuilder
+from adv2e.formats.assembly import assemble
+from adv2e.formats.event_file import EventFile, Facts, Progress
 from adv2e.formats.recording import Recording
+from adv2e.formats.registry import format_of
 from adv2e.process.machine import machine_complaint
-from adv2e.sources import VIDEO_SUFFIXES
 
-__all__ = ["Recording", "read_events"]
+__all__ = ["Recording", "open_events", "read_events"]
 
 MOST_PIXELS = 1 << 25
 """Pixels of the largest sensor: 8192x4096."""
 
-_SUFFIXES = (".txt", ".zip", ".h5", ".hdf5", ".npz")
+
+def open_events(
+    path: str | Path, *, time_unit: str | None = None, progress: Progress | None = None
+) -> EventFile:
+    """Open an event file, or a folder in the DAVIS240C layout; its events are not read yet.
+
+    Parameters and errors as :func:`read_events`.
+    """
+    path = Path(path)
+    facts = Facts(path, time_unit, progress)
+    with _reading(path):
+        check_ends(path)
+        if not path.exists():
+            raise DataError(f"{path}: no such file or folder")
+        found = format_of(path)
+        beside = path.with_name(path.name + ".json")
+        if not found.holds_settings and beside.is_file():
+            facts.describe_from(beside)
+        file: EventFile = found.load(found.reader)(path, facts)
+    return file
 
 
 def read_events(
@@ -29,8 +51,7 @@ def read_events(
     Parameters
     ----------
     path : str or Path
-        The suffix tells the format: .txt, .zip (DAVIS240C, or a single text file), .h5 or .hdf5
-        (layout ``monash``), .npz.
+        Its suffix and its first bytes tell the format: see :mod:`adv2e.formats.registry`.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the times; default: see :mod:`adv2e.formats.units`.
     progress : callable, optional
@@ -61,18 +82,22 @@ def read_events(
     >>> recording.width, recording.height, recording.frame_times_ns is None
     (4, 3, True)
     """
-    path = Path(path)
+    file = open_events(path, time_unit=time_unit, progress=progress)
+    with _reading(file.facts.path):
+        recording = assemble(file)
+    _check_size(recording)
+    return recording
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Make what the system says of a file in the body a DataError."""
     try:
-        check_ends(path)
-        if not path.exists():
-            raise DataError(f"{path}: no such file or folder")
-        recording = _read(path, RecordingBuilder(path, time_unit, progress))
+        yield
     except OSError as error:
         if machine_complaint(error):
             raise
         raise DataError(f"{path}: cannot be read: {error.strerror or error}") from error
-    _check_size(recording)
-    return recording
 
 
 def _check_size(recording: Recording) -> None:
@@ -89,31 +114,4 @@ def _check_size(recording: Recording) -> None:
         )
     raise DataError(
         f"{recording.path}: a sensor of {width}x{height} pixels, over {MOST_PIXELS:,}, {why}"
-    )
-
-
-def _read(path: Path, builder: RecordingBuilder) -> Recording:
-    """Read a file or folder by what is imported late, as each needs other libraries."""
-    suffix = path.suffix.lower()
-    if path.is_dir() or suffix == ".zip":
-        from adv2e.formats.davis240c.reader import read_davis240c  # noqa: PLC0415
-
-        return read_davis240c(path, builder)
-    if suffix == ".txt":
-        from adv2e.formats.text.reader import read_text  # noqa: PLC0415
-
-        return read_text(path, builder)
-    if suffix in (".h5", ".hdf5"):
-        from adv2e.formats.monash.reader import read_hdf5  # noqa: PLC0415
-
-        return read_hdf5(path, builder)
-    if suffix == ".npz":
-        from adv2e.formats.npz import read_npz  # noqa: PLC0415
-
-        return read_npz(path, builder)
-    if suffix in VIDEO_SUFFIXES:
-        raise DataError(f"{path}: is a video and holds no events; make some: adv2e convert {path}")
-    raise DataError(
-        f"{path}: unknown suffix '{suffix}', must be one of {', '.join(_SUFFIXES)}"
-        " or a DAVIS240C folder"
     )

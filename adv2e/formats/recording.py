@@ -13,9 +13,6 @@ from adv2e.events import Events
 from adv2e.sources.frame import RECORDED, Frame, Image, Light, Pixels, as_pixels, odd_white
 from adv2e.sources.stored import light_stored
 
-MOST_COLUMNS = 1 << 16
-"""Columns and rows that coordinates of events can name."""
-
 
 @dataclass(frozen=True)
 class Recording:
@@ -26,7 +23,7 @@ class Recording:
     path : str
         What was read.
     layout : str
-        ``text``, ``davis240c``, ``monash`` or ``npz``.
+        ``text``, ``davis240c``, ``monash`` and others: see :mod:`adv2e.formats.registry`.
     width, height : int
         Geometry [pixels]; zero when nothing tells.
     events : array of EVENT_DTYPE
@@ -87,13 +84,3 @@ class Recording:
             odd = "" if stored is not None else odd_white(pixels, first)
             label = f"{self.path}: frame {number}"
             yield Frame(t_ns, pixels.image, label, pixels.alpha, stored or first, odd)
-
-
-def described_geometry(description: dict[str, Any]) -> tuple[int, int] | None:
-    """Return (width, height) [pixels] that a description holds, or None."""
-    width, height = description.get("width"), description.get("height")
-    if not (isinstance(width, int) and isinstance(height, int)):
-        return None
-    return (
-        (width, height) if min(width, height) > 0 and max(width, height) <= MOST_COLUMNS else None
-    )

@@ -9,12 +9,14 @@ from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from numpy.typing import NDArray
 
+from adv2e.errors import OutputError
 from adv2e.events import Events
 from adv2e.files.staging import Staging, writing
+from adv2e.formats.registry import Format
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,8 +42,6 @@ class Writer(ABC):
     *temporary : Path
         What :meth:`stage` returned.
     """
-
-    takes_frames: ClassVar[bool] = False
 
     @staticmethod
     def stage(path: Path, staging: Staging) -> list[Path]:
@@ -70,8 +70,8 @@ class Sink:
 
     Parameters
     ----------
-    writer : type
-        Says how.
+    format : Format
+        What is written.
     request : Request
     staging : Staging
         Takes the files.
@@ -85,12 +85,40 @@ class Sink:
     """
 
     def __init__(
-        self, writer: type[Writer], request: Request, staging: Staging, *, is_alone: bool
+        self, format: Format, request: Request, staging: Staging, *, is_alone: bool
     ) -> None:
-        self.wants_frames = request.with_frames and writer.takes_frames
+        self.wants_frames = request.with_frames and "w" in format.frames
         self._name = "standard output" if str(request.path) == "-" else str(request.path)
+        self._format = format
+        self._check_size(request.width, request.height)
+        writer = format.load(format.writer)
         temporary = writer.stage(request.path, staging)
+        self._description: tuple[Path, str] | None = None
+        if temporary and not format.holds_settings:
+            beside = request.path.with_name(request.path.name + ".json")
+            self._description = staging.file(beside), to_json(request.description)
         self._open = self._opened(partial(writer, request), staging, temporary, is_alone)
+
+    def _check_size(self, width: int, height: int) -> None:
+        """Refuse a sensor that the format cannot name the pixels of."""
+        most = self._format.most
+        if width > most[0] or height > most[1]:
+            raise OutputError(
+                f"{self._name}: a sensor of {width}x{height} pixels does not fit"
+                f" {self._format.what}, which holds {most[0]}x{most[1]} at most; choose another"
+                " format, such as .h5"
+            )
+
+    def _check_times(self, events: Events) -> None:
+        """Refuse times that would be wrapped or cut; `events` are sorted."""
+        first, last = self._format.first_us, self._format.last_us
+        for t in (int(events["t"][0]), int(events["t"][-1])):
+            if not first <= t <= last:
+                raise OutputError(
+                    f"{self._name}: an event at {t / 1e6:.6f} s does not fit"
+                    f" {self._format.what}, which holds times from {first / 1e6:.6f} to"
+                    f" {last / 1e6:.6f} s; --t0 zero may help, or another format, such as .h5"
+                )
 
     @contextmanager
     def _opened(
@@ -103,6 +131,9 @@ class Sink:
         with staging if is_alone else nullcontext(), _closing() as stack:
             with writing(self._name):
                 staging.prepare()
+                if self._description is not None:
+                    beside, text = self._description
+                    beside.write_text(text, encoding="utf-8", newline="\n")
                 made = writer(stack, *temporary)
             yield made
             with writing(self._name):
@@ -115,10 +146,12 @@ class Sink:
         Raises
         ------
         OutputError
-            They cannot be written, as when the disk is full.
+            They cannot be written, as when the disk is full, or do not fit the format.
         BrokenPipeError
             They go to standard output, and nobody reads them any more.
         """
+        if events.size:
+            self._check_times(events)
         with writing(self._name):
             self._writer.write_events(events)
 

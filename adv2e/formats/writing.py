@@ -15,16 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.background import default_threads
-from adv2e.errors import UsageError
 from adv2e.events import Events, checked_events
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import Request, Sink, Writer
-
-FORMATS = {"txt": (".txt",), "zip": (".zip",), "folder": ("",), "h5": (".h5", ".hdf5")}
-"""Formats by name, and the suffixes that stand for them."""
-
-LAYOUTS = ("monash",)
-"""Layouts of HDF5 files; the first is the default."""
+from adv2e.formats.registry import to_write
+from adv2e.formats.sink import Request, Sink
 
 
 def open_sink(
@@ -52,11 +46,12 @@ def open_sink(
     width, height : int
         Geometry [pixels].
     metadata : dict
-        What JSON can hold; stored inside, or in ``<path>.json`` beside a text file.
+        What JSON can hold; stored inside, or in ``<path>.json`` where a format cannot hold it.
     format : str, optional
-        One of :data:`FORMATS`; default: by the suffix, a path without one is a folder.
+        See :func:`adv2e.formats.registry.names`; default: by the suffix, a path without one is a
+        folder.
     layout : str, optional
-        One of :data:`LAYOUTS`, for HDF5.
+        See :func:`adv2e.formats.registry.layouts`, for HDF5.
     overwrite : bool
         Replace, at the end, what exists.
     with_frames : bool
@@ -71,17 +66,10 @@ def open_sink(
     UsageError
         Unknown `format` or `layout`, or they do not fit together.
     OutputError
-        Unknown suffix; the output exists already, or cannot be made.
+        The output exists already, or cannot be made; or the format cannot hold such a sensor.
     """
     path = Path(path)
-    name = format_name(path, format)
-    if layout is not None:
-        if str(path) == "-":
-            raise UsageError(f"--layout {layout}: standard output takes text only")
-        if name != "h5":
-            raise UsageError(f"--layout {layout}: only HDF5 files (.h5) have layouts")
-        if layout not in LAYOUTS:
-            raise UsageError(f"--layout {layout}: unknown, must be one of {', '.join(LAYOUTS)}")
+    chosen = to_write(path, format, layout)
     version = {"adv2e": metadata["adv2e"]} if "adv2e" in metadata else {}
     request = Request(
         path=path,
@@ -92,7 +80,7 @@ def open_sink(
         threads=threads or default_threads(),
     )
     files = Staging(overwrite) if staging is None else staging
-    return Sink(_writer(path, name), request, files, is_alone=staging is None)
+    return Sink(chosen, request, files, is_alone=staging is None)
 
 
 def write_events(
@@ -108,13 +96,13 @@ def write_events(
     Parameters
     ----------
     path : str or Path
-        Output: .txt, .h5, .zip (DAVIS240C), or a folder in that layout.
+        Output: its suffix tells the format; without one, a DAVIS240C folder.
     events : structured array, (n,)
         With the fields t [us], x, y, p, in any order of time; sorted ones are written as they are.
     size : (int, int)
         Width and height of the sensor [pixels].
     metadata : dict, optional
-        What JSON can hold; stored inside, or in ``<path>.json`` beside a text file.
+        What JSON can hold; stored inside, or in ``<path>.json`` where a format cannot hold it.
     overwrite : bool
         Replace, at the end, what exists.
 
@@ -144,49 +132,3 @@ def write_events(
         path, width=width, height=height, metadata=dict(metadata or {}), overwrite=overwrite
     ) as sink:
         sink.write_events(ours)
-
-
-def _writer(path: Path, name: str) -> type[Writer]:
-    """Return what writes a format; imported late, as each needs other libraries."""
-    if str(path) == "-":
-        from adv2e.formats.text.writer import StandardOutput  # noqa: PLC0415
-
-        return StandardOutput
-    if name == "h5":
-        from adv2e.formats.monash.writer import MonashWriter  # noqa: PLC0415
-
-        return MonashWriter
-    if name == "txt":
-        from adv2e.formats.text.writer import TextWriter  # noqa: PLC0415
-
-        return TextWriter
-    from adv2e.formats.davis240c.writer import FolderWriter, ZipWriter  # noqa: PLC0415
-
-    return ZipWriter if name == "zip" else FolderWriter
-
-
-def format_name(path: Path, format: str | None) -> str:
-    """Return the format that was asked for by name, or by the path's suffix; of "-", text.
-
-    Raises
-    ------
-    UsageError
-        There is no such format.
-    """
-    if str(path) == "-":
-        if format not in (None, "txt"):
-            raise UsageError(f"--format {format}: standard output takes txt only")
-        return "txt"
-    if format is not None:
-        if format not in FORMATS:
-            raise UsageError(f"--format {format}: unknown, must be one of {', '.join(FORMATS)}")
-        return format
-    suffix = path.suffix.lower()
-    for name, suffixes in FORMATS.items():
-        if suffix in suffixes:
-            return name
-    known = [suffix for suffixes in FORMATS.values() for suffix in suffixes if suffix]
-    raise UsageError(
-        f"{path}: unknown suffix '{suffix}', must be one of {', '.join(known)},"
-        f" none (a DAVIS240C folder), or choose with --format: {', '.join(FORMATS)}"
-    )

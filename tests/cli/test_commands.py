@@ -18,7 +18,7 @@ from adv2e.config.files import find
 from adv2e.config.model import Pixel
 from adv2e.diagnosis.fitting.library import names
 from adv2e.effects import EFFECTS, STAGES
-from adv2e.formats.writing import FORMATS, LAYOUTS
+from adv2e.formats import registry
 
 
 @pytest.mark.parametrize("option", ["--version", "-V"])
@@ -62,8 +62,9 @@ def test_examples_in_the_help_stand_line_by_line(adv2e, command):
 def test_the_help_of_convert_names_what_can_be_written(adv2e):
     out = " ".join(adv2e("convert", "--help").out.split())
     named = re.search(r"Write this format, whatever the suffix: ([a-z0-9, ]+)\.", out)
-    assert re.split(", | or ", named[1]) == list(FORMATS)
-    assert f"Layout of an HDF5 output: {', '.join(LAYOUTS)}. [default: {LAYOUTS[0]}]" in out
+    assert re.split(", | or ", named[1]) == registry.names()
+    known = registry.layouts()
+    assert f"Layout of an HDF5 output: {', '.join(known)}. [default: {known[0]}]" in out
 
 
 def test_convert_passes_its_options_on(adv2e, pipeline):

@@ -12,7 +12,7 @@ import pytest
 from adv2e.cli import COMMANDS
 from adv2e.config import all_keys, shipped
 from adv2e.effects import EFFECTS
-from adv2e.formats.writing import FORMATS
+from adv2e.formats import registry
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def offered(adv2e, monkeypatch):
         ("adv2e convert -c ", shipped()),
         ("adv2e convert -c davis", ["davis240c", "davis346"]),
         ("adv2e config show -c pa", ["paper"]),
-        ("adv2e convert --format ", list(FORMATS)),
+        ("adv2e convert --format ", registry.names()),
         ("adv2e convert --layout ", ["monash"]),
         (
             "adv2e convert --set pixel.hot",

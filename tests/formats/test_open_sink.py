@@ -208,13 +208,15 @@ def test_suffix_in_capitals_is_known(tmp_path):
 
 
 def test_unknown_suffix_lists_what_exists(tmp_path):
-    with pytest.raises(UsageError, match=r"out\.xyz: unknown suffix '\.xyz'.*\.txt.*\.h5") as info:
+    with pytest.raises(UsageError, match=r"out\.xyz: unknown suffix '\.xyz'.*\.h5.*\.txt") as info:
         open_at(tmp_path / "out.xyz")
     assert "\n" not in str(info.value)
 
 
 def test_unknown_format_lists_what_exists(tmp_path):
-    with pytest.raises(UsageError, match="--format xyz: unknown, must be one of txt, zip, folder"):
+    with pytest.raises(
+        UsageError, match="--format xyz: unknown, must be one of h5, txt, zip, folder"
+    ):
         open_at(tmp_path / "out.txt", format="xyz")
 
 

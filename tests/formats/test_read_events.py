@@ -139,7 +139,7 @@ def test_zip_of_one_text_file_is_text(tmp_path):
 def test_zip_that_is_none_is_refused(tmp_path):
     (tmp_path / "a.zip").write_bytes(b"not a zip")
 
-    assert "not a zip archive" in error_of(tmp_path / "a.zip")
+    assert "does not begin as a DAVIS240C recording as a zip does" in error_of(tmp_path / "a.zip")
 
 
 def test_damaged_zip_is_refused(tmp_path):
@@ -159,7 +159,7 @@ def test_missing_file(tmp_path):
 def test_unknown_suffix_lists_what_exists(tmp_path):
     (tmp_path / "a.xyz").write_bytes(b"")
 
-    assert "unknown suffix '.xyz', must be one of .txt" in error_of(tmp_path / "a.xyz")
+    assert "unknown suffix '.xyz', must be one of .h5" in error_of(tmp_path / "a.xyz")
 
 
 def test_a_video_is_to_be_converted_first(tmp_path):

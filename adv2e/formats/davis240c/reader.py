@@ -12,18 +12,16 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from adv2e.errors import DataError
 from adv2e.files.zips import Members
-from adv2e.formats.builder import RecordingBuilder
-from adv2e.formats.recording import Recording
-from adv2e.formats.text.reader import read_lines
-from adv2e.sources.frame import Pixels
+from adv2e.formats.event_file import EventFile, Facts
+from adv2e.formats.text.reader import lines_of
+from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
 from adv2e.sources.times.columns import has_lines
@@ -31,8 +29,8 @@ from adv2e.sources.times.lists import FrameList, decoded, parse_list
 from adv2e.sources.times.names import members_of
 
 
-def read_davis240c(path: Path, builder: RecordingBuilder) -> Recording:
-    """Return the recording in a folder or zip; `builder` is a new one.
+def open_davis240c(path: Path, facts: Facts) -> EventFile:
+    """Open the recording in a folder or zip.
 
     Raises
     ------
@@ -55,30 +53,32 @@ def read_davis240c(path: Path, builder: RecordingBuilder) -> Recording:
         (name,) = found
     if files.has(DESCRIPTION):
         text = files.read(DESCRIPTION).decode("utf-8-sig", "replace")
-        builder.describe(text, files.label(DESCRIPTION), DESCRIPTION)
-    listed = _listed(files, stated=builder.stated_unit)
+        facts.describe(text, files.label(DESCRIPTION), DESCRIPTION)
+    listed = _listed(files, stated=facts.stated_unit)
     if listed is not None and len(listed.stamps) > 1:
-        builder.note_frames(listed.unit, whole=listed.whole)
-    with files.open(name) as file:
-        geometry = read_lines(file, files.size(name), files.label(name), builder)
-    times, names = None, []
-    if listed is not None:
-        if unit := builder.unit_of_frames(whole=listed.whole):
-            listed = _listed(files, time_unit=unit) or listed
-        told = listed.unit.doubt, listed.order
-        builder.problems += [f"{LIST}: {line}" for line in told if line]
-        names = members_of(listed.stamps, files.label(LIST), files.has)
-        times = np.array([stamp.t_ns for stamp in listed.stamps], np.int64)
+        facts.note_frames(listed.unit, whole=listed.whole)
+    if facts.geometry is None and listed is not None:
+        first = members_of(listed.stamps[:1], files.label(LIST), files.has)[0]
+        rows, columns = decode_image(files.read(first), files.label(first)).image.shape[:2]
+        facts.state((columns, rows), first)
+    label = files.label(name)
+    header = f"the first line of {name}"
+    text_file = lines_of(lambda: files.open(name), files.size(name), label, facts, header)
+    if listed is None:
+        return replace(text_file, layout="davis240c" if name == EVENTS else "text")
+    if unit := facts.unit_of_frames(whole=listed.whole):
+        listed = _listed(files, time_unit=unit) or listed
+    facts.problems += [f"{LIST}: {line}" for line in (listed.unit.doubt, listed.order) if line]
+    names = members_of(listed.stamps, files.label(LIST), files.has)
+    shots = [
+        Shot(stamp.t_ns, files.label(member), partial(_image, files, member))
+        for stamp, member in zip(listed.stamps, names, strict=True)
+    ]
+    return EventFile("davis240c", facts, text_file.parts, lambda: iter(shots))
 
-    def images() -> Iterator[Pixels]:
-        for name in names:
-            yield decode_image(files.read(name), files.label(name))
 
-    if builder.geometry is None and names:
-        rows, columns = next(images()).image.shape[:2]
-        builder.state((columns, rows), names[0])
-    builder.state(geometry, f"the first line of {name}")
-    return builder.finish("davis240c" if name == EVENTS else "text", times, images)
+def _image(files: Members, name: str) -> Pixels:
+    return decode_image(files.read(name), files.label(name))
 
 
 def _listed(files: Members, **evidence: Any) -> FrameList | None:

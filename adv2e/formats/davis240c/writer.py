@@ -55,8 +55,6 @@ def _png(image: NDArray[Any]) -> bytes:
 class _Davis240cWriter(Writer):
     """What folder and archive share: the frames' names and list."""
 
-    takes_frames = True
-
     def __init__(self, request: Request, stack: ExitStack) -> None:
         self._description = to_json(request.description)
         self._work = OrderedWork(request.threads - 1)

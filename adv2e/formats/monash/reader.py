@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from decimal import Decimal
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,8 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.formats import hdf5
-from adv2e.formats.builder import RecordingBuilder
-from adv2e.formats.recording import MOST_COLUMNS, Recording
-from adv2e.sources.frame import Image
+from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts
+from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.times.units import Unit, frame_unit
 from adv2e.ticks import NS, US, to_ticks
 
@@ -29,44 +29,54 @@ COLUMNS = ("events/ts", "events/xs", "events/ys", "events/ps")
 _PART = 1 << 20  # events read at once
 
 
-def read_hdf5(path: Path, builder: RecordingBuilder) -> Recording:
-    """Return the recording in a file of this layout; `builder` is a new one.
+def open_monash(path: Path, facts: Facts) -> EventFile:
+    """Open a file of this layout.
 
     Raises
     ------
     DataError
-        Another layout, columns of different lengths or kinds, times that are not finite or beyond
-        146 years, a broken image, or something that is not in the file itself.
+        Columns of different lengths or kinds, times that are not finite or beyond 146 years, a
+        broken image, or something that is not in the file itself.
     """
     with hdf5.opened(path) as file:
-        if all(hdf5.find(file, name) is not None for name in COLUMNS):
-            return _read(path, file, builder)
-    raise DataError(f"{path}: unknown HDF5 layout, must be monash (datasets {', '.join(COLUMNS)})")
+        if "adv2e" in file.attrs:
+            text = str(file.attrs["adv2e"])
+            facts.describe(text, f"{path}: attribute adv2e", "the attribute adv2e")
+        images = hdf5.find(file, "images")
+        if isinstance(images, h5py.Dataset):
+            raise DataError(f"{path}: images is a dataset, must be a group of images")
+        names = [f"images/{name}" for name in sorted(images)] if images is not None else []
+        found = [hdf5.dataset(file, name) for name in names]
+        facts.state(_geometry(path, file, found), "sensor_resolution")
+        frames = _Stamps(path, found)
+        if len(found) > 1 and frames.name == "timestamp":
+            facts.note_frames(frames.unit(None, facts.stated_unit), whole=frames.whole)
+        columns = _columns(path, file)
+        whole = columns[0].dtype.kind in "iu"
+        t, x, y = (column[:_PART] for column in columns[:3])
+        unit = facts.unit_of_events(t, x, y, facts.geometry, whole=whole)
+        of_frames = frames.unit(facts.unit_of_frames(whole=frames.whole), facts.stated_unit)
+        if of_frames.doubt:
+            facts.problems.append(f"images: {of_frames.doubt}")
+        times = frames.times_ns(of_frames).tolist() if found else []
+
+    def parts() -> Iterator[Columns]:
+        with hdf5.opened(path) as file:
+            columns = _columns(path, file)
+            for begin in range(0, columns[0].size, _PART):
+                t, x, y, p = (column[begin : begin + _PART] for column in columns)
+                yield to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, _signs(p)
+                facts.progress(begin + t.size, columns[0].size)
+
+    shots = [
+        Shot(t_ns, f"{path}: {name}", partial(_image, path, name))
+        for t_ns, name in zip(times, names, strict=True)
+    ]
+    return EventFile("monash", facts, parts, (lambda: iter(shots)) if shots else None)
 
 
-def _read(path: Path, file: h5py.File, builder: RecordingBuilder) -> Recording:
-    if "adv2e" in file.attrs:
-        text = str(file.attrs["adv2e"])
-        builder.describe(text, f"{path}: attribute adv2e", "the attribute adv2e")
-    images = hdf5.find(file, "images")
-    if isinstance(images, h5py.Dataset):
-        raise DataError(f"{path}: images is a dataset, must be a group of images")
-    names = [f"images/{name}" for name in sorted(images)] if images is not None else []
-    found = [hdf5.dataset(file, name) for name in names]
-    builder.state(_geometry(path, file, found), "sensor_resolution")
-    frames = _Stamps(path, found)
-    if len(found) > 1 and frames.name == "timestamp":
-        builder.note_frames(frames.unit(None, builder.stated_unit), whole=frames.whole)
-    _read_events(path, file, builder)
-    unit = frames.unit(builder.unit_of_frames(whole=frames.whole), builder.stated_unit)
-    if unit.doubt:
-        builder.problems.append(f"images: {unit.doubt}")
-    times = frames.times_ns(unit) if found else None
-    return builder.finish("monash", times, lambda: _images(path, names))
-
-
-def _read_events(path: Path, file: h5py.File, builder: RecordingBuilder) -> None:
-    """Read all events into `builder`."""
+def _columns(path: Path, file: h5py.File) -> list[h5py.Dataset]:
+    """Return times, columns, rows and polarities of the events; DataError if they cannot be."""
     columns = [hdf5.dataset(file, name) for name in COLUMNS]
     if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
         shapes = ", ".join(
@@ -77,13 +87,7 @@ def _read_events(path: Path, file: h5py.File, builder: RecordingBuilder) -> None
         if column.dtype.kind not in kinds:
             raise DataError(f"{path}: {name} must hold numbers, not {column.dtype}")
     hdf5.check_stored(columns, f"{path}: events")
-    whole = columns[0].dtype.kind in "iu"
-    t, x, y = (column[:_PART] for column in columns[:3])
-    unit = builder.unit_of_events(t, x, y, builder.geometry, whole=whole)
-    for begin in range(0, columns[0].size, _PART):
-        t, x, y, p = (column[begin : begin + _PART] for column in columns)
-        builder.add(to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, _signs(p))
-        builder.progress(begin + t.size, columns[0].size)
+    return columns
 
 
 def _signs(p: NDArray[Any]) -> NDArray[np.int8]:
@@ -153,12 +157,11 @@ def _stamp(label: str, image: h5py.Dataset, name: str) -> NDArray[Any]:
     raise DataError(f"{label} has no attribute timestamp [s]")
 
 
-def _images(path: Path, names: list[str]) -> Iterator[Image]:
+def _image(path: Path, name: str) -> Pixels:
     with hdf5.opened(path) as file:
-        for name in names:
-            found = hdf5.dataset(file, name)
-            shape = _pixels(path, found)
-            image = hdf5.read_all(found, f"{path}: {name}")
-            if len(shape) == 3:
-                image = image[..., 0] if shape[2] == 1 else image[..., ::-1]
-            yield np.ascontiguousarray(image)
+        found = hdf5.dataset(file, name)
+        shape = _pixels(path, found)
+        image = hdf5.read_all(found, f"{path}: {name}")
+    if len(shape) == 3:
+        image = image[..., 0] if shape[2] == 1 else image[..., ::-1]
+    return Pixels(np.ascontiguousarray(image))

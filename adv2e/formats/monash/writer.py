@@ -66,8 +66,6 @@ class MonashWriter(Writer):
     any reader of HDF5 opens them without plug-ins.
     """
 
-    takes_frames = True
-
     def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
         (path,) = temporary
         self._request = request

@@ -10,18 +10,17 @@ DVS-Voltmeter, are told from the times: see :mod:`adv2e.formats.units`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 
 from adv2e.errors import DataError
-from adv2e.formats.builder import RecordingBuilder
-from adv2e.formats.recording import Recording
+from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.text.lines import parse_lines
 from adv2e.sources.stored import DESCRIPTION, EVENTS
-from adv2e.sources.times.units import Unit
 from adv2e.ticks import LARGEST_NS, US, check_us
 
 _BLOCK = 1 << 22  # bytes read at once
@@ -31,63 +30,76 @@ _SIZE = re.compile(rb"0{0,9}[1-9][0-9]{0,4}")
 _DECIMAL_TIME = re.compile(rb"^[\x00-\x09\x0b-\x20]*(?!#)[^\x00-\x20.eE]*[.eE]", re.M)
 
 
-def read_text(path: Path, builder: RecordingBuilder) -> Recording:
-    """Return the recording in a text file of events; `builder` is a new one.
+def open_text(path: Path, facts: Facts) -> EventFile:
+    """Open a text file of events.
 
-    ``<name>.json`` beside it, or ``adv2e.json`` beside an ``events.txt``, tells the geometry.
-
-    Raises
-    ------
-    DataError
-        A line that cannot be read.
-    """
-    beside = [path.with_name(path.name + ".json")]
-    if path.name == EVENTS:
-        beside.append(path.with_name(DESCRIPTION))
-    description = next((file for file in beside if file.is_file()), None)
-    if description is not None:
-        text = description.read_text("utf-8", errors="replace")
-        builder.describe(text, str(description), description.name)
-    with path.open("rb") as file:
-        geometry = read_lines(file, path.stat().st_size, str(path), builder)
-    builder.state(geometry, "the first line")
-    return builder.finish("text")
-
-
-def read_lines(
-    file: IO[bytes], size: int, label: str, builder: RecordingBuilder
-) -> tuple[int, int] | None:
-    """Read all lines of `file` into `builder`; return what the first says of width and height.
-
-    `size` is that of the file [bytes], for telling the progress.
+    ``adv2e.json`` beside an ``events.txt`` tells the geometry.
 
     Raises
     ------
     DataError
-        A line is not ``time x y polarity``; the text names file and line.
+        From `parts`: a line that cannot be read.
     """
-    geometry, whole, unit = None, False, Unit("s")
-    before = 0  # lines in earlier blocks
-    for number, read in enumerate(_blocks(file)):
-        block = read
-        if number == 0:
-            geometry, begin, before = _header(read)
-            block = read[begin:]
-            whole = not _DECIMAL_TIME.search(block)
-            (t, x, y, _), *_ = parse_lines(block, 0 if whole else 6, exact=whole)
-            unit = builder.unit_of_events(t if whole else t / 1e6, x, y, geometry, whole=whole)
-        decimals = _DECIMALS[unit.name]
-        columns, lines, wrong = parse_lines(block, decimals, exact=whole and decimals == 0)
-        if wrong:
-            raise _malformed(block, label, before, wrong)
-        t = columns[0]
-        late = np.flatnonzero(np.abs(t) > LARGEST_NS // US)
-        if late.size:
-            check_us(t[late[:1]], f"{label} line {before + lines[late[0]]}")
-        builder.add(*columns)
-        before += block.count(b"\n")
-        builder.progress(file.tell(), size)
-    return geometry
+    beside = path.with_name(DESCRIPTION)
+    if path.name == EVENTS and not facts.description and beside.is_file():
+        facts.describe_from(beside)
+    return lines_of(
+        lambda: path.open("rb"), path.stat().st_size, str(path), facts, "the first line"
+    )
+
+
+def lines_of(
+    opened: Callable[[], AbstractContextManager[IO[bytes]]],
+    size: int,
+    label: str,
+    facts: Facts,
+    header: str,
+) -> EventFile:
+    """Return the events that are the lines of a text.
+
+    Parameters
+    ----------
+    opened : callable
+        Opens the text.
+    size : int
+        That of the text [bytes], for telling the progress.
+    label, header : str
+        What it and its first line are called, for messages.
+    facts : Facts
+
+    Raises
+    ------
+    DataError
+        From `parts`: a line is not ``time x y polarity``; the text names file and line.
+    """
+    with opened() as file:
+        block = next(_blocks(file), b"")
+    geometry, skipped, lines = _header(block)
+    facts.state(geometry, header)
+    block = block[skipped:]
+    whole = not _DECIMAL_TIME.search(block)
+    (t, x, y, _), *_ = parse_lines(block, 0 if whole else 6, exact=whole)
+    unit = facts.unit_of_events(t if whole else t / 1e6, x, y, facts.geometry, whole=whole)
+    decimals = _DECIMALS[unit.name]
+
+    def parts() -> Iterator[Columns]:
+        begin, before = skipped, lines  # bytes to leave out, lines in earlier blocks
+        with opened() as file:
+            for read in _blocks(file):
+                block = read[begin:]
+                columns, places, wrong = parse_lines(block, decimals, exact=whole and decimals == 0)
+                if wrong:
+                    raise _malformed(block, label, before, wrong)
+                t = columns[0]
+                late = np.flatnonzero(np.abs(t) > LARGEST_NS // US)
+                if late.size:
+                    check_us(t[late[:1]], f"{label} line {before + places[late[0]]}")
+                yield tuple(columns)
+                before += block.count(b"\n")
+                begin = 0
+                facts.progress(file.tell(), size)
+
+    return EventFile("text", facts, parts)
 
 
 def _blocks(file: IO[bytes]) -> Iterator[bytes]:

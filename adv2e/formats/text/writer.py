@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from adv2e.compiled import kernel
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import Request, Writer, to_json
+from adv2e.formats.sink import Request, Writer
 
 _BLOCK = 1 << 15  # events formatted at once
 _LONGEST = 48  # bytes of the longest line, and what the kernel may write beyond its end
@@ -117,16 +117,10 @@ def text_blocks(events: Events) -> Iterator[memoryview]:
 
 
 class TextWriter(Writer):
-    """Writes a text file of events, and ``<name>.json`` beside it."""
-
-    @staticmethod
-    def stage(path: Path, staging: Staging) -> list[Path]:
-        """Return the temporary names of both files."""
-        return [staging.file(path), staging.file(path.with_name(path.name + ".json"))]
+    """Writes a text file of events."""
 
     def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        text, beside = temporary
-        beside.write_text(to_json(request.description), encoding="utf-8", newline="\n")
+        (text,) = temporary
         self._file = stack.enter_context(text.open("wb"))
 
     def write_events(self, events: Events) -> None:

@@ -2,15 +2,15 @@ import numpy as np
 import pytest
 
 from adv2e.events import sort_events
-from adv2e.formats.builder import RecordingBuilder
+from adv2e.formats.assembly import assemble
+from adv2e.formats.event_file import EventFile, Facts
 
 
 def built(rows, geometry=(10, 10), parts=1):
-    builder = RecordingBuilder("a.h5")
-    for part in np.array_split(np.array(rows, np.int64).reshape(-1, 4), parts):
-        builder.add(*part.T)
-    builder.state(geometry, "the file")
-    found = builder.finish("monash")
+    facts = Facts("a.h5")
+    facts.state(geometry, "the file")
+    columns = [part.T for part in np.array_split(np.array(rows, np.int64).reshape(-1, 4), parts)]
+    found = assemble(EventFile("monash", facts, lambda: iter(columns)))
     return found.events.tolist(), (found.width, found.height), found.problems
 
 
@@ -45,10 +45,7 @@ def test_order_agrees_with_a_full_sort():
             rng.integers(0, 2, 2000),
         ]
     )
-    builder = RecordingBuilder("a.h5")
-    builder.add(*rows.T)
-
-    events = builder.finish("monash").events
+    events = assemble(EventFile("monash", Facts("a.h5"), lambda: iter([rows.T]))).events
 
     assert np.array_equal(events, sort_events(events))
 

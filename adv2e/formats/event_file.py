@@ -1,0 +1,211 @@
+"""An event file that was opened: what it states, its events in parts, and the frames beside them.
+
+What reads a format is a function ``open_...(path, facts)``.  It reads the head of the file, tells
+`facts` what the file states, and returns an :class:`EventFile`; the events are read when its
+`parts` are.  Whether they are kept or passed on is for others to say.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from adv2e.formats.units import event_unit
+from adv2e.sources.frame import RECORDED, Light, Shot
+from adv2e.sources.stored import light_stored
+from adv2e.sources.times.units import Unit
+
+MOST_COLUMNS = 1 << 16
+"""Columns and rows that coordinates of events can name."""
+
+Column = NDArray[Any]
+
+Columns = tuple[Column, Column, Column, Column]
+"""Time [us], column, row, and polarity (ON above 0; 0/1 and -1/+1 are both usual), of integers."""
+
+Progress = Callable[[int, int], None]
+"""Is told how much of a file was read, and of how much: bytes, or events."""
+
+
+class Facts:
+    """What an event file states, what the user says of it, and what is wrong with it.
+
+    Parameters
+    ----------
+    path : Path
+        The file, or folder.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times, as the user says.
+    progress : callable, optional
+        Is told how far the reading is.
+
+    Attributes
+    ----------
+    progress : callable
+        For the reader to tell.
+    problems : list of str
+        What is doubtful and what was done about it.
+    description : dict
+        What the file says of itself, if this program wrote it.
+    geometry : (int, int) or None
+        Width and height [pixels] that the file states.
+    stated_by : str
+        What states them, for messages.
+    time_unit : str or None
+        What the user says.
+    stated_unit : str or None
+        What the file says: that of times that we wrote.
+    """
+
+    def __init__(
+        self, path: Path, time_unit: str | None = None, progress: Progress | None = None
+    ) -> None:
+        self.path = path
+        self.progress = progress or (lambda done, total: None)
+        self.problems: list[str] = []
+        self.description: dict[str, Any] = {}
+        self.geometry: tuple[int, int] | None = None
+        self.stated_by = ""
+        self.time_unit = time_unit
+        self.stated_unit: str | None = None
+        self._frames: tuple[Unit, bool] | None = None
+        self._events: tuple[Unit, bool] = Unit("s"), False
+
+    def describe(self, text: str, label: str, name: str) -> None:
+        """Take what the file says of itself; if that is broken, note a problem.
+
+        Parameters
+        ----------
+        text : str
+            JSON.
+        label, name : str
+            Where it stands, for messages: in full, and in short.
+        """
+        try:
+            description = json.loads(text)
+        except (ValueError, RecursionError):
+            description = None
+        if isinstance(description, dict):
+            self.description = description
+            self.stated_unit = "s" if description else None
+            self.state(described_geometry(description), name)
+        else:
+            self.problems.append(f"{label}: not a JSON mapping, ignored")
+
+    def describe_from(self, file: Path) -> None:
+        """Take what a file beside it says, as :meth:`describe`."""
+        text = file.read_text("utf-8", errors="replace")
+        self.describe(text, str(file), file.name)
+
+    def state(self, geometry: tuple[int, int] | None, by: str) -> None:
+        """Take (width, height) [pixels] that something states, unless something before it did."""
+        if self.geometry is None:
+            self.geometry, self.stated_by = geometry, by
+
+    @property
+    def light(self) -> Light:
+        """What the numbers of the frames stand for, as a conversion of them takes it.
+
+        Frames that cameras recorded beside events are linear; of those that this program stored,
+        the file says it.
+
+        Raises
+        ------
+        DataError
+            The file says what cannot be.
+        """
+        return light_stored(self.description, str(self.path)) or Light("linear", RECORDED)
+
+    def note_frames(self, unit: Unit, *, whole: bool) -> None:
+        """Take the unit of the times of two or more frames, and whether they are whole numbers."""
+        self._frames = unit, whole
+
+    def unit_of_events(
+        self, t: Column, x: Column, y: Column, size: tuple[int, int] | None, *, whole: bool
+    ) -> Unit:
+        """Return the unit of the times of the events.
+
+        Where the times of frames and events are written in different ways, one of them as whole
+        numbers, what the user says is meant for that one: the other is in seconds.
+
+        Parameters
+        ----------
+        t, x, y : arrays, (events,)
+            Times as the file has them, columns and rows; of all events, or of the first.
+        size : (int, int) or None
+            Width and height, where the file states them.
+        whole : bool
+            Times are written as whole numbers.
+        """
+        if self.stated_unit is not None:
+            unit = Unit(self.stated_unit)
+        else:
+            if size is None:
+                size = (int(x.max()) + 1, int(y.max()) + 1) if t.size else (1, 1)
+            frames = self._frames
+            alike = frames is None or frames[1] == whole
+            unit = event_unit(
+                t,
+                max(1, size[0] * size[1]),
+                whole=whole,
+                given=self.time_unit if alike or whole else None,
+                beside=frames[0] if frames is not None and alike else None,
+            )
+        if t.size and unit.doubt:
+            self.problems.append(unit.doubt)
+        self._events = unit, whole
+        return unit
+
+    def unit_of_frames(self, *, whole: bool) -> str | None:
+        """Return the unit of the frames' times that the user or events tell; None: neither.
+
+        Parameters
+        ----------
+        whole : bool
+            They are written as whole numbers.
+        """
+        unit, events_whole = self._events
+        if self.stated_unit is not None:
+            return None
+        if self.time_unit is not None:
+            return self.time_unit if whole or not events_whole else None
+        return unit.name if events_whole == whole and self._frames is None else None
+
+
+@dataclass(frozen=True)
+class EventFile:
+    """An event file that was opened.
+
+    Attributes
+    ----------
+    layout : str
+        What it is called.
+    facts : Facts
+        What it states.
+    parts : callable
+        Returns an iterator over all events, part by part in the order of the file; it raises
+        DataError where they cannot be read, and may add problems to the facts.
+    shots : callable, optional
+        Returns an iterator over the frames, in the order of time and not loaded; None: the file has
+        none.
+    """
+
+    layout: str
+    facts: Facts
+    parts: Callable[[], Iterator[Columns]]
+    shots: Callable[[], Iterator[Shot]] | None = None
+
+
+def described_geometry(description: dict[str, Any]) -> tuple[int, int] | None:
+    """Return (width, height) [pixels] that a description holds, or None."""
+    width, height = description.get("width"), description.get("height")
+    if not (isinstance(width, int) and isinstance(height, int)):
+        return None
+    return (
+        (width, height) if min(width, height) > 0 and max(width, height) <= MOST_COLUMNS else None
+    )

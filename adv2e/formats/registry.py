@@ -1,0 +1,239 @@
+"""The formats of event files: what they are called, how they begin, and what they can hold.
+
+Nothing is imported here but names: each format is a module below this one, with what reads it and
+what writes it, and is imported when it is used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from adv2e.errors import DataError, UsageError
+
+_LARGEST_US = 2**62 // 1000  # adv2e.ticks.LARGEST_NS, without NumPy
+
+
+@dataclass(frozen=True, kw_only=True)
+class Format:
+    """One format of event files.
+
+    Attributes
+    ----------
+    name : str
+        What ``--format`` calls it; of a layout of HDF5, ``--layout``.
+    what : str
+        What it is, in a few words.
+    suffixes : tuple of str
+        With their dots; the empty one: a folder.
+    reader, writer : str
+        Where the function ``open(path, facts) -> EventFile`` is, and the subclass of
+        :class:`adv2e.formats.sink.Writer`: ``module:name`` below this package.  Empty: it cannot
+        be read, or written.
+    magic : bytes
+        How such a file begins, if always so.
+    datasets : tuple of str
+        Of a layout of HDF5: the datasets by which it is known.
+    file : str
+        Of a folder: the file in it by which it is known.
+    frames : str
+        ``r``: frames are read, ``w``: they are written, ``rw``: both.
+    is_camera : bool
+        Such files are recordings of cameras: where they hold frames, ``adv2e convert`` simulates.
+    holds_settings : bool
+        It holds how it was made; else that lies beside it, in ``<path>.json``.
+    most : (int, int)
+        Most columns and rows of a sensor that it can hold.
+    first_us, last_us : int
+        Times that it can hold [us].
+    extra : str
+        Name of the optional packages that it needs.
+    """
+
+    name: str
+    what: str
+    suffixes: tuple[str, ...]
+    reader: str = ""
+    writer: str = ""
+    magic: bytes = b""
+    datasets: tuple[str, ...] = ()
+    file: str = ""
+    frames: str = ""
+    is_camera: bool = False
+    holds_settings: bool = True
+    most: tuple[int, int] = (1 << 16, 1 << 16)
+    first_us: int = -_LARGEST_US
+    last_us: int = _LARGEST_US
+    extra: str = ""
+
+    @property
+    def is_hdf5(self) -> bool:
+        """Whether it is a layout of HDF5."""
+        return ".h5" in self.suffixes
+
+    def load(self, what: str) -> Any:
+        """Return the object that `what`, `reader` or `writer`, stands for."""
+        module, _, name = what.partition(":")
+        return getattr(importlib.import_module(f"adv2e.formats.{module}"), name)
+
+
+_HDF5 = (".h5", ".hdf5")
+
+FORMATS = (
+    Format(
+        name="monash",
+        what="HDF5 of event_utils and event_cnn_minimal",
+        suffixes=_HDF5,
+        reader="monash.reader:open_monash",
+        writer="monash.writer:MonashWriter",
+        datasets=("events/ts", "events/xs", "events/ys", "events/ps"),
+        frames="rw",
+    ),
+    Format(
+        name="txt",
+        what="text, a line for each event: seconds, column, row, polarity",
+        suffixes=(".txt",),
+        reader="text.reader:open_text",
+        writer="text.writer:TextWriter",
+        holds_settings=False,
+    ),
+    Format(
+        name="zip",
+        what="a DAVIS240C recording as a zip",
+        suffixes=(".zip",),
+        reader="davis240c.reader:open_davis240c",
+        writer="davis240c.writer:ZipWriter",
+        magic=b"PK",
+        frames="rw",
+        is_camera=True,
+    ),
+    Format(
+        name="folder",
+        what="a DAVIS240C recording as a folder",
+        suffixes=("",),
+        reader="davis240c.reader:open_davis240c",
+        writer="davis240c.writer:FolderWriter",
+        file="events.txt",
+        frames="rw",
+        is_camera=True,
+    ),
+    Format(
+        name="npz",
+        what="NumPy archive",
+        suffixes=(".npz",),
+        reader="npz:open_npz",
+        magic=b"PK",
+    ),
+)
+"""All formats; of those with the same suffix, the first is what a suffix alone stands for."""
+
+_MOST_MAGIC = max(len(found.magic) for found in FORMATS)
+
+HDF5 = "h5"
+"""What ``--format`` calls HDF5 of any layout."""
+
+
+def layouts() -> list[str]:
+    """Return the layouts of HDF5 that can be written; the first is the default."""
+    return [found.name for found in FORMATS if found.is_hdf5 and found.writer]
+
+
+def names() -> list[str]:
+    """Return what ``--format`` takes."""
+    return [HDF5, *(found.name for found in FORMATS if not found.is_hdf5 and found.writer)]
+
+
+def to_write(path: Path, format: str | None = None, layout: str | None = None) -> Format:
+    """Return the format that was asked for by name, or by the path's suffix; of "-", text.
+
+    Raises
+    ------
+    UsageError
+        There is no such format or layout, or they do not fit together.
+    """
+    if str(path) == "-":
+        if format not in (None, "txt"):
+            raise UsageError(f"--format {format}: standard output takes txt only")
+        if layout is not None:
+            raise UsageError(f"--layout {layout}: standard output takes text only")
+        return _STANDARD_OUTPUT
+    if format is not None:
+        if format not in names():
+            raise UsageError(f"--format {format}: unknown, must be one of {', '.join(names())}")
+        found = next(f for f in FORMATS if format in (f.name, HDF5 * f.is_hdf5))
+    else:
+        found = _of_suffix(path)
+    if layout is None:
+        return found
+    if not found.is_hdf5:
+        raise UsageError(f"--layout {layout}: only HDF5 files (.h5) have layouts")
+    if layout not in layouts():
+        raise UsageError(f"--layout {layout}: unknown, must be one of {', '.join(layouts())}")
+    return next(f for f in FORMATS if f.name == layout)
+
+
+def format_of(path: Path) -> Format:
+    """Return the format of a file or folder that exists.
+
+    Raises
+    ------
+    DataError
+        It is of no known format, or not of that which its suffix says.
+    """
+    if path.is_dir():
+        folders = [found for found in FORMATS if found.reader and "" in found.suffixes]
+        return next((f for f in folders if (path / f.file).is_file()), folders[0])
+    suffix = path.suffix.lower()
+    named = [found for found in FORMATS if found.reader and suffix and suffix in found.suffixes]
+    if suffix in _HDF5:
+        return _layout_of(path, named)
+    with path.open("rb") as file:
+        begin = file.read(_MOST_MAGIC)
+    fitting = [found for found in named if begin.startswith(found.magic)]
+    if fitting:
+        return fitting[0]
+    like = [f for f in FORMATS if f.reader and any(f.magic) and begin.startswith(f.magic)]
+    if like and named:
+        raise DataError(
+            f"{path}: begins as {like[0].what} does, which is called {like[0].suffixes[0]}: rename"
+            " it"
+        )
+    if named:
+        raise DataError(f"{path}: does not begin as {named[0].what} does: damaged, or misnamed")
+    from adv2e.sources import VIDEO_SUFFIXES  # noqa: PLC0415 - names should cost nothing
+
+    if suffix in VIDEO_SUFFIXES:
+        raise DataError(f"{path}: is a video and holds no events; make some: adv2e convert {path}")
+    known = dict.fromkeys(s for f in FORMATS if f.reader for s in f.suffixes if s)
+    raise DataError(
+        f"{path}: unknown suffix '{suffix}', must be one of {', '.join(known)}"
+        " or a DAVIS240C folder"
+    )
+
+
+def _layout_of(path: Path, layouts: list[Format]) -> Format:
+    from adv2e.formats import hdf5  # noqa: PLC0415 - h5py takes its time
+
+    with hdf5.opened(path) as file:
+        for found in layouts:
+            if all(hdf5.find(file, name) is not None for name in found.datasets):
+                return found
+    known = "; or ".join(f"{f.name} (datasets {', '.join(f.datasets)})" for f in layouts)
+    raise DataError(f"{path}: unknown HDF5 layout, must be {known}")
+
+
+_STANDARD_OUTPUT = Format(name="txt", what="text", suffixes=(), writer="text.writer:StandardOutput")
+
+
+def _of_suffix(path: Path) -> Format:
+    suffix = path.suffix.lower()
+    for found in FORMATS:
+        if found.writer and suffix in found.suffixes:
+            return found
+    known = dict.fromkeys(s for f in FORMATS if f.writer for s in f.suffixes if s)
+    raise UsageError(
+        f"{path}: unknown suffix '{suffix}', must be one of {', '.join(known)},"
+        f" none (a DAVIS240C folder), or choose with --format: {', '.join(names())}"
+    )
