@@ -1,4 +1,4 @@
-"""Where frames come from: video files, folders of images, DAVIS240C recordings, ``.npy`` stacks."""
+"""Where frames come from: videos, folders of images, recordings of data sets, stacks."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def open_source(
     Parameters
     ----------
     path : path
-        Video file, folder of images, DAVIS240C folder or zip, or ``.npy`` stack.
+        Video file, folder of images, sequence of GOPRO, DAVIS240C folder or zip, or ``.npy`` stack.
     fps : float, Fraction or str, optional
         Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
     timestamps : path, optional
@@ -101,9 +101,7 @@ def _advice(path: str) -> str:
 def _opener(path: Path) -> str:
     suffix = path.suffix.lower()
     if path.is_dir():
-        from adv2e.sources import davis240c  # noqa: PLC0415  (needs OpenCV; most of us do not)
-
-        return f"adv2e.sources.{'davis240c' if davis240c.is_recording(path) else 'images.source'}"
+        return f"adv2e.sources.{_kind_of_folder(path)}"
     if suffix in OPENERS:
         return OPENERS[suffix]
     known = " ".join(suffix.lstrip(".") for suffix in OPENERS)
@@ -111,3 +109,11 @@ def _opener(path: Path) -> str:
         f"{path}: frames cannot be read from {suffix or 'a file without suffix'}; give a folder of"
         f" images, a DAVIS240C folder, or a file ({known})"
     )
+
+
+def _kind_of_folder(path: Path) -> str:
+    from adv2e.sources import davis240c, gopro  # noqa: PLC0415  (need OpenCV; most of us do not)
+
+    if davis240c.is_recording(path):
+        return "davis240c"
+    return "gopro" if gopro.find_sequence(path) else "images.source"

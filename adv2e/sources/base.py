@@ -42,7 +42,7 @@ class Source(ABC):
     path : str
         What was opened.
     kind : str
-        ``video``, ``images``, ``davis240c`` or ``npy``.
+        ``video``, ``images``, ``gopro``, ``davis240c`` or ``npy``.
     width, height : int
         Columns and rows of the frames.
     dtype : numpy.dtype

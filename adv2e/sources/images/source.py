@@ -37,7 +37,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         raise _no_images(path)
     if len(pictures) == 1:
         pictures[0].load()  # if it holds several, that is what is to be told
-    found = _found_list(path)
+    found = found_list(path)
     label = None if found is None else str(found)
     missing = f"one of {', '.join(LISTS)} there"
     times = timed(given, pictures, path, label, partial(_read, given), missing)
@@ -72,7 +72,8 @@ def natural_key(name: str) -> tuple[list[tuple[bool, int, str]], str]:
     return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts], name
 
 
-def _found_list(folder: Path) -> Path | None:
+def found_list(folder: Path) -> Path | None:
+    """Return the list of times in a folder, or beside it; None: there is none."""
     for place in (folder, folder.absolute().parent):
         for name in LISTS:
             if (place / name).is_file():
