@@ -8,7 +8,10 @@ from pathlib import Path
 
 from adv2e.errors import OutputError
 
-_LISTS = ("images.txt", "timestamps.txt", "info.txt")
+_LISTS = (
+    *("images.txt", "timestamps.txt", "info.txt", "rgb.txt", "depth.txt", "left_images.txt"),
+    *("right_images.txt", "data.csv", "cam0/data.csv", "mav0/cam0/data.csv"),
+)
 _OF_RECORDINGS = ("events.txt", "adv2e.json")
 _PICTURES = (
     *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".hdr", ".exr"),

@@ -44,7 +44,7 @@ def open_source(
     Parameters
     ----------
     path : path
-        Video file, folder of images, sequence of GOPRO, DAVIS240C folder or zip, or ``.npy`` stack.
+        Video file, folder of images, recording of a data set, or ``.npy`` stack.
     fps : float, Fraction or str, optional
         Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
     timestamps : path, optional
@@ -112,8 +112,12 @@ def _opener(path: Path) -> str:
 
 
 def _kind_of_folder(path: Path) -> str:
-    from adv2e.sources import davis240c, gopro  # noqa: PLC0415  (need OpenCV; most of us do not)
+    # they need OpenCV; most of us do not
+    from adv2e.files.zips import Members  # noqa: PLC0415
+    from adv2e.sources import davis240c, gopro, listings  # noqa: PLC0415
 
     if davis240c.is_recording(path):
         return "davis240c"
+    if listings.find_listing(Members(path)):
+        return "listings"
     return "gopro" if gopro.find_sequence(path) else "images.source"

@@ -42,7 +42,7 @@ class Source(ABC):
     path : str
         What was opened.
     kind : str
-        ``video``, ``images``, ``gopro``, ``davis240c`` or ``npy``.
+        ``video``, ``images``, ``npy``, or the data set that it is of, such as ``davis240c``.
     width, height : int
         Columns and rows of the frames.
     dtype : numpy.dtype

@@ -16,6 +16,9 @@ from adv2e.sources.wanted import GivenTimes, Selection
 LISTS = ("images.txt", "timestamps.txt", "info.txt")
 """Lists of times that are looked for in the folder, then beside it."""
 
+_BESIDE = {"rgb": "rgb.txt", "depth": "depth.txt", "data": "data.csv", "img": "left_images.txt"}
+"""Lists beside folders of these names, in data sets: see :mod:`adv2e.sources.listings`."""
+
 _UNREAD = (
     *(".heic", ".heif", ".avif", ".jxl", ".jp2", ".gif", ".pbm", ".pam", ".tga", ".psd"),
     *(".dpx", ".cin", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
@@ -74,11 +77,11 @@ def natural_key(name: str) -> tuple[list[tuple[bool, int, str]], str]:
 
 def found_list(folder: Path) -> Path | None:
     """Return the list of times in a folder, or beside it; None: there is none."""
-    for place in (folder, folder.absolute().parent):
-        for name in LISTS:
-            if (place / name).is_file():
-                return place / name
-    return None
+    whole = folder.absolute()
+    places = [place / name for place in (folder, whole.parent) for name in LISTS]
+    if whole.name in _BESIDE:
+        places.append(whole.parent / _BESIDE[whole.name])
+    return next((place for place in places if place.is_file()), None)
 
 
 def _unread(folder: Path) -> list[str]:

@@ -53,9 +53,9 @@ class FrameList:
         return [f"{label}: {self.unit.doubt}"] if self.unit.doubt else [], notes
 
 
-def first_name(path: Path) -> str:
+def first_name(text: str, label: str) -> str:
     """Return the name on the first line of a list; "" if lines have none."""
-    table = table_of(_text(path), str(path))
+    table = table_of(text, label)
     return _name(table.lines[0], table) or ""
 
 
