@@ -16,6 +16,7 @@ from adv2e.formats import registry
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
     from adv2e.config import Config
+    from adv2e.geometry import Rectangle, Size
 
 
 @click.command("convert", cls=Command)
@@ -25,6 +26,16 @@ if TYPE_CHECKING:
 @options.source_options
 @click.option("--start", type=SECONDS, metavar="S", help="Begin S seconds after the first frame.")
 @click.option("--stop", type=SECONDS, metavar="S", help="Stop S seconds after the first frame.")
+@options.crop_option(
+    "Take a part of each frame only, before anything else: first column, first row, columns, rows."
+)
+@click.option(
+    "--size",
+    type=options.SIZE,
+    metavar="WxH",
+    help="Size of the sensor, such as 346x260 (sensor.width and sensor.height). Frames are scaled"
+    " and cut to it; sensor.fit says how.  [default: as the frames are]",
+)
 @click.option(
     "--t0",
     type=click.Choice(["auto", "zero", "keep"]),
@@ -61,12 +72,14 @@ if TYPE_CHECKING:
 def command(
     source: str,
     output: str | None,
-    config: Callable[[], Config],
+    config: Callable[[Size | None], Config],
     threads: int | None,
     log: Log,
     given: dict[str, Any],
     start: float | None,
     stop: float | None,
+    crop: Rectangle | None,
+    size: Size | None,
     t0: str,
     **written: Any,
 ) -> None:
@@ -76,6 +89,7 @@ def command(
     Examples:
       adv2e convert clip.mp4
       adv2e convert clip.mp4 -o clip.txt -c davis346 --set pixel.leak=null
+      adv2e convert clip.mp4 --size 346x260
       adv2e convert frames/ --fps 240 -o events.h5 --with-frames
       adv2e convert urban.zip -o urban_simulated --preview urban.mp4
 
@@ -103,7 +117,9 @@ def command(
     import_ahead()
     from adv2e.conversion.reading import Reading
 
-    reading = Reading(source, **given, start_s=start, stop_s=stop, t0=t0, threads=threads)
+    reading = Reading(
+        source, **given, start_s=start, stop_s=stop, t0=t0, crop=crop, threads=threads
+    )
     with reading:  # it reads while all else that is needed is imported
         from adv2e.conversion.pipeline import convert_reading
 
@@ -111,7 +127,7 @@ def command(
         summary = convert_reading(
             reading,
             output,
-            config=config(),
+            config=config(size),
             also_read=options.files_given(),
             log=log,
             **written,

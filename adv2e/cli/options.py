@@ -21,10 +21,12 @@ from adv2e.cli import completion
 from adv2e.cli.compiling import compilation_told
 from adv2e.cli.exit_status import VERBOSITY
 from adv2e.files.names import shown
+from adv2e.geometry import parse_rectangle, parse_size
 
 if TYPE_CHECKING:
     from adv2e.config import Config
     from adv2e.effects.hooks import Hooks
+    from adv2e.geometry import Size
 
 Body = TypeVar("Body", bound=Callable[..., Any])
 
@@ -66,6 +68,29 @@ class FiniteNumber(click.FloatRange):
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number", param, ctx)
         return number
+
+
+class _Parsed(click.ParamType):  # type: ignore[type-arg] # not generic in all versions
+    """What a function makes of a text, or ValueError with what would be right."""
+
+    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
+        self.name, self._parse = name, parse
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return what `value` stands for; raise BadParameter."""
+        try:
+            return self._parse(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+SIZE = _Parsed("size", parse_size)
+RECTANGLE = _Parsed("rectangle", parse_rectangle)
+
+
+def crop_option(text: str) -> Callable[[Body], Body]:
+    """Return what adds --crop, explained by `text`; the command gets ``crop``, or None."""
+    return click.option("--crop", type=RECTANGLE, metavar="X,Y,W,H", help=text)
 
 
 def _rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -137,8 +162,9 @@ def sets_option(text: str) -> Callable[[Body], Body]:
 def config_options(body: Body) -> Body:
     """Add -c, --set, --seed and --effect; the command gets ``config``, a function.
 
-    It returns the Config.  A command that has other things to begin with calls it after those:
-    configurations know of all effects, and importing these takes its time.
+    It returns the Config, for a sensor of a size if it is given one.  A command that has other
+    things to begin with calls it after those: configurations know of all effects, and importing
+    these takes its time.
     """
 
     @files_option(
@@ -165,10 +191,10 @@ def config_options(body: Body) -> Body:
         effect_files: tuple[str, ...],
         **kw: Any,
     ) -> Any:
-        def config() -> Config:
+        def config(size: Size | None = None) -> Config:
             from adv2e.config import load_config
 
-            return load_config(config_files, sets, seed, own_effects(effect_files))
+            return load_config(config_files, sets, seed, own_effects(effect_files), size=size)
 
         return body(*args, config=config, **kw)
 

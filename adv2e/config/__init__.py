@@ -46,8 +46,10 @@ def load_config(
     sets: str | Sequence[str] = (),
     seed: int | None = None,
     effects: Sequence[type[Hooks]] = (),
+    *,
+    size: tuple[int, int] | None = None,
 ) -> Config:
-    """Return the defaults with `files`, then `sets`, then `seed` on top; later ones win.
+    """Return the defaults with `files`, `sets`, and `seed` and `size` on top; later ones win.
 
     Parameters
     ----------
@@ -61,6 +63,8 @@ def load_config(
     effects : sequence of classes, optional
         Effects of your own (:class:`adv2e.effects.hooks.Hooks`); each is on, and has a section
         ``user.<name>``.  Those of a configuration among `files` come before them.
+    size : (int, int), optional
+        Width and height of the sensor.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def load_config(
     configs = (layer for layer in layers if isinstance(layer, Config))
     own = {effect: None for config in configs for effect in user_effects(config).values()}
     added = [effect for effect in effects if effect not in own]
-    return build(config_class([*own, *added]), _merged(layers, _texts(sets), seed))
+    return build(config_class([*own, *added]), _merged(layers, _texts(sets), seed, size))
 
 
 def _texts(sets: str | Sequence[str]) -> Sequence[str]:
@@ -123,12 +127,19 @@ def _layer(written: Written) -> Value:
     )
 
 
-def _merged(files: Sequence[Written], sets: Sequence[str], seed: int | None = None) -> Value:
-    """Return what `files`, `sets` and `seed` say, later ones on top."""
+def _merged(
+    files: Sequence[Written],
+    sets: Sequence[str],
+    seed: int | None = None,
+    size: tuple[int, int] | None = None,
+) -> Value:
+    """Return what `files`, `sets`, `seed` and `size` say, later ones on top."""
     over = [parse_set(text) for text in sets]  # what is wrong on the command line comes first
     if seed is not None:
-        origin = Origin("--seed", on_command_line=True)
-        over.append(Value({"seed": Value(seed, origin)}, origin))
+        over.append(_tree({"seed": seed}, Origin("--seed", on_command_line=True)))
+    if size is not None:
+        sensor = dict(zip(("width", "height"), size, strict=True))
+        over.append(_tree({"sensor": sensor}, Origin("--size", on_command_line=True)))
     return reduce(merge, [*map(_layer, files), *over], Value({}))
 
 

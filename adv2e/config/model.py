@@ -27,10 +27,14 @@ from adv2e.effects.readout.arbiter import Arbiter
 from adv2e.effects.readout.event_loss import EventLoss
 from adv2e.effects.readout.frame_coupling import FrameCoupling
 from adv2e.errors import ConfigError
+from adv2e.geometry import MOST_PIXELS
 from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter, subsection
 
 INTERPOLATIONS = ("linear", "flow")
+FITS = ("crop", "pad", "stretch", "none")
+MOST_COLUMNS = 1 << 16
+"""Columns, or rows, that the coordinates of events can name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,6 +100,30 @@ class Frames(Section):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_encoding(self.encoding)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor(Section):
+    """The pixels that the frames are brought to, each the mean of the light on its area."""
+
+    width: int = parameter(unit="px", meaning="columns", at_least=1, at_most=MOST_COLUMNS)
+    height: int = parameter(unit="px", meaning="rows", at_least=1, at_most=MOST_COLUMNS)
+    fit: str = parameter(
+        "crop",
+        unit="-",
+        meaning="how frames of another shape come in; crop: they cover the sensor, and what is"
+        " over at both ends is cut; pad: all of them is seen, and the rest is black; stretch: each"
+        " axis by itself; none: they must have its size",
+        choices=FITS,
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.width * self.height > MOST_PIXELS:
+            raise ConfigError(
+                f"width: {self.width}x{self.height} are {self.width * self.height:,} pixels; at"
+                f" most {MOST_PIXELS:,} are simulated"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,6 +236,9 @@ class Config(Section):
         0, unit="-", meaning="seed of all random numbers", at_least=0, at_most=rng.LARGEST_SEED
     )
     frames: Frames = subsection(Frames, meaning="the input's numbers")
+    sensor: Sensor | None = subsection(
+        None, meaning="size of the sensor, and how frames come to it; null: as the frames are"
+    )
     sampling: Sampling = subsection(Sampling, meaning="in-between frames and samples")
     pixel: Pixel = subsection(Pixel, meaning="the pixel")
     readout: Readout | None = subsection(None, meaning="the readout")

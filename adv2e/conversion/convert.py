@@ -11,6 +11,7 @@ from adv2e.config import Written, files_among, load_config
 from adv2e.conversion.pipeline import Summary, convert_reading
 from adv2e.conversion.reading import Reading
 from adv2e.errors import UsageError
+from adv2e.geometry import parse_rectangle, parse_size
 from adv2e.sources.times.rates import Rate
 
 
@@ -26,6 +27,8 @@ def convert(
     stop_s: float | None = None,
     t0: str = "auto",
     allow_damaged: bool = False,
+    size: str | tuple[int, int] | None = None,
+    crop: str | tuple[int, int, int, int] | None = None,
     format: str | None = None,
     layout: str | None = None,
     with_frames: bool = False,
@@ -56,6 +59,10 @@ def convert(
         Time of the first frame: zero, or as on the source's clock; auto: keep where it has one.
     allow_damaged : bool
         Take what can be decoded of a damaged video.
+    size : (int, int) or str, optional
+        Width and height of the sensor, such as "346x260": sensor.width and .height.
+    crop : (int, int, int, int) or str, optional
+        First column, first row, columns and rows of the part to cut out of the frames first.
     format, layout : str, optional
         Format of the output where its suffix does not say it, and layout of HDF5.
     with_frames : bool
@@ -98,7 +105,12 @@ def convert(
     >>> folder.cleanup()
     """
     notes: list[str] = []
-    ready = load_config(config)
+    try:
+        wanted = None if size is None else parse_size(size)
+        part = None if crop is None else parse_rectangle(crop)
+    except ValueError as error:
+        raise UsageError(f"size, crop: {error}") from None
+    ready = load_config(config, size=wanted)
     if fps is not None and timestamps is not None:
         raise UsageError("fps and timestamps both give the times of the frames: keep one")
     reading = Reading(
@@ -110,6 +122,7 @@ def convert(
         stop_s=stop_s,
         t0=t0,
         allow_damaged=allow_damaged,
+        crop=part,
         threads=threads,
     )
     with reading:

@@ -33,8 +33,10 @@ from adv2e.formats import compression
 from adv2e.formats.registry import to_write
 from adv2e.formats.sink import Sink
 from adv2e.formats.writing import open_sink
+from adv2e.geometry import Size
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.pictures import drawn, picture_white
+from adv2e.light.sensor import fitting_of
 from adv2e.sources.base import Source
 
 if TYPE_CHECKING:
@@ -185,14 +187,17 @@ def convert_reading(
         white=recording.full_scale,
     )
     white = picture_white(recording.dtype, decoder.full_scale, not keeps_all_bits)
+    frames = Size(recording.width, recording.height)
+    fitting = fitting_of(*frames, config.sensor, recording.path)
+    width, height = frames if fitting is None else fitting.size
     # events and preview come into place together, when all is written
     inputs = (*reading.inputs, *also_read)
     with Staging(overwrite, inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
                 target,
-                width=recording.width,
-                height=recording.height,
+                width=width,
+                height=height,
                 format=format,
                 layout=layout,
                 metadata=_metadata(config, recording, decoder, white if with_frames else None),
@@ -204,17 +209,19 @@ def convert_reading(
         # a write to standard output may block until the reader pleases, and only the main thread
         # can be interrupted in it
         beside = workers > 1 and target != "-"
-        seen = _open_preview(preview, recording, staging, stack)
+        seen = _open_preview(preview, width, height, staging, stack)
         work = stack.enter_context(OrderedWork(int(beside), limit=BEHIND_BYTES, count=BEHIND_TASKS))
         out = _Output(sink, seen, white, work)
         told = _doubt_of_white(recording, recording.largest, config)
         for text in filter(None, (*recording.doubts, told)):
             doubt(text)
         hooks = active_hooks(config)
-        table = kernel_table(decoder, config.sampling, hooks)
+        table = kernel_table(decoder, config.sampling, hooks, fitting)
         stated = config.frames.full_scale
         stills = reading.stills(
-            Decoding(decoder, table is not None, out.wants_frames, stated, not keeps_all_bits)
+            Decoding(
+                decoder, table is not None, out.wants_frames, stated, not keeps_all_bits, fitting
+            )
         )
         if progress:
             stills = _shown(stills, recording.count, out, stack)
@@ -232,6 +239,8 @@ def convert_reading(
     # at the end: an error is to be the only line
     taken = light_text(recording.light, recording.full_scale, config.frames)
     log(f"frames are {taken}")
+    if fitting is not None:
+        log(fitting.text())
     found = _doubt_of_white(recording, recording.largest_read, config)
     if told:
         largest = f"{recording.path}: whole numbers up to {recording.largest_read:g} came"
@@ -242,8 +251,8 @@ def convert_reading(
         doubt(found)
     return Summary(
         output=target,
-        width=recording.width,
-        height=recording.height,
+        width=width,
+        height=height,
         frames=out.frames,
         duration_s=(out.last_ns - out.first_ns) * 1e-9,
         events=out.events,
@@ -283,14 +292,14 @@ def _metadata(
 
 
 def _open_preview(
-    preview: str | None, recording: Source, staging: Staging, stack: ExitStack
+    preview: str | None, width: int, height: int, staging: Staging, stack: ExitStack
 ) -> Timeline | None:
     if preview is None:
         return None
     from adv2e.rendering import open_preview  # noqa: PLC0415 - most conversions draw nothing
 
     return stack.enter_context(
-        open_preview(Path(preview), recording.width, recording.height, frames=True, staging=staging)
+        open_preview(Path(preview), width, height, frames=True, staging=staging)
     )
 
 

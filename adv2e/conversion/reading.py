@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from adv2e.background import default_threads, read_ahead
 from adv2e.effects.frames.brightness import check_floats, check_light
 from adv2e.errors import Adv2eError, DataError
+from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of
 from adv2e.sources import open_source
 from adv2e.sources.base import Source
@@ -28,6 +29,7 @@ from adv2e.sources.times.rates import Rate
 
 if TYPE_CHECKING:
     from adv2e.effects.frames.encoding import LightDecoder
+    from adv2e.light.sensor import Fitting
 
 AHEAD_BYTES, AHEAD_FRAMES = 16 << 20, 256
 """Memory for frames that were decoded and not taken yet, light and what is seen of them."""
@@ -60,6 +62,8 @@ class Decoding:
         Number that somebody said to mean white.
     eight_bit : bool
         What is seen of them must be of 8 bits.
+    fitting : Fitting, optional
+        How they are brought to the sensor; None: they have its size.
     """
 
     decoder: LightDecoder
@@ -67,6 +71,7 @@ class Decoding:
     with_pictures: bool
     full_scale: float | None = None
     eight_bit: bool = False
+    fitting: Fitting | None = None
 
     def still(self, frame: Frame) -> Still:
         """Return a frame as the pixel wants it; DataError if white is not what was said."""
@@ -75,9 +80,13 @@ class Decoding:
             raise DataError(f"{frame.label}: {frame.odd_white}")
         picture = None
         if self.with_pictures:
-            picture = picture_of(frame.image, frame.alpha, self.decoder, self.eight_bit)
+            picture = picture_of(
+                frame.image, frame.alpha, self.decoder, self.eight_bit, self.fitting
+            )
         if not self.coded:
             light = self.decoder.decode(frame.image, frame.alpha)
+            if self.fitting is not None:
+                light = self.fitting.light(light, frame.label)
         elif frame.alpha is None:
             light = frame.image
         else:
@@ -95,7 +104,7 @@ class Reading:
 
     Parameters
     ----------
-    path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged
+    path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged, crop
         See :func:`adv2e.sources.open_source`.
     threads : int, optional
         Threads that the whole conversion may compute with; default: all cores.
@@ -112,13 +121,14 @@ class Reading:
         stop_s: float | None = None,
         t0: str = "auto",
         allow_damaged: bool = False,
+        crop: Rectangle | None = None,
         threads: int | None = None,
     ) -> None:
         self.path = path
         self.threads = threads or default_threads()
         self.given: dict[str, Any] = {
             "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
-            "time_unit": time_unit, "allow_damaged": allow_damaged,
+            "time_unit": time_unit, "allow_damaged": allow_damaged, "crop": crop,
         }  # fmt: skip
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()

@@ -25,6 +25,7 @@ from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.light.decoding import decoder_for, kernel_table
 from adv2e.light.intervals import Intervals, Part
+from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
 from adv2e.sources.frame import check_values
@@ -50,7 +51,8 @@ def simulate(
     ----------
     frames : iterable of (rows, columns) or (rows, columns, 3) arrays
         uint8, uint16, float32 or float64; colour as RGB.  `frames.encoding: auto` means linear
-        here, except for 8-bit colour, which is taken as sRGB.
+        here, except for 8-bit colour, which is taken as sRGB.  With a `sensor` in the configuration
+        they are brought to its size, which is that of the events.
     times : iterable of float, or float
         Time of each frame [s], increasing; or so many frames a second, the first at 0.
     config : Config, or what :func:`adv2e.load_config` takes, optional
@@ -98,9 +100,15 @@ def simulate(
     if first is None:
         raise DataError("no frames: at least two are needed")
     decoder = _decoder_for(np.asarray(first), config)
-    table = kernel_table(decoder, config.sampling, hooks)
+    rows, columns = np.shape(first)[:2]
+    fitting = fitting_of(columns, rows, config.sensor, "frame 0")
+    table = kernel_table(decoder, config.sampling, hooks, fitting)
     images = _checked(itertools.chain([first], coming), instants, config.frames.full_scale)
     light = images if table is not None else ((t, decoder.decode(image)) for t, image in images)
+    if fitting is not None:
+        light = (
+            (t, fitting.light(now, f"frame {number}")) for number, (t, now) in enumerate(light)
+        )
     yield from events_from_light(light, config, hooks=hooks, threads=threads, table=table)
 
 

@@ -14,12 +14,10 @@ from adv2e.formats.assembly import assemble
 from adv2e.formats.event_file import EventFile, Facts, Progress
 from adv2e.formats.recording import Recording
 from adv2e.formats.registry import format_of
+from adv2e.geometry import MOST_PIXELS
 from adv2e.process.machine import machine_complaint
 
 __all__ = ["Recording", "open_events", "read_events"]
-
-MOST_PIXELS = 1 << 25
-"""Pixels of the largest sensor: 8192x4096."""
 
 
 def open_events(

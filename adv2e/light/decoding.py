@@ -11,6 +11,7 @@ from adv2e.config.model import Frames, Sampling
 from adv2e.effects.composition import changes_light
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.effects.hooks import Hooks
+from adv2e.light.sensor import Fitting
 from adv2e.sources.frame import Light
 
 
@@ -32,15 +33,15 @@ def decoder_for(
 
 
 def kernel_table(
-    decoder: LightDecoder, sampling: Sampling, hooks: Iterable[Hooks]
+    decoder: LightDecoder, sampling: Sampling, hooks: Iterable[Hooks], fitting: Fitting | None
 ) -> NDArray[np.float32] | None:
     """Return the table with which the kernel decodes grey frames itself; None: it takes light.
 
     A quarter of the memory traffic, but every instant looks its frames up again, and only linear
-    interpolation, without effects on the light (`hooks`), needs no light before.
+    interpolation, of frames as they are, without effects on the light (`hooks`), needs none before.
     """
     once = sampling.L == 1 and sampling.interpolation == "linear" and not changes_light(hooks)
-    return decoder.grey_table if once else None
+    return decoder.grey_table if once and fitting is None else None
 
 
 def light_text(light: Light, white: float, frames: Frames | None = None) -> str:

@@ -7,13 +7,17 @@ are composed over black.
 
 from __future__ import annotations
 
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.sources.frame import Frame
+
+if TYPE_CHECKING:
+    from adv2e.light.sensor import Fitting
 
 
 def _stays(dtype: DTypeLike, eight_bit: bool) -> bool:
@@ -28,17 +32,32 @@ def picture_white(dtype: DTypeLike, white: float, eight_bit: bool) -> float:
 
 
 def picture_of(
-    image: NDArray[Any], alpha: NDArray[Any] | None, decoder: LightDecoder, eight_bit: bool
+    image: NDArray[Any],
+    alpha: NDArray[Any] | None,
+    decoder: LightDecoder,
+    eight_bit: bool,
+    fitting: Fitting | None = None,
 ) -> NDArray[Any]:
-    """Return a frame as a picture of 8 or 16 bits, encoded as the frame is."""
-    picture = image
+    """Return a frame as a picture of 8 or 16 bits, encoded as the frame is.
+
+    With a `fitting`, it has the size of the sensor, and each channel is nearest to its light there.
+    """
+    picture, stored = image, decoder
     if not _stays(image.dtype, eight_bit):
         white = picture_white(image.dtype, decoder.full_scale, eight_bit)
         kind = np.uint8 if eight_bit else np.uint16
-        picture = np.clip(np.rint(image * (white / decoder.full_scale)), 0, white).astype(kind)
-        if alpha is not None:
-            decoder = LightDecoder(decoder.encoding, white, kind, decoder.colour)
-    return picture if alpha is None else decoder.over_black(picture, alpha)
+        if alpha is not None or fitting is not None:
+            stored = _decoder(decoder.encoding, white, kind, decoder.colour)
+        if fitting is None:
+            picture = np.clip(np.rint(image * (white / decoder.full_scale)), 0, white).astype(kind)
+    if fitting is not None:
+        return stored.encode(map(fitting.plane, decoder.shares(image, alpha)))
+    return picture if alpha is None else stored.over_black(picture, alpha)
+
+
+@lru_cache(maxsize=4)
+def _decoder(encoding: str, white: float, dtype: type, colour: bool) -> LightDecoder:
+    return LightDecoder(encoding, white, dtype, colour)
 
 
 def eight_bit(image: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.files.regular import check_ends
+from adv2e.geometry import Rectangle
 from adv2e.sources.base import Source
 from adv2e.sources.frame import Frame
 from adv2e.sources.times.rates import Rate
@@ -38,6 +39,7 @@ def open_source(
     t0: str = "auto",
     time_unit: str | None = None,
     allow_damaged: bool = False,
+    crop: Rectangle | None = None,
 ) -> Source:
     """Open an input with frames.
 
@@ -59,6 +61,8 @@ def open_source(
         Unit of the times in lists; default: see :mod:`adv2e.sources.times.units`.
     allow_damaged : bool
         Take what can be decoded of a damaged video, and tell what is missing.
+    crop : Rectangle, optional
+        Part to cut out of each frame, before anything else.
 
     Returns
     -------
@@ -74,7 +78,7 @@ def open_source(
     """
     listed = Path(timestamps) if timestamps is not None else None
     given = GivenTimes(fps, listed, time_unit)
-    selection = Selection(start_s, stop_s, t0, allow_damaged)
+    selection = Selection(start_s, stop_s, t0, allow_damaged, crop)
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")
     named, path = str(path), Path(path)

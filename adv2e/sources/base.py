@@ -19,6 +19,7 @@ import numpy as np
 from adv2e.effects.frames.brightness import doubt_of_white
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
+from adv2e.geometry import Rectangle
 from adv2e.sources.frame import (
     OVER_BLACK,
     Frame,
@@ -44,7 +45,7 @@ class Source(ABC):
     kind : str
         ``video``, ``images``, ``npy``, or the data set that it is of, such as ``davis240c``.
     width, height : int
-        Columns and rows of the frames.
+        Columns and rows of the frames, of the part that is cut out of them where one is.
     dtype : numpy.dtype
         Data type of the frames.
     colour : bool
@@ -93,7 +94,14 @@ class Source(ABC):
             usual = full_scale_of(image.dtype)
         except DataError as error:
             raise DataError(f"{label}: {error}") from error
-        self.height, self.width = image.shape[:2]
+        self._height, self._width = self.height, self.width = image.shape[:2]
+        crop = self.selection.crop
+        if crop is not None:
+            if not crop.is_inside(self.width, self.height):
+                raise DataError(
+                    f"{label}: --crop {crop} is not inside its {self.width}x{self.height} pixels"
+                )
+            self.width, self.height = crop.width, crop.height
         self.dtype = image.dtype
         self.colour = image.ndim == 3
         light = light or light_of_images(image.dtype, colour=self.colour)
@@ -187,16 +195,25 @@ class Source(ABC):
     def _load(self, shot: Shot) -> Pixels:
         pixels, label = shot.load(), shot.label
         image = pixels.image
-        first = _description(self.width, self.height, self.dtype, self.colour)
+        first = _description(self._width, self._height, self.dtype, self.colour)
         this = _description(image.shape[1], image.shape[0], image.dtype, image.ndim == 3)
         if this != first:
             raise DataError(f"{label}: {this}, but the first frame is {first}")
-        check_values(image, label)
+        if self.selection.crop is not None:
+            pixels = _cut(pixels, self.selection.crop)
+        check_values(pixels.image, label)
         if pixels.alpha is not None or pixels.composed:
             self._note(OVER_BLACK)
         if self.largest_read == 0 or self.doubt_of_white(self.largest_read):
             self.largest_read = max(self.largest_read, float(image.max()))
         return pixels
+
+
+def _cut(pixels: Pixels, crop: Rectangle) -> Pixels:
+    """Return a part of an image, which keeps none of the rest in memory."""
+    part = slice(crop.y, crop.y + crop.height), slice(crop.x, crop.x + crop.width)
+    alpha = None if pixels.alpha is None else pixels.alpha[part].copy()
+    return replace(pixels, image=pixels.image[part].copy(), alpha=alpha)
 
 
 def _description(width: int, height: int, dtype: np.dtype[Any], colour: bool) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adv2e.errors import UsageError
+from adv2e.geometry import Rectangle
 from adv2e.sources.times.instants import NS_PER_S
 from adv2e.sources.times.rates import FrameRate, Rate, parse_rate
 from adv2e.sources.times.units import UNITS
@@ -74,6 +75,8 @@ class Selection:
         frame.  zero: zero at the first frame wanted.
     allow_damaged : bool
         What can be decoded of a damaged video is wanted; what is missing is told.
+    crop : Rectangle, optional
+        Part of each frame that is wanted; default: all of it.
 
     Raises
     ------
@@ -85,6 +88,7 @@ class Selection:
     stop_s: float | None = None
     t0: str = "auto"
     allow_damaged: bool = False
+    crop: Rectangle | None = None
 
     def __post_init__(self) -> None:
         for name, value in (("--start", self.start_s), ("--stop", self.stop_s)):

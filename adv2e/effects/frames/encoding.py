@@ -32,7 +32,7 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -215,12 +215,28 @@ class LightDecoder:
 
     def over_black(self, image: NDArray[Any], alpha: NDArray[Any]) -> NDArray[Any]:
         """Return the whole numbers whose light is nearest to that of `image` times `alpha`."""
-        planes = image if self.colour else image[..., np.newaxis]
-        composed = np.empty_like(planes)
-        for number, table in enumerate(self._tables):
+        return self.encode(self.shares(image, alpha))
+
+    def shares(
+        self, image: NDArray[Any], alpha: NDArray[Any] | None = None
+    ) -> Iterator[NDArray[Any]]:
+        """Yield the share of each channel in the light of an image [DN]; :meth:`decode` adds."""
+        planes = np.moveaxis(image, -1, 0) if self.colour else image[np.newaxis]
+        weights = LUMA_WEIGHTS if self.colour else (1.0,)
+        for number, (plane, weight) in enumerate(zip(planes, weights, strict=True)):
+            if self._tables:
+                share = self._tables[number].take(plane)
+            else:
+                share = weight * decode_values(plane, self.encoding, self.full_scale)
+            yield share if alpha is None else share * alpha
+
+    def encode(self, shares: Iterable[NDArray[Any]]) -> NDArray[Any]:
+        """Return the whole numbers whose light is nearest, in each channel, to its share."""
+        planes = []
+        for share, table in zip(shares, self._tables, strict=True):
             middles = (table[1:] + table[:-1]) / 2
-            composed[..., number] = np.searchsorted(middles, table[planes[..., number]] * alpha)
-        return composed if self.colour else composed[..., 0]
+            planes.append(np.searchsorted(middles, share).astype(self.dtype))
+        return np.stack(planes, axis=-1) if self.colour else planes[0]
 
     def _decode(self, image: NDArray[Any]) -> NDArray[Any]:
         if self._tables:

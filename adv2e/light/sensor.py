@@ -1,0 +1,165 @@
+"""Frames brought to the size of the sensor, in linear light, before anything else sees them.
+
+A pixel of the sensor sees the mean of the light on its area.  A pixel of the frame is taken for a
+square of constant light, whether the sensor's pixels are larger than those squares or smaller, so
+that one rule holds at every size: no light is made up, none is lost, and what is constant stays as
+it is to the last bit.  Enlarged frames show their squares; no detail is invented.
+
+Frames come first to the sensor, then to the effects on their light: shifts are counted in pixels of
+the sensor, blur and lamps are those of its pixels, and frames that were stored beside events, which
+have the sensor's size, go the same way.
+
+The share that each square has in each pixel is a whole number of a common unit.  Products with
+light of 24 bits and their sums over one axis are so exact in float64 for any constant, and all else
+is rounded the same way everywhere: NumPy adds in the order written here, with one thread.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.config.model import Sensor
+from adv2e.effects.frames.brightness import check_light
+from adv2e.errors import DataError
+from adv2e.geometry import Size
+
+
+class _Axis:
+    """Means over the pixels of one axis of the sensor.
+
+    Parameters
+    ----------
+    count : int
+        Pixels of the frame.
+    size : int
+        Pixels of the sensor.
+    scale : Fraction
+        Pixels of the sensor that a pixel of the frame spans; the middles lie on each other.
+    """
+
+    def __init__(self, count: int, size: int, scale: Fraction) -> None:
+        begin = (count - size / scale) / 2
+        step = 1 / scale
+        unit = np.lcm(begin.denominator, step.denominator)
+        # of the sensor's pixels, in that share of a pixel of the frame
+        edges = int(begin * int(unit)) + int(step * int(unit)) * np.arange(size + 1, dtype=np.int64)
+        first, behind = edges[:-1] // unit, -(-edges[1:] // unit)
+        taps = np.arange(int((behind - first).max()))[:, np.newaxis]
+        number = first + taps
+        shares = np.minimum((number + 1) * unit, edges[1:]) - np.maximum(number * unit, edges[:-1])
+        shares[(number < 0) | (number >= count)] = 0  # black
+        self._numbers = np.clip(number, 0, count - 1)
+        self._shares = np.maximum(shares, 0).astype(np.float64)
+        self._whole = float(step * int(unit))
+
+    def means(self, light: NDArray[Any], axis: int) -> NDArray[np.float64]:
+        """Return the means of `light` (rows, columns) along `axis`, one for each pixel."""
+        across = (slice(None), np.newaxis) if axis == 0 else (np.newaxis, slice(None))
+        found: NDArray[np.float64] | None = None
+        for numbers, shares in zip(self._numbers, self._shares, strict=True):
+            part = np.multiply(light.take(numbers, axis=axis), shares[across])
+            found = part if found is None else np.add(found, part, out=found)
+        assert found is not None
+        found /= self._whole
+        return found
+
+
+class Fitting:
+    """How frames of one size are brought to a sensor of another.
+
+    Parameters
+    ----------
+    frames : Size
+    sensor : Sensor
+        The section of the configuration.
+    label : str
+        What the frames are of, for messages.
+
+    Raises
+    ------
+    DataError
+        They do not have its size and `sensor.fit` is none, or next to nothing of them would be
+        left.
+    """
+
+    def __init__(self, frames: Size, sensor: Sensor, label: str) -> None:
+        self.frames, self.size = frames, Size(sensor.width, sensor.height)
+        self._fit = sensor.fit
+        if sensor.fit == "none":
+            raise DataError(
+                f"{label}: frames are {frames}, but the sensor is {self.size} and sensor.fit is"
+                " none; say crop, pad or stretch, or give it their size"
+            )
+        across = Fraction(self.size.width, frames.width)
+        down = Fraction(self.size.height, frames.height)
+        if sensor.fit == "crop":
+            across = down = max(across, down)
+        elif sensor.fit == "pad":
+            across = down = min(across, down)
+        self._scaled = Size(
+            max(1, round(frames.width * across)), max(1, round(frames.height * down))
+        )
+        axes = zip(frames, self.size, (across, down), strict=True)
+        for count, size, scale in axes:
+            seen, filled = size / scale, count * scale
+            if sensor.fit == "crop" and seen < 1 < count:
+                raise DataError(
+                    f"{label}: sensor.fit crop: of frames of {frames}, a sensor of {self.size}"
+                    f" would see {float(seen):.2g} of a pixel; say pad or stretch"
+                )
+            if sensor.fit == "pad" and filled < 1 < size:
+                raise DataError(
+                    f"{label}: sensor.fit pad: frames of {frames} would fill {float(filled):.2g} of"
+                    f" a pixel of a sensor of {self.size}; say crop or stretch"
+                )
+        self._columns = _Axis(frames.width, self.size.width, across)
+        self._rows = _Axis(frames.height, self.size.height, down)
+
+    def light(self, light: NDArray[Any], label: str) -> NDArray[np.float32]:
+        """Return what the sensor sees of the light [DN] of a frame, (rows, columns).
+
+        Raises
+        ------
+        DataError
+            The light is too bright or not finite; the text begins with `label`.
+        """
+        check_light(light, label)
+        return self.plane(light)
+
+    def plane(self, light: NDArray[Any]) -> NDArray[np.float32]:
+        """Return the same of light that is known to be right, or of a share of it."""
+        single = np.asarray(light, np.float32)
+        return self._columns.means(self._rows.means(single, 0), 1).astype(np.float32)
+
+    def text(self) -> str:
+        """Return in one sentence what is done."""
+        begin = f"frames are {self.frames}"
+        if self._fit == "stretch":
+            return f"{begin}, stretched to {self.size}"
+        is_scaled = self._scaled != self.frames
+        if is_scaled:
+            begin += f", scaled to {self._scaled}"
+        if self._scaled == self.size:
+            return begin
+        if self._fit == "pad":
+            return f"{begin}, the rest of {self.size} is black"
+        return f"{begin}{' and' if is_scaled else ','} cut to {self.size}"
+
+
+def fitting_of(width: int, height: int, sensor: Sensor | None, label: str) -> Fitting | None:
+    """Return how frames are brought to the sensor; None where they stay as they are.
+
+    Raises
+    ------
+    DataError
+        See :class:`Fitting`; or frames without pixels.
+    """
+    if sensor is None or (width, height) == (sensor.width, sensor.height):
+        return None
+    if min(width, height) < 1:
+        raise DataError(f"{label}: frames of {width}x{height} pixels")
+    return Fitting(Size(width, height), sensor, label)

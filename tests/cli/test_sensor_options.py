@@ -1,0 +1,169 @@
+"""Sensor and crop from the command line to the file: sizes, light, stored frames, errors."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+import adv2e as package
+from adv2e import read_events, simulate
+from adv2e.config import load_config
+from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.light.sensor import fitting_of
+
+GREY = np.random.default_rng(5).integers(0, 256, (4, 18, 32), np.uint8)
+COLOUR = np.random.default_rng(6).integers(0, 256, (4, 18, 32, 3), np.uint8)
+
+
+@pytest.fixture
+def clip(tmp_path):
+    np.save(tmp_path / "clip.npy", GREY)
+    return tmp_path / "clip.npy"
+
+
+def simulated(frames, *sets):
+    return np.concatenate(list(simulate(frames, 100, load_config([], sets), threads=1)))
+
+
+@pytest.mark.parametrize("level", ["sampling.L=10", "sampling.L=1"])
+def test_events_are_those_of_the_light_on_the_sensor(adv2e, clip, tmp_path, level):
+    """With one frame an interval, too: unscaled ones would go to the kernel as they are."""
+    output = tmp_path / "a.h5"
+    words = ["--fps", 100, "--size", "8x6", "--set", level]
+    outcome = adv2e("convert", clip, "-o", output, *words)
+    assert outcome.status == 0
+    recording = read_events(output)
+    assert (recording.width, recording.height) == (8, 6)
+    seen = fitting_of(32, 18, load_config([], ["sensor={width: 8, height: 6}"]).sensor, "")
+    light = [seen.light(frame.astype(np.float32), "") for frame in GREY]
+    expected = simulated(light, level, "frames.full_scale=255")
+    assert recording.events.tobytes() == expected.tobytes()
+    assert simulated(GREY, level, "sensor={width: 8, height: 6}").tobytes() == expected.tobytes()
+
+
+def test_what_is_done_is_printed_and_else_nothing(adv2e, clip, tmp_path):
+    said = adv2e("convert", clip, "--fps", 100, "--size", "8x6", "-o", tmp_path / "a.h5").err
+    assert "frames are 32x18, scaled to 11x6 and cut to 8x6\n" in said
+    for number, words in enumerate([[], ["--size", "32x18"]]):
+        output = tmp_path / f"{number}.h5"
+        said = adv2e("convert", clip, "--fps", 100, *words, "-o", output).err
+        assert said.count("frames are ") == 1  # which light they are
+
+
+def test_size_leaves_the_fit_that_was_said(adv2e, clip, tmp_path):
+    (tmp_path / "pad.yaml").write_text("sensor: {fit: pad}\n")
+    ways = [["-c", tmp_path / "pad.yaml"], ["--set", "sensor.fit=pad"]]
+    for number, words in enumerate(ways):
+        output = tmp_path / f"{number}.h5"
+        said = adv2e("convert", clip, "--fps", 100, "--size", "8x6", *words, "-o", output).err
+        assert "frames are 32x18, scaled to 8x4, the rest of 8x6 is black\n" in said
+        config = read_events(output).metadata["config"]
+        assert config["sensor"] == {"width": 8, "height": 6, "fit": "pad"}
+    over = ["--size", "8x6", "--set", "sensor=null"]
+    assert adv2e("convert", clip, "--fps", 100, *over, "-o", tmp_path / "c.h5").status == 0
+    assert read_events(tmp_path / "c.h5").width == 8
+
+
+def test_crop_comes_before_the_sensor(adv2e, clip, tmp_path):
+    words = ["--fps", 100, "--crop", "3,2,12,9", "--size", "4x3"]
+    said = adv2e("convert", clip, *words, "-o", tmp_path / "a.zip").err
+    assert "frames are 12x9, scaled to 4x3\n" in said
+    part = GREY[:, 2:11, 3:15]
+    expected = simulated(part, "sensor={width: 4, height: 3}")
+    recording = read_events(tmp_path / "a.zip")
+    assert recording.events.tobytes() == expected.tobytes()
+    stored = [frame.image for frame in recording.frames()]
+    means = part.reshape(4, 3, 3, 4, 3).mean(axis=(2, 4))
+    np.testing.assert_allclose(stored, means, atol=0.5001)
+
+
+def test_crop_alone_leaves_the_numbers_as_they_are(adv2e, clip, tmp_path):
+    outcome = adv2e("convert", clip, "--fps", 100, "--crop", "3,2,12,9", "-o", tmp_path / "a.zip")
+    assert outcome.status == 0
+    recording = read_events(tmp_path / "a.zip")
+    assert recording.events.tobytes() == simulated(GREY[:, 2:11, 3:15]).tobytes()
+    stored = [frame.image for frame in recording.frames()]
+    np.testing.assert_array_equal(stored, GREY[:, 2:11, 3:15])
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [COLOUR, COLOUR.astype(np.uint16) * 257, COLOUR / 255, GREY, (GREY / 255).astype(np.float32)],
+    ids=["colour", "colour16", "float", "grey", "grey float"],
+)
+@pytest.mark.parametrize("name", ["a.zip", "a.h5"])
+@pytest.mark.parametrize("encoding", ["srgb", "linear"])
+def test_stored_frames_are_the_light_on_the_sensor(adv2e, tmp_path, frames, name, encoding):
+    np.save(tmp_path / "clip.npy", frames)
+    words = ["--fps", 100, "--size", "8x6", "--set", f"frames.encoding={encoding}", "--with-frames"]
+    assert adv2e("convert", tmp_path / "clip.npy", "-o", tmp_path / name, *words).status == 0
+    recording = read_events(tmp_path / name)
+    decoder = LightDecoder(
+        encoding,
+        255.0 if frames.dtype == np.uint8 else 65535.0 if frames.dtype == np.uint16 else 1.0,
+        frames.dtype,
+        frames.ndim == 4,
+    )
+    seen = fitting_of(32, 18, load_config([], ["sensor={width: 8, height: 6}"]).sensor, "")
+    for stored, given in zip(recording.frames(), frames, strict=True):
+        light = seen.light(decoder.decode(given), "")
+        again = LightDecoder(
+            recording.encoding, stored.white or 0, stored.image.dtype, stored.image.ndim == 3
+        ).decode(stored.image)
+        assert again.shape == (6, 8)
+        steps = {np.dtype(np.uint8): 255, np.dtype(np.uint16): 65535}[stored.image.dtype]
+        # half a step, where the curve of sRGB is steepest
+        np.testing.assert_allclose(again, light, atol=0.51 * 2.28 * 255 / steps)
+
+
+def test_the_preview_has_the_size_of_the_sensor(adv2e, clip, tmp_path):
+    words = ["--fps", 100, "-o", tmp_path / "a.h5", "--preview", tmp_path / "a.png"]
+    assert adv2e("convert", clip, *words, "--size", "16x12").status == 0
+    resized = cv2.imread(str(tmp_path / "a.png"))
+    np.save(tmp_path / "small.npy", GREY[:, :12, :16])
+    words = ["--fps", 100, "-o", tmp_path / "b.h5", "--preview", tmp_path / "b.png"]
+    assert adv2e("convert", tmp_path / "small.npy", *words).status == 0
+    assert resized.shape == cv2.imread(str(tmp_path / "b.png")).shape
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "complaint"),
+    [
+        (["--size", "8"], 2, "'--size': must be columns x rows, such as 346x260, got '8'"),
+        (["--size", "8x0"], 2, "must be columns x rows"),
+        (["--size", "70000x2"], 2, "--size sensor.width: must be at most 65536 px, got 70000"),
+        (["--size", "60000x60000"], 2, "sensor.width: 60000x60000 are 3,600,000,000 pixels"),
+        (["--set", "sensor.width=8"], 2, "--set sensor.height: must be given"),
+        (["--set", "sensor.height=8"], 2, "--set sensor.width: must be given"),
+        (["--set", "sensor={width: 8, height: 6, fit: fill}"], 2, "crop, pad, stretch, none"),
+        (["--crop", "1,2,3"], 2, "'--crop': must be first column, first row, columns, rows"),
+        (["--crop", "30,0,3,3"], 1, "frame 0: --crop 30,0,3,3 is not inside its 32x18 pixels"),
+        (["--size", "8x6", "--set", "sensor.fit=none"], 1, "frames are 32x18, but the sensor is"),
+    ],
+)
+def test_what_cannot_be_is_one_line(adv2e, clip, tmp_path, words, status, complaint):
+    outcome = adv2e("convert", clip, "--fps", 100, *words, "-o", tmp_path / "a.h5")
+    assert outcome.status == status
+    assert complaint in outcome.err
+    assert outcome.err.count("\n") == 1
+    assert not (tmp_path / "a.h5").exists()
+
+
+def test_in_python_sizes_are_text_or_numbers(clip, tmp_path):
+    made = [
+        package.convert(clip, tmp_path / f"{n}.h5", fps=100, size=size, crop=crop)
+        for n, (size, crop) in enumerate([("8x6", "0,0,32,16"), ((8, 6), (0, 0, 32, 16))])
+    ]
+    assert [(one.width, one.height) for one in made] == [(8, 6)] * 2
+    assert made[0].events == made[1].events > 0
+    assert "frames are 32x16, scaled to 12x6 and cut to 8x6" in made[0].notes
+    for wrong in ({"size": (8, 6, 3)}, {"size": "8"}, {"crop": (1, 2, 3)}):
+        with pytest.raises(package.errors.UsageError, match="must be"):
+            package.convert(clip, tmp_path / "c.h5", fps=100, **wrong)
+
+
+def test_frames_of_one_size_in_a_simulation():
+    for frames in (GREY, COLOUR):
+        events = simulated(frames, "sensor={width: 8, height: 6}")
+        assert (events["x"].max(), events["y"].max()) == (7, 5)
