@@ -93,9 +93,9 @@ def command(
       adv2e convert frames/ --fps 240 -o events.h5 --with-frames
       adv2e convert urban.zip -o urban_simulated --preview urban.mp4
 
-    INPUT is a video file, a folder of images, a recording of frames (DAVIS240C, as a folder or a
-    zip, GOPRO, TUM RGB-D, EuRoC, UZH-FPV) or a .npy stack of frames, grey (frames, rows, columns)
-    or colour (with a fourth axis, of 3).
+    INPUT is a video file, a folder or a zip of images, a recording of a data set (DAVIS240C, GOPRO,
+    TUM RGB-D, EuRoC, UZH-FPV) or a .npy stack of frames, grey (frames, rows, columns) or colour
+    (with a fourth axis, of 3).
 
     Without -o, the events go to <stem>.events.h5 in the current folder. The suffix of OUT chooses
     the format:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import lzma
+import re
+import stat
 import struct
 import zipfile
 import zlib
@@ -50,6 +53,22 @@ def open_member(archive: zipfile.ZipFile, member: str | zipfile.ZipInfo) -> IO[b
     return archive.open(info)
 
 
+def _check_member(info: zipfile.ZipInfo, path: Path) -> None:
+    """Refuse a member that would lie outside the folder into which its archive is unpacked."""
+    parts = re.split(r"[/\\]", info.filename)
+    wrong = ""
+    if ".." in parts:
+        wrong = "leads out of the archive by '..'"
+    elif not parts[0] or re.fullmatch("[A-Za-z]:", parts[0]):
+        wrong = "is absolute"
+    elif stat.S_ISLNK(info.external_attr >> 16):
+        wrong = "is a link"
+    if wrong:
+        raise DataError(
+            f"{path}: its member {info.filename!r} {wrong}, must be a file below its root"
+        )
+
+
 class Members:
     """The files of a recording by their names in it, in a folder or a zip.
 
@@ -58,7 +77,7 @@ class Members:
     Raises
     ------
     DataError
-        `path` is neither a folder nor a zip that can be read.
+        `path` is neither a folder nor a zip that can be read, or a zip whose members lie outside.
     """
 
     def __init__(self, path: Path) -> None:
@@ -69,7 +88,19 @@ class Members:
         if not path.is_dir():
             with unpacking(f"{path}: not a zip archive that can be read"):
                 self._archive = zipfile.ZipFile(path)
+            for info in self._archive.infolist():
+                _check_member(info, path)
             self._names = set(self._archive.namelist())
+
+    def archived(self) -> list[str]:
+        """Return the names of all files of a zip, in no order; none of what a Mac adds to them."""
+        return [n for n in self._names if not n.endswith("/") and not n.startswith("__MACOSX/")]
+
+    def below(self, folder: str) -> Members:
+        """Return the files of a zip with their names below one of its folders ('' or 'a/b/')."""
+        files = copy.copy(self)
+        files._top = folder
+        return files
 
     def enter(self, pattern: str) -> list[str]:
         """Return the files whose name matches; if there is one, the others are beside it."""

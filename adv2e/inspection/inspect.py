@@ -75,8 +75,10 @@ def _has_only_frames(path: Path) -> bool:
     if path.is_dir():
         return not (path / EVENTS).is_file()
     if path.suffix.lower() == ".zip":
+        from adv2e.sources.zipped import images_in  # noqa: PLC0415  (needs OpenCV)
+
         files = Members(path)
-        return bool(files.enter(LIST)) and not files.enter(EVENTS)
+        return bool(files.enter(LIST) or images_in(files)) and not files.enter(EVENTS)
     return path.suffix.lower() in (*VIDEO_SUFFIXES, ".npy")
 
 

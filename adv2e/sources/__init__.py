@@ -23,7 +23,7 @@ VIDEO_SUFFIXES = (
 
 OPENERS = {
     **dict.fromkeys(VIDEO_SUFFIXES, "adv2e.sources.video.source"),
-    ".zip": "adv2e.sources.davis240c",
+    ".zip": "adv2e.sources.zipped",
     ".npy": "adv2e.sources.npy",
 }
 """Module whose ``open_source(path, given, selection)`` reads files of a suffix."""
@@ -46,7 +46,7 @@ def open_source(
     Parameters
     ----------
     path : path
-        Video file, folder of images, recording of a data set, or ``.npy`` stack.
+        Video file, folder or zip of images, recording of a data set, or ``.npy`` stack.
     fps : float, Fraction or str, optional
         Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
     timestamps : path, optional
@@ -111,7 +111,7 @@ def _opener(path: Path) -> str:
     known = " ".join(suffix.lstrip(".") for suffix in OPENERS)
     raise DataError(
         f"{path}: frames cannot be read from {suffix or 'a file without suffix'}; give a folder of"
-        f" images, a DAVIS240C folder, or a file ({known})"
+        f" images, a recording of a data set, or a file ({known})"
     )
 
 

@@ -81,6 +81,14 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     listing = find_listing(files)
     if listing is None:
         raise DataError(f"{path}: no list of frames in it that is known")
+    return open_listing(files, listing, given, selection)
+
+
+def open_listing(
+    files: Members, listing: Listing, given: GivenTimes, selection: Selection
+) -> ListedSource:
+    """Return the frames of a list that was found in a folder or zip."""
+    path = files.path
     source = listed_source(files, listing, given, selection)
     if listing.other and files.has(f"{listing.other}/data.csv"):
         other = files.label(listing.other)
