@@ -3,13 +3,16 @@
 =========================== ====================================================================
 /events/xs, /events/ys      int16 (uint16 where the sensor is larger), column and row
 /events/ts                  float64, seconds
-/events/ps                  bool, true is ON
+/events/ps                  int8, 1 is ON and 0 is OFF
 /images/image%09d           uint8 (rows, columns) or (rows, columns, 3) as BGR; attributes size,
                             timestamp [s], timestamp_ns, type, event_idx
 =========================== ====================================================================
 
 Attributes of the root: num_events, num_pos, num_neg, duration, t0, tk, num_imgs, num_flow,
 sensor_resolution (height, width), source; and of ours layout, layout_version and adv2e (JSON).
+
+``ps`` has a sign, so that the ``ps * 2 - 1`` of loaders is -1 and not 255, and is no bool, which
+HDF5 has none of: h5py stores an enumeration, which MATLAB reads as words.
 
 ``event_idx`` is the index of the last event before the frame,
 ``max(searchsorted(ts, timestamp) - 1, 0)``.
@@ -85,7 +88,7 @@ class MonashWriter(Writer):
                 *(name, (0,), dtype),
                 **(_FILTERS | {"chunks": (CHUNK,), "maxshape": (None,), "shuffle": True}),
             )
-            for name, dtype in zip(_COLUMNS, (pixel, pixel, np.float64, np.bool_), strict=True)
+            for name, dtype in zip(_COLUMNS, (pixel, pixel, np.float64, np.int8), strict=True)
         }
         self._images = self._file.create_group("images")
         self._buffer = np.zeros(CHUNK, EVENT_DTYPE)
@@ -179,7 +182,7 @@ class MonashWriter(Writer):
                 ),
                 "source": "unknown",
                 "layout": "monash",
-                "layout_version": "1",
+                "layout_version": "2",
                 "adv2e": to_json(self._request.description),
             }
         )

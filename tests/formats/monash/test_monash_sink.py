@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from adv2e.errors import OutputError
-from adv2e.events import empty_events, make_events
+from adv2e.events import empty_events, make_events, sort_events
 from adv2e.formats.monash.writer import CHUNK
+from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink
 
 METADATA = {"adv2e": "9", "config": {"pixel": {"low_pass": {"cutoff_hz": 300.0}}}, "seed": 3}
@@ -44,12 +45,31 @@ def test_columns_and_types(tmp_path):
             "xs": np.int16,
             "ys": np.int16,
             "ts": np.float64,
-            "ps": np.bool_,
+            "ps": np.int8,
         }
         assert group["ts"][:].tolist() == [-2.0, 5e-06]
         assert group["xs"][:].tolist() == [0, 345]
         assert group["ys"][:].tolist() == [259, 0]
-        assert group["ps"][:].tolist() == [True, False]
+        assert group["ps"][:].tolist() == [1, 0]
+
+
+def test_loaders_get_minus_one_and_one(tmp_path):
+    with write(tmp_path / "a.h5", [make_events([1, 5], [0, 345], [259, 0], [1, 0])]) as file:
+        ps = file["events/ps"]
+        assert (ps[:] * 2 - 1).tolist() == [1, -1]
+        assert (ps[:] * 2.0 - 1.0).tolist() == [1, -1]
+        assert np.where(ps[:], 1, -1).tolist() == [1, -1]
+        assert ps.id.get_type().get_class() == h5py.h5t.INTEGER
+
+
+def test_polarities_of_files_of_before_are_read(tmp_path):
+    events = many(10)
+    write(tmp_path / "a.h5", [events]).close()
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        on = file["events/ps"][:] == 1
+        del file["events/ps"]
+        file["events/ps"] = on
+    assert np.array_equal(read_events(tmp_path / "a.h5").events, sort_events(events))
 
 
 def test_columns_are_chunked_resizable_and_compressed_with_standard_filters(tmp_path):
@@ -71,7 +91,7 @@ def test_chunks_hold_every_event(tmp_path, count, slower):
         assert np.array_equal(group["xs"][:], events["x"])
         assert np.array_equal(group["ys"][:], events["y"])
         assert np.array_equal(group["ts"][:], events["t"] / 1e6)
-        assert np.array_equal(group["ps"][:], events["p"] == 1)
+        assert np.array_equal(group["ps"][:], events["p"])
 
 
 def test_last_chunk_can_be_extended_by_other_programs(tmp_path):
@@ -105,7 +125,7 @@ def test_attributes_of_the_file(tmp_path):
             "num_flow": 0,
             "source": "unknown",
             "layout": "monash",
-            "layout_version": "1",
+            "layout_version": "2",
         }
         assert description == {**METADATA, "width": 346, "height": 260}
 
