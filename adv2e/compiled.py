@@ -44,15 +44,16 @@ _watchers: list[Callable[[Callable[..., Any]], None]] = []
 def sources() -> list[Path]:
     """Return every source file that compiled code is made of.
 
-    Those that use a decorator, what compiles them, and the whole kernel: offsets and sizes of rows,
-    which compiled code takes in as constants, stand in files without a compiled function.
+    Those that use a decorator, what compiles them, the whole kernel, and the causes: offsets, sizes
+    and numbers, which compiled code takes in as constants, stand in files without a compiled
+    function.
     """
-    whole = {_PACKAGE / "kernel", _PACKAGE / "compilation"}
+    whole = {_PACKAGE / "kernel", _PACKAGE / "compilation", _PACKAGE / "causes.py"}
     return [
         path
         for path in sorted(_PACKAGE.rglob("*.py"))
         if path.stem == "compiled"
-        or not whole.isdisjoint(path.parents)
+        or not whole.isdisjoint((path, *path.parents))
         or b"adv2e.compiled" in path.read_bytes()
     ]
 

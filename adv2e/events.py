@@ -90,8 +90,9 @@ def pixels_of(events: Events, columns: int) -> NDArray[np.int64]:
 
 
 def sort_events(events: Events) -> Events:
-    """Return the events sorted by time, ties by (y, x, p)."""
-    order = np.lexsort((events["p"], events["x"], events["y"], events["t"]))
+    """Return the events sorted by time, ties by (y, x, p), and then by cause if they know it."""
+    held = events.dtype.names or ()
+    order = np.lexsort([events[name] for name in ("cause", "p", "x", "y", "t") if name in held])
     return events[order]
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from adv2e.background import worker_pool
 from adv2e.config import Config, Written, load_config
 from adv2e.config.active_effects import active_hooks
-from adv2e.effects.composition import additions_of, begin, map_events, overrides
+from adv2e.effects.composition import additions_of, begin, check_causes, map_events, overrides
 from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images
 from adv2e.effects.hooks import Hooks
@@ -44,6 +44,7 @@ def simulate(
     *,
     effects: Sequence[Hooks] = (),
     threads: int | None = None,
+    causes: bool = False,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of frames, sorted, chunk by chunk.
 
@@ -61,6 +62,9 @@ def simulate(
         Effects of your own, besides those of the configuration.
     threads : int, optional
         Default: all cores.  The events do not depend on it.
+    causes : bool
+        Give each event one more field, ``cause``: the number in :data:`adv2e.causes.CAUSES` of
+        what made it.
 
     Yields
     ------
@@ -73,7 +77,7 @@ def simulate(
         Fewer than two frames, times that do not increase, frames of different sizes or types, NaN,
         another number of times than frames where both have a length, a rate that cannot be.
     ConfigError
-        As :func:`adv2e.load_config`.
+        As :func:`adv2e.load_config`; effects whose causes cannot be told apart.
 
     Warns
     -----
@@ -109,7 +113,9 @@ def simulate(
         light = (
             (t, fitting.light(now, f"frame {number}")) for number, (t, now) in enumerate(light)
         )
-    yield from events_from_light(light, config, hooks=hooks, threads=threads, table=table)
+    yield from events_from_light(
+        light, config, hooks=hooks, threads=threads, table=table, causes=causes
+    )
 
 
 def _instants(times: Any) -> Iterable[float]:
@@ -184,14 +190,15 @@ def events_from_light(
     method: str = "auto",
     coarseness: Coarseness = PRECISE,
     complete: Callable[[int], None] | None = None,
+    causes: bool = False,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 
     `hooks` are the effects that are on, in signal order; default: those of `config`.  With a
     `table` (:func:`adv2e.light.decoding.kernel_table`), the frames are grey values of 8 bits that
-    it decodes.  `method`, `coarseness`: see :class:`adv2e.pixel.array.PixelArray`.  `complete` is
-    called now and then with a time [us] before which no event will come any more; not so if effects
-    change events, as they may change times.
+    it decodes.  `method`, `coarseness`, `causes`: see :class:`adv2e.pixel.array.PixelArray`.
+    `complete` is called now and then with a time [us] before which no event will come any more; not
+    so if effects change events, as they may change times.
 
     Raises
     ------
@@ -199,6 +206,8 @@ def events_from_light(
         Fewer than two frames, or times that do not increase.
     """
     hooks = active_hooks(config) if hooks is None else hooks
+    if causes:
+        check_causes(hooks)
     frames = bounded(begin(hooks, iter(light), config.seed), table)
     t_ns, first = next(frames)
     array = PixelArray(
@@ -211,13 +220,15 @@ def events_from_light(
         additions=additions_of(hooks),
         method=method,
         coarseness=coarseness,
+        causes=causes,
     )
     intervals = Intervals(t_ns, first, config.sampling, threads=array.threads)
     del first
     if any(overrides(hook, "events") for hook in hooks):
         complete = None
     parts = intervals.parts(frames)
-    yield from map_events(hooks, _pixel_events(array, intervals, parts, table, hooks, complete))
+    made = _pixel_events(array, intervals, parts, table, hooks, complete)
+    yield from map_events(hooks, made, causes)
 
 
 def _pixel_events(

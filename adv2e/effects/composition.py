@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.causes import CAUSED_DTYPE, FRAME_COUPLING, OWN_EFFECT, with_cause
 from adv2e.effects.courses import INJECTED_DTYPE, Additions, Course
 from adv2e.effects.hooks import Frames, Hooks, Times, View
-from adv2e.errors import Adv2eError, DataError
-from adv2e.events import EVENT_DTYPE, Events, empty_events
+from adv2e.errors import Adv2eError, ConfigError, DataError
+from adv2e.events import EVENT_DTYPE, Events
 
 Array = NDArray[Any]
 
@@ -89,8 +90,33 @@ def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
     return Additions(
         longest_step_us=partial(_shortest_us, timed),
         inject=partial(_injected, injecting) if injecting else None,
+        cause=_cause_of_signal(hooks),
         **courses,
     )
+
+
+def _cause_of_signal(hooks: Sequence[Hooks]) -> int:
+    """Return the cause of events by what the effects add to the signal."""
+    return OWN_EFFECT if any(map(_is_own, _adding(hooks))) else FRAME_COUPLING
+
+
+def check_causes(hooks: Sequence[Hooks]) -> None:
+    """Raise ConfigError where causes cannot be told: effects of ours and of others in one sum."""
+    own = [hook for hook in _adding(hooks) if _is_own(hook)]
+    if own and len(own) < len(_adding(hooks)):
+        raise ConfigError(
+            f"causes: readout.frame_coupling and the effect {own[0].name} both add to the signal,"
+            " so their events cannot be told apart: switch one of them off"
+        )
+
+
+def _adding(hooks: Sequence[Hooks]) -> list[Hooks]:
+    return [hook for hook in hooks if overrides(hook, "signal")]
+
+
+def _is_own(hook: Hooks) -> bool:
+    """Tell whether an effect is the user's own."""
+    return not type(hook).__module__.startswith("adv2e.")
 
 
 def _shortest_us(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> float:
@@ -160,22 +186,29 @@ def _injection_complaint(found: Array, start_s: float, stop_s: float, view: View
     return None
 
 
-def map_events(hooks: Iterable[Hooks], chunks: Iterable[Events]) -> Iterator[Events]:
-    """Yield the events that leave the last of the effects: one array at least."""
+def map_events(
+    hooks: Iterable[Hooks], chunks: Iterable[Events], causes: bool = False
+) -> Iterator[Events]:
+    """Yield the events that leave the last of the effects: one array at least.
+
+    With `causes`, all know theirs: what an effect returns without is its own.
+    """
     chunks = iter(chunks)
     for hook in hooks:
         if overrides(hook, "events"):
-            chunks = _events(hook, chunks)
+            chunks = _events(hook, chunks, CAUSED_DTYPE if causes else EVENT_DTYPE)
     return chunks
 
 
-def _events(hook: Hooks, chunks: Iterator[Events]) -> Iterator[Events]:
+def _events(hook: Hooks, chunks: Iterator[Events], dtype: np.dtype[Any]) -> Iterator[Events]:
     last, nothing = -np.inf, True
     source = _Watched(chunks)
     with blamed(hook, source):
-        for events in hook.events(source):
-            if not isinstance(events, np.ndarray) or events.dtype != EVENT_DTYPE:
+        for made in hook.events(source):
+            if not isinstance(made, np.ndarray) or made.dtype not in (EVENT_DTYPE, dtype):
                 raise DataError(f"effect {hook.name}: events: must yield arrays of EVENT_DTYPE")
+            events = made if made.dtype == dtype else with_cause(made, OWN_EFFECT)
+            del made
             if events.size:
                 times = events["t"]
                 if times[0] < last or np.any(times[1:] < times[:-1]):
@@ -185,7 +218,7 @@ def _events(hook: Hooks, chunks: Iterator[Events]) -> Iterator[Events]:
             yield events
             del events  # or they would stay while the next ones are made
     if nothing:
-        yield empty_events()
+        yield np.empty(0, dtype)
 
 
 class _Watched:
@@ -216,10 +249,9 @@ def blamed(hook: Hooks, source: _Watched | None = None) -> Iterator[None]:
     except Adv2eError:
         raise
     except Exception as error:
-        own = type(hook).__module__
-        if own.startswith("adv2e.") or (source is not None and error is source.error):
+        if not _is_own(hook) or (source is not None and error is source.error):
             raise
-        file = str(getattr(sys.modules.get(own), "__file__", ""))
+        file = str(getattr(sys.modules.get(type(hook).__module__), "__file__", ""))
         lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
         where = f"{file}:{lines[-1]}: " if lines else ""
         text = " ".join(str(error).split())

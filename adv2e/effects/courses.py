@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.causes import FRAME_COUPLING
+
 LONGEST_US = 100.0
 """Longest step in which the circuit is solved, and courses are followed unless they say more."""
 
@@ -49,6 +51,8 @@ class Additions:
         Factors on the thresholds, above 0.
     inject : Injection, optional
         Events that fire whenever their pixel is not in its dead time, as those of hot pixels do.
+    cause : int
+        That of events by `signal`.
     """
 
     longest_step_us: StepLimit
@@ -58,3 +62,4 @@ class Additions:
     on: Course | None = None
     off: Course | None = None
     inject: Injection | None = None
+    cause: int = FRAME_COUPLING

@@ -20,18 +20,20 @@ class InOrder:
     """Hands events on in order; those at and after the time up to which all are known wait."""
 
     def __init__(self) -> None:
-        self._held = empty_events()
+        self._held: Events | None = None
 
     def add(self, events: Events, end_us: int) -> Iterator[Events]:
         """Yield what is in its place for good once `events` are in.
 
         Parameters
         ----------
-        events : (n,) array of EVENT_DTYPE
+        events : (n,) array
             Sorted; none before the `end_us` of the last call.
         end_us : int
             No event before this time will come any more [us].
         """
+        if self._held is None:
+            self._held = events[:0]
         if self._held.size:
             split = _before(events, int(self._held["t"].max()) + 1)
             border = sort_events(np.concatenate([self._held, events[:split]]))
@@ -48,5 +50,6 @@ class InOrder:
 
     def rest(self) -> Events:
         """Return the events still held."""
-        rest, self._held = self._held, empty_events()
+        rest = empty_events() if self._held is None else self._held
+        self._held = rest[:0]
         return rest

@@ -13,7 +13,7 @@ and what they share:
 
 ``circuit``         the record of the circuit; ``per_pixel`` what is kept of each pixel
 ``first_state``     what differs from pixel to pixel before the first frame
-``comparator``      when a level counts as reached, and how an event fires
+``comparator``      when a level counts as reached, and how an event fires; ``causes`` says why
 ``leak``, ``noise``  what leak takes from the reference; events that come by themselves
 ``quadrature``      Gauss rules for the lag at the end of an interval, or of a dead time
 ``special``         exponential and logarithm that vectorise and give the same bits everywhere

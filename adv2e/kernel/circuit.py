@@ -41,4 +41,6 @@ class Circuit(NamedTuple):
     hot_rate: float  # events of a hot pixel a us
     noise_rms: float  # photoreceptor noise
     noise_step: float
+    causes: bool  # whether events know their causes
+    added: int  # cause of events by what is added to the signal
     seed: np.uint64

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 
+from adv2e.causes import HOT_PIXEL, SHOT_NOISE, SIGNAL
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel, rng
 
-NONE, SHOT, HOT = 0, 1, 2
-"""Kinds of noise events."""
+NONE, SHOT, HOT = SIGNAL, SHOT_NOISE, HOT_PIXEL
+"""Kinds of noise events: their causes."""
 
 
 @inlined

@@ -5,7 +5,7 @@ from __future__ import annotations
 NEVER = 1e300
 """Time of what does not happen [us]."""
 
-ROWS = 17
+ROWS = 22
 
 (
     X,  # log intensity at the last frame
@@ -25,4 +25,10 @@ ROWS = 17
     FIRST,  # signal behind the first pole, as the stepped solver keeps it
     SECOND,  # the same behind the second pole
     BEYOND,  # where the reference goes beyond the signal at the end of the dead time
+    # for the causes of events alone: see adv2e.kernel.causes
+    RESET,  # the reference as it was at its reset, NEVER in the dead time
+    RESET_LIGHT,  # and what it was made of: signal by the light alone,
+    RESET_NOISE,  # photoreceptor noise,
+    RESET_ADDED,  # what is added to the signal
+    SEEN,  # photoreceptor noise as the comparator sees it
 ) = range(ROWS)

@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from adv2e.causes import SIGNAL
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, screen
+from adv2e.kernel.causes import cause_by_leak, note_reset
 from adv2e.kernel.comparator import TIE, fire
 from adv2e.kernel.lanes.exchange import EARLY, log_of, watch
 from adv2e.kernel.leak import fill_falls
@@ -158,6 +160,8 @@ def _solve(
                 break
             reference = x + fall * s
             state[per_pixel.HOLD, i] = -1.0
+            if circuit.causes:
+                state[per_pixel.RESET, i] = x
         kind, t_end, s_end = NONE, ta + length, 1.0
         if noise < ta + length:
             kind, t_end = noise_within(i, ta + s * length, ta + length, circuit, state)
@@ -165,12 +169,13 @@ def _solve(
             if kind != NONE:
                 s_end = max(s, (t_end - ta) / length)
         away = x - reference
-        polarity, level = 0, 0.0
+        polarity, level, cause = 0, 0.0, kind
         if away + fall * s_end >= on:
             polarity, level = 1, state[per_pixel.ON, i]
             s = max(s, min(s_end, (on - away) / fall if fall > 0.0 else 0.0))
+            cause = cause_by_leak(i, polarity, reference - fall * s, circuit, state)
         elif away + fall * s <= -off:
-            polarity, level = -1, -state[per_pixel.OFF, i]
+            polarity, level, cause = -1, -state[per_pixel.OFF, i], SIGNAL
         elif kind == NONE:
             break
         else:
@@ -181,7 +186,7 @@ def _solve(
                 continue
             level = away + fall * s
         when = ta + s * length
-        n = fire(i, when, polarity, t_base, circuit, state, keys, times, n)
+        n = fire(i, when, polarity, cause, t_base, circuit, state, keys, times, n)
         if circuit.leak_jitter > 0.0:
             fall_of_block(i, k, 1, 1.0, circuit, state, falls, means)
             strip[screen.FALL + k] = falls[k]
@@ -192,6 +197,7 @@ def _solve(
             state[per_pixel.HOLD, i] = when + circuit.dead_time
         else:
             reference += level
+        note_reset(i, reference - fall * s, circuit, state)
     state[per_pixel.REFERENCE, i] = reference - fall
     strip[screen.LAG_1 + k] = 0.0
     watch(k, i, x, start, circuit, state, strip)

@@ -117,7 +117,9 @@ class Intervals:
         ahead = 1 if self._printed else 0
         for instant in self._cut(self._checked(frames)):
             self._instants.append(instant)
-            if len(self._instants) > self._size + ahead:
+            # the times of a part must not grow out of a packed event either
+            long = instant.t_ns - self._instants[0].t_ns > LONGEST_S * 10**9
+            if len(self._instants) > (1 if long else self._size) + ahead:
                 yield self._part(len(self._instants) - 1 - ahead)
                 self._drop(len(self._instants) - 1 - ahead)
         if len(self._instants) > 1:

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.background import default_threads
+from adv2e.causes import CAUSE_BITS, CAUSED_DTYPE, FRAME_COUPLING
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.courses import Additions
 from adv2e.errors import DataError
-from adv2e.events import Events, empty_events
+from adv2e.events import EVENT_DTYPE, Events
 from adv2e.kernel import exact
 from adv2e.kernel import packing as order
 from adv2e.kernel.frames import Frames, frames_of
@@ -66,6 +67,8 @@ class PixelArray:
         How the circuit is solved: the fastest way that covers it, or in steps of time.
     coarseness : Coarseness
         Of those steps, where some us of precision may go for speed.
+    causes : bool
+        Events are of CAUSED_DTYPE: they know why they came.
 
     Raises
     ------
@@ -87,6 +90,7 @@ class PixelArray:
         additions: Additions | None = None,
         method: str = "auto",
         coarseness: Coarseness = PRECISE,
+        causes: bool = False,
     ) -> None:
         self.rows, self.columns = first.shape
         self.pixels = self.rows * self.columns
@@ -100,7 +104,8 @@ class PixelArray:
                 f"{self.columns}x{self.rows} pixels: at most {1 << PIXEL_BITS} are supported"
             )
         self.origin_us = t_ns // 1000
-        self.circuit = make_circuit(pixel, sampling, seed)
+        added = FRAME_COUPLING if additions is None else additions.cause
+        self.circuit = make_circuit(pixel, sampling, seed, causes, added)
         self.threads = default_threads() if threads is None else max(1, threads)
         self.started = False
         start = self._relative(t_ns)
@@ -138,7 +143,8 @@ class PixelArray:
         """
         before = np.arange(-1, frames.shape[0] - 1)
         part = Part(frames, before, np.ones(before.size, np.float32), times_ns, last)
-        return np.concatenate([empty_events(), *self.advance_part(part, None, pool)])
+        nothing = np.empty(0, CAUSED_DTYPE if self.circuit.causes else EVENT_DTYPE)
+        return np.concatenate([nothing, *self.advance_part(part, None, pool)])
 
     def advance_part(
         self, part: Part, table: NDArray[np.float32] | None, pool: ThreadPoolExecutor | None
@@ -151,12 +157,13 @@ class PixelArray:
         starts = np.array([self._relative(t) for t in part.times_ns])
         span = starts[-1] - starts[0]
         t_base = math.floor(starts[0]) - 1
-        if span >= pack_limit_us() // 2:
+        bits = CAUSE_BITS if self.circuit.causes else 0
+        if span >= (pack_limit_us() >> bits) // 2:
             raise DataError(
                 f"{span / 1e6:.0f} s between frames: too long; are their times in another unit?"
             )
         frames = frames_of(part.frames, table)
-        per_us = order.SLICES / (span + 2.0)
+        per_us = order.SLICES / (span + 2.0) / (1 << bits)
         parted: list[Parted] = []
         for how in self._solutions(part, frames, starts):
             arguments = (
@@ -166,7 +173,8 @@ class PixelArray:
             parted += self._by_tiles(arguments, per_us, pool)
         self.started = True
         self._keep_times(parted)
-        yield from in_order(parted, self.columns, self.origin_us + t_base, pool)
+        t0_us = self.origin_us + t_base
+        yield from in_order(parted, self.columns, t0_us, pool, self.circuit.causes)
 
     def _solutions(
         self, part: Part, frames: Frames, starts: NDArray[Any]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from adv2e.causes import FRAME_COUPLING
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.courses import Additions
 from adv2e.effects.pixel.low_pass import UPDATES
@@ -20,8 +21,13 @@ METHODS = ("auto", "stepped")
 """How the circuit is solved: by the fastest way that covers it, or in steps of time."""
 
 
-def make_circuit(pixel: Pixel, sampling: Sampling, seed: int) -> Circuit:
-    """Return what the compiled code needs of the configuration; rates a us, corners in rad a us."""
+def make_circuit(
+    pixel: Pixel, sampling: Sampling, seed: int, causes: bool = False, added: int = FRAME_COUPLING
+) -> Circuit:
+    """Return what the compiled code needs of the configuration; rates a us, corners in rad a us.
+
+    With `causes`, events know theirs; `added` is that of what is added to the signal.
+    """
     low_pass, follower, leak = pixel.low_pass, pixel.source_follower, pixel.leak
     knee_dn = pixel.log_response.linear_below
     corner = 2.0 * math.pi * _PER_US
@@ -54,6 +60,8 @@ def make_circuit(pixel: Pixel, sampling: Sampling, seed: int) -> Circuit:
         ),
         noise_rms=noise.rms if noise else 0.0,
         noise_step=noise.step if noise else 0.1,
+        causes=causes,
+        added=added,
         seed=rng.key_of(seed),
     )
 

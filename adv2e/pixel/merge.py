@@ -8,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.events import EVENT_DTYPE, Events
+from adv2e.causes import CAUSE_BITS, CAUSED_DTYPE, with_cause
+from adv2e.events import EVENT_DTYPE, Events, empty_events
 from adv2e.kernel import packing as order
 
 _SORTED = 1 << 15
@@ -40,11 +41,15 @@ class Parted:
 
 
 def in_order(
-    parted: Sequence[Parted], columns: int, t0_us: int, pool: ThreadPoolExecutor | None
+    parted: Sequence[Parted],
+    columns: int,
+    t0_us: int,
+    pool: ThreadPoolExecutor | None,
+    causes: bool = False,
 ) -> Iterator[Events]:
     """Yield the events of all tiles, sorted, not many more than a million at a time.
 
-    Packed times count from `t0_us`.
+    Packed times count from `t0_us`.  With `causes`, their numbers are the last bits.
     """
     ends = np.sum([tile.ends for tile in parted], axis=0)
     first = 0
@@ -52,7 +57,7 @@ def in_order(
         last = first + 1
         while last < order.SLICES and ends[last + 1] - ends[first] <= _YIELDED:
             last += 1
-        yield _sorted_slices(parted, columns, t0_us, ends, first, last, pool)
+        yield _sorted_slices(parted, columns, t0_us, ends, first, last, pool, causes)
         first = last
 
 
@@ -64,10 +69,11 @@ def _sorted_slices(
     first: int,
     last: int,
     pool: ThreadPoolExecutor | None,
+    causes: bool,
 ) -> Events:
     """Return the sorted events of the slices first..last."""
     begin = ends[first]
-    events = np.empty(int(ends[last] - begin), EVENT_DTYPE)
+    events = np.empty(int(ends[last] - begin), CAUSED_DTYPE if causes else EVENT_DTYPE)
     # as many slices at a time as sort in cache
     borders = [first]
     for s in range(first + 1, last + 1):
@@ -77,7 +83,13 @@ def _sorted_slices(
     def sort(lo: int, hi: int) -> None:
         keys = np.concatenate([tile.of(lo, hi) for tile in parted])
         keys.sort()
-        order.unpack(keys, columns, t0_us, events[ends[lo] - begin : ends[hi] - begin])
+        of = slice(ends[lo] - begin, ends[hi] - begin)
+        if causes:
+            plain = empty_events(keys.size)
+            order.unpack(keys >> CAUSE_BITS, columns, t0_us, plain)
+            events[of] = with_cause(plain, keys & ((1 << CAUSE_BITS) - 1))
+        else:
+            order.unpack(keys, columns, t0_us, events[of])
 
     list((pool.map if pool else map)(sort, borders[:-1], borders[1:]))
     return events

@@ -62,6 +62,7 @@ def initial_state(
         fill_first_noise(seed, circuit.noise_rms, state[per_pixel.NOISE])
     if stepping is not None:
         _rest_poles(state, circuit, stepping)
+    reset = state[per_pixel.REFERENCE].copy() if circuit.causes else None
     leaks = circuit.leak > 0 or circuit.photo_leak > 0
     if leaks and pixel.initial_reference == RUNNING:
         level = np.ones(first.size)
@@ -70,7 +71,31 @@ def initial_state(
         fill(fill_running, circuit, start, light, level, state)
     elif circuit.leak_jitter > 0:
         fill_first_factors(seed, circuit.leak_jitter, state[per_pixel.LEAK_FACTOR])
+    if reset is not None:
+        _note_resets(state, circuit, stepping, reset)
     return state
+
+
+def _note_resets(
+    state: NDArray[np.float64],
+    circuit: Circuit,
+    stepping: Stepping | None,
+    reference: NDArray[np.float64],
+) -> None:
+    """Fill the rows that causes follow from; `reference`: without what leak has done before.
+
+    Where references are random, the light has moved from there.
+    """
+    seen = state[per_pixel.SEEN]
+    seen[:] = state[per_pixel.NOISE]
+    added = 0.0 if stepping is None else stepping.first_signal()
+    state[per_pixel.RESET_LIGHT] = reference - seen - added
+    state[per_pixel.RESET_NOISE] = seen
+    state[per_pixel.RESET_ADDED] = added
+    began = state[per_pixel.REFERENCE] != reference  # a cycle, by a reset
+    beyond = np.where(began, circuit.overshoot * state[per_pixel.ON], 0.0)
+    held = state[per_pixel.HOLD] >= 0.0
+    state[per_pixel.RESET] = np.where(held, per_pixel.NEVER, reference + beyond)
 
 
 def _rest_poles(state: NDArray[np.float64], circuit: Circuit, stepping: Stepping) -> None:

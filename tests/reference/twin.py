@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -128,6 +129,7 @@ def exact_lines(
         return w * (x - y), follower * ((y if filtered else x) + n - z)
 
     y, z = samples[0], samples[0]
+    seen = noise.at(at[0]) if not follower else noise.zero  # as the comparator sees it
     if not follower:
         z = y + noise.at(at[0])
     for x0, x1, t0, t1 in zip(samples[:-1], samples[1:], at[:-1], at[1:], strict=True):
@@ -145,12 +147,14 @@ def exact_lines(
             dy2, dz2 = slopes(y + 0.5 * h * dy1, z + 0.5 * h * dz1, xm, wm, nm)
             dy3, dz3 = slopes(y + 0.5 * h * dy2, z + 0.5 * h * dz2, xm, wm, nm)
             dy4, dz4 = slopes(y + h * dy3, z + h * dz3, xb, wb, nb)
-            before = z
+            before, seen_before = z, seen
             y = y + h / 6 * (dy1 + 2 * dy2 + 2 * dy3 + dy4)
             z = z + h / 6 * (dz1 + 2 * dz2 + 2 * dz3 + dz4)
             if not follower:
-                z = (y if filtered else xb) + nb
-            yield Line(ta, tb, before, z, lights[2 * k], lights[2 * k + 2])
+                z, seen = (y if filtered else xb) + nb, nb
+            elif noise.paths is not None:
+                seen = ramp_response(seen, na, nb, follower * h)
+            yield Line(ta, tb, before, z, lights[2 * k], lights[2 * k + 2], seen_before, seen)
 
 
 def stepped_lines(
@@ -161,14 +165,45 @@ def stepped_lines(
     if fixed_point:
         y = paper_gain(corner_of(light_of(y, circuit), circuit) * (at[1] - at[0])) * y
     z = y if circuit.follower_hz else y + noise.at(at[0])
+    seen = noise.zero if circuit.follower_hz else noise.at(at[0])
     for x0, x1, t0, t1 in zip(samples[:-1], samples[1:], at[:-1], at[1:], strict=True):
-        drive, before = y + noise.at(t0), z
+        drive, before, seen_before = y + noise.at(t0), z, seen
         y = stepped(y, x0, x1, t1 - t0, circuit)
-        z = y + noise.at(t1)
+        z, seen = y + noise.at(t1), noise.at(t1)
         if circuit.follower_hz:
             a = 2 * math.pi * circuit.follower_hz * (t1 - t0)
             z = ramp_response(before, drive, z, a)
-        yield Line(t0, t1, before, z, light_of(x0, circuit), light_of(x1, circuit))
+            seen = ramp_response(seen_before, noise.at(t0), seen, a)
+        lights = light_of(x0, circuit), light_of(x1, circuit)
+        yield Line(t0, t1, before, z, *lights, seen_before, seen)
+
+
+def run_twin(
+    light: ArrayLike,
+    times: ArrayLike,
+    circuit: Circuit,
+    draws: Draws | None = None,
+    *,
+    step_us: float = 2.0,
+    fixed_point: bool = False,
+    tie: float = TIE,
+) -> Comparator:
+    """Return the comparator after all; see `simulate_twin`."""
+    draws = draws or Draws()
+    x = log_of(light, circuit)
+    samples, at = continuity_samples(x, np.asarray(times, np.float64), circuit)
+    noise = Noise(draws, x.shape[1])
+    if circuit.update == "exact":
+        lines = exact_lines(samples, at, noise, step_us, circuit)
+    else:
+        lines = stepped_lines(samples, at, noise, fixed_point, circuit)
+    comparator = None
+    for line in lines:
+        if comparator is None:
+            comparator = Comparator(line, circuit, draws, tie)
+        comparator.follow(line)
+    assert comparator is not None
+    return comparator
 
 
 def simulate_twin(
@@ -203,18 +238,20 @@ def simulate_twin(
     per pixel, (events, 2)
         Time [s] and polarity, 1 or -1.
     """
-    draws = draws or Draws()
-    x = log_of(light, circuit)
-    samples, at = continuity_samples(x, np.asarray(times, np.float64), circuit)
-    noise = Noise(draws, x.shape[1])
-    if circuit.update == "exact":
-        lines = exact_lines(samples, at, noise, step_us, circuit)
-    else:
-        lines = stepped_lines(samples, at, noise, fixed_point, circuit)
-    comparator = None
-    for line in lines:
-        if comparator is None:
-            comparator = Comparator(line.signal_start, circuit, draws, tie)
-        comparator.follow(line)
-    assert comparator is not None
+    options = {"step_us": step_us, "fixed_point": fixed_point, "tie": tie}
+    return events_of(run_twin(light, times, circuit, draws, **options))
+
+
+def events_of(comparator: Comparator) -> list[Array]:
+    """Return the events of every pixel, (events, 2)."""
     return [np.array(e, np.float64).reshape(-1, 2) for e in comparator.events]
+
+
+def moves_of_twin(*arguments: Any, **options: Any) -> tuple[list[Array], list[Array]]:
+    """Return what `simulate_twin` does, and what moved each event's pixel since its reset.
+
+    The latter, per pixel, (events, 3): see :class:`reference.twin_comparator.Moves`.
+    """
+    comparator = run_twin(*arguments, **options)
+    moves = [np.array(m, np.float64).reshape(-1, 3) for m in comparator.moves]
+    return events_of(comparator), moves

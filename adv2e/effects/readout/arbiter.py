@@ -30,6 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.causes import has_causes, with_cause
 from adv2e.effects.hooks import Hooks, View
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.events import Events, make_events, pixels_of, sort_events
@@ -91,29 +92,36 @@ class ArbiterHooks(Hooks):
 
     def _served(self, events: Events, known_us: float) -> Events:
         """Return what leaves the channel before `known_us`, in that order."""
-        asking_us, pixel, polarity = self._requests(events)
+        asking_us, pixel, what = self._requests(events)
         most = events.size + int(self._channel[EVENTS])
         times, pixels = np.empty(most), np.empty(most, np.int64)
-        polarities = np.empty(most, np.int8)
+        served = np.empty(most, np.int8)
         p = self.parameters
         count = serve(
-            asking_us, pixel, polarity, known_us, p.row_ns * 1e-3, p.event_ns * 1e-3,
+            asking_us, pixel, what, known_us, p.row_ns * 1e-3, p.event_ns * 1e-3,
             self.view.columns, self._channel, self._queue, self._asked, self._waiting, self._left,
-            times, pixels, polarities,
+            times, pixels, served,
         )  # fmt: skip
         stamps = np.rint(times[:count]).astype(np.int64) + self._origin_us
         y, x = np.divmod(pixels[:count], self.view.columns)
-        return make_events(stamps, x, y, polarities[:count])
+        sent = make_events(stamps, x, y, served[:count] & 1)
+        return with_cause(sent, served[:count] >> 1) if has_causes(events) else sent
 
     def _requests(
         self, events: Events
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int8]]:
-        """Return when the events ask [us], in order, and their pixels and polarities."""
+        """Return when the events ask [us], in order, their pixels, and what they are.
+
+        That is the polarity and, above its bit, the cause.
+        """
         pixels = pixels_of(events, self.view.columns)
         drawn = rng.next_uniforms(self.view.seed, rng.REQUEST, pixels, self._numbers)
         asking_us = (events["t"] - self._origin_us) + (drawn - 0.5)
         order = np.argsort(asking_us, kind="stable")
-        return asking_us[order], pixels[order], events["p"].astype(np.int8)[order]
+        what = events["p"].astype(np.int8)
+        if has_causes(events):
+            what |= events["cause"].astype(np.int8) << 1
+        return asking_us[order], pixels[order], what[order]
 
 
 _FAR_US = np.iinfo(np.int64).max

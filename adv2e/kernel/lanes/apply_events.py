@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel
+from adv2e.kernel.causes import cause_by_leak, note_reset
 from adv2e.kernel.comparator import TIE, fire
 from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.pieces import fallen_at_place
@@ -91,11 +92,20 @@ def release(count, length, circuit, rule, lanes):
         lanes[rows.SEEKS + j] = rows.READY if waits else seeks
 
 
+@kernel
+def note_releases(lo, count, pixels, state, lanes):
+    """Keep the references that lanes took at the end of their dead times."""
+    for j in range(count):
+        i = lo + pixels[j]
+        if state[per_pixel.RESET, i] == per_pixel.NEVER and lanes[rows.HOLD + j] < 0.0:
+            state[per_pixel.RESET, i] = lanes[rows.REFERENCE + j] - lanes[rows.FALLEN_S + j]
+
+
 @inlined
-def fire_lane(i, j, when, polarity, t_base, circuit, state, lanes, keys, times, n):
+def fire_lane(i, j, when, polarity, cause, t_base, circuit, state, lanes, keys, times, n):
     """Write an event of pixel i, in lane j, where the lane is; returns the number of events."""
     before = state[per_pixel.LEAK_FACTOR, i]
-    n = fire(i, when, polarity, t_base, circuit, state, keys, times, n)
+    n = fire(i, when, polarity, cause, t_base, circuit, state, keys, times, n)
     if circuit.leak_jitter > 0.0:
         _change_leak(j, 1.0 / before * state[per_pixel.LEAK_FACTOR, i], lanes)
     return n
@@ -122,5 +132,10 @@ def fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n):
         event = lanes[rows.EVENT + j]
         if event != 0.0:
             i, when = lo + pixels[j], lanes[rows.WHEN + j]
-            n = fire_lane(i, j, when, event, t_base, circuit, state, lanes, keys, times, n)
+            after = lanes[rows.REFERENCE + j] - lanes[rows.FALLEN_S + j]
+            level = lanes[rows.ON + j] if event > 0.0 else -lanes[rows.OFF + j]
+            before = after if circuit.dead_time > 0.0 else after - level
+            cause = cause_by_leak(i, event, before, circuit, state)
+            note_reset(i, after, circuit, state)
+            n = fire_lane(i, j, when, event, cause, t_base, circuit, state, lanes, keys, times, n)
     return n

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from adv2e.compiled import kernel
 from adv2e.kernel.lanes import rows
-from adv2e.kernel.lanes.apply_events import cross, fire_found, release
+from adv2e.kernel.lanes.apply_events import cross, fire_found, note_releases, release
 from adv2e.kernel.lanes.exchange import sort_out
 from adv2e.kernel.lanes.next_target import choose
 from adv2e.kernel.lanes.pieces import next_piece, open_piece
@@ -45,6 +45,8 @@ def decide(
     while True:
         if waiting > 0:
             release(whole(waiting), length, circuit, rule, lanes)
+            if circuit.causes:
+                note_releases(lo, waiting, pixels, state, lanes)
         choose(whole(m), ta, length, circuit, lanes)
         for j in range(m):
             seeks = lanes[rows.SEEKS + j]

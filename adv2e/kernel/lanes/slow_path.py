@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel
+from adv2e.kernel.causes import note_reset
 from adv2e.kernel.comparator import TIE
 from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.apply_events import fire_lane
@@ -143,9 +144,10 @@ def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
     if polarity == 0:
         return n, False
     when = ta + lanes[rows.S + j] * length
-    n = fire_lane(i, j, when, polarity, t_base, circuit, state, lanes, keys, times, n)
+    n = fire_lane(i, j, when, polarity, kind, t_base, circuit, state, lanes, keys, times, n)
     lanes[rows.REFERENCE + j] += lanes[rows.AWAY_S + j]
     lanes[rows.AWAY_S + j] = 0.0
+    note_reset(i, lanes[rows.REFERENCE + j] - lanes[rows.FALLEN_S + j], circuit, state)
     return n, True
 
 

@@ -95,6 +95,8 @@ def _open(lo, count, n, circuit, run, injected, state, strip):
             strip[rows.SECOND + k] if circuit.follower > 0.0 else strip[rows.INPUT1 + k]
         )
         strip[rows.REFERENCE + k] = state[per_pixel.REFERENCE, i]
+        if circuit.causes:
+            strip[rows.SEEN + k] = state[per_pixel.SEEN, i]
         strip[rows.LEAK_ON + k] = state[per_pixel.ON, i] * (
             state[per_pixel.LEAK_FACTOR, i] if jitter else 1.0
         )
@@ -117,6 +119,8 @@ def _close(lo, count, draw, circuit, state, strip):
         if circuit.noise_rms > 0.0:
             state[per_pixel.NOISE, i] = strip[rows.NOISE + k]
             state[per_pixel.NOISE_DRAW, i] = draw
+            if circuit.causes:
+                state[per_pixel.SEEN, i] = strip[rows.SEEN + k]
 
 
 @kernel
@@ -160,6 +164,8 @@ def _take_piece(n, p, pieces, strip):
 @kernel
 def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, second, normals, strip):
     """Signal of a strip over step m of a run, of h us, that ends at `share` of its piece."""
+    if circuit.causes:
+        signal.keep_parts(n, strip)
     if circuit.update == EXACT:
         signal.advance_light(n, share, half, circuit, strip)
     else:
@@ -183,6 +189,8 @@ def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, second, norm
         if draw % 4 == 0 or m == 0:
             rng.normals_of_four(circuit.seed, rng.PHOTORECEPTOR_STEPS, lo, n, draw // 4, normals)
         signal.add_noise(n, circuit.noise_rms, normals[draw % 4], strip)
+        if circuit.causes:
+            signal.see_noise(n, circuit.follower > 0.0, second, strip)
     else:
         signal.no_noise(n, strip)
     if circuit.follower > 0.0:

@@ -13,9 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.causes import OWN_EFFECT
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel
 from adv2e.kernel.borrowing import borrowed
+from adv2e.kernel.causes import cause_by_most, note_parts
 from adv2e.kernel.circuit import EXACT
 from adv2e.kernel.comparator import TIE, fire
 from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
@@ -27,7 +29,7 @@ _NEWTON = 50
 _NOWHERE = 2.0
 _STRAIGHT = 1e-14
 """Curvature over slope that rounding gives a line."""
-INJECTED = 3
+INJECTED = OWN_EFFECT
 """Kind of an event from outside, beside those of noise."""
 
 
@@ -219,6 +221,14 @@ def _take_due(i, kind, light, circuit, injected, state):
 
 
 @kernel
+def _parts(k, s, signal, strip):
+    """Return the parts of the signal of pixel k at s: by the light, by noise, and what is added."""
+    noise = strip[rows.SEEN0 + k] + (strip[rows.SEEN + k] - strip[rows.SEEN0 + k]) * s
+    added = strip[rows.ADDED0 + k] + (strip[rows.ADDED + k] - strip[rows.ADDED0 + k]) * s
+    return signal - noise - added, noise, added
+
+
+@kernel
 def fire_step(
     k, i, ta, h, leak, levels, share, t_base, circuit, injected, state, strip, keys, times, n
 ):  # fmt: skip
@@ -247,6 +257,9 @@ def fire_step(
         reference = _at(c0, c1, c2, c3, s) + factor * _at(0.0, l1, l2, l3, s)
         reference += state[per_pixel.BEYOND, i]
         state[per_pixel.HOLD, i] = -1.0
+        if circuit.causes:
+            now = reference - factor * _at(0.0, l1, l2, l3, s)
+            note_parts(i, now, *_parts(k, s, _at(c0, c1, c2, c3, s), strip), state)
     whole = True
     while True:
         if n == keys.shape[0]:
@@ -276,8 +289,12 @@ def fire_step(
             if polarity == 0:
                 s = s_end
                 continue
-        t = ta + s_event * h
-        n = fire(i, t, polarity, t_base, circuit, state, keys, times, n)
+        t, cause = ta + s_event * h, kind
+        if circuit.causes and signal_event:
+            now = reference - factor * _at(0.0, l1, l2, l3, s_event)
+            light, noise, added = _parts(k, s_event, _at(c0, c1, c2, c3, s_event), strip)
+            cause = cause_by_most(i, polarity, now, light, noise, added, circuit, state)
+        n = fire(i, t, polarity, cause, t_base, circuit, state, keys, times, n)
         before = factor
         factor = state[per_pixel.LEAK_FACTOR, i] if jitter else 1.0
         s = s_event
@@ -296,6 +313,9 @@ def fire_step(
             level *= on0 + (on1 - on0) * s if polarity > 0 else off0 + (off1 - off0) * s
             reference += level * (1.0 + circuit.overshoot)
             reference += (factor - before) * _at(0.0, l1, l2, l3, s)
+        if circuit.causes:
+            now = reference - factor * _at(0.0, l1, l2, l3, s)
+            note_parts(i, now, *_parts(k, s, _at(c0, c1, c2, c3, s), strip), state)
     strip[rows.REFERENCE + k] = reference - factor * fallen
     strip[rows.LEAK_ON + k] = factor * on_level
     if whole:

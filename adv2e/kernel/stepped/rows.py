@@ -51,12 +51,17 @@ _PADDED = WIDTH + 24  # rows must not share cache sets
     DUE,  # when something happens whatever the signal does [us]
     FROM,  # part of the step that is over
     HIT,
-) = range(0, 37 * _PADDED, _PADDED)
+    # for the causes of events alone
+    NOISE0,  # photoreceptor noise at the start of the step
+    SEEN0,  # the same as the comparator sees it, at the start and at the end
+    SEEN,
+    ADDED0,  # what is added to the signal, at the start
+) = range(0, 41 * _PADDED, _PADDED)
 
 
 def scratch() -> NDArray[np.float64]:
     """Return the rows of a strip."""
-    size, line = 37 * _PADDED, 8
+    size, line = 41 * _PADDED, 8
     memory = np.zeros(size + line)
     # from the start of a cache line on: where vectors cross lines, steps take an eighth longer
     first = -(memory.ctypes.data // memory.itemsize) % line

@@ -228,6 +228,26 @@ def no_noise(n, strip):
 
 
 @kernel
+def keep_parts(n, strip):
+    """Rows of the parts of the signal at the start of a step, as the end of the last one."""
+    for k in range(n):
+        strip[rows.NOISE0 + k] = strip[rows.NOISE + k]
+        strip[rows.SEEN0 + k] = strip[rows.SEEN + k]
+        strip[rows.ADDED0 + k] = strip[rows.ADDED + k]
+
+
+@kernel
+def see_noise(n, follows, weights, strip):
+    """Row SEEN: photoreceptor noise behind the second pole, if there is one."""
+    decay, w0, w1, v0, v1 = weights
+    for k in range(n):
+        before, after = strip[rows.NOISE0 + k], strip[rows.NOISE + k]
+        seen = decay * strip[rows.SEEN + k] + w0 * before + w1 * after
+        seen += (v0 + v1) * (after - before)
+        strip[rows.SEEN + k] = seen if follows else after
+
+
+@kernel
 def second_pole_weights(b, line):
     """Return what the second pole keeps, and takes of values and slopes at its input, in a step.
 
