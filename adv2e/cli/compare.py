@@ -77,15 +77,15 @@ def command(
     import numpy as np
 
     from adv2e.comparison.compare import compare
+    from adv2e.formats.frames import open_frames
     from adv2e.formats.reading import read_events
-    from adv2e.sources import open_source
 
     declared = config()
     with reading_told(measured, progress) as told:
         ours = read_events(measured, time_unit=time_unit, progress=told)
     with reading_told(simulated, progress) as told:
         theirs = read_events(simulated, time_unit=time_unit, progress=told)
-    source = open_source(frames_path) if frames_path else None
+    source = open_frames(frames_path) if frames_path else None
     for doubt in source.doubts if source else []:
         log(doubt)
     times = np.array([frame.t_ns for frame in source.frames()]) if source else None

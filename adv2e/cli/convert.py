@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
@@ -27,7 +29,8 @@ if TYPE_CHECKING:
 @click.option("--start", type=SECONDS, metavar="S", help="Begin S seconds after the first frame.")
 @click.option("--stop", type=SECONDS, metavar="S", help="Stop S seconds after the first frame.")
 @options.crop_option(
-    "Take a part of each frame only, before anything else: first column, first row, columns, rows."
+    "Take a part of each frame or sensor only, before anything else: first column, first row,"
+    " columns, rows."
 )
 @click.option(
     "--size",
@@ -43,6 +46,13 @@ if TYPE_CHECKING:
     show_default=True,
     help="Where times begin. zero: at the first frame converted. keep, auto: as on the input's own"
     " clock; if it has none, at the input's first frame.",
+)
+@click.option(
+    "--from",
+    "choice",
+    type=click.Choice(["frames", "events"]),
+    help="What to take of an INPUT that holds both: simulate its frames, or write its events in"
+    " another format.  [default: the frames of cameras' recordings; the events of other files]",
 )
 @click.option(
     "--format",
@@ -81,9 +91,10 @@ def command(
     crop: Rectangle | None,
     size: Size | None,
     t0: str,
+    choice: str | None,
     **written: Any,
 ) -> None:
-    """Turn a video or frames into events.
+    """Turn a video or frames into events, or a file of events into another format.
 
     \b
     Examples:
@@ -92,10 +103,12 @@ def command(
       adv2e convert clip.mp4 --size 346x260
       adv2e convert frames/ --fps 240 -o events.h5 --with-frames
       adv2e convert urban.zip -o urban_simulated --preview urban.mp4
+      adv2e convert clip.events.h5 -o clip.txt
 
     INPUT is a video file, a folder or a zip of images, a recording of a data set (DAVIS240C, GOPRO,
     TUM RGB-D, EuRoC, UZH-FPV) or a .npy stack of frames, grey (frames, rows, columns) or colour
-    (with a fourth axis, of 3).
+    (with a fourth axis, of 3). It may be a file of events, too: these are written in the format of
+    OUT, and nothing is simulated.
 
     Without -o, the events go to <stem>.events.h5 in the current folder. The suffix of OUT chooses
     the format:
@@ -112,14 +125,26 @@ def command(
     if given["fps"] is not None and given["time_unit"] is not None:
         raise click.UsageError("--time-unit is for lists of times, which --fps replaces: keep one")
     options.check_part(start, stop)
+    part: dict[str, Any] = {"start_s": start, "stop_s": stop, "t0": t0, "crop": crop}
+    if _takes_events(source, choice):
+        from adv2e.conversion.transfer import convert_events
+
+        del written["preview"]
+        if output is None:
+            raise click.UsageError("-o OUT is missing: say what to write the events to")
+        unit = given["time_unit"]
+        summary = convert_events(
+            source, output, size=size, time_unit=unit, threads=threads, log=log, **part, **written
+        )
+        if log.level >= 0:
+            click.echo(summary.text(), err=output == "-")
+        return
     from adv2e.compiled import import_ahead
 
     import_ahead()
     from adv2e.conversion.reading import Reading
 
-    reading = Reading(
-        source, **given, start_s=start, stop_s=stop, t0=t0, crop=crop, threads=threads
-    )
+    reading = Reading(source, **given, **part, threads=threads)
     with reading:  # it reads while all else that is needed is imported
         from adv2e.conversion.pipeline import convert_reading
 
@@ -134,3 +159,37 @@ def command(
         )
     if log.level >= 0:
         click.echo(summary.text(), err=output == "-")
+
+
+_OF_SIMULATION = (
+    *("config_files", "sets", "seed", "effect_files"),
+    *("fps", "timestamps", "allow_damaged", "preview"),
+)
+"""Options that say how frames are simulated."""
+
+
+def _takes_events(source: str, choice: str | None) -> bool:
+    """Tell whether events are to be written and nothing simulated.
+
+    Raises
+    ------
+    DataError
+        They are, and options of a simulation are given.
+    """
+    if choice is None and not registry.may_hold_events(Path(source)):
+        return False
+    from adv2e.errors import DataError
+    from adv2e.formats.frames import takes_events
+
+    if not takes_events(Path(source), choice):
+        return False
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        written = context.get_parameter_source(name) is not ParameterSource.DEFAULT
+        if name in _OF_SIMULATION and written:
+            raise DataError(
+                f"{source}: its events are written, nothing is simulated: leave out"
+                f" {parameter.opts[-1]}, or take its frames, if it has any, with --from frames"
+            )
+    return True

@@ -10,7 +10,9 @@ from pathlib import Path
 from adv2e.config import Written, files_among, load_config
 from adv2e.conversion.pipeline import Summary, convert_reading
 from adv2e.conversion.reading import Reading
+from adv2e.conversion.transfer import convert_events
 from adv2e.errors import UsageError
+from adv2e.formats.frames import takes_events
 from adv2e.geometry import parse_rectangle, parse_size
 from adv2e.sources.times.rates import Rate
 
@@ -36,13 +38,16 @@ def convert(
     preview: str | Path | None = None,
     threads: int | None = None,
     progress: bool = False,
+    take: str | None = None,
 ) -> Summary:
     """Convert a video, a folder of images or a recording to a file of events.
+
+    A file of events is written in another format, and nothing is simulated.
 
     Parameters
     ----------
     source : str or Path
-        Video, folder of images, DAVIS240C recording, or .npy stack of frames.
+        Video, folder of images, DAVIS240C recording, .npy stack of frames, or file of events.
     output : str or Path, optional
         File or folder to write; the suffix gives the format: .h5, .txt, .zip, or none for a
         DAVIS240C folder.  Default: ``<stem>.events.h5`` in the current folder.
@@ -75,6 +80,9 @@ def convert(
         Default: all cores.  The events do not depend on it.
     progress : bool
         Show a progress bar on stderr.
+    take : {'frames', 'events'}, optional
+        What to take of a source that holds both.  Default: the frames of cameras' recordings, the
+        events of other files.
 
     Returns
     -------
@@ -110,9 +118,38 @@ def convert(
         part = None if crop is None else parse_rectangle(crop)
     except ValueError as error:
         raise UsageError(f"size, crop: {error}") from None
-    ready = load_config(config, size=wanted)
+
+    def doubt(text: str) -> None:
+        warnings.warn(text, stacklevel=4)
+
     if fps is not None and timestamps is not None:
         raise UsageError("fps and timestamps both give the times of the frames: keep one")
+    if takes_events(Path(source), take):
+        simulated = {"config": config, "fps": fps, "timestamps": timestamps, "preview": preview}
+        if given := [name for name, value in simulated.items() if value is not None]:
+            raise UsageError(f"{source} holds events, nothing is simulated: leave out {given[0]}")
+        if output is None:
+            raise UsageError("output is missing: say what to write the events to")
+        summary = convert_events(
+            str(source),
+            str(output),
+            size=wanted,
+            crop=part,
+            time_unit=time_unit,
+            start_s=start_s,
+            stop_s=stop_s,
+            t0=t0,
+            format=format,
+            layout=layout,
+            with_frames=with_frames,
+            overwrite=overwrite,
+            threads=threads,
+            progress=progress,
+            log=notes.append,
+            doubt=doubt,
+        )
+        return replace(summary, notes=tuple(notes))
+    ready = load_config(config, size=wanted)
     reading = Reading(
         str(source),
         fps=fps,
@@ -138,6 +175,6 @@ def convert(
             progress=progress,
             also_read=files_among(config),
             log=notes.append,
-            doubt=lambda text: warnings.warn(text, stacklevel=4),
+            doubt=doubt,
         )
     return replace(summary, notes=tuple(notes))

@@ -51,7 +51,7 @@ BEHIND_TASKS = 1000
 
 @dataclass(frozen=True)
 class Summary:
-    """What a conversion did."""
+    """What a conversion did; `copied_from` is the file whose events were written, if any."""
 
     output: str
     width: int
@@ -62,10 +62,19 @@ class Summary:
     on: int
     seconds: float
     notes: tuple[str, ...] = ()
+    copied_from: str = ""
 
     def text(self) -> str:
         """Return the summary as two lines for people."""
         share = f"{100 * self.on / self.events:.1f} % ON" if self.events else "no events"
+        if self.copied_from:
+            frames = f" and {self.frames} frames" if self.frames else ""
+            return (
+                f"{shown(self.output)}: {self.events:,} events ({share}){frames} of"
+                f" {self.width}x{self.height} pixels, over {self.duration_s:.3f} s\n"
+                f"copied from {shown(self.copied_from)}, nothing was simulated; took"
+                f" {self.seconds:.1f} s"
+            )
         rate = self.events / self.duration_s / (self.width * self.height)
         return (
             f"{shown(self.output)}: {self.events:,} events ({share}) from {self.frames} frames of"

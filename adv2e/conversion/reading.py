@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from adv2e.background import default_threads, read_ahead
 from adv2e.effects.frames.brightness import check_floats, check_light
 from adv2e.errors import Adv2eError, DataError
+from adv2e.formats.frames import open_frames
 from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of
-from adv2e.sources import open_source
 from adv2e.sources.base import Source
 from adv2e.sources.frame import Frame
 from adv2e.sources.times.rates import Rate
@@ -162,7 +162,7 @@ class Reading:
 
     def __enter__(self) -> Reading:
         try:
-            source = self._opened = open_source(self.path, **self.given)
+            source = self._opened = open_frames(self.path, **self.given)
         except Adv2eError as error:  # the other parts of the command may be wrong, too
             self._opened = error
             return self

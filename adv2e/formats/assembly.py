@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.events import EVENT_DTYPE, Events, disorder, empty_events, sort_events, sort_ties
+from adv2e.events import (
+    EVENT_DTYPE,
+    Events,
+    disorder,
+    empty_events,
+    is_sorted,
+    sort_events,
+    sort_ties,
+)
 from adv2e.formats.event_file import Column, Columns, EventFile, Facts
 from adv2e.formats.recording import Recording
 from adv2e.sources.times.instants import seconds
@@ -73,7 +84,11 @@ def assemble(file: EventFile) -> Recording:
     events = np.concatenate(parts) if parts else empty_events()
     del parts
     facts.problems += check.problems()
-    events, width, height = _fit(events, facts)
+    size = settled_size(_needed(events), facts)
+    found = events.size
+    events = inside(events, size)
+    if events.size < found:
+        facts.problems.append(left_out(found - events.size, size, facts.stated_by))
     events = _in_order(events, facts)
     shots = list(file.shots()) if file.shots is not None else None
     times = None if shots is None else np.array([shot.t_ns for shot in shots], np.int64)
@@ -81,8 +96,8 @@ def assemble(file: EventFile) -> Recording:
     return Recording(
         path=str(facts.path),
         layout=file.layout,
-        width=width,
-        height=height,
+        width=size[0],
+        height=size[1],
         events=events,
         frame_times_ns=times,
         metadata=facts.description,
@@ -91,34 +106,48 @@ def assemble(file: EventFile) -> Recording:
     )
 
 
-def _fit(events: Events, facts: Facts) -> tuple[Events, int, int]:
-    """Settle the geometry, and leave out what lies outside."""
-    geometry, by = facts.geometry, facts.stated_by
-    if not events.size:
+def settled_size(needed: tuple[int, int] | None, facts: Facts) -> tuple[int, int]:
+    """Return width and height of the sensor, and note what is doubtful of them.
+
+    Parameters
+    ----------
+    needed : (int, int) or None
+        What the largest coordinates need; None: there are no events.
+    facts : Facts
+    """
+    stated, by = facts.geometry, facts.stated_by
+    if needed is None:
         facts.problems.append("no events")
-        return events, *(geometry or (0, 0))
-    needed = int(events["x"].max()) + 1, int(events["y"].max()) + 1
-    if geometry is None:
-        size = f"{needed[0]}x{needed[1]}"
+        return stated or (0, 0)
+    size = f"{needed[0]}x{needed[1]}"
+    if stated is None:
         facts.problems.append(f"no geometry stated: {size} from the largest coordinates")
-        return events, *needed
-    width, height = geometry
-    if needed[0] <= width and needed[1] <= height:
-        return events, width, height
-    if needed[0] <= width + 1 and needed[1] <= height + 1:
-        # a known fault of writers: the largest coordinate in place of the size
-        wider = max(width, needed[0]), max(height, needed[1])
-        facts.problems.append(
-            f"{by} states {width}x{height}, one less than the largest coordinates need:"
-            f" {wider[0]}x{wider[1]} taken"
-        )
-        return events, *wider
-    inside = (events["x"] < width) & (events["y"] < height)
+        return needed
+    wider = max(stated[0], needed[0]), max(stated[1], needed[1])
+    if wider == stated or wider[0] > stated[0] + 1 or wider[1] > stated[1] + 1:
+        return stated
+    # a known fault of writers: the largest coordinate in place of the size
     facts.problems.append(
-        f"{inside.size - np.count_nonzero(inside)} events outside {width}x{height}, which"
-        f" {by} states: left out"
+        f"{by} states {stated[0]}x{stated[1]}, one less than the largest coordinates need:"
+        f" {wider[0]}x{wider[1]} taken"
     )
-    return events[inside], width, height
+    return wider
+
+
+def inside(events: Events, size: tuple[int, int]) -> Events:
+    """Return the events on a sensor of that width and height."""
+    fits = (events["x"] < size[0]) & (events["y"] < size[1])
+    return events if fits.all() else events[fits]
+
+
+def left_out(count: int, size: tuple[int, int], by: str) -> str:
+    """Return what is told of so many events outside the sensor."""
+    return f"{count} events outside {size[0]}x{size[1]}, which {by} states: left out"
+
+
+def _needed(events: Events) -> tuple[int, int] | None:
+    """Return width and height that the largest coordinates need."""
+    return (int(events["x"].max()) + 1, int(events["y"].max()) + 1) if events.size else None
 
 
 def _in_order(events: Events, facts: Facts) -> Events:
@@ -135,6 +164,62 @@ def _in_order(events: Events, facts: Facts) -> Events:
     if repeated:
         facts.problems.append(f"{repeated} events repeat another one exactly: kept")
     return events
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What one reading of all events told that must be known before they can be passed on.
+
+    Attributes
+    ----------
+    count : int
+        Events, but for those that no sensor can have.
+    needed : (int, int) or None
+        Width and height that the largest coordinates need; None without events.
+    first_us : int
+        Time of the first event [us].
+    is_sorted : bool
+        Times never decrease.
+    """
+
+    count: int
+    needed: tuple[int, int] | None
+    first_us: int
+    is_sorted: bool
+
+
+def survey(file: EventFile) -> Survey:
+    """Read all events of a file once, and keep none."""
+    check, count, needed = Check(), 0, (0, 0)
+    first = last = None
+    in_order = True
+    for columns in file.parts():
+        events = check.events_of(columns)
+        if not events.size:
+            continue
+        count += events.size
+        here = _needed(events) or (0, 0)
+        needed = max(needed[0], here[0]), max(needed[1], here[1])
+        first = events["t"][0] if first is None else first
+        in_order &= is_sorted(events) and (last is None or bool(last <= events["t"][0]))
+        last = events["t"][-1]
+    return Survey(count, needed if count else None, int(first or 0), in_order)
+
+
+def in_order(parts: Iterable[Events]) -> Iterator[Events]:
+    """Yield events whose times never decrease, with those of one time in their order."""
+    held = empty_events()
+    for part in parts:
+        events = np.concatenate([held, part]) if held.size else part
+        # more of the last time may come
+        cut = int(np.searchsorted(events["t"], events["t"][-1])) if events.size else 0
+        done, held = events[:cut], events[cut:]
+        if done.size:
+            sort_ties(done)
+            yield done
+    if held.size:
+        sort_ties(held)
+        yield held
 
 
 def _disagreement(events: Events, times_ns: NDArray[np.int64] | None) -> list[str]:

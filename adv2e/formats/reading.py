@@ -21,14 +21,29 @@ __all__ = ["Recording", "open_events", "read_events"]
 
 
 def open_events(
-    path: str | Path, *, time_unit: str | None = None, progress: Progress | None = None
+    path: str | Path,
+    *,
+    time_unit: str | None = None,
+    progress: Progress | None = None,
+    size: tuple[int, int] | None = None,
 ) -> EventFile:
     """Open an event file, or a folder in the DAVIS240C layout; its events are not read yet.
 
-    Parameters and errors as :func:`read_events`.
+    Parameters
+    ----------
+    path, time_unit, progress
+        See :func:`read_events`.
+    size : (int, int), optional
+        Width and height [pixels] that hold whatever the file states.
+
+    Raises
+    ------
+    DataError
+        As :func:`read_events`.
     """
     path = Path(path)
     facts = Facts(path, time_unit, progress)
+    facts.state(size, "--size")
     with _reading(path):
         check_ends(path)
         if not path.exists():

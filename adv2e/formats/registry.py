@@ -174,6 +174,15 @@ def to_write(path: Path, format: str | None = None, layout: str | None = None) -
     return next(f for f in FORMATS if f.name == layout)
 
 
+def may_hold_events(path: Path) -> bool:
+    """Tell, by its name alone, whether a file or folder may be an event file."""
+    readable = (found for found in FORMATS if found.reader)
+    if path.is_dir():
+        return any(found.file and (path / found.file).is_file() for found in readable)
+    suffix = path.suffix.lower()
+    return bool(suffix) and any(suffix in found.suffixes for found in readable)
+
+
 def format_of(path: Path) -> Format:
     """Return the format of a file or folder that exists.
 

@@ -14,6 +14,7 @@ from adv2e.files.names import shown
 from adv2e.files.regular import check_ends
 from adv2e.files.zips import Members
 from adv2e.formats.reading import Recording, read_events
+from adv2e.formats.registry import may_hold_events
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
 from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
@@ -73,7 +74,7 @@ def inspect(
 
 def _has_only_frames(path: Path) -> bool:
     if path.is_dir():
-        return not (path / EVENTS).is_file()
+        return not may_hold_events(path)
     if path.suffix.lower() == ".zip":
         from adv2e.sources.zipped import images_in  # noqa: PLC0415  (needs OpenCV)
 

@@ -38,7 +38,7 @@ def timed(
     pictures: Sequence[Picture],
     path: Path,
     found: str | None,
-    read_found: Callable[[str], FrameList],
+    read_found: Callable[[str], FrameList] | None = None,
     missing: str = "",
 ) -> Timed:
     """Return the pictures at the times that the user gave, else at those found beside them.
@@ -50,7 +50,9 @@ def timed(
         All of `path`, in order.
     path : Path
     found : str or None
-        Name of the list that was found; `read_found` reads what is called so.
+        Name of the list that was found.
+    read_found : callable, optional
+        Reads what is called so; not needed where the user gave times.
     missing : str
         What was looked for.
 
@@ -69,7 +71,7 @@ def timed(
         result = _listed(listed, label, pictures, path)
         if len(result.shots) != len(pictures):
             raise _other_number(label, len(result.shots), len(pictures), path)
-    elif found is not None:
+    elif found is not None and read_found is not None:
         return _listed(read_found(found), found, pictures, path)
     else:
         raise DataError(

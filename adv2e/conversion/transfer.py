@@ -1,0 +1,307 @@
+"""Events of one file, written to another: no simulation, part by part in bounded memory.
+
+The file is read twice: first to see how large the sensor is and whether the events are in the order
+of time, then to write them.  Events out of order are sorted, for which all are kept in memory.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e import __version__
+from adv2e.conversion.pipeline import Summary
+from adv2e.conversion.versions import versions
+from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.errors import DataError
+from adv2e.events import Events
+from adv2e.files.names import shown
+from adv2e.files.staging import Staging
+from adv2e.formats import compression
+from adv2e.formats.assembly import (
+    Check,
+    assemble,
+    in_order,
+    inside,
+    left_out,
+    settled_size,
+    survey,
+)
+from adv2e.formats.event_file import EventFile, Progress
+from adv2e.formats.reading import open_events
+from adv2e.formats.registry import to_write
+from adv2e.formats.sink import Sink
+from adv2e.formats.writing import open_sink
+from adv2e.geometry import Rectangle
+from adv2e.light.pictures import picture_of, picture_white
+from adv2e.sources.frame import Pixels
+from adv2e.sources.wanted import Selection
+
+_MADE = ("adv2e", "versions", "config", "seed", "effects", "source")
+"""What a file of ours says of how its events were made, which stays true of a copy."""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Which part of a recording is wanted, and where its time begins.
+
+    Attributes
+    ----------
+    first_us, last_us : float
+        First and last time wanted, both inclusive [us].
+    origin_us : int
+        Time that becomes zero [us].
+    crop : Rectangle
+    """
+
+    first_us: float
+    last_us: float
+    origin_us: int
+    crop: Rectangle
+
+    def of(self, events: Events) -> Events:
+        """Return what is wanted of sorted events, on the clock and the sensor of the output."""
+        begin = np.searchsorted(events["t"], self.first_us, "left")
+        end = np.searchsorted(events["t"], self.last_us, "right")
+        x, y, width, height = self.crop
+        events = events[begin:end]
+        if (x, y) != (0, 0):
+            events = events[(events["x"] >= x) & (events["y"] >= y)]
+            events["x"] -= x
+            events["y"] -= y
+        events = inside(events, (width, height))
+        events["t"] -= self.origin_us
+        return events
+
+    def image_of(self, image: NDArray[Any], label: str) -> NDArray[Any]:
+        """Return what is wanted of a frame; DataError if it is not of the sensor's size."""
+        x, y, width, height = self.crop
+        if image.shape[0] < y + height or image.shape[1] < x + width:
+            raise DataError(
+                f"{label}: {image.shape[1]}x{image.shape[0]} pixels, fewer than events have"
+                f" ({x + width}x{y + height}); leave the frames out"
+            )
+        return image[y : y + height, x : x + width]
+
+
+def convert_events(
+    path: str,
+    output: str,
+    *,
+    size: tuple[int, int] | None = None,
+    crop: Rectangle | None = None,
+    time_unit: str | None = None,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    t0: str = "auto",
+    format: str | None = None,
+    layout: str | None = None,
+    with_frames: bool = False,
+    overwrite: bool = False,
+    threads: int | None = None,
+    progress: bool = False,
+    log: Callable[[str], None] = lambda text: None,
+    doubt: Callable[[str], None] | None = None,
+) -> Summary:
+    """Write the events of a file to another, of any format.
+
+    Parameters
+    ----------
+    path : str
+        Event file, or folder.
+    output : str
+        Output path ("-": text to stdout).
+    size : (int, int), optional
+        Width and height of the sensor [pixels]; default: what the file states, or the largest
+        coordinates.
+    crop : Rectangle, optional
+        Column and row of the first pixel that is kept, columns and rows.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the times in the file.
+    start_s, stop_s : float, optional
+        First and last time wanted, from the first event [s]; both inclusive.
+    t0 : {'auto', 'keep', 'zero'}
+        auto, keep: times stay; zero: from the first event, or from `start_s` after it.
+    format, layout, with_frames, overwrite, threads
+        See :func:`adv2e.formats.writing.open_sink`.
+    progress : bool
+        Show a progress bar on stderr.
+    log, doubt : callable
+        Take lines for people; `doubt` those that ask for a look, by default `log`.
+
+    Raises
+    ------
+    Adv2eError
+        For anything wrong with input or output; then no output file is left.
+    """
+    began = time.perf_counter()
+    selection = Selection(start_s, stop_s, t0)
+    keeps_all_bits = to_write(Path(output), format, layout).name in ("folder", "zip")
+    file = open_events(path, time_unit=time_unit, size=size)
+    facts = file.facts
+    with _bar(path, progress) as facts.progress:
+        found, first_us, parts = _events_of(file)
+        if found == (0, 0):
+            raise DataError(f"{path}: no events, and no size of the sensor: state it with --size")
+        part = _part(path, found, first_us, selection, crop)
+        width, height = part.crop[2:]
+        frames = file.shots is not None and (with_frames or keeps_all_bits)
+        with Staging(overwrite, (path,)) as staging, ExitStack() as stack:
+            sink = stack.enter_context(
+                open_sink(
+                    output,
+                    width=width,
+                    height=height,
+                    metadata=_metadata(file, part, frames, keeps_all_bits),
+                    format=format,
+                    layout=layout,
+                    overwrite=overwrite,
+                    with_frames=frames,
+                    threads=threads,
+                    staging=staging,
+                )
+            )
+            stored = _write_frames(file, part, sink, keeps_all_bits) if sink.wants_frames else 0
+            events = on = outside = first = last = 0
+            for chunk in parts:
+                fitting = inside(chunk, found)
+                outside += chunk.size - fitting.size
+                wanted = part.of(fitting)
+                if wanted.size:
+                    sink.write_events(wanted)
+                    first = first if events else int(wanted["t"][0])
+                    last = int(wanted["t"][-1])
+                    events += wanted.size
+                    on += int(np.count_nonzero(wanted["p"]))
+                if chunk["t"][-1] > part.last_us:
+                    break
+    if outside:
+        facts.problems.append(left_out(outside, found, facts.stated_by))
+    for text in dict.fromkeys(facts.problems):
+        (doubt or log)(f"{path}: {text}")
+    return Summary(
+        output=output,
+        width=width,
+        height=height,
+        frames=stored,
+        duration_s=(last - first) * 1e-6,
+        events=events,
+        on=on,
+        seconds=time.perf_counter() - began,
+        copied_from=path,
+    )
+
+
+def _events_of(file: EventFile) -> tuple[tuple[int, int], int, Iterator[Events]]:
+    """Return the size of the sensor, the time of the first event, and all events in order."""
+    seen = survey(file)
+    if not seen.is_sorted:
+        recording = assemble(file)
+        events = recording.events
+        first_us = int(events["t"][0])
+        return (recording.width, recording.height), first_us, iter([events])
+    size = settled_size(seen.needed, file.facts)
+    check = Check()
+
+    def parts() -> Iterator[Events]:
+        yield from in_order(check.events_of(columns) for columns in file.parts())
+        file.facts.problems += check.problems()
+
+    return size, seen.first_us, parts()
+
+
+def _part(
+    path: str, size: tuple[int, int], first_us: int, wanted: Selection, crop: Rectangle | None
+) -> _Part:
+    """Return what is wanted of a recording; DataError if the crop is not on its sensor."""
+    crop = crop or Rectangle(0, 0, *size)
+    if not crop.is_inside(*size):
+        raise DataError(
+            f"{path}: --crop {crop} does not lie on the sensor of {size[0]}x{size[1]} pixels"
+        )
+    begin = first_us + wanted.start_ns / 1000 if wanted.start_ns else -math.inf
+    end = first_us + wanted.stop_ns / 1000
+    origin = first_us + wanted.start_ns // 1000 if wanted.t0 == "zero" else 0
+    return _Part(begin, end, origin, crop)
+
+
+def _write_frames(file: EventFile, part: _Part, sink: Sink, keeps_all_bits: bool) -> int:
+    """Write the frames of the part that is wanted; return how many."""
+    assert file.shots is not None
+    count = 0
+    for shot in file.shots():
+        if part.first_us <= shot.t_ns / 1000 <= part.last_us:
+            picture = _picture(shot.load(), file, keeps_all_bits)
+            sink.write_frame(shot.t_ns - part.origin_us * 1000, part.image_of(picture, shot.label))
+            count += 1
+    return count
+
+
+def _picture(pixels: Pixels, file: EventFile, keeps_all_bits: bool) -> NDArray[Any]:
+    """Return a frame in the whole numbers that are stored."""
+    image, light = pixels.image, file.facts.light
+    white = light.full_scale or pixels.white or full_scale_of(image.dtype)
+    decoder = LightDecoder(light.encoding, white, image.dtype, image.ndim == 3)
+    return picture_of(image, pixels.alpha, decoder, not keeps_all_bits)
+
+
+def _metadata(file: EventFile, part: _Part, frames: bool, keeps_all_bits: bool) -> dict[str, Any]:
+    """Return how the events were made, as the file says it, and from which file they are."""
+    facts = file.facts
+    made = {name: facts.description[name] for name in _MADE if name in facts.description}
+    name = shown(facts.path.name)
+    stored: dict[str, Any] = {}
+    if frames and file.shots is not None and (first := next(file.shots(), None)) is not None:
+        pixels, light = first.load(), facts.light
+        white = light.full_scale or pixels.white or full_scale_of(pixels.image.dtype)
+        white = picture_white(pixels.image.dtype, white, not keeps_all_bits)
+        stored = {"frames": {"encoding": light.encoding, "full_scale": white}}
+    return {
+        "adv2e": __version__,
+        "versions": versions(compression.PACKAGES),
+        "source": {"name": name, "kind": file.layout},
+        **made,
+        "converted": {
+            "adv2e": __version__,
+            "name": name,
+            "layout": file.layout,
+            "crop": list(part.crop),
+            "origin_us": part.origin_us,
+        },
+        **stored,
+    }
+
+
+class _Bar:
+    """A bar on stderr for a file that is read twice."""
+
+    def __init__(self, path: str) -> None:
+        from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and scripts need none
+
+        self._bar = tqdm(desc=f"looking through {Path(path).name}", leave=False)
+        self._bar.bar_format = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
+
+    def __enter__(self) -> Progress:
+        return self._told
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+    def _told(self, done: int, total: int) -> None:
+        if done < self._bar.n:
+            self._bar.reset()
+            self._bar.set_description_str("writing")
+        self._bar.total = total
+        self._bar.update(done - self._bar.n)
+
+
+def _bar(path: str, progress: bool) -> Any:
+    return _Bar(path) if progress else nullcontext(lambda done, total: None)

@@ -1,0 +1,86 @@
+"""Inputs with frames: those of :mod:`adv2e.sources`, and event files that hold frames, too.
+
+What an input with both is converted from, its frames or its events, is settled here.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from adv2e.errors import DataError
+from adv2e.files.zips import Members
+from adv2e.formats.event_file import EventFile
+from adv2e.formats.reading import open_events
+from adv2e.formats.registry import format_of, may_hold_events
+from adv2e.sources import open_source
+from adv2e.sources.base import Source
+from adv2e.sources.listed import ListedSource, Picture, Timed, timed
+from adv2e.sources.stored import EVENTS
+from adv2e.sources.wanted import GivenTimes, Selection
+
+_DAVIS240C = ("zip", "folder")
+"""Formats whose frames are a source of their own, as they may come without events."""
+
+
+def open_frames(path: str | Path, **given: Any) -> Source:
+    """Open an input with frames; parameters and errors as :func:`adv2e.sources.open_source`."""
+    named = Path(path)
+    if not (named.exists() and may_hold_events(named)) or format_of(named).name in _DAVIS240C:
+        return open_source(path, **given)
+    listed = given.get("timestamps")
+    times = GivenTimes(given.get("fps"), Path(listed) if listed else None, given.get("time_unit"))
+    wanted = ("start_s", "stop_s", "t0", "allow_damaged", "crop")
+    selection = Selection(**{name: given[name] for name in wanted if name in given})
+    file = open_events(path, time_unit=given.get("time_unit"))
+    if file.shots is None:
+        raise DataError(f"{path}: holds events and no frames")
+    return _source(file, times, selection)
+
+
+def _source(file: EventFile, given: GivenTimes, selection: Selection) -> Source:
+    """Return the frames of an event file as a source."""
+    assert file.shots is not None
+    path = file.facts.path
+    times = Timed(list(file.shots()), list(file.facts.problems), [])
+    if given:
+        pictures = [Picture(shot.label, None, shot.load) for shot in times.shots]
+        times = timed(given, pictures, path, str(path))
+    return ListedSource(
+        path,
+        file.layout,
+        times,
+        selection,
+        has_clock=given.fps is None,
+        light=file.facts.light,
+    )
+
+
+def takes_events(path: Path, choice: str | None = None) -> bool:
+    """Tell whether it is the events of an input that are converted, and not its frames.
+
+    Recordings of cameras are simulated from their frames, where they have any; other event files
+    are converted to another format.
+
+    Parameters
+    ----------
+    path : Path
+    choice : {'frames', 'events'}, optional
+        What the user wants.
+
+    Raises
+    ------
+    DataError
+        The input cannot be read.
+    """
+    if choice is not None:
+        return choice == "events"
+    if not (path.exists() and may_hold_events(path)):
+        return False
+    found = format_of(path)
+    if found.name in _DAVIS240C:
+        files = Members(path)
+        if files.enter(EVENTS):
+            return open_events(path).shots is None
+        return not path.is_dir() and len(files.enter("*")) == len(files.enter("*.txt")) == 1
+    return not found.is_camera or open_events(path).shots is None
