@@ -82,5 +82,5 @@ def takes_events(path: Path, choice: str | None = None) -> bool:
         files = Members(path)
         if files.enter(EVENTS):
             return open_events(path).shots is None
-        return not path.is_dir() and len(files.enter("*")) == len(files.enter("*.txt")) == 1
+        return not path.is_dir() and [Path(name).suffix for name in files.archived()] == [".txt"]
     return not found.is_camera or open_events(path).shots is None
