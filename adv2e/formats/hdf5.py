@@ -20,15 +20,25 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d
+from h5py import h5d, h5z
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.files.expansion import check_expansion
+from adv2e.formats.event_file import Facts
 from adv2e.process.machine import machine_complaint
+
+PART = 1 << 20
+"""Events read at once."""
 
 _LINKS = 16
 """Soft links on the way to one name, as in the library itself."""
+
+_ECF = 0x8ECF
+"""The filter of Prophesee's files."""
+
+_PLUGINS = {32001: "Blosc", 32004: "LZ4", 32008: "bitshuffle", 32015: "Zstandard", 32026: "Blosc2"}
+"""Filters of the package hdf5plugin that recordings use."""
 
 _FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError)
 """What h5py raises for files that are damaged."""
@@ -101,6 +111,54 @@ def read_all(column: h5py.Dataset, label: str) -> NDArray[Any]:
     return np.asarray(column[()])
 
 
+def number(file: h5py.File, name: str) -> int:
+    """Return the one whole number that a dataset holds; DataError if it holds something else."""
+    found = dataset(file, name)
+    if found.size != 1 or found.dtype.kind not in "iu":
+        raise DataError(f"{file.filename}: {name} must hold one whole number")
+    return int(np.asarray(found[()]).item())
+
+
+def describe(file: h5py.File, facts: Facts) -> None:
+    """Take what a file says of itself, if this program wrote it."""
+    if "adv2e" in file.attrs:
+        label = f"{facts.path}: attribute adv2e"
+        facts.describe(str(file.attrs["adv2e"]), label, "the attribute adv2e")
+
+
+def columns(file: h5py.File, names: tuple[str, ...]) -> list[h5py.Dataset]:
+    """Return times, columns, rows and polarities of the events; DataError if they cannot be."""
+    found = [dataset(file, name) for name in names]
+    if len({column.shape for column in found}) != 1 or found[0].ndim != 1:
+        shapes = ", ".join(f"{name} {c.shape}" for name, c in zip(names, found, strict=True))
+        raise DataError(f"{file.filename}: columns must be of one length, got {shapes}")
+    for name, column, kinds in zip(names, found, ("fiu", "iu", "iu", "biuf"), strict=True):
+        if column.dtype.kind not in kinds:
+            raise DataError(f"{file.filename}: {name} must hold numbers, not {column.dtype}")
+    check_stored(found, f"{file.filename}: {names[0].rpartition('/')[0]}")
+    return found
+
+
+def parts(path: Path, names: tuple[str, ...], facts: Facts) -> Iterator[list[NDArray[Any]]]:
+    """Yield what :func:`columns` returns, a part of the events at a time."""
+    with opened(path) as file:
+        found = columns(file, names)
+        for begin in range(0, found[0].size, PART):
+            part = [column[begin : begin + PART] for column in found]
+            yield part
+            facts.progress(begin + part[0].size, found[0].size)
+
+
+def signs(p: NDArray[Any]) -> NDArray[np.int8]:
+    """Return polarities in 8 bits; those that do not fit keep their sign, and stay odd."""
+    if p.dtype.kind == "b":
+        return p.astype(np.int8)
+    if p.dtype.kind == "u":  # -1 without a sign
+        p = p.view(p.dtype.str.replace("u", "i"))
+    found: NDArray[np.int8] = np.clip(np.nan_to_num(p, nan=-2.0), -2, 2).astype(np.int8)
+    return found
+
+
 def check_stored(columns: list[h5py.Dataset], label: str) -> None:
     """Raise DataError if datasets together state far more than the file holds of them."""
     stated = sum(math.prod(column.shape or ()) * column.dtype.itemsize for column in columns)
@@ -116,3 +174,25 @@ def _check_own(found: h5py.Dataset, label: str) -> None:
         raise DataError(f"{label}: keeps its numbers in another file, which is not read")
     if found.shape is None:
         raise DataError(f"{label}: is an empty dataset")
+    for number in range(made.get_nfilters()):
+        _check_filter(made.get_filter(number)[0], label)
+
+
+def _check_filter(code: int, label: str) -> None:
+    """Refuse a dataset that is compressed in a way for which the plug-in is missing."""
+    if h5z.filter_avail(code):
+        return
+    if code == _ECF:
+        raise DataError(
+            f"{label}: is compressed with ECF (filter {_ECF}), which only Metavision's own plug-in"
+            " reads; make a .dat of it with that: metavision_file_to_dat -i FILE"
+        )
+    try:
+        import hdf5plugin  # noqa: F401, PLC0415 - an extra; it registers what it can read
+    except ImportError:
+        raise DataError(
+            f"{label}: is compressed with {_PLUGINS.get(code, 'a plug-in')} (filter {code}), which"
+            " needs another package: pip install 'adv2e[blosc]'"
+        ) from None
+    if not h5z.filter_avail(code):
+        raise DataError(f"{label}: is compressed with filter {code}, which is not known here")

@@ -92,6 +92,14 @@ FORMATS = (
         frames="rw",
     ),
     Format(
+        name="dsec",
+        what="HDF5 of DSEC",
+        suffixes=_HDF5,
+        reader="dsec:open_dsec",
+        writer="dsec:DsecWriter",
+        datasets=("events/t", "events/x", "events/y", "events/p"),
+    ),
+    Format(
         name="txt",
         what="text, a line for each event: seconds, column, row, polarity",
         suffixes=(".txt",),

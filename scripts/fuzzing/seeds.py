@@ -15,6 +15,9 @@ import cv2
 import h5py
 import numpy as np
 
+from adv2e.events import make_events
+from adv2e.formats.registry import layouts
+from adv2e.formats.writing import open_sink
 from adv2e.sources.images.opencv import quiet
 from fuzzing.mutations import ODD_NUMBERS, mutated
 
@@ -250,7 +253,21 @@ def _hdf5(scratch: Path) -> list[Seed]:
         _write_hdf5(path, packed=packed)
         name = "hdf5 packed" if packed else "hdf5"
         seeds += [Seed(name, {"a.h5": path.read_bytes()}, commands[:4])] * 2
+    for layout in layouts()[1:]:
+        path = scratch / f"{layout}.h5"
+        _write_layout(path, layout)
+        seeds.append(Seed(f"hdf5 {layout}", {"a.h5": path.read_bytes()}, commands[:4]))
     return [*seeds, _Structured("hdf5 structure", {}, commands[:4])]
+
+
+def _write_layout(path: Path, layout: str) -> None:
+    with open_sink(
+        path, width=COLUMNS, height=ROWS, metadata={}, layout=layout, with_frames=True
+    ) as sink:
+        for n, frame in enumerate(_frames()):
+            sink.write_frame(200_000_000 * n, frame)
+        columns = _columns()
+        sink.write_events(make_events(np.rint(columns.pop("t") * 1e6), **columns))
 
 
 def _write_hdf5(path: Path, *, packed: bool) -> None:

@@ -26,8 +26,6 @@ from adv2e.ticks import NS, US, to_ticks
 
 COLUMNS = ("events/ts", "events/xs", "events/ys", "events/ps")
 
-_PART = 1 << 20  # events read at once
-
 
 def open_monash(path: Path, facts: Facts) -> EventFile:
     """Open a file of this layout.
@@ -39,9 +37,7 @@ def open_monash(path: Path, facts: Facts) -> EventFile:
         broken image, or something that is not in the file itself.
     """
     with hdf5.opened(path) as file:
-        if "adv2e" in file.attrs:
-            text = str(file.attrs["adv2e"])
-            facts.describe(text, f"{path}: attribute adv2e", "the attribute adv2e")
+        hdf5.describe(file, facts)
         images = hdf5.find(file, "images")
         if isinstance(images, h5py.Dataset):
             raise DataError(f"{path}: images is a dataset, must be a group of images")
@@ -51,9 +47,9 @@ def open_monash(path: Path, facts: Facts) -> EventFile:
         frames = _Stamps(path, found)
         if len(found) > 1 and frames.name == "timestamp":
             facts.note_frames(frames.unit(None, facts.stated_unit), whole=frames.whole)
-        columns = _columns(path, file)
+        columns = hdf5.columns(file, COLUMNS)
         whole = columns[0].dtype.kind in "iu"
-        t, x, y = (column[:_PART] for column in columns[:3])
+        t, x, y = (column[: hdf5.PART] for column in columns[:3])
         unit = facts.unit_of_events(t, x, y, facts.geometry, whole=whole)
         of_frames = frames.unit(facts.unit_of_frames(whole=frames.whole), facts.stated_unit)
         if of_frames.doubt:
@@ -61,43 +57,14 @@ def open_monash(path: Path, facts: Facts) -> EventFile:
         times = frames.times_ns(of_frames).tolist() if found else []
 
     def parts() -> Iterator[Columns]:
-        with hdf5.opened(path) as file:
-            columns = _columns(path, file)
-            for begin in range(0, columns[0].size, _PART):
-                t, x, y, p = (column[begin : begin + _PART] for column in columns)
-                yield to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, _signs(p)
-                facts.progress(begin + t.size, columns[0].size)
+        for t, x, y, p in hdf5.parts(path, COLUMNS, facts):
+            yield to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, hdf5.signs(p)
 
     shots = [
         Shot(t_ns, f"{path}: {name}", partial(_image, path, name))
         for t_ns, name in zip(times, names, strict=True)
     ]
     return EventFile("monash", facts, parts, (lambda: iter(shots)) if shots else None)
-
-
-def _columns(path: Path, file: h5py.File) -> list[h5py.Dataset]:
-    """Return times, columns, rows and polarities of the events; DataError if they cannot be."""
-    columns = [hdf5.dataset(file, name) for name in COLUMNS]
-    if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
-        shapes = ", ".join(
-            f"{name} {column.shape}" for name, column in zip(COLUMNS, columns, strict=True)
-        )
-        raise DataError(f"{path}: columns must be of one length, got {shapes}")
-    for name, column, kinds in zip(COLUMNS, columns, ("fiu", "iu", "iu", "biuf"), strict=True):
-        if column.dtype.kind not in kinds:
-            raise DataError(f"{path}: {name} must hold numbers, not {column.dtype}")
-    hdf5.check_stored(columns, f"{path}: events")
-    return columns
-
-
-def _signs(p: NDArray[Any]) -> NDArray[np.int8]:
-    """Return polarities in 8 bits; those that do not fit keep their sign, and stay odd."""
-    if p.dtype.kind == "b":
-        return p.astype(np.int8)
-    if p.dtype.kind == "u":  # -1 without a sign
-        p = p.view(p.dtype.str.replace("u", "i"))
-    signs: NDArray[np.int8] = np.clip(np.nan_to_num(p, nan=-2.0), -2, 2).astype(np.int8)
-    return signs
 
 
 def _geometry(path: Path, file: h5py.File, images: list[h5py.Dataset]) -> tuple[int, int] | None:

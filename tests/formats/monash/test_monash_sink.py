@@ -6,7 +6,7 @@ import pytest
 
 from adv2e.errors import OutputError
 from adv2e.events import empty_events, make_events, sort_events
-from adv2e.formats.monash.writer import CHUNK
+from adv2e.formats.hdf5_writer import CHUNK
 from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink
 

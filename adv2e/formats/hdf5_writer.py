@@ -1,0 +1,296 @@
+"""What all layouts of HDF5 share that are written: chunks compressed beforehand, frames kept back.
+
+HDF5 compresses in the thread that writes.  Here whole chunks are compressed in threads, into what
+its filters shuffle and deflate would read, and stored as they are, so that any reader of HDF5 opens
+them without plug-ins.  The bytes of a file follow from its content.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import cv2
+import h5py
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from adv2e.background import OrderedWork
+from adv2e.errors import OutputError
+from adv2e.events import EVENT_DTYPE, Events
+from adv2e.files.backlog import Backlog
+from adv2e.formats.compression import compress, compress_shuffled
+from adv2e.formats.sink import Request, Writer, to_json
+from adv2e.light.pictures import eight_bit
+
+CHUNK = 1 << 16
+"""Rows of a chunk."""
+
+FILTERS: dict[str, Any] = {"compression": "gzip", "compression_opts": 1, "track_times": False}
+"""Of a dataset whose chunks are zlib streams."""
+
+_CACHE_BYTES = 512 << 10
+"""Memory for the index of chunks and images, as HDF5 counts it, a tenth of what it takes.
+
+Only the end of the index grows; but below this, storing many images takes longer.
+"""
+
+Values = NDArray[Any]
+
+
+class Column(NamedTuple):
+    """A dataset with a row for each item."""
+
+    name: str
+    dtype: DTypeLike
+    of: Callable[[Values], Values]
+    """Its rows, of some items."""
+    width: int = 0
+    """Numbers in a row; 0: it has one dimension."""
+
+
+class Columns:
+    """Datasets that grow together, a chunk at a time, by items that come in any number.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Where they are made.
+    work : OrderedWork
+        Compresses.
+    dtype : data type
+        Of the items.
+    columns : list of Column
+    told : callable, optional
+        Is told the items of each chunk, and how many were before.
+    """
+
+    def __init__(
+        self,
+        file: h5py.File,
+        work: OrderedWork,
+        dtype: DTypeLike,
+        columns: list[Column],
+        told: Callable[[int, Values], None] | None = None,
+    ) -> None:
+        self.size = 0
+        self._work, self._columns, self._told = work, columns, told
+        self._datasets = [_dataset(file, column) for column in columns]
+        self._buffer = np.empty(CHUNK, dtype)
+        self._held = 0
+
+    def append(self, items: Values) -> None:
+        """Add items at the end."""
+        while items.size:
+            part, items = np.split(items, [CHUNK - self._held])
+            self._buffer[self._held : self._held + part.size] = part
+            self._held += part.size
+            if self._held == CHUNK:
+                self.flush()
+
+    def flush(self) -> None:
+        """Hand over what waits for its chunk to be full: nothing may come after that."""
+        if not self._held:
+            return
+        items, begin = self._buffer[: self._held], self.size
+        self.size = end = begin + self._held
+        if self._told is not None:
+            self._told(begin, items)
+
+        def take(chunks: list[bytes]) -> None:
+            for dataset, data in zip(self._datasets, chunks, strict=True):
+                dataset.resize(end, axis=0)
+                dataset.id.write_direct_chunk((begin,) + (0,) * (dataset.ndim - 1), data)
+
+        self._work.submit(self._compressed, items, take=take)
+        self._held, self._buffer = 0, np.empty_like(self._buffer)
+
+    def _compressed(self, items: Values) -> list[bytes]:
+        chunks = []
+        for column, dataset in zip(self._columns, self._datasets, strict=True):
+            values = np.zeros(dataset.chunks, dataset.dtype)  # the last chunk is stored in full
+            values[: items.size] = column.of(items)
+            chunks.append(compress_shuffled(values))
+        return chunks
+
+
+def _dataset(file: h5py.File, column: Column) -> h5py.Dataset:
+    row = (column.width,) if column.width else ()
+    return file.create_dataset(
+        *(column.name, (0, *row), column.dtype),
+        **(FILTERS | {"chunks": (CHUNK, *row), "maxshape": (None, *row), "shuffle": True}),
+    )
+
+
+class Hdf5Writer(Writer):
+    """Writes an HDF5 file; its subclasses say in which datasets.
+
+    Attributes
+    ----------
+    layout, version : str
+        What the attributes of the file call it.
+    file : h5py.File
+    work : OrderedWork
+        Compresses; it is finished before :meth:`complete`.
+    size, on : int
+        Events, and ON events, that were written.
+    frames : list of (int, tuple)
+        Time [ns] and shape of each frame.
+    """
+
+    layout: ClassVar[str]
+    version: ClassVar[str] = "1"
+
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+        (path,) = temporary
+        self.request = request
+        # fixed: the oldest structures, which every reader knows and which hold no times
+        self.file = stack.enter_context(h5py.File(path, "w", libver=("earliest", "v108")))
+        _bound_cache(self.file)
+        self.work = OrderedWork(request.threads - 1)
+        stack.callback(self.work.abandon)
+        # kept aside until the events are all written: the file must not depend on how they come
+        self._encoded = stack.enter_context(closing(Backlog(path.parent, limit=0)))
+        self.frames: list[tuple[int, tuple[int, ...]]] = []
+        self._before: list[int | None] = []  # events before each; None: to be looked up
+        self._ends: list[float] = []  # time of the last event of each chunk [s]
+        self.on = 0
+        self._events = Columns(self.file, self.work, EVENT_DTYPE, self.columns(), self.chunk_made)
+
+    @property
+    def size(self) -> int:
+        """Events that were written."""
+        return self._events.size
+
+    @abstractmethod
+    def columns(self) -> list[Column]:
+        """Return the columns of the events."""
+
+    def chunk_made(self, begin: int, events: Events) -> None:
+        """Take note of a chunk, `begin` events after the first."""
+        self.on += int(np.count_nonzero(events["p"]))
+        times = events["t"] / 1e6
+        for t_ns, _ in self.frames[len(self._before) :]:
+            t = t_ns / 1e9
+            if t > times[-1]:
+                break
+            came_late = self._ends and t <= self._ends[-1]
+            self._before.append(None if came_late else begin + int(np.searchsorted(times, t)))
+        self._ends.append(times[-1])
+
+    def write_events(self, events: Events) -> None:
+        """Append events."""
+        self._events.append(events)
+
+    def picture(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return a frame, grey or RGB, as the layout stores it; here grey, of colour the luma."""
+        return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
+
+    def write_frame(self, t_ns: int, image: NDArray[np.uint8 | np.uint16]) -> None:
+        """Append a frame."""
+        picture = self.picture(eight_bit(image)).copy()
+        self.frames.append((t_ns, picture.shape))
+
+        def take(data: bytes) -> None:
+            self._encoded.append(t_ns, np.frombuffer(data, np.uint8))
+
+        self.work.submit(compress, picture, take=take)
+
+    def next_frame(self) -> bytes:
+        """Return the next frame, compressed."""
+        return self._encoded.take().tobytes()
+
+    def events_before(self, number: int) -> int:
+        """Return how many events are before a frame; those after which it came are read again."""
+        known = self._before[number] if number < len(self._before) else None
+        if known is not None:
+            return known
+        t = self.frames[number][0] / 1e9
+        begin = int(np.searchsorted(self._ends, t)) * CHUNK
+        times = self.seconds(begin, begin + CHUNK)
+        return min(begin, self.size) + int(np.searchsorted(times, t))
+
+    def seconds(self, begin: int, end: int) -> NDArray[np.float64]:
+        """Return times of events as written [s]; a layout without frames needs none."""
+        raise NotImplementedError
+
+    def finish(self) -> None:
+        """Write what is left, and the attributes."""
+        self._events.flush()
+        self.flush()
+        self.work.finish()
+        self.complete()
+        self.file.attrs.update(
+            {
+                "sensor_resolution": np.array([self.request.height, self.request.width], np.int64),
+                "layout": self.layout,
+                "layout_version": self.version,
+                "adv2e": to_json(self.request.description),
+            }
+        )
+
+    def flush(self) -> None:
+        """Hand over what is still to be compressed, after all events."""
+
+    def complete(self) -> None:
+        """Write what follows the events, such as the frames."""
+
+
+class Milliseconds:
+    """For each millisecond the first event at it or after, so that parts of a file are found.
+
+    Parameters
+    ----------
+    writer : Hdf5Writer
+    name : str
+        Of the dataset.
+    """
+
+    _MOST_US = 1 << 40
+    _BLOCK = 1 << 20  # entries made at once
+
+    def __init__(self, writer: Hdf5Writer, name: str) -> None:
+        column = Column(name, np.uint64, lambda values: values)
+        self._writer = writer
+        self._index = Columns(writer.file, writer.work, np.uint64, [column])
+        self._next = 0
+
+    def add(self, begin: int, times_us: NDArray[np.int64]) -> None:
+        """Add the entries up to the last of the times of a chunk, which begin at zero or after.
+
+        Raises
+        ------
+        OutputError
+            The times go on for more than 12 days.
+        """
+        last = int(times_us[-1])
+        if last >= self._MOST_US:
+            raise OutputError(
+                f"{self._writer.request.path}: an event {last / 86_400e6:.1f} days after time zero"
+                f" or the first does not fit the layout {self._writer.layout}, which has an entry"
+                " for each millisecond; --t0 zero may help, or the layout monash"
+            )
+        while self._next <= last // 1000:
+            end = min(last // 1000 + 1, self._next + self._BLOCK)
+            wanted = np.arange(self._next, end) * 1000
+            self._index.append((begin + np.searchsorted(times_us, wanted)).astype(np.uint64))
+            self._next = end
+
+    def flush(self, size: int) -> None:
+        """Add the last entry, after all events, and hand over what waits."""
+        self._index.append(np.array([size], np.uint64))
+        self._index.flush()
+
+
+def _bound_cache(file: h5py.File) -> None:
+    """Keep HDF5 from holding what it has written of the index of the chunks.
+
+    By default that grows to some 15 MiB over half a billion events.
+    """
+    cache = file.id.get_mdc_config()
+    cache.set_initial_size = True
+    cache.initial_size = cache.min_size = cache.max_size = _CACHE_BYTES
+    file.id.set_mdc_config(cache)
