@@ -106,9 +106,9 @@ def command(
       adv2e convert clip.events.h5 -o clip.txt
 
     INPUT is a video file, a folder or a zip of images, a recording of a data set (DAVIS240C, GOPRO,
-    TUM RGB-D, EuRoC, UZH-FPV) or a .npy stack of frames, grey (frames, rows, columns) or colour
-    (with a fourth axis, of 3). It may be a file of events, too: these are written in the format of
-    OUT, and nothing is simulated.
+    TUM RGB-D, EuRoC, UZH-FPV), a TIFF of several pages, or a .npy stack of frames, grey (frames,
+    rows, columns) or colour (with a fourth axis, of 3). It may be a file of events, too: these are
+    written in the format of OUT, and nothing is simulated.
 
     Without -o, the events go to <stem>.events.h5 in the current folder. The suffix of OUT chooses
     the format:

@@ -17,7 +17,7 @@ from adv2e.formats.reading import Recording, read_events
 from adv2e.formats.registry import may_hold_events
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
-from adv2e.sources import VIDEO_SUFFIXES, Source, open_source
+from adv2e.sources import OPENERS, Source, open_source
 from adv2e.sources.frame import Light
 from adv2e.sources.stored import EVENTS, LIST
 from adv2e.sources.times.rates import Rate
@@ -80,7 +80,7 @@ def _has_only_frames(path: Path) -> bool:
 
         files = Members(path)
         return bool(files.enter(LIST) or images_in(files)) and not files.enter(EVENTS)
-    return path.suffix.lower() in (*VIDEO_SUFFIXES, ".npy")
+    return path.suffix.lower() in OPENERS
 
 
 def _of_recording(recording: Recording) -> dict[str, Any]:

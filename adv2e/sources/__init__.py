@@ -25,6 +25,7 @@ OPENERS = {
     **dict.fromkeys(VIDEO_SUFFIXES, "adv2e.sources.video.source"),
     ".zip": "adv2e.sources.zipped",
     ".npy": "adv2e.sources.npy",
+    **dict.fromkeys((".tif", ".tiff"), "adv2e.sources.images.stack"),
 }
 """Module whose ``open_source(path, given, selection)`` reads files of a suffix."""
 
@@ -46,7 +47,8 @@ def open_source(
     Parameters
     ----------
     path : path
-        Video file, folder or zip of images, recording of a data set, or ``.npy`` stack.
+        Video file, folder or zip of images, recording of a data set, TIFF of several pages,
+        or ``.npy`` stack.
     fps : float, Fraction or str, optional
         Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
     timestamps : path, optional

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from decimal import Decimal
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
 from adv2e.files.npy import Header, read_array, read_header
 from adv2e.sources.frame import Light, Pixels
-from adv2e.sources.listed import ListedSource, Picture, timed
+from adv2e.sources.listed import ListedSource, Picture, Timed, timed
 from adv2e.sources.times.instants import Stamp
 from adv2e.sources.times.lists import FrameList, read_list
 from adv2e.sources.times.units import frame_unit
@@ -45,12 +46,17 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     ]
     if not pictures:
         raise DataError(f"{path}: no frames in it; at least two are needed")
+    times = timed_beside(path, given, pictures)
+    return ListedSource(path, "npy", times, selection, has_clock=given.fps is None, light=_LIGHT)
+
+
+def timed_beside(path: Path, given: GivenTimes, pictures: Sequence[Picture]) -> Timed:
+    """Return the frames of a file at the times given, or at those in a file beside it."""
     beside = f"{path.stem}_ts.npy", f"{path.stem}.timestamps.txt"
     found = next((f for f in map(path.with_name, beside) if f.is_file()), None)
     label = None if found is None else str(found)
     missing = f"{' or '.join(beside)} beside it"
-    times = timed(given, pictures, path, label, partial(_read_times, given), missing)
-    return ListedSource(path, "npy", times, selection, has_clock=given.fps is None, light=_LIGHT)
+    return timed(given, pictures, path, label, partial(_read_times, given), missing)
 
 
 def _open_stack(path: Path) -> _Stack:

@@ -87,7 +87,9 @@ def examine(data: bytes, label: str) -> Tiff | None:
     if found := _IMAGEJ.match(_text(directories[0])):
         pages = max(pages, int(found[1]))
     if pages > 1:
-        raise DataError(f"{label}: {pages} pages in it; give each frame a file of its own")
+        raise DataError(
+            f"{label}: {pages} pages in it; give each frame a file of its own, or this one alone"
+        )
     tags = directories[0]
     check_size(_first(tags, _WIDTH, 0), _first(tags, _HEIGHT, 0), data, label)
     bits, colours = _first(tags, _BITS, 1), _first(tags, _COLOURS, _BLACK_IS_ZERO)
