@@ -114,19 +114,25 @@ def _resimulation(
     measured: Recording, source: Source | None, config: Config, threads: int | None, log: Log
 ) -> Resimulation:
     """Return how to simulate the frames of `source`, or of `measured`, again."""
+    from dataclasses import replace
+
     from adv2e.comparison.compare import Resimulation
     from adv2e.comparison.resimulation import resimulator
     from adv2e.errors import DataError
     from adv2e.kernel.rng import LARGEST_SEED
+    from adv2e.light.sensor import check_beside
 
+    size = measured.width, measured.height
     if source is not None:
         frames, encoding = source.frames, source.encoding
     elif measured.frame_times_ns is not None:
+        check_beside(*size, config.sensor, measured.path)
+        config = replace(config, sensor=None)
         frames, encoding = measured.frames, measured.encoding
     else:
         raise DataError(
             f"{measured.path}: holds no frames to simulate with this configuration; give them with"
             " --frames"
         )
-    simulate_events = resimulator(frames, config, encoding, threads=threads)
+    simulate_events = resimulator(frames, config, encoding, size, threads=threads)
     return Resimulation(simulate_events, (config.seed, (config.seed + 1) % (LARGEST_SEED + 1)))

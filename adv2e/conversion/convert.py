@@ -109,7 +109,7 @@ def convert(
     >>> np.save(clip, np.repeat(np.array([20, 40, 80, 160], np.uint8), 32 * 24).reshape(4, 24, 32))
     >>> done = convert(clip, os.path.join(folder.name, "clip.h5"), "davis346", fps=100)
     >>> (done.width, done.height, done.frames, done.events > 0)
-    (32, 24, 4, True)
+    (346, 260, 4, True)
     >>> folder.cleanup()
     """
     notes: list[str] = []

@@ -248,8 +248,10 @@ def convert_reading(
     # at the end: an error is to be the only line
     taken = light_text(recording.light, recording.full_scale, config.frames)
     log(f"frames are {taken}")
-    if fitting is not None:
-        log(fitting.text())
+    crop = recording.selection.crop
+    if crop is not None or fitting is not None:
+        part = f" at x {crop.x}, y {crop.y} of the input's" if crop is not None else ""
+        log(f"frames are {frames}{part}{f', {fitting.text()}' if fitting is not None else ''}")
     found = _doubt_of_white(recording, recording.largest_read, config)
     if told:
         largest = f"{recording.path}: whole numbers up to {recording.largest_read:g} came"

@@ -41,7 +41,7 @@ def diagnose(
     recording : str or Path
         Frames and events on one clock: a DAVIS240C folder or zip, or HDF5.
     declared : Config, or what :func:`adv2e.load_config` takes, optional
-        What is known of the camera.
+        What is known of the camera.  A `sensor` must have the size of the recording.
     output : str or Path, optional
         Folder for report.html, report.json and model.yaml.  Default: none is written.
     without : sequence of str
@@ -120,7 +120,7 @@ def diagnose_file(
         check_folder(output, overwrite=overwrite, inputs=[recording, *also_read])
     with _stages(progress) as tell:
         found = diagnose_evidence(
-            read_evidence(recording, time_unit),
+            read_evidence(recording, time_unit, declared.sensor),
             declared,
             declared_name=name or "the defaults",
             without=without,

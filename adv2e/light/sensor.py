@@ -132,22 +132,24 @@ class Fitting:
 
     def plane(self, light: NDArray[Any]) -> NDArray[np.float32]:
         """Return the same of light that is known to be right, or of a share of it."""
-        single = np.asarray(light, np.float32)
-        return self._columns.means(self._rows.means(single, 0), 1).astype(np.float32)
+        seen: NDArray[Any] = np.asarray(light, np.float32)
+        axes = [(self._rows, 0), (self._columns, 1)]
+        if self.size.height > self.frames.height:  # or all columns would be enlarged first
+            axes.reverse()
+        for means, axis in axes:
+            seen = means.means(seen, axis)
+        return seen.astype(np.float32)
 
     def text(self) -> str:
-        """Return in one sentence what is done."""
-        begin = f"frames are {self.frames}"
+        """Return what is done, to follow the size that the frames have, after a comma."""
         if self._fit == "stretch":
-            return f"{begin}, stretched to {self.size}"
-        is_scaled = self._scaled != self.frames
-        if is_scaled:
-            begin += f", scaled to {self._scaled}"
+            return f"stretched to {self.size}"
+        scaled = "" if self._scaled == self.frames else f"scaled to {self._scaled}"
         if self._scaled == self.size:
-            return begin
+            return scaled
         if self._fit == "pad":
-            return f"{begin}, the rest of {self.size} is black"
-        return f"{begin}{' and' if is_scaled else ','} cut to {self.size}"
+            return f"{scaled}{', ' if scaled else ''}the rest of {self.size} is black"
+        return f"{scaled}{' and ' if scaled else ''}cut to {self.size}"
 
 
 def fitting_of(width: int, height: int, sensor: Sensor | None, label: str) -> Fitting | None:
@@ -163,3 +165,17 @@ def fitting_of(width: int, height: int, sensor: Sensor | None, label: str) -> Fi
     if min(width, height) < 1:
         raise DataError(f"{label}: frames of {width}x{height} pixels")
     return Fitting(Size(width, height), sensor, label)
+
+
+def check_beside(width: int, height: int, sensor: Sensor | None, label: str) -> None:
+    """Refuse a recording whose events are not of the sensor that is declared (DataError).
+
+    Frames beside measured events are on the sensor already: scaled, they would lie elsewhere than
+    the events.
+    """
+    if sensor is not None and (width, height) != (sensor.width, sensor.height):
+        raise DataError(
+            f"{label}: events of {width}x{height} pixels, but the configuration says a sensor of"
+            f" {sensor.width}x{sensor.height}; frames beside measured events are never scaled: give"
+            " the configuration of this camera, or --set sensor=null if this is a part of it"
+        )

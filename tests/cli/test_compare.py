@@ -114,6 +114,27 @@ def test_frames_from_elsewhere_make_windows_and_floor(adv2e, write, simulation, 
     assert len(simulation[0][0]) == 6
 
 
+def test_frames_beside_measured_events_are_never_scaled(adv2e, pair, simulation):
+    status, out, err = adv2e("compare", *pair, "-c", "davis346")
+    assert (status, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "real.h5: events of 10x8 pixels, but the configuration says a sensor of 346x260" in err
+    assert adv2e("compare", *pair, "-c", "davis346", "--set", "sensor=null").status == 0
+    assert adv2e("compare", *pair, "--set", "sensor={width: 10, height: 8}").status == 0
+
+
+def test_frames_from_elsewhere_come_to_the_sensor(adv2e, pair, simulation, tmp_path):
+    np.save(tmp_path / "frames.npy", np.full((6, 3 * HEIGHT, 2 * WIDTH), 40, np.uint8))
+    times = "".join(f"{0.02 * n:.6f}\n" for n in range(6))
+    (tmp_path / "frames.timestamps.txt").write_text(times)
+    words = (*pair, "--frames", tmp_path / "frames.npy", "--set")
+    assert adv2e("compare", *words, "sensor={width: 10, height: 8}").status == 0
+    assert simulation[0][0] == [40.0] * 6
+    status, _, err = adv2e("compare", *words, "seed=3")
+    assert status == 1
+    assert "20x24 pixels, but the events are of 10x8" in err
+
+
 def test_a_floor_of_two_seeds_without_frames_says_what_to_give(adv2e, write):
     measured, simulated = write("real.h5", some_events(1)), write("made.h5", some_events(2))
     status, out, err = adv2e("compare", measured, simulated, "-c", "ideal")

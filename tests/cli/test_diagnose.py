@@ -276,7 +276,8 @@ def made_up(monkeypatch, tmp_path):
     """Stand in for reading and diagnosing; returns the calls, and what there was to tell."""
     calls = []
 
-    def read(path, time_unit):
+    def read(path, time_unit, sensor):
+        assert sensor is None or (sensor.width, sensor.height) == (346, 260)
         return path
 
     def write(found, folder, *, overwrite):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import cv2
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 import adv2e as package
 from adv2e import read_events, simulate
 from adv2e.config import load_config
+from adv2e.diagnosis.data.evidence import read_evidence
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.light.sensor import fitting_of
 
@@ -68,7 +71,7 @@ def test_size_leaves_the_fit_that_was_said(adv2e, clip, tmp_path):
 def test_crop_comes_before_the_sensor(adv2e, clip, tmp_path):
     words = ["--fps", 100, "--crop", "3,2,12,9", "--size", "4x3"]
     said = adv2e("convert", clip, *words, "-o", tmp_path / "a.zip").err
-    assert "frames are 12x9, scaled to 4x3\n" in said
+    assert "frames are 12x9 at x 3, y 2 of the input's, scaled to 4x3\n" in said
     part = GREY[:, 2:11, 3:15]
     expected = simulated(part, "sensor={width: 4, height: 3}")
     recording = read_events(tmp_path / "a.zip")
@@ -117,6 +120,33 @@ def test_stored_frames_are_the_light_on_the_sensor(adv2e, tmp_path, frames, name
         np.testing.assert_allclose(again, light, atol=0.51 * 2.28 * 255 / steps)
 
 
+def test_what_comes_out_is_one_recording_of_that_sensor(adv2e, clip, tmp_path):
+    """As diagnosis and comparison read it, with the configuration that made it."""
+    words = [
+        "--fps",
+        100,
+        "--size",
+        "16x12",
+        "--set",
+        "frames.encoding=srgb",
+        "--set",
+        "pixel.leak=null",
+    ]
+    first, second = tmp_path / "a.zip", tmp_path / "b.h5"
+    assert adv2e("convert", clip, "-o", first, *words).status == 0
+    assert adv2e("convert", clip, "-o", second, *words, "--with-frames", "--seed", 1).status == 0
+    declared = load_config([], ["sensor={width: 16, height: 12}"])
+    for path in (first, second):
+        evidence = read_evidence(path, sensor=declared.sensor)
+        assert (evidence.width, evidence.height) == (16, 12)
+        assert next(evidence.lights(declared)).shape == (12, 16)
+    words = ["--set", "sensor={width: 16, height: 12}", "--set", "pixel.leak=null", "--json"]
+    report = json.loads(adv2e("compare", first, second, *words).out)
+    errors = report["measures"]["relative_5_bins"]
+    # as far from each other as two simulations from the frames stored
+    assert errors["value"] < 2 * errors["floor"]["two_seeds"]
+
+
 def test_the_preview_has_the_size_of_the_sensor(adv2e, clip, tmp_path):
     words = ["--fps", 100, "-o", tmp_path / "a.h5", "--preview", tmp_path / "a.png"]
     assert adv2e("convert", clip, *words, "--size", "16x12").status == 0
@@ -157,7 +187,10 @@ def test_in_python_sizes_are_text_or_numbers(clip, tmp_path):
     ]
     assert [(one.width, one.height) for one in made] == [(8, 6)] * 2
     assert made[0].events == made[1].events > 0
-    assert "frames are 32x16, scaled to 12x6 and cut to 8x6" in made[0].notes
+    assert (
+        "frames are 32x16 at x 0, y 0 of the input's, scaled to 12x6 and cut to 8x6"
+        in made[0].notes
+    )
     for wrong in ({"size": (8, 6, 3)}, {"size": "8"}, {"crop": (1, 2, 3)}):
         with pytest.raises(package.errors.UsageError, match="must be"):
             package.convert(clip, tmp_path / "c.h5", fps=100, **wrong)

@@ -20,9 +20,10 @@ def clip(tmp_path, monkeypatch):
 def test_it_does_what_the_command_does(clip, adv2e, tmp_path):
     import adv2e as package
 
-    given = ("--fps", "100", "--set", "pixel.leak=null", "--start", "0.01", "--seed", "3")
+    given = ("--fps", "100", "--start", "0.01", "--seed", "3")
+    given += ("--set", "pixel.leak=null", "--set", "sensor=null")
     assert adv2e("convert", clip, "-o", "a.txt", "-c", "davis346", *given).status == 0
-    config = package.load_config("davis346", "pixel.leak=null", seed=3)
+    config = package.load_config("davis346", ["pixel.leak=null", "sensor=null"], seed=3)
     done = package.convert(clip, tmp_path / "b.txt", config, fps=100, start_s=0.01, threads=1)
     assert (tmp_path / "a.txt").read_bytes() == (tmp_path / "b.txt").read_bytes()
     assert (tmp_path / "a.txt.json").read_bytes() == (tmp_path / "b.txt.json").read_bytes()

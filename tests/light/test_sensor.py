@@ -127,8 +127,7 @@ def test_frames_of_the_size_of_the_sensor_stay_untouched(fit):
     ],
 )
 def test_what_is_done_is_one_sentence(frames, sensor, fit, text):
-    made = fitting(frames, sensor, fit)
-    assert made.text() == f"frames are {frames[0]}x{frames[1]}, {text}"
+    assert fitting(frames, sensor, fit).text() == text
 
 
 def test_none_refuses_other_sizes():

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
+from adv2e.config.model import Sensor
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
@@ -18,6 +19,7 @@ from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.formats.reading import read_events
 from adv2e.light.decoding import decoder_for
+from adv2e.light.sensor import check_beside
 from adv2e.reports.result import Masked
 
 LEAST_EVENTS = 1000
@@ -140,17 +142,20 @@ class Evidence:
         )
 
 
-def read_evidence(path: str | Path, time_unit: str | None = None) -> Evidence:
+def read_evidence(
+    path: str | Path, time_unit: str | None = None, sensor: Sensor | None = None
+) -> Evidence:
     """Read a recording that holds frames and events; its unit as :func:`read_events` has it.
 
     Raises
     ------
     DataError
-        It cannot be read, has no frames, fewer than three, or too few events; frames and events do
-        not overlap in time; frames are out of order, not all alike, or of another size than the
-        events.
+        It does not have the size of the `sensor` that is declared; it cannot be read, has no
+        frames, fewer than three, or too few events; frames and events do not overlap in time;
+        frames are out of order, not all alike, or of another size than the events.
     """
     recording = read_events(path, time_unit=time_unit)
+    check_beside(recording.width, recording.height, sensor, recording.path)
     if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
         raise DataError(f"{path}: holds no frames, from which the events could be simulated")
     frames, times = [], []

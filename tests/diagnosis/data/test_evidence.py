@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from adv2e.config import load_config
+from adv2e.config.model import Sensor
 from adv2e.diagnosis.data.evidence import LEAST_EVENTS, read_evidence
+from adv2e.errors import DataError
 
 WIDTH, HEIGHT = 12, 8
 
@@ -221,3 +223,22 @@ def test_a_broken_image(adv2e, record):
     folder = record()
     Path(folder / "images/4.png").write_bytes(b"nothing")
     assert "4.png" in complaint(adv2e, folder)
+
+
+def test_a_recording_of_another_size_than_the_declared_sensor_is_refused(record):
+    path = record()
+    assert read_evidence(path, sensor=Sensor(width=WIDTH, height=HEIGHT)).width == WIDTH
+    told = rf"events of {WIDTH}x{HEIGHT} pixels, but .* a sensor of {HEIGHT}x{WIDTH};"
+    with pytest.raises(DataError, match=told):
+        read_evidence(path, sensor=Sensor(width=HEIGHT, height=WIDTH))
+
+
+def test_the_sensor_that_a_shipped_configuration_declares_counts(adv2e, record):
+    path = record()
+    words = ("-o", path.parent / "found", "-c", "davis346")
+    status, _, err = adv2e("diagnose", path, *words)
+    assert status == 1
+    assert err.count("\n") == 1
+    assert "but the configuration says a sensor of 346x260" in err
+    assert "--set sensor=null" in err
+    assert not (path.parent / "found").exists()
