@@ -163,7 +163,7 @@ def command(
 
 _OF_SIMULATION = (
     *("config_files", "sets", "seed", "effect_files"),
-    *("fps", "timestamps", "allow_damaged", "preview"),
+    *("fps", "timestamps", "allow_damaged", "bayer", "preview"),
 )
 """Options that say how frames are simulated."""
 

@@ -84,6 +84,8 @@ class _Parsed(click.ParamType):  # type: ignore[type-arg] # not generic in all v
             self.fail(str(error), param, ctx)
 
 
+# adv2e.sources.wanted.PATTERNS, without the time that importing it takes
+BAYER = ("RGGB", "BGGR", "GRBG", "GBRG")
 SIZE = _Parsed("size", parse_size)
 RECTANGLE = _Parsed("rectangle", parse_rectangle)
 
@@ -215,7 +217,7 @@ def source_options(body: Body) -> Body:
     """Add what says how to read an input with frames.
 
     The command gets ``given``, these by the names that :func:`adv2e.sources.open_source` has for
-    them: fps, as it was written, timestamps, time_unit and allow_damaged.
+    them: fps, as it was written, timestamps, time_unit, allow_damaged and bayer.
     """
 
     @click.option(
@@ -236,9 +238,14 @@ def source_options(body: Body) -> Body:
         is_flag=True,
         help="Take what can be decoded of a damaged video, and say what is missing.",
     )
+    @click.option(
+        "--bayer",
+        type=click.Choice(BAYER, case_sensitive=False),
+        help="Frames are raw mosaics, with these colours in the first two rows: make them colour.",
+    )
     @functools.wraps(body)
     def with_given(*args: Any, **kw: Any) -> Any:
-        names = ("fps", "timestamps", "time_unit", "allow_damaged")
+        names = ("fps", "timestamps", "time_unit", "allow_damaged", "bayer")
         return body(*args, given={name: kw.pop(name) for name in names}, **kw)
 
     return with_given  # type: ignore[return-value]

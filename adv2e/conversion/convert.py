@@ -31,6 +31,7 @@ def convert(
     allow_damaged: bool = False,
     size: str | tuple[int, int] | None = None,
     crop: str | tuple[int, int, int, int] | None = None,
+    bayer: str | None = None,
     format: str | None = None,
     layout: str | None = None,
     with_frames: bool = False,
@@ -68,6 +69,8 @@ def convert(
         Width and height of the sensor, such as "346x260": sensor.width and .height.
     crop : (int, int, int, int) or str, optional
         First column, first row, columns and rows of the part to cut out of the frames first.
+    bayer : {'RGGB', 'BGGR', 'GRBG', 'GBRG'}, optional
+        Frames are raw mosaics with these colours in the first two rows.
     format, layout : str, optional
         Format of the output where its suffix does not say it, and layout of HDF5.
     with_frames : bool
@@ -126,6 +129,7 @@ def convert(
         raise UsageError("fps and timestamps both give the times of the frames: keep one")
     if takes_events(Path(source), take):
         simulated = {"config": config, "fps": fps, "timestamps": timestamps, "preview": preview}
+        simulated["bayer"] = bayer
         if given := [name for name, value in simulated.items() if value is not None]:
             raise UsageError(f"{source} holds events, nothing is simulated: leave out {given[0]}")
         if output is None:
@@ -160,6 +164,7 @@ def convert(
         t0=t0,
         allow_damaged=allow_damaged,
         crop=part,
+        bayer=bayer,
         threads=threads,
     )
     with reading:

@@ -104,7 +104,7 @@ class Reading:
 
     Parameters
     ----------
-    path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged, crop
+    path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged, crop, bayer
         See :func:`adv2e.sources.open_source`.
     threads : int, optional
         Threads that the whole conversion may compute with; default: all cores.
@@ -122,6 +122,7 @@ class Reading:
         t0: str = "auto",
         allow_damaged: bool = False,
         crop: Rectangle | None = None,
+        bayer: str | None = None,
         threads: int | None = None,
     ) -> None:
         self.path = path
@@ -129,6 +130,7 @@ class Reading:
         self.given: dict[str, Any] = {
             "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
             "time_unit": time_unit, "allow_damaged": allow_damaged, "crop": crop,
+            "bayer": bayer,
         }  # fmt: skip
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()

@@ -30,7 +30,7 @@ def open_frames(path: str | Path, **given: Any) -> Source:
         return open_source(path, **given)
     listed = given.get("timestamps")
     times = GivenTimes(given.get("fps"), Path(listed) if listed else None, given.get("time_unit"))
-    wanted = ("start_s", "stop_s", "t0", "allow_damaged", "crop")
+    wanted = ("start_s", "stop_s", "t0", "allow_damaged", "crop", "bayer")
     selection = Selection(**{name: given[name] for name in wanted if name in given})
     file = open_events(path, time_unit=given.get("time_unit"))
     if file.shots is None:

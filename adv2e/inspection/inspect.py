@@ -30,6 +30,7 @@ def inspect(
     timestamps: Path | None = None,
     time_unit: str | None = None,
     allow_damaged: bool = False,
+    bayer: str | None = None,
     progress: Callable[[int, int | None], None] | None = None,
 ) -> dict[str, Any]:
     """Return what a recording, an event file or an input with frames holds, ready for JSON.
@@ -44,6 +45,8 @@ def inspect(
         See :func:`adv2e.sources.open_source`; for all inputs.
     allow_damaged : bool
         Damage of a video becomes one of the problems.
+    bayer : str, optional
+        See :func:`adv2e.sources.open_source`.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much, where that is
         known.
@@ -67,6 +70,7 @@ def inspect(
             timestamps=timestamps,
             time_unit=time_unit,
             allow_damaged=allow_damaged,
+            bayer=bayer,
         )
         return _of_source(source, progress or (lambda done, total: None))
     return _of_recording(read_events(path, time_unit=time_unit, progress=progress))

@@ -41,6 +41,7 @@ def open_source(
     time_unit: str | None = None,
     allow_damaged: bool = False,
     crop: Rectangle | None = None,
+    bayer: str | None = None,
 ) -> Source:
     """Open an input with frames.
 
@@ -65,6 +66,8 @@ def open_source(
         Take what can be decoded of a damaged video, and tell what is missing.
     crop : Rectangle, optional
         Part to cut out of each frame, before anything else.
+    bayer : {'RGGB', 'BGGR', 'GRBG', 'GBRG'}, optional
+        Frames are mosaics of this pattern: they are made colour, before `crop`.
 
     Returns
     -------
@@ -80,7 +83,7 @@ def open_source(
     """
     listed = Path(timestamps) if timestamps is not None else None
     given = GivenTimes(fps, listed, time_unit)
-    selection = Selection(start_s, stop_s, t0, allow_damaged, crop)
+    selection = Selection(start_s, stop_s, t0, allow_damaged, crop, bayer)
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")
     named, path = str(path), Path(path)

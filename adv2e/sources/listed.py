@@ -8,6 +8,7 @@ from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.sources.base import Source
+from adv2e.sources.bayer import in_colour, light_of
 from adv2e.sources.frame import Light, Pixels, Shot, check_values
 from adv2e.sources.times.gaps import gap_doubts, numbering_doubt
 from adv2e.sources.times.lists import FrameList, read_list
@@ -126,6 +127,9 @@ class ListedSource(Source):
     ) -> None:
         super().__init__(path, kind, selection, has_clock)
         shots = self._shots = timed.shots
+        if (pattern := selection.bayer) is not None:
+            shots = self._shots = [in_colour(shot, pattern) for shot in shots]
+            light = light_of(pattern)
         self.doubts += timed.doubts
         self.notes += timed.notes
         self._count()

@@ -12,6 +12,9 @@ from adv2e.sources.times.instants import NS_PER_S
 from adv2e.sources.times.rates import FrameRate, Rate, parse_rate
 from adv2e.sources.times.units import UNITS
 
+PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
+"""Mosaics: colours of the first two pixels of the first row, then of the second."""
+
 
 @dataclass(frozen=True)
 class GivenTimes:
@@ -77,6 +80,8 @@ class Selection:
         What can be decoded of a damaged video is wanted; what is missing is told.
     crop : Rectangle, optional
         Part of each frame that is wanted; default: all of it.
+    bayer : {'RGGB', 'BGGR', 'GRBG', 'GBRG'}, optional
+        Frames are mosaics of this pattern, and wanted in colour.
 
     Raises
     ------
@@ -89,6 +94,7 @@ class Selection:
     t0: str = "auto"
     allow_damaged: bool = False
     crop: Rectangle | None = None
+    bayer: str | None = None
 
     def __post_init__(self) -> None:
         for name, value in (("--start", self.start_s), ("--stop", self.stop_s)):
@@ -100,6 +106,8 @@ class Selection:
             )
         if self.t0 not in ("auto", "keep", "zero"):
             raise UsageError(f"--t0: must be auto, keep or zero, got {self.t0!r}")
+        if self.bayer not in (None, *PATTERNS):
+            raise UsageError(f"--bayer: must be one of {', '.join(PATTERNS)}, got {self.bayer!r}")
 
     @property
     def start_ns(self) -> int:

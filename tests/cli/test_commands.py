@@ -72,7 +72,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         *("convert", "frames", "-o", "out.h5", "-c", "ideal", "--set", "sampling.L=3"),
         *("--seed", "7", "--threads", "2", "--overwrite", "--progress", "--start", "0.5"),
         *("--stop", "2", "--t0", "keep", "--timestamps", "t.txt", "--format", "h5"),
-        *("--time-unit", "us", "--crop", "1,2,30,20", "--size", "8x6"),
+        *("--time-unit", "us", "--crop", "1,2,30,20", "--size", "8x6", "--bayer", "gbrg"),
         *("--layout", "dsec", "--with-frames", "--preview", "p.gif", "--allow-damaged"),
     )
     assert outcome.status == 0
@@ -87,6 +87,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "t0": "keep",
         "allow_damaged": True,
         "crop": (1, 2, 30, 20),
+        "bayer": "GBRG",
     }
     log = options.pop("log")
     assert options == {

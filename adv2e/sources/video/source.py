@@ -55,6 +55,11 @@ class VideoSource(Source):
 
     def __init__(self, path: Path, given: GivenTimes, selection: Selection) -> None:
         super().__init__(path, "video", selection, has_clock=given.timestamps is not None)
+        if selection.bayer is not None:
+            raise DataError(
+                f"{path}: --bayer {selection.bayer} is for images, TIFF and .npy; a video has"
+                " colours already"
+            )
         self._container = examine(path, allow_damaged=selection.allow_damaged)
         told = [*self._container.faults, *self._container.doubts]
         self.doubts += [f"{path}: {line}" for line in told]

@@ -1,0 +1,51 @@
+"""Mosaics: frames as a sensor with a colour filter gives them, one number a pixel, made colour.
+
+Colours between are interpolated linearly, which is right for light: a mosaic is what the sensor
+measured, without a curve.  Neither white balance nor a matrix of the camera is applied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import cv2
+import numpy as np
+
+from adv2e.errors import DataError
+from adv2e.sources.frame import Light, Pixels, Shot
+from adv2e.sources.wanted import PATTERNS
+
+# OpenCV's own names are those of the second and third pixel of the second row
+_CODES = {pattern: getattr(cv2, f"COLOR_Bayer{pattern}2RGB") for pattern in PATTERNS}
+_SMALLEST = 4
+
+
+def light_of(pattern: str) -> Light:
+    """Return what the numbers of a mosaic stand for."""
+    return Light("linear", f"a mosaic of {pattern}")
+
+
+def in_colour(shot: Shot, pattern: str) -> Shot:
+    """Return a shot of a mosaic as one in colour."""
+    return Shot(shot.t_ns, shot.label, partial(_load, shot.load, pattern, shot.label))
+
+
+def _load(load: Callable[[], Pixels], pattern: str, label: str) -> Pixels:
+    mosaic = load()
+    image = mosaic.image
+    if image.ndim != 2 or mosaic.alpha is not None or mosaic.composed:
+        raise DataError(
+            f"{label}: --bayer {pattern}: a mosaic has one number a pixel, this has more"
+        )
+    if image.dtype not in (np.uint8, np.uint16):
+        raise DataError(
+            f"{label}: --bayer {pattern}: a mosaic must be of uint8 or uint16, this is of"
+            f" {image.dtype.name}"
+        )
+    if min(image.shape) < _SMALLEST:
+        raise DataError(
+            f"{label}: --bayer {pattern}: a mosaic must have {_SMALLEST} rows and columns at least"
+        )
+    colour = cv2.cvtColor(np.ascontiguousarray(image), _CODES[pattern])
+    return Pixels(np.asarray(colour), white=mosaic.white)
