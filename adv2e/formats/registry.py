@@ -134,6 +134,28 @@ FORMATS = (
         reader="npz:open_npz",
         magic=b"PK",
     ),
+    Format(
+        name="evt3",
+        what="EVT 3.0 of Prophesee's cameras",
+        suffixes=(".raw",),
+        reader="raw:open_raw",
+        writer="evt3:Evt3Writer",
+        is_camera=True,
+        most=(1 << 11, 1 << 11),
+        first_us=0,
+        last_us=(1 << 36) - 1,
+    ),
+    Format(
+        name="evt2",
+        what="EVT 2.0 of Prophesee's cameras",
+        suffixes=(".raw",),
+        reader="raw:open_raw",
+        writer="evt2:Evt2Writer",
+        is_camera=True,
+        most=(1 << 11, 1 << 11),
+        first_us=0,
+        last_us=(1 << 34) - 1,
+    ),
 )
 """All formats; of those with the same suffix, the first is what a suffix alone stands for."""
 

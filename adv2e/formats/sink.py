@@ -190,3 +190,8 @@ def to_json(description: dict[str, Any]) -> str:
     """Return the description as text, the same for the same content, and fit for UTF-8."""
     text = json.dumps(description, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def to_line(description: dict[str, Any]) -> str:
+    """Return the description as one line of ASCII."""
+    return json.dumps(json.loads(to_json(description)))

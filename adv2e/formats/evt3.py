@@ -1,0 +1,206 @@
+"""Events in EVT 3.0, a format of Prophesee's cameras, in files that end on ``.raw``.
+
+A header of lines (:mod:`adv2e.formats.percent_header`) is followed by words of 16 bits, little
+endian.  What a word says holds until another one of its kind:
+
+========= =========== ===================================================
+kind      bits 12-15  bits 0-11
+========= =========== ===================================================
+ROW       0x0         0-10: row
+COLUMN    0x2         0-10: column; 11: polarity: an event
+BASE      0x3         0-10: column, from which vectors count; 11: polarity
+VECTOR    0x4, 0x5    12, or 8, columns: an event where a bit is set;
+                      the base moves on by as many
+LOW       0x6         time, low bits
+HIGH      0x8         time, high bits; if they change, the low ones are 0
+others    0x7, A, E,  triggers and what vendors add, left out
+          0xF
+========= =========== ===================================================
+
+Times have 24 bits [us], so they begin again at zero every 16.8 s, which is counted on reading.  So
+that every reader can count it, each HIGH is written, one every 4.096 ms, also where there is no
+event, from time 0 on; up to 19 hours, which are 34 MB of such words.  Vectors are not written.
+Rows of kind 0x1 are those of another type of event, which is left out.
+
+References
+----------
+.. [1] Prophesee, "EVT 3.0 Format", https://docs.prophesee.ai/stable/data/encoding_formats/evt3.html.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.events import Events
+from adv2e.formats.event_file import Columns, EventFile, Facts
+from adv2e.formats.percent_header import Header, header_of
+from adv2e.formats.sink import Request, Writer
+from adv2e.formats.words import Counter, Kinds, Numbers, blocks, last_before
+
+_ROW, _OTHER_ROW, _COLUMN, _BASE, _VECTOR_12, _VECTOR_8, _LOW, _HIGH = 0, 1, 2, 3, 4, 5, 6, 8
+_KINDS = (_ROW, _COLUMN, _BASE, _VECTOR_12, _VECTOR_8, _LOW, 0x7, _HIGH, 0xA, 0xE, 0xF)
+_BLOCK = 1 << 18  # words, or events to be written
+_NOWHERE = -(1 << 40)
+
+
+def evt3_of(header: Header, facts: Facts) -> EventFile:
+    """Return the events of a file whose header was read."""
+    begin = header.whole("t0") or 0
+
+    def parts() -> Iterator[Columns]:
+        decoder = _Decoder()
+        for words in blocks(header.path, header.size, "<u2", _BLOCK, facts):
+            t, x, y, p = decoder.events_of(words)
+            yield t + begin, x, y, p
+        facts.problems += decoder.kinds.problems()
+
+    return EventFile("evt3", facts, parts)
+
+
+class _Decoder:
+    """Decodes block after block, and holds what the words before said."""
+
+    def __init__(self) -> None:
+        self.kinds = Kinds(*_KINDS)
+        self._counter = Counter(12)
+        self._high = self._t = self._row = -1
+        self._base = _NOWHERE  # of the next vector, and ...
+        self._polarity = 0
+
+    def events_of(self, words: NDArray[np.uint16]) -> Columns:
+        """Return the events of some words."""
+        kind = (words >> 12).astype(np.uint8)
+        self.kinds.note(kind)
+        content = words & 0xFFF
+        at = np.flatnonzero(kind == _COLUMN)
+        column = content[at]
+        x, p = column & 0x7FF, column >> 11
+        is_vector = (kind == _VECTOR_12) | (kind == _VECTOR_8)
+        is_base = kind == _BASE
+        if is_base.any() or is_vector.any():
+            at_vectors, x_vectors, p_vectors = self._vectors(kind, content, is_base, is_vector)
+            at = np.concatenate([at, at_vectors])
+            order = np.argsort(at, kind="stable")
+            at = at[order]
+            x = np.concatenate([x, x_vectors])[order]
+            p = np.concatenate([p, p_vectors])[order]
+        t = self._times(kind, content, at)
+        is_row = kind <= _OTHER_ROW
+        rows = np.where(kind == _ROW, content & 0x7FF, -1)[is_row]
+        y = last_before(rows, is_row, self._row, at)
+        self._row = int(rows[-1]) if rows.size else self._row
+        known = (t >= 0) & (y >= 0) & (x >= 0)
+        if not known.all():
+            self.kinds.early += int(np.count_nonzero(~known))
+            t, x, y, p = t[known], x[known], y[known], p[known]
+        return t, x, y, p
+
+    def _times(self, kind: NDArray[np.uint8], content: NDArray[Any], at: Numbers) -> Numbers:
+        """Return the time that holds at each of the words `at`."""
+        is_time = (kind == _HIGH) | (kind == _LOW)
+        value, is_high = content[is_time], kind[is_time] == _HIGH
+        if not value.size:
+            return np.full(at.size, self._t, np.int64)
+        highs = np.concatenate([[self._high], self._counter(value[is_high])])
+        high = highs[np.cumsum(is_high)]
+        t = high << 12
+        t[~is_high] += value[~is_high]
+        # a HIGH that says what held already, as cameras repeat it, leaves the low bits as they are
+        repeats = np.zeros(value.size, np.bool_)
+        repeats[is_high] = highs[1:] == highs[:-1]
+        if repeats.any():
+            which = np.where(repeats, 0, np.arange(1, value.size + 1))
+            t = np.concatenate([[self._t], t])[np.maximum.accumulate(which)]
+        t[high < 0] = -1
+        held = last_before(t, is_time, self._t, at)
+        self._high, self._t = int(highs[-1]), int(t[-1])
+        return held
+
+    def _vectors(
+        self,
+        kind: NDArray[np.uint8],
+        content: NDArray[Any],
+        is_base: NDArray[np.bool_],
+        is_vector: NDArray[np.bool_],
+    ) -> tuple[Numbers, Numbers, Numbers]:
+        """Return the word, column and polarity of each event in a vector."""
+        moved = np.where(kind == _VECTOR_12, 12, 8) * is_vector
+        moved = np.cumsum(moved) - moved  # by all vectors before
+        at = np.flatnonzero(is_vector)
+        bases = content[is_base].astype(np.int64)
+        begin = last_before((bases & 0x7FF) - moved[is_base], is_base, self._base, at) + moved[at]
+        polarity = last_before(bases >> 11, is_base, self._polarity, at)
+        if bases.size:
+            self._base = int(bases[-1] & 0x7FF) - int(moved[is_base][-1])
+            self._polarity = int(bases[-1] >> 11)
+        self._base += int(moved[-1]) + int(is_vector[-1]) * (12 if kind[-1] == _VECTOR_12 else 8)
+        bits = np.where(kind[at] == _VECTOR_12, content[at], content[at] & 0xFF).astype("<u2")
+        row, bit = np.nonzero(
+            np.unpackbits(bits.view(np.uint8).reshape(-1, 2), axis=1, bitorder="little")
+        )
+        return at[row], begin[row] + bit, polarity[row]
+
+
+class Evt3Writer(Writer):
+    """Writes EVT 3.0; see :class:`Writer`."""
+
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+        (path,) = temporary
+        self._file = stack.enter_context(path.open("wb"))
+        size = f"height={request.height};width={request.width}"
+        geometry = f"geometry {request.width}x{request.height}"
+        self._file.write(header_of(request, "evt 3.0", f"format EVT3;{size}", geometry))
+        self._file.write(b"% end\n")
+        self._high = self._low = self._row = -1
+
+    def write_events(self, events: Events) -> None:
+        """Append events."""
+        for begin in range(0, events.size, _BLOCK):
+            part = events[begin : begin + _BLOCK]
+            far = np.flatnonzero(np.diff(part["t"] >> 12) > _BLOCK) + 1
+            for piece in np.split(part, far):
+                self._pass_time(int(piece["t"][0] >> 12))
+                self._write(piece)
+
+    def finish(self) -> None:
+        """Write the time at which nothing happened, where there was no event."""
+        self._pass_time(0)
+
+    def _pass_time(self, high: int) -> None:
+        """Write the high bits of all times up to one."""
+        while self._high < high:
+            highs = np.arange(self._high + 1, min(self._high + _BLOCK, high) + 1)
+            self._file.write((highs & 0xFFF | _HIGH << 12).astype("<u2").data)
+            self._high, self._low = int(highs[-1]), -1
+
+    def _write(self, events: Events) -> None:
+        """Append events; the time before the first of them has passed."""
+        high, low, row = events["t"] >> 12, (events["t"] & 0xFFF).astype(np.int32), events["y"]
+        passed = np.diff(high, prepend=self._high)
+        new_low = np.empty(events.size, np.bool_)
+        new_low[0] = low[0] != self._low
+        new_low[1:] = (low[1:] != low[:-1]) | (passed[1:] > 0)
+        new_row = np.empty(events.size, np.bool_)
+        new_row[0] = row[0] != self._row
+        np.not_equal(row[1:], row[:-1], out=new_row[1:])
+        self._high, self._low, self._row = int(high[-1]), int(low[-1]), int(row[-1])
+
+        place = np.cumsum(passed + new_low + new_row + 1) - 1  # of each event's last word
+        words = np.empty(int(place[-1]) + 1, "<u2")
+        words[place] = _COLUMN << 12 | events["p"].astype(np.uint16) << 11 | events["x"]
+        words[place[new_row] - 1] = _ROW << 12 | row[new_row]
+        words[(place - new_row)[new_low] - 1] = _LOW << 12 | low[new_low]
+        steps = np.flatnonzero(passed)
+        count = passed[steps]
+        # the last HIGH before an event stands before its LOW, which a new HIGH always has
+        last = (place - new_row)[steps] - 2
+        back = np.repeat(np.cumsum(count), count) - 1 - np.arange(int(count.sum()))
+        highs = np.repeat(high[steps], count) - back
+        words[np.repeat(last, count) - back] = _HIGH << 12 | highs & 0xFFF
+        self._file.write(words.data)
