@@ -80,7 +80,7 @@ def all_seeds(scratch: Path) -> list[Seed]:
     """Return every seed; `scratch` is a folder for files that only libraries can write."""
     seeds = [*_stacks(), *_events(), *_recordings(), *_images(), *_texts()]
     with quiet():
-        return [*seeds, *_hdf5(scratch), *_videos(scratch)]
+        return [*seeds, *_hdf5(scratch), *_camera_files(scratch), *_videos(scratch)]
 
 
 def _frames(dtype: str = "u1", *, colour: bool = False) -> np.ndarray:
@@ -280,6 +280,20 @@ def _write_hdf5(path: Path, *, packed: bool) -> None:
         for n, frame in enumerate(_frames()):
             file[f"images/image{n:09d}"] = frame
             file[f"images/image{n:09d}"].attrs["timestamp"] = 0.2 * n
+
+
+def _camera_files(scratch: Path) -> list[Seed]:
+    t, x, y, p = _columns().values()
+    events = make_events((t * 1e6).astype(np.int64), x, y, p)
+    seeds = []
+    for name, suffix in (("evt3", ".raw"), ("evt2", ".raw")):
+        path = scratch / f"a{suffix}"
+        with open_sink(
+            path, width=COLUMNS, height=ROWS, metadata={}, format=name, overwrite=True
+        ) as sink:
+            sink.write_events(events)
+        seeds.append(Seed(name, {path.name: path.read_bytes()}, _of_events(path.name)))
+    return seeds
 
 
 class _Structured(Seed):
