@@ -156,6 +156,18 @@ FORMATS = (
         first_us=0,
         last_us=(1 << 34) - 1,
     ),
+    Format(
+        name="dat",
+        what="DAT of Prophesee's cameras",
+        suffixes=(".dat",),
+        reader="dat:open_dat",
+        writer="dat:DatWriter",
+        magic=b"%",
+        is_camera=True,
+        most=(1 << 14, 1 << 14),
+        first_us=0,
+        last_us=(1 << 32) - 1,
+    ),
 )
 """All formats; of those with the same suffix, the first is what a suffix alone stands for."""
 

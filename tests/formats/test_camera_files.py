@@ -17,6 +17,11 @@ from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink
 
 READERS = {
+    "dat": [
+        event_readers.faery,
+        event_readers.eventcv,
+        event_readers.expelliarmus("dat"),
+    ],
     "evt3": [event_readers.faery, event_readers.eventcv],
     "evt2": [
         event_readers.faery,
@@ -132,14 +137,15 @@ def test_times_that_do_not_fit_leave_nothing(tmp_path, name, t):
 @pytest.mark.parametrize("name", NAMES)
 def test_sensors_that_do_not_fit_leave_nothing(tmp_path, name):
     width, height = FORMATS[name].most
-    largest = make_events([7], [width - 1], [height - 1], [1])
-    path = write(file_of(tmp_path, name), name, largest, size=(width, height))
-    assert np.array_equal(read_events(path).events, largest)
+    path = file_of(tmp_path, name)
+    for size in ((width, 5), (5, height)):
+        farthest = make_events([7], [size[0] - 1], [size[1] - 1], [1])
+        assert np.array_equal(read_events(write(path, name, farthest, size)).events, farthest)
     path.unlink()
 
     for size in ((width + 1, height), (width, height + 1)):
         with pytest.raises(OutputError, match=f"holds {width}x{height} at most"):
-            write(path, name, largest, size=size)
+            write(path, name, farthest, size)
 
     assert [left for left in tmp_path.iterdir() if left.suffix != ".json"] == []
 
