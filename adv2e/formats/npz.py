@@ -1,113 +1,215 @@
 """Events in NumPy archives: one structured array, or an array for each column.
 
-========== ======================= =================================================
-column     names                   meaning
-========== ======================= =================================================
-time       t_s, t_ms, t_us, t_ns   as they say
-           t, ts, time(stamp)(s)   told from the times: :mod:`adv2e.formats.units`
-column     x, xs                   from the left
-row        y, ys                   from the top
-polarity   p, ps, pol(arity)       ON above 0
-========== ======================= =================================================
+The columns are called as in :mod:`adv2e.formats.column_names`.  ``width`` and ``height`` tell the
+geometry [pixels], ``adv2e`` (JSON) what wrote the file.  What is written here:
 
-``width`` and ``height`` tell the geometry [pixels], ``adv2e`` (JSON) what wrote the file.
+======================== =========================================
+t_us                     int64, time [us]
+x, y                     uint16, column and row, from the top left
+p                        uint8, 1 is ON and 0 is OFF
+width, height            int64
+adv2e                    text: version, configuration, seed (JSON)
+======================== =========================================
+
+References
+----------
+.. [1] NumPy, ``numpy.savez_compressed``, https://numpy.org/doc/stable/reference/routines.io.html.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import io
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.files.npy import read_array
+from adv2e.events import EVENT_DTYPE, Events
+from adv2e.files.npy import Header, read_array, read_header
 from adv2e.files.zips import open_member, zip_archive
-from adv2e.formats.event_file import EventFile, Facts, Progress, described_geometry
+from adv2e.formats.column_names import find_columns, stated_unit
+from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
+from adv2e.formats.sink import Request, Writer, to_json
 from adv2e.ticks import US, to_ticks
 
-_NAMES = {
-    "time": ("t_us", "t_ns", "t_ms", "t_s", "t", "ts", "time", "times", "timestamp", "timestamps"),
-    "x": ("x", "xs"),
-    "y": ("y", "ys"),
-    "polarity": ("p", "ps", "pol", "polarity"),
-}
-
 _BEYOND = 1 << 31
+_PART = 1 << 20  # events read at once
+_LEVEL = 1  # of deflate
+_BLOCK = 1 << 20  # bytes deflated at once
+
+_WRITTEN = {"t_us": "t", "x": "x", "y": "y", "p": "p"}
+"""Fields of the events by the names of the arrays."""
 
 
 def open_npz(path: Path, facts: Facts) -> EventFile:
-    """Open a NumPy archive, and read it.
+    """Open a NumPy archive.
 
     Raises
     ------
     DataError
-        Not such an archive, a column is missing, or columns differ in length.
+        Not such an archive, a column is missing, or columns differ in length; from `parts`: they
+        hold no whole numbers.
     """
-    arrays = _load(path, facts.progress)
-    if "adv2e" in arrays:
-        facts.describe(str(arrays["adv2e"]), f"{path}: adv2e", "the file")
-    columns = _columns(path, arrays)
-    x, y, p = (_whole(path, *columns[name]) for name in ("x", "y", "polarity"))
-    sizes: dict[str, Any] = {
-        name: arrays[name].item()
-        for name in ("width", "height")
-        if name in arrays and arrays[name].size == 1
-    }
-    facts.state(described_geometry(sizes), "the file")
-    name, t = columns["time"]
+    with _archive(path) as archive:
+        headers = _headers(archive)
+        held = {
+            name: _read(archive, name)
+            for name in ("adv2e", "width", "height")
+            if name in headers and not headers[name].shape
+        }
+        if "adv2e" in held:
+            facts.describe(str(held["adv2e"]), f"{path}: adv2e", "the file")
+        sizes: dict[str, Any] = {
+            name: held[name].item() for name in ("width", "height") if name in held
+        }
+        facts.state(described_geometry(sizes), "the file")
+        table, names, count = _table(path, headers)
+        first = next(_parts(archive, table, names, count), None)
+    time = names[0]
+    facts.time_unit, facts.stated_unit = facts.time_unit or stated_unit(time), None
+    t, x, y = (np.empty(0, np.int64),) * 3 if first is None else first[:3]
     if t.dtype.kind not in "iuf":
-        raise DataError(f"{path}: {name} must hold numbers, not {t.dtype}")
-    stated = name[2:] if name.startswith("t_") else None
-    facts.time_unit, facts.stated_unit = facts.time_unit or stated, None
-    unit = facts.unit_of_events(t, x, y, facts.geometry, whole=t.dtype.kind != "f")
-    ticks = to_ticks(t, unit.ns, US, f"{path}: {name}")
-    return EventFile("npz", facts, lambda: iter([(ticks, x, y, p)]))
+        raise DataError(f"{path}: {time} must hold numbers, not {t.dtype}")
+    whole = t.dtype.kind != "f"
+    unit = facts.unit_of_events(t, x, y, facts.geometry, whole=whole)
+
+    def parts() -> Iterator[Columns]:
+        done = 0
+        with _archive(path) as archive:
+            for t, *others in _parts(archive, table, names, count):
+                ticks = to_ticks(t, unit.ns, US, f"{path}: {time}")
+                x, y, p = others
+                yield ticks, x, y, p
+                done += t.size
+                facts.progress(done, count)
+
+    return EventFile("npz", facts, parts)
 
 
-def _load(path: Path, progress: Progress) -> dict[str, NDArray[Any]]:
-    arrays = {}
-    with zip_archive(path, "a NumPy archive") as archive:
-        total, done = sum(member.file_size for member in archive.infolist()), 0
-        for member in archive.infolist():
-            name, suffix = member.filename[:-4], member.filename[-4:]
-            if suffix == ".npy":
-                with open_member(archive, member) as file:
-                    arrays[name] = read_array(file, member.file_size, f"{path}: {name}")
-            done += member.file_size
-            progress(done, total)
-    return arrays
+def _archive(path: Path) -> Any:
+    return zip_archive(path, "a NumPy archive")
 
 
-def _columns(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[str, NDArray[Any]]]:
-    """Return (name in the file, array) of each column."""
-    structured = [array for array in arrays.values() if array.dtype.names is not None]
-    if len(structured) == 1:
-        table = structured[0]
-        arrays = {name: table[name] for name in table.dtype.names or ()}
-    found = {}
-    for column, names in _NAMES.items():
-        name = next((name for name in names if name in arrays), None)
-        if name is None:
-            raise DataError(
-                f"{path}: no column for {column} ({', '.join(names)}); it has"
-                f" {', '.join(arrays) or 'nothing'}"
-            )
-        found[column] = (name, arrays[name])
-    shapes = {array.shape for _, array in found.values()}
+def _headers(archive: zipfile.ZipFile) -> dict[str, Header]:
+    """Return the headers of all arrays by their names."""
+    headers = {}
+    for member in archive.infolist():
+        if member.filename.endswith(".npy"):
+            name = member.filename[:-4]
+            with open_member(archive, member) as file:
+                headers[name] = read_header(file, member.file_size, f"{archive.filename}: {name}")
+    return headers
+
+
+def _read(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    with open_member(archive, f"{name}.npy") as file:
+        size = archive.getinfo(f"{name}.npy").file_size
+        return read_array(file, size, f"{archive.filename}: {name}")
+
+
+def _table(path: Path, headers: Mapping[str, Header]) -> tuple[str, tuple[str, ...], int]:
+    """Return the name of the structured array or "", the names of its columns, and their length."""
+    structured = [name for name, header in headers.items() if header.dtype.names is not None]
+    table = structured[0] if len(structured) == 1 else ""
+    names = find_columns((headers[table].dtype.names or ()) if table else headers, str(path))
+    shapes = {headers[name].shape for name in ([table] if table else names)}
     if len(shapes) != 1 or len(next(iter(shapes))) != 1:
         raise DataError(f"{path}: columns must be of one length, got {sorted(shapes)}")
-    return found
+    return table, names, next(iter(shapes))[0]
 
 
-def _whole(path: Path, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
+def _parts(
+    archive: zipfile.ZipFile, table: str, names: tuple[str, ...], count: int
+) -> Iterator[tuple[NDArray[Any], ...]]:
+    """Yield the columns, times as they are and the others as whole numbers."""
+    with ExitStack() as stack:
+        streams = {}
+        for name in [table] if table else names:
+            file = stack.enter_context(open_member(archive, f"{name}.npy"))
+            size = archive.getinfo(f"{name}.npy").file_size
+            streams[name] = file, read_header(file, size, f"{archive.filename}: {name}").dtype
+        for begin in range(0, count, _PART):
+            held = {
+                name: _take(file, dtype, min(_PART, count - begin), f"{archive.filename}: {name}")
+                for name, (file, dtype) in streams.items()
+            }
+            t, *others = (held[table][name] if table else held[name] for name in names)
+            label = str(archive.filename)
+            yield t, *(_whole(label, *pair) for pair in zip(names[1:], others, strict=True))
+
+
+def _take(file: IO[bytes], dtype: np.dtype[Any], count: int, label: str) -> NDArray[Any]:
+    data = file.read(count * dtype.itemsize)
+    if len(data) < count * dtype.itemsize:
+        raise DataError(f"{label}: cut short while it was read")
+    return np.frombuffer(data, dtype)
+
+
+def _whole(label: str, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
     """Return a column of whole numbers, whatever their type."""
     if column.dtype.kind not in "biuf":
-        raise DataError(f"{path}: {name} must hold numbers, not {column.dtype}")
+        raise DataError(f"{label}: {name} must hold numbers, not {column.dtype}")
     if column.dtype.kind == "f" and not np.array_equal(np.floor(column), column):
-        raise DataError(f"{path}: {name} must hold whole numbers")
+        raise DataError(f"{label}: {name} must hold whole numbers")
     # beyond any sensor, and within 64 bits whatever the type
     whole: NDArray[np.int64] = np.clip(column, -_BEYOND, _BEYOND).astype(np.int64)
     return whole
+
+
+class NpzWriter(Writer):
+    """Writes a NumPy archive, compressed; its bytes follow from its content.
+
+    How many events there are stands before each column, so the columns wait on disk until then.
+    """
+
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+        (path,) = temporary
+        self._request = request
+        self._archive = stack.enter_context(
+            zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)
+        )
+        # nameless: they are gone whatever becomes of the process
+        self._columns = {
+            name: stack.enter_context(tempfile.TemporaryFile(dir=path.parent))  # noqa: SIM115
+            for name in _WRITTEN
+        }
+        self._count = 0
+
+    def write_events(self, events: Events) -> None:
+        """Append events."""
+        self._count += events.size
+        for name, field in _WRITTEN.items():
+            self._columns[name].write(np.ascontiguousarray(events[field]).data)
+
+    def finish(self) -> None:
+        """Write the archive."""
+        for name, field in _WRITTEN.items():
+            file = self._columns[name]
+            file.seek(0)
+            self._add(name, EVENT_DTYPE[field], (self._count,), file)
+        for name, value in (
+            ("width", np.array(self._request.width, np.int64)),
+            ("height", np.array(self._request.height, np.int64)),
+            ("adv2e", np.array(to_json(self._request.description))),
+        ):
+            self._add(name, value.dtype, value.shape, io.BytesIO(value.tobytes()))
+
+    def _add(
+        self, name: str, dtype: np.dtype[Any], shape: tuple[int, ...], data: IO[bytes]
+    ) -> None:
+        """Add an array with the time that zip counts from."""
+        info = zipfile.ZipInfo(f"{name}.npy")
+        info.compress_type = zipfile.ZIP_DEFLATED
+        info.external_attr = 0o644 << 16
+        with self._archive.open(info, "w", force_zip64=True) as member:
+            header = {"descr": npy.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+            npy.write_array_header_1_0(member, header)
+            shutil.copyfileobj(data, member, _BLOCK)

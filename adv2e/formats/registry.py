@@ -128,10 +128,26 @@ FORMATS = (
         is_camera=True,
     ),
     Format(
+        name="e2vid",
+        what="text for rpg_e2vid, its first line the size; or a zip of it",
+        suffixes=(".txt", ".zip"),
+        writer="e2vid:E2vidWriter",
+        holds_settings=False,
+    ),
+    Format(
+        name="csv",
+        what="CSV with a heading",
+        suffixes=(".csv",),
+        reader="csv:open_csv",
+        writer="csv:CsvWriter",
+        holds_settings=False,
+    ),
+    Format(
         name="npz",
         what="NumPy archive",
         suffixes=(".npz",),
         reader="npz:open_npz",
+        writer="npz:NpzWriter",
         magic=b"PK",
     ),
     Format(

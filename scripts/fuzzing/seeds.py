@@ -171,6 +171,9 @@ def _events() -> list[Seed]:
             _of_events("a.npz"),
             archive="a.npz",
         ),
+        Seed(
+            "csv", {"a.csv": _event_lines("t_s x y p\n").replace(b" ", b",")}, _of_events("a.csv")
+        ),
         Seed("npz table", {"e.npy": _npy(table)}, _of_events("a.npz"), archive="a.npz"),
     ]
 

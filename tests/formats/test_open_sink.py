@@ -9,7 +9,7 @@ from adv2e.errors import OutputError, UsageError
 from adv2e.events import make_events, sort_events
 from adv2e.formats.writing import open_sink
 
-NAMES = ["out.txt", "out.zip", "out.h5", "out"]
+NAMES = ["out.txt", "out.zip", "out.h5", "out.npz", "out.csv", "out"]
 METADATA = {"adv2e": "1.2.3", "config": {"pixel": {"leak": None}}, "seed": 1}
 
 

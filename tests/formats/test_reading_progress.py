@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from adv2e.formats import hdf5
+from adv2e.formats import hdf5, npz
 from adv2e.formats.reading import read_events
 from adv2e.formats.text import reader as text
 
@@ -40,6 +40,7 @@ def test_it_grows_to_the_whole_and_changes_nothing(path, monkeypatch):
     expected = read_events(path)
     monkeypatch.setattr(text, "_BLOCK", 1 << 12)
     monkeypatch.setattr(hdf5, "PART", 100)
+    monkeypatch.setattr(npz, "_PART", 100)
     told = []
     found = read_events(path, progress=lambda done, total: told.append((done, total)))
     assert np.array_equal(found.events, expected.events)

@@ -13,7 +13,7 @@ from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink
 
 EPOCH_US = 1_468_941_032_229_165
-NAMES = ["out.txt", "out", "out.zip", "out.h5"]
+NAMES = ["out.txt", "out", "out.zip", "out.h5", "out.npz", "out.csv"]
 METADATA = {"adv2e": "9", "config": {"pixel": {"leak": None}}, "seed": 3}
 
 

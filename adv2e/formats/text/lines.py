@@ -17,7 +17,14 @@ _TENS = 10 ** np.arange(19)
 Numbers = NDArray[np.int64]
 
 
-def parse_lines(block: bytes, decimals: int, *, exact: bool) -> tuple[Numbers, Numbers, int]:
+def parse_lines(
+    block: bytes,
+    decimals: int,
+    *,
+    exact: bool,
+    fields: int = 4,
+    order: tuple[int, ...] = (0, 1, 2, 3),
+) -> tuple[Numbers, Numbers, int]:
     """Read lines of ``time x y polarity``.
 
     Parameters
@@ -28,6 +35,10 @@ def parse_lines(block: bytes, decimals: int, *, exact: bool) -> tuple[Numbers, N
         Times are multiplied by 10**decimals, and rounded to the nearest, halves away from zero.
     exact : bool
         A time that would have to be rounded is wrong, as a column, row or polarity always is.
+    fields : int
+        How many a line has.
+    order : tuple of int
+        Where time, x, y and polarity stand among them.
 
     Returns
     -------
@@ -44,19 +55,23 @@ def parse_lines(block: bytes, decimals: int, *, exact: bool) -> tuple[Numbers, N
     filled = data > ord(" ")
     edges = np.flatnonzero(filled[1:] != filled[:-1]) + 1
     begin, end = edges[::2], edges[1::2]
-    fields = np.diff(np.searchsorted(begin, np.flatnonzero(data == ord("\n"))))
-    lines = np.flatnonzero(fields) + 1
-    uneven = lines[fields[lines - 1] != 4]
+    counts = np.diff(np.searchsorted(begin, np.flatnonzero(data == ord("\n"))))
+    lines = np.flatnonzero(counts) + 1
+    uneven = lines[counts[lines - 1] != fields]
     wrong = int(uneven[0]) if uneven.size else 0
     if wrong:
         lines = lines[lines < wrong]
-    begin, end = (edge[: 4 * lines.size].reshape(-1, 4) for edge in (begin, end))
+    begin, end = (edge[: fields * lines.size].reshape(-1, fields) for edge in (begin, end))
     marks = np.flatnonzero(filled & (data - np.uint8(_ZERO) > 9))
     columns = np.empty((4, lines.size), np.int64)
     sound = np.empty((2, lines.size), np.bool_)
-    columns[0], sound[0] = _numbers(data, marks, begin[:, 0], end[:, 0], decimals, exact)
-    values, good = _numbers(data, marks, begin[:, 1:].ravel(), end[:, 1:].ravel(), 0, True)
-    columns[1:], sound[1] = values.reshape(-1, 3).T, good.reshape(-1, 3).all(axis=1)
+    time, *others = order
+    ordered = sorted(others)
+    columns[0], sound[0] = _numbers(data, marks, begin[:, time], end[:, time], decimals, exact)
+    begin, end = begin[:, ordered].ravel(), end[:, ordered].ravel()
+    values, good = _numbers(data, marks, begin, end, 0, True)
+    columns[1:] = values.reshape(-1, 3).T[np.argsort(np.argsort(others))]
+    sound[1] = good.reshape(-1, 3).all(axis=1)
     bad = np.flatnonzero(~sound.all(axis=0))
     if bad.size:
         wrong = int(lines[bad[0]])

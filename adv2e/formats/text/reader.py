@@ -12,8 +12,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
@@ -27,7 +28,40 @@ _BLOCK = 1 << 22  # bytes read at once
 _DECIMALS = {"s": 6, "ms": 3, "us": 0, "ns": -3}  # that make a microsecond
 
 _SIZE = re.compile(rb"0{0,9}[1-9][0-9]{0,4}")
-_DECIMAL_TIME = re.compile(rb"^[\x00-\x09\x0b-\x20]*(?!#)[^\x00-\x20.eE]*[.eE]", re.M)
+
+
+@dataclass(frozen=True)
+class Form:
+    """How the numbers of an event lie in its line.
+
+    Attributes
+    ----------
+    what : str
+        What a line must be, for messages.
+    fields : int
+        How many numbers it has.
+    order : tuple of int
+        Where time, x, y and polarity stand among them.
+    clean : callable
+        Makes of lines as they are as many lines of numbers and blanks.
+    """
+
+    what: str = "'time x y polarity'"
+    fields: int = 4
+    order: tuple[int, ...] = (0, 1, 2, 3)
+    clean: Callable[[bytes], bytes] = bytes
+
+    def parse(self, block: bytes, decimals: int, *, exact: bool) -> Any:
+        """Return what :func:`parse_lines` does."""
+        return parse_lines(
+            self.clean(block), decimals, exact=exact, fields=self.fields, order=self.order
+        )
+
+    def has_decimals(self, block: bytes) -> bool:
+        """Tell whether a time in lines as they are is no whole number."""
+        before = rb"[^\x00-\x20]+[\x00-\x09\x0b-\x20]+" * self.order[0]
+        line = rb"^[\x00-\x09\x0b-\x20]*(?!#)" + before + rb"[^\x00-\x20.eE]*[.eE]"
+        return re.search(line, self.clean(block), re.M) is not None
 
 
 def open_text(path: Path, facts: Facts) -> EventFile:
@@ -55,6 +89,25 @@ def lines_of(
     facts: Facts,
     header: str,
 ) -> EventFile:
+    """Return the events that are the lines of a text, of which the first may be the geometry.
+
+    Parameters and errors as :func:`events_of_lines`; `header` is what the first line is called.
+    """
+    with opened() as file:
+        block = next(_blocks(file), b"")
+    geometry, skipped, lines = _header(block)
+    facts.state(geometry, header)
+    return events_of_lines(opened, size, label, facts, (skipped, lines), Form())
+
+
+def events_of_lines(
+    opened: Callable[[], AbstractContextManager[IO[bytes]]],
+    size: int,
+    label: str,
+    facts: Facts,
+    head: tuple[int, int],
+    form: Form,
+) -> EventFile:
     """Return the events that are the lines of a text.
 
     Parameters
@@ -63,22 +116,23 @@ def lines_of(
         Opens the text.
     size : int
         That of the text [bytes], for telling the progress.
-    label, header : str
-        What it and its first line are called, for messages.
+    label : str
+        What it is called, for messages.
     facts : Facts
+    head : (int, int)
+        Bytes and lines before the events.
+    form : Form
 
     Raises
     ------
     DataError
-        From `parts`: a line is not ``time x y polarity``; the text names file and line.
+        From `parts`: a line is not of that form; the text names file and line.
     """
+    skipped, lines = head
     with opened() as file:
-        block = next(_blocks(file), b"")
-    geometry, skipped, lines = _header(block)
-    facts.state(geometry, header)
-    block = block[skipped:]
-    whole = not _DECIMAL_TIME.search(block)
-    (t, x, y, _), *_ = parse_lines(block, 0 if whole else 6, exact=whole)
+        block = next(_blocks(file), b"")[skipped:]
+    whole = not form.has_decimals(block)
+    (t, x, y, _), *_ = form.parse(block, 0 if whole else 6, exact=whole)
     unit = facts.unit_of_events(t if whole else t / 1e6, x, y, facts.geometry, whole=whole)
     decimals = _DECIMALS[unit.name]
 
@@ -87,9 +141,9 @@ def lines_of(
         with opened() as file:
             for read in _blocks(file):
                 block = read[begin:]
-                columns, places, wrong = parse_lines(block, decimals, exact=whole and decimals == 0)
+                columns, places, wrong = form.parse(block, decimals, exact=whole and decimals == 0)
                 if wrong:
-                    raise _malformed(block, label, before, wrong)
+                    raise _malformed(block, f"{label} line {before + wrong}", wrong, form.what)
                 t = columns[0]
                 late = np.flatnonzero(np.abs(t) > LARGEST_NS // US)
                 if late.size:
@@ -131,7 +185,7 @@ def _header(block: bytes) -> tuple[tuple[int, int] | None, int, int]:
     return None, begin, 0
 
 
-def _malformed(data: bytes, label: str, before: int, wrong: int) -> DataError:
+def _malformed(data: bytes, label: str, wrong: int, what: str) -> DataError:
     line = data.split(b"\n", wrong)[wrong - 1].strip()
     shown = line[:60].decode("utf-8", errors="backslashreplace")
-    return DataError(f"{label} line {before + wrong}: must be 'time x y polarity', got {shown!r}")
+    return DataError(f"{label}: must be {what}, got {shown!r}")

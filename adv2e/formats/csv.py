@@ -1,0 +1,163 @@
+"""Events as CSV: a heading that names the columns, then a line for each event.
+
+========= =====================================
+written   meaning
+========= =====================================
+t         time [us]
+x         column, from the left
+y         row, from the top
+p         polarity, 1 is ON and 0 is OFF
+========= =====================================
+
+pandas and faery take this with their defaults.  Read are the columns that
+:mod:`adv2e.formats.column_names` names, in any order and among others, between commas, semicolons
+or tabs.  A file without a heading is refused: some programs write ``t, x, y, p``, Metavision
+``x, y, p, t``.
+
+References
+----------
+.. [1] Y. Shafranovich, RFC 4180, "Common format and MIME type for comma-separated values", 2005.
+.. [2] pandas, ``pandas.read_csv``; faery, ``faery.events_stream_from_file``.
+"""
+
+from __future__ import annotations
+
+import re
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.errors import DataError
+from adv2e.events import Events
+from adv2e.formats.column_names import find_columns, stated_unit
+from adv2e.formats.event_file import EventFile, Facts
+from adv2e.formats.sink import Request, Writer
+from adv2e.formats.text.reader import Form, events_of_lines
+
+_HEADING = b"t,x,y,p\n"
+_MOST_HEADING = 1 << 16  # bytes that a heading lies within
+
+_BETWEEN = re.compile(r"\s*[,;\t]\s*|\s+")
+_BLANK = bytes.maketrans(b',;\t"', b"    ")
+_TRUTH = ((b"True", b"1"), (b"False", b"0"), (b"true", b"1"), (b"false", b"0"))
+"""What pandas and others make of polarities that are true or false."""
+
+_BLOCK = 1 << 15  # events formatted at once
+
+
+def open_csv(path: Path, facts: Facts) -> EventFile:
+    """Open a CSV of events.
+
+    Raises
+    ------
+    DataError
+        There is no heading, or a column is missing; from `parts`: a line that cannot be read.
+    """
+    with path.open("rb") as file:
+        begin = file.read(_MOST_HEADING)
+    names, skipped, lines = _heading(path, begin)
+    found = find_columns(names, str(path))
+    # of what was written here, the description beside it tells: t is in us
+    facts.stated_unit = "us" if facts.description and found[0] == "t" else None
+    facts.time_unit = facts.time_unit or stated_unit(found[0])
+    form = Form(
+        f"the {len(names)} numbers that the heading names",
+        len(names),
+        tuple(names.index(name) for name in found),
+        _cleaned,
+    )
+    size, head = path.stat().st_size, (skipped, lines)
+    opened = events_of_lines(lambda: path.open("rb"), size, str(path), facts, head, form)
+    return replace(opened, layout="csv")
+
+
+def _heading(path: Path, begin: bytes) -> tuple[list[str], int, int]:
+    """Return the names of the columns, and the bytes and lines before the first event."""
+    at = 3 if begin.startswith(b"\xef\xbb\xbf") else 0
+    lines = 0
+    while at < len(begin):
+        end = begin.find(b"\n", at) + 1 or len(begin)
+        text = begin[at:end].decode("utf-8", "replace").strip()
+        at, lines = end, lines + 1
+        names = [name.strip("\"'").lower() for name in _BETWEEN.split(text.lstrip("# "))]
+        if len(names) >= 4 and not any(map(_is_number, names)):
+            return names, at, lines
+        if text and not text.startswith("#"):
+            break
+    raise DataError(
+        f"{path}: must begin with a line that names the columns, such as t,x,y,p (t in"
+        " microseconds; t_s,x,y,p in seconds); files of Metavision need x,y,p,t_us"
+    )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _cleaned(block: bytes) -> bytes:
+    """Return lines of numbers and blanks."""
+    for word, number in _TRUTH:
+        if word in block:
+            block = block.replace(word, number)
+    return block.translate(_BLANK)
+
+
+class CsvWriter(Writer):
+    """Writes a CSV of events."""
+
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+        (path,) = temporary
+        self._file = stack.enter_context(path.open("wb"))
+        self._file.write(_HEADING)
+
+    def write_events(self, events: Events) -> None:
+        """Append events."""
+        for begin in range(0, events.size, _BLOCK):
+            self._file.write(_lines(events[begin : begin + _BLOCK]))
+
+
+def _lines(events: Events) -> bytes:
+    """Return the lines of some events."""
+    numbers, triples = _tables()
+    t = events["t"]
+    left = np.abs(t)
+    groups = [left % 1000]  # of three digits, the last first
+    while (left := left // 1000).any():
+        groups.append(left % 1000)
+    comma = 1 + 3 * len(groups)
+    table = np.zeros((events.size, comma + 15), np.uint8)  # zeros are left out
+    table[:, 0] = np.where(t < 0, ord("-"), 0)
+    begun = np.zeros(events.size, np.bool_)
+    for k, group in enumerate(reversed(groups)):
+        table[:, 1 + 3 * k : 4 + 3 * k] = triples[group + 1000 * begun]
+        begun |= group > 0
+    table[~begun, comma - 1] = ord("0")
+    table[:, comma] = ord(",")
+    table[:, comma + 1 : comma + 7] = numbers[events["x"]]
+    table[:, comma + 7 : comma + 13] = numbers[events["y"]]
+    table[:, comma + 13] = events["p"] + ord("0")
+    table[:, comma + 14] = ord("\n")
+    return table[table > 0].tobytes()
+
+
+@cache
+def _tables() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return all 16-bit numbers, each with a comma, and triples of digits, zeros behind them.
+
+    Of the triples, first those that begin a number, then those within.
+    """
+    numbers = b"".join(b"%d," % n + bytes(5 - len(str(n))) for n in range(1 << 16))
+    begin = b"".join(b"%d" % n + bytes(3 - len(str(n))) for n in range(1, 1000))
+    within = b"".join(b"%03d" % n for n in range(1000))
+    return (
+        np.frombuffer(numbers, np.uint8).reshape(-1, 6),
+        np.frombuffer(bytes(3) + begin + within, np.uint8).reshape(-1, 3),
+    )
