@@ -135,6 +135,18 @@ FORMATS = (
         holds_settings=False,
     ),
     Format(
+        name="aedat4",
+        what="AEDAT4 of iniVation's cameras",
+        suffixes=(".aedat4",),
+        reader="aedat4.reader:open_aedat4",
+        writer="aedat4.writer:Aedat4Writer",
+        magic=b"#!AER-DAT4.0\r\n",
+        frames="rw",
+        is_camera=True,
+        most=(32767, 32767),
+        extra="aedat4",
+    ),
+    Format(
         name="csv",
         what="CSV with a heading",
         suffixes=(".csv",),

@@ -248,6 +248,22 @@ def _texts() -> list[Seed]:
     ]
 
 
+def _packets(scratch: Path) -> list[Seed]:
+    """Files of packets, as this program writes them."""
+    columns = _columns()
+    events = make_events((columns["t"] * 1e6).astype(int), *(columns[name] for name in "xyp"))
+    seeds = []
+    for name in ("a.aedat4",):
+        path, size = scratch / name, {"width": COLUMNS, "height": ROWS}
+        with open_sink(path, **size, metadata={}, with_frames=True, overwrite=True) as sink:
+            for n, frame in enumerate(_frames()):
+                sink.write_frame(n * 200_000_000, frame)
+            sink.write_events(events)
+        commands = (*_of_events(name), _convert(name))
+        seeds.append(Seed(path.suffix[1:], {name: path.read_bytes()}, commands))
+    return seeds
+
+
 def _hdf5(scratch: Path) -> list[Seed]:
     commands = (*_of_events("a.h5"), _convert("a.h5"))
     seeds = []

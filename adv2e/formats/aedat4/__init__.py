@@ -1,0 +1,1 @@
+"""AEDAT4, the format of iniVation's DV, jAER's successor, for events and frames."""
