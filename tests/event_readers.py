@@ -31,3 +31,15 @@ def expelliarmus(encoding):
         return None, make_events(events["t"], events["x"], events["y"], events["p"])
 
     return read
+
+
+def event_stream(path):
+    """Events as event_stream gets them; it leaves the rows as they are: from the bottom."""
+    with pytest.importorskip("event_stream").Decoder(path) as decoder:
+        size = decoder.width, decoder.height
+        parts = list(decoder)
+    names = zip("txyp", ("t", "x", "y", "on"), strict=True)
+    columns = {ours: np.concatenate([np.zeros(0, "i8"), *(part[name] for part in parts)])
+               for ours, name in names}  # fmt: skip
+    columns["y"] = size[1] - 1 - columns["y"]
+    return size, make_events(**columns)

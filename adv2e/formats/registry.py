@@ -196,6 +196,19 @@ FORMATS = (
         first_us=0,
         last_us=(1 << 32) - 1,
     ),
+    Format(
+        name="es",
+        what="Event Stream",
+        suffixes=(".es",),
+        reader="es:open_es",
+        writer="es:EsWriter",
+        magic=b"Event Stream",
+        is_camera=True,
+        holds_settings=False,
+        most=((1 << 16) - 1, (1 << 16) - 1),
+        first_us=0,
+        last_us=(1 << 35) - 1,
+    ),
 )
 """All formats; of those with the same suffix, the first is what a suffix alone stands for."""
 

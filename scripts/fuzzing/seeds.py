@@ -305,7 +305,7 @@ def _camera_files(scratch: Path) -> list[Seed]:
     t, x, y, p = _columns().values()
     events = make_events((t * 1e6).astype(np.int64), x, y, p)
     seeds = []
-    for name, suffix in (("evt3", ".raw"), ("evt2", ".raw"), ("dat", ".dat")):
+    for name, suffix in (("evt3", ".raw"), ("evt2", ".raw"), ("dat", ".dat"), ("es", ".es")):
         path = scratch / f"a{suffix}"
         with open_sink(
             path, width=COLUMNS, height=ROWS, metadata={}, format=name, overwrite=True
