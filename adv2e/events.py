@@ -18,7 +18,7 @@ EVENT_DTYPE = np.dtype([("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
 """The record type of every event array in the package."""
 
 Events = NDArray[Any]
-"""A structured array of ``EVENT_DTYPE``."""
+"""A structured array of ``EVENT_DTYPE``, or with one more field (:mod:`adv2e.causes`)."""
 
 _PART = 1 << 20  # events looked at together
 
@@ -43,7 +43,9 @@ def make_events(t: Any, x: Any, y: Any, p: Any) -> Events:
     return events
 
 
-def checked_events(events: Any, width: int, height: int) -> Events:
+def checked_events(
+    events: Any, width: int, height: int, dtype: np.dtype[Any] = EVENT_DTYPE
+) -> Events:
     """Return events that somebody made as a sorted array of ``EVENT_DTYPE``.
 
     Parameters
@@ -52,6 +54,8 @@ def checked_events(events: Any, width: int, height: int) -> Events:
         With the fields t [us], x, y, p of whole numbers, in any order of time.
     width, height : int
         Size of the sensor [pixels].
+    dtype : dtype
+        Another record type to return, whose fields `events` has.
 
     Raises
     ------
@@ -78,8 +82,11 @@ def checked_events(events: Any, width: int, height: int) -> Events:
                 f"events: number {number} has {name} {events[name][number]}, outside a sensor of"
                 f" {width}x{height} pixels"
             )
-    if events.dtype != EVENT_DTYPE:
-        events = make_events(*(events[name] for name in ("t", "x", "y", "p")))
+    if events.dtype != dtype:
+        ours = np.empty(events.size, dtype)
+        for name in dtype.names or ():
+            ours[name] = events[name] > 0 if name == "p" else events[name]
+        events = ours
     return events if is_sorted(events) else sort_events(events)
 
 

@@ -79,6 +79,12 @@ if TYPE_CHECKING:
     help="Also draw the frames beside the events, as 'adv2e render' does: a film (.mp4, .webm,"
     " .gif, .avi) or a sheet of pictures (.png).",
 )
+@click.option(
+    "--causes",
+    is_flag=True,
+    help="Also store what made each event: the light, leak or a kind of noise. HDF5 holds it as"
+    " events/causes; beside other formats it is OUT.causes.txt, a number on each line.",
+)
 def command(
     source: str,
     output: str | None,

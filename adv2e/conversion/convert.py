@@ -37,6 +37,7 @@ def convert(
     with_frames: bool = False,
     overwrite: bool = False,
     preview: str | Path | None = None,
+    causes: bool = False,
     threads: int | None = None,
     progress: bool = False,
     take: str | None = None,
@@ -79,6 +80,8 @@ def convert(
         Replace, at the end, an output that exists.
     preview : str or Path, optional
         Picture or film of the events to write beside.
+    causes : bool
+        Store what made each event, too: as a column of HDF5, else in ``<output>.causes.txt``.
     threads : int, optional
         Default: all cores.  The events do not depend on it.
     progress : bool
@@ -147,6 +150,7 @@ def convert(
             layout=layout,
             with_frames=with_frames,
             overwrite=overwrite,
+            causes=causes,
             threads=threads,
             progress=progress,
             log=notes.append,
@@ -177,6 +181,7 @@ def convert(
             with_frames=with_frames,
             overwrite=overwrite,
             preview=None if preview is None else str(preview),
+            causes=causes,
             progress=progress,
             also_read=files_among(config),
             log=notes.append,

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from adv2e import __version__
 from adv2e.background import OrderedWork
+from adv2e.causes import CAUSES
 from adv2e.config import Config, to_dict
 from adv2e.config.active_effects import active_hooks, user_sources
 from adv2e.conversion.reading import Decoding, Reading, Still
@@ -148,6 +149,7 @@ def convert_reading(
     with_frames: bool = False,
     overwrite: bool = False,
     preview: str | None = None,
+    causes: bool = False,
     progress: bool = False,
     also_read: Iterable[str | Path] = (),
     log: Callable[[str], None] = lambda text: None,
@@ -167,6 +169,8 @@ def convert_reading(
         frames.
     preview : str, optional
         Picture or film of the events to write beside.
+    causes : bool
+        Store what made each event, too.
     progress : bool
         Show a progress bar on stderr.
     also_read : iterable of str or Path
@@ -209,10 +213,14 @@ def convert_reading(
                 height=height,
                 format=format,
                 layout=layout,
-                metadata=_metadata(config, recording, decoder, white if with_frames else None),
+                metadata={
+                    **_metadata(config, recording, decoder, white if with_frames else None),
+                    **({"causes": CAUSES} if causes else {}),
+                },
                 with_frames=with_frames,
                 threads=workers,
                 staging=staging,
+                causes=causes,
             )
         )
         # a write to standard output may block until the reader pleases, and only the main thread
@@ -241,6 +249,7 @@ def convert_reading(
             threads=workers,
             table=table,
             complete=out.complete_until,
+            causes=causes,
         )
         for events in chunks:
             out.add(events)

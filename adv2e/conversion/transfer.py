@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e import __version__
+from adv2e.causes import CAUSES
 from adv2e.conversion.pipeline import Summary
 from adv2e.conversion.versions import versions
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
@@ -29,6 +30,7 @@ from adv2e.formats import compression
 from adv2e.formats.assembly import (
     Check,
     assemble,
+    events_of_file,
     in_order,
     inside,
     left_out,
@@ -106,6 +108,7 @@ def convert_events(
     layout: str | None = None,
     with_frames: bool = False,
     overwrite: bool = False,
+    causes: bool = False,
     threads: int | None = None,
     progress: bool = False,
     log: Callable[[str], None] = lambda text: None,
@@ -132,6 +135,8 @@ def convert_events(
         auto, keep: times stay; zero: from the first event, or from `start_s` after it.
     format, layout, with_frames, overwrite, threads
         See :func:`adv2e.formats.writing.open_sink`.
+    causes : bool
+        Store the causes of the events, too, which the file must have.
     progress : bool
         Show a progress bar on stderr.
     log, doubt : callable
@@ -147,6 +152,10 @@ def convert_events(
     keeps_all_bits = to_write(Path(output), format, layout).name in ("folder", "zip")
     file = open_events(path, time_unit=time_unit, size=size)
     facts = file.facts
+    if causes and file.causes is None:
+        raise DataError(
+            f"{path}: its events have no causes; only 'adv2e convert --causes' has them"
+        )
     with _bar(path, progress) as facts.progress:
         found, first_us, parts = _events_of(file)
         if found == (0, 0):
@@ -160,13 +169,17 @@ def convert_events(
                     output,
                     width=width,
                     height=height,
-                    metadata=_metadata(file, part, frames, keeps_all_bits),
+                    metadata={
+                        **_metadata(file, part, frames, keeps_all_bits),
+                        **({"causes": CAUSES} if causes else {}),
+                    },
                     format=format,
                     layout=layout,
                     overwrite=overwrite,
                     with_frames=frames,
                     threads=threads,
                     staging=staging,
+                    causes=causes,
                 )
             )
             stored = _write_frames(file, part, sink, keeps_all_bits) if sink.wants_frames else 0
@@ -212,7 +225,7 @@ def _events_of(file: EventFile) -> tuple[tuple[int, int], int, Iterator[Events]]
     check = Check()
 
     def parts() -> Iterator[Events]:
-        yield from in_order(check.events_of(columns) for columns in file.parts())
+        yield from in_order(events_of_file(file, check))
         file.facts.problems += check.problems()
 
     return size, seen.first_us, parts()

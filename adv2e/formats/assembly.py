@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.causes import CAUSED_DTYPE
+from adv2e.errors import DataError
 from adv2e.events import (
     EVENT_DTYPE,
     Events,
@@ -17,6 +19,7 @@ from adv2e.events import (
     sort_events,
     sort_ties,
 )
+from adv2e.formats.causes import check_numbers
 from adv2e.formats.event_file import Column, Columns, EventFile, Facts
 from adv2e.formats.recording import Recording
 from adv2e.sources.times.instants import seconds
@@ -38,7 +41,7 @@ class Check:
         self._values: set[int] = set()
         self._odd_polarities = 0
 
-    def events_of(self, columns: Columns) -> Events:
+    def events_of(self, columns: Columns, causes: Column | None = None) -> Events:
         """Return the events of a part in their order, without those that no sensor can have."""
         t, x, y, p = columns
         self._note_polarities(p)
@@ -47,8 +50,11 @@ class Check:
         if count < fits.size:
             self._unstorable += fits.size - count
             t, x, y, p = t[fits], x[fits], y[fits], p[fits]
-        part = np.empty(count, EVENT_DTYPE)
+            causes = None if causes is None else causes[fits]
+        part = np.empty(count, EVENT_DTYPE if causes is None else CAUSED_DTYPE)
         part["t"], part["x"], part["y"], part["p"] = t, x, y, p > 0
+        if causes is not None:
+            part["cause"] = causes
         return part
 
     def _note_polarities(self, p: Column) -> None:
@@ -80,8 +86,9 @@ class Check:
 def assemble(file: EventFile) -> Recording:
     """Return all that a file holds, its events sorted and inside its geometry."""
     facts, check = file.facts, Check()
-    parts = [check.events_of(columns) for columns in file.parts()]
-    events = np.concatenate(parts) if parts else empty_events()
+    parts = list(events_of_file(file, check))
+    dtype = EVENT_DTYPE if file.causes is None else CAUSED_DTYPE
+    events = np.concatenate([np.empty(0, dtype), *parts])
     del parts
     facts.problems += check.problems()
     size = settled_size(_needed(events), facts)
@@ -104,6 +111,23 @@ def assemble(file: EventFile) -> Recording:
         problems=facts.problems,
         images=lambda: (shot.load() for shot in shots or ()),
     )
+
+
+def events_of_file(file: EventFile, check: Check) -> Iterator[Events]:
+    """Yield the events part by part, with their causes if the file has them."""
+    if file.causes is None:
+        yield from map(check.events_of, file.parts())
+        return
+    causes, done = file.causes(), 0
+    check_numbers(causes, f"{file.facts.path}: causes")
+    for columns in file.parts():
+        size = columns[0].size
+        if done + size > causes.size:
+            raise DataError(f"{file.facts.path}: fewer causes than events: {causes.size}")
+        yield check.events_of(columns, causes[done : done + size])
+        done += size
+    if done != causes.size:
+        raise DataError(f"{file.facts.path}: {causes.size} causes for {done} events")
 
 
 def settled_size(needed: tuple[int, int] | None, facts: Facts) -> tuple[int, int]:

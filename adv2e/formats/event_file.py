@@ -193,12 +193,15 @@ class EventFile:
     shots : callable, optional
         Returns an iterator over the frames, in the order of time and not loaded; None: the file has
         none.
+    causes : callable, optional
+        Returns the number of the cause of each event, in the order of the file; None: it has none.
     """
 
     layout: str
     facts: Facts
     parts: Callable[[], Iterator[Columns]]
     shots: Callable[[], Iterator[Shot]] | None = None
+    causes: Callable[[], Column] | None = None
 
 
 def described_geometry(description: dict[str, Any]) -> tuple[int, int] | None:

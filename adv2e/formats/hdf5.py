@@ -111,6 +111,15 @@ def read_all(column: h5py.Dataset, label: str) -> NDArray[Any]:
     return np.asarray(column[()])
 
 
+def read_column(path: Path, name: str) -> NDArray[Any]:
+    """Return a dataset of one dimension; DataError if it is none."""
+    with opened(path) as file:
+        found = read_all(dataset(file, name), f"{path}: {name}")
+    if found.ndim != 1:
+        raise DataError(f"{path}: {name} must be a column, not of shape {found.shape}")
+    return found
+
+
 def number(file: h5py.File, name: str) -> int:
     """Return the one whole number that a dataset holds; DataError if it holds something else."""
     found = dataset(file, name)

@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from adv2e.background import OrderedWork
+from adv2e.causes import CAUSED_DTYPE
 from adv2e.errors import OutputError
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.backlog import Backlog
+from adv2e.formats import causes
 from adv2e.formats.compression import compress, compress_shuffled
 from adv2e.formats.sink import Request, Writer, to_json
 from adv2e.light.pictures import eight_bit
@@ -50,6 +52,9 @@ class Column(NamedTuple):
     """Its rows, of some items."""
     width: int = 0
     """Numbers in a row; 0: it has one dimension."""
+
+
+_CAUSES = Column(causes.DATASET, np.uint8, lambda events: events["cause"])
 
 
 class Columns:
@@ -158,7 +163,12 @@ class Hdf5Writer(Writer):
         self._before: list[int | None] = []  # events before each; None: to be looked up
         self._ends: list[float] = []  # time of the last event of each chunk [s]
         self.on = 0
-        self._events = Columns(self.file, self.work, EVENT_DTYPE, self.columns(), self.chunk_made)
+        columns, dtype = self.columns(), EVENT_DTYPE
+        if request.causes:
+            columns, dtype = [*columns, _CAUSES], CAUSED_DTYPE
+        self._events = Columns(self.file, self.work, dtype, columns, self.chunk_made)
+        if request.causes:
+            self.file[_CAUSES.name].attrs["names"] = causes.NAMES
 
     @property
     def size(self) -> int:

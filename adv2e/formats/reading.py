@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from adv2e.errors import DataError
 from adv2e.files.regular import check_ends
 from adv2e.formats.assembly import assemble
+from adv2e.formats.causes import reader_of
 from adv2e.formats.event_file import EventFile, Facts, Progress
 from adv2e.formats.recording import Recording
 from adv2e.formats.registry import format_of
@@ -53,7 +55,8 @@ def open_events(
         if not found.holds_settings and beside.is_file():
             facts.describe_from(beside)
         file: EventFile = found.load(found.reader)(path, facts)
-    return file
+        causes = reader_of(path, is_hdf5=found.is_hdf5)
+    return replace(file, causes=causes)
 
 
 def read_events(

@@ -44,6 +44,9 @@ class Format:
         Such files are recordings of cameras: where they hold frames, ``adv2e convert`` simulates.
     holds_settings : bool
         It holds how it was made; else that lies beside it, in ``<path>.json``.
+    holds_causes : bool
+        It holds the causes of the events; else they lie beside it: see
+        :mod:`adv2e.formats.causes`.
     most : (int, int)
         Most columns and rows of a sensor that it can hold.
     first_us, last_us : int
@@ -63,6 +66,7 @@ class Format:
     frames: str = ""
     is_camera: bool = False
     holds_settings: bool = True
+    holds_causes: bool = False
     most: tuple[int, int] = (1 << 16, 1 << 16)
     first_us: int = -_LARGEST_US
     last_us: int = _LARGEST_US
@@ -90,6 +94,7 @@ FORMATS = (
         writer="monash.writer:MonashWriter",
         datasets=("events/ts", "events/xs", "events/ys", "events/ps"),
         frames="rw",
+        holds_causes=True,
     ),
     Format(
         name="dsec",
@@ -98,6 +103,7 @@ FORMATS = (
         reader="dsec:open_dsec",
         writer="dsec:DsecWriter",
         datasets=("events/t", "events/x", "events/y", "events/p"),
+        holds_causes=True,
     ),
     Format(
         name="txt",

@@ -6,16 +6,18 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
-from adv2e.errors import OutputError
+from adv2e.causes import without_causes
+from adv2e.errors import OutputError, UsageError
 from adv2e.events import Events
 from adv2e.files.staging import Staging, writing
+from adv2e.formats import causes
 from adv2e.formats.registry import Format
 
 
@@ -29,6 +31,7 @@ class Request:
     description: dict[str, Any]
     with_frames: bool
     threads: int
+    causes: bool = False
 
 
 class Writer(ABC):
@@ -97,7 +100,26 @@ class Sink:
         if temporary and not format.holds_settings:
             beside = request.path.with_name(request.path.name + ".json")
             self._description = staging.file(beside), to_json(request.description)
-        self._open = self._opened(partial(writer, request), staging, temporary, is_alone)
+        self._holds_causes = request.causes and format.holds_causes
+        self._causes = self._place_of_causes(request, staging, temporary)
+        told = replace(request, causes=self._holds_causes)
+        self._open = self._opened(partial(writer, told), staging, temporary, is_alone)
+
+    def _place_of_causes(
+        self, request: Request, staging: Staging, temporary: list[Path]
+    ) -> Path | None:
+        """Return where causes are written beside the output; None: nowhere."""
+        beside = causes.beside(request.path)
+        if request.causes and not self._holds_causes:
+            if not temporary:
+                raise UsageError("--causes: standard output has no place for them; give -o FILE")
+            return staging.file(beside)
+        if temporary and beside.exists():
+            raise OutputError(
+                f"{beside}: exists, and would be taken for the causes of these events: remove it,"
+                " or write them too (--causes)"
+            )
+        return None
 
     def _check_size(self, width: int, height: int) -> None:
         """Refuse a sensor that the format cannot name the pixels of."""
@@ -134,6 +156,8 @@ class Sink:
                 if self._description is not None:
                     beside, text = self._description
                     beside.write_text(text, encoding="utf-8", newline="\n")
+                if self._causes is not None:
+                    self._lines = stack.enter_context(self._causes.open("wb"))
                 made = writer(stack, *temporary)
             yield made
             with writing(self._name):
@@ -153,7 +177,9 @@ class Sink:
         if events.size:
             self._check_times(events)
         with writing(self._name):
-            self._writer.write_events(events)
+            if self._causes is not None:
+                self._lines.write(causes.lines_of(events["cause"]))
+            self._writer.write_events(events if self._holds_causes else without_causes(events))
 
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         """Append a frame taken at `t_ns` [ns]; over all calls sorted by time.

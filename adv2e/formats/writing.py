@@ -14,9 +14,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from adv2e.background import default_threads
-from adv2e.events import Events, checked_events
+from adv2e.causes import CAUSED_DTYPE, has_causes
+from adv2e.events import EVENT_DTYPE, Events, checked_events
 from adv2e.files.staging import Staging
+from adv2e.formats.causes import check_numbers
 from adv2e.formats.registry import to_write
 from adv2e.formats.sink import Request, Sink
 
@@ -33,6 +37,7 @@ def open_sink(
     with_frames: bool = False,
     threads: int | None = None,
     staging: Staging | None = None,
+    causes: bool = False,
 ) -> Sink:
     """Return a sink for `path`, to be used in a ``with`` block.
 
@@ -60,13 +65,17 @@ def open_sink(
         Threads that compress; default: all cores.  The bytes do not depend on it.
     staging : Staging, optional
         Takes the output together with others; it says whether what exists is replaced.
+    causes : bool
+        The events know their causes, which are stored: inside where the format has a column for
+        them, else beside: see :mod:`adv2e.formats.causes`.
 
     Raises
     ------
     UsageError
-        Unknown `format` or `layout`, or they do not fit together.
+        Unknown `format` or `layout`, or they do not fit together; causes to standard output.
     OutputError
-        The output exists already, or cannot be made; or the format cannot hold such a sensor.
+        The output, or causes beside it, exists already, or cannot be made; or the format cannot
+        hold such a sensor.
     """
     path = Path(path)
     chosen = to_write(path, format, layout)
@@ -78,6 +87,7 @@ def open_sink(
         description={**version, "width": width, "height": height, **metadata},
         with_frames=with_frames,
         threads=threads or default_threads(),
+        causes=causes,
     )
     files = Staging(overwrite) if staging is None else staging
     return Sink(chosen, request, files, is_alone=staging is None)
@@ -99,6 +109,7 @@ def write_events(
         Output: its suffix tells the format; without one, a DAVIS240C folder.
     events : structured array, (n,)
         With the fields t [us], x, y, p, in any order of time; sorted ones are written as they are.
+        The field cause, if there is one, is written too.
     size : (int, int)
         Width and height of the sensor [pixels].
     metadata : dict, optional
@@ -109,7 +120,7 @@ def write_events(
     Raises
     ------
     DataError
-        The array has other fields, or an event lies outside the sensor.
+        The array has other fields, or an event lies outside the sensor, or has no cause.
     OutputError
         Unknown suffix; the output exists already, or cannot be made.
 
@@ -127,8 +138,16 @@ def write_events(
     ([10, 20], 4, 3)
     """
     width, height = size
-    ours = checked_events(events, width, height)
+    caused = has_causes(np.asarray(events))
+    ours = checked_events(events, width, height, CAUSED_DTYPE if caused else EVENT_DTYPE)
+    if caused:
+        check_numbers(np.asarray(events)["cause"], "events: cause")
     with open_sink(
-        path, width=width, height=height, metadata=dict(metadata or {}), overwrite=overwrite
+        path,
+        width=width,
+        height=height,
+        metadata=dict(metadata or {}),
+        overwrite=overwrite,
+        causes=caused,
     ) as sink:
         sink.write_events(ours)

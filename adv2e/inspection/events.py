@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.causes import CAUSES, has_causes
 from adv2e.events import Events, pixels_of
 from adv2e.sources.times.instants import seconds
 
@@ -38,7 +39,16 @@ def describe_events(events: Events, width: int, height: int) -> dict[str, Any]:
         "rate_hz": rate_hz,
         "rate_per_pixel_hz": rate_hz / (width * height) if rate_hz else None,
         "tick_us": tick_us(events),
+        "causes": causes_of(events),
     }
+
+
+def causes_of(events: Events) -> dict[str, int] | None:
+    """Return how many events each cause made, by its name; None: they do not know."""
+    if not has_causes(events):
+        return None
+    counts = np.bincount(events["cause"], minlength=len(CAUSES)).tolist()
+    return dict(zip(CAUSES, counts, strict=True))
 
 
 def tick_us(events: Events) -> int | None:

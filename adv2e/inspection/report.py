@@ -40,6 +40,9 @@ def _events(events: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "rate", f"{events['rate_hz']:,.0f} events/s, {each:.4g} a pixel a second"
     if events["tick_us"]:
         yield "tick", f"{events['tick_us']} us"
+    if events["causes"]:
+        made = {name: count for name, count in events["causes"].items() if count}
+        yield "causes", ", ".join(f"{name} {count:,}" for name, count in made.items()) or "none"
 
 
 def _frames(frames: dict[str, Any]) -> Iterator[tuple[str, str]]:

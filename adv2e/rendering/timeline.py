@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.causes import without_causes
 from adv2e.events import Events, empty_events
 from adv2e.files.backlog import Backlog
 from adv2e.light.pictures import eight_bit
@@ -105,7 +106,7 @@ class Timeline:
         if events.size:
             self._first_us.setdefault("event", int(events["t"][0]))
             self._last_event_us = int(events["t"][-1])
-            self._coming.append(self._last_event_us, events)
+            self._coming.append(self._last_event_us, without_causes(events))
             self._draw_up_to(self._known_us())
 
     def complete_until(self, t_us: int) -> None:

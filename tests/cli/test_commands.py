@@ -74,6 +74,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         *("--stop", "2", "--t0", "keep", "--timestamps", "t.txt", "--format", "h5"),
         *("--time-unit", "us", "--crop", "1,2,30,20", "--size", "8x6", "--bayer", "gbrg"),
         *("--layout", "dsec", "--with-frames", "--preview", "p.gif", "--allow-damaged"),
+        "--causes",
     )
     assert outcome.status == 0
     ((reading, output, options),) = pipeline.calls
@@ -97,6 +98,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "with_frames": True,
         "overwrite": True,
         "preview": "p.gif",
+        "causes": True,
         "progress": True,
         "also_read": [find("ideal")],
     }

@@ -26,6 +26,7 @@ def test_counts_span_and_rates():
         "rate_hz": 6,
         "rate_per_pixel_hz": 0.75,
         "tick_us": 10,
+        "causes": None,
     }
 
 

@@ -6,6 +6,7 @@
 /events/ps                  int8, 1 is ON and 0 is OFF
 /images/image%09d           uint8 (rows, columns) or (rows, columns, 3) as BGR; attributes size,
                             timestamp [s], timestamp_ns, type, event_idx
+/events/causes              with causes: see :mod:`adv2e.formats.causes`
 =========================== ====================================================================
 
 Attributes of the root: num_events, num_pos, num_neg, duration, t0, tk, num_imgs, num_flow,

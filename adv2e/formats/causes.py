@@ -1,0 +1,75 @@
+"""Causes of events in files: as a column of HDF5, and beside formats that have none.
+
+======================== =========================================================================
+/events/causes           of HDF5: uint8; its attribute names has the names of the numbers from 0 on,
+                         with commas between
+<path>.causes.txt        beside other formats: a digit on each line, in the order of the events
+======================== =========================================================================
+
+:mod:`adv2e.causes` says what each number means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.causes import CAUSES
+from adv2e.errors import DataError
+
+_DIGITS, _END = ord("0"), ord("\n")
+
+DATASET = "events/causes"
+
+NAMES = ",".join(CAUSES)
+"""The names in the order of the numbers, as files state them."""
+
+
+def beside(path: Path) -> Path:
+    """Return where the causes of the events in `path` are."""
+    return path.with_name(f"{path.name}.causes.txt")
+
+
+def lines_of(causes: NDArray[np.uint8]) -> bytes:
+    """Return the lines for some events."""
+    lines = np.full((causes.size, 2), _END, np.uint8)
+    lines[:, 0] = causes + _DIGITS
+    return lines.tobytes()
+
+
+def check_numbers(causes: NDArray[Any], label: str) -> None:
+    """Raise DataError for numbers that are no causes."""
+    most = len(CAUSES) - 1
+    if causes.dtype.kind not in "iu" or np.any((causes < 0) | (causes > most)):
+        raise DataError(f"{label}: must be whole numbers from 0 to {most}")
+
+
+def reader_of(path: Path, *, is_hdf5: bool) -> Callable[[], NDArray[Any]] | None:
+    """Return what reads the causes of the events in `path`, None if it has none."""
+    if is_hdf5:
+        from adv2e.formats import hdf5  # noqa: PLC0415 - h5py takes its time
+
+        with hdf5.opened(path) as file:
+            if hdf5.find(file, DATASET) is not None:
+                return partial(hdf5.read_column, path, DATASET)
+    return partial(read_beside, beside(path)) if beside(path).is_file() else None
+
+
+def read_beside(path: Path) -> NDArray[np.uint8]:
+    """Return what a file beside holds.
+
+    Raises
+    ------
+    DataError
+        It has another form.
+    """
+    data = np.frombuffer(path.read_bytes(), np.uint8)
+    if data.size % 2 or np.any(data[1::2] != _END):
+        raise DataError(f"{path}: must hold a digit on each line")
+    causes: NDArray[np.uint8] = data[::2] - np.uint8(_DIGITS)
+    return causes
