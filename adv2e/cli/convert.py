@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     type=options.SIZE,
     metavar="WxH",
     help="Size of the sensor, such as 346x260 (sensor.width and sensor.height). Frames are scaled"
-    " and cut to it; sensor.fit says how.  [default: as the frames are]",
+    " and cut to it; sensor.fit says how. Of raw video it is the size of the frames, too."
+    "  [default: as the frames are]",
 )
 @click.option(
     "--t0",
@@ -110,11 +111,13 @@ def command(
       adv2e convert frames/ --fps 240 -o events.h5 --with-frames
       adv2e convert urban.zip -o urban_simulated --preview urban.mp4
       adv2e convert clip.events.h5 -o clip.txt
+      ffmpeg -i clip.mp4 -f yuv4mpegpipe - | adv2e convert - -o piped.h5
 
     INPUT is a video file, a folder or a zip of images, a recording of a data set (DAVIS240C, GOPRO,
     TUM RGB-D, EuRoC, UZH-FPV), a TIFF of several pages, or a .npy stack of frames, grey (frames,
-    rows, columns) or colour (with a fourth axis, of 3). It may be a file of events, too: these are
-    written in the format of OUT, and nothing is simulated.
+    rows, columns) or colour (with a fourth axis, of 3). INPUT - is standard input, through which
+    Y4M or raw video comes. It may be a file of events, too: these are written in the format of OUT,
+    and nothing is simulated.
 
     Without -o, the events go to <stem>.events.h5 in the current folder. The suffix of OUT chooses
     the format:
@@ -150,7 +153,7 @@ def command(
     import_ahead()
     from adv2e.conversion.reading import Reading
 
-    reading = Reading(source, **given, **part, threads=threads)
+    reading = Reading(source, **given, **part, frame_size=size, threads=threads)
     with reading:  # it reads while all else that is needed is imported
         from adv2e.conversion.pipeline import convert_reading
 
@@ -158,7 +161,7 @@ def command(
         summary = convert_reading(
             reading,
             output,
-            config=config(size),
+            config=config(None if crop and given["pixel_format"] else size),
             also_read=options.files_given(),
             log=log,
             **written,
@@ -169,7 +172,7 @@ def command(
 
 _OF_SIMULATION = (
     *("config_files", "sets", "seed", "effect_files"),
-    *("fps", "timestamps", "allow_damaged", "bayer", "preview"),
+    *("fps", "timestamps", "allow_damaged", "bayer", "pixel_format", "preview"),
 )
 """Options that say how frames are simulated."""
 

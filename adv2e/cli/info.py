@@ -10,16 +10,25 @@ import click
 from adv2e.cli import options
 from adv2e.cli.commands import Command
 from adv2e.cli.reading import reading_told
+from adv2e.geometry import Size
 
 
 @click.command("info", cls=Command)
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path, readable=False))
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, always with the same keys.")
 @options.source_options
+@click.option(
+    "--size", type=options.SIZE, metavar="WxH", help="Size of the frames of raw video (FILE is -)."
+)
 @options.progress_option
 @options.verbosity_options
 def command(
-    file: Path, as_json: bool, given: dict[str, Any], progress: bool, log: options.Log
+    file: Path,
+    as_json: bool,
+    given: dict[str, Any],
+    size: Size | None,
+    progress: bool,
+    log: options.Log,
 ) -> None:
     """Show what a video, a recording or an event file holds.
 
@@ -37,7 +46,7 @@ def command(
 
     log(f"reading {file}", 1)
     with reading_told(file, progress) as told:
-        report = inspect(file, **given, progress=told)
+        report = inspect(file, **given, frame_size=size, progress=told)
     if as_json:
         import json
 

@@ -86,6 +86,10 @@ class _Parsed(click.ParamType):  # type: ignore[type-arg] # not generic in all v
 
 # adv2e.sources.wanted.PATTERNS, without the time that importing it takes
 BAYER = ("RGGB", "BGGR", "GRBG", "GBRG")
+# adv2e.sources.pipes.raw.PIXEL_FORMATS, likewise
+PIXEL_FORMATS = (
+    *("gray", "gray10le", "gray12le", "gray14le", "gray16le", "rgb24", "bgr24", "rgb48le"),
+)
 SIZE = _Parsed("size", parse_size)
 RECTANGLE = _Parsed("rectangle", parse_rectangle)
 
@@ -217,7 +221,8 @@ def source_options(body: Body) -> Body:
     """Add what says how to read an input with frames.
 
     The command gets ``given``, these by the names that :func:`adv2e.sources.open_source` has for
-    them: fps, as it was written, timestamps, time_unit, allow_damaged and bayer.
+    them: fps, as it was written, timestamps, time_unit, allow_damaged, bayer and
+    pixel_format.
     """
 
     @click.option(
@@ -243,9 +248,14 @@ def source_options(body: Body) -> Body:
         type=click.Choice(BAYER, case_sensitive=False),
         help="Frames are raw mosaics, with these colours in the first two rows: make them colour.",
     )
+    @click.option(
+        "--pixel-format",
+        type=click.Choice(PIXEL_FORMATS),
+        help="Raw video comes through standard input (INPUT is -), in frames of the --size given.",
+    )
     @functools.wraps(body)
     def with_given(*args: Any, **kw: Any) -> Any:
-        names = ("fps", "timestamps", "time_unit", "allow_damaged", "bayer")
+        names = ("fps", "timestamps", "time_unit", "allow_damaged", "bayer", "pixel_format")
         return body(*args, given={name: kw.pop(name) for name in names}, **kw)
 
     return with_given  # type: ignore[return-value]

@@ -32,6 +32,7 @@ def convert(
     size: str | tuple[int, int] | None = None,
     crop: str | tuple[int, int, int, int] | None = None,
     bayer: str | None = None,
+    pixel_format: str | None = None,
     format: str | None = None,
     layout: str | None = None,
     with_frames: bool = False,
@@ -72,6 +73,8 @@ def convert(
         First column, first row, columns and rows of the part to cut out of the frames first.
     bayer : {'RGGB', 'BGGR', 'GRBG', 'GBRG'}, optional
         Frames are raw mosaics with these colours in the first two rows.
+    pixel_format : str, optional
+        Raw video of pixels of this kind comes through standard input; `size` is that of its frames.
     format, layout : str, optional
         Format of the output where its suffix does not say it, and layout of HDF5.
     with_frames : bool
@@ -132,7 +135,7 @@ def convert(
         raise UsageError("fps and timestamps both give the times of the frames: keep one")
     if takes_events(Path(source), take):
         simulated = {"config": config, "fps": fps, "timestamps": timestamps, "preview": preview}
-        simulated["bayer"] = bayer
+        simulated |= {"bayer": bayer, "pixel_format": pixel_format}
         if given := [name for name, value in simulated.items() if value is not None]:
             raise UsageError(f"{source} holds events, nothing is simulated: leave out {given[0]}")
         if output is None:
@@ -157,7 +160,7 @@ def convert(
             doubt=doubt,
         )
         return replace(summary, notes=tuple(notes))
-    ready = load_config(config, size=wanted)
+    ready = load_config(config, size=None if part and pixel_format else wanted)
     reading = Reading(
         str(source),
         fps=fps,
@@ -169,6 +172,8 @@ def convert(
         allow_damaged=allow_damaged,
         crop=part,
         bayer=bayer,
+        pixel_format=pixel_format,
+        frame_size=wanted,
         threads=threads,
     )
     with reading:

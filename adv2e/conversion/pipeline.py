@@ -38,6 +38,7 @@ from adv2e.geometry import Size
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.pictures import drawn, picture_white
 from adv2e.light.sensor import fitting_of
+from adv2e.sources import STDIN
 from adv2e.sources.base import Source
 
 if TYPE_CHECKING:
@@ -134,6 +135,8 @@ class _Output:
 
 def default_output(source: str) -> str:
     """Return ``<stem>.events.h5`` in the current folder."""
+    if source == STDIN:
+        return "stdin.events.h5"
     path = Path(source)
     name = path.resolve().name if path.name in ("", ".", "..") else path.name
     return f"{name if path.is_dir() else Path(name).stem}.events.h5"

@@ -21,8 +21,9 @@ from adv2e.background import default_threads, read_ahead
 from adv2e.effects.frames.brightness import check_floats, check_light
 from adv2e.errors import Adv2eError, DataError
 from adv2e.formats.frames import open_frames
-from adv2e.geometry import Rectangle
+from adv2e.geometry import Rectangle, Size
 from adv2e.light.pictures import picture_of
+from adv2e.sources import STDIN
 from adv2e.sources.base import Source
 from adv2e.sources.frame import Frame
 from adv2e.sources.times.rates import Rate
@@ -104,7 +105,8 @@ class Reading:
 
     Parameters
     ----------
-    path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged, crop, bayer
+    path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged, crop, bayer,
+    pixel_format, frame_size
         See :func:`adv2e.sources.open_source`.
     threads : int, optional
         Threads that the whole conversion may compute with; default: all cores.
@@ -123,6 +125,8 @@ class Reading:
         allow_damaged: bool = False,
         crop: Rectangle | None = None,
         bayer: str | None = None,
+        pixel_format: str | None = None,
+        frame_size: Size | None = None,
         threads: int | None = None,
     ) -> None:
         self.path = path
@@ -130,7 +134,7 @@ class Reading:
         self.given: dict[str, Any] = {
             "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
             "time_unit": time_unit, "allow_damaged": allow_damaged, "crop": crop,
-            "bayer": bayer,
+            "bayer": bayer, "pixel_format": pixel_format, "frame_size": frame_size,
         }  # fmt: skip
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()
@@ -155,7 +159,8 @@ class Reading:
     def inputs(self) -> tuple[str | Path, ...]:
         """What is read: the source, and the list of times if there is one."""
         timestamps = self.given["timestamps"]
-        return (self.path,) if timestamps is None else (self.path, timestamps)
+        source = () if self.path == STDIN else (self.path,)
+        return source if timestamps is None else (*source, timestamps)
 
     def stills(self, decoding: Decoding) -> Iterator[Still]:
         """Return the frames, as `decoding` says; raises what goes wrong with them."""
@@ -170,7 +175,7 @@ class Reading:
             return self
         source.threads = self.threads
         self._stills = _stills(source.frames(), self._decoding)
-        if self.threads > 1:
+        if self.threads > 1 and not source.waits:
             count = AHEAD_BYTES // (8 * source.width * source.height)
             self._stills = self._at_end.enter_context(
                 read_ahead(self._stills, min(max(1, count), AHEAD_FRAMES))

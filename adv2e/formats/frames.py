@@ -26,7 +26,12 @@ _DAVIS240C = ("zip", "folder")
 def open_frames(path: str | Path, **given: Any) -> Source:
     """Open an input with frames; parameters and errors as :func:`adv2e.sources.open_source`."""
     named = Path(path)
-    if not (named.exists() and may_hold_events(named)) or format_of(named).name in _DAVIS240C:
+    raw = given.get("pixel_format") is not None
+    if (
+        raw
+        or not (named.exists() and may_hold_events(named))
+        or format_of(named).name in _DAVIS240C
+    ):
         return open_source(path, **given)
     listed = given.get("timestamps")
     times = GivenTimes(given.get("fps"), Path(listed) if listed else None, given.get("time_unit"))

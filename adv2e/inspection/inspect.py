@@ -15,9 +15,10 @@ from adv2e.files.regular import check_ends
 from adv2e.files.zips import Members
 from adv2e.formats.reading import Recording, read_events
 from adv2e.formats.registry import may_hold_events
+from adv2e.geometry import Size
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
-from adv2e.sources import OPENERS, Source, open_source
+from adv2e.sources import OPENERS, STDIN, Source, open_source
 from adv2e.sources.frame import Light
 from adv2e.sources.stored import EVENTS, LIST
 from adv2e.sources.times.rates import Rate
@@ -31,6 +32,8 @@ def inspect(
     time_unit: str | None = None,
     allow_damaged: bool = False,
     bayer: str | None = None,
+    pixel_format: str | None = None,
+    frame_size: Size | None = None,
     progress: Callable[[int, int | None], None] | None = None,
 ) -> dict[str, Any]:
     """Return what a recording, an event file or an input with frames holds, ready for JSON.
@@ -45,7 +48,7 @@ def inspect(
         See :func:`adv2e.sources.open_source`; for all inputs.
     allow_damaged : bool
         Damage of a video becomes one of the problems.
-    bayer : str, optional
+    bayer, pixel_format, frame_size
         See :func:`adv2e.sources.open_source`.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much, where that is
@@ -63,7 +66,7 @@ def inspect(
         The file is missing, of an unknown kind, or cannot be read.
     """
     check_ends(path)
-    if _has_only_frames(path):
+    if str(path) == STDIN or _has_only_frames(path):
         source = open_source(
             path,
             fps=fps,
@@ -71,6 +74,8 @@ def inspect(
             time_unit=time_unit,
             allow_damaged=allow_damaged,
             bayer=bayer,
+            pixel_format=pixel_format,
+            frame_size=frame_size,
         )
         return _of_source(source, progress or (lambda done, total: None))
     return _of_recording(read_events(path, time_unit=time_unit, progress=progress))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib
 from pathlib import Path
 
-from adv2e.errors import DataError
+from adv2e.errors import DataError, UsageError
 from adv2e.files.regular import check_ends
-from adv2e.geometry import Rectangle
+from adv2e.geometry import Rectangle, Size
 from adv2e.sources.base import Source
 from adv2e.sources.frame import Frame
 from adv2e.sources.times.rates import Rate
@@ -20,6 +20,9 @@ VIDEO_SUFFIXES = (
     *(".wmv", ".flv", ".3gp", ".ogv", ".gif", ".y4m"),
 )
 """Files that are opened as video."""
+
+STDIN = "-"
+"""What standard input is called."""
 
 OPENERS = {
     **dict.fromkeys(VIDEO_SUFFIXES, "adv2e.sources.video.source"),
@@ -42,6 +45,8 @@ def open_source(
     allow_damaged: bool = False,
     crop: Rectangle | None = None,
     bayer: str | None = None,
+    pixel_format: str | None = None,
+    frame_size: Size | None = None,
 ) -> Source:
     """Open an input with frames.
 
@@ -49,7 +54,7 @@ def open_source(
     ----------
     path : path
         Video file, folder or zip of images, recording of a data set, TIFF of several pages,
-        or ``.npy`` stack.
+        or ``.npy`` stack; "-" is standard input, through which Y4M or raw video comes.
     fps : float, Fraction or str, optional
         Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
     timestamps : path, optional
@@ -68,11 +73,16 @@ def open_source(
         Part to cut out of each frame, before anything else.
     bayer : {'RGGB', 'BGGR', 'GRBG', 'GBRG'}, optional
         Frames are mosaics of this pattern: they are made colour, before `crop`.
+    pixel_format : str, optional
+        Raw video comes through standard input, of pixels of this kind; see
+        :mod:`adv2e.sources.pipes.raw`.
+    frame_size : Size, optional
+        Size of the frames of raw video.
 
     Returns
     -------
     Source
-        Its `frames` yields them, checked, as often as asked.
+        Its `frames` yields them, checked, as often as asked; those of standard input once.
 
     Raises
     ------
@@ -86,6 +96,15 @@ def open_source(
     selection = Selection(start_s, stop_s, t0, allow_damaged, crop, bayer)
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")
+    if pixel_format is not None and (str(path) != STDIN or frame_size is None):
+        raise UsageError(
+            "--pixel-format is for raw video through standard input: INPUT must be -, and --size"
+            " WxH says the size of its frames"
+        )
+    if str(path) == STDIN:
+        from adv2e.sources.pipes import source as pipe  # noqa: PLC0415  (needs OpenCV)
+
+        return pipe.open_source(given, selection, pixel_format=pixel_format, size=frame_size)
     named, path = str(path), Path(path)
     try:
         check_ends(path)

@@ -1,8 +1,9 @@
 """What every source of frames is: a description, and frames in the order of time.
 
 A source states its geometry when it is opened and reads its frames one after another, as often as
-asked.  Times are integer nanoseconds.  What must hold of any source (two frames at least, times
-that increase, one size and data type, finite values) is checked here, once.
+asked, but for a pipe, which gives them once.  Times are integer nanoseconds.  What must hold of any
+source (two frames at least, times that increase, one size and data type, finite values) is checked
+here, once.
 """
 
 from __future__ import annotations
@@ -69,6 +70,8 @@ class Source(ABC):
         Threads that decoding may use; one, unless set otherwise before `frames`.
     packages : tuple of str
         Optional packages that decode it.
+    waits : bool
+        Reading waits for others, and for ever if they please: it belongs in the main thread.
     """
 
     def __init__(self, path: Path, kind: str, selection: Selection, has_clock: bool) -> None:
@@ -83,6 +86,7 @@ class Source(ABC):
         self.count: int | None = None
         self.threads = 1
         self.packages: tuple[str, ...] = ()
+        self.waits = False
 
     def _describe(self, first: Pixels, label: str, light: Light | None = None) -> None:
         """Take geometry, data type and meaning of the numbers from the first frame.

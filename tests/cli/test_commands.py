@@ -89,6 +89,8 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "allow_damaged": True,
         "crop": (1, 2, 30, 20),
         "bayer": "GBRG",
+        "pixel_format": None,
+        "frame_size": (8, 6),
     }
     log = options.pop("log")
     assert options == {

@@ -1,12 +1,8 @@
 """Videos through PyAV (extra ``video``): fields, more than 8 bits, high dynamic range.
 
 Codes of 8 bits come from the same conversion as OpenCV's.  Deeper ones are converted here, as that
-conversion is off by several codes of 10 bits: with the matrix and range of the stream, each chroma
-sample standing for all the pixels it covers, to whole numbers of 16 bits.
-
-References
-----------
-.. [1] ITU-T H.273 (07/2021), 8.3 (matrix coefficients).
+conversion is off by several codes of 10 bits: with the matrix and range of the stream, to whole
+numbers of 16 bits.
 """
 
 from __future__ import annotations
@@ -23,14 +19,9 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.sources.video.colours import UNSTATED, is_stated
 from adv2e.sources.video.opening import openable
+from adv2e.sources.video.ycbcr import SHARES, bgr_of
 
 _FULL = 2
-_SHARES = {
-    **dict.fromkeys((0, 2, 3, 5, 6), (0.299, 0.114)),
-    **{1: (0.2126, 0.0722), 4: (0.30, 0.11), 7: (0.212, 0.087), 9: (0.2627, 0.0593)},
-}
-"""Shares of red and blue in luma; what is not stated is BT.601, as for FFmpeg."""
-
 _TURNS = {90: cv2.ROTATE_90_COUNTERCLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_CLOCKWISE}
 
 
@@ -162,7 +153,7 @@ def codes_of(frame: Any, matrix: int = UNSTATED) -> NDArray[Any]:
     matrix = int(frame.colorspace) if is_stated(int(frame.colorspace)) else matrix
     alpha = parts[-1].is_alpha
     rgb = frame.format.is_rgb or len(parts) - alpha < 3
-    if not rgb and matrix not in _SHARES:
+    if not rgb and matrix not in SHARES:
         raise ValueError(f"colours by the matrix {frame.colorspace} cannot be read")
     if bits > 16 or frame.format.name.startswith(("xyz", "bayer", "grayf", "gbrpf", "rgbf")):
         raise ValueError(f"pixels of {frame.format.name} cannot be read")
@@ -178,36 +169,12 @@ def codes_of(frame: Any, matrix: int = UNSTATED) -> NDArray[Any]:
     if rgb:
         bgr = cv2.merge([planes[1], planes[0], planes[2], *there])
         return _rounded(bgr * np.float32(1 / top))
-    luma, chroma = 1 / top, 1 / top
-    black = 0
-    if int(frame.color_range) != _FULL:
-        black, luma, chroma = 16 << bits - 8, 1 / (219 << bits - 8), 1 / (224 << bits - 8)
-    whole = [planes[0], *(_spread(plane, planes[0].shape) for plane in planes[1:3])]
-    to_bgr = _to_bgr(matrix) * [luma, chroma, chroma]
-    offset = to_bgr @ np.array([black, 1 << bits - 1, 1 << bits - 1])
-    image = cv2.transform(cv2.merge(whole), np.column_stack([to_bgr, -offset]).astype(np.float32))
+    image = bgr_of(planes, matrix, bits, full=int(frame.color_range) == _FULL)
     return _rounded(np.dstack([image, *(plane / top for plane in there)]))
-
-
-def _spread(plane: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    """Return chroma for every pixel."""
-    for axis in (0, 1):
-        plane = np.repeat(plane, -(-shape[axis] // plane.shape[axis]), axis)
-    return plane[: shape[0], : shape[1]]
 
 
 def _rounded(image: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(np.rint(np.clip(image, 0, 1) * 65535), np.uint16)
-
-
-def _to_bgr(matrix: int) -> NDArray[np.float64]:
-    """Return blue, green and red of luma 0..1 and two chromas of -0.5..0.5."""
-    red, blue = _SHARES[matrix]
-    green = 1 - red - blue
-    to_red, to_blue = 2 * (1 - red), 2 * (1 - blue)
-    return np.array(
-        [[1, to_blue, 0], [1, -blue * to_blue / green, -red * to_red / green], [1, 0, to_red]]
-    )
 
 
 def _planes(frame: Any) -> list[NDArray[np.float32]]:

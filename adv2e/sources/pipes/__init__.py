@@ -1,0 +1,1 @@
+"""Frames that come through standard input, uncompressed: Y4M, and raw video of a stated layout."""

@@ -1,0 +1,165 @@
+"""Frames through standard input: each is read once, and none is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO
+
+from adv2e.errors import DataError
+from adv2e.geometry import Size
+from adv2e.sources.base import Source
+from adv2e.sources.bayer import in_colour, light_of
+from adv2e.sources.frame import Shot
+from adv2e.sources.pipes.layout import Layout
+from adv2e.sources.pipes.raw import PIXEL_FORMATS, raw_layout
+from adv2e.sources.pipes.stream import NAME, Stream, standard_input
+from adv2e.sources.pipes.y4m import LONGEST_LINE, MAGIC, y4m_layout
+from adv2e.sources.times.instants import Stamp
+from adv2e.sources.times.lists import read_list
+from adv2e.sources.wanted import GivenTimes, Selection
+
+
+def open_source(
+    given: GivenTimes,
+    selection: Selection,
+    *,
+    pixel_format: str | None = None,
+    size: Size | None = None,
+    file: BinaryIO | None = None,
+) -> PipeSource:
+    """Return the frames that come through standard input, or another stream.
+
+    Parameters
+    ----------
+    given : GivenTimes
+    selection : Selection
+    pixel_format : str, optional
+        One of `PIXEL_FORMATS`: raw video comes, of this `size`; default: Y4M does.
+    size : Size, optional
+    file : binary file, optional
+        Default: standard input.
+
+    Raises
+    ------
+    DataError
+        Nothing that can be read, no times, or fewer than one frame.
+    """
+    stream = Stream(standard_input() if file is None else file)
+    begin = stream.peek(len(MAGIC))
+    if not begin:
+        raise DataError(f"{NAME}: nothing came through it")
+    if begin == MAGIC:
+        if pixel_format is not None:
+            raise DataError(f"{NAME}: is Y4M, which says its pixels: leave --pixel-format out")
+        return PipeSource(stream, y4m_layout(stream), given, selection)
+    if pixel_format is None or size is None:
+        raise DataError(
+            f"{NAME}: is not Y4M; let FFmpeg write -f yuv4mpegpipe, or raw frames, -f rawvideo, and"
+            f" say --size WxH and --pixel-format: {', '.join(PIXEL_FORMATS)}"
+        )
+    return PipeSource(stream, raw_layout(size, pixel_format), given, selection)
+
+
+class PipeSource(Source):
+    """Frames of a stream that is read once."""
+
+    def __init__(
+        self, stream: Stream, layout: Layout, given: GivenTimes, selection: Selection
+    ) -> None:
+        has_clock = given.timestamps is not None
+        super().__init__(Path(NAME), layout.kind, selection, has_clock)
+        self.waits = True
+        self._stream, self._layout, self._given = stream, layout, given
+        self._stamps: list[Stamp] | None = None
+        self._rate = given.rate or layout.rate
+        self._take_times()
+        self._first: bytes | None = self._next(0)
+        if self._first is None:
+            raise DataError(f"{NAME}: no frames came through it")
+        shot = self._shot(0, self._first)
+        light = layout.light
+        if selection.bayer is not None:
+            light = replace(light_of(selection.bayer), full_scale=light.full_scale)
+        self._describe(shot.load(), shot.label, light)
+        if layout.note and selection.bayer is None:
+            self.notes.append(layout.note)
+
+    def _take_times(self) -> None:
+        if self._given.timestamps is not None:
+            label = str(self._given.timestamps)
+            found = read_list(self._given.timestamps, time_unit=self._given.time_unit)
+            doubts, notes = found.told(label)
+            self._stamps, self._rate = found.stamps, None
+            self.doubts += doubts
+            self.notes += notes
+        elif self._given.time_unit is not None:
+            raise DataError(f"{NAME}: --time-unit is for lists of times, and none is given")
+        elif self._rate is None:
+            raise DataError(
+                f"{NAME}: no times of its frames are known: give --fps F or --timestamps FILE"
+            )
+        if self._given and self._layout.rate is not None:
+            self.notes.append(f"{self._given} replaces the {self._layout.rate.hz} Hz of the stream")
+
+    def _time_ns(self, number: int) -> int:
+        if self._rate is not None:
+            return self._rate.time_ns(number)
+        assert self._stamps is not None
+        if number >= len(self._stamps):
+            raise DataError(f"{self._given.timestamps}: {number} times, and more frames come")
+        return self._stamps[number].t_ns
+
+    def _next(self, number: int) -> bytes | None:
+        """Return the bytes of the next frame; None at the end."""
+        before = f"{NAME}: ends within frame {number}"
+        if self._layout.marked:
+            line = self._stream.line(LONGEST_LINE)
+            if not line:
+                return None
+            if line != b"FRAME\n" and not (line.startswith(b"FRAME ") and line.endswith(b"\n")):
+                if b"FRAME\n".startswith(line):
+                    self._cut_short(before)
+                    return None
+                raise DataError(f"{NAME}: damaged before frame {number}: no line FRAME")
+        data = self._stream.read(self._layout.nbytes)
+        if len(data) == self._layout.nbytes:
+            return data
+        if not data and not self._layout.marked:
+            return None
+        self._cut_short(f"{before}, after {len(data):,} of {self._layout.nbytes:,} bytes")
+        return None
+
+    def _cut_short(self, fault: str) -> None:
+        if not self.selection.allow_damaged:
+            raise DataError(f"{fault}; --allow-damaged takes those before")
+        self._note(fault)
+
+    def _shot(self, number: int, data: bytes) -> Shot:
+        label = f"{NAME}: frame {number}"
+        shot = Shot(self._time_ns(number), label, partial(self._layout.pixels, data, label))
+        return shot if self.selection.bayer is None else in_colour(shot, self.selection.bayer)
+
+    def shots(self) -> Iterator[Shot]:
+        """Yield every frame as it comes.
+
+        Raises
+        ------
+        DataError
+            The stream ends within a frame, or does not fit the times; it was read before.
+        """
+        if self._first is None:
+            raise DataError(f"{NAME}: its frames were read, and come only once")
+        data: bytes | None = self._first
+        self._first = None
+        number = 0
+        while data is not None:
+            yield self._shot(number, data)
+            number += 1
+            data = self._next(number)
+        if self._stamps is not None and number != len(self._stamps):
+            raise DataError(
+                f"{self._given.timestamps}: {len(self._stamps)} times for {number} frames"
+            )
