@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     " is simulated.  [default: the frames in MEASURED]",
 )
 @options.time_unit_option
+@options.rotate_option(" of MEASURED, and of --frames,")
 @options.config_options
 @options.threads_option
 @options.progress_option
@@ -54,6 +55,7 @@ def command(
     window_s: float | None,
     frames_path: str | None,
     time_unit: str | None,
+    rotate180: bool,
     config: Callable[[], Config],
     threads: int | None,
     progress: bool,
@@ -82,10 +84,10 @@ def command(
 
     declared = config()
     with reading_told(measured, progress) as told:
-        ours = read_events(measured, time_unit=time_unit, progress=told)
+        ours = read_events(measured, time_unit=time_unit, progress=told, rotate180=rotate180)
     with reading_told(simulated, progress) as told:
         theirs = read_events(simulated, time_unit=time_unit, progress=told)
-    source = open_frames(frames_path) if frames_path else None
+    source = open_frames(frames_path, rotate180=rotate180) if frames_path else None
     for doubt in source.doubts if source else []:
         log(doubt)
     times = np.array([frame.t_ns for frame in source.frames()]) if source else None

@@ -141,9 +141,9 @@ def command(
         del written["preview"]
         if output is None:
             raise click.UsageError("-o OUT is missing: say what to write the events to")
-        unit = given["time_unit"]
+        part |= {name: given[name] for name in ("time_unit", "rotate180")}
         summary = convert_events(
-            source, output, size=size, time_unit=unit, threads=threads, log=log, **part, **written
+            source, output, size=size, threads=threads, log=log, **part, **written
         )
         if log.level >= 0:
             click.echo(summary.text(), err=output == "-")

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     help="The contrast thresholds are not known: fit them first, to the totals of ON and OFF.",
 )
 @options.time_unit_option
+@options.rotate_option()
 def command(
     recording: str,
     config: Callable[[], Config],
@@ -42,6 +43,7 @@ def command(
     without: tuple[str, ...],
     fit_thresholds: bool,
     time_unit: str | None,
+    rotate180: bool,
     threads: int | None,
     progress: bool,
     log: Log,
@@ -82,6 +84,7 @@ def command(
         without=without,
         fit_thresholds=fit_thresholds,
         time_unit=time_unit,
+        rotate180=rotate180,
         overwrite=overwrite,
         threads=threads,
         progress=progress,

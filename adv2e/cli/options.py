@@ -221,8 +221,8 @@ def source_options(body: Body) -> Body:
     """Add what says how to read an input with frames.
 
     The command gets ``given``, these by the names that :func:`adv2e.sources.open_source` has for
-    them: fps, as it was written, timestamps, time_unit, allow_damaged, bayer and
-    pixel_format.
+    them: fps, as it was written, timestamps, time_unit, allow_damaged, bayer, pixel_format and
+    rotate180.
     """
 
     @click.option(
@@ -253,12 +253,31 @@ def source_options(body: Body) -> Body:
         type=click.Choice(PIXEL_FORMATS),
         help="Raw video comes through standard input (INPUT is -), in frames of the --size given.",
     )
+    @rotate_option()
     @functools.wraps(body)
     def with_given(*args: Any, **kw: Any) -> Any:
-        names = ("fps", "timestamps", "time_unit", "allow_damaged", "bayer", "pixel_format")
+        names = (
+            "fps",
+            "timestamps",
+            "time_unit",
+            "allow_damaged",
+            "bayer",
+            "pixel_format",
+            "rotate180",
+        )
         return body(*args, given={name: kw.pop(name) for name in names}, **kw)
 
     return with_given  # type: ignore[return-value]
+
+
+def rotate_option(what: str = "") -> Callable[[Body], Body]:
+    """Return what adds --rotate180, which turns `what`; the command gets ``rotate180``, a bool."""
+    return click.option(
+        "--rotate180",
+        is_flag=True,
+        help=f"Turn frames and events{what} by 180 degrees, first of all: the camera was mounted"
+        " upside down, as for DDD17 and DDD20.",
+    )
 
 
 def time_unit_option(body: Body) -> Body:

@@ -98,6 +98,7 @@ if TYPE_CHECKING:
     help="Draw each pixel N times as wide and high.  [default: panels about 640 pixels wide]",
 )
 @options.time_unit_option
+@options.rotate_option()
 def command(
     events: str,
     output: str | None,
@@ -109,6 +110,7 @@ def command(
     frames: bool | None,
     progress: bool,
     time_unit: str | None,
+    rotate180: bool,
     **shown: Any,
 ) -> None:
     """Make pictures and films of events.
@@ -141,7 +143,7 @@ def command(
     about = {name: shown[name] for name in ("fps", "speed", "at_s")}
     chosen = chosen_style(output, style, on_color, off_color, window_ms=window, **about)
     with reading_told(events, progress) as told:
-        recording = read_events(events, time_unit=time_unit, progress=told)
+        recording = read_events(events, time_unit=time_unit, progress=told, rotate180=rotate180)
     for problem in recording.problems:
         log(f"{events}: {problem}")
     if frames and recording.frame_times_ns is None:

@@ -33,6 +33,7 @@ def convert(
     crop: str | tuple[int, int, int, int] | None = None,
     bayer: str | None = None,
     pixel_format: str | None = None,
+    rotate180: bool = False,
     format: str | None = None,
     layout: str | None = None,
     with_frames: bool = False,
@@ -75,6 +76,8 @@ def convert(
         Frames are raw mosaics with these colours in the first two rows.
     pixel_format : str, optional
         Raw video of pixels of this kind comes through standard input; `size` is that of its frames.
+    rotate180 : bool
+        Turn frames and events by half a turn, before even that.
     format, layout : str, optional
         Format of the output where its suffix does not say it, and layout of HDF5.
     with_frames : bool
@@ -145,6 +148,7 @@ def convert(
             str(output),
             size=wanted,
             crop=part,
+            rotate180=rotate180,
             time_unit=time_unit,
             start_s=start_s,
             stop_s=stop_s,
@@ -174,6 +178,7 @@ def convert(
         bayer=bayer,
         pixel_format=pixel_format,
         frame_size=wanted,
+        rotate180=rotate180,
         threads=threads,
     )
     with reading:

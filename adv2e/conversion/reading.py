@@ -106,7 +106,7 @@ class Reading:
     Parameters
     ----------
     path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged, crop, bayer,
-    pixel_format, frame_size
+    pixel_format, frame_size, rotate180
         See :func:`adv2e.sources.open_source`.
     threads : int, optional
         Threads that the whole conversion may compute with; default: all cores.
@@ -127,6 +127,7 @@ class Reading:
         bayer: str | None = None,
         pixel_format: str | None = None,
         frame_size: Size | None = None,
+        rotate180: bool = False,
         threads: int | None = None,
     ) -> None:
         self.path = path
@@ -135,6 +136,7 @@ class Reading:
             "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
             "time_unit": time_unit, "allow_damaged": allow_damaged, "crop": crop,
             "bayer": bayer, "pixel_format": pixel_format, "frame_size": frame_size,
+            "rotate180": rotate180,
         }  # fmt: skip
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()

@@ -101,6 +101,7 @@ def convert_events(
     size: tuple[int, int] | None = None,
     crop: Rectangle | None = None,
     time_unit: str | None = None,
+    rotate180: bool = False,
     start_s: float | None = None,
     stop_s: float | None = None,
     t0: str = "auto",
@@ -129,6 +130,8 @@ def convert_events(
         Column and row of the first pixel that is kept, columns and rows.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the times in the file.
+    rotate180 : bool
+        Turn events and frames by half a turn, before they are cut.
     start_s, stop_s : float, optional
         First and last time wanted, from the first event [s]; both inclusive.
     t0 : {'auto', 'keep', 'zero'}
@@ -150,7 +153,7 @@ def convert_events(
     began = time.perf_counter()
     selection = Selection(start_s, stop_s, t0)
     keeps_all_bits = to_write(Path(output), format, layout).name in ("folder", "zip")
-    file = open_events(path, time_unit=time_unit, size=size)
+    file = open_events(path, time_unit=time_unit, size=size, rotate180=rotate180)
     facts = file.facts
     if causes and file.causes is None:
         raise DataError(

@@ -28,6 +28,7 @@ def diagnose(
     without: Sequence[str] = (),
     fit_thresholds: bool = False,
     time_unit: str | None = None,
+    rotate180: bool = False,
     overwrite: bool = False,
     threads: int | None = None,
     progress: bool = False,
@@ -50,6 +51,8 @@ def diagnose(
         The contrast thresholds are not known: they are fitted first.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the times in lists.
+    rotate180 : bool
+        Turn frames and events by half a turn, as for a camera that was mounted upside down.
     overwrite : bool
         Replace the folder of an earlier report.
     threads : int, optional
@@ -86,6 +89,7 @@ def diagnose(
         without=without,
         fit_thresholds=fit_thresholds,
         time_unit=time_unit,
+        rotate180=rotate180,
         overwrite=overwrite,
         threads=threads,
         progress=progress,
@@ -103,6 +107,7 @@ def diagnose_file(
     without: Sequence[str],
     fit_thresholds: bool,
     time_unit: str | None,
+    rotate180: bool,
     overwrite: bool,
     threads: int | None,
     progress: bool,
@@ -120,7 +125,7 @@ def diagnose_file(
         check_folder(output, overwrite=overwrite, inputs=[recording, *also_read])
     with _stages(progress) as tell:
         found = diagnose_evidence(
-            read_evidence(recording, time_unit, declared.sensor),
+            read_evidence(recording, time_unit, declared.sensor, rotate180=rotate180),
             declared,
             declared_name=name or "the defaults",
             without=without,

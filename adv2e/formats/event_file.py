@@ -9,14 +9,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.errors import DataError
 from adv2e.formats.units import event_unit
-from adv2e.sources.frame import RECORDED, Light, Shot
+from adv2e.sources.frame import RECORDED, Light, Pixels, Shot
+from adv2e.sources.frame import rotated180 as turned_pixels
 from adv2e.sources.stored import light_stored
 from adv2e.sources.times.units import Unit
 
@@ -43,6 +47,8 @@ class Facts:
         Unit of the times, as the user says.
     progress : callable, optional
         Is told how far the reading is.
+    rotate180 : bool
+        What is read will be turned by half a turn, as the user says; see :func:`rotated180`.
 
     Attributes
     ----------
@@ -63,9 +69,15 @@ class Facts:
     """
 
     def __init__(
-        self, path: Path, time_unit: str | None = None, progress: Progress | None = None
+        self,
+        path: Path,
+        time_unit: str | None = None,
+        progress: Progress | None = None,
+        *,
+        rotate180: bool = False,
     ) -> None:
         self.path = path
+        self.rotate180 = rotate180
         self.progress = progress or (lambda done, total: None)
         self.problems: list[str] = []
         self.description: dict[str, Any] = {}
@@ -202,6 +214,38 @@ class EventFile:
     parts: Callable[[], Iterator[Columns]]
     shots: Callable[[], Iterator[Shot]] | None = None
     causes: Callable[[], Column] | None = None
+
+
+def rotated180(file: EventFile) -> EventFile:
+    """Return a file of which events and frames are turned by half a turn.
+
+    Raises
+    ------
+    DataError
+        It does not state the size of its sensor.
+    """
+    geometry, shots = file.facts.geometry, file.shots
+    if geometry is None:
+        raise DataError(
+            f"{file.facts.path}: states no size of its sensor, which --rotate180 needs to turn the"
+            " events"
+        )
+    last_x, last_y = geometry[0] - 1, geometry[1] - 1
+
+    def parts() -> Iterator[Columns]:
+        for t, x, y, p in file.parts():
+            yield t, last_x - x.astype(np.int64), last_y - y.astype(np.int64), p
+
+    def turned() -> Iterator[Shot]:
+        assert shots is not None
+        for shot in shots():
+            yield replace(shot, load=partial(_turned, shot.load))
+
+    return replace(file, parts=parts, shots=None if shots is None else turned)
+
+
+def _turned(load: Callable[[], Pixels]) -> Pixels:
+    return turned_pixels(load())
 
 
 def described_geometry(description: dict[str, Any]) -> tuple[int, int] | None:

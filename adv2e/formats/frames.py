@@ -37,7 +37,10 @@ def open_frames(path: str | Path, **given: Any) -> Source:
     times = GivenTimes(given.get("fps"), Path(listed) if listed else None, given.get("time_unit"))
     wanted = ("start_s", "stop_s", "t0", "allow_damaged", "crop", "bayer")
     selection = Selection(**{name: given[name] for name in wanted if name in given})
-    file = open_events(path, time_unit=given.get("time_unit"))
+    turn = given.get("rotate180", False)
+    if turn and selection.bayer is not None:
+        raise DataError(f"{path}: --bayer is not known of frames that --rotate180 turns: give one")
+    file = open_events(path, time_unit=given.get("time_unit"), rotate180=turn)
     if file.shots is None:
         raise DataError(f"{path}: holds events and no frames")
     return _source(file, times, selection)

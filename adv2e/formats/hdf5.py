@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.files.expansion import check_expansion
-from adv2e.formats.event_file import Facts
+from adv2e.formats.event_file import MOST_COLUMNS, Facts
 from adv2e.process.machine import machine_complaint
 
 PART = 1 << 20
@@ -97,6 +97,11 @@ def find(file: h5py.File, name: str) -> h5py.Group | h5py.Dataset | None:
     return here if isinstance(here, (h5py.Group, h5py.Dataset)) else None
 
 
+def is_dataset(file: h5py.File, name: str) -> bool:
+    """Tell whether the name is that of a dataset; DataError as :func:`find`."""
+    return isinstance(find(file, name), h5py.Dataset)
+
+
 def dataset(file: h5py.File, name: str) -> h5py.Dataset:
     """Return the dataset of a name; DataError as :func:`find`, or if it is none."""
     found = find(file, name)
@@ -129,10 +134,17 @@ def number(file: h5py.File, name: str) -> int:
 
 
 def describe(file: h5py.File, facts: Facts) -> None:
-    """Take what a file says of itself, if this program wrote it."""
+    """Take what a file says of itself, if this program wrote it, and of the size of its sensor."""
     if "adv2e" in file.attrs:
         label = f"{facts.path}: attribute adv2e"
         facts.describe(str(file.attrs["adv2e"]), label, "the attribute adv2e")
+    stated = np.atleast_1d(file.attrs.get("sensor_resolution", ()))
+    if stated.size >= 2 and stated.dtype.kind in "iuf" and np.all(stated[:2] > 0):
+        if not np.all(stated[:2] <= MOST_COLUMNS):
+            raise DataError(
+                f"{facts.path}: sensor_resolution is {stated[:2]}, must be rows and columns"
+            )
+        facts.state((int(stated[1]), int(stated[0])), "sensor_resolution")
 
 
 def columns(file: h5py.File, names: tuple[str, ...]) -> list[h5py.Dataset]:

@@ -13,7 +13,7 @@ from adv2e.errors import DataError
 from adv2e.files.regular import check_ends
 from adv2e.formats.assembly import assemble
 from adv2e.formats.causes import reader_of
-from adv2e.formats.event_file import EventFile, Facts, Progress
+from adv2e.formats.event_file import EventFile, Facts, Progress, rotated180
 from adv2e.formats.recording import Recording
 from adv2e.formats.registry import format_of
 from adv2e.geometry import MOST_PIXELS
@@ -28,12 +28,13 @@ def open_events(
     time_unit: str | None = None,
     progress: Progress | None = None,
     size: tuple[int, int] | None = None,
+    rotate180: bool = False,
 ) -> EventFile:
     """Open an event file, or a folder in the DAVIS240C layout; its events are not read yet.
 
     Parameters
     ----------
-    path, time_unit, progress
+    path, time_unit, progress, rotate180
         See :func:`read_events`.
     size : (int, int), optional
         Width and height [pixels] that hold whatever the file states.
@@ -44,7 +45,7 @@ def open_events(
         As :func:`read_events`.
     """
     path = Path(path)
-    facts = Facts(path, time_unit, progress)
+    facts = Facts(path, time_unit, progress, rotate180=rotate180)
     facts.state(size, "--size")
     with _reading(path):
         check_ends(path)
@@ -56,11 +57,16 @@ def open_events(
             facts.describe_from(beside)
         file: EventFile = found.load(found.reader)(path, facts)
         causes = reader_of(path, is_hdf5=found.is_hdf5)
-    return replace(file, causes=causes)
+    file = replace(file, causes=causes)
+    return rotated180(file) if rotate180 else file
 
 
 def read_events(
-    path: str | Path, *, time_unit: str | None = None, progress: Progress | None = None
+    path: str | Path,
+    *,
+    time_unit: str | None = None,
+    progress: Progress | None = None,
+    rotate180: bool = False,
 ) -> Recording:
     r"""Read an event file, or a folder in the DAVIS240C layout.
 
@@ -72,6 +78,8 @@ def read_events(
         Unit of the times; default: see :mod:`adv2e.formats.units`.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much.
+    rotate180 : bool
+        Turn events and frames by half a turn, as for a camera that was mounted upside down.
 
     Returns
     -------
@@ -98,7 +106,7 @@ def read_events(
     >>> recording.width, recording.height, recording.frame_times_ns is None
     (4, 3, True)
     """
-    file = open_events(path, time_unit=time_unit, progress=progress)
+    file = open_events(path, time_unit=time_unit, progress=progress, rotate180=rotate180)
     with _reading(file.facts.path):
         recording = assemble(file)
     _check_size(recording)

@@ -106,6 +106,24 @@ FORMATS = (
         holds_causes=True,
     ),
     Format(
+        name="ddd",
+        what="HDF5 of DDD17 and DDD20",
+        suffixes=_HDF5,
+        reader="ddd:open_ddd",
+        datasets=("dvs/data", "dvs/timestamp"),
+        frames="r",
+        is_camera=True,
+    ),
+    Format(
+        name="ddd20",
+        what="HDF5 exported from DDD20",
+        suffixes=_HDF5,
+        reader="ddd:open_exported",
+        datasets=("event", "frame", "frame_ts"),
+        frames="r",
+        is_camera=True,
+    ),
+    Format(
         name="txt",
         what="text, a line for each event: seconds, column, row, polarity",
         suffixes=(".txt",),
@@ -316,7 +334,7 @@ def _layout_of(path: Path, layouts: list[Format]) -> Format:
 
     with hdf5.opened(path) as file:
         for found in layouts:
-            if all(hdf5.find(file, name) is not None for name in found.datasets):
+            if all(hdf5.is_dataset(file, name) for name in found.datasets):
                 return found
     known = "; or ".join(f"{f.name} (datasets {', '.join(f.datasets)})" for f in layouts)
     raise DataError(f"{path}: unknown HDF5 layout, must be {known}")

@@ -34,6 +34,7 @@ def inspect(
     bayer: str | None = None,
     pixel_format: str | None = None,
     frame_size: Size | None = None,
+    rotate180: bool = False,
     progress: Callable[[int, int | None], None] | None = None,
 ) -> dict[str, Any]:
     """Return what a recording, an event file or an input with frames holds, ready for JSON.
@@ -50,6 +51,8 @@ def inspect(
         Damage of a video becomes one of the problems.
     bayer, pixel_format, frame_size
         See :func:`adv2e.sources.open_source`.
+    rotate180 : bool
+        See :func:`adv2e.read_events`.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much, where that is
         known.
@@ -76,9 +79,12 @@ def inspect(
             bayer=bayer,
             pixel_format=pixel_format,
             frame_size=frame_size,
+            rotate180=rotate180,
         )
         return _of_source(source, progress or (lambda done, total: None))
-    return _of_recording(read_events(path, time_unit=time_unit, progress=progress))
+    return _of_recording(
+        read_events(path, time_unit=time_unit, progress=progress, rotate180=rotate180)
+    )
 
 
 def _has_only_frames(path: Path) -> bool:

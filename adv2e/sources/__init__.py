@@ -47,6 +47,7 @@ def open_source(
     bayer: str | None = None,
     pixel_format: str | None = None,
     frame_size: Size | None = None,
+    rotate180: bool = False,
 ) -> Source:
     """Open an input with frames.
 
@@ -78,6 +79,8 @@ def open_source(
         :mod:`adv2e.sources.pipes.raw`.
     frame_size : Size, optional
         Size of the frames of raw video.
+    rotate180 : bool
+        Turn each frame by half a turn, before even that.
 
     Returns
     -------
@@ -93,7 +96,7 @@ def open_source(
     """
     listed = Path(timestamps) if timestamps is not None else None
     given = GivenTimes(fps, listed, time_unit)
-    selection = Selection(start_s, stop_s, t0, allow_damaged, crop, bayer)
+    selection = Selection(start_s, stop_s, t0, allow_damaged, crop, bayer, rotate180)
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")
     if pixel_format is not None and (str(path) != STDIN or frame_size is None):

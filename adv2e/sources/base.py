@@ -30,6 +30,7 @@ from adv2e.sources.frame import (
     check_values,
     light_of_images,
     odd_white,
+    rotated180,
 )
 from adv2e.sources.times.instants import seconds
 from adv2e.sources.wanted import Selection
@@ -203,6 +204,8 @@ class Source(ABC):
         this = _description(image.shape[1], image.shape[0], image.dtype, image.ndim == 3)
         if this != first:
             raise DataError(f"{label}: {this}, but the first frame is {first}")
+        if self.selection.rotate180:
+            pixels = rotated180(pixels)
         if self.selection.crop is not None:
             pixels = _cut(pixels, self.selection.crop)
         check_values(pixels.image, label)

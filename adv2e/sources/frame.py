@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -104,6 +104,12 @@ class Shot:
     t_ns: int
     label: str
     load: Callable[[], Pixels]
+
+
+def rotated180(pixels: Pixels) -> Pixels:
+    """Return an image turned by half a turn."""
+    alpha = None if pixels.alpha is None else np.ascontiguousarray(pixels.alpha[::-1, ::-1])
+    return replace(pixels, image=np.ascontiguousarray(pixels.image[::-1, ::-1]), alpha=alpha)
 
 
 def odd_white(pixels: Pixels, first: float | None) -> str:

@@ -82,6 +82,8 @@ class Selection:
         Part of each frame that is wanted; default: all of it.
     bayer : {'RGGB', 'BGGR', 'GRBG', 'GBRG'}, optional
         Frames are mosaics of this pattern, and wanted in colour.
+    rotate180 : bool
+        Frames are wanted turned by half a turn, before they are cut.
 
     Raises
     ------
@@ -95,6 +97,7 @@ class Selection:
     allow_damaged: bool = False
     crop: Rectangle | None = None
     bayer: str | None = None
+    rotate180: bool = False
 
     def __post_init__(self) -> None:
         for name, value in (("--start", self.start_s), ("--stop", self.stop_s)):

@@ -43,7 +43,10 @@ def prepare() -> None:
         *("cli.info", "cli.convert", "cli.render", "cli.compare", "cli.config", "cli.characterise"),
         *("inspection.inspect", "inspection.report", "rendering", "comparison.compare"),
         *("comparison.report", "diagnosis.tables.characterise"),
-        *(f"formats.{name}" for name in ("monash.reader", "npz", "hdf5", "dsec", "text.reader")),
+        *(
+            f"formats.{name}"
+            for name in ("monash.reader", "npz", "hdf5", "dsec", "ddd", "text.reader")
+        ),
         *("formats.davis240c.reader", "conversion.pipeline", "conversion.simulation"),
         *(f"sources.{name}" for name in ("video.source", "images.source", "npy", "davis240c")),
     ):

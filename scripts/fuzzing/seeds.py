@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import random
+import struct
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -276,7 +277,27 @@ def _hdf5(scratch: Path) -> list[Seed]:
         path = scratch / f"{layout}.h5"
         _write_layout(path, layout)
         seeds.append(Seed(f"hdf5 {layout}", {"a.h5": path.read_bytes()}, commands[:4]))
+    _write_ddd(scratch / "ddd.h5")
+    seeds.append(Seed("hdf5 ddd", {"a.h5": (scratch / "ddd.h5").read_bytes()}, commands[:4]))
     return [*seeds, _Structured("hdf5 structure", {}, commands[:4])]
+
+
+def _write_ddd(path: Path) -> None:
+    times, x, y, p = (np.rint(c * 1e6).astype("<u4") if c.dtype.kind == "f" else c.astype("<u4")
+                      for c in _columns().values())  # fmt: skip
+    words = np.stack([x << 17 | y << 2 | p << 1 | 1, times], axis=1).astype("<u4")
+    packets = [(1, 8, words.tobytes())]
+    for n, frame in enumerate(_frames()):
+        head = np.array([3, 0, 0, n * 200_000, n * 200_000 + 9, COLUMNS, ROWS, 0, 0], "<i4")
+        packets.append((2, 36 + 2 * frame.size, head.tobytes() + frame.astype("<u2").tobytes()))
+    with h5py.File(path, "w") as file:
+        data = file.create_dataset("dvs/data", (16, 3), h5py.vlen_dtype(np.uint8), chunks=(8, 3))
+        for row, (kind, size, body) in enumerate(packets):
+            number = len(body) // size
+            parts = b"15", struct.pack("<hhiiiiii", kind, 1, size, 4, 0, *[number] * 3), body
+            for column, part in enumerate(parts):
+                data[row, column] = np.frombuffer(part, np.uint8)
+        file["dvs/timestamp"] = np.arange(16)
 
 
 def _write_layout(path: Path, layout: str) -> None:

@@ -73,7 +73,15 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         *("--seed", "7", "--threads", "2", "--overwrite", "--progress", "--start", "0.5"),
         *("--stop", "2", "--t0", "keep", "--timestamps", "t.txt", "--format", "h5"),
         *("--time-unit", "us", "--crop", "1,2,30,20", "--size", "8x6", "--bayer", "gbrg"),
-        *("--layout", "dsec", "--with-frames", "--preview", "p.gif", "--allow-damaged"),
+        *(
+            "--rotate180",
+            "--layout",
+            "dsec",
+            "--with-frames",
+            "--preview",
+            "p.gif",
+            "--allow-damaged",
+        ),
         "--causes",
     )
     assert outcome.status == 0
@@ -91,6 +99,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "bayer": "GBRG",
         "pixel_format": None,
         "frame_size": (8, 6),
+        "rotate180": True,
     }
     log = options.pop("log")
     assert options == {

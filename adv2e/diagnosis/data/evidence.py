@@ -143,7 +143,11 @@ class Evidence:
 
 
 def read_evidence(
-    path: str | Path, time_unit: str | None = None, sensor: Sensor | None = None
+    path: str | Path,
+    time_unit: str | None = None,
+    sensor: Sensor | None = None,
+    *,
+    rotate180: bool = False,
 ) -> Evidence:
     """Read a recording that holds frames and events; its unit as :func:`read_events` has it.
 
@@ -154,7 +158,7 @@ def read_evidence(
         frames, fewer than three, or too few events; frames and events do not overlap in time;
         frames are out of order, not all alike, or of another size than the events.
     """
-    recording = read_events(path, time_unit=time_unit)
+    recording = read_events(path, time_unit=time_unit, rotate180=rotate180)
     check_beside(recording.width, recording.height, sensor, recording.path)
     if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
         raise DataError(f"{path}: holds no frames, from which the events could be simulated")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.formats import hdf5
-from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts
+from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.times.units import Unit, frame_unit
 from adv2e.ticks import NS, US, to_ticks
@@ -43,7 +43,9 @@ def open_monash(path: Path, facts: Facts) -> EventFile:
             raise DataError(f"{path}: images is a dataset, must be a group of images")
         names = [f"images/{name}" for name in sorted(images)] if images is not None else []
         found = [hdf5.dataset(file, name) for name in names]
-        facts.state(_geometry(path, file, found), "sensor_resolution")
+        if found:
+            height, width = _pixels(path, found[0])[:2]
+            facts.state((width, height), "the first image")
         frames = _Stamps(path, found)
         if len(found) > 1 and frames.name == "timestamp":
             facts.note_frames(frames.unit(None, facts.stated_unit), whole=frames.whole)
@@ -65,19 +67,6 @@ def open_monash(path: Path, facts: Facts) -> EventFile:
         for t_ns, name in zip(times, names, strict=True)
     ]
     return EventFile("monash", facts, parts, (lambda: iter(shots)) if shots else None)
-
-
-def _geometry(path: Path, file: h5py.File, images: list[h5py.Dataset]) -> tuple[int, int] | None:
-    """Return (width, height) as the attribute or the first image has it."""
-    stated = np.atleast_1d(file.attrs.get("sensor_resolution", ()))
-    if stated.size >= 2 and stated.dtype.kind in "iuf" and np.all(stated[:2] > 0):
-        if not np.all(stated[:2] <= MOST_COLUMNS):
-            raise DataError(f"{path}: sensor_resolution is {stated[:2]}, must be rows and columns")
-        return int(stated[1]), int(stated[0])
-    if images:
-        rows, columns = _pixels(path, images[0])[:2]
-        return columns, rows
-    return None
 
 
 def _pixels(path: Path, image: h5py.Dataset) -> tuple[int, ...]:
