@@ -221,6 +221,18 @@ FORMATS = (
         last_us=(1 << 32) - 1,
     ),
     Format(
+        name="aedat2",
+        what="AEDAT-2.0 of jAER",
+        suffixes=(".aedat",),
+        reader="aedat2:open_aedat2",
+        writer="aedat2:Aedat2Writer",
+        frames="r",
+        is_camera=True,
+        most=(1 << 10, 1 << 9),
+        first_us=0,
+        last_us=(1 << 31) - 1,
+    ),
+    Format(
         name="es",
         what="Event Stream",
         suffixes=(".es",),

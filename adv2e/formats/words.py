@@ -15,8 +15,8 @@ Numbers = NDArray[np.int64]
 
 
 def blocks(
-    path: Path, begin: int, dtype: str | list[Any], count: int, facts: Facts
-) -> Iterator[Any]:
+    path: Path, begin: int, dtype: str, count: int, facts: Facts | None = None
+) -> Iterator[NDArray[Any]]:
     """Yield the words of a file as arrays of at most `count` of them.
 
     What is left at the end and is no whole word, as where a recording was broken off, is told.
@@ -26,10 +26,10 @@ def blocks(
     path : Path
     begin : int
         Where the first word begins [bytes].
-    dtype : str or list
+    dtype : str
         Of a word.
     count : int
-    facts : Facts
+    facts : Facts, optional
         Is told the progress, and what is left.
     """
     word = np.dtype(dtype)
@@ -40,6 +40,8 @@ def blocks(
             whole, left = divmod(len(data), word.itemsize)
             if whole:
                 yield np.frombuffer(data, word, whole)
+            if facts is None:
+                continue
             if left:
                 facts.problems.append(
                     f"{left} bytes at the end, at byte {file.tell() - left}, are no whole word of"

@@ -326,7 +326,13 @@ def _camera_files(scratch: Path) -> list[Seed]:
     t, x, y, p = _columns().values()
     events = make_events((t * 1e6).astype(np.int64), x, y, p)
     seeds = []
-    for name, suffix in (("evt3", ".raw"), ("evt2", ".raw"), ("dat", ".dat"), ("es", ".es")):
+    for name, suffix in (
+        ("evt3", ".raw"),
+        ("evt2", ".raw"),
+        ("dat", ".dat"),
+        ("es", ".es"),
+        ("aedat2", ".aedat"),
+    ):
         path = scratch / f"a{suffix}"
         with open_sink(
             path, width=COLUMNS, height=ROWS, metadata={}, format=name, overwrite=True
