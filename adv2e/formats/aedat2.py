@@ -25,7 +25,7 @@ with a rolling one.
 Traps: the header ends where a line does not begin with ``#``, so that an event in one of four rows
 would be taken for a line of it: an external signal is written before.  Tonic reads the fifth word
 of ``# Creation time:`` as a number.  Tonic and v2e know only events with both coordinates turned
-round, EventCV leaves the columns as they are.
+round, EventCV leaves the columns as they are and takes the signal off the next reset.
 
 References
 ----------
