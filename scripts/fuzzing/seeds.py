@@ -254,7 +254,7 @@ def _packets(scratch: Path) -> list[Seed]:
     columns = _columns()
     events = make_events((columns["t"] * 1e6).astype(int), *(columns[name] for name in "xyp"))
     seeds = []
-    for name in ("a.aedat4",):
+    for name in ("a.aedat4", "a.bag"):
         path, size = scratch / name, {"width": COLUMNS, "height": ROWS}
         with open_sink(path, **size, metadata={}, with_frames=True, overwrite=True) as sink:
             for n, frame in enumerate(_frames()):
@@ -302,8 +302,9 @@ def _write_ddd(path: Path) -> None:
 
 def _write_layout(path: Path, layout: str) -> None:
     with open_sink(
-        path, width=COLUMNS, height=ROWS, metadata={}, layout=layout, with_frames=True
-    ) as sink:
+        path, width=COLUMNS, height=ROWS, metadata={}, layout=layout, with_frames=True,
+        overwrite=True,
+    ) as sink:  # fmt: skip
         for n, frame in enumerate(_frames()):
             sink.write_frame(200_000_000 * n, frame)
         columns = _columns()

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from adv2e.errors import DataError, MissingExtraError
-from adv2e.files.expansion import FREE, MOST
+from adv2e.files.expansion import expand
 
 MAGIC = b"#!AER-DAT4.0\r\n"
 EVENT = np.dtype({
@@ -111,34 +111,22 @@ def unpacked(data: bytes, compression: int, label: str) -> bytes:
     MissingExtraError
         The package that uncompresses it is not installed.
     """
-    most = max(FREE, MOST * len(data))
     if compression != NONE:
-        data = _uncompressed(data, compression, most, label)
+        reader, errors = _decompressor(compression, label)
+        data = expand(reader, data, label, errors)
     (size,) = struct.unpack_from("<I", data) if len(data) >= 4 else (0,)
     if size != len(data) - 4:
         raise DataError(f"{label}: states {size:,} bytes and holds {max(0, len(data) - 4):,}")
     return data[4:]
 
 
-def _uncompressed(data: bytes, compression: int, most: int, label: str) -> bytes:
-    reader, error = _decompressor(compression, label)
-    try:
-        plain: bytes = reader.decompress(data, max_length=most)
-    except (error, ValueError, EOFError) as failed:
-        raise DataError(f"{label}: cannot be uncompressed: {failed}") from failed
-    if not reader.eof:
-        how = f"grows more than {MOST}-fold" if len(plain) >= most else "is cut short"
-        raise DataError(f"{label}: cannot be uncompressed: it {how}")
-    return plain
-
-
-def _decompressor(compression: int, label: str) -> tuple[Any, type[Exception]]:
+def _decompressor(compression: int, label: str) -> tuple[Any, tuple[type[Exception], ...]]:
     """Return what uncompresses one packet, and what it raises."""
     if compression in _LZ4:
-        return lz4_frame(label).LZ4FrameDecompressor(), RuntimeError
+        return lz4_frame(label).LZ4FrameDecompressor(), (RuntimeError, EOFError)
     if compression in _ZSTD:
         zstd = _zstd(label)
-        return zstd.ZstdDecompressor(), zstd.ZstdError
+        return zstd.ZstdDecompressor(), (zstd.ZstdError, EOFError)
     raise DataError(f"{label}: compressed in a way that is not known, number {compression}")
 
 
