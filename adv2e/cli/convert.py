@@ -84,7 +84,7 @@ if TYPE_CHECKING:
     "--causes",
     is_flag=True,
     help="Also store what made each event: the light, leak or a kind of noise. HDF5 holds it as"
-    " events/causes; beside other formats it is OUT.causes.txt, a number on each line.",
+    " events/causes, .npz and .csv as a column; beside other formats it is OUT.causes.txt.",
 )
 def command(
     source: str,

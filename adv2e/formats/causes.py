@@ -1,8 +1,10 @@
-"""Causes of events in files: as a column of HDF5, and beside formats that have none.
+"""Causes of events in files: as a column, and beside formats that have none.
 
 ======================== =========================================================================
 /events/causes           of HDF5: uint8; its attribute names has the names of the numbers from 0 on,
                          with commas between
+causes.npy               in a NumPy archive: uint8
+cause                    of CSV: the last column
 <path>.causes.txt        beside other formats: a digit on each line, in the order of the events
 ======================== =========================================================================
 
@@ -49,14 +51,17 @@ def check_numbers(causes: NDArray[Any], label: str) -> None:
         raise DataError(f"{label}: must be whole numbers from 0 to {most}")
 
 
-def reader_of(path: Path, *, is_hdf5: bool) -> Callable[[], NDArray[Any]] | None:
-    """Return what reads the causes of the events in `path`, None if it has none."""
-    if is_hdf5:
-        from adv2e.formats import hdf5  # noqa: PLC0415 - h5py takes its time
+def in_hdf5(path: Path) -> Callable[[], NDArray[Any]] | None:
+    """Return what reads the causes in an HDF5 file, None if it has none."""
+    from adv2e.formats import hdf5  # noqa: PLC0415 - h5py takes its time
 
-        with hdf5.opened(path) as file:
-            if hdf5.find(file, DATASET) is not None:
-                return partial(hdf5.read_column, path, DATASET)
+    with hdf5.opened(path) as file:
+        found = hdf5.find(file, DATASET)
+    return None if found is None else partial(hdf5.read_column, path, DATASET)
+
+
+def found_beside(path: Path) -> Callable[[], NDArray[Any]] | None:
+    """Return what reads the causes beside the events in `path`, None if there are none."""
     return partial(read_beside, beside(path)) if beside(path).is_file() else None
 
 

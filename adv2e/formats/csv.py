@@ -7,6 +7,7 @@ t         time [us]
 x         column, from the left
 y         row, from the top
 p         polarity, 1 is ON and 0 is OFF
+cause     with causes: see adv2e.causes
 ========= =====================================
 
 pandas and faery take this with their defaults.  Read are the columns that
@@ -23,14 +24,17 @@ References
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.causes import has_causes
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.formats.column_names import find_columns, stated_unit
@@ -38,7 +42,8 @@ from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.sink import Request, Writer
 from adv2e.formats.text.reader import Form, events_of_lines
 
-_HEADING = b"t,x,y,p\n"
+_HEADING = b"t,x,y,p"
+_CAUSE = "cause"
 _MOST_HEADING = 1 << 16  # bytes that a heading lies within
 
 _BETWEEN = re.compile(r"\s*[,;\t]\s*|\s+")
@@ -94,6 +99,25 @@ def _heading(path: Path, begin: bytes) -> tuple[list[str], int, int]:
     )
 
 
+def causes_of(path: Path) -> Callable[[], NDArray[Any]] | None:
+    """Return what reads the column of causes, None if there is none, as we write it."""
+    with path.open("rb") as file:
+        begin = file.read(_MOST_HEADING)
+    names, skipped, lines = _heading(path, begin)
+    # of others, such a column may be anything
+    ours = begin[:skipped].rstrip().endswith(_HEADING + f",{_CAUSE}".encode())
+    return partial(_read_causes, path, skipped, lines) if ours and len(names) == 5 else None
+
+
+def _read_causes(path: Path, skipped: int, lines: int) -> NDArray[Any]:
+    if path.stat().st_size <= skipped:  # of which NumPy warns
+        return np.empty(0, np.int64)
+    try:
+        return np.loadtxt(path, np.int64, None, ",", None, lines, 4, ndmin=1)
+    except ValueError as error:
+        raise DataError(f"{path}: {_CAUSE}: {error}") from None
+
+
 def _is_number(text: str) -> bool:
     try:
         float(text)
@@ -116,7 +140,7 @@ class CsvWriter(Writer):
     def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
         (path,) = temporary
         self._file = stack.enter_context(path.open("wb"))
-        self._file.write(_HEADING)
+        self._file.write(_HEADING + (f",{_CAUSE}\n".encode() if request.causes else b"\n"))
 
     def write_events(self, events: Events) -> None:
         """Append events."""
@@ -133,7 +157,7 @@ def _lines(events: Events) -> bytes:
     while (left := left // 1000).any():
         groups.append(left % 1000)
     comma = 1 + 3 * len(groups)
-    table = np.zeros((events.size, comma + 15), np.uint8)  # zeros are left out
+    table = np.zeros((events.size, comma + 17), np.uint8)  # zeros are left out
     table[:, 0] = np.where(t < 0, ord("-"), 0)
     begun = np.zeros(events.size, np.bool_)
     for k, group in enumerate(reversed(groups)):
@@ -144,7 +168,10 @@ def _lines(events: Events) -> bytes:
     table[:, comma + 1 : comma + 7] = numbers[events["x"]]
     table[:, comma + 7 : comma + 13] = numbers[events["y"]]
     table[:, comma + 13] = events["p"] + ord("0")
-    table[:, comma + 14] = ord("\n")
+    if has_causes(events):
+        table[:, comma + 14] = ord(",")
+        table[:, comma + 15] = events["cause"] + ord("0")
+    table[:, comma + 16] = ord("\n")
     return table[table > 0].tobytes()
 
 

@@ -7,6 +7,7 @@ geometry [pixels], ``adv2e`` (JSON) what wrote the file.  What is written here:
 t_us                     int64, time [us]
 x, y                     uint16, column and row, from the top left
 p                        uint8, 1 is ON and 0 is OFF
+causes                   uint8, with causes: see adv2e.causes
 width, height            int64
 adv2e                    text: version, configuration, seed (JSON)
 ======================== =========================================
@@ -22,8 +23,9 @@ import io
 import shutil
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -31,8 +33,9 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from adv2e.causes import CAUSED_DTYPE
 from adv2e.errors import DataError
-from adv2e.events import EVENT_DTYPE, Events
+from adv2e.events import Events
 from adv2e.files.npy import Header, read_array, read_header
 from adv2e.files.zips import open_member, zip_archive
 from adv2e.formats.column_names import find_columns, stated_unit
@@ -44,6 +47,8 @@ _BEYOND = 1 << 31
 _PART = 1 << 20  # events read at once
 _LEVEL = 1  # of deflate
 _BLOCK = 1 << 20  # bytes deflated at once
+
+_CAUSES = "causes"
 
 _WRITTEN = {"t_us": "t", "x": "x", "y": "y", "p": "p"}
 """Fields of the events by the names of the arrays."""
@@ -164,6 +169,21 @@ def _whole(label: str, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
     return whole
 
 
+def causes_of(path: Path) -> Callable[[], NDArray[Any]] | None:
+    """Return what reads the causes of the events, None if the archive has none."""
+    with _archive(path) as archive:
+        there = f"{_CAUSES}.npy" in archive.namelist()
+    return partial(_read_causes, path) if there else None
+
+
+def _read_causes(path: Path) -> NDArray[Any]:
+    with _archive(path) as archive:
+        causes = _read(archive, _CAUSES)
+    if causes.ndim != 1:
+        raise DataError(f"{path}: {_CAUSES} must be a column, not of shape {causes.shape}")
+    return causes
+
+
 class NpzWriter(Writer):
     """Writes a NumPy archive, compressed; its bytes follow from its content.
 
@@ -176,25 +196,26 @@ class NpzWriter(Writer):
         self._archive = stack.enter_context(
             zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)
         )
+        self._written = _WRITTEN | ({_CAUSES: "cause"} if request.causes else {})
         # nameless: they are gone whatever becomes of the process
         self._columns = {
             name: stack.enter_context(tempfile.TemporaryFile(dir=path.parent))  # noqa: SIM115
-            for name in _WRITTEN
+            for name in self._written
         }
         self._count = 0
 
     def write_events(self, events: Events) -> None:
         """Append events."""
         self._count += events.size
-        for name, field in _WRITTEN.items():
+        for name, field in self._written.items():
             self._columns[name].write(np.ascontiguousarray(events[field]).data)
 
     def finish(self) -> None:
         """Write the archive."""
-        for name, field in _WRITTEN.items():
+        for name, field in self._written.items():
             file = self._columns[name]
             file.seek(0)
-            self._add(name, EVENT_DTYPE[field], (self._count,), file)
+            self._add(name, CAUSED_DTYPE[field], (self._count,), file)
         for name, value in (
             ("width", np.array(self._request.width, np.int64)),
             ("height", np.array(self._request.height, np.int64)),

@@ -12,7 +12,7 @@ import numpy as np
 from adv2e.errors import DataError
 from adv2e.files.regular import check_ends
 from adv2e.formats.assembly import assemble
-from adv2e.formats.causes import reader_of
+from adv2e.formats.causes import found_beside
 from adv2e.formats.event_file import EventFile, Facts, Progress, rotated180
 from adv2e.formats.recording import Recording
 from adv2e.formats.registry import format_of
@@ -56,8 +56,8 @@ def open_events(
         if not found.holds_settings and beside.is_file():
             facts.describe_from(beside)
         file: EventFile = found.load(found.reader)(path, facts)
-        causes = reader_of(path, is_hdf5=found.is_hdf5)
-    file = replace(file, causes=causes)
+        inside = found.load(found.causes)(path) if found.causes else None
+    file = replace(file, causes=inside or found_beside(path))
     return rotated180(file) if rotate180 else file
 
 

@@ -44,9 +44,9 @@ class Format:
         Such files are recordings of cameras: where they hold frames, ``adv2e convert`` simulates.
     holds_settings : bool
         It holds how it was made; else that lies beside it, in ``<path>.json``.
-    holds_causes : bool
-        It holds the causes of the events; else they lie beside it: see
-        :mod:`adv2e.formats.causes`.
+    causes : str
+        Where the function is that finds the causes of the events in it: ``find(path)`` returns what
+        reads them, or None.  Empty: it has no place for them, and they lie beside it.
     most : (int, int)
         Most columns and rows of a sensor that it can hold.
     first_us, last_us : int
@@ -66,7 +66,7 @@ class Format:
     frames: str = ""
     is_camera: bool = False
     holds_settings: bool = True
-    holds_causes: bool = False
+    causes: str = ""
     most: tuple[int, int] = (1 << 16, 1 << 16)
     first_us: int = -_LARGEST_US
     last_us: int = _LARGEST_US
@@ -94,7 +94,7 @@ FORMATS = (
         writer="monash.writer:MonashWriter",
         datasets=("events/ts", "events/xs", "events/ys", "events/ps"),
         frames="rw",
-        holds_causes=True,
+        causes="causes:in_hdf5",
     ),
     Format(
         name="dsec",
@@ -103,7 +103,7 @@ FORMATS = (
         reader="dsec:open_dsec",
         writer="dsec:DsecWriter",
         datasets=("events/t", "events/x", "events/y", "events/p"),
-        holds_causes=True,
+        causes="causes:in_hdf5",
     ),
     Format(
         name="ddd",
@@ -224,6 +224,7 @@ FORMATS = (
         reader="csv:open_csv",
         writer="csv:CsvWriter",
         holds_settings=False,
+        causes="csv:causes_of",
     ),
     Format(
         name="npz",
@@ -232,6 +233,7 @@ FORMATS = (
         reader="npz:open_npz",
         writer="npz:NpzWriter",
         magic=b"PK",
+        causes="npz:causes_of",
     ),
     Format(
         name="evt3",

@@ -100,7 +100,7 @@ class Sink:
         if temporary and not format.holds_settings:
             beside = request.path.with_name(request.path.name + ".json")
             self._description = staging.file(beside), to_json(request.description)
-        self._holds_causes = request.causes and format.holds_causes
+        self._holds_causes = request.causes and format.causes != ""
         self._causes = self._place_of_causes(request, staging, temporary)
         told = replace(request, causes=self._holds_causes)
         self._open = self._opened(partial(writer, told), staging, temporary, is_alone)

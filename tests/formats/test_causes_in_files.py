@@ -17,7 +17,7 @@ from adv2e.formats.writing import open_sink
 
 SIZE = 12, 9
 NOISY = ["pixel.leak.rate_hz=20", "pixel.shot_noise.rate_hz=40"]
-OUTPUTS = ["out.h5", "dsec.h5", "out.txt", "out.zip", "out"]
+OUTPUTS = ["out.h5", "dsec.h5", "out.npz", "out.csv", "out.txt", "out.zip", "out"]
 
 
 def frames():
@@ -62,13 +62,22 @@ def test_what_is_converted_is_what_simulate_gives(name, clip, tmp_path):
     assert found.metadata["causes"] == list(CAUSES)
     assert not found.problems
     beside = tmp_path / f"{name}.causes.txt"
-    if out.suffix == ".h5":
+    if out.suffix in (".h5", ".npz", ".csv"):
         assert not beside.exists()
+    if out.suffix == ".h5":
         with h5py.File(out) as file:
             column = file["events/causes"]
             assert column.dtype == np.uint8
             assert column.attrs["names"].split(",") == list(CAUSES)
             assert np.array_equal(column, found.events["cause"])
+    elif out.suffix == ".npz":
+        with np.load(out) as archive:
+            assert archive["causes"].dtype == np.uint8
+            assert np.array_equal(archive["causes"], found.events["cause"])
+    elif out.suffix == ".csv":
+        table = np.genfromtxt(out, int, delimiter=",", names=True)
+        assert table.dtype.names == ("t", "x", "y", "p", "cause")
+        assert np.array_equal(table["cause"], found.events["cause"])
     else:
         assert np.array_equal(np.loadtxt(beside, int), found.events["cause"])
     # all else is as without
@@ -87,7 +96,7 @@ def test_text_of_the_events_is_that_without_causes(clip, tmp_path):
 
 
 @pytest.mark.parametrize("count", [0, 1, 1 << 16, (1 << 16) + 7])
-@pytest.mark.parametrize("name", ["a.h5", "a.txt"])
+@pytest.mark.parametrize("name", ["a.h5", "a.npz", "a.csv", "a.txt"])
 def test_events_of_ones_own_are_written_with_their_causes(count, name, tmp_path):
     events = some(count)
     write_events(tmp_path / name, events[::-1], (9, 9))
@@ -213,6 +222,27 @@ def test_columns_that_do_not_fit(column, message, tmp_path):
         file["events/causes"] = column
     with pytest.raises(DataError, match=message):
         read_events(path)
+
+
+def test_other_files_that_do_not_fit(tmp_path):
+    csv, npz = tmp_path / "a.csv", tmp_path / "a.npz"
+    csv.write_text("t,x,y,p,cause\n1,1,1,1,2\n2,1,1,1,1.5\n")
+    with pytest.raises(DataError, match=r"a\.csv: cause: could not convert string '1\.5'"):
+        read_events(csv)
+    csv.write_text("t,x,y,p,cause\n1,1,1,1,2\n2,1,1,1,7\n")
+    with pytest.raises(DataError, match="causes: must be whole numbers from 0 to 6"):
+        read_events(csv)
+    columns = dict.fromkeys("txyp", np.array([1, 2]))
+    np.savez(npz, **columns, causes=np.array([1]))
+    with pytest.raises(DataError, match="fewer causes than events: 1"):
+        read_events(npz)
+    np.savez(npz, **columns, causes=np.array([[1, 2]]))
+    with pytest.raises(DataError, match=r"causes must be a column, not of shape \(1, 2\)"):
+        read_events(npz)
+    # elsewhere, or between other signs, it is a column among others
+    for text in ("t;x;y;p;cause\n1;1;1;1;2\n", "cause,t,x,y,p\n2,1,1,1,1\n"):
+        csv.write_text(text)
+        assert not has_causes(read_events(csv).events)
 
 
 def test_events_that_no_sensor_has_take_their_causes_along(tmp_path):
