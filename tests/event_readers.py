@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from adv2e.events import make_events
+from adv2e.events import make_events, sort_events
 
 
 def faery(path):
@@ -18,6 +18,14 @@ def eventcv(path):
     stream = pytest.importorskip("eventcv").load(str(path))
     x, y, t, p = np.asarray(stream.numpy(), np.int64).reshape(-1, 4).T
     return tuple(stream.sensor_size), make_events(t, x, y, p)
+
+
+def evlib(path):
+    """Events as evlib gets them, sorted: it leaves those of one time in no certain order."""
+    table = pytest.importorskip("evlib").load_events(str(path)).collect()
+    t = table["t"].dt.total_microseconds().to_numpy()
+    x, y, p = (table[name].to_numpy() for name in ("x", "y", "polarity"))
+    return None, sort_events(make_events(t, x, y, p))
 
 
 def expelliarmus(encoding):

@@ -49,12 +49,8 @@ _HEADER = 20  # bytes
 _OVERFLOW, _RESET = 0xFF, 0xFE
 _LONGEST = 127  # us of an overflow
 _EVENT = 5  # bytes
-_LANE = 512  # bytes that are looked at one after the other, in many lanes at once
 _READ = 1 << 20  # bytes
 _WRITE = 1 << 18  # events, or bytes of empty time
-
-# what is to come of an event, by the same one byte before, for bytes that stand alone or do not
-_NEXT = np.array([[_EVENT - 1, 0, 1, 2, 3], [0, 0, 1, 2, 3]], np.uint8).ravel()
 
 
 def open_es(path: Path, facts: Facts) -> EventFile:
@@ -89,19 +85,14 @@ def open_es(path: Path, facts: Facts) -> EventFile:
             file.seek(_HEADER)
             while data := file.read(_READ):
                 block = np.frombuffer(rest + data, np.uint8)
-                at, size = _begins(block)
-                rest = block[size:].tobytes()
-                first = block[at]
-                alone = first >= _RESET
-                passed = np.where(alone, (first == _OVERFLOW) * _LONGEST, first >> 1)
-                times = t + np.cumsum(passed)
-                t = int(times[-1]) if times.size else t
-                at, first = at[~alone], first[~alone]
+                events, waits, rest = _split(block)
+                times = t + np.cumsum(waits[:-1] + (events[:, 0] >> 1))
+                t = int(times[-1] if times.size else t) + int(waits[-1])
                 x, y = (
-                    block[at + k].astype(np.int32) | block[at + k + 1].astype(np.int32) << 8
+                    events[:, k].astype(np.int32) | events[:, k + 1].astype(np.int32) << 8
                     for k in (1, 3)
                 )
-                yield times[~alone], x, height - 1 - y, first & 1
+                yield times, x, height - 1 - y, events[:, 0] & 1
                 facts.progress(file.tell(), total)
         if rest:
             facts.problems.append(f"the last {len(rest)} bytes are no whole event: left out")
@@ -109,32 +100,35 @@ def open_es(path: Path, facts: Facts) -> EventFile:
     return EventFile("es", facts, parts)
 
 
-def _begins(block: NDArray[np.uint8]) -> tuple[NDArray[np.int64], int]:
-    """Return where events, and bytes that stand alone, begin; and the end of the last whole one.
+def _split(block: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.int64], bytes]:
+    """Return the events, (n, 5), the empty time before each and at the end, and what is left.
 
-    Where one begins depends on all before.  So the block is cut into lanes, and these are gone
-    through all at once, each as if it began with 0 to 4 bytes of an event still to come.
+    Bytes from 0xFE on stand alone where an event may begin.  Where that is depends on all before,
+    but only on those that stand alone, which come in few runs.
     """
-    lanes = -(-block.size // _LANE)
-    padded = np.full(lanes * _LANE, _RESET, np.uint8)
-    padded[: block.size] = block
-    alone = (padded >= _RESET).reshape(lanes, _LANE).T * np.uint8(_EVENT)
-    come = np.empty((_LANE + 1, _EVENT, lanes), np.uint8)
-    come[0] = np.arange(_EVENT)[:, None]
-    for step in range(_LANE):
-        np.take(_NEXT, come[step] + alone[step], out=come[step + 1], mode="clip")
-    ends = come[_LANE].T.tolist()
-    begun, state = [], 0
-    for end in ends:
-        begun.append(state)
-        state = end[state]
-    is_begin = come[:_LANE, begun, np.arange(lanes)].T.ravel()[: block.size] == 0
-    at = np.flatnonzero(is_begin)
-    size = block.size
-    if at.size and block[at[-1]] < _RESET and at[-1] + _EVENT > size:
-        size = int(at[-1])
-        at = at[:-1]
-    return at, size
+    is_high = np.zeros(block.size + 2, np.int8)
+    np.greater_equal(block, _RESET, out=is_high[1:-1].view(np.bool_))
+    edges = np.flatnonzero(np.diff(is_high))
+    begin = 0  # of some event before the run
+    alone: list[tuple[int, int]] = []
+    for run, end in edges.reshape(-1, 2).tolist():
+        at = run + (begin - run) % _EVENT
+        if at < end:
+            begin = end
+            alone.append((at, end))
+    first, last = np.array(alone, np.int64).reshape(-1, 2).T
+    step = np.zeros(block.size + 1, np.int8)
+    step[first] = 1
+    step[last] -= 1
+    of_events = block[np.cumsum(step[:-1], dtype=np.int8) == 0]
+    count, left = divmod(of_events.size, _EVENT)
+    overflows = np.concatenate([[0], np.cumsum(block == _OVERFLOW, dtype=np.int32)])
+    lengths = last - first
+    which = (first - (np.cumsum(lengths) - lengths)) // _EVENT
+    waits = np.zeros(count + 1, np.int64)
+    waits[which] = (overflows[last] - overflows[first]) * _LONGEST
+    rest = of_events[count * _EVENT :].tobytes() if left else b""
+    return of_events[: count * _EVENT].reshape(count, _EVENT), waits, rest
 
 
 class EsWriter(Writer):

@@ -38,7 +38,8 @@ from adv2e.formats.words import Counter, Kinds, blocks, last_before
 _HIGH = 0x8
 _KINDS = (0x0, 0x1, _HIGH, 0xA, 0xE, 0xF)
 _LOW_BITS = 6
-_BLOCK = 1 << 18  # words
+_ADDRESS_BITS = 11
+_BLOCK = 1 << 16  # words, or events to be written
 
 
 def evt2_of(header: Header, facts: Facts) -> EventFile:
@@ -50,10 +51,10 @@ def evt2_of(header: Header, facts: Facts) -> EventFile:
         high = -1  # of the words before
         for words in blocks(header.path, header.size, "<u4", _BLOCK, facts):
             kind = (words >> 28).astype(np.uint8)
-            kinds.note(kind)
-            is_high = kind == _HIGH
+            is_high, is_event = kind == _HIGH, kind <= 1
+            kinds.note(kind, is_high | is_event)
             highs = counter(words[is_high] & 0xFFF_FFFF)
-            at = np.flatnonzero(kind <= 1)
+            at = np.flatnonzero(is_event)
             held = last_before(highs, is_high, high, at)
             if high < 0 and held.size and held[0] < 0:
                 known = held >= 0
@@ -85,15 +86,16 @@ class Evt2Writer(Writer):
         """Append events."""
         for begin in range(0, events.size, _BLOCK):
             part = events[begin : begin + _BLOCK]
-            high = part["t"] >> _LOW_BITS
-            is_new = np.empty(part.size, np.bool_)
-            is_new[0] = high[0] != self._high
-            np.not_equal(high[1:], high[:-1], out=is_new[1:])
+            t = np.ascontiguousarray(part["t"])
+            words = part["p"].astype("<u4")
+            for bits, value in (
+                (_LOW_BITS, (t & 0x3F).astype("<u4")),
+                (_ADDRESS_BITS, part["x"]),
+                (_ADDRESS_BITS, part["y"]),
+            ):
+                words <<= bits
+                words |= value
+            high = t >> _LOW_BITS
+            new = np.flatnonzero(np.diff(high, prepend=self._high))
             self._high = int(high[-1])
-            place = np.arange(part.size) + np.cumsum(is_new)
-            words = np.empty(int(place[-1]) + 1, "<u4")
-            words[place[is_new] - 1] = high[is_new] | _HIGH << 28
-            low = (part["t"] & 0x3F).astype(np.uint32)
-            event = part["p"].astype(np.uint32) << 28 | low << 22
-            words[place] = event | part["x"].astype(np.uint32) << 11 | part["y"]
-            self._file.write(words.data)
+            self._file.write(np.insert(words, new, (high[new] | _HIGH << 28).astype("<u4")).data)

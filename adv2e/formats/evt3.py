@@ -45,6 +45,7 @@ from adv2e.formats.words import Counter, Kinds, Numbers, blocks, last_before
 
 _ROW, _OTHER_ROW, _COLUMN, _BASE, _VECTOR_12, _VECTOR_8, _LOW, _HIGH = 0, 1, 2, 3, 4, 5, 6, 8
 _KINDS = (_ROW, _COLUMN, _BASE, _VECTOR_12, _VECTOR_8, _LOW, 0x7, _HIGH, 0xA, 0xE, 0xF)
+_USUAL = np.isin(np.arange(16), (_ROW, _COLUMN, _BASE, _VECTOR_12, _VECTOR_8, _LOW, _HIGH))
 _BLOCK = 1 << 18  # words, or events to be written
 _NOWHERE = -(1 << 40)
 
@@ -76,7 +77,7 @@ class _Decoder:
     def events_of(self, words: NDArray[np.uint16]) -> Columns:
         """Return the events of some words."""
         kind = (words >> 12).astype(np.uint8)
-        self.kinds.note(kind)
+        self.kinds.note(kind, _USUAL[kind])
         content = words & 0xFFF
         at = np.flatnonzero(kind == _COLUMN)
         column = content[at]

@@ -91,9 +91,13 @@ def last_before(values: NDArray[Any], which: NDArray[np.bool_], carry: int, at: 
     carry : int
         What held before the first of them.
     at : array of int, (n,)
+        None of those set in `which`.
     """
     table = np.empty(values.size + 1, np.int64)
     table[0], table[1:] = carry, values
+    if values.size < at.size >> 4:  # few, so each holds for many
+        ends = np.searchsorted(at, np.flatnonzero(which))
+        return np.repeat(table, np.diff(ends, prepend=0, append=at.size))
     held: Numbers = table[np.cumsum(which, dtype=np.int32)[at]]
     return held
 
@@ -110,11 +114,14 @@ class Kinds:
     def __init__(self, *known: int) -> None:
         self._known = known
         self._counts = np.zeros(16, np.int64)
+        self._total = 0
         self.early = 0
 
-    def note(self, kinds: NDArray[Any]) -> None:
-        """Count some words."""
-        self._counts += np.bincount(kinds, minlength=16)
+    def note(self, kinds: NDArray[Any], usual: NDArray[np.bool_]) -> None:
+        """Count some words, of which those that are `usual` are known."""
+        self._total += kinds.size
+        if not usual.all():
+            self._counts += np.bincount(kinds[~usual], minlength=16)
 
     def problems(self) -> list[str]:
         """Return what is to be told of all words until now."""
@@ -125,7 +132,7 @@ class Kinds:
         if odd:
             names = ", ".join(f"{kind:#x}" for kind in odd)
             told.append(
-                f"{self._counts[odd].sum()} of {self._counts.sum()} words of a kind that the format"
+                f"{self._counts[odd].sum()} of {self._total} words of a kind that the format"
                 f" does not have ({names}): left out"
             )
         return told

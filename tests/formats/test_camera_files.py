@@ -24,10 +24,11 @@ READERS = {
         event_readers.eventcv,
         event_readers.expelliarmus("dat"),
     ],
-    "evt3": [event_readers.faery, event_readers.eventcv],
+    "evt3": [event_readers.faery, event_readers.eventcv, event_readers.evlib],
     "evt2": [
         event_readers.faery,
         event_readers.eventcv,
+        event_readers.evlib,
         event_readers.expelliarmus("evt2"),
     ],
 }

@@ -1,9 +1,12 @@
 """EVT 3.0 as cameras write it: vectors, repeated times, times that begin again, other words."""
 
+import event_readers
 import numpy as np
 import pytest
 
+from adv2e.events import make_events
 from adv2e.formats.reading import read_events
+from adv2e.formats.writing import write_events
 
 HEADER = b"% evt 3.0\n% format EVT3;height=480;width=640\n% geometry 640x480\n% end\n"
 
@@ -116,3 +119,13 @@ def test_a_part_of_a_word_at_the_end_is_told(tmp_path):
     assert events == [(1, 3, 2, 1)]
     begin = len(HEADER + words)
     assert problems == [f"1 bytes at the end, at byte {begin}, are no whole word of 2: left out"]
+
+
+def test_expelliarmus_counts_turns_of_the_low_bits_twice(tmp_path):
+    """So it is no witness of EVT 3.0: it is late by 4096 us for each time that they turn over."""
+    t = [4000, 4100, 60_000]
+    write_events(tmp_path / "a.raw", make_events(t, [0, 1, 2], [0, 0, 0], [1, 1, 0]), (4, 3))
+
+    _, found = event_readers.expelliarmus("evt3")(tmp_path / "a.raw")
+
+    assert [int(time) - real for time, real in zip(found["t"], t, strict=True)] == [0, 4096, 4096]
