@@ -47,7 +47,7 @@ def offered(adv2e, monkeypatch):
         ("adv2e convert -c davis", ["davis240c", "davis346"]),
         ("adv2e config show -c pa", ["paper"]),
         ("adv2e convert --format ", registry.names()),
-        ("adv2e convert --layout ", ["monash"]),
+        ("adv2e convert --layout ", registry.layouts()),
         (
             "adv2e convert --set pixel.hot",
             ["pixel.hot_pixels.fraction=", "pixel.hot_pixels.rate_hz="],
