@@ -47,7 +47,6 @@ __all__ = [
 
 TYPE_CHECKING = False  # as in `typing`, which takes longer to import than all else here
 if TYPE_CHECKING:
-    from adv2e.comparison.grids import voxel_grid
     from adv2e.config import Config, load_config
     from adv2e.conversion.convert import convert
     from adv2e.conversion.simulation import simulate
@@ -56,6 +55,7 @@ if TYPE_CHECKING:
     from adv2e.formats.reading import read_events
     from adv2e.formats.writing import write_events
     from adv2e.rendering.render import render
+    from adv2e.representations.voxel_grid import voxel_grid
 
 _HOMES = {
     "EVENT_DTYPE": "adv2e.events",
@@ -66,7 +66,7 @@ _HOMES = {
     "read_events": "adv2e.formats.reading",
     "render": "adv2e.rendering.render",
     "simulate": "adv2e.conversion.simulation",
-    "voxel_grid": "adv2e.comparison.grids",
+    "voxel_grid": "adv2e.representations.voxel_grid",
     "write_events": "adv2e.formats.writing",
 }
 

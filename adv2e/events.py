@@ -20,6 +20,9 @@ EVENT_DTYPE = np.dtype([("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
 Events = NDArray[Any]
 """A structured array of ``EVENT_DTYPE``, or with one more field (:mod:`adv2e.causes`)."""
 
+Window = tuple[int, int]
+"""Start and stop [us], half open."""
+
 _PART = 1 << 20  # events looked at together
 
 
@@ -94,6 +97,12 @@ def pixels_of(events: Events, columns: int) -> NDArray[np.int64]:
     """Return the pixel of each event, counted along rows of so many columns, (events,)."""
     pixels: NDArray[np.int64] = events["y"].astype(np.int64) * columns + events["x"]
     return pixels
+
+
+def cut(events: Events, start: int, stop: int) -> Events:
+    """Return the part of the sorted `events` with start <= t < stop [us], as a view."""
+    first, last = np.searchsorted(events["t"], (start, stop))
+    return events[first:last]
 
 
 def sort_events(events: Events) -> Events:

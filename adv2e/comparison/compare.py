@@ -15,9 +15,9 @@ from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.offset import latency_offset_us
 from adv2e.comparison.smoothed_error import SIGMAS_US
 from adv2e.comparison.stream_statistics import STATISTICS, stream_statistics
-from adv2e.comparison.windows import Window, Windows, cut, fixed_windows, frame_windows, span_of
+from adv2e.comparison.windows import Windows, fixed_windows, frame_windows, span_of
 from adv2e.errors import DataError
-from adv2e.events import Events
+from adv2e.events import Events, Window, cut
 from adv2e.formats.recording import Recording
 from adv2e.sources.times.instants import seconds
 

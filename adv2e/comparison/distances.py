@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adv2e.comparison.grids import Grid, own_window, signed_grid, smoothed, z_scored
 from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_errors
-from adv2e.comparison.windows import Window, Windows, cut, holding_events
-from adv2e.events import Events
+from adv2e.comparison.windows import Windows, holding_events
+from adv2e.events import Events, Window, cut
+from adv2e.representations.voxel_grid import Grid, own_window, signed_grid, smoothed, z_scored
 
 BINS = 5
 """Temporal bins of a window."""

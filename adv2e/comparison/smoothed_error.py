@@ -26,10 +26,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.comparison.grids import signs
 from adv2e.comparison.pairs import add_pairs
 from adv2e.comparison.trains import Keys, keys, stride_of
 from adv2e.events import Events
+from adv2e.representations.voxel_grid import signs
 
 SIGMAS_US = (2_000, 10_000, 50_000, 100_000)
 """Scales of the error [us]."""

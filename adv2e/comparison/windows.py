@@ -16,10 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.events import Events
-
-Window = tuple[int, int]
-"""Start and stop [us], half open."""
+from adv2e.events import Events, Window
 
 MOST = 1_000_000
 """Windows of one comparison: 14 hours of the usual length."""
@@ -49,12 +46,6 @@ class Windows:
     def duration_s(self) -> float:
         """Time that all windows cover [s]."""
         return (self.stop - self.start) / 1e6
-
-
-def cut(events: Events, start: int, stop: int) -> Events:
-    """Return the part of the sorted `events` with start <= t < stop [us], as a view."""
-    first, last = np.searchsorted(events["t"], (start, stop))
-    return events[first:last]
 
 
 def holding_events(windows: Windows, streams: Sequence[Events]) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,20 +27,12 @@ from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
 from adv2e.formats import compression
-from adv2e.formats.assembly import (
-    Check,
-    assemble,
-    events_of_file,
-    in_order,
-    inside,
-    left_out,
-    settled_size,
-    survey,
-)
+from adv2e.formats.assembly import inside
 from adv2e.formats.event_file import EventFile, Progress
 from adv2e.formats.reading import open_events
 from adv2e.formats.registry import to_write
 from adv2e.formats.sink import Sink
+from adv2e.formats.streaming import events_in_order
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of, picture_white
@@ -160,7 +152,7 @@ def convert_events(
             f"{path}: its events have no causes; only 'adv2e convert --causes' has them"
         )
     with _bar(path, progress) as facts.progress:
-        found, first_us, parts = _events_of(file)
+        found, first_us, parts = events_in_order(file)
         if found == (0, 0):
             raise DataError(f"{path}: no events, and no size of the sensor: state it with --size")
         part = _part(path, found, first_us, selection, crop)
@@ -186,11 +178,9 @@ def convert_events(
                 )
             )
             stored = _write_frames(file, part, sink, keeps_all_bits) if sink.wants_frames else 0
-            events = on = outside = first = last = 0
+            events = on = first = last = 0
             for chunk in parts:
-                fitting = inside(chunk, found)
-                outside += chunk.size - fitting.size
-                wanted = part.of(fitting)
+                wanted = part.of(chunk)
                 if wanted.size:
                     sink.write_events(wanted)
                     first = first if events else int(wanted["t"][0])
@@ -199,8 +189,7 @@ def convert_events(
                     on += int(np.count_nonzero(wanted["p"]))
                 if chunk["t"][-1] > part.last_us:
                     break
-    if outside:
-        facts.problems.append(left_out(outside, found, facts.stated_by))
+            parts.close()
     for text in dict.fromkeys(facts.problems):
         (doubt or log)(f"{path}: {text}")
     return Summary(
@@ -214,24 +203,6 @@ def convert_events(
         seconds=time.perf_counter() - began,
         copied_from=path,
     )
-
-
-def _events_of(file: EventFile) -> tuple[tuple[int, int], int, Iterator[Events]]:
-    """Return the size of the sensor, the time of the first event, and all events in order."""
-    seen = survey(file)
-    if not seen.is_sorted:
-        recording = assemble(file)
-        events = recording.events
-        first_us = int(events["t"][0])
-        return (recording.width, recording.height), first_us, iter([events])
-    size = settled_size(seen.needed, file.facts)
-    check = Check()
-
-    def parts() -> Iterator[Events]:
-        yield from in_order(events_of_file(file, check))
-        file.facts.problems += check.problems()
-
-    return size, seen.first_us, parts()
 
 
 def _part(

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +12,6 @@ from adv2e.events import (
     Events,
     disorder,
     empty_events,
-    is_sorted,
     sort_events,
     sort_ties,
 )
@@ -91,7 +87,7 @@ def assemble(file: EventFile) -> Recording:
     events = np.concatenate([np.empty(0, dtype), *parts])
     del parts
     facts.problems += check.problems()
-    size = settled_size(_needed(events), facts)
+    size = settled_size(needed_size(events), facts)
     found = events.size
     events = inside(events, size)
     if events.size < found:
@@ -169,7 +165,7 @@ def left_out(count: int, size: tuple[int, int], by: str) -> str:
     return f"{count} events outside {size[0]}x{size[1]}, which {by} states: left out"
 
 
-def _needed(events: Events) -> tuple[int, int] | None:
+def needed_size(events: Events) -> tuple[int, int] | None:
     """Return width and height that the largest coordinates need."""
     return (int(events["x"].max()) + 1, int(events["y"].max()) + 1) if events.size else None
 
@@ -188,62 +184,6 @@ def _in_order(events: Events, facts: Facts) -> Events:
     if repeated:
         facts.problems.append(f"{repeated} events repeat another one exactly: kept")
     return events
-
-
-@dataclass(frozen=True)
-class Survey:
-    """What one reading of all events told that must be known before they can be passed on.
-
-    Attributes
-    ----------
-    count : int
-        Events, but for those that no sensor can have.
-    needed : (int, int) or None
-        Width and height that the largest coordinates need; None without events.
-    first_us : int
-        Time of the first event [us].
-    is_sorted : bool
-        Times never decrease.
-    """
-
-    count: int
-    needed: tuple[int, int] | None
-    first_us: int
-    is_sorted: bool
-
-
-def survey(file: EventFile) -> Survey:
-    """Read all events of a file once, and keep none."""
-    check, count, needed = Check(), 0, (0, 0)
-    first = last = None
-    in_order = True
-    for columns in file.parts():
-        events = check.events_of(columns)
-        if not events.size:
-            continue
-        count += events.size
-        here = _needed(events) or (0, 0)
-        needed = max(needed[0], here[0]), max(needed[1], here[1])
-        first = events["t"][0] if first is None else first
-        in_order &= is_sorted(events) and (last is None or bool(last <= events["t"][0]))
-        last = events["t"][-1]
-    return Survey(count, needed if count else None, int(first or 0), in_order)
-
-
-def in_order(parts: Iterable[Events]) -> Iterator[Events]:
-    """Yield events whose times never decrease, with those of one time in their order."""
-    held = empty_events()
-    for part in parts:
-        events = np.concatenate([held, part]) if held.size else part
-        # more of the last time may come
-        cut = int(np.searchsorted(events["t"], events["t"][-1])) if events.size else 0
-        done, held = events[:cut], events[cut:]
-        if done.size:
-            sort_ties(done)
-            yield done
-    if held.size:
-        sort_ties(held)
-        yield held
 
 
 def _disagreement(events: Events, times_ns: NDArray[np.int64] | None) -> list[str]:

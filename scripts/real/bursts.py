@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from writing import table
 
-from adv2e.comparison.windows import Windows, cut
+from adv2e.comparison.windows import Windows
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import without_coupling
 from adv2e.diagnosis.hints.readouts import Pulse
-from adv2e.events import Events
+from adv2e.events import Events, cut
 from real.model import Bench
 
 _LASTS_US = 1000.0

@@ -21,10 +21,11 @@ import click
 import numpy as np
 from writing import one_line_errors, output_option, threads_option, write_report
 
-from adv2e.comparison.windows import Windows, cut
+from adv2e.comparison.windows import Windows
 from adv2e.config import Config, load_config
 from adv2e.config.model import INTERPOLATIONS
 from adv2e.diagnosis.fitting.nuisances import TOLERANCE, fit_thresholds
+from adv2e.events import cut
 from adv2e.sources.times.instants import seconds
 from real.model import Bench, Judged, totals
 from real.recording import halves, read

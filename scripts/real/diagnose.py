@@ -30,10 +30,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 from writing import one_line_errors, output_option, table, threads_option, write_report
 
-from adv2e.comparison.windows import cut
 from adv2e.config import Config, load_config, to_dict, to_yaml
 from adv2e.config.paths import flat
 from adv2e.errors import DataError
+from adv2e.events import cut
 from real.bursts import bursts
 from real.model import SCORE, Bench
 from real.peers import peer_rows

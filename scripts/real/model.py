@@ -12,13 +12,13 @@ import numpy as np
 
 from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
-from adv2e.comparison.windows import Windows, cut
+from adv2e.comparison.windows import Windows
 from adv2e.config import Config
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.fitting.nuisances import fit_thresholds
 from adv2e.diagnosis.hints.readouts import Pulse, has_pulse, pulse_of
 from adv2e.diagnosis.simulation.frames import FrameCache, Instants, events_of, is_made_once
-from adv2e.events import Events
+from adv2e.events import Events, cut
 from adv2e.light.decoding import decoder_for
 from adv2e.pixel.steps import Coarseness
 from real.recording import Real, halves, still_rate

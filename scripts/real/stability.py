@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.comparison.grids import smoothed, voxel_grid
-from adv2e.comparison.windows import Windows, cut
-from adv2e.events import Events
+from adv2e.comparison.windows import Windows
+from adv2e.events import Events, cut
+from adv2e.representations.voxel_grid import smoothed, voxel_grid
 
 TILE = 8
 """Pixels along a tile."""

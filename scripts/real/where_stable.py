@@ -9,10 +9,10 @@ import numpy as np
 from writing import table
 
 from adv2e.comparison.floor import half_split
-from adv2e.comparison.windows import Windows, cut
+from adv2e.comparison.windows import Windows
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import without_coupling
-from adv2e.events import Events
+from adv2e.events import Events, cut
 from real.model import SCORE, Bench
 from real.stability import LINES, MOST, Stability, compare_halved
 from real.table import JUDGED, SHORT, Step, judged_cells, number, steps_table

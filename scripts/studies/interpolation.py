@@ -33,12 +33,12 @@ import numpy as np
 from numpy.typing import NDArray
 from writing import load_pyplot, one_line_errors, output_option, write_report
 
-from adv2e.comparison.grids import Grid, smoothed, voxel_grid
-from adv2e.comparison.windows import cut, frame_windows
+from adv2e.comparison.windows import frame_windows
 from adv2e.config.model import Config, Frames, Pixel, Sampling
 from adv2e.conversion.simulation import events_from_light
-from adv2e.events import Events
+from adv2e.events import Events, cut
 from adv2e.light.interpolation import make_upsampler
+from adv2e.representations.voxel_grid import Grid, smoothed, voxel_grid
 from studies.interpolation_report import METHODS, Cost, Row, Score, draw, report
 from studies.interpolation_scenes import Case, Image, cases
 

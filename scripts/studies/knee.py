@@ -42,15 +42,15 @@ import numpy as np
 from numpy.typing import NDArray
 from writing import load_pyplot, one_line_errors, output_option, write_report
 
-from adv2e.comparison.grids import Grid, voxel_grid
 from adv2e.comparison.smoothed_error import smoothed_errors
-from adv2e.comparison.windows import cut, frame_windows
+from adv2e.comparison.windows import frame_windows
 from adv2e.config.model import Config, Pixel, Sampling
 from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.pixel.log_response import LogResponse
 from adv2e.effects.pixel.thresholds import Thresholds
-from adv2e.events import Events
+from adv2e.events import Events, cut
+from adv2e.representations.voxel_grid import Grid, voxel_grid
 from adv2e.synthetic import Scene
 from adv2e.synthetic.scene import GO_S, PERIOD_S, RAMP_S
 from studies.knee_report import Score, Scores, draw, report

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from adv2e.comparison.distances import MEASURES, distances, pooled
-from adv2e.comparison.grids import own_window, smoothed, voxel_grid, z_scored
 from adv2e.comparison.smoothed_error import smoothed_errors
-from adv2e.comparison.windows import Windows, cut
-from adv2e.events import empty_events, make_events
+from adv2e.comparison.windows import Windows
+from adv2e.events import cut, empty_events, make_events
+from adv2e.representations.voxel_grid import own_window, smoothed, voxel_grid, z_scored
 
 SIZE = (12, 9)
 WINDOWS = Windows("windows", ((0, 40_000), (40_000, 100_000)), 2)

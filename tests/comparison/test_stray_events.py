@@ -10,9 +10,9 @@ from adv2e.comparison import compact as module
 from adv2e.comparison.compact import compact
 from adv2e.comparison.distances import distances
 from adv2e.comparison.trains import keys
-from adv2e.comparison.windows import Windows, cut, fixed_windows, holding_events
+from adv2e.comparison.windows import Windows, fixed_windows, holding_events
 from adv2e.errors import DataError
-from adv2e.events import make_events, sort_events
+from adv2e.events import cut, make_events, sort_events
 
 
 def stream(seed, count=400, span=400_000, width=60, height=40):

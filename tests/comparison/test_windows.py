@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adv2e.comparison.windows import cut, fixed_windows, frame_windows, span_of, to_us
+from adv2e.comparison.windows import fixed_windows, frame_windows, span_of, to_us
 from adv2e.errors import DataError
-from adv2e.events import empty_events, make_events
+from adv2e.events import cut, empty_events, make_events
 
 FRAMES_NS = np.arange(6) * 10_000_000
 

@@ -8,25 +8,19 @@ import tracemalloc
 import h5py
 import numpy as np
 import pytest
+from streams import random_events
 
 import adv2e
 from adv2e.errors import DataError, OutputError, UsageError
-from adv2e.events import make_events, sort_events
+from adv2e.events import make_events
 from adv2e.formats.writing import open_sink
 
 WIDTH, HEIGHT = 30, 20
 NAMES = ("a.h5", "a.txt", "a.zip", "a")
 
 
-def events_of(count=5000, seed=1, first=0, last=2_000_000):
-    rng = np.random.default_rng(seed)
-    t = np.sort(rng.integers(first, last, count))
-    return sort_events(
-        make_events(
-            t, rng.integers(0, WIDTH, count), rng.integers(0, HEIGHT, count),
-            rng.integers(0, 2, count),
-        )
-    )  # fmt: skip
+def events_of(count=5000, first=0, last=2_000_000):
+    return random_events(1, count, first=first, last=last, size=(WIDTH, HEIGHT))
 
 
 def frames_of(count=5):

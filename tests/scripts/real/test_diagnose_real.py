@@ -19,10 +19,10 @@ from real.tried import UNSEEN, Added, tried_names
 from written_recordings import write_recording
 
 from adv2e import simulate
-from adv2e.comparison.windows import Windows, cut
+from adv2e.comparison.windows import Windows
 from adv2e.config import load_config
 from adv2e.diagnosis.fitting.library import names as library_names
-from adv2e.events import empty_events, make_events
+from adv2e.events import cut, empty_events, make_events
 
 REAL = os.environ.get("ADV2E_REAL_DATA")
 WIDTH, HEIGHT, FRAMES = 24, 16, 9

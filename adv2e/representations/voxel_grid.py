@@ -17,9 +17,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.comparison.windows import Window, cut
 from adv2e.errors import DataError
-from adv2e.events import Events, checked_events, pixels_of
+from adv2e.events import Events, Window, checked_events, cut, pixels_of
 
 Grid = NDArray[np.float64]
 """(bins, rows, columns)."""

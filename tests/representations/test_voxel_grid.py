@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from adv2e.comparison.grids import own_window, smoothed, voxel_grid, z_scored
 from adv2e.errors import DataError
 from adv2e.events import empty_events, make_events
+from adv2e.representations.voxel_grid import own_window, smoothed, voxel_grid, z_scored
 
 WIDTH, HEIGHT = SIZE = 12, 9
 
