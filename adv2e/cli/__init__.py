@@ -25,6 +25,7 @@ COMMANDS = {
     "info": "Show what a video, a recording or an event file holds.",
     "render": "Make pictures and films of events.",
     "compare": "Measure how much two event streams differ.",
+    "export": "Make training sets and representations of events.",
     "diagnose": "Find what a recording holds that its simulation lacks.",
     "characterise": "Name the effect that tables of latency or noise ask for.",
     "config": "Show or check a configuration, and explain its keys.",

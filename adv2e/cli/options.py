@@ -70,7 +70,7 @@ class FiniteNumber(click.FloatRange):
         return number
 
 
-class _Parsed(click.ParamType):  # type: ignore[type-arg] # not generic in all versions
+class Parsed(click.ParamType):  # type: ignore[type-arg] # not generic in all versions
     """What a function makes of a text, or ValueError with what would be right."""
 
     def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
@@ -90,8 +90,8 @@ BAYER = ("RGGB", "BGGR", "GRBG", "GBRG")
 PIXEL_FORMATS = (
     *("gray", "gray10le", "gray12le", "gray14le", "gray16le", "rgb24", "bgr24", "rgb48le"),
 )
-SIZE = _Parsed("size", parse_size)
-RECTANGLE = _Parsed("rectangle", parse_rectangle)
+SIZE = Parsed("size", parse_size)
+RECTANGLE = Parsed("rectangle", parse_rectangle)
 
 
 def crop_option(text: str) -> Callable[[Body], Body]:

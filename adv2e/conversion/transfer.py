@@ -36,7 +36,7 @@ from adv2e.formats.streaming import events_in_order
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of, picture_white
-from adv2e.sources.frame import Pixels
+from adv2e.sources.frame import Light, Pixels
 from adv2e.sources.wanted import Selection
 
 _MADE = ("adv2e", "versions", "config", "seed", "effects", "source")
@@ -165,7 +165,12 @@ def convert_events(
                     width=width,
                     height=height,
                     metadata={
-                        **_metadata(file, part, frames, keeps_all_bits),
+                        **copied_metadata(
+                            file,
+                            {"crop": list(part.crop), "origin_us": part.origin_us},
+                            frames=frames,
+                            keeps_all_bits=keeps_all_bits,
+                        ),
                         **({"causes": CAUSES} if causes else {}),
                     },
                     format=format,
@@ -226,43 +231,50 @@ def _write_frames(file: EventFile, part: _Part, sink: Sink, keeps_all_bits: bool
     count = 0
     for shot in file.shots():
         if part.first_us <= shot.t_ns / 1000 <= part.last_us:
-            picture = _picture(shot.load(), file, keeps_all_bits)
+            picture = stored_picture(shot.load(), file.facts.light, keeps_all_bits)
             sink.write_frame(shot.t_ns - part.origin_us * 1000, part.image_of(picture, shot.label))
             count += 1
     return count
 
 
-def _picture(pixels: Pixels, file: EventFile, keeps_all_bits: bool) -> NDArray[Any]:
-    """Return a frame in the whole numbers that are stored."""
-    image, light = pixels.image, file.facts.light
-    white = light.full_scale or pixels.white or full_scale_of(image.dtype)
+def stored_picture(pixels: Pixels, light: Light, keeps_all_bits: bool) -> NDArray[Any]:
+    """Return a frame of an event file in the whole numbers that are stored."""
+    image, white = pixels.image, _white(pixels, light)
     decoder = LightDecoder(light.encoding, white, image.dtype, image.ndim == 3)
     return picture_of(image, pixels.alpha, decoder, not keeps_all_bits)
 
 
-def _metadata(file: EventFile, part: _Part, frames: bool, keeps_all_bits: bool) -> dict[str, Any]:
-    """Return how the events were made, as the file says it, and from which file they are."""
+def _white(pixels: Pixels, light: Light) -> float:
+    return light.full_scale or pixels.white or full_scale_of(pixels.image.dtype)
+
+
+def copied_metadata(
+    file: EventFile, converted: dict[str, Any], *, frames: bool, keeps_all_bits: bool
+) -> dict[str, Any]:
+    """Return how copied events were made, as their file says it, and what was done to them.
+
+    Parameters
+    ----------
+    file : EventFile
+    converted : dict
+        What was done.
+    frames, keeps_all_bits : bool
+        Its frames are stored, too; with all their bits, or with 8.
+    """
     facts = file.facts
     made = {name: facts.description[name] for name in _MADE if name in facts.description}
-    name = shown(facts.path.name)
+    origin = {"name": shown(facts.path.name), "kind": file.layout}
     stored: dict[str, Any] = {}
     if frames and file.shots is not None and (first := next(file.shots(), None)) is not None:
         pixels, light = first.load(), facts.light
-        white = light.full_scale or pixels.white or full_scale_of(pixels.image.dtype)
-        white = picture_white(pixels.image.dtype, white, not keeps_all_bits)
+        white = picture_white(pixels.image.dtype, _white(pixels, light), not keeps_all_bits)
         stored = {"frames": {"encoding": light.encoding, "full_scale": white}}
     return {
         "adv2e": __version__,
         "versions": versions(compression.PACKAGES),
-        "source": {"name": name, "kind": file.layout},
+        "source": origin,
         **made,
-        "converted": {
-            "adv2e": __version__,
-            "name": name,
-            "layout": file.layout,
-            "crop": list(part.crop),
-            "origin_us": part.origin_us,
-        },
+        "converted": {"adv2e": __version__, **origin, **converted},
         **stored,
     }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,6 @@ from adv2e.events import (
     EVENT_DTYPE,
     Events,
     disorder,
-    empty_events,
     sort_events,
     sort_ties,
 )

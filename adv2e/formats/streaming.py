@@ -12,7 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from adv2e.events import Events, empty_events, is_sorted, sort_ties
-from adv2e.formats.assembly import Check, assemble, events_of_file, inside, left_out, needed_size, settled_size
+from adv2e.formats.assembly import (
+    Check,
+    assemble,
+    events_of_file,
+    inside,
+    left_out,
+    needed_size,
+    settled_size,
+)
 from adv2e.formats.event_file import EventFile
 
 

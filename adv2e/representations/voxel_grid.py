@@ -124,3 +124,36 @@ def smoothed(grid: Grid) -> Grid:
     both[:, :, 1:] += side * rows[:, :, :-1]
     both[:, :, :-1] += side * rows[:, :, 1:]
     return both
+
+
+def split_grid(events: Events, bins: int, size: tuple[int, int], window: Window) -> Grid:
+    """Return a grid of ON events above one of OFF events, both counted up, (2 bins, rows, columns).
+
+    Events lie inside the window and the sensor.
+    """
+    polarities = (events[events["p"] == on].copy() for on in (1, 0))
+    halves = []
+    for part in polarities:
+        part["p"] = 1
+        halves.append(signed_grid(part, bins, size, window))
+    return np.concatenate(halves)
+
+
+def robust(grid: Grid, most: float = 95.0) -> Grid:
+    """Return the grid clipped to its 0th to `most`-th percentile, less its least, over its largest.
+
+    As ``RobustNorm`` of event_cnn_minimal: percentiles are those of the cells in order, the nearest
+    one and not interpolated; the largest is that of the clipped grid, before its least is taken
+    off.  A grid of zeros stays as it is.
+
+    References
+    ----------
+    .. [1] T. Stoffregen et al., "Reducing the sim-to-real gap for event cameras", ECCV 2020,
+       arXiv:2003.09078; github.com/TimoStoff/event_cnn_minimal.
+    """
+    ordered = np.sort(grid, axis=None)
+    low, high = ordered[0], ordered[round(0.01 * most * (grid.size - 1))]
+    if low == 0 and high == 0:
+        return grid
+    scaled: Grid = (np.clip(grid, low, high) - low) / (high + 1e-6)
+    return scaled

@@ -6,7 +6,14 @@ from scipy import ndimage
 
 from adv2e.errors import DataError
 from adv2e.events import empty_events, make_events
-from adv2e.representations.voxel_grid import own_window, smoothed, voxel_grid, z_scored
+from adv2e.representations.voxel_grid import (
+    own_window,
+    robust,
+    smoothed,
+    split_grid,
+    voxel_grid,
+    z_scored,
+)
 
 WIDTH, HEIGHT = SIZE = 12, 9
 
@@ -124,3 +131,22 @@ def test_a_grid_that_cannot_be(bins, size, window, text):
 def test_an_array_without_fields_is_refused():
     with pytest.raises(DataError, match="structured array"):
         voxel_grid(np.zeros((3, 4)), 5, SIZE)
+
+
+def test_split_polarities_are_counts_of_on_above_those_of_off(events):
+    window = (0, 100_000)
+    grid = split_grid(events, 3, SIZE, window)
+    assert grid.shape == (6, HEIGHT, WIDTH)
+    on, off = (events[events["p"] == p] for p in (1, 0))
+    np.testing.assert_allclose(grid[:3], slow_grid(on, window, 3), atol=1e-12)
+    np.testing.assert_allclose(grid[3:], -slow_grid(off, window, 3), atol=1e-12)
+
+
+def test_the_robust_normalisation_takes_ordered_cells_and_interpolates_nothing():
+    grid = np.random.default_rng(1).normal(size=(5, 4, 3))
+    cells = sorted(grid.ravel().tolist())
+    low, high = cells[0], cells[round(0.95 * 59)]
+    expected = [[[(min(v, high) - low) / (high + 1e-6) for v in r] for r in c] for c in grid]
+    np.testing.assert_allclose(robust(grid), expected, atol=1e-12)
+    zeros = np.zeros((5, 4, 3))
+    assert robust(zeros) is zeros

@@ -1,0 +1,1 @@
+"""Training sets and representations, made from recordings and simulated events alike."""

@@ -1,0 +1,84 @@
+"""Pictures of events for Ev-SegNet, in the folders that its loader reads.
+
+====================================== ========================================================
+events/SPLIT/NAME_export_%d.npy        float32, (rows, columns, 6): see
+                                       :mod:`adv2e.representations.event_images`
+images/SPLIT/NAME_export_%d.png        the image at the end of the window, grey, 8 bits
+====================================== ========================================================
+
+SPLIT is train, test or other.  Labels are those of the data set: they belong into ``labels/SPLIT``
+under the same names.  Of DDD17's 260 rows the lower 60, the car itself, were cut off.
+
+References
+----------
+.. [1] I. Alonso, A. C. Murillo, "EV-SegNet: Semantic Segmentation for Event-based Cameras", CVPRW
+   2019, arXiv:1811.12039; github.com/Shathe/Ev-SegNet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.export.windows import Slice
+from adv2e.representations.event_images import event_image
+
+DDD17 = (346, 260)
+"""Columns and rows of the camera of DDD17."""
+DDD17_ROWS = 200
+"""Rows of its pictures that are kept."""
+
+
+@dataclass(frozen=True)
+class SegmentationSettings:
+    """How pictures are made.
+
+    Attributes
+    ----------
+    split : {'train', 'test', 'other'}
+    rows : int or None
+        Rows that are kept, from the top; None: 200 of the 260 of DDD17's camera, else all.
+    scale_counts : bool
+        See :func:`adv2e.representations.event_images.event_image`.
+    """
+
+    split: str = "train"
+    rows: int | None = None
+    scale_counts: bool = True
+
+    def rows_of(self, size: tuple[int, int]) -> int:
+        """Return the rows that are kept of a sensor."""
+        return self.rows or (DDD17_ROWS if size == DDD17 else size[1])
+
+
+def write_event_images(
+    name: str,
+    slices: Iterator[Slice],
+    images: Iterator[NDArray[Any]],
+    size: tuple[int, int],
+    folder: Path,
+    settings: SegmentationSettings,
+) -> int:
+    """Write a picture of events for each image, and the image; return how many."""
+    events_in, images_in = (folder / kind / settings.split for kind in ("events", "images"))
+    for place in (events_in, images_in):
+        place.mkdir(parents=True, exist_ok=True)
+    rows = settings.rows_of(size)
+    number = 0
+    for part, image in zip(slices, images, strict=True):
+        kept = part.events[part.events["y"] < rows]
+        window = part.start_us, part.stop_us
+        picture = event_image(kept, (size[0], rows), window, scale_counts=settings.scale_counts)
+        stem = f"{name}_export_{number}"
+        np.save(events_in / f"{stem}.npy", picture, allow_pickle=False)
+        done, data = cv2.imencode(".png", image[:rows])
+        assert done
+        (images_in / f"{stem}.png").write_bytes(data.tobytes())
+        number += 1
+    return number

@@ -1,0 +1,240 @@
+"""Exports: what ``adv2e export`` does."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from collections.abc import Sequence as Many
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from adv2e import __version__
+from adv2e.errors import DataError
+from adv2e.export import e2vid, ev_segnet, voxels
+from adv2e.export.sequence import Sequence, open_sequences
+from adv2e.export.windows import Slice, before_images, between_images, by_count, by_time
+from adv2e.files.names import shown
+from adv2e.files.staging import Staging, writing
+from adv2e.formats.streaming import events_in_order
+
+DESCRIPTION = "export.json"
+"""Says how an export was made."""
+
+
+@dataclass(frozen=True)
+class Cutting:
+    """How events are cut into windows: by time, by count, or at images; one of the three.
+
+    Attributes
+    ----------
+    window_us : int, optional
+        Length of a window [us]; of a picture for Ev-SegNet, that before each image.
+    count : int, optional
+        Events of a window.
+    at_images : bool
+        From each image to the next.
+    """
+
+    window_us: int | None = None
+    count: int | None = None
+    at_images: bool = False
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What an export holds."""
+
+    output: str
+    sequences: int
+    items: int
+    what: str
+    seconds: float
+
+    def text(self) -> str:
+        """Return it as a line for people."""
+        recordings = f"{self.sequences} recording" + "s" * (self.sequences != 1)
+        return (
+            f"{shown(self.output)}: {self.items:,} {self.what} of {recordings}; took"
+            f" {self.seconds:.1f} s"
+        )
+
+
+def export_voxels(
+    paths: Many[str | Path],
+    output: str | Path,
+    cutting: Cutting,
+    settings: voxels.VoxelSettings | None = None,
+    **how: Any,
+) -> Exported:
+    """Write the voxel grids of all windows; `how` as in :func:`_exported`.
+
+    Raises
+    ------
+    Adv2eError
+        For anything wrong with an input or the output; then nothing is left.
+    """
+    settings = settings or voxels.VoxelSettings()
+
+    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
+        items = 0
+        for sequence in sequences:
+            size, slices = _slices(sequence, cutting)
+            items += (number := voxels.write_voxels(slices, size, folder / sequence.name, settings))
+            told["sequences"].append({"name": sequence.name, "size": list(size), "items": number})
+        return items
+
+    described = {"to": "voxel", "cutting": asdict(cutting), **asdict(settings)}
+    return _exported(paths, output, described, "voxel grids", write, **how)
+
+
+def export_ev_segnet(
+    paths: Many[str | Path],
+    output: str | Path,
+    window_us: int = 50_000,
+    settings: ev_segnet.SegmentationSettings | None = None,
+    **how: Any,
+) -> Exported:
+    """Write a picture of the events before each image; `how` as in :func:`_exported`.
+
+    Raises
+    ------
+    Adv2eError
+        For anything wrong with an input or the output; then nothing is left.
+    """
+    settings = settings or ev_segnet.SegmentationSettings()
+
+    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
+        items = 0
+        for sequence in sequences:
+            size, _, parts = events_in_order(sequence.file)
+            slices = before_images(parts, sequence.image_times_us, window_us)
+            images = (image for _, image in e2vid.images_of(sequence))
+            number = ev_segnet.write_event_images(
+                sequence.name, slices, images, size, folder, settings
+            )
+            told["sequences"].append({"name": sequence.name, "size": list(size), "items": number})
+            items += number
+        return items
+
+    described = {"to": "ev-segnet", "window_us": window_us, **asdict(settings)}
+    return _exported(paths, output, described, "pictures of events", write, **how)
+
+
+def export_e2vid(
+    paths: Many[str | Path],
+    output: str | Path,
+    valid_share: float = 0.2,
+    threads: int | None = None,
+    **how: Any,
+) -> Exported:
+    """Write a training set for E2VID; `how` as in :func:`_exported`.
+
+    Raises
+    ------
+    Adv2eError
+        For anything wrong with an input or the output; then nothing is left.
+    """
+
+    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
+        for sequence in sequences:
+            number = len(sequence.image_times_us)
+            if number < e2vid.USUAL_FRAMES:
+                told["doubts"].append(
+                    f"{sequence.file.facts.path}: {number} images; a loader of 40 intervals, as"
+                    f" event_cnn_minimal has it, needs {e2vid.USUAL_FRAMES}"
+                )
+        train, valid = e2vid.write_training_set(
+            sequences, folder, Path(output), valid_share, threads
+        )
+        told.update(train=train, valid=valid)
+        return len(train) + len(valid)
+
+    described = {"to": "e2vid", "valid_share": valid_share}
+    return _exported(paths, output, described, "sequences", write, **how)
+
+
+def _exported(
+    paths: Many[str | Path],
+    output: str | Path,
+    described: dict[str, Any],
+    what: str,
+    write: Callable[[list[Sequence], Path, dict[str, Any]], int],
+    *,
+    time_unit: str | None = None,
+    size: tuple[int, int] | None = None,
+    overwrite: bool = False,
+    doubt: Callable[[str], None] = lambda text: None,
+) -> Exported:
+    """Let `write` fill a folder, which comes into place when all is there.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        Event files or recordings, measured or simulated.
+    output : str or Path
+        Folder to write.
+    described : dict
+        What ``export.json`` says of the settings.
+    what : str
+        What the items are, for people.
+    write : callable
+        Is given the recordings, the folder, and what is told of them; returns how many items.
+    time_unit, size
+        See :func:`adv2e.formats.reading.open_events`.
+    overwrite : bool
+        Replace, at the end, an export that exists.
+    doubt : callable
+        Takes lines for people that ask for a look.
+    """
+    began = time.perf_counter()
+    sequences = open_sequences(paths, time_unit, size)
+    told: dict[str, Any] = {"sequences": [], "doubts": []}
+    with Staging(overwrite, paths) as staging, writing(output):
+        folder = staging.folder(Path(output), _foreign)
+        staging.prepare()
+        folder.mkdir()
+        items = write(sequences, folder, told)
+        doubts = told.pop("doubts")
+        entries = sorted([entry.name for entry in folder.iterdir()] + [DESCRIPTION])
+        inputs = [
+            {"name": sequence.name, "file": shown(sequence.file.facts.path.name)}
+            for sequence in sequences
+        ]
+        text = {"adv2e": __version__, **described, "inputs": inputs, **told, "entries": entries}
+        (folder / DESCRIPTION).write_text(json.dumps(text, indent=2) + "\n", "utf-8", newline="\n")
+    for sequence in sequences:
+        doubts += [
+            f"{sequence.file.facts.path}: {problem}"
+            for problem in dict.fromkeys(sequence.file.facts.problems)
+        ]
+    for line in doubts:
+        doubt(line)
+    return Exported(str(output), len(sequences), items, what, time.perf_counter() - began)
+
+
+def _slices(sequence: Sequence, cutting: Cutting) -> tuple[tuple[int, int], Iterator[Slice]]:
+    """Return the size of the sensor and the windows of a recording."""
+    size, first_us, parts = events_in_order(sequence.file)
+    if size == (0, 0):
+        raise DataError(
+            f"{sequence.file.facts.path}: no events, and no size of the sensor: state it with"
+            " --size"
+        )
+    if cutting.at_images:
+        return size, between_images(parts, sequence.image_times_us)
+    if cutting.count is not None:
+        return size, by_count(parts, cutting.count)
+    assert cutting.window_us is not None
+    return size, by_time(parts, first_us, cutting.window_us)
+
+
+def _foreign(folder: Path) -> str | None:
+    """Name something in `folder` that no export of ours has put there."""
+    try:
+        ours = json.loads((folder / DESCRIPTION).read_text("utf-8"))["entries"]
+    except (OSError, ValueError, KeyError, TypeError):
+        ours = []
+    found = sorted(entry.name for entry in folder.iterdir())
+    return next((name for name in found if name not in ours), None)
