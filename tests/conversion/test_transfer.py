@@ -155,9 +155,9 @@ def test_events_outside_the_sensor_are_left_out_and_it_is_told(adv2e, tmp_path):
 
 
 def test_events_of_one_time_are_ordered_across_the_parts_of_reading(tmp_path, monkeypatch):
-    from adv2e.formats.monash import reader
+    from adv2e.formats import hdf5
 
-    monkeypatch.setattr(reader, "_PART", 3)
+    monkeypatch.setattr(hdf5, "PART", 3)
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["events/ts"] = np.full(10, 0.5)
         file["events/xs"] = np.arange(10)[::-1].astype(np.int16)
@@ -240,9 +240,9 @@ def test_no_events_need_a_size(tmp_path):
 
 
 def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
-    from adv2e.formats.monash import reader
+    from adv2e.formats import hdf5
 
-    monkeypatch.setattr(reader, "_PART", 1 << 14)
+    monkeypatch.setattr(hdf5, "PART", 1 << 14)
     peaks = []
     for count in (100_000, 800_000):
         write(tmp_path / f"{count}.h5", events_of(count))
