@@ -176,7 +176,7 @@ def _frames(path: Path, facts: Facts) -> Generator[Shot, None, None]:
 def _load(path: Path, row: int, number: int) -> Pixels:
     label = f"{path}: dvs/data row {row}"
     with hdf5.opened(path) as file:
-        (packet,) = _packets_of(file, row, row + 1)
+        (packet,) = _packets_of(_data(file), row, row + 1, str(path))
         item = packet.items[number]
     columns, rows = item[20:28].view("<i4").tolist()
     channels = int(item[0]) >> 1 & 7
@@ -192,10 +192,11 @@ def _load(path: Path, row: int, number: int) -> Pixels:
 
 def _packets(path: Path, facts: Facts) -> Iterator[_Packet]:
     with hdf5.opened(path) as file:
-        rows = _data(file).shape[0]
+        data = _data(file)
+        rows = data.shape[0]
         for begin in range(0, rows, _ROWS):
             end = min(begin + _ROWS, rows)
-            yield from _packets_of(file, begin, end)
+            yield from _packets_of(data, begin, end, str(path))
             facts.progress(end, rows)
 
 
@@ -207,11 +208,11 @@ def _data(file: h5py.File) -> h5py.Dataset:
     return data
 
 
-def _packets_of(file: h5py.File, begin: int, end: int) -> Iterator[_Packet]:
-    for row, (head, body) in enumerate(_data(file)[begin:end, 1:], begin):
+def _packets_of(data: h5py.Dataset, begin: int, end: int, path: str) -> Iterator[_Packet]:
+    for row, (head, body) in enumerate(data[begin:end, 1:], begin):
         if not head.size and not body.size:
             continue
-        label = f"{file.filename}: dvs/data row {row}"
+        label = f"{path}: dvs/data row {row}"
         if head.size != _HEAD.size:
             raise DataError(f"{label}: a head of {head.size} bytes, must be {_HEAD.size}")
         kind, _, size, _, wraps, capacity, number, _ = _HEAD.unpack(head.tobytes())

@@ -213,6 +213,26 @@ class Hdf5Writer(Writer):
         """Return the next frame, compressed."""
         return self._encoded.take().tobytes()
 
+    def write_stack(self, name: str) -> None:
+        """Write all frames, which are grey, into one dataset.
+
+        Raises
+        ------
+        OutputError
+            They differ in size.
+        """
+        shapes = {shape for _, shape in self.frames}
+        if len(shapes) > 1:
+            sizes = ", ".join(f"{columns}x{rows}" for rows, columns in sorted(shapes))
+            raise OutputError(f"{self.request.path}: frames of several sizes: {sizes}")
+        shape = shapes.pop() if shapes else (self.request.height, self.request.width)
+        stack = self.file.create_dataset(
+            *(name, (len(self.frames), *shape), np.uint8),
+            **(FILTERS | {"chunks": (1, *shape), "maxshape": (None, *shape)}),
+        )
+        for number in range(len(self.frames)):
+            stack.id.write_direct_chunk((number, 0, 0), self.next_frame())
+
     def events_before(self, number: int) -> int:
         """Return how many events are before a frame; those after which it came are read again."""
         known = self._before[number] if number < len(self._before) else None

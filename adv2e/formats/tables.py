@@ -117,9 +117,9 @@ def _parts(path: Path, facts: Facts, table: Table, unit_ns: int) -> Iterator[Col
 def _whole(values: NDArray[Any], label: str) -> NDArray[np.int64]:
     """Return coordinates as whole numbers."""
     if values.dtype.kind == "f":
+        values = np.rint(values.astype(np.float64))
         if not np.all(np.abs(values) < 1 << 31):  # nor is NaN
             raise DataError(f"{label} holds numbers that are no coordinates")
-        values = np.rint(values)
     whole: NDArray[np.int64] = values.astype(np.int64)
     return whole
 

@@ -45,7 +45,18 @@ def prepare() -> None:
         *("comparison.report", "diagnosis.tables.characterise"),
         *(
             f"formats.{name}"
-            for name in ("monash.reader", "npz", "hdf5", "dsec", "ddd", "text.reader")
+            for name in (
+                "monash.reader",
+                "npz",
+                "hdf5",
+                "dsec",
+                "ddd",
+                "v2e",
+                "mvsec",
+                "m3ed",
+                "prophesee",
+                "text.reader",
+            )
         ),
         *("formats.davis240c.reader", "conversion.pipeline", "conversion.simulation"),
         *(f"sources.{name}" for name in ("video.source", "images.source", "npy", "davis240c")),

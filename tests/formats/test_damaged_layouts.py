@@ -25,10 +25,15 @@ def datasets_of(path):
     return names
 
 
-@pytest.fixture(scope="module", params=layouts())
+@pytest.fixture(scope="module", params=[*layouts(), "prophesee"])
 def whole(request, tmp_path_factory):
     path = tmp_path_factory.mktemp(request.param) / "a.h5"
     events = make_events(np.arange(60) * 700, np.arange(60) % 16, np.arange(60) % 12, [1, 0] * 30)
+    if request.param == "prophesee":
+        with h5py.File(path, "w") as file:
+            file["CD/events"] = events
+            file.attrs["geometry"] = "16x12"
+        return path
     with open_sink(
         path, width=16, height=12, metadata={}, layout=request.param, with_frames=True
     ) as sink:
@@ -48,7 +53,7 @@ def read_or_refuse(path):
         assert (recording.events["x"] < recording.width).all()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_one_dataset_is_another(whole, data):
     name = data.draw(st.sampled_from(datasets_of(whole)))
