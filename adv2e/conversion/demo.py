@@ -77,7 +77,7 @@ class Demo:
         return "\n".join(
             (
                 f"clip     {shown(self.clip)}",
-                f"         {done.frames} frames of {done.width}x{done.height} at {FPS:g} a second;"
+                f"         {done.frames} frames of {WIDTH}x{HEIGHT} at {FPS:g} a second;"
                 " the scene moves, rests, moves and rests",
                 f"events   {shown(self.events)}",
                 f"         {done.events:,} events, {share}; {rate / 1e6:.2f} million a second,"

@@ -79,7 +79,7 @@ class Summary:
             )
         rate = self.events / self.duration_s / (self.width * self.height)
         return (
-            f"{shown(self.output)}: {self.events:,} events ({share}) from {self.frames} frames of"
+            f"{shown(self.output)}: {self.events:,} events ({share}) from {self.frames} frames, on"
             f" {self.width}x{self.height} pixels, over {self.duration_s:.3f} s\n"
             f"{rate:.2f} events a pixel a second; made in {self.seconds:.1f} s"
         )
@@ -297,6 +297,7 @@ def _metadata(
     """
     own = user_sources(config)
     stored = {"encoding": decoder.encoding, "full_scale": white}
+    crop = recording.selection.crop
     return {
         "adv2e": __version__,
         "versions": versions((*recording.packages, *compression.PACKAGES)),
@@ -306,6 +307,7 @@ def _metadata(
         "source": {
             "name": shown(Path(recording.path).name),
             "kind": recording.kind,
+            **({"crop": list(crop)} if crop is not None else {}),
             "encoding": decoder.encoding,
             "full_scale": decoder.full_scale,
             "light": light_text(recording.light, recording.full_scale, config.frames),

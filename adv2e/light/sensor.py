@@ -27,6 +27,9 @@ from adv2e.effects.frames.brightness import check_light
 from adv2e.errors import DataError
 from adv2e.geometry import Size
 
+_BLOCK = 1 << 16
+"""Numbers worked on at a time; they stay in the cache, and in memory that is used again."""
+
 
 class _Axis:
     """Means over the pixels of one axis of the sensor.
@@ -52,17 +55,24 @@ class _Axis:
         number = first + taps
         shares = np.minimum((number + 1) * unit, edges[1:]) - np.maximum(number * unit, edges[:-1])
         shares[(number < 0) | (number >= count)] = 0  # black
-        self._numbers = np.clip(number, 0, count - 1)
+        numbers = np.clip(number, 0, count - 1)
+        self.used = slice(int(numbers.min()), int(numbers.max()) + 1)
+        self._numbers = numbers - self.used.start
         self._shares = np.maximum(shares, 0).astype(np.float64)
         self._whole = float(step * int(unit))
 
-    def means(self, light: NDArray[Any], axis: int) -> NDArray[np.float64]:
-        """Return the means of `light` (rows, columns) along `axis`, one for each pixel."""
+    def means(
+        self, light: NDArray[Any], axis: int, part: slice = slice(None)
+    ) -> NDArray[np.float64]:
+        """Return the means of `light` along an axis, of which it is what is `used`.
+
+        One for each pixel of the sensor, or for a `part` of them.
+        """
         across = (slice(None), np.newaxis) if axis == 0 else (np.newaxis, slice(None))
         found: NDArray[np.float64] | None = None
-        for numbers, shares in zip(self._numbers, self._shares, strict=True):
-            part = np.multiply(light.take(numbers, axis=axis), shares[across])
-            found = part if found is None else np.add(found, part, out=found)
+        for numbers, shares in zip(self._numbers[:, part], self._shares[:, part], strict=True):
+            seen = np.multiply(light.take(numbers, axis=axis), shares[across])
+            found = seen if found is None else np.add(found, seen, out=found)
         assert found is not None
         found /= self._whole
         return found
@@ -132,13 +142,14 @@ class Fitting:
 
     def plane(self, light: NDArray[Any]) -> NDArray[np.float32]:
         """Return the same of light that is known to be right, or of a share of it."""
-        seen: NDArray[Any] = np.asarray(light, np.float32)
-        axes = [(self._rows, 0), (self._columns, 1)]
-        if self.size.height > self.frames.height:  # or all columns would be enlarged first
-            axes.reverse()
-        for means, axis in axes:
-            seen = means.means(seen, axis)
-        return seen.astype(np.float32)
+        # `take` would copy all of a part again and again
+        single = np.ascontiguousarray(light[self._rows.used, self._columns.used], np.float32)
+        seen = np.empty((self.size.height, self.size.width), np.float32)
+        step = max(1, _BLOCK // single.shape[1])
+        for first in range(0, self.size.height, step):
+            part = slice(first, first + step)
+            seen[part] = self._columns.means(self._rows.means(single, 0, part), 1)
+        return seen
 
     def text(self) -> str:
         """Return what is done, to follow the size that the frames have, after a comma."""

@@ -20,7 +20,6 @@ import numpy as np
 from adv2e.effects.frames.brightness import doubt_of_white
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
-from adv2e.geometry import Rectangle
 from adv2e.sources.frame import (
     OVER_BLACK,
     Frame,
@@ -204,10 +203,7 @@ class Source(ABC):
         this = _description(image.shape[1], image.shape[0], image.dtype, image.ndim == 3)
         if this != first:
             raise DataError(f"{label}: {this}, but the first frame is {first}")
-        if self.selection.rotate180:
-            pixels = rotated180(pixels)
-        if self.selection.crop is not None:
-            pixels = _cut(pixels, self.selection.crop)
+        pixels = self._wanted(pixels)
         check_values(pixels.image, label)
         if pixels.alpha is not None or pixels.composed:
             self._note(OVER_BLACK)
@@ -215,12 +211,16 @@ class Source(ABC):
             self.largest_read = max(self.largest_read, float(image.max()))
         return pixels
 
-
-def _cut(pixels: Pixels, crop: Rectangle) -> Pixels:
-    """Return a part of an image, which keeps none of the rest in memory."""
-    part = slice(crop.y, crop.y + crop.height), slice(crop.x, crop.x + crop.width)
-    alpha = None if pixels.alpha is None else pixels.alpha[part].copy()
-    return replace(pixels, image=pixels.image[part].copy(), alpha=alpha)
+    def _wanted(self, pixels: Pixels) -> Pixels:
+        """Return what is wanted of an image, upright; it keeps none of the rest in memory."""
+        if self.selection.rotate180:
+            pixels = rotated180(pixels)
+        crop = self.selection.crop
+        if crop is None:
+            return pixels
+        part = slice(crop.y, crop.y + crop.height), slice(crop.x, crop.x + crop.width)
+        alpha = None if pixels.alpha is None else pixels.alpha[part].copy()
+        return replace(pixels, image=pixels.image[part].copy(), alpha=alpha)
 
 
 def _description(width: int, height: int, dtype: np.dtype[Any], colour: bool) -> str:

@@ -81,6 +81,39 @@ def test_crop_comes_before_the_sensor(adv2e, clip, tmp_path):
     np.testing.assert_allclose(stored, means, atol=0.5001)
 
 
+def test_what_lies_outside_the_crop_does_not_matter(adv2e, tmp_path):
+    frames = (GREY / 255).astype(np.float32)
+    frames[:, :2], frames[:, -3:] = np.nan, -1
+    np.save(tmp_path / "clip.npy", frames)
+    words = ["convert", tmp_path / "clip.npy", "--fps", 100, "-o", tmp_path / "a.h5"]
+    assert adv2e(*words).status == 1
+    assert adv2e(*words, "--crop", "0,2,32,13").status == 0
+    recording = read_events(tmp_path / "a.h5")
+    assert recording.events.tobytes() == simulated(frames[:, 2:15]).tobytes()
+    assert recording.metadata["source"]["crop"] == [0, 2, 32, 13]
+    assert (recording.width, recording.height) == (32, 13)
+
+
+def test_crop_of_images_with_transparent_pixels(adv2e, tmp_path):
+    (tmp_path / "frames").mkdir()
+    alpha = np.full((18, 32, 1), 128, np.uint8)
+    for number, frame in enumerate(COLOUR):
+        assert cv2.imwrite(str(tmp_path / f"frames/{number}.png"), np.dstack([frame, alpha]))
+    words = ["convert", tmp_path / "frames", "--fps", 100, "--with-frames"]
+    assert adv2e(*words, "-o", tmp_path / "all.h5").status == 0
+    assert adv2e(*words, "-o", tmp_path / "part.h5", "--crop", "4,3,8,6").status == 0
+    whole, part = (read_events(tmp_path / name) for name in ("all.h5", "part.h5"))
+    for all_of_it, cut in zip(whole.frames(), part.frames(), strict=True):
+        np.testing.assert_array_equal(all_of_it.image[3:9, 4:12], cut.image)
+    halved = adv2e(*words, "-o", tmp_path / "half.h5", "--size", "16x9")
+    assert halved.status == 0
+    seen = next(read_events(tmp_path / "half.h5").frames()).image
+    first = next(whole.frames()).image
+    decoder = LightDecoder("srgb", 255.0, np.uint8, True)
+    expected = decoder.decode(first).reshape(9, 2, 16, 2).mean(axis=(1, 3))
+    np.testing.assert_allclose(decoder.decode(seen), expected, atol=2.5)
+
+
 def test_crop_alone_leaves_the_numbers_as_they_are(adv2e, clip, tmp_path):
     outcome = adv2e("convert", clip, "--fps", 100, "--crop", "3,2,12,9", "-o", tmp_path / "a.zip")
     assert outcome.status == 0
@@ -194,6 +227,12 @@ def test_in_python_sizes_are_text_or_numbers(clip, tmp_path):
     for wrong in ({"size": (8, 6, 3)}, {"size": "8"}, {"crop": (1, 2, 3)}):
         with pytest.raises(package.errors.UsageError, match="must be"):
             package.convert(clip, tmp_path / "c.h5", fps=100, **wrong)
+
+
+def test_the_widest_sensor_has_all_its_columns():
+    frames = np.array([[[10, 200]], [[200, 10]], [[10, 200]]], np.uint8)
+    events = simulated(frames, "sensor={width: 65536, height: 1, fit: stretch}", "sampling.L=1")
+    assert (events["x"].min(), events["x"].max()) == (0, 65535)
 
 
 def test_frames_of_one_size_in_a_simulation():

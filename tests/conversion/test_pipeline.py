@@ -573,7 +573,7 @@ def test_a_failure_is_told_in_a_line_of_its_own(adv2e, tmp_path):
 def test_the_summary_counts_in_sentences(adv2e, video, tmp_path):
     out = adv2e("convert", video, "-o", tmp_path / "a.txt").out
     assert re.fullmatch(
-        r".*a\.txt: [\d,]+ events \(\d+\.\d % ON\) from 6 frames of 32x24 pixels, over 0\.167 s\n"
+        r".*a\.txt: [\d,]+ events \(\d+\.\d % ON\) from 6 frames, on 32x24 pixels, over 0\.167 s\n"
         r"[\d.]+ events a pixel a second; made in \d+\.\d s\n",
         out,
     )

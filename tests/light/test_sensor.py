@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+
 import cv2
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from adv2e.config.model import FITS, Sensor
 from adv2e.errors import ConfigError, DataError
@@ -56,6 +60,32 @@ def test_each_pixel_is_the_mean_of_the_light_on_its_area(frames, sensor, fit):
     assert seen.dtype == np.float32
     expected = dense(light.astype(np.float64), *sensor, fit).astype(np.float32)
     np.testing.assert_array_max_ulp(seen, expected, 1)
+
+
+SIDE = st.integers(1, 9)
+
+
+@given(st.tuples(SIDE, SIDE), st.tuples(SIDE, SIDE), st.sampled_from(["crop", "pad", "stretch"]))
+@settings(max_examples=60, deadline=None)
+def test_any_ratio_of_sizes_is_exact(frames, sensor, fit):
+    light = np.random.default_rng(sum(frames)).uniform(0, 255, frames[::-1]).astype(np.float32)
+    try:
+        made = fitting(frames, sensor, fit)
+    except DataError:  # next to nothing of the frames would be left
+        assume(False)
+    seen = light if made is None else made.light(light, "")
+    expected = dense(light.astype(np.float64), *sensor, fit).astype(np.float32)
+    np.testing.assert_array_max_ulp(seen, expected, 1)
+
+
+def test_the_result_is_the_same_everywhere():
+    """Whatever the versions of NumPy and OpenCV, and the processor."""
+    light = (np.arange(720 * 1280) % 4099).reshape(720, 1280).astype(np.float32) * np.float32(0.06)
+    digests = []
+    for sensor, fit in [((346, 260), "crop"), ((240, 180), "pad"), ((1500, 731), "stretch")]:
+        seen = fitting((1280, 720), sensor, fit).light(light, "")
+        digests.append(hashlib.sha256(seen.astype("<f4").tobytes()).hexdigest()[:16])
+    assert digests == ["99c6c809fb05d8bb", "e9dd12c48deac66a", "e08c9d1c4aa133a0"]
 
 
 def test_a_film_for_a_davis346_is_near_the_area_filter_of_opencv():
