@@ -128,8 +128,8 @@ def _is_number(text: str) -> bool:
 
 def _cleaned(block: bytes) -> bytes:
     """Return lines of numbers and blanks."""
-    for word, number in _TRUTH:
-        if word in block:
+    if b"e" in block:
+        for word, number in _TRUTH:
             block = block.replace(word, number)
     return block.translate(_BLANK)
 

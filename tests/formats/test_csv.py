@@ -121,6 +121,16 @@ def test_damaged_lines(good, data):
         read_or_refused(path, 12)
 
 
+def test_the_line_that_is_wrong_behind_many(read):
+    lines = ["t_us,x,y,p", *(f"{n},{n % 300},7,1" for n in range(60_000))]
+    recording = read("\n".join(lines))
+    assert recording.events["t"].tolist() == list(range(60_000))
+
+    lines[50_000] = "1,2,3"
+    with pytest.raises(DataError, match="line 50001: must be the 4 numbers"):
+        read("\n".join(lines))
+
+
 def test_many_lines_are_formatted_as_numpy_does(tmp_path):
     draw = np.random.default_rng(0)
     most = 10 ** draw.integers(0, 16, 70_000)
