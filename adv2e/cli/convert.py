@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
-from adv2e.cli.options import SECONDS
+from adv2e.cli.options import POSITIVE, SECONDS
 from adv2e.formats import registry
 
 if TYPE_CHECKING:
@@ -47,6 +47,26 @@ if TYPE_CHECKING:
     show_default=True,
     help="Where times begin. zero: at the first frame converted. keep, auto: as on the input's own"
     " clock; if it has none, at the input's first frame.",
+)
+@click.option(
+    "--motion",
+    type=click.Choice(["saccade", "shake", "pan"]),
+    help="INPUT is one picture, before which the sensor moves: in three saccades, as N-MNIST was"
+    " recorded, as a hand shakes, or to the right.",
+)
+@click.option(
+    "--extent",
+    "extent_px",
+    type=POSITIVE,
+    metavar="PX",
+    help="How far it moves, in pixels of the sensor.  [default: 6, 8 or 32]",
+)
+@click.option(
+    "--duration",
+    "duration_s",
+    type=POSITIVE,
+    metavar="S",
+    help="How long that takes, in seconds.  [default: 0.3, 1 or 1]",
 )
 @click.option(
     "--from",
@@ -99,6 +119,9 @@ def command(
     size: Size | None,
     t0: str,
     choice: str | None,
+    motion: str | None,
+    extent_px: float | None,
+    duration_s: float | None,
     **written: Any,
 ) -> None:
     """Turn a video or frames into events, or a file of events into another format.
@@ -110,6 +133,7 @@ def command(
       adv2e convert clip.mp4 --size 346x260
       adv2e convert frames/ --fps 240 -o events.h5 --with-frames
       adv2e convert urban.zip -o urban_simulated --preview urban.mp4
+      adv2e convert photo.png --motion saccade -o photo.h5
       adv2e convert clip.events.h5 -o clip.txt
       ffmpeg -i clip.mp4 -f yuv4mpegpipe - | adv2e convert - -o piped.h5
 
@@ -134,6 +158,8 @@ def command(
     if given["fps"] is not None and given["time_unit"] is not None:
         raise click.UsageError("--time-unit is for lists of times, which --fps replaces: keep one")
     options.check_part(start, stop)
+    if motion is None and (extent_px is not None or duration_s is not None):
+        raise click.UsageError("--extent and --duration are of the path that --motion makes")
     part: dict[str, Any] = {"start_s": start, "stop_s": stop, "t0": t0, "crop": crop}
     if _takes_events(source, choice):
         from adv2e.conversion.transfer import convert_events
@@ -153,6 +179,10 @@ def command(
     import_ahead()
     from adv2e.conversion.reading import Reading
 
+    if motion is not None:
+        from adv2e.sources.paths import SensorPath
+
+        part["along"] = SensorPath(motion, extent_px, duration_s)
     reading = Reading(source, **given, **part, frame_size=size, threads=threads)
     with reading:  # it reads while all else that is needed is imported
         from adv2e.conversion.pipeline import convert_reading
@@ -172,7 +202,7 @@ def command(
 
 _OF_SIMULATION = (
     *("config_files", "sets", "seed", "effect_files"),
-    *("fps", "timestamps", "allow_damaged", "bayer", "pixel_format", "preview"),
+    *("fps", "timestamps", "allow_damaged", "bayer", "pixel_format", "motion", "preview"),
 )
 """Options that say how frames are simulated."""
 

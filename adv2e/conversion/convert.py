@@ -14,6 +14,7 @@ from adv2e.conversion.transfer import convert_events
 from adv2e.errors import UsageError
 from adv2e.formats.frames import takes_events
 from adv2e.geometry import parse_rectangle, parse_size
+from adv2e.sources.paths import SensorPath
 from adv2e.sources.times.rates import Rate
 
 
@@ -43,6 +44,9 @@ def convert(
     threads: int | None = None,
     progress: bool = False,
     take: str | None = None,
+    motion: str | None = None,
+    extent_px: float | None = None,
+    duration_s: float | None = None,
 ) -> Summary:
     """Convert a video, a folder of images or a recording to a file of events.
 
@@ -95,6 +99,10 @@ def convert(
     take : {'frames', 'events'}, optional
         What to take of a source that holds both.  Default: the frames of cameras' recordings, the
         events of other files.
+    motion : {'saccade', 'shake', 'pan'}, optional
+        The source is one picture, before which the sensor moves so; see :mod:`adv2e.sources.paths`.
+    extent_px, duration_s : float, optional
+        Length of the longer side of that path [pixels of the sensor], and of its time [s].
 
     Returns
     -------
@@ -179,6 +187,7 @@ def convert(
         pixel_format=pixel_format,
         frame_size=wanted,
         rotate180=rotate180,
+        along=None if motion is None else SensorPath(motion, extent_px, duration_s),
         threads=threads,
     )
     with reading:

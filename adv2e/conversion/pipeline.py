@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -204,7 +204,7 @@ def convert_reading(
     )
     white = picture_white(recording.dtype, decoder.full_scale, not keeps_all_bits)
     frames = Size(recording.width, recording.height)
-    fitting = fitting_of(*frames, config.sensor, recording.path)
+    fitting = fitting_of(*frames, config.sensor, recording.path, recording.along)
     width, height = frames if fitting is None else fitting.size
     # events and preview come into place together, when all is written
     inputs = (*reading.inputs, *also_read)
@@ -311,6 +311,7 @@ def _metadata(
             "encoding": decoder.encoding,
             "full_scale": decoder.full_scale,
             "light": light_text(recording.light, recording.full_scale, config.frames),
+            **({"motion": asdict(recording.along)} if recording.along is not None else {}),
         },
         **({"frames": stored} if white is not None else {}),
     }

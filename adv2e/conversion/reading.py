@@ -26,6 +26,7 @@ from adv2e.light.pictures import picture_of
 from adv2e.sources import STDIN
 from adv2e.sources.base import Source
 from adv2e.sources.frame import Frame
+from adv2e.sources.paths import SensorPath
 from adv2e.sources.times.rates import Rate
 
 if TYPE_CHECKING:
@@ -79,15 +80,15 @@ class Decoding:
         check_floats(frame.image, frame.label, self.full_scale)
         if frame.odd_white and self.full_scale is None:
             raise DataError(f"{frame.label}: {frame.odd_white}")
-        picture = None
+        picture, fitting = None, self.fitting
+        if fitting is not None and frame.offset is not None:
+            fitting = fitting.moved(frame.offset)
         if self.with_pictures:
-            picture = picture_of(
-                frame.image, frame.alpha, self.decoder, self.eight_bit, self.fitting
-            )
+            picture = picture_of(frame.image, frame.alpha, self.decoder, self.eight_bit, fitting)
         if not self.coded:
             light = self.decoder.decode(frame.image, frame.alpha)
-            if self.fitting is not None:
-                light = self.fitting.light(light, frame.label)
+            if fitting is not None:
+                light = fitting.light(light, frame.label)
         elif frame.alpha is None:
             light = frame.image
         else:
@@ -106,7 +107,7 @@ class Reading:
     Parameters
     ----------
     path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged, crop, bayer,
-    pixel_format, frame_size, rotate180
+    pixel_format, frame_size, rotate180, along
         See :func:`adv2e.sources.open_source`.
     threads : int, optional
         Threads that the whole conversion may compute with; default: all cores.
@@ -128,6 +129,7 @@ class Reading:
         pixel_format: str | None = None,
         frame_size: Size | None = None,
         rotate180: bool = False,
+        along: SensorPath | None = None,
         threads: int | None = None,
     ) -> None:
         self.path = path
@@ -136,7 +138,7 @@ class Reading:
             "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
             "time_unit": time_unit, "allow_damaged": allow_damaged, "crop": crop,
             "bayer": bayer, "pixel_format": pixel_format, "frame_size": frame_size,
-            "rotate180": rotate180,
+            "rotate180": rotate180, "along": along,
         }  # fmt: skip
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()

@@ -16,6 +16,7 @@ is rounded the same way everywhere: NumPy adds in the order written here, with o
 
 from __future__ import annotations
 
+from copy import copy
 from fractions import Fraction
 from typing import Any
 
@@ -26,6 +27,7 @@ from adv2e.config.model import Sensor
 from adv2e.effects.frames.brightness import check_light
 from adv2e.errors import DataError
 from adv2e.geometry import Size
+from adv2e.sources.paths import SensorPath
 
 _BLOCK = 1 << 16
 """Numbers worked on at a time; they stay in the cache, and in memory that is used again."""
@@ -41,11 +43,13 @@ class _Axis:
     size : int
         Pixels of the sensor.
     scale : Fraction
-        Pixels of the sensor that a pixel of the frame spans; the middles lie on each other.
+        Pixels of the sensor that a pixel of the frame spans.
+    offset : Fraction
+        From the middle of the frame to that of the sensor [pixels of the sensor].
     """
 
-    def __init__(self, count: int, size: int, scale: Fraction) -> None:
-        begin = (count - size / scale) / 2
+    def __init__(self, count: int, size: int, scale: Fraction, offset: Fraction) -> None:
+        begin = (count - size / scale) / 2 + offset / scale
         step = 1 / scale
         unit = np.lcm(begin.denominator, step.denominator)
         # of the sensor's pixels, in that share of a pixel of the frame
@@ -88,6 +92,8 @@ class Fitting:
         The section of the configuration.
     label : str
         What the frames are of, for messages.
+    margin : int
+        Pixels that a sensor that moves needs on each side.
 
     Raises
     ------
@@ -96,16 +102,17 @@ class Fitting:
         left.
     """
 
-    def __init__(self, frames: Size, sensor: Sensor, label: str) -> None:
+    def __init__(self, frames: Size, sensor: Sensor, label: str, margin: int = 0) -> None:
         self.frames, self.size = frames, Size(sensor.width, sensor.height)
         self._fit = sensor.fit
-        if sensor.fit == "none":
+        needed = Size(sensor.width + 2 * margin, sensor.height + 2 * margin)
+        if sensor.fit == "none" and frames != needed:
             raise DataError(
-                f"{label}: frames are {frames}, but the sensor is {self.size} and sensor.fit is"
+                f"{label}: frames are {frames}, but the sensor needs {needed} and sensor.fit is"
                 " none; say crop, pad or stretch, or give it their size"
             )
-        across = Fraction(self.size.width, frames.width)
-        down = Fraction(self.size.height, frames.height)
+        across = Fraction(needed.width, frames.width)
+        down = Fraction(needed.height, frames.height)
         if sensor.fit == "crop":
             across = down = max(across, down)
         elif sensor.fit == "pad":
@@ -126,8 +133,20 @@ class Fitting:
                     f"{label}: sensor.fit pad: frames of {frames} would fill {float(filled):.2g} of"
                     f" a pixel of a sensor of {self.size}; say crop or stretch"
                 )
-        self._columns = _Axis(frames.width, self.size.width, across)
-        self._rows = _Axis(frames.height, self.size.height, down)
+        self._scales = across, down
+        self._look(0.0, 0.0)
+
+    def _look(self, right: float, down: float) -> None:
+        pairs = zip(self.frames, self.size, self._scales, (right, down), strict=True)
+        self._columns, self._rows = (
+            _Axis(count, size, scale, Fraction(offset)) for count, size, scale, offset in pairs
+        )
+
+    def moved(self, offset: tuple[float, float]) -> Fitting:
+        """Return the same for a sensor that looks elsewhere: to the right and down [its pixels]."""
+        moved = copy(self)
+        moved._look(*offset)
+        return moved
 
     def light(self, light: NDArray[Any], label: str) -> NDArray[np.float32]:
         """Return what the sensor sees of the light [DN] of a frame, (rows, columns).
@@ -163,14 +182,29 @@ class Fitting:
         return f"{scaled}{' and ' if scaled else ''}cut to {self.size}"
 
 
-def fitting_of(width: int, height: int, sensor: Sensor | None, label: str) -> Fitting | None:
+def fitting_of(
+    width: int, height: int, sensor: Sensor | None, label: str, along: SensorPath | None = None
+) -> Fitting | None:
     """Return how frames are brought to the sensor; None where they stay as they are.
+
+    A sensor that moves `along` a path sees all of the frames on its way; without a size of its own
+    it has one that just fits.
 
     Raises
     ------
     DataError
-        See :class:`Fitting`; or frames without pixels.
+        See :class:`Fitting`; or frames without pixels, or too few for the path.
     """
+    if along is not None:
+        margin = along.margin
+        left = Size(width - 2 * margin, height - 2 * margin)
+        if sensor is None and min(left) < 1:
+            raise DataError(
+                f"{label}: {width}x{height} pixels are too few for a path of {along.extent:g}"
+                " pixels; give a smaller --extent, or a larger picture"
+            )
+        sensor = sensor or Sensor(width=left.width, height=left.height)
+        return Fitting(Size(width, height), sensor, label, margin)
     if sensor is None or (width, height) == (sensor.width, sensor.height):
         return None
     if min(width, height) < 1:

@@ -10,6 +10,7 @@ from adv2e.files.regular import check_ends
 from adv2e.geometry import Rectangle, Size
 from adv2e.sources.base import Source
 from adv2e.sources.frame import Frame
+from adv2e.sources.paths import SensorPath
 from adv2e.sources.times.rates import Rate
 from adv2e.sources.wanted import GivenTimes, Selection
 
@@ -20,6 +21,8 @@ VIDEO_SUFFIXES = (
     *(".wmv", ".flv", ".3gp", ".ogv", ".gif", ".y4m"),
 )
 """Files that are opened as video."""
+
+_PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".exr", ".hdr", ".pgm", ".ppm", ".pfm")
 
 STDIN = "-"
 """What standard input is called."""
@@ -48,6 +51,7 @@ def open_source(
     pixel_format: str | None = None,
     frame_size: Size | None = None,
     rotate180: bool = False,
+    along: SensorPath | None = None,
 ) -> Source:
     """Open an input with frames.
 
@@ -81,6 +85,8 @@ def open_source(
         Size of the frames of raw video.
     rotate180 : bool
         Turn each frame by half a turn, before even that.
+    along : SensorPath, optional
+        The input is one picture, before which the sensor moves so.
 
     Returns
     -------
@@ -115,6 +121,10 @@ def open_source(
         raise DataError(f"{named}: {error.strerror or error}") from error
     if not path.exists():
         raise DataError(f"{named}: no such file or folder{_advice(named)}")
+    if along is not None:
+        from adv2e.sources import still  # noqa: PLC0415  (needs OpenCV)
+
+        return still.open_source(path, given, selection, along)
     opener = importlib.import_module(_opener(path))
     source: Source = opener.open_source(path, given, selection)
     return source
@@ -135,6 +145,11 @@ def _opener(path: Path) -> str:
         return f"adv2e.sources.{_kind_of_folder(path)}"
     if suffix in OPENERS:
         return OPENERS[suffix]
+    if suffix in _PICTURES:
+        raise DataError(
+            f"{path}: a single picture makes no events: --motion saccade moves a sensor before it;"
+            " give the folder if it is one of many frames"
+        )
     known = " ".join(suffix.lstrip(".") for suffix in OPENERS)
     raise DataError(
         f"{path}: frames cannot be read from {suffix or 'a file without suffix'}; give a folder of"

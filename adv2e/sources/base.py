@@ -31,6 +31,7 @@ from adv2e.sources.frame import (
     odd_white,
     rotated180,
 )
+from adv2e.sources.paths import SensorPath
 from adv2e.sources.times.instants import seconds
 from adv2e.sources.wanted import Selection
 from adv2e.ticks import check_time
@@ -70,6 +71,8 @@ class Source(ABC):
         Threads that decoding may use; one, unless set otherwise before `frames`.
     packages : tuple of str
         Optional packages that decode it.
+    along : SensorPath or None
+        Path of a sensor that moves before one picture.
     waits : bool
         Reading waits for others, and for ever if they please: it belongs in the main thread.
     """
@@ -87,6 +90,7 @@ class Source(ABC):
         self.threads = 1
         self.packages: tuple[str, ...] = ()
         self.waits = False
+        self.along: SensorPath | None = None
 
     def _describe(self, first: Pixels, label: str, light: Light | None = None) -> None:
         """Take geometry, data type and meaning of the numbers from the first frame.
@@ -194,7 +198,9 @@ class Source(ABC):
     def _frame(self, shot: Shot, t_ns: int) -> Frame:
         pixels = self._load(shot)
         odd = "" if self._white_told is not None else odd_white(pixels, self._white_stated)
-        return Frame(t_ns, pixels.image, shot.label, pixels.alpha, self.full_scale, odd)
+        return Frame(
+            t_ns, pixels.image, shot.label, pixels.alpha, self.full_scale, odd, pixels.offset
+        )
 
     def _load(self, shot: Shot) -> Pixels:
         pixels, label = shot.load(), shot.label

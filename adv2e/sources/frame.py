@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import encoding_of_images, full_scale_of
 from adv2e.errors import DataError
+from adv2e.sources.paths import Offset
 
 Image = NDArray[Any]
 """(rows, columns) or (rows, columns, 3) RGB; uint8, uint16, float32 or float64."""
@@ -32,12 +33,15 @@ class Pixels:
         The file has transparent pixels, and its colours are light over black already.
     white : float, optional
         Number that means white, where the file says it and it is not that of the data type.
+    offset : (float, float), optional
+        Where on it the sensor looks, from the middle: to the right and down [its pixels].
     """
 
     image: Image
     alpha: NDArray[np.float32] | None = None
     composed: bool = False
     white: float | None = None
+    offset: Offset | None = None
 
 
 OVER_BLACK = "transparent pixels are composed over black, in linear light"
@@ -87,6 +91,8 @@ class Frame:
         Number that means white in it; None: that of the data type.
     odd_white : str
         How the white that its file states differs from that of the first frame.
+    offset : (float, float), optional
+        See :class:`Pixels`.
     """
 
     t_ns: int
@@ -95,6 +101,7 @@ class Frame:
     alpha: NDArray[np.float32] | None = None
     white: float | None = None
     odd_white: str = ""
+    offset: Offset | None = None
 
 
 @dataclass(frozen=True)

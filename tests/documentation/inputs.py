@@ -43,6 +43,11 @@ def images(path: Path) -> None:
         cv2.imwrite(str(path / f"frame_{k:04d}.png"), picture(k))
 
 
+def photo(path: Path) -> None:
+    """Make a picture."""
+    cv2.imwrite(str(path), np.kron(picture(3), np.ones((2, 2), np.uint8)))
+
+
 def listed_images(path: Path) -> None:
     """Make a folder with lists of times and names, and the images in a folder below it."""
     path.mkdir()
@@ -112,6 +117,7 @@ INPUTS: dict[str, Callable[[Path], None]] = {
     "videos/": videos,
     "frames/": images,
     "sequence/": listed_images,
+    "photo.png": photo,
     "times.txt": times,
     "clip.npy": stack,
     "recording.zip": recording,
