@@ -107,8 +107,9 @@ class Fitting:
         self._fit = sensor.fit
         needed = Size(sensor.width + 2 * margin, sensor.height + 2 * margin)
         if sensor.fit == "none" and frames != needed:
+            way = " with its way" if margin else ""
             raise DataError(
-                f"{label}: frames are {frames}, but the sensor needs {needed} and sensor.fit is"
+                f"{label}: frames are {frames}, but the sensor is {needed}{way} and sensor.fit is"
                 " none; say crop, pad or stretch, or give it their size"
             )
         across = Fraction(needed.width, frames.width)

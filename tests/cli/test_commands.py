@@ -19,6 +19,7 @@ from adv2e.config.model import Pixel
 from adv2e.diagnosis.fitting.library import names
 from adv2e.effects import EFFECTS, STAGES
 from adv2e.formats import registry
+from adv2e.sources.paths import SensorPath
 
 
 @pytest.mark.parametrize("option", ["--version", "-V"])
@@ -82,7 +83,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
             "p.gif",
             "--allow-damaged",
         ),
-        "--causes",
+        *("--causes", "--motion", "pan", "--extent", "9"),
     )
     assert outcome.status == 0
     ((reading, output, options),) = pipeline.calls
@@ -100,6 +101,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "pixel_format": None,
         "frame_size": (8, 6),
         "rotate180": True,
+        "along": SensorPath("pan", 9.0),
     }
     log = options.pop("log")
     assert options == {
