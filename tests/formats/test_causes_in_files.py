@@ -11,8 +11,9 @@ from adv2e import convert, load_config, read_events, render, simulate, write_eve
 from adv2e.causes import CAUSED_DTYPE, CAUSES, has_causes, with_cause
 from adv2e.cli import main
 from adv2e.errors import DataError, OutputError, UsageError
-from adv2e.events import EVENT_DTYPE, make_events
+from adv2e.events import EVENT_DTYPE, make_events, sort_events
 from adv2e.formats.causes import NAMES
+from adv2e.formats.registry import FORMATS
 from adv2e.formats.writing import open_sink
 
 SIZE = 12, 9
@@ -104,6 +105,26 @@ def test_events_of_ones_own_are_written_with_their_causes(count, name, tmp_path)
     order = np.lexsort([events[n] for n in ("cause", "p", "x", "y", "t")])
     assert found.dtype == CAUSED_DTYPE
     assert np.array_equal(found, events[order])
+
+
+@pytest.mark.parametrize("name", [found.name for found in FORMATS if found.writer])
+def test_every_format_keeps_them_with_their_events_where_many_share_a_time(name, tmp_path):
+    found = next(found for found in FORMATS if found.name == name)
+    path = tmp_path / f"a{found.suffixes[0]}"
+    events = some(4000)
+    events["t"] //= 10_000  # forty at a time
+    events = sort_events(events)
+    _, first = np.unique(events[["t", "x", "y"]], return_index=True)
+    events = events[np.sort(first)]  # some formats have one event a pixel and time
+    chosen = {"layout": name} if found.is_hdf5 else {"format": name}
+    with open_sink(path, width=9, height=9, metadata={}, causes=True, **chosen) as sink:
+        for part in np.array_split(events, 7):
+            sink.write_events(part)
+    assert (tmp_path / f"{path.name}.causes.txt").exists() == (not found.causes)
+    again = read_events(path).events
+    assert np.array_equal(again["t"] - again["t"][0], events["t"] - events["t"][0])
+    for field in ("x", "y", "p", "cause"):
+        assert np.array_equal(again[field], events[field])
 
 
 def test_numbers_that_are_no_causes_are_refused(tmp_path):
