@@ -124,12 +124,17 @@ def test_crop_alone_leaves_the_numbers_as_they_are(adv2e, clip, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "frames",
-    [COLOUR, COLOUR.astype(np.uint16) * 257, COLOUR / 255, GREY, (GREY / 255).astype(np.float32)],
-    ids=["colour", "colour16", "float", "grey", "grey float"],
+    ("frames", "name", "encoding"),
+    [
+        (COLOUR, "a.zip", "srgb"),
+        (COLOUR, "a.h5", "linear"),
+        (COLOUR.astype(np.uint16) * 257, "a.h5", "srgb"),  # stored in 8 bits
+        (COLOUR / 255, "a.zip", "srgb"),  # stored in 16 bits
+        (GREY, "a.h5", "srgb"),
+        ((GREY / 255).astype(np.float32), "a.zip", "linear"),
+    ],
+    ids=["colour", "linear colour", "deep colour", "float colour", "grey", "float grey"],
 )
-@pytest.mark.parametrize("name", ["a.zip", "a.h5"])
-@pytest.mark.parametrize("encoding", ["srgb", "linear"])
 def test_stored_frames_are_the_light_on_the_sensor(adv2e, tmp_path, frames, name, encoding):
     np.save(tmp_path / "clip.npy", frames)
     words = ["--fps", 100, "--size", "8x6", "--set", f"frames.encoding={encoding}", "--with-frames"]
