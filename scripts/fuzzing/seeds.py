@@ -81,7 +81,13 @@ def all_seeds(scratch: Path) -> list[Seed]:
     """Return every seed; `scratch` is a folder for files that only libraries can write."""
     seeds = [*_stacks(), *_events(), *_recordings(), *_images(), *_texts()]
     with quiet():
-        return [*seeds, *_hdf5(scratch), *_camera_files(scratch), *_videos(scratch)]
+        return [
+            *seeds,
+            *_packets(scratch),
+            *_hdf5(scratch),
+            *_camera_files(scratch),
+            *_videos(scratch),
+        ]
 
 
 def _frames(dtype: str = "u1", *, colour: bool = False) -> np.ndarray:

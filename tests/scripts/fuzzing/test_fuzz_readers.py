@@ -86,7 +86,16 @@ def test_the_same_number_makes_the_same_file(tmp_path):
         first, again = (mutated(data, random.Random(n), text=n % 2 == 0) for _ in range(2))
         assert first == again
     kinds = [seed.name for seed in all_seeds(tmp_path)]
-    assert {"npz", "recording zip", "hdf5", "video mp4", "video y4m", "config"} <= set(kinds)
+    assert {
+        "npz",
+        "bag",
+        "aedat4",
+        "recording zip",
+        "hdf5",
+        "video mp4",
+        "video y4m",
+        "config",
+    } <= set(kinds)
     for seed in all_seeds(tmp_path):
         made = []
         for name in ("one", "two"):
