@@ -143,8 +143,8 @@ def command(
     Y4M or raw video comes. It may be a file of events, too: these are written in the format of OUT,
     and nothing is simulated.
 
-    Without -o, the events go to <stem>.events.h5 in the current folder. The suffix of OUT chooses
-    the format:
+    Without -o, the events go to <stem>.events.h5 in the current folder, or with the suffix of
+    --format. The suffix of OUT chooses the format:
 
     \b
       .h5          HDF5

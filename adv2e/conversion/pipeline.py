@@ -133,13 +133,14 @@ class _Output:
             self._preview.add_events(events)
 
 
-def default_output(source: str) -> str:
-    """Return ``<stem>.events.h5`` in the current folder."""
+def default_output(source: str, format: str | None = None) -> str:
+    """Return ``<stem>.events.h5`` in the current folder, or with the suffix of another format."""
+    suffix = to_write(Path("events.h5"), format).suffixes[0]
     if source == STDIN:
-        return "stdin.events.h5"
+        return f"stdin.events{suffix}"
     path = Path(source)
     name = path.resolve().name if path.name in ("", ".", "..") else path.name
-    return f"{name if path.is_dir() else Path(name).stem}.events.h5"
+    return f"{name if path.is_dir() else Path(name).stem}.events{suffix}"
 
 
 def convert_reading(
@@ -191,7 +192,7 @@ def convert_reading(
     recording, workers = reading.source, reading.threads
     if recording.largest is not None and recording.dtype.kind == "f":
         check_white(recording.largest, recording.path, config.frames.full_scale)
-    target = output or default_output(reading.path)
+    target = output or default_output(reading.path, format)
     name = to_write(Path(target), format, layout).name
     keeps_all_bits = name in ("folder", "zip")  # whole recordings, to which the frames belong
     with_frames = with_frames or keeps_all_bits

@@ -39,6 +39,12 @@ def test_the_default_output_is_that_of_the_command(clip):
     assert adv2e.convert(clip, fps=100, overwrite=True).events > 0
 
 
+def test_the_default_output_has_the_suffix_of_its_format(clip):
+    assert adv2e.convert(clip, fps=100, format="evt2").output == "clip.events.raw"
+    assert adv2e.convert(clip, fps=100, format="folder").output == "clip.events"
+    assert len(adv2e.read_events("clip.events.raw").events) > 100
+
+
 def test_a_doubt_is_a_warning_and_no_note(clip, tmp_path):
     (tmp_path / "times.txt").write_text("0\n33\n66\n100\n133\n")
     with pytest.warns(UserWarning, match=r"times\.txt: .*ms") as told:

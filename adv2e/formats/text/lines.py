@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ _LOWER = 32  # sets a letter in lower case
 _LONGEST = 1000  # digits of a number
 _MOST = 2**63 // 10 - 1  # that one more digit leaves within 64 bits
 _TENS = 10 ** np.arange(19)
+_EXACT = 12  # digits of a number that stays within 64 bits whatever is done with it
 
 Numbers = NDArray[np.int64]
 
@@ -49,6 +51,9 @@ def parse_lines(
     wrong : int
         The first line that is wrong, from 1, before which the columns end; 0 if there is none.
     """
+    found = _plain_numbers(block, fields, order[0])
+    if found is not None and decimals >= 0 and not (exact and found.point):
+        return found.columns(decimals, order), np.arange(1, len(found.numbers) + 1), 0
     if b"#" in block:
         block = _COMMENT.sub(b"", block)
     data = np.frombuffer(b"\n" + block + b"\n", np.uint8)
@@ -77,6 +82,64 @@ def parse_lines(
         wrong = int(lines[bad[0]])
         return columns[:, : bad[0]], lines[: bad[0]], wrong
     return columns, lines, wrong
+
+
+@dataclass(frozen=True)
+class _Plain:
+    """Numbers of lines that are written plainly.
+
+    Attributes
+    ----------
+    numbers : array of int64, (lines, fields)
+        The time has two fields if it has a point: what is before it, and what is behind.
+    point : bool
+        It has.
+    digits : array of int64, (lines,)
+        Digits behind it.
+    """
+
+    numbers: Numbers
+    point: bool
+    digits: Numbers
+
+    def columns(self, decimals: int, order: tuple[int, ...]) -> Numbers:
+        """Return time, x, y and polarity, (4, lines), the time times 10**decimals."""
+        time = order[0]
+        places = [place + (self.point and place > time) for place in order]
+        columns = np.ascontiguousarray(self.numbers.T[places])
+        columns[0] *= _TENS[decimals]
+        if self.point:
+            behind, over = self.numbers[:, time + 1], self.digits - decimals
+            whole, scale = _TENS[np.maximum(over, 0)], _TENS[np.maximum(-over, 0)]
+            columns[0] += (behind + whole // 2) // whole * scale
+        return columns
+
+
+def _plain_numbers(block: bytes, fields: int, time: int) -> _Plain | None:
+    """Return the numbers of lines of digits and single blanks, with a point in each time or none.
+
+    Most files are written so, and compiled code reads them in a third of the time.  None: some
+    line may be of another kind.
+    """
+    if not block.endswith(b"\n") or block.translate(None, b"0123456789. \n"):
+        return None
+    data = np.frombuffer(block, np.uint8)
+    edges = np.flatnonzero(data < ord("0"))
+    marks = data[edges]
+    count, points = (int(np.count_nonzero(marks == ord(mark))) for mark in "\n.")
+    if points not in (0, count) or edges.size != count * (fields + (points > 0)):
+        return None
+    between = bytearray(b" " * (fields - 1) + b"\n")
+    if points:
+        between.insert(time, ord("."))
+    lengths = np.diff(edges, prepend=-1).reshape(count, -1) - 1
+    if (marks.reshape(count, -1) != np.frombuffer(between, np.uint8)).any():
+        return None
+    if lengths.min() < 1 or lengths.max() > _EXACT:
+        return None
+    text = block.translate(bytes.maketrans(b".", b" "))
+    numbers = np.fromstring(text, np.int64, sep=" ").reshape(count, -1)
+    return _Plain(numbers, points > 0, lengths[:, time + 1] if points else lengths[:, time])
 
 
 def _numbers(

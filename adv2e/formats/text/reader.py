@@ -25,6 +25,7 @@ from adv2e.sources.stored import DESCRIPTION, EVENTS
 from adv2e.ticks import LARGEST_NS, US, check_us
 
 _BLOCK = 1 << 22  # bytes read at once
+_SAMPLE = 1 << 19  # bytes that tell the unit of the times
 _PIECE = 1 << 18  # bytes parsed at once
 _DECIMALS = {"s": 6, "ms": 3, "us": 0, "ns": -3}  # that make a microsecond
 
@@ -145,7 +146,8 @@ def events_of_lines(
     with opened() as file:
         block = next(_blocks(file), b"")[skipped:]
     whole = not form.has_decimals(block)
-    (t, x, y, _), *_ = form.parse(block, 0 if whole else 6, exact=whole)
+    sample = block[: block.rfind(b"\n", 0, _SAMPLE) + 1 or len(block)]
+    (t, x, y, _), *_ = form.parse(sample, 0 if whole else 6, exact=whole)
     unit = facts.unit_of_events(t if whole else t / 1e6, x, y, facts.geometry, whole=whole)
     decimals = _DECIMALS[unit.name]
 

@@ -2,6 +2,8 @@ from decimal import ROUND_HALF_UP, Decimal
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from adv2e.errors import DataError
 from adv2e.formats.reading import read_events
@@ -210,3 +212,31 @@ def test_broken_metadata_are_a_problem_not_an_error(tmp_path):
 
     assert recording.metadata == {}
     assert "e.txt.json: not a JSON mapping, ignored" in recording.problems[0]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 10**11).map(str),
+            st.text("0123456789", min_size=1, max_size=13),
+            *(st.integers(0, 70_000).map(str) for _ in range(3)),
+        ),
+        min_size=1,
+        max_size=20,
+    ),
+    st.booleans(),
+    st.integers(0, 6),
+)
+def test_lines_written_plainly_are_read_as_all_others(rows, point, decimals):
+    lines = [
+        f"{whole}.{part} {x} {y} {p}" if point else f"{whole} {x} {y} {p}"
+        for whole, part, x, y, p in rows
+    ]
+    plain, others = ("".join(f"{first}{line}\n" for line in lines) for first in ("", "  "))
+    for exact in (False, True):
+        found, expected = (
+            parse_lines(text.encode(), decimals, exact=exact) for text in (plain, others)
+        )
+        assert np.array_equal(found[0], expected[0])
+        assert np.array_equal(found[1], expected[1])
+        assert found[2] == expected[2]
