@@ -59,20 +59,21 @@ def open_aedat4(path: Path, facts: Facts) -> EventFile:
     Raises
     ------
     DataError
-        It is damaged, or holds no events.
+        It is damaged, or holds neither events nor frames.
     MissingExtraError
         Its packets are compressed, and the package for it is not installed.
     """
     head = _head(path)
     events = _first(head.streams, _EVENTS, facts)
-    if events is None:
+    beside = [s for s in head.streams if events is None or s.source == events.source]
+    frames = _first(beside or head.streams, _FRAME, facts)
+    first = events or frames
+    if first is None:
         kinds = ", ".join(stream.holds for stream in head.streams) or "nothing"
-        raise DataError(f"{path}: holds no stream of events (EVTS), but {kinds}")
-    beside = [s for s in head.streams if s.source == events.source] or head.streams
-    frames = _first(beside, _FRAME, facts)
-    if events.description:
-        facts.describe(events.description, f"{path}: adv2e", "the file")
-    facts.state(events.size, "the header")
+        raise DataError(f"{path}: holds neither events (EVTS) nor frames ({_FRAME}), but {kinds}")
+    if first.description:
+        facts.describe(first.description, f"{path}: adv2e", "the file")
+    facts.state(first.size, "the header")
     facts.stated_unit = "us"
     shots = [] if frames is None else list(_shots(path, head, frames.number, facts))
     if any(a.t_ns > b.t_ns for a, b in pairwise(shots)):
@@ -80,6 +81,8 @@ def open_aedat4(path: Path, facts: Facts) -> EventFile:
         shots.sort(key=lambda shot: shot.t_ns)
 
     def parts() -> Iterator[Columns]:
+        if events is None:
+            return
         with path.open("rb") as file:
             held: list[np.ndarray[tuple[int], np.dtype[np.void]]] = []
             for begin, label, data in _packets(path, file, head, events.number, facts):

@@ -144,16 +144,18 @@ def test_frames_lie_among_the_events_around_them(tmp_path):
     assert "".join(kinds) == "FeFeeFeFFF"
 
 
-def write_by_library(path):
+def write_by_library(path, *, events=True):
     library = pytest.importorskip("dv_processing")
     config = library.io.MonoCameraWriter.Config("DAVIS346_sample")
-    config.addEventStream((346, 260))
+    if events:
+        config.addEventStream((346, 260))
     config.addFrameStream((346, 260))
     writer = library.io.MonoCameraWriter(str(path), config)
-    store = library.EventStore()
-    for t, x, y, p in CORNERS.tolist():
-        store.push_back(t, x, y, bool(p))
-    writer.writeEvents(store)
+    if events:
+        store = library.EventStore()
+        for t, x, y, p in CORNERS.tolist():
+            store.push_back(t, x, y, bool(p))
+        writer.writeEvents(store)
     for t_ns, image in FRAMES:
         ordered = image[..., ::-1] if image.ndim == 3 else image
         writer.writeFrame(library.Frame(t_ns // 1000, ordered))
@@ -169,6 +171,14 @@ def test_a_file_of_the_library_is_read(tmp_path):
     assert recording.frame_times_ns.tolist() == [t_ns for t_ns, _ in FRAMES]
     for frame, (_, image) in zip(recording.frames(), FRAMES, strict=True):
         assert np.array_equal(frame.image, image)
+
+
+def test_a_file_of_frames_alone_has_no_events(tmp_path):
+    recording = read_events(write_by_library(tmp_path / "a.aedat4", events=False))
+
+    assert (recording.width, recording.height) == (346, 260)
+    assert recording.problems == ["no events"]
+    assert recording.frame_times_ns.tolist() == [t_ns for t_ns, _ in FRAMES]
 
 
 def interrupted(path):
