@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.errors import DataError, UsageError
+from adv2e.files.regular import check_ends
 
 _LARGEST_US = 2**62 // 1000  # adv2e.ticks.LARGEST_NS, without NumPy
 
@@ -395,8 +396,10 @@ def format_of(path: Path) -> Format:
     Raises
     ------
     DataError
-        It is of no known format, or not of that which its suffix says.
+        It is of no known format, or not of that which its suffix says; or it is a pipe, which
+        would have to be read twice.
     """
+    check_ends(path)
     if path.is_dir():
         folders = [found for found in FORMATS if found.reader and "" in found.suffixes]
         return next((f for f in folders if (path / f.file).is_file()), folders[0])

@@ -81,7 +81,9 @@ class Real:
                     return
                 yield frame
 
-        return resimulator(frames, config, self.source.encoding, threads=threads)
+        # its frames lie on its own sensor, whatever camera the configuration is of
+        config = replace(config, sensor=None)
+        return resimulator(frames, config, self.source.encoding, self.size, threads=threads)
 
     def thinned(self) -> Real:
         """Return the recording with every second frame alone, the last one kept."""

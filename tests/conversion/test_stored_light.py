@@ -100,7 +100,8 @@ def test_converted_again_a_recording_gives_the_same_events(adv2e, made, tmp_path
     assert first.events.size > 1000
     assert again.events.tobytes() == first.events.tobytes()
     # one simulation more, as comparisons make it
-    simulate = resimulator(first.frames, load_config([], QUIET[1::2]), first.encoding)
+    size = first.width, first.height
+    simulate = resimulator(first.frames, load_config([], QUIET[1::2]), first.encoding, size)
     assert simulate(0).tobytes() == first.events.tobytes()
 
 

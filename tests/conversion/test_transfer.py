@@ -250,4 +250,4 @@ def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
         adv2e_convert(f"{count}.h5", f"{count}.txt", threads=1)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    assert peaks[1] < peaks[0] + (1 << 20)
+    assert peaks[1] < peaks[0] + (4 << 20)  # of 10 MB that the larger one's events take
