@@ -31,7 +31,7 @@ from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
 from adv2e.formats import compression
-from adv2e.formats.registry import to_write
+from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.sink import Sink
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Size
@@ -193,8 +193,13 @@ def convert_reading(
     if recording.largest is not None and recording.dtype.kind == "f":
         check_white(recording.largest, recording.path, config.frames.full_scale)
     target = output or default_output(reading.path, format)
-    name = to_write(Path(target), format, layout).name
-    keeps_all_bits = name in ("folder", "zip")  # whole recordings, to which the frames belong
+    chosen = to_write(Path(target), format, layout)
+    if with_frames:
+        check_frames(chosen)
+    keeps_all_bits = chosen.name in (
+        "folder",
+        "zip",
+    )  # whole recordings, to which the frames belong
     with_frames = with_frames or keeps_all_bits
     decoder = decoder_for(
         config.frames,

@@ -30,7 +30,7 @@ from adv2e.formats import compression
 from adv2e.formats.assembly import inside
 from adv2e.formats.event_file import EventFile, Progress
 from adv2e.formats.reading import open_events
-from adv2e.formats.registry import to_write
+from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.sink import Sink
 from adv2e.formats.streaming import events_in_order
 from adv2e.formats.writing import open_sink
@@ -144,7 +144,10 @@ def convert_events(
     """
     began = time.perf_counter()
     selection = Selection(start_s, stop_s, t0)
-    keeps_all_bits = to_write(Path(output), format, layout).name in ("folder", "zip")
+    chosen = to_write(Path(output), format, layout)
+    if with_frames:
+        check_frames(chosen)
+    keeps_all_bits = chosen.name in ("folder", "zip")
     file = open_events(path, time_unit=time_unit, size=size, rotate180=rotate180)
     facts = file.facts
     if causes and file.causes is None:
@@ -185,6 +188,7 @@ def convert_events(
             stored = _write_frames(file, part, sink, keeps_all_bits) if sink.wants_frames else 0
             events = on = first = last = 0
             for chunk in parts:
+                ends = chunk["t"][-1] > part.last_us
                 wanted = part.of(chunk)
                 if wanted.size:
                     sink.write_events(wanted)
@@ -192,7 +196,7 @@ def convert_events(
                     last = int(wanted["t"][-1])
                     events += wanted.size
                     on += int(np.count_nonzero(wanted["p"]))
-                if chunk["t"][-1] > part.last_us:
+                if ends:
                     break
             parts.close()
     for text in dict.fromkeys(facts.problems):

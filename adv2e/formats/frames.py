@@ -26,9 +26,9 @@ _DAVIS240C = ("zip", "folder")
 def open_frames(path: str | Path, **given: Any) -> Source:
     """Open an input with frames; parameters and errors as :func:`adv2e.sources.open_source`."""
     named = Path(path)
-    raw = given.get("pixel_format") is not None
+    other = given.get("pixel_format") is not None or given.get("along") is not None
     if (
-        raw
+        other
         or not (named.exists() and may_hold_events(named))
         or format_of(named).name in _DAVIS240C
     ):

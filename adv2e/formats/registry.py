@@ -381,6 +381,15 @@ def to_write(path: Path, format: str | None = None, layout: str | None = None) -
     return next(f for f in FORMATS if f.name == layout)
 
 
+def check_frames(found: Format) -> None:
+    """Raise UsageError if a format is to hold frames and cannot."""
+    if "w" not in found.frames:
+        others = [f.name for f in FORMATS if "w" in f.frames]
+        raise UsageError(
+            f"--with-frames: {found.what} holds events alone; frames go to {', '.join(others)}"
+        )
+
+
 def may_hold_events(path: Path) -> bool:
     """Tell, by its name alone, whether a file or folder may be an event file."""
     readable = (found for found in FORMATS if found.reader)

@@ -204,6 +204,21 @@ def test_options_of_a_simulation_are_refused(option, adv2e, tmp_path):
     assert not (tmp_path / "b.txt").exists()
 
 
+def test_frames_are_refused_where_they_cannot_be_stored(adv2e, tmp_path):
+    write(tmp_path / "a.zip", events_of(), frames_of())
+    for more in ((), ("--from", "events")):
+        told = adv2e("convert", "a.zip", "-o", "b.raw", "--with-frames", *more)
+        assert told.status == 2
+        assert "--with-frames: EVT 3.0 of Prophesee's cameras holds events alone" in told.err
+    assert not (tmp_path / "b.raw").exists()
+
+
+def test_a_recording_is_no_picture_to_move_before(adv2e, tmp_path):
+    write(tmp_path / "a.aedat4", events_of(), frames_of())
+    told = adv2e("convert", "a.aedat4", "-o", "b.txt", "--motion", "pan")
+    assert (told.status, "--motion moves before one picture" in told.err) == (1, True)
+
+
 def test_an_output_must_be_named(adv2e, tmp_path):
     write(tmp_path / "a.h5", events_of())
     told = adv2e("convert", "a.h5")
