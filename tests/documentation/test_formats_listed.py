@@ -8,7 +8,6 @@ from adv2e.formats.registry import FORMATS
 from documentation.documents import ROOT
 
 DOCUMENT = ROOT / "adv2e" / "formats" / "README.md"
-_DONE = {"r": "read", "w": "written", "rw": "read, written", "": ""}
 
 
 def listed():
@@ -24,9 +23,9 @@ def test_every_format_has_a_row_that_says_what_is_done():
     rows = listed()
     assert list(rows) == [found.name for found in FORMATS]
     for found in FORMATS:
-        _, suffix, events, frames, _ = rows[found.name]
+        _, suffix, events, frames, *_ = rows[found.name]
         assert set(re.findall("`([^`]+)`", suffix)) == {s for s in found.suffixes if s}, found.name
-        assert events == _DONE["r" * bool(found.reader) + "w" * bool(found.writer)], found.name
-        assert frames == _DONE[found.frames], found.name
+        assert events == "r" * bool(found.reader) + "w" * bool(found.writer), found.name
+        assert frames == found.frames, found.name
         extra = re.findall(r"`\.\[(\w+)\]`", rows[found.name][0])
         assert extra == [found.extra] * bool(found.extra), found.name
