@@ -196,10 +196,7 @@ def convert_reading(
     chosen = to_write(Path(target), format, layout)
     if with_frames:
         check_frames(chosen)
-    keeps_all_bits = chosen.name in (
-        "folder",
-        "zip",
-    )  # whole recordings, to which the frames belong
+    keeps_all_bits = chosen.is_davis240c
     with_frames = with_frames or keeps_all_bits
     decoder = decoder_for(
         config.frames,

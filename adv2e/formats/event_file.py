@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.formats.units import event_unit
-from adv2e.sources.frame import RECORDED, Light, Pixels, Shot
+from adv2e.sources.frame import Light, Pixels, Shot
 from adv2e.sources.frame import rotated180 as turned_pixels
-from adv2e.sources.stored import light_stored
+from adv2e.sources.stored import recorded_light
 from adv2e.sources.times.units import Unit
 
 MOST_COLUMNS = 1 << 16
@@ -121,17 +121,8 @@ class Facts:
 
     @property
     def light(self) -> Light:
-        """What the numbers of the frames stand for, as a conversion of them takes it.
-
-        Frames that cameras recorded beside events are linear; of those that this program stored,
-        the file says it.
-
-        Raises
-        ------
-        DataError
-            The file says what cannot be.
-        """
-        return light_stored(self.description, str(self.path)) or Light("linear", RECORDED)
+        """What the numbers of the frames stand for; see :func:`recorded_light`."""
+        return recorded_light(self.description, str(self.path))
 
     def note_frames(self, unit: Unit, *, whole: bool) -> None:
         """Take the unit of the times of two or more frames, and whether they are whole numbers."""

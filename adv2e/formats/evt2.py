@@ -31,7 +31,7 @@ import numpy as np
 
 from adv2e.events import Events
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.formats.percent_header import Header, header_of
+from adv2e.formats.percent_header import Header, raw_header
 from adv2e.formats.sink import Request, Writer
 from adv2e.formats.words import Counter, Kinds, blocks, last_before
 
@@ -75,10 +75,7 @@ class Evt2Writer(Writer):
     def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
         (path,) = temporary
         self._file = stack.enter_context(path.open("wb"))
-        size = f"height={request.height};width={request.width}"
-        geometry = f"geometry {request.width}x{request.height}"
-        self._file.write(header_of(request, "evt 2.0", f"format EVT2;{size}", geometry))
-        self._file.write(b"% end\n")
+        self._file.write(raw_header(request, "2.0"))
         self._file.write(np.array([_HIGH << 28], "<u4").data)
         self._high = 0
 

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from adv2e.events import Events
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.formats.percent_header import Header, header_of
+from adv2e.formats.percent_header import Header, raw_header
 from adv2e.formats.sink import Request, Writer
 from adv2e.formats.words import Counter, Kinds, Numbers, blocks, last_before
 
@@ -154,10 +154,7 @@ class Evt3Writer(Writer):
     def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
         (path,) = temporary
         self._file = stack.enter_context(path.open("wb"))
-        size = f"height={request.height};width={request.width}"
-        geometry = f"geometry {request.width}x{request.height}"
-        self._file.write(header_of(request, "evt 3.0", f"format EVT3;{size}", geometry))
-        self._file.write(b"% end\n")
+        self._file.write(raw_header(request, "3.0"))
         self._high = self._low = self._row = -1
 
     def write_events(self, events: Events) -> None:

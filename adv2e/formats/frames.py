@@ -19,9 +19,6 @@ from adv2e.sources.listed import ListedSource, Picture, Timed, timed
 from adv2e.sources.stored import EVENTS
 from adv2e.sources.wanted import GivenTimes, Selection
 
-_DAVIS240C = ("zip", "folder")
-"""Formats whose frames are a source of their own, as they may come without events."""
-
 
 def open_frames(path: str | Path, **given: Any) -> Source:
     """Open an input with frames; parameters and errors as :func:`adv2e.sources.open_source`."""
@@ -30,7 +27,7 @@ def open_frames(path: str | Path, **given: Any) -> Source:
     if (
         other
         or not (named.exists() and may_hold_events(named))
-        or format_of(named).name in _DAVIS240C
+        or format_of(named).is_davis240c  # a source of its own: it may come without events
     ):
         return open_source(path, **given)
     listed = given.get("timestamps")
@@ -86,7 +83,7 @@ def takes_events(path: Path, choice: str | None = None) -> bool:
     if not (path.exists() and may_hold_events(path)):
         return False
     found = format_of(path)
-    if found.name in _DAVIS240C:
+    if found.is_davis240c:
         files = Members(path)
         if files.enter(EVENTS):
             return open_events(path).shots is None

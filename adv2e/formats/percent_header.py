@@ -86,6 +86,13 @@ def read_header(path: Path) -> Header:
     return Header(path, values, at)
 
 
+def raw_header(request: Request, version: str) -> bytes:
+    """Return the whole header of a RAW file in EVT of that version, such as 3.0."""
+    encoding = f"EVT{version[0]};height={request.height};width={request.width}"
+    geometry = f"geometry {request.width}x{request.height}"
+    return header_of(request, f"evt {version}", f"format {encoding}", geometry) + b"% end\n"
+
+
 def header_of(request: Request, *lines: str) -> bytes:
     """Return a header of such lines and the settings; the end is for the caller to add."""
     settings = f"adv2e {to_line(request.description)}"

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import Events
-from adv2e.sources.frame import RECORDED, Frame, Image, Light, Pixels, as_pixels, odd_white
-from adv2e.sources.stored import light_stored
+from adv2e.sources.frame import Frame, Image, Light, Pixels, as_pixels, odd_white
+from adv2e.sources.stored import recorded_light
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,8 @@ class Recording:
 
     @property
     def light(self) -> Light:
-        """What the numbers of the frames stand for, as a conversion of them takes it.
-
-        Frames that cameras recorded beside events are linear; of those that this program stored,
-        the file says it.
-
-        Raises
-        ------
-        DataError
-            The file says what cannot be.
-        """
-        return light_stored(self.metadata, self.path) or Light("linear", RECORDED)
+        """What the numbers of the frames stand for; see :func:`recorded_light`."""
+        return recorded_light(self.metadata, self.path)
 
     @property
     def encoding(self) -> str:

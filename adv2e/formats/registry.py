@@ -78,6 +78,11 @@ class Format:
         """Whether it is a layout of HDF5."""
         return ".h5" in self.suffixes
 
+    @property
+    def is_davis240c(self) -> bool:
+        """Whether it is a whole recording, to which frames belong, with all their bits."""
+        return self.name in ("zip", "folder")
+
     def load(self, what: str) -> Any:
         """Return the object that `what`, `reader` or `writer`, stands for."""
         module, _, name = what.partition(":")

@@ -13,7 +13,7 @@ from typing import Any
 
 from adv2e.effects.frames.encoding import check_encoding
 from adv2e.errors import ConfigError, DataError
-from adv2e.sources.frame import Light
+from adv2e.sources.frame import RECORDED, Light
 
 EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
 """Files of a recording: its events, its frames and their times, and how it was made."""
@@ -52,6 +52,20 @@ def light_stored(description: Any, label: str) -> Light | None:
     if white is not None and not _is_white(white):
         raise DataError(f"{label}: {section}.full_scale: must be a number above 0, got {white!r}")
     return Light(encoding, _REASON, white)
+
+
+def recorded_light(description: Any, label: str) -> Light:
+    """Return what the numbers of frames beside events stand for, as a conversion takes them.
+
+    Frames that cameras recorded are linear; of those that this program stored, the description
+    says it.
+
+    Raises
+    ------
+    DataError
+        As :func:`light_stored`.
+    """
+    return light_stored(description, label) or Light("linear", RECORDED)
 
 
 def _is_white(value: Any) -> bool:
