@@ -145,7 +145,10 @@ def convert(
     if fps is not None and timestamps is not None:
         raise UsageError("fps and timestamps both give the times of the frames: keep one")
     if takes_events(Path(source), take):
-        simulated = {"config": config, "fps": fps, "timestamps": timestamps, "preview": preview}
+        simulated = {
+            **{"config": config, "fps": fps, "timestamps": timestamps, "preview": preview},
+            **{"bayer": bayer, "pixel_format": pixel_format, "motion": motion},
+        }
         simulated |= {"bayer": bayer, "pixel_format": pixel_format}
         if given := [name for name, value in simulated.items() if value is not None]:
             raise UsageError(f"{source} holds events, nothing is simulated: leave out {given[0]}")

@@ -147,7 +147,7 @@ def convert_events(
     chosen = to_write(Path(output), format, layout)
     if with_frames:
         check_frames(chosen)
-    keeps_all_bits = chosen.name in ("folder", "zip")
+    keeps_all_bits = chosen.is_davis240c
     file = open_events(path, time_unit=time_unit, size=size, rotate180=rotate180)
     facts = file.facts
     if causes and file.causes is None:
@@ -156,8 +156,6 @@ def convert_events(
         )
     with _bar(path, progress) as facts.progress:
         found, first_us, parts = events_in_order(file)
-        if found == (0, 0):
-            raise DataError(f"{path}: no events, and no size of the sensor: state it with --size")
         part = _part(path, found, first_us, selection, crop)
         width, height = part.crop[2:]
         frames = file.shots is not None and (with_frames or keeps_all_bits)

@@ -108,7 +108,6 @@ def _write(
     size, _, parts = events_in_order(file)
     begin = -math.inf if start_us is None else start_us
     end = math.inf if stop_us is None else stop_us
-    times = sequence.image_times_us
     with open_sink(
         path,
         width=size[0],
@@ -118,20 +117,23 @@ def _write(
         with_frames=True,
         threads=threads,
     ) as sink:
-        for t_us, (t_ns, image) in zip(times, images_of(sequence), strict=True):
-            if begin <= t_us <= end:
-                sink.write_frame(t_ns, image)
+        for t_ns, image in images_of(sequence, begin, end):
+            sink.write_frame(t_ns, image)
         for events in parts:
             chosen = _between(events, begin, end)
             if chosen.size:
                 sink.write_events(chosen)
 
 
-def images_of(sequence: Sequence) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Yield time [ns] and picture, grey and of 8 bits, of each image of a sequence."""
-    file = sequence.file
+def images_of(
+    sequence: Sequence, begin_us: float = -math.inf, end_us: float = math.inf
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    """Yield time [ns] and picture, grey and of 8 bits, of each image between two times."""
+    file, times = sequence.file, sequence.image_times_us
     assert file.shots is not None
-    for shot in file.shots():
+    for t_us, shot in zip(times, file.shots(), strict=True):
+        if not begin_us <= t_us <= end_us:
+            continue
         yield shot.t_ns, grey(stored_picture(shot.load(), file.facts.light, False))
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from adv2e import __version__
-from adv2e.errors import DataError
 from adv2e.export import e2vid, ev_segnet, voxels
 from adv2e.export.sequence import Sequence, open_sequences
 from adv2e.export.windows import Slice, before_images, between_images, by_count, by_time
@@ -77,16 +76,12 @@ def export_voxels(
     """
     settings = settings or voxels.VoxelSettings()
 
-    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
-        items = 0
-        for sequence in sequences:
-            size, slices = _slices(sequence, cutting)
-            items += (number := voxels.write_voxels(slices, size, folder / sequence.name, settings))
-            told["sequences"].append({"name": sequence.name, "size": list(size), "items": number})
-        return items
+    def one(sequence: Sequence, folder: Path) -> tuple[tuple[int, int], int]:
+        size, slices = _slices(sequence, cutting)
+        return size, voxels.write_voxels(slices, size, folder / sequence.name, settings)
 
     described = {"to": "voxel", "cutting": asdict(cutting), **asdict(settings)}
-    return _exported(paths, output, described, "voxel grids", write, **how)
+    return _exported(paths, output, described, "voxel grids", _each(one), **how)
 
 
 def export_ev_segnet(
@@ -105,21 +100,15 @@ def export_ev_segnet(
     """
     settings = settings or ev_segnet.SegmentationSettings()
 
-    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
-        items = 0
-        for sequence in sequences:
-            size, _, parts = events_in_order(sequence.file)
-            slices = before_images(parts, sequence.image_times_us, window_us)
-            images = (image for _, image in e2vid.images_of(sequence))
-            number = ev_segnet.write_event_images(
-                sequence.name, slices, images, size, folder, settings
-            )
-            told["sequences"].append({"name": sequence.name, "size": list(size), "items": number})
-            items += number
-        return items
+    def one(sequence: Sequence, folder: Path) -> tuple[tuple[int, int], int]:
+        size, _, parts = events_in_order(sequence.file)
+        slices = before_images(parts, sequence.image_times_us, window_us)
+        images = (image for _, image in e2vid.images_of(sequence))
+        number = ev_segnet.write_event_images(sequence.name, slices, images, size, folder, settings)
+        return size, number
 
     described = {"to": "ev-segnet", "window_us": window_us, **asdict(settings)}
-    return _exported(paths, output, described, "pictures of events", write, **how)
+    return _exported(paths, output, described, "pictures of events", _each(one), **how)
 
 
 def export_e2vid(
@@ -155,12 +144,28 @@ def export_e2vid(
     return _exported(paths, output, described, "sequences", write, **how)
 
 
+Write = Callable[[list[Sequence], Path, dict[str, Any]], int]
+"""Is given the recordings, the folder, and what is told of them; returns how many items."""
+
+
+def _each(one: Callable[[Sequence, Path], tuple[tuple[int, int], int]]) -> Write:
+    """Return what writes recordings one by one; `one` returns size of the sensor and items."""
+
+    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
+        for sequence in sequences:
+            size, items = one(sequence, folder)
+            told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
+        return sum(entry["items"] for entry in told["sequences"])
+
+    return write
+
+
 def _exported(
     paths: Many[str | Path],
     output: str | Path,
     described: dict[str, Any],
     what: str,
-    write: Callable[[list[Sequence], Path, dict[str, Any]], int],
+    write: Write,
     *,
     time_unit: str | None = None,
     size: tuple[int, int] | None = None,
@@ -180,7 +185,7 @@ def _exported(
     what : str
         What the items are, for people.
     write : callable
-        Is given the recordings, the folder, and what is told of them; returns how many items.
+        Fills the folder.
     time_unit, size
         See :func:`adv2e.formats.reading.open_events`.
     overwrite : bool
@@ -217,11 +222,6 @@ def _exported(
 def _slices(sequence: Sequence, cutting: Cutting) -> tuple[tuple[int, int], Iterator[Slice]]:
     """Return the size of the sensor and the windows of a recording."""
     size, first_us, parts = events_in_order(sequence.file)
-    if size == (0, 0):
-        raise DataError(
-            f"{sequence.file.facts.path}: no events, and no size of the sensor: state it with"
-            " --size"
-        )
     if cutting.at_images:
         return size, between_images(parts, sequence.image_times_us)
     if cutting.count is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from adv2e.errors import DataError, UsageError
@@ -19,7 +20,7 @@ class Sequence:
     name: str
     file: EventFile
 
-    @property
+    @cached_property
     def image_times_us(self) -> list[int]:
         """Times of its images [us]; DataError if it has none."""
         if self.file.shots is None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from adv2e.errors import DataError
 from adv2e.events import Events, empty_events, is_sorted, sort_ties
 from adv2e.formats.assembly import (
     Check,
@@ -29,14 +30,23 @@ def events_in_order(file: EventFile) -> tuple[tuple[int, int], int, Generator[Ev
 
     The events come part by part, those on the sensor.  What is doubtful is added to the problems of
     the file, of the events themselves after the last part that is taken.
+
+    Raises
+    ------
+    DataError
+        There are no events, and no size is stated; or the file cannot be read.
     """
     seen = survey(file)
     if not seen.is_sorted:
         recording = assemble(file)
-        events = recording.events
-        first_us = int(events["t"][0])
-        return (recording.width, recording.height), first_us, (part for part in [events])
+        held = [recording.events] if recording.events.size else []
+        first_us = int(held[0]["t"][0]) if held else 0
+        return (recording.width, recording.height), first_us, (part for part in held)
     size = settled_size(seen.needed, file.facts)
+    if size == (0, 0):
+        raise DataError(
+            f"{file.facts.path}: no events, and no size of the sensor: state it with --size"
+        )
     check = Check()
 
     def parts() -> Generator[Events, None, None]:
@@ -61,8 +71,6 @@ class Survey:
 
     Attributes
     ----------
-    count : int
-        Events, but for those that no sensor can have.
     needed : (int, int) or None
         Width and height that the largest coordinates need; None without events.
     first_us : int
@@ -71,7 +79,6 @@ class Survey:
         Times never decrease.
     """
 
-    count: int
     needed: tuple[int, int] | None
     first_us: int
     is_sorted: bool
@@ -79,20 +86,20 @@ class Survey:
 
 def survey(file: EventFile) -> Survey:
     """Read all events of a file once, and keep none."""
-    check, count, needed = Check(), 0, (0, 0)
+    check = Check()
+    needed: tuple[int, int] | None = None
     first = last = None
-    in_order = True
+    rising = True
     for columns in file.parts():
         events = check.events_of(columns)
         if not events.size:
             continue
-        count += events.size
-        here = needed_size(events) or (0, 0)
-        needed = max(needed[0], here[0]), max(needed[1], here[1])
+        here, most = needed_size(events) or (0, 0), needed or (0, 0)
+        needed = max(most[0], here[0]), max(most[1], here[1])
         first = events["t"][0] if first is None else first
-        in_order &= is_sorted(events) and (last is None or bool(last <= events["t"][0]))
+        rising &= is_sorted(events) and (last is None or bool(last <= events["t"][0]))
         last = events["t"][-1]
-    return Survey(count, needed if count else None, int(first or 0), in_order)
+    return Survey(needed, int(first or 0), rising)
 
 
 def in_order(parts: Iterable[Events]) -> Iterator[Events]:

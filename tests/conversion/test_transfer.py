@@ -219,6 +219,21 @@ def test_a_recording_is_no_picture_to_move_before(adv2e, tmp_path):
     assert (told.status, "--motion moves before one picture" in told.err) == (1, True)
 
 
+def test_events_out_of_order_that_all_lie_outside_leave_none(adv2e, tmp_path):
+    (tmp_path / "a.txt").write_text("0.2 9 9 1\n0.1 8 8 0\n")
+    told = adv2e("convert", "a.txt", "-o", "b.h5", "--size", "4x3")
+    assert told.status == 0, told.err
+    assert "2 events outside 4x3, which --size states: left out" in told.err
+    assert adv2e_read(tmp_path / "b.h5").events.size == 0
+
+
+@pytest.mark.parametrize("option", [{"bayer": "RGGB"}, {"motion": "pan"}, {"fps": 30}])
+def test_arguments_of_a_simulation_are_refused(option, tmp_path):
+    write(tmp_path / "a.h5", events_of())
+    with pytest.raises(UsageError, match=f"nothing is simulated: leave out {next(iter(option))}"):
+        adv2e_convert("a.h5", "b.txt", **option)
+
+
 def test_an_output_must_be_named(adv2e, tmp_path):
     write(tmp_path / "a.h5", events_of())
     told = adv2e("convert", "a.h5")
