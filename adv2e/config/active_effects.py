@@ -48,7 +48,7 @@ def frame_hooks(frames: Frames, sampling: Sampling) -> Iterator[Hooks]:
         yield ClockDriftHooks(frames.clock_drift_ppm)
     if frames.clock_offset_us:
         yield ClockOffsetHooks(frames.clock_offset_us)
-    if frames.exposure_us and sampling.interpolation == "flow":
+    if frames.exposure_us and sampling.interpolation != "linear":
         # imported late: few conversions need it, and all would load its compiled loops
         from adv2e.effects.frames.motion_blur import MotionBlurHooks  # noqa: PLC0415
 

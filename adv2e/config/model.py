@@ -31,7 +31,7 @@ from adv2e.geometry import MOST_PIXELS
 from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter, subsection
 
-INTERPOLATIONS = ("linear", "flow")
+INTERPOLATIONS = ("linear", "flow", "onnx")
 FITS = ("crop", "pad", "stretch", "none")
 MOST_COLUMNS = 1 << 16
 """Columns, or rows, that the coordinates of events can name."""
@@ -149,8 +149,19 @@ class Sampling(Section):
     interpolation: str = parameter(
         "linear",
         unit="-",
-        meaning="how in-between frames are made, in linear light",
+        meaning="how in-between frames are made: linear blends them, flow moves them along the"
+        " motion, onnx asks a network",
         choices=INTERPOLATIONS,
+    )
+    model: str | None = parameter(
+        None, unit="-", meaning="ONNX file of the network that interpolation: onnx asks"
+    )
+    max_motion_px: float | None = parameter(
+        None,
+        unit="px",
+        meaning="furthest that a pixel may move from one made frame to the next, if L of them are"
+        " enough; null: always L",
+        above=0,
     )
     last_interval: str = parameter(
         "corrected",
@@ -158,6 +169,22 @@ class Sampling(Section):
         meaning="start of the last interpolated interval; printed: as in the paper's equation",
         choices=("corrected", "printed"),
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        network = self.interpolation == "onnx"
+        if network and not self.model:
+            raise ConfigError("model: interpolation: onnx needs the network's file, such as a.onnx")
+        if self.model is not None and not network:
+            raise ConfigError(
+                f"model: {self.interpolation} interpolation asks no network: leave it out, or set"
+                " interpolation: onnx"
+            )
+        if self.max_motion_px is not None and self.interpolation == "linear":
+            raise ConfigError(
+                "max_motion_px: linear interpolation knows of no motion: leave it out, or set"
+                " interpolation: flow or onnx"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

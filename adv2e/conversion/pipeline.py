@@ -36,6 +36,7 @@ from adv2e.formats.sink import Sink
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Size
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
+from adv2e.light.interpolation import network_of
 from adv2e.light.pictures import drawn, picture_white
 from adv2e.light.sensor import fitting_of
 from adv2e.sources import STDIN
@@ -271,6 +272,9 @@ def convert_reading(
     if told:
         largest = f"{recording.path}: whole numbers up to {recording.largest_read:g} came"
         found = "" if found else f"{largest}: what was said of white does not hold"
+    network = network_of(config.sampling)
+    if network is not None:
+        log(f"frames in between are made by {network.text}")
     for note in recording.notes:
         log(note)
     if found:
@@ -298,15 +302,17 @@ def _metadata(
 
     `white` is that of the frames stored; None where there are none.
     """
-    own = user_sources(config)
+    own, network = user_sources(config), network_of(config.sampling)
+    runs = network.PACKAGES if network is not None else ()
     stored = {"encoding": decoder.encoding, "full_scale": white}
     crop = recording.selection.crop
     return {
         "adv2e": __version__,
-        "versions": versions((*recording.packages, *compression.PACKAGES)),
+        "versions": versions((*recording.packages, *compression.PACKAGES, *runs)),
         "config": to_dict(config),
         "seed": config.seed,
         **({"effects": own} if own else {}),
+        **({"network": network.source} if network is not None else {}),
         "source": {
             "name": shown(Path(recording.path).name),
             "kind": recording.kind,

@@ -86,9 +86,7 @@ class Intervals:
         self._printed = sampling.last_interval == "printed"
         # without frames in between, there is nothing to interpolate
         linear = sampling.interpolation == "linear" or sampling.L == 1
-        self._upsampler = (
-            None if linear else make_upsampler(sampling.interpolation, sampling.L, threads=threads)
-        )
+        self._upsampler = None if linear else make_upsampler(sampling, threads=threads)
         self._first = t_ns, first
         per_frame = self._L if linear else 1
         frames = max(2, min(_MOST // per_frame + 2, FRAME_BYTES // max(1, first.nbytes)))
@@ -157,8 +155,9 @@ class Intervals:
 
     def _cut(self, frames: Iterator[Timed]) -> Iterator[_Instant]:
         """Yield the instants of all intervals."""
-        upsampler, count = self._upsampler, self._L
+        upsampler = self._upsampler
         if upsampler is None:
+            count = self._L
             before_ns = self._first[0]
             for now_ns, now in frames:
                 self._hold(now)
@@ -168,6 +167,7 @@ class Intervals:
                 before_ns = now_ns
             return
         for (start_ns, a), (stop_ns, b), beside in neighbours(chain([self._first], frames)):
+            count = upsampler.count(a, b, beside)
             for step, made in enumerate(upsampler.between(a, b, beside), start=1):
                 t_ns = instant_ns(start_ns, stop_ns, step, count)
                 check_light(made, f"a frame made {t_ns * 1e-9:.6f} s in")

@@ -115,6 +115,27 @@ def bends(
     return _bend(first, second, there, spans), _bend(second, first, back, spans[::-1])
 
 
+def fastest(motion: Motion, bend: Bend | None) -> float:
+    """Return the greatest speed on the paths of a frame's pixels [px per interval].
+
+    Velocity is linear in time but for its jump, so it is greatest at an end of what lies before the
+    jump, or behind it.  No path is faster; one that bends in both ways may be slower.
+    """
+    if bend is None:
+        return float(np.hypot(motion.u, motion.v).max())
+    most = 0.0
+    for jumped in (bend.when - 1.0, bend.when):
+        for sign in (-1.0, 1.0):
+            ends = (
+                along + sign * even + jumped * jump
+                for along, even, jump in zip(
+                    (motion.u, motion.v), bend.even, bend.jump, strict=True
+                )
+            )
+            most = max(most, float(np.hypot(*ends).max()))
+    return most
+
+
 def _is_like(span: float) -> bool:
     return 1.0 / _LIKE_SPANS <= span <= _LIKE_SPANS
 

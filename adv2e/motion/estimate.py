@@ -62,11 +62,14 @@ class Motion:
         Columns and rows moved [px].
     score : (rows, columns) float32
         Lower is more credible; from ONE_SIDED on not seen in the other frame, UNKNOWN: none.
+    unexplained : float
+        How much the light changes along the motion as it was found, over its change in place.
     """
 
     u: Image
     v: Image
     score: Image
+    unexplained: float = 0.0
 
 
 def estimate_motion(a: NDArray[Any], b: NDArray[Any]) -> tuple[Motion, Motion] | None:
@@ -78,7 +81,7 @@ def estimate_motion(a: NDArray[Any], b: NDArray[Any]) -> tuple[Motion, Motion] |
         return None
     ga, gb = _log_light(a, b)
     change = np.abs(ga - gb)
-    if not np.any(change > _LEAST_CHANGE):
+    if not _is_seen(change):
         return None
     equal = cv2.erode((a == b).astype(np.uint8), np.ones(_AROUND, np.uint8)).astype(np.bool_)
     there, back = _flow(ga, gb)
@@ -90,6 +93,16 @@ def estimate_motion(a: NDArray[Any], b: NDArray[Any]) -> tuple[Motion, Motion] |
             return None
         found.append(motion)
     return found[0], found[1]
+
+
+def is_unchanged(a: NDArray[Any], b: NDArray[Any]) -> bool:
+    """Tell whether two frames are equal to within 1 %, but for a change of the whole scene."""
+    ga, gb = _log_light(a, b)
+    return not _is_seen(np.abs(ga - gb))
+
+
+def _is_seen(change: Image) -> bool:
+    return bool(np.any(change > _LEAST_CHANGE))
 
 
 def _log_light(a: NDArray[Any], b: NDArray[Any]) -> tuple[Image, Image]:
@@ -145,7 +158,7 @@ def _judged(
     score: Image = np.add(around / _MISMATCH_UNIT, 0.5 / (1.0 + np.hypot(u, v)), dtype=np.float32)
     score[lost] = ONE_SIDED
     score[doubtful | (distance >= UNKNOWN)] = UNKNOWN
-    return Motion(u, v, score)
+    return Motion(u, v, score, float(cost.mean() / change.mean()))
 
 
 def _doubtful(seen: Any, cost: Any, change: Any) -> Any:

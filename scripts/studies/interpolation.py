@@ -201,7 +201,9 @@ def costs(seed: int, sizes: list[tuple[int, int]]) -> list[Cost]:
         for method in ("linear", "flow"):
             took = []
             for _ in range(4):  # the first also compiles
-                upsampler = make_upsampler(method, 10)  # which keeps the motion it found
+                upsampler = make_upsampler(
+                    Sampling(interpolation=method)
+                )  # which keeps the motion it found
                 start = time.perf_counter()
                 for _ in upsampler.between(a, b):
                     pass

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from flow_scenes import FIGURE, GROUND, clouds, disk, pan, pixels
 
+from adv2e.config.model import Sampling
 from adv2e.light.interpolation import make_upsampler
 from adv2e.light.interpolation.sequence import Beside, neighbours
-from adv2e.motion.acceleration import Side, bends
+from adv2e.motion.acceleration import Bend, Side, bends, fastest
 from adv2e.motion.estimate import Motion
 
 SHAPE = (40, 48)
@@ -34,7 +35,7 @@ def swung(t):
 
 
 def made(scene, beside, L=4):
-    upsampler = make_upsampler("flow", L)
+    upsampler = make_upsampler(Sampling(interpolation="flow", L=L))
     return list(upsampler.between(scene(0.0), scene(1.0), beside))
 
 
@@ -167,16 +168,40 @@ def test_neighbours_of_a_sequence():
 
 
 def test_motion_is_found_once_for_each_pair(monkeypatch):
-    from adv2e.light.interpolation import flow
+    from adv2e.light.interpolation import paths
 
     asked = []
 
     def estimate(a, b):
         asked.append((a[0, 0], b[0, 0]))
 
-    monkeypatch.setattr(flow, "estimate_motion", estimate)
+    monkeypatch.setattr(paths, "estimate_motion", estimate)
     frames = [(k, np.full((40, 40), k, np.float32)) for k in range(6)]
-    upsampler = make_upsampler("flow", 3)
+    upsampler = make_upsampler(Sampling(interpolation="flow", L=3))
     for (_, a), (_, b), beside in neighbours(iter(frames)):
         list(upsampler.between(a, b, beside))
     assert asked == [(k, k + 1) for k in range(5)]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_path_is_faster_than_the_fastest(seed):
+    rng = np.random.default_rng(seed)
+    u, v, p, q, j, k = rng.normal(0.0, 3.0, (6, *SHAPE)).astype(np.float32)
+    kind = seed % 4  # straight, even, hit, both
+    none = np.zeros(SHAPE, np.float32)
+    even = (p, q) if kind in (1, 3) else (none, none)
+    jump = (j, k) if kind in (2, 3) else (none, none)
+    bend = Bend(even, jump, rng.uniform(0.05, 0.95, SHAPE).astype(np.float32))
+    motion = Motion(u, v, none)
+    # the same path in small steps, as pixels are sent
+    share = np.linspace(1e-4, 1 - 1e-4, 2001)
+    ways = []
+    for s in share:
+        x, y = bend.at(s)
+        ways.append((s * u - s * (1 - s) * x, s * v - s * (1 - s) * y))
+    ways = np.array(ways)
+    speed = np.hypot(*np.moveaxis(np.diff(ways, axis=0), 1, 0)).max() / (share[1] - share[0])
+    most = fastest(motion, bend)
+    assert speed <= most * 1.001
+    if kind != 3:
+        assert speed >= most * 0.98

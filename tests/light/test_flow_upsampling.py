@@ -16,7 +16,7 @@ from adv2e.motion.warping import ONE_SIDED, UNKNOWN
 
 
 def made(a, b, L=4, interpolation="flow", **options):
-    return list(make_upsampler(interpolation, L, **options).between(a, b))
+    return list(make_upsampler(Sampling(interpolation=interpolation, L=L), **options).between(a, b))
 
 
 def error(light, truth, border=6):
@@ -161,7 +161,7 @@ def test_threads_and_order_of_pairs_change_nothing():
     before = cv2.getNumThreads()
     try:
         results = []
-        upsampler = make_upsampler("flow", 5, threads=3)
+        upsampler = make_upsampler(Sampling(interpolation="flow", L=5), threads=3)
         list(upsampler.between(pan(0.0), pan(1.0)))
         results.append(list(upsampler.between(a, b)))
         for threads in (1, 2, 4):

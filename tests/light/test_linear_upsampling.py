@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from adv2e.config.model import Sampling
 from adv2e.errors import ConfigError
 from adv2e.light.interpolation import make_upsampler
 
@@ -17,7 +18,7 @@ def frames(dtype=np.float32, shape=(24, 31)):
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_light_is_linear_in_time(dtype):
     a, b = frames(dtype)
-    made = list(make_upsampler("linear", 7).between(a, b))
+    made = list(make_upsampler(Sampling(L=7)).between(a, b))
     assert len(made) == 7
     for number, light in enumerate(made, start=1):
         expected = a.astype(float) + (b.astype(float) - a.astype(float)) * number / 7
@@ -27,26 +28,26 @@ def test_light_is_linear_in_time(dtype):
 
 def test_the_last_frame_is_the_second_itself():
     a, b = frames()
-    assert list(make_upsampler("linear", 4).between(a, b))[-1] is b
+    assert list(make_upsampler(Sampling(L=4)).between(a, b))[-1] is b
 
 
 def test_one_frame_an_interval_is_the_second_frame_alone():
     a, b = frames()
-    made = list(make_upsampler("linear", 1).between(a, b))
+    made = list(make_upsampler(Sampling(L=1)).between(a, b))
     assert len(made) == 1
     assert made[0] is b
 
 
 def test_pixels_that_do_not_change_keep_every_bit():
     a, b = frames()
-    for light in make_upsampler("linear", 10).between(a, b):
+    for light in make_upsampler(Sampling(L=10)).between(a, b):
         assert np.array_equal(light[:7], a[:7])
 
 
 def test_frames_given_are_left_as_they_are_and_each_result_is_its_own():
     a, b = frames()
     before = a.copy(), b.copy()
-    made = list(make_upsampler("linear", 3).between(a, b))
+    made = list(make_upsampler(Sampling(L=3)).between(a, b))
     made[0][:] = -1
     assert np.array_equal(a, before[0])
     assert np.array_equal(b, before[1])
@@ -56,21 +57,21 @@ def test_frames_given_are_left_as_they_are_and_each_result_is_its_own():
 @pytest.mark.parametrize("shape", [(1, 1), (4, 1), (1, 4), (3, 5)])
 def test_frames_of_any_size(shape):
     a, b = frames(shape=shape)
-    middle = next(make_upsampler("linear", 2).between(a, b))
+    middle = next(make_upsampler(Sampling(L=2)).between(a, b))
     assert middle.shape == shape
     np.testing.assert_allclose(middle, (a.astype(float) + b) / 2, rtol=1e-6)
 
 
 def test_views_of_larger_arrays():
     a, b = frames()
-    middle = next(make_upsampler("linear", 2).between(a[::2, ::3], b[::2, ::3]))
+    middle = next(make_upsampler(Sampling(L=2)).between(a[::2, ::3], b[::2, ::3]))
     np.testing.assert_allclose(middle, (a[::2, ::3].astype(float) + b[::2, ::3]) / 2, rtol=1e-6)
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "flow"])
 def test_pairs_that_do_not_fit_are_refused(interpolation):
     a, b = frames()
-    upsampler = make_upsampler(interpolation, 2)
+    upsampler = make_upsampler(Sampling(interpolation=interpolation, L=2))
     with pytest.raises(ValueError, match="two frames"):
         next(upsampler.between(a, b[:5]))
     with pytest.raises(ValueError, match="two frames"):
@@ -80,10 +81,12 @@ def test_pairs_that_do_not_fit_are_refused(interpolation):
 
 
 def test_unknown_interpolation_names_key_and_choices():
-    with pytest.raises(ConfigError, match=r"sampling\.interpolation: .*linear or flow.*'cubic'"):
-        make_upsampler("cubic", 10)
+    with pytest.raises(
+        ConfigError, match="interpolation: must be one of linear, flow, onnx, got 'cubic'"
+    ):
+        Sampling(interpolation="cubic")
 
 
 def test_no_frames_an_interval_is_refused():
-    with pytest.raises(ConfigError, match=r"sampling\.L: must be at least 1, got 0"):
-        make_upsampler("linear", 0)
+    with pytest.raises(ConfigError, match="L: must be at least 1, got 0"):
+        Sampling(L=0)

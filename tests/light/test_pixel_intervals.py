@@ -143,7 +143,7 @@ def test_parts_hold_every_frame_made_along_the_motion(monkeypatch, sizes, printe
     frames, times = [np.roll(still, 2 * k, 1) for k in range(6)], clock(6)
     settings = sampling(L, printed=printed, interpolation="flow")
     parts = cut(frames, times, settings, threads=threads)
-    upsampler = make_upsampler("flow", L)
+    upsampler = make_upsampler(Sampling(interpolation="flow", L=L))
     light = [frames[0]]
     for a, b in itertools.pairwise(frames):
         light += list(upsampler.between(a, b))

@@ -51,7 +51,7 @@ class FrameCache:
         """
         frames, sampling = config.frames, config.sampling
         once = is_made_once(config)
-        how = (sampling.interpolation, sampling.L, frames.exposure_us) if once else None
+        how = (sampling, frames.exposure_us) if once else None
         key, acting = (frames.encoding, frames.full_scale, how), _until_moved(config)
 
         def in_place() -> Instants:
@@ -98,10 +98,13 @@ def is_made_once(config: Config) -> bool:
     Not where an effect needs to know which of them were recorded, and not where making them costs
     nothing: linear interpolation, of frames as they are.
     """
-    sampling, user = config.sampling, getattr(config, "user", None)
+    sampling, user, coupling = config.sampling, getattr(config, "user", None), coupling_of(config)
+    # which were recorded is counted, and intervals differ in number
+    uneven = sampling.max_motion_px is not None
     return (
         (_is_along_motion(config) or config.frames.exposure_us > 0.0)
         and sampling.last_interval != "printed"
+        and not (uneven and coupling is not None and coupling.amplitude)
         and not any(getattr(user, name) is not None for name in user_effects(config))
     )
 
@@ -145,14 +148,14 @@ def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Ins
     sharp = _after(Frames(exposure_us=config.frames.exposure_us), config, times_ns, light)
     if not _is_along_motion(config):
         return times_ns, sharp
-    count = config.sampling.L
-    upsampler = make_upsampler(config.sampling.interpolation, count)
+    upsampler = make_upsampler(config.sampling)
     times: list[int] = []
     found: list[NDArray[np.float32]] = []
     for (t0, first), (t1, second), beside in neighbours(zip(times_ns, sharp, strict=True)):
         if not times:
             times.append(t0)
             found.append(first)
+        count = upsampler.count(first, second, beside)
         times += [instant_ns(t0, t1, k, count) for k in range(1, count + 1)]
         found += list(upsampler.between(first, second, beside))
     return times, np.array(found, np.float32)

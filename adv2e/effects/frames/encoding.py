@@ -108,6 +108,34 @@ def decode_values(values: NDArray[Any], encoding: str, full_scale: float) -> NDA
     return light
 
 
+def encode_light(light: NDArray[Any], encoding: str) -> NDArray[Any]:
+    """Return the value, 1 for white, whose light is `light` [DN], in its own float type.
+
+    The inverse of :func:`decode_values`; negative light has the value of none, above white curves
+    go on.
+
+    Raises
+    ------
+    ConfigError
+        For auto, pq and hlg, which nothing needs to be encoded to, and for what is no curve.
+    """
+    check_encoding(encoding)
+    share = np.maximum(light, 0) / light.dtype.type(255)
+    value: NDArray[Any]
+    if encoding == "linear":
+        value = share
+    elif encoding == "srgb":
+        value = np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)
+    elif encoding == "bt709":
+        above = _BT709_E * share**0.45 - (_BT709_E - 1)
+        value = np.where(share < _BT709_D, 4.5 * share, above)
+    elif encoding.startswith("gamma:"):
+        value = np.power(share, 1 / float(encoding.partition(":")[2]), dtype=share.dtype)
+    else:
+        raise ConfigError(f"encoding: must be linear, srgb, bt709 or gamma:<g>, got {encoding!r}")
+    return value
+
+
 def _linear(value: NDArray[Any]) -> NDArray[Any]:
     return value
 

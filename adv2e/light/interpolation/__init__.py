@@ -1,29 +1,37 @@
 """In-between frames, so that no pixel jumps too far between samples.
 
-Each input interval is cut into L equal parts; the frame at l/L of it is made from the light of the
-two frames around it, linear in time for every pixel (:mod:`.linear`) or along the motion
-(:mod:`.flow`).
+Each input interval is cut into L equal parts, or into fewer where little moves
+(:mod:`.paths`).  The frame at l/L of it is made from the light of the two frames around it: linear
+in time for every pixel (:mod:`.linear`), along the motion (:mod:`.flow`), or by a network
+(:mod:`.network`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import NDArray
 
-from adv2e.errors import ConfigError
+from adv2e.config.model import Sampling
 from adv2e.light.interpolation.linear import LinearUpsampler
 from adv2e.light.interpolation.sequence import NOTHING, Beside
+
+if TYPE_CHECKING:
+    from adv2e.light.interpolation.onnx_file import Network
 
 
 class Upsampler(Protocol):
     """Makes the frames inside one input interval."""
 
+    def count(self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING) -> int:
+        """Return how many frames :meth:`between` makes of the same interval, at least 1."""
+        ...
+
     def between(
         self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING
     ) -> Iterator[NDArray[Any]]:
-        """Yield the light at l/L of the way from `a` to `b`, l = 1..L; the last is `b` itself.
+        """Yield the light at l/n of the way from `a` to `b`, l = 1..n; the last is `b` itself.
 
         Parameters
         ----------
@@ -40,29 +48,49 @@ class Upsampler(Protocol):
         ...
 
 
-def make_upsampler(interpolation: str, L: int, *, threads: int = 1) -> Upsampler:
-    """Return what makes `L` frames of each input interval.
+def make_upsampler(sampling: Sampling, *, threads: int = 1) -> Upsampler:
+    """Return what makes the frames of each input interval.
 
-    Parameters
-    ----------
-    interpolation : str
-        ``linear`` or ``flow``.
-    L : int
-        Frames an interval, at least 1.
-    threads : int
-        In-between frames made at a time; they do not depend on it.
+    `threads` in-between frames are made at a time; they do not depend on it.
 
     Raises
     ------
     ConfigError
-        `interpolation` is unknown or `L` below 1.
+        A network's file is not one that can be asked, or cannot make so many frames.
+    MissingExtraError
+        A network is asked for, and what runs it is not installed.
     """
-    if L < 1:
-        raise ConfigError(f"sampling.L: must be at least 1, got {L}")
-    if interpolation == "linear":
-        return LinearUpsampler(L)
-    if interpolation == "flow":
-        from adv2e.light.interpolation.flow import FlowUpsampler  # noqa: PLC0415 - compiled code
+    if sampling.interpolation == "linear":
+        return LinearUpsampler(sampling.L)
+    # imported late: compiled code
+    from adv2e.light.interpolation.paths import Paths  # noqa: PLC0415
 
-        return FlowUpsampler(L, threads=threads)
-    raise ConfigError(f"sampling.interpolation: must be linear or flow, got {interpolation!r}")
+    paths = Paths(sampling.L, sampling.max_motion_px)
+    if sampling.interpolation == "flow":
+        from adv2e.light.interpolation.flow import FlowUpsampler  # noqa: PLC0415
+
+        return FlowUpsampler(paths, threads=threads)
+    from adv2e.light.interpolation.network import NetworkUpsampler  # noqa: PLC0415
+
+    network = network_of(sampling)
+    # without frames in between, there is nothing to ask a network for
+    return (
+        LinearUpsampler(1)
+        if network is None
+        else NetworkUpsampler(network, sampling, threads=threads)
+    )
+
+
+def network_of(sampling: Sampling) -> Network | None:
+    """Return the network that is asked for frames; None: none is.
+
+    Raises
+    ------
+    ConfigError, MissingExtraError
+        As :func:`adv2e.light.interpolation.onnx_file.open_network`.
+    """
+    if sampling.model is None or sampling.L == 1:
+        return None
+    from adv2e.light.interpolation.onnx_file import open_network  # noqa: PLC0415 - few need it
+
+    return open_network(sampling.model)

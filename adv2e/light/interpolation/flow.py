@@ -35,65 +35,42 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.background import worker_pool
 from adv2e.light.interpolation.linear import LinearUpsampler, check_pair
-from adv2e.light.interpolation.sequence import NOTHING, Beside
-from adv2e.motion.acceleration import Bend, Side, bends
-from adv2e.motion.estimate import Motion, estimate_motion
+from adv2e.light.interpolation.paths import Paths
+from adv2e.light.interpolation.sequence import NOTHING, Beside, ordered
+from adv2e.motion.acceleration import Bend
+from adv2e.motion.estimate import Motion
 from adv2e.motion.warping import compose, splat
 
 Array = NDArray[Any]
-Pair = tuple[Motion, Motion]
 
 
 class FlowUpsampler:
-    """Makes `L` frames of each interval along the motion, `threads` of them at a time."""
+    """Makes the frames of each interval along `paths`, `threads` of them at a time."""
 
-    def __init__(self, L: int, *, threads: int = 1) -> None:
-        self.L = L
-        self.threads = threads
-        self._linear = LinearUpsampler(L)
-        self._known: list[tuple[Array, Array, Pair | None]] = []
+    def __init__(self, paths: Paths, *, threads: int = 1) -> None:
+        self._paths, self._threads = paths, threads
+
+    def count(self, a: Array, b: Array, beside: Beside = NOTHING) -> int:
+        """Return how many frames :meth:`between` makes."""
+        return self._paths.count(a, b, beside)
 
     def between(self, a: Array, b: Array, beside: Beside = NOTHING) -> Iterator[Array]:
-        """Yield `L` frames, the last `b` itself; see :class:`.Upsampler`."""
+        """Yield the frames, the last `b` itself; see :class:`.Upsampler`."""
         check_pair(a, b)
-        motion = self._motion(a, b) if self.L > 1 else None
-        if motion is None:
-            yield from self._linear.between(a, b)
+        count = self.count(a, b, beside)
+        way = None if count == 1 else self._paths.of(a, b, beside)
+        if way is None or way.motion is None:
+            yield from LinearUpsampler(count).between(a, b)
             return
-        bent = bends(*motion, *self._sides(a, b, beside))
+        motion, bent = way.motion, way.bent
         first, second = np.ascontiguousarray(a), np.ascontiguousarray(b)
 
         def frame(step: int) -> Array:
-            return warp(first, second, *motion, step / self.L, bent)
+            return warp(first, second, *motion, step / count, bent)
 
-        if self.threads > 1:
-            with worker_pool(self.threads) as pool:
-                # no more at a time than threads, so that memory does not grow with L
-                for start in range(1, self.L, self.threads):
-                    yield from pool.map(frame, range(start, min(start + self.threads, self.L)))
-        else:
-            yield from map(frame, range(1, self.L))
+        yield from ordered(frame, count, self._threads)
         yield b
-
-    def _sides(self, a: Array, b: Array, beside: Beside) -> tuple[Side | None, Side | None]:
-        """Return the motion to what lies beside; none at all where only one side is there."""
-        if beside.before is None or beside.after is None:
-            return None, None
-        before, after = self._motion(beside.before, a), self._motion(b, beside.after)
-        if before is None or after is None:
-            return None, None
-        return Side(before[1], beside.span_before), Side(after[0], beside.span_after)
-
-    def _motion(self, a: Array, b: Array) -> Pair | None:
-        """Return the motion between two frames, found once for the three intervals that ask."""
-        for first, second, found in self._known:
-            if first is a and second is b:
-                return found
-        found = estimate_motion(a, b)
-        self._known = [*self._known[-2:], (a, b, found)]
-        return found
 
 
 def warp(

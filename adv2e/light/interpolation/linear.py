@@ -42,6 +42,11 @@ class LinearUpsampler:
     def __init__(self, L: int) -> None:
         self.L = L
 
+    def count(self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING) -> int:
+        """Return `L`."""
+        del a, b, beside
+        return self.L
+
     def between(
         self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING
     ) -> Iterator[NDArray[Any]]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
+
+from adv2e.background import worker_pool
 
 Timed = tuple[int, NDArray[Any]]
 """Time [ns] and light [DN] of a frame."""
@@ -36,6 +38,21 @@ NOTHING = Beside()
 def instant_ns(start_ns: int, stop_ns: int, step: int, count: int) -> int:
     """Return the time of a step of an interval of `count`, to the nearest ns."""
     return start_ns + ((stop_ns - start_ns) * step + count // 2) // count
+
+
+def ordered(
+    frame: Callable[[int], NDArray[Any]], count: int, threads: int
+) -> Iterator[NDArray[Any]]:
+    """Yield ``frame(step)`` of the steps 1 to `count` - 1, `threads` of them made at a time.
+
+    No more are held than that, so that memory does not grow with `count`.
+    """
+    if threads == 1:
+        yield from map(frame, range(1, count))
+        return
+    with worker_pool(threads) as pool:
+        for start in range(1, count, threads):
+            yield from pool.map(frame, range(start, min(start + threads, count)))
 
 
 def neighbours(frames: Iterable[Timed]) -> Iterator[tuple[Timed, Timed, Beside]]:
