@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-r"""How far interpolated frames are from the truth, as events: linear against flow.
+r"""How far interpolated frames are from the truth, as events: linear, flow and networks.
 
 Scenes are rendered as a camera of 24, 30 and 60 frames a second would take them.  The frames go
 through the interpolation and the default pixel (background noise off) to events.  The truth is the
@@ -7,9 +7,10 @@ same pixel, with the same thresholds, fed with the scene itself at 2000 pictures
 so that nothing moves by more than a quarter of a pixel between two.
 
 Beside ``linear`` and ``flow`` stands ``perfect``: frames rendered at the L times of each interval.
-What it lacks is due to L, not to interpolation.
+What it lacks is due to L, not to interpolation.  ``--model`` adds networks, ``--max-motion`` flow
+with as few frames as keep pixels from moving further than that between two.
 
-    python scripts/studies/interpolation.py [--quick] [-o FILE.md]
+    python scripts/studies/interpolation.py [--quick] [--model FILE.onnx] [-o FILE.md]
 
 prints the tables; ``-o`` also writes them, with a figure in ``FILE.png``.
 """
@@ -20,7 +21,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -38,8 +39,9 @@ from adv2e.config.model import Config, Frames, Pixel, Sampling
 from adv2e.conversion.simulation import events_from_light
 from adv2e.events import Events, cut
 from adv2e.light.interpolation import make_upsampler
+from adv2e.light.interpolation.sequence import neighbours
 from adv2e.representations.voxel_grid import Grid, smoothed, voxel_grid
-from studies.interpolation_report import METHODS, Cost, Row, Score, draw, report
+from studies.interpolation_report import Cost, Row, Score, draw, report
 from studies.interpolation_scenes import Case, Image, cases
 
 RATES = (24.0, 30.0, 60.0)
@@ -50,6 +52,10 @@ EXPOSURE_PARTS = 33
 
 BINS = 5
 """Temporal bins of a frame interval, as in ``adv2e compare``."""
+
+
+Methods = Mapping[str, Sampling | None]
+"""What makes the frames, by its name in the tables; None: the scene itself."""
 
 
 @dataclass(frozen=True)
@@ -67,11 +73,11 @@ class Setup:
         return min(self.longest_s, case.duration_s)
 
 
-def configuration(setup: Setup, interpolation: str, count: int) -> Config:
-    """Return the default pixel without background noise, and `count` frames an interval."""
+def configuration(setup: Setup, sampling: Sampling) -> Config:
+    """Return the default pixel without background noise."""
     return Config(
         seed=setup.seed,
-        sampling=Sampling(L=count, interpolation=interpolation),
+        sampling=sampling,
         pixel=replace(Pixel(), leak=None, shot_noise=None),
     )
 
@@ -112,15 +118,27 @@ def events(light: Iterator[tuple[int, Image]], config: Config) -> Events:
 
 def true_events(case: Case, setup: Setup) -> Events:
     light = rendered(case, setup, case.true_hz(setup.height))
-    return events(light, configuration(setup, "linear", 1))
+    return events(light, configuration(setup, Sampling(L=1)))
 
 
-def made_events(case: Case, setup: Setup, rate: float, method: str) -> Events:
-    """Return the events of one method: linear, flow or perfect."""
-    if method == "perfect":
+def methods_of(setup: Setup, models: Sequence[Path], max_motion: float | None) -> Methods:
+    """Return what makes the frames, by the name in the tables."""
+    L = setup.L
+    found = {"linear": Sampling(L=L), "flow": Sampling(L=L, interpolation="flow")}
+    if max_motion is not None:
+        name = f"flow, {max_motion:g} px"
+        found[name] = Sampling(L=L, interpolation="flow", max_motion_px=max_motion)
+    for model in models:
+        found[model.stem] = Sampling(L=L, interpolation="onnx", model=str(model))
+    return {**found, "perfect": None}
+
+
+def made_events(case: Case, setup: Setup, rate: float, sampling: Sampling | None) -> Events:
+    """Return the events of one method; None: of the scene itself, rendered L times an interval."""
+    if sampling is None:
         light = rendered(case, setup, rate * setup.L)
-        return events(light, configuration(setup, "linear", 1))
-    config = configuration(setup, method, setup.L)
+        return events(light, configuration(setup, Sampling(L=1)))
+    config = configuration(setup, sampling)
     if case.declared:
         config = replace(config, frames=Frames(exposure_us=1e6 * case.exposure_s))
     return events(filmed(case, setup, rate), config)
@@ -179,31 +197,42 @@ def score(true: Events, made: Events, times_ns: list[int], setup: Setup) -> Scor
     )
 
 
-def study(case: Case, setup: Setup) -> list[Row]:
+def frames_made(case: Case, setup: Setup, rate: float, sampling: Sampling | None) -> float:
+    """Return how many frames an interval gets, in the mean."""
+    if sampling is None or sampling.max_motion_px is None:
+        return setup.L
+    upsampler = make_upsampler(sampling)
+    pairs = neighbours(filmed(case, setup, rate))
+    return float(np.mean([upsampler.count(a, b, beside) for (_, a), (_, b), beside in pairs]))
+
+
+def study(case: Case, setup: Setup, methods: Methods) -> list[Row]:
     """Return the rows of one case, one a frame rate."""
     true = true_events(case, setup)
     found = []
     for rate in RATES:
         times_ns = frame_times_ns(setup.duration_s(case), rate)
         scores = {
-            method: score(true, made_events(case, setup, rate, method), times_ns, setup)
-            for method in METHODS
+            name: score(true, made_events(case, setup, rate, sampling), times_ns, setup)
+            for name, sampling in methods.items()
         }
-        found.append(Row(case.name, rate, case.speed(setup.height) / rate, true.size, scores))
+        made = {name: frames_made(case, setup, rate, one) for name, one in methods.items()}
+        step_px = case.speed(setup.height) / rate
+        found.append(Row(case.name, rate, step_px, true.size, scores, made))
     return found
 
 
-def costs(seed: int, sizes: list[tuple[int, int]]) -> list[Cost]:
+def costs(seed: int, sizes: list[tuple[int, int]], methods: Methods) -> list[Cost]:
     """Return what ten frames of an interval of the pan cost on one thread, the best of three."""
     found = []
     for width, height in sizes:
         a, b = (cases(seed)[1].light(t_s, width, height) for t_s in (0.0, 1 / 30))
-        for method in ("linear", "flow"):
+        for method, sampling in methods.items():
+            if sampling is None:
+                continue
             took = []
             for _ in range(4):  # the first also compiles
-                upsampler = make_upsampler(
-                    Sampling(interpolation=method)
-                )  # which keeps the motion it found
+                upsampler = make_upsampler(sampling)  # which keeps the motion it found
                 start = time.perf_counter()
                 for _ in upsampler.between(a, b):
                     pass
@@ -212,11 +241,11 @@ def costs(seed: int, sizes: list[tuple[int, int]]) -> list[Cost]:
     return found
 
 
-def run(setup: Setup, tell: Callable[[str], None]) -> list[Row]:
+def run(setup: Setup, methods: Methods, tell: Callable[[str], None]) -> list[Row]:
     """Return all rows, in the order of the cases."""
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         rows = []
-        for found in pool.map(lambda case: study(case, setup), cases(setup.seed)):
+        for found in pool.map(lambda case: study(case, setup, methods), cases(setup.seed)):
             tell(f"done: {found[0].case}")
             rows += found
     return rows
@@ -225,19 +254,38 @@ def run(setup: Setup, tell: Callable[[str], None]) -> list[Row]:
 @click.command()
 @click.option("--quick", is_flag=True, help="Small pictures and short clips.")
 @click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True,
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
     help="Of textures, paths and thresholds.",
+)
+@click.option(
+    "--model",
+    "models",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE.onnx",
+    multiple=True,
+    help="A network to measure, too; may be given again.",
+)
+@click.option(
+    "--max-motion", type=click.FloatRange(min=0, min_open=True), metavar="PX",
+    help="Measure flow with sampling.max_motion_px, too.",
 )  # fmt: skip
 @output_option
 @one_line_errors()
-def main(quick: bool, seed: int, output: Path | None) -> None:
+def main(
+    quick: bool, seed: int, models: tuple[Path, ...], max_motion: float | None, output: Path | None
+) -> None:
     """Measure how far interpolated frames are from the truth, as events."""
     if output:
         load_pyplot()  # before the work, so that a missing package costs no time
     size = (128, 96, 1 / 6) if quick else (240, 180, 0.5)
-    rows = run(Setup(*size, seed), partial(click.echo, err=True))
+    setup = Setup(*size, seed)
+    methods = methods_of(setup, models, max_motion)
+    rows = run(setup, methods, partial(click.echo, err=True))
     sizes = [(240, 180)] if quick else [(240, 180), (346, 260), (640, 480)]
-    write_report(report(rows, costs(seed, sizes)), output)
+    write_report(report(rows, costs(seed, sizes, methods)), output)
     if output:
         draw(rows, output.with_suffix(".png"))
 

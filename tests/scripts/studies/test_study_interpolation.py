@@ -2,11 +2,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import onnx_models
 import pytest
 from studies import interpolation as study
 from studies import interpolation_scenes as scenes
+from studies.interpolation_report import report
 
 from adv2e.events import make_events
 
@@ -63,9 +66,28 @@ def test_light_of_every_case_is_smooth_in_time():
 def test_flow_is_nearer_than_linear_where_things_move():
     setup = study.Setup(64, 48, 1 / 15, 0)
     pan = scenes.cases(0)[1]
-    row = study.study(replace(pan, duration_s=1 / 12), setup)[1]
+    row = study.study(replace(pan, duration_s=1 / 12), setup, study.methods_of(setup, [], 1.0))[1]
     assert row.rate == 30.0
     scores = row.scores
     assert scores["perfect"].distance < scores["flow"].distance < 0.6 * scores["linear"].distance
     assert scores["flow"].made_to_true_ms < 0.3 * scores["linear"].made_to_true_ms
     assert abs(math.log(scores["flow"].ratio)) < abs(math.log(scores["linear"].ratio))
+    # as few frames as needed: half as many, and hardly worse
+    assert row.frames["flow"] == 10
+    assert 5 <= row.frames["flow, 1 px"] <= 8
+    assert scores["flow, 1 px"].distance < 0.6 * scores["linear"].distance
+
+
+def test_networks_stand_beside_under_the_names_of_their_files(tmp_path):
+    blend = onnx_models.blend(tmp_path / "blends.onnx", encoding="linear")
+    setup = study.Setup(32, 24, 1 / 15, 0)
+    methods = study.methods_of(setup, [Path(blend)], None)
+    assert list(methods) == ["linear", "flow", "blends", "perfect"]
+    short = replace(scenes.cases(0)[1], duration_s=1 / 12)
+    rows = study.study(short, setup, methods)
+    scores = rows[1].scores
+    # what blends light is linear interpolation
+    assert scores["blends"].distance == pytest.approx(scores["linear"].distance, rel=1e-2)
+    text = report(rows, study.costs(0, [(32, 24)], methods))
+    assert "Each cell: linear / flow / blends / perfect." in text
+    assert "| 32 x 24 | blends |" in text
