@@ -1,6 +1,7 @@
 """Whole conversions through the command line: formats, the record of their making, bad input."""
 
 import errno
+import hashlib
 import importlib.metadata
 import json
 import os
@@ -16,6 +17,7 @@ from pathlib import Path
 import cv2
 import h5py
 import numpy as np
+import onnx_models
 import pytest
 import tqdm
 from pictures import picture
@@ -578,3 +580,35 @@ def test_the_summary_counts_in_sentences(adv2e, video, tmp_path):
         r"[\d.]+ events a pixel a second; made in \d+\.\d s\n",
         out,
     )
+
+
+def asking(model, *more):
+    sets = ("sampling.interpolation=onnx", f"sampling.model={model}", *more)
+    return [word for one in sets for word in ("--set", one)]
+
+
+def test_a_network_is_told_and_recorded(adv2e, video, tmp_path):
+    model = onnx_models.blend(tmp_path / "blend.onnx", encoding="gamma:2.2")
+    outcome = adv2e("convert", video, "-o", tmp_path / "a.txt", *asking(model))
+    assert outcome.status == 0, outcome.err
+    assert "frames in between are made by blend.onnx: grey, gamma:2.2, at any time" in outcome.err
+    record = json.loads((tmp_path / "a.txt.json").read_text())
+    digest = hashlib.sha256(Path(model).read_bytes()).hexdigest()
+    assert record["network"] == {"file": "blend.onnx", "sha256": digest}
+    assert record["versions"]["onnxruntime"] == importlib.metadata.version("onnxruntime")
+    assert record["config"]["sampling"]["model"] == model
+    adv2e("convert", video, "-o", tmp_path / "b.txt", *asking(model), "--threads", "1")
+    assert (tmp_path / "b.txt").read_bytes() == (tmp_path / "a.txt").read_bytes()
+    adv2e("convert", video, "-o", tmp_path / "linear.txt")
+    assert "network" not in json.loads((tmp_path / "linear.txt.json").read_text())
+
+
+def test_a_network_that_is_none_leaves_nothing(adv2e, video, tmp_path):
+    model = tmp_path / "torn.onnx"
+    model.write_bytes(b"\x08\x08 torn")
+    outcome = adv2e("convert", video, "-o", tmp_path / "a.h5", *asking(model))
+    assert outcome.status == 1
+    assert outcome.err.strip().count("\n") == 0
+    assert f"sampling.model: {model}: is no network that can be run" in outcome.err
+    assert not (tmp_path / "a.h5").exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["clip.avi", "torn.onnx"]

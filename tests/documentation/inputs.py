@@ -12,6 +12,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import onnx_models
 from camera import Camera, patchwork
 from camera.catalogue import cases
 from pictures import picture
@@ -46,6 +47,11 @@ def images(path: Path) -> None:
 def photo(path: Path) -> None:
     """Make a picture."""
     cv2.imwrite(str(path), np.kron(picture(3), np.ones((2, 2), np.uint8)))
+
+
+def network(path: Path) -> None:
+    """Write a network that makes the frame between two."""
+    onnx_models.blend_stacked(path)
 
 
 def listed_images(path: Path) -> None:
@@ -118,6 +124,7 @@ INPUTS: dict[str, Callable[[Path], None]] = {
     "frames/": images,
     "sequence/": listed_images,
     "photo.png": photo,
+    "rife.onnx": network,
     "times.txt": times,
     "clip.npy": stack,
     "recording.zip": recording,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.config.active_effects import active_hooks, frame_hooks
-from adv2e.config.model import Frames
+from adv2e.config.model import Frames, Sampling
 from adv2e.config.user_effects import user_effects
 from adv2e.conversion.simulation import events_from_light
 from adv2e.diagnosis.configurations import coupling_of
@@ -176,7 +176,7 @@ def _as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
             readout = replace(readout, frame_coupling=None)
         frames = replace(frames, exposure_us=0.0)
         if _is_along_motion(config):
-            sampling = replace(sampling, L=1, interpolation="linear")
+            sampling = Sampling(L=1, K=sampling.K, last_interval=sampling.last_interval)
     if _is_moved(config):
         frames = replace(frames, black_level_dn=0.0, black_depth_dn=0.0, shift_px=(0.0, 0.0))
     return replace(config, frames=frames, sampling=sampling, readout=readout), effects

@@ -205,9 +205,20 @@ def moving(k):
 # slow enough to be followed at any time, and faster than the steps that the circuit needs
 COUPLED = ["readout.frame_coupling.amplitude=0.05", "readout.frame_coupling.tau_us=1150"]
 
+# frames move by 2.4 pixels: fewer than ten between them
+UNEVEN = ["sampling.max_motion_px=0.7"]
+
 
 @pytest.mark.parametrize(
-    "exposed", [[], ["frames.exposure_us=6000"], COUPLED, [*COUPLED, "frames.exposure_us=6000"]]
+    "exposed",
+    [
+        [],
+        ["frames.exposure_us=6000"],
+        COUPLED,
+        [*COUPLED, "frames.exposure_us=6000"],
+        UNEVEN,
+        [*UNEVEN, "frames.exposure_us=6000"],
+    ],
 )
 def test_frames_along_the_motion_are_made_once_and_the_same(monkeypatch, exposed):
     made = []
