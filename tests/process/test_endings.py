@@ -11,14 +11,11 @@ from processes import running_python
 from threads import wait_until
 
 
-@pytest.fixture
-def long_stack(tmp_path):
-    """Frames that take minutes to convert, with many events."""
-    path = tmp_path / "long.npy"
-    stack = np.lib.format.open_memmap(path, "w+", np.uint8, (100_000, 24, 32))
-    for k in range(10):
-        stack[k::10] = picture(k)
-    stack.flush()
+@pytest.fixture(scope="module")
+def long_stack(tmp_path_factory):
+    """Frames that take seconds to convert, with millions of events."""
+    path = tmp_path_factory.mktemp("long") / "long.npy"
+    np.save(path, np.tile([picture(k) for k in range(10)], (1_000, 1, 1)))
     return path
 
 
