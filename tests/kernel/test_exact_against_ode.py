@@ -1,4 +1,4 @@
-"""The exact solver against the dense ODE: counts equal, every time within 1 us."""
+"""Both solvers against the dense ODE: counts equal, every time within 1 us."""
 
 import math
 from dataclasses import replace
@@ -41,7 +41,7 @@ WITH_EFFECTS = (
 
 
 def compare(stimulus, circuit, sections):
-    """Return (agreement where the truth is defined, ties, events of the truth)."""
+    """Return (agreement where the truth is defined, ties, events of the truth and until when)."""
     truths = dense_truth(*stimulus, circuit)
     truth, until = as_lists(truths)
     found = []
@@ -50,24 +50,43 @@ def compare(stimulus, circuit, sections):
         found.append(events)
     assert all(a.tobytes() == b.tobytes() for a, b in zip(*found, strict=True))
     ties = sum(math.isfinite(u) for u in until)
-    return count_and_time_errors(found[0], truth, until), ties
+    return count_and_time_errors(found[0], truth, until), ties, (truth, until)
+
+
+def check_steps(stimulus, sections, truth, until):
+    """Compare the solver in steps of time with the truth."""
+    found = solve(stimulus.light, stimulus.times, quiet(**sections), method="stepped")
+    agreement = count_and_time_errors(found, truth, until)
+    assert agreement.count_b > 40
+    assert not agreement.differing
+    assert agreement.max_dt_us < 1.0
+    assert agreement.mean_dt_us < 0.1
 
 
 @pytest.mark.parametrize("name", CIRCUITS)
 @pytest.mark.parametrize(("fps", "L"), [(10, 10), (24, 10), (240, 1), (1000, 1)])
 def test_edges_ramps_and_textures(name, fps, L):
+    circuit, sections = CIRCUITS[name]
     stimulus = stimuli.standard(fps, L=L, pixels=24, frames=7)
-    agreement, ties = compare(stimulus, *CIRCUITS[name])
+    agreement, ties, truth = compare(stimulus, circuit, sections)
     assert agreement.count_b > 40
     assert not agreement.differing
     assert agreement.max_dt_us < 1.0
     assert ties <= 2
+    check_steps(stimulus, sections, *truth)
+
+
+@pytest.mark.parametrize(("fps", "L"), [(24, 10), (240, 1), (1000, 1)])
+def test_all_effects_in_steps_of_time(fps, L):
+    circuit, sections = WITH_EFFECTS
+    stimulus = stimuli.standard(fps, L=L, pixels=24, frames=7)
+    check_steps(stimulus, sections, *as_lists(dense_truth(*stimulus, circuit)))
 
 
 @pytest.mark.parametrize("fps", [24, 240])
 def test_with_second_pole_dead_time_and_leak(fps):
     stimulus = stimuli.standard(fps, L=10, pixels=16, frames=5)
-    agreement, _ = compare(stimulus, *WITH_EFFECTS)
+    agreement, *_ = compare(stimulus, *WITH_EFFECTS)
     assert agreement.count_b > 40
     assert not agreement.differing
     assert agreement.max_dt_us < 1.0
@@ -84,7 +103,7 @@ def test_with_dead_time_and_leak(fps, effects):
         circuit = replace(circuit, leak_hz=3.0, photo_leak_hz=6.0)
         sections["leak"] = Leak(rate_hz=3.0, photo_rate_hz=6.0, jitter=0.0)
     stimulus = stimuli.standard(fps, L=10, pixels=24, frames=7)
-    agreement, _ = compare(stimulus, circuit, sections)
+    agreement, *_ = compare(stimulus, circuit, sections)
     assert agreement.count_b > 40
     assert not agreement.differing
     assert agreement.max_dt_us < 1.0
@@ -115,7 +134,7 @@ def test_crossings_right_after_a_turn():
 def test_turning_points_and_returns():
     """Blinking pixels: every interval turns, and levels are approached without being reached."""
     stimulus = stimuli.blinking(pixels=30, frames=12, fps=200.0, L=1)
-    agreement, _ = compare(stimulus, *CIRCUITS["lin-log, dark corner"])
+    agreement, *_ = compare(stimulus, *CIRCUITS["lin-log, dark corner"])
     assert agreement.count_b > 40
     assert not agreement.differing
     assert agreement.max_dt_us < 1.0
@@ -142,7 +161,7 @@ def test_fast_and_slow_corners():
     for cutoff, dark in ((20.0, 1.0), (3000.0, 200.0), (30_000.0, 0.0)):
         circuit = Circuit(cutoff_hz=cutoff, dark_cutoff_hz=dark)
         low_pass = LowPass(cutoff_hz=cutoff, dark_cutoff_hz=dark)
-        agreement, _ = compare(stimulus, circuit, {"low_pass": low_pass})
+        agreement, *_ = compare(stimulus, circuit, {"low_pass": low_pass})
         assert agreement.count_b > 8
         assert not agreement.differing
         assert agreement.max_dt_us < 1.0

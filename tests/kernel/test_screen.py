@@ -1,6 +1,8 @@
 """The first pass over all pixels: its end values, and that no pixel that fires is missed."""
 
+import itertools
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -33,18 +35,21 @@ def draw(seed, knee, largest=0.99):
 def integrate(x0, x1, lag, length_us, circuit, steps=4000):
     """Return y at many instants, by a fourth-order Runge-Kutta method on the equation itself."""
 
-    def slope(s, y):
+    def at(s):
         x = x0 + (x1 - x0) * s
-        return length_us * (circuit.dark + circuit.per_dn * light(x, circuit)) * (x - y)
+        return x, length_us * (circuit.dark + circuit.per_dn * light(x, circuit))
 
     h, y = 1 / steps, x0 + lag
     path = [y]
+    end, end_rate = at(0.0)
     for k in range(steps):
-        s = k * h
-        k1 = slope(s, y)
-        k2 = slope(s + h / 2, y + h / 2 * k1)
-        k3 = slope(s + h / 2, y + h / 2 * k2)
-        k4 = slope(s + h, y + h * k3)
+        begin, begin_rate = end, end_rate
+        middle, middle_rate = at((k + 0.5) * h)
+        end, end_rate = at((k + 1) * h)
+        k1 = begin_rate * (begin - y)
+        k2 = middle_rate * (middle - y - h / 2 * k1)
+        k3 = middle_rate * (middle - y - h / 2 * k2)
+        k4 = end_rate * (end - y - h * k3)
         y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         path.append(y)
     return np.array(path)
@@ -109,34 +114,56 @@ def true_path(circuit, rows, length):
     return x0, x1, integrate(x0, x1, row(rows, screen.LAG_0), length, circuit, steps=steps)
 
 
-@pytest.mark.parametrize(("pixel", "knee"), CASES)
-@pytest.mark.parametrize("length", [500.0, 4167.0, 33_333.0])
-@pytest.mark.parametrize("seed", range(2))
-def test_end_values(pixel, knee, length, seed):
+class Strip(NamedTuple):
+    """A strip's pixels over one interval: what the pass is given, and what their signals do."""
+
+    seed: int
+    length: float
+    circuit: Any
+    given: np.ndarray
+    x0: np.ndarray
+    x1: np.ndarray
+    last: np.ndarray
+    highest: np.ndarray
+    lowest: np.ndarray
+
+
+@pytest.fixture(
+    scope="module",
+    params=itertools.product(range(len(CASES)), [500.0, 4167.0, 33_333.0], range(3)),
+    ids=lambda param: "-".join(map(str, param)),
+)
+def strip(request):
+    number, length, seed = request.param
+    pixel, knee = CASES[number]
     circuit, rows = fill(pixel, *draw(seed, knee, largest=0.97))
-    run(circuit, rows, length)
     x0, x1, path = true_path(circuit, rows, length)
+    signal = path[-1], path.max(0), path.min(0)
+    return Strip(seed, length, circuit, rows, x0, x1, *signal)
+
+
+def test_end_values(strip):
+    circuit, rows, length, x0, x1 = (
+        strip.circuit, strip.given.copy(), strip.length, strip.x0, strip.x1
+    )  # fmt: skip
+    run(circuit, rows, length)
     # in terms of event time: an error of the lag moves an event by error / slope, the slope being
     # rate times lag, or what the lag comes to be while x moves, or was at the start
     rate = circuit.dark + circuit.per_dn * light(x1, circuit)
     usual = np.abs(x1 - x0) / np.maximum(1.0, rate * length)
     decayed = np.abs(row(rows, screen.LAG_0)) * np.exp(-np.minimum(rate * length, 50.0))
     lag = np.maximum(np.maximum(usual, decayed), 3e-5)
-    moved = np.abs(path[-1] - x1 - row(rows, screen.LAG_1)) / (rate * lag)
+    moved = np.abs(strip.last - x1 - row(rows, screen.LAG_1)) / (rate * lag)
     # single precision itself: a few roundings of the lag, over the corner
     assert np.max(moved - 4e-7 / rate) < 0.1
 
 
-@pytest.mark.parametrize(("pixel", "knee"), CASES)
-@pytest.mark.parametrize("length", [500.0, 4167.0, 33_333.0])
-@pytest.mark.parametrize("seed", range(3))
-def test_no_pixel_that_fires_is_missed(pixel, knee, length, seed):
+def test_no_pixel_that_fires_is_missed(strip):
     """Thresholds that the signal just reaches: at its ends, at its turn, at a tangent."""
-    circuit, rows = fill(pixel, *draw(seed, knee, largest=0.97))
-    x0, _, path = true_path(circuit, rows, length)
-    rng = np.random.default_rng(seed)
+    rows = strip.given.copy()
+    rng = np.random.default_rng(strip.seed)
     away = rng.uniform(-0.3, 0.3, PIXELS).astype(np.float32)
-    high, low = path.max(0) - x0 + away, path.min(0) - x0 + away
+    high, low = strip.highest - strip.x0 + away, strip.lowest - strip.x0 + away
     reached = 1e-6
     for leak in (0.0, 0.01):
         for on, off in ((high + leak - reached, 1e3), (1e3, -low - reached)):
@@ -144,7 +171,7 @@ def test_no_pixel_that_fires_is_missed(pixel, knee, length, seed):
             rows[screen.FALL : screen.FALL + PIXELS] = leak
             rows[screen.ON : screen.ON + PIXELS] = on - screen.MARGIN
             rows[screen.OFF : screen.OFF + PIXELS] = off - screen.MARGIN
-            run(circuit, rows, length)
+            run(strip.circuit, rows, strip.length)
             assert np.all(row(rows, screen.HIT) == 1.0)
 
 

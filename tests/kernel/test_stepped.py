@@ -1,4 +1,8 @@
-"""The stepping solver against the exact one, the dense ODE and the slow twin."""
+"""The stepping solver against the exact one and the slow twin.
+
+Beside the exact one, it meets the dense ODE in ``test_exact_against_ode.py`` and the twin in
+``test_twin.py``.
+"""
 
 import math
 
@@ -7,12 +11,9 @@ import pytest
 from camera.helpers import seen, still
 from differences import STEP_S, Truth
 from harness import advance, by_pixel, quiet, solve, start
-from reference import stimuli
 from reference.agreement import count_and_time_errors
 from reference.circuit import Circuit
-from reference.dense_ode import as_lists, dense_truth
-from test_exact_against_ode import CIRCUITS, WITH_EFFECTS
-from test_twin import CASES, check, clock, moving_light
+from test_twin import check, clock, moving_light
 
 from adv2e.config.model import (
     HotPixels,
@@ -31,28 +32,6 @@ from adv2e.errors import UsageError
 from adv2e.kernel import rng
 from adv2e.pixel.array import make_circuit
 from adv2e.pixel.steps import steps_of
-
-
-@pytest.mark.parametrize("name", [*CIRCUITS, "effects"])
-@pytest.mark.parametrize(("fps", "L"), [(24, 10), (240, 1), (1000, 1)])
-def test_edges_ramps_and_textures_against_the_dense_ode(name, fps, L):
-    circuit, sections = CIRCUITS.get(name, WITH_EFFECTS)
-    stimulus = stimuli.standard(fps, L=L, pixels=24, frames=7)
-    truth, until = as_lists(dense_truth(*stimulus, circuit))
-    found = solve(stimulus.light, stimulus.times, quiet(**sections), method="stepped")
-    agreement = count_and_time_errors(found, truth, until)
-    assert agreement.count_b > 40
-    assert not agreement.differing
-    assert agreement.max_dt_us < 1.0
-    assert agreement.mean_dt_us < 0.1
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_all_circuits_against_the_twin(name):
-    sections, circuit = CASES[name]
-    light = moving_light(14, 32, seed=len(name))
-    options = {"method": "stepped", "within_us": 1.0}
-    check(light, clock(14, 1 / 240), quiet(**sections), Circuit(**circuit), **options)
 
 
 @pytest.mark.parametrize("update", ["first_order_hold", "zero_order_hold", "euler", "paper"])

@@ -33,7 +33,10 @@ def moving_light(knots, pixels, seed=0, step=0.3):
     return walk.astype(np.float32).astype(np.float64)
 
 
-def check(light, times, pixel, circuit, draws=None, within_us=0.3, step_us=4.0, **options):
+def check(
+    light, times, pixel, circuit, draws=None, within_us=0.3, step_us=4.0, in_steps=False, **options
+):
+    """Compare the kernel with the twin; `in_steps`: the solver in steps of time, too."""
     draws = draws or Draws()
 
     def begin(array):
@@ -43,10 +46,14 @@ def check(light, times, pixel, circuit, draws=None, within_us=0.3, step_us=4.0, 
 
     kernel = solve(light, times, pixel, begin=begin, **options)
     twin = simulate_twin(light, times, circuit, draws, step_us=step_us)
-    found = count_and_time_errors(kernel, twin)
-    assert found.count_b > 50
-    assert not found.differing
-    assert found.max_dt_us < within_us
+    solved = [(kernel, within_us)]
+    if in_steps:
+        solved.append((solve(light, times, pixel, method="stepped", **options), 1.0))
+    for events, within in solved:
+        found = count_and_time_errors(events, twin)
+        assert found.count_b > 50
+        assert not found.differing
+        assert found.max_dt_us < within
 
 
 def clock(knots, interval_s):
@@ -101,10 +108,10 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("interval_s", [1 / 240, 1 / 1000])
-def test_exact(name, interval_s):
+def test_exact_and_in_steps_of_time(name, interval_s):
     sections, circuit = CASES[name]
     light = moving_light(14, 32, seed=len(name))
-    check(light, clock(14, interval_s), quiet(**sections), Circuit(**circuit))
+    check(light, clock(14, interval_s), quiet(**sections), Circuit(**circuit), in_steps=True)
 
 
 @pytest.mark.parametrize("update", ["first_order_hold", "zero_order_hold", "euler", "paper"])
