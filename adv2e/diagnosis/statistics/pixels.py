@@ -51,6 +51,7 @@ def pixels(scene: Scene, expected: Array) -> Group:
     `expected`: (parts, numbers), mean of :func:`count_pixels` over its simulations.
     """
     y, x = np.mgrid[-1.0 : 1.0 : scene.height * 1j, -1.0 : 1.0 : scene.width * 1j]
+    ways = [_centred(way) for way in (x * x + y * y, x, y)]
     # mostly there is no silent pixel, so that simulations do not tell how rare one is
     least = [0.6 if entry is _SILENT else 0.01 for entry in _ENTRIES]
 
@@ -63,6 +64,8 @@ def pixels(scene: Scene, expected: Array) -> Group:
         off, on = excess(n.sum(axis=0), mu.sum(axis=0))
         total_n, total_mu = n.sum(axis=0).sum(axis=0), mu.sum(axis=0).sum(axis=0)
         both = excess(total_n, total_mu)
+        bounded, on_bounded, off_bounded = _bounded(both), _bounded(on), _bounded(off)
+        on_1, on_2, off_1, off_2 = (_bounded(one) for one in (on_1, on_2, off_1, off_2))
         silent = (total_n == 0) & (total_mu > 4.0)
         ordered = np.sort(both, axis=None)
         top = max(1, both.size // 100)
@@ -70,7 +73,7 @@ def pixels(scene: Scene, expected: Array) -> Group:
             [
                 np.mean(np.minimum(on * on, 100.0)),
                 np.mean(np.minimum(off * off, 100.0)),
-                _product(on, off),
+                _product(on_bounded, off_bounded),
                 _product(on_1, on_2),
                 _product(off_1, off_2),
                 _product(on_1, off_2) + _product(off_1, on_2),
@@ -79,11 +82,9 @@ def pixels(scene: Scene, expected: Array) -> Group:
                 float(stabilised(silent.sum())),
                 float(np.log(np.var(both.mean(axis=1)) + 1e-3)),
                 float(np.log(np.var(both.mean(axis=0)) + 1e-3)),
-                _product(both[:, 1:], both[:, :-1]),
-                _product(both[1:], both[:-1]),
-                _slope(both, x * x + y * y),
-                _slope(both, x),
-                _slope(both, y),
+                _product(bounded[:, 1:], bounded[:, :-1]),
+                _product(bounded[1:], bounded[:-1]),
+                *(_slope(bounded, *way) for way in ways),
             ]
         )
 
@@ -92,15 +93,23 @@ def pixels(scene: Scene, expected: Array) -> Group:
     )
 
 
+def _bounded(values: Array) -> Array:
+    return np.asarray(np.minimum(np.maximum(values, -10.0), 10.0))  # in half the time of a clip
+
+
 def _product(a: Array, b: Array) -> float:
     if not a.size:  # nothing is beside the pixels of a single column
         return 0.0
-    return float(np.mean(np.clip(a, -10, 10) * np.clip(b, -10, 10)))
+    return float(np.mean(a * b))
 
 
-def _slope(values: Array, over: Array) -> float:
+def _centred(over: Array) -> tuple[Array, float]:
+    """Return values less their mean, and the sum of the squares of those."""
     centred = over - over.mean()
-    spread = float(np.sum(centred * centred))
+    return centred, float(np.sum(centred * centred))
+
+
+def _slope(values: Array, centred: Array, spread: float) -> float:
     if spread < 1e-9:  # all pixels are as far to a side as any other
         return 0.0
-    return float(np.sum(np.clip(values, -10, 10) * centred)) / spread
+    return float(np.sum(values * centred)) / spread
