@@ -1,0 +1,29 @@
+"""Networks that interpolate between two frames, and the files of ONNX that hold them.
+
+Every file keeps the same contract.  Its inputs are ``img0`` and ``img1`` of shape (1, channels,
+rows, columns) in [0, 1], and ``timestep`` of shape (1,), strictly between 0 and 1: 0 is the instant
+of ``img0``.  Its output is ``output``, shaped like ``img0``.  All are float32.  Rows and columns
+are free, but must be multiples of ``multiple`` in the metadata.  ``encoding`` there says what the
+numbers are: ``srgb``, as in video files.  ``source`` and ``sha256`` name the file of the weights.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from adv2e.errors import MissingExtraError
+
+
+def late(name: str) -> Any:
+    """Return a module of this package that needs PyTorch.
+
+    Raises
+    ------
+    MissingExtraError
+        PyTorch, or what it needs to write ONNX, is not installed.
+    """
+    try:
+        return importlib.import_module(f"networks.{name}")
+    except ImportError as error:
+        raise MissingExtraError("the export of a network", "torch") from error
