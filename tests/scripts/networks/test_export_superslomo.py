@@ -200,7 +200,9 @@ def test_another_file_is_one_line(tmp_path, raw):
 @pytest.mark.parametrize("is_zip", [True, False])
 def test_half_a_checkpoint_is_one_line(tmp_path, is_zip):
     path = tmp_path / "a.ckpt"
-    torch.save({"state_dictFC": {"a": torch.zeros(9999)}}, path, _use_new_zipfile_serialization=is_zip)
+    torch.save(
+        {"state_dictFC": {"a": torch.zeros(9999)}}, path, _use_new_zipfile_serialization=is_zip
+    )
     path.write_bytes(path.read_bytes()[:20000])
     refused(path, f"{path}: is no checkpoint of PyTorch (")
 
