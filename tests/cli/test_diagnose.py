@@ -27,7 +27,7 @@ from adv2e.reports.files import write_reports
 FILES = ["model.yaml", "report.html", "report.json"]
 TRIED = ("refractory", "leak", "event_loss")
 WITHOUT = [part for name in names() if name not in TRIED for part in ("--without", name)]
-SIZE, DEAD_US = (32, 24), 20_000.0
+SIZE, DEAD_US = (24, 16), 20_000.0
 SUMMARY = ["two lines of", "  summary"]
 REPORT = "report: a.diagnosis/report.html"
 
@@ -38,7 +38,7 @@ def recordings(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recordings")
     camera = Camera(
         patchwork(SIZE, seed=6), BENCH, hidden={"pixel": {"refractory": {"period_us": DEAD_US}}},
-        size=SIZE, duration_s=0.3, fps=400.0, step_us=25.0,
+        size=SIZE, duration_s=0.3, fps=200.0, step_us=25.0,
     )  # fmt: skip
     camera.record(folder / "dead.zip")
     shutil.copy(folder / "dead.declared.yaml", folder / "none.declared.yaml")
