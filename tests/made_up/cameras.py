@@ -1,6 +1,7 @@
 """One scene as three cameras recorded it, and simulations beside them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from camera import SCENES, Camera
@@ -14,20 +15,28 @@ CAMERAS = 3
 
 
 class Recorded:
-    """Recordings (32x24 px) that differ by chance: their frames, scene and declared model."""
+    """Recordings (32x24 px) that differ by chance: their frames, scene and declared model.
+
+    All but the first are made when they are first measured.
+    """
 
     def __init__(self, folder, seed, *, hidden=None, duration_s, fps):
-        paths = [folder / f"{number}.zip" for number in range(CAMERAS)]
-        size = (32, 24)
-        for number, path in enumerate(paths):
-            scene = SCENES["patchwork"](size, seed=seed)
-            how = {"hidden": hidden or {}, "duration_s": duration_s, "fps": fps, "seed": number}
-            Camera(scene, size=size, **how).record(path)
+        self._folder, self._seed = folder, seed
+        self._how = {"hidden": hidden or {}, "duration_s": duration_s, "fps": fps}
+        self.evidence = self._record(0)
         self.declared = load_config([folder / "0.declared.yaml"])
-        self.recordings = [read_evidence(path) for path in paths]
-        self.evidence = self.recordings[0]
         light = self.evidence.light(self.declared)
         self.scene = Scene.of(light, self.evidence.times_s, 0.0)
+
+    def _record(self, number):
+        path, size = self._folder / f"{number}.zip", (32, 24)
+        scene = SCENES["patchwork"](size, seed=self._seed)
+        Camera(scene, size=size, seed=number, **self._how).record(path)
+        return read_evidence(path)
+
+    @cached_property
+    def recordings(self):
+        return [self.evidence, *map(self._record, range(1, CAMERAS))]
 
     def measured(self, statistics):
         """Return the mean statistics of both parts of the data, over the recordings."""
