@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Iterator
 from types import ModuleType
 from typing import NamedTuple
+
+# before NumPy is imported: threads of its BLAS, in several processes at once, wait for one another
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
