@@ -1,5 +1,8 @@
 """What stamps say of a readout, on streams whose readout is known."""
 
+import bisect
+from operator import itemgetter
+
 import numpy as np
 import pytest
 from made_up.streams import stream_of
@@ -57,8 +60,9 @@ def read_out(t, x, y, event_us, row_us):
     while waiting:
         row = waiting[0][2]
         latch = max(free, waiting[0][0]) + row_us
-        served = [one for one in waiting if one[2] == row and one[0] <= latch]
-        waiting = [one for one in waiting if one not in served]
+        come = bisect.bisect_right(waiting, latch, key=itemgetter(0))
+        served = [one for one in waiting[:come] if one[2] == row]
+        waiting[:come] = [one for one in waiting[:come] if one[2] != row]
         free = latch
         for column in sorted({column for _, column, _ in served}):
             free += event_us
