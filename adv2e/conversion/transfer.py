@@ -39,7 +39,7 @@ from adv2e.light.pictures import picture_of, picture_white
 from adv2e.sources.frame import Light, Pixels
 from adv2e.sources.wanted import Selection
 
-_MADE = ("adv2e", "versions", "config", "seed", "effects", "source")
+_MADE = ("adv2e", "versions", "config", "seed", "effects", "network", "source")
 """What a file of ours says of how its events were made, which stays true of a copy."""
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,13 +15,16 @@ from adv2e.errors import DataError
 from adv2e.files.regular import check_ends
 from adv2e.formats.assembly import assemble
 from adv2e.formats.causes import found_beside
-from adv2e.formats.event_file import EventFile, Facts, Progress, rotated180
+from adv2e.formats.event_file import Columns, EventFile, Facts, Progress, rotated180
 from adv2e.formats.recording import Recording
 from adv2e.formats.registry import format_of
 from adv2e.geometry import MOST_PIXELS
 from adv2e.process.machine import machine_complaint
+from adv2e.sources.frame import Shot
 
 __all__ = ["Recording", "open_events", "read_events"]
+
+Loaded = TypeVar("Loaded")
 
 
 def open_events(
@@ -57,7 +62,7 @@ def open_events(
             facts.describe_from(beside)
         file: EventFile = found.load(found.reader)(path, facts)
         inside = found.load(found.causes)(path) if found.causes else None
-    file = replace(file, causes=inside or found_beside(path))
+    file = _named(replace(file, causes=inside or found_beside(path)))
     return rotated180(file) if rotate180 else file
 
 
@@ -107,10 +112,36 @@ def read_events(
     (4, 3, True)
     """
     file = open_events(path, time_unit=time_unit, progress=progress, rotate180=rotate180)
-    with _reading(file.facts.path):
-        recording = assemble(file)
+    recording = assemble(file)
     _check_size(recording)
     return recording
+
+
+def _named(file: EventFile) -> EventFile:
+    """Return a file that is named wherever the system says why it cannot be read."""
+    path, parts, shots, causes = file.facts.path, file.parts, file.shots, file.causes
+
+    def named_parts() -> Iterator[Columns]:
+        with _reading(path):
+            yield from parts()
+
+    def named_shots() -> Iterator[Shot]:
+        assert shots is not None
+        with _reading(path):
+            for shot in shots():
+                yield replace(shot, load=partial(_read, path, shot.load))
+
+    return replace(
+        file,
+        parts=named_parts,
+        shots=None if shots is None else named_shots,
+        causes=None if causes is None else partial(_read, path, causes),
+    )
+
+
+def _read(path: Path, load: Callable[[], Loaded]) -> Loaded:
+    with _reading(path):
+        return load()
 
 
 @contextmanager

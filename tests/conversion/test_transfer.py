@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import errno
+import itertools
 import json
 import tracemalloc
+from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -13,6 +17,7 @@ from streams import random_events
 import adv2e
 from adv2e.errors import DataError, OutputError, UsageError
 from adv2e.events import make_events
+from adv2e.formats.monash import reader
 from adv2e.formats.writing import open_sink
 
 WIDTH, HEIGHT = 30, 20
@@ -281,3 +286,39 @@ def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < peaks[0] + (4 << 20)  # of 10 MB that the larger one's events take
+
+
+def failing_disk(opened, at):
+    """Return what opens a file of which part `at`, over all readings, cannot be read."""
+    count = itertools.count()
+
+    def check():
+        if next(count) == at:
+            raise OSError(errno.EIO, "Input/output error")
+
+    def open_failing(path, facts):
+        file = opened(path, facts)
+
+        def parts():
+            for part in file.parts():
+                check()
+                yield part
+
+        def shots():
+            for shot in file.shots():
+                yield replace(shot, load=lambda load=shot.load: check() or load())
+
+        return replace(file, parts=parts, shots=file.shots and shots)
+
+    return open_failing
+
+
+@pytest.mark.parametrize("at", range(4))
+def test_a_disk_that_fails_is_told_in_one_line_and_nothing_is_left(adv2e, monkeypatch, at):
+    write("a.h5", events_of(), frames_of(2))
+    # the events twice, and a frame for what is stored of it, and to store it
+    monkeypatch.setattr(reader, "open_monash", failing_disk(reader.open_monash, at))
+    told = adv2e("convert", "a.h5", "-o", "b.zip", "--from", "events")
+    assert told.status == 1
+    assert told.err == "adv2e: error: a.h5: cannot be read: Input/output error\n"
+    assert [path.name for path in Path().iterdir()] == ["a.h5"]

@@ -5,13 +5,16 @@ import hashlib
 import numpy as np
 import onnx_models
 import pytest
+from damage import damages
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from onnx import TensorProto, helper
 from onnx_models import image, number
 
 from adv2e.config.model import Sampling
 from adv2e.errors import ConfigError, DataError, MissingExtraError
 from adv2e.light.interpolation import make_upsampler, network_of
-from adv2e.light.interpolation.onnx_file import open_network
+from adv2e.light.interpolation.onnx_file import Network, open_network
 
 
 def values(shape=(32, 64), seed=1):
@@ -254,6 +257,29 @@ def test_a_network_that_fails_names_the_size_and_the_way_out(tmp_path):
     wide = values((64, 256))
     with pytest.raises(DataError, match=r"gives \(1, 1, 128, 128\) for images of \(64, 256\)"):
         network.ask(*wide, 0.5)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    path = tmp_path_factory.mktemp("whole") / "a.onnx"
+    onnx_models.blend_stacked(path)
+    return path.read_bytes()
+
+
+@settings(
+    max_examples=200,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(data=st.data())
+def test_a_damaged_file_is_refused_in_one_line_or_taken(whole, data, capfd):
+    damaged = data.draw(damages(whole))
+    try:
+        Network("a.onnx", damaged).ask(*values((64, 64)), 0.5)
+    except (ConfigError, DataError) as error:
+        assert str(error).startswith("sampling.model: a.onnx: ")
+        assert "\n" not in str(error)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_without_the_extra_it_is_named(tmp_path, monkeypatch):

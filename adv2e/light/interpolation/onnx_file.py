@@ -63,6 +63,15 @@ _MULTIPLE_MOST = 1024
 
 
 @dataclass(frozen=True)
+class _Given:
+    """An input as the file declares it: lengths, or their names."""
+
+    name: str
+    kind: str
+    shape: tuple[int | str | None, ...]
+
+
+@dataclass(frozen=True)
 class _Image:
     """An input that takes images."""
 
@@ -115,11 +124,11 @@ class Network:
     def __init__(self, path: str, data: bytes) -> None:
         self.source = {"file": shown(Path(path).name), "sha256": hashlib.sha256(data).hexdigest()}
         self._label = f"{_KEY}: {path}"
-        self._session = _open(self._label, data)
-        stated = self._session.get_modelmeta().custom_metadata_map
+        self._session, given, outputs, stated = _open(self._label, data)
         self.encoding, self.multiple = self._encoding(stated), self._multiple(stated)
+        self._given = given
         self._images, self._time = self._inputs()
-        self._output = self._only_output()
+        self._output = self._only_output(outputs)
         first = self._images[0]
         self.size = first.size
         self.knows_time = self._time is not None or first.channels == 7
@@ -214,8 +223,8 @@ class Network:
         return int(text)
 
     def _inputs(self) -> tuple[tuple[_Image, ...], _Time | None]:
-        given = self._session.get_inputs()
-        if any(one.type not in _TYPES for one in given):
+        given = self._given
+        if any(one.kind not in _TYPES for one in given):
             raise self._unfit("numbers must be float32, float16 or float64")
         images = [one for one in map(_image, given) if one is not None]
         if len(given) == 1:
@@ -239,21 +248,22 @@ class Network:
             raise self._unfit("the two images differ in shape")
         return (first, second), self._of_time(times[0]) if times else None
 
-    def _of_time(self, given: Any) -> _Time:
+    def _of_time(self, given: _Given) -> _Time:
         shape = tuple(one if isinstance(one, int) else None for one in given.shape)
         if len(shape) > 4 or (len(shape) < 4 and any(one not in (None, 1) for one in shape)):
             raise self._unfit(f"{given.name} takes more than one number")
-        return _Time(given.name, _TYPES[given.type], shape)
+        return _Time(given.name, _TYPES[given.kind], shape)
 
-    def _only_output(self) -> str:
-        names = [one.name for one in self._session.get_outputs()]
+    def _only_output(self, names: Sequence[str]) -> str:
         named = [one for one in names if one.partition(":")[0] in ("output", "image")]
         if len(names) != 1 and len(named) != 1:
-            raise self._unfit(f"of several outputs one must be named output or image: {names}")
-        return str((named or names)[0])
+            raise self._unfit(
+                f"of several outputs one must be named output or image: {list(names)}"
+            )
+        return (named or names)[0]
 
     def _unfit(self, why: str) -> ConfigError:
-        inputs = ", ".join(f"{one.name} {list(one.shape)}" for one in self._session.get_inputs())
+        inputs = ", ".join(f"{one.name} {list(one.shape)}" for one in self._given)
         return ConfigError(f"{self._label}: takes {inputs}: {why}; what fits: {_FITS}")
 
 
@@ -282,7 +292,10 @@ def _opened(path: str, changed_ns: int, size: int) -> Network:
     return Network(path, Path(path).read_bytes())
 
 
-def _open(label: str, data: bytes) -> Any:
+def _open(
+    label: str, data: bytes
+) -> tuple[Any, tuple[_Given, ...], tuple[str, ...], Mapping[str, str]]:
+    """Return what runs a network, its inputs, the names of its outputs, and its metadata."""
     try:
         import onnxruntime  # noqa: PLC0415 - an extra
     except ImportError:
@@ -292,12 +305,19 @@ def _open(label: str, data: bytes) -> Any:
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4  # errors are told once, as ours
     try:
-        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        session = onnxruntime.InferenceSession(
+            data, options, providers=["CPUExecutionProvider"], enable_fallback=0
+        )
+        # names of a damaged file may be no text, which is found where they are asked for
+        given = [_Given(one.name, one.type, tuple(one.shape)) for one in session.get_inputs()]
+        outputs = [one.name for one in session.get_outputs()]
+        stated = dict(session.get_modelmeta().custom_metadata_map)
     except Exception as error:
         raise ConfigError(f"{label}: is no network that can be run: {_one_line(error)}") from None
+    return session, tuple(given), tuple(outputs), stated
 
 
-def _image(given: Any) -> _Image | None:
+def _image(given: _Given) -> _Image | None:
     """Return an input that may take images: of one batch, with a known number of channels."""
     shape = given.shape
     if len(shape) != 4 or (isinstance(shape[0], int) and shape[0] != 1):
@@ -308,7 +328,7 @@ def _image(given: Any) -> _Image | None:
         return None
     rows, columns = shape[1:3] if last else shape[2:]
     size = tuple(one if isinstance(one, int) else None for one in (rows, columns))
-    return _Image(given.name, _TYPES[given.type], channels, last, (size[0], size[1]))
+    return _Image(given.name, _TYPES[given.kind], channels, last, (size[0], size[1]))
 
 
 def _number(name: str) -> int:
