@@ -54,13 +54,13 @@ def library(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offe
 
 def formats(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
     """Offer the formats that can be written."""
-    from adv2e.formats.registry import names
+    from adv2e.formats.lookup import names
 
     return starting(names(), incomplete)
 
 
 def layouts(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
     """Offer the layouts of HDF5 files."""
-    from adv2e.formats import registry
+    from adv2e.formats import lookup
 
-    return starting(registry.layouts(), incomplete)
+    return starting(lookup.layouts(), incomplete)

@@ -16,8 +16,8 @@ from adv2e.files.regular import check_ends
 from adv2e.formats.assembly import assemble
 from adv2e.formats.causes import found_beside
 from adv2e.formats.event_file import Columns, EventFile, Facts, Progress, rotated180
+from adv2e.formats.lookup import format_of
 from adv2e.formats.recording import Recording
-from adv2e.formats.registry import format_of
 from adv2e.geometry import MOST_PIXELS
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.frame import Shot

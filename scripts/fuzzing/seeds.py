@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 
 from adv2e.events import make_events
-from adv2e.formats.registry import layouts
+from adv2e.formats.lookup import layouts
 from adv2e.formats.writing import open_sink
 from adv2e.sources.images.opencv import quiet
 from fuzzing.mutations import ODD_NUMBERS, mutated
