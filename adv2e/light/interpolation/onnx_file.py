@@ -23,9 +23,9 @@ weighed to luma.  Rows and columns are those of the file, or multiples of its pr
 
 Exports that fit, with the names of their inputs and outputs:
 
-- Super SloMo, of one channel or three: ``img0``, ``img1``, ``timestep``; ``output``;
+- Super SloMo by ``scripts/export_superslomo.py``, RIFE 4.0 by ``scripts/export_rife.py``, and other
+  exports of RIFE 4: ``img0``, ``img1``, ``timestep``; ``output``;
 - RIFE 4, as vs-mlrt publishes it in ``rife_v2/``: ``input`` of 7 channels; ``output``;
-- RIFE 4, as exported by others: ``img0``, ``img1``, ``timestep``; ``output``;
 - FILM, by tf2onnx from its saved model: ``x0``, ``x1``, ``time``, channels last; ``image``;
 - FILM, from its PyTorch form: ``img0``, ``img1``, ``timestep``; ``output``, of one size.
 """
