@@ -57,15 +57,21 @@ class Outcome:
 def run(arguments: Sequence[str], folder: Path, limits: Limits) -> Outcome:
     """Run ``adv2e`` with `arguments` in a copy of this process and judge how it ends."""
     said = folder / "stderr"
+    hears, tells = os.pipe()
     child = os.fork()
     if not child:
+        # the copy itself: what is mapped from files counts in this process alone
+        os.write(tells, str(_resident_mib()).encode())
         _become(lambda: _command(arguments), folder, said, limits)
+    os.close(tells)
     status, usage, slow = _wait(child, limits)
+    began_mib = float(os.read(hears, 64) or 0)
+    os.close(hears)
     text = said.read_text("utf-8", errors="replace") if said.exists() else ""
     mib = usage.ru_maxrss / 1024
     code = os.waitstatus_to_exitcode(status)
     wrong = "too slow" if slow or code == -signal.SIGXCPU else judged(code, text)
-    if not wrong and mib - _resident_mib() > limits.mib:
+    if not wrong and mib - began_mib > limits.mib:
         wrong = f"{mib:.0f} MiB"
     return Outcome(wrong, code, text, mib)
 

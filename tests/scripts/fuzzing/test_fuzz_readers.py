@@ -1,6 +1,7 @@
 """Damaged files of every kind end in one right line, and the fuzzer sees it when they do not."""
 
 import ctypes
+import mmap
 import os
 import random
 import subprocess
@@ -74,6 +75,18 @@ def test_what_ends_badly_is_seen(tmp_path, monkeypatch, action, wrong):
     cpu_s, wall_s = (0.5, 3.0) if wrong == "too slow" else (20.0, 60.0)
     found = running.run([], tmp_path, Limits(cpu_s=cpu_s, wall_s=wall_s, mib=200))
     assert wrong in found.wrong if wrong else not found.wrong, found
+
+
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")  # fork beside threads
+def test_what_is_mapped_from_files_here_is_not_taken_off_there(tmp_path, monkeypatch):
+    with (tmp_path / "large").open("wb+") as file:
+        file.truncate(300 << 20)
+        mapped = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
+    assert not any(mapped[:: 1 << 12])  # looks at every page
+    monkeypatch.setattr(running, "_command", lambda _: _allocate())
+    monkeypatch.setattr(running, "_virtual_bytes", lambda: 1 << 46)
+    assert "MiB" in running.run([], tmp_path, Limits(mib=200)).wrong
+    mapped.close()
 
 
 def test_an_exit_status_of_success_with_an_error_is_wrong():
