@@ -149,7 +149,6 @@ def convert(
             **{"config": config, "fps": fps, "timestamps": timestamps, "preview": preview},
             **{"bayer": bayer, "pixel_format": pixel_format, "motion": motion},
         }
-        simulated |= {"bayer": bayer, "pixel_format": pixel_format}
         if given := [name for name, value in simulated.items() if value is not None]:
             raise UsageError(f"{source} holds events, nothing is simulated: leave out {given[0]}")
         if output is None:

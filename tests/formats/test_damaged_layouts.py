@@ -53,7 +53,7 @@ def read_or_refuse(path):
         assert (recording.events["x"] < recording.width).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(data=st.data())
 def test_one_dataset_is_another(whole, data):
     name = data.draw(st.sampled_from(datasets_of(whole)))
@@ -74,7 +74,7 @@ def test_one_dataset_is_another(whole, data):
         read_or_refuse(path)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(data=st.data())
 def test_a_part_of_the_file_is_missing(whole, data):
     content = whole.read_bytes()
