@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.effects.frames.encoding import encode_light
 from adv2e.rendering.output import replacing
 from adv2e.rendering.video import VideoFile
 
@@ -18,9 +19,8 @@ if TYPE_CHECKING:
 
 def encode_srgb(light: NDArray[Any]) -> NDArray[np.uint8]:
     """Return 8-bit sRGB codes of linear light [DN of 255] (IEC 61966-2-1)."""
-    value = np.clip(np.asarray(light) / 255.0, 0.0, 1.0)
-    code = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
-    return np.rint(255.0 * code).astype(np.uint8)
+    value = encode_light(np.clip(light, 0.0, 255.0), "srgb")
+    return np.rint(255.0 * value).astype(np.uint8)
 
 
 def frame_times(fps: float, duration_s: float) -> list[float]:

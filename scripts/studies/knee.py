@@ -46,7 +46,7 @@ from adv2e.comparison.smoothed_error import smoothed_errors
 from adv2e.comparison.windows import frame_windows
 from adv2e.config.model import Config, Pixel, Sampling
 from adv2e.conversion.simulation import events_from_light
-from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.effects.frames.encoding import LightDecoder, encode_light
 from adv2e.effects.pixel.log_response import LogResponse
 from adv2e.effects.pixel.thresholds import Thresholds
 from adv2e.events import Events, cut
@@ -133,13 +133,7 @@ def configuration(response: LogResponse) -> Config:
 
 def codes_of(light: Light, encoding: str) -> NDArray[np.float64]:
     """Return the code of `light` before rounding: linear, or sRGB (IEC 61966-2-1)."""
-    value = np.clip(light.astype(np.float64) / 255.0, 0.0, 1.0)
-    if encoding == "linear":
-        return 255.0 * value
-    codes: NDArray[np.float64] = np.where(
-        value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055
-    )
-    return 255.0 * codes
+    return 255.0 * encode_light(np.clip(light.astype(np.float64), 0.0, 255.0), encoding)
 
 
 def filmed(light: Light, noise: float, seed: int, encoding: str) -> Light:
