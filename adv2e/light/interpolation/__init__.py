@@ -60,29 +60,24 @@ def make_upsampler(sampling: Sampling, *, threads: int = 1) -> Upsampler:
     MissingExtraError
         A network is asked for, and what runs it is not installed.
     """
-    if sampling.interpolation == "linear":
+    if sampling.interpolation == "linear" or sampling.L == 1:
         return LinearUpsampler(sampling.L)
     # imported late: compiled code
     from adv2e.light.interpolation.paths import Paths  # noqa: PLC0415
 
     paths = Paths(sampling.L, sampling.max_motion_px)
-    if sampling.interpolation == "flow":
+    network = network_of(sampling)
+    if network is None:
         from adv2e.light.interpolation.flow import FlowUpsampler  # noqa: PLC0415
 
         return FlowUpsampler(paths, threads=threads)
     from adv2e.light.interpolation.network import NetworkUpsampler  # noqa: PLC0415
 
-    network = network_of(sampling)
-    # without frames in between, there is nothing to ask a network for
-    return (
-        LinearUpsampler(1)
-        if network is None
-        else NetworkUpsampler(network, sampling, threads=threads)
-    )
+    return NetworkUpsampler(network, paths, threads=threads)
 
 
 def network_of(sampling: Sampling) -> Network | None:
-    """Return the network that is asked for frames; None: none is.
+    """Return the network that is asked for frames; None: none is, as where there are none between.
 
     Raises
     ------

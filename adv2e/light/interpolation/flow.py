@@ -58,12 +58,11 @@ class FlowUpsampler:
     def between(self, a: Array, b: Array, beside: Beside = NOTHING) -> Iterator[Array]:
         """Yield the frames, the last `b` itself; see :class:`.Upsampler`."""
         check_pair(a, b)
-        count = self.count(a, b, beside)
-        way = None if count == 1 else self._paths.of(a, b, beside)
-        if way is None or way.motion is None:
+        way = self._paths.of(a, b, beside)
+        motion, bent, count = way.motion, way.bent, way.count
+        if motion is None or count == 1:
             yield from LinearUpsampler(count).between(a, b)
             return
-        motion, bent = way.motion, way.bent
         first, second = np.ascontiguousarray(a), np.ascontiguousarray(b)
 
         def frame(step: int) -> Array:

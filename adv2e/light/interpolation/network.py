@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.config.model import Sampling
 from adv2e.errors import ConfigError
 from adv2e.light.interpolation.linear import LinearUpsampler, check_pair
 from adv2e.light.interpolation.onnx_file import Network
@@ -34,8 +33,8 @@ class NetworkUpsampler:
     Parameters
     ----------
     network : Network
-    sampling : Sampling
-        With how many frames an interval gets.
+    paths : Paths
+        Which say how many frames an interval gets.
     threads : int
 
     Raises
@@ -44,15 +43,14 @@ class NetworkUpsampler:
         The network makes middles, and L is no power of two.
     """
 
-    def __init__(self, network: Network, sampling: Sampling, *, threads: int = 1) -> None:
-        self._network, self._threads = network, threads
-        self._paths = Paths(sampling.L, sampling.max_motion_px)
-        if not network.knows_time and sampling.L.bit_count() != 1:
-            below = 1 << (sampling.L.bit_length() - 1)
+    def __init__(self, network: Network, paths: Paths, *, threads: int = 1) -> None:
+        self._network, self._paths, self._threads = network, paths, threads
+        if not network.knows_time and paths.L.bit_count() != 1:
+            below = 1 << (paths.L.bit_length() - 1)
             raise ConfigError(
                 f"sampling.L: {network.source['file']} takes no time, so it makes middles and"
                 f" middles of these: L must be a power of two, such as {below} or {2 * below}, got"
-                f" {sampling.L}"
+                f" {paths.L}"
             )
 
     def count(self, a: Array, b: Array, beside: Beside = NOTHING) -> int:

@@ -27,6 +27,7 @@ from adv2e.motion.warping import UNKNOWN
 
 Array = NDArray[Any]
 Pair = tuple[Motion, Motion]
+Bent = tuple[Bend, Bend] | None
 
 _UNEXPLAINED_MOST = 0.5
 
@@ -41,10 +42,13 @@ class Way:
         From the first to the second and back; None: not known.
     bent : (Bend, Bend), or None
         How their paths bend; None: they are straight.
+    count : int
+        Frames that the interval gets.
     """
 
     motion: Pair | None
-    bent: tuple[Bend, Bend] | None
+    bent: Bent
+    count: int
 
 
 class Paths:
@@ -59,7 +63,7 @@ class Paths:
     """
 
     def __init__(self, L: int, max_motion_px: float | None = None) -> None:
-        self._L, self._max_motion_px = L, max_motion_px
+        self.L, self._max_motion_px = L, max_motion_px
         self._motions: list[tuple[Array, Array, Pair | None]] = []
         self._last: tuple[Array, Array, Way] | None = None
 
@@ -68,21 +72,22 @@ class Paths:
         if self._last is None or self._last[0] is not a or self._last[1] is not b:
             motion = self._motion(a, b)
             bent = None if motion is None else bends(*motion, *self._sides(a, b, beside))
-            self._last = a, b, Way(motion, bent)
+            self._last = a, b, Way(motion, bent, self._count(a, b, motion, bent))
         return self._last[2]
 
     def count(self, a: Array, b: Array, beside: Beside) -> int:
-        """Return how many frames the interval from `a` to `b` gets."""
-        if self._max_motion_px is None or self._L == 1:
-            return self._L
-        way = self.of(a, b, beside)
-        if way.motion is None:
-            return 1 if is_unchanged(a, b) else self._L
-        if not all(_is_known(one) for one in way.motion):
-            return self._L
-        bent = way.bent or (None, None)
-        speeds = [fastest(one, bend) for one, bend in zip(way.motion, bent, strict=True)]
-        return max(1, min(self._L, math.ceil(max(speeds) / self._max_motion_px)))
+        """Return how many frames the interval from `a` to `b` gets; motion is not always needed."""
+        return self.L if self._max_motion_px is None else self.of(a, b, beside).count
+
+    def _count(self, a: Array, b: Array, motion: Pair | None, bent: Bent) -> int:
+        if self._max_motion_px is None:
+            return self.L
+        if motion is None:
+            return 1 if is_unchanged(a, b) else self.L
+        if not all(_is_known(one) for one in motion):
+            return self.L
+        speeds = map(fastest, motion, bent or (None, None))
+        return max(1, min(self.L, math.ceil(max(speeds) / self._max_motion_px)))
 
     def _sides(self, a: Array, b: Array, beside: Beside) -> tuple[Side | None, Side | None]:
         """Return the motion to what lies beside; none at all where only one side is there."""
