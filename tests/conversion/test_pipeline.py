@@ -84,7 +84,7 @@ def test_files_say_how_they_were_made(adv2e, folder, tmp_path):
         assert record["versions"]["numba"] == importlib.metadata.version("numba")
         assert record["versions"]["opencv"].startswith(cv2.__version__)
         assert record["versions"]["zlib"] == zlib.ZLIB_RUNTIME_VERSION
-        assert record["versions"]["isal"] == importlib.metadata.version("isal")
+        assert record["versions"]["deflate"] == importlib.metadata.version("deflate")
         assert "av" not in record["versions"]
         assert record["adv2e"]
         assert record["source"]["encoding"] == "linear"
