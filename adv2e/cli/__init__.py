@@ -22,6 +22,7 @@ from adv2e.process.signals import stopping_on_signals
 
 COMMANDS = {
     "convert": "Turn a video or frames into events.",
+    "batch": "Convert all videos or sequences below a folder.",
     "info": "Show what a video, a recording or an event file holds.",
     "render": "Make pictures and films of events.",
     "compare": "Measure how much two event streams differ.",

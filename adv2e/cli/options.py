@@ -99,7 +99,8 @@ def crop_option(text: str) -> Callable[[Body], Body]:
     return click.option("--crop", type=RECTANGLE, metavar="X,Y,W,H", help=text)
 
 
-def _rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+def rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """Return a rate as it was written; raise BadParameter if it is none."""
     from adv2e.sources.times.rates import parse_rate
 
     try:
@@ -228,7 +229,7 @@ def source_options(body: Body) -> Body:
     @click.option(
         "--fps",
         metavar="F",
-        callback=_rate,
+        callback=rate,
         help="Take the frames at F a second, such as 240 or 30000/1001, whatever the input says.",
     )
     @click.option(

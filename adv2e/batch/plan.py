@@ -1,0 +1,146 @@
+"""What of a batch is to be done, and why; what is kept, and that it is still what it was."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from adv2e import __version__
+from adv2e.batch.sequences import Sequence as Found
+from adv2e.batch.states import State, digest_of
+from adv2e.errors import UsageError
+
+
+@dataclass(frozen=True)
+class Task:
+    """A sequence and what is to be done with it.
+
+    Attributes
+    ----------
+    sequence : Sequence
+    state : State
+        Of its source.
+    output : Path
+    seed : int
+    why : str
+        Why it is converted; empty: its file is kept.
+    """
+
+    sequence: Found
+    state: State
+    output: Path
+    seed: int
+    why: str
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What all files of a batch are made with.
+
+    Attributes
+    ----------
+    dest : Path
+    suffix : str
+        Of the files; empty: folders.
+    seed : int
+        From which those of the sequences come.
+    settings : str
+        Digest of the configuration and all options, less the seed.
+    """
+
+    dest: Path
+    suffix: str
+    seed: int
+    settings: str
+
+    def output(self, sequence: Found) -> Path:
+        """Return the file of a sequence: the tree below DEST is that below SOURCE."""
+        return self.dest / (sequence.name + self.suffix)
+
+
+def settings_digest(*parts: Any) -> str:
+    """Return the SHA-256 of what can be written as JSON."""
+    text = json.dumps(parts, sort_keys=True, ensure_ascii=True, allow_nan=False)
+    return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def seed_of(seed: int, name: str) -> int:
+    """Return the seed of a sequence, 0..2^48 - 1: from that of the batch and its name alone."""
+    digest = hashlib.sha256(f"{seed}\n{name}".encode("utf-8", "surrogateescape")).digest()
+    return int.from_bytes(digest[:6], "big")
+
+
+def parse_shard(text: str) -> tuple[int, int]:
+    """Return (I, N) of ``I/N``, I from 1 to N; raise UsageError."""
+    number, slash, count = text.partition("/")
+    if slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
+        return int(number), int(count)
+    raise UsageError(f"--shard {text}: must be I/N with I from 1 to N, such as 2/8")
+
+
+def shard_of(states: Mapping[str, State], number: int, count: int) -> set[str]:
+    """Return the names of a shard: the largest first, each to the shard with the fewest bytes."""
+    held = [0] * count
+    mine = set()
+    for name in sorted(states, key=lambda one: (-states[one].bytes, one)):
+        least = min(range(count), key=lambda k: (held[k], k))
+        held[least] += max(1, states[name].bytes)
+        if least == number - 1:
+            mine.add(name)
+    return mine
+
+
+def plan(
+    sequences: Iterable[Found],
+    states: Mapping[str, State],
+    records: Mapping[str, Mapping[str, Any]],
+    wanted: Wanted,
+    *,
+    overwrite: bool = False,
+) -> list[Task]:
+    """Return what is to be done with each sequence."""
+    tasks = []
+    for sequence in sequences:
+        seed = seed_of(wanted.seed, sequence.name)
+        output, state = wanted.output(sequence), states[sequence.name]
+        record = records.get(sequence.name)
+        why = "all are made anew" if overwrite else _why(record, state, sequence, output, wanted)
+        tasks.append(Task(sequence, state, output, seed, why))
+    return tasks
+
+
+def _why(
+    record: Mapping[str, Any] | None, state: State, sequence: Found, output: Path, wanted: Wanted
+) -> str:
+    if record is None:
+        return "new"
+    if record["status"] != "done":
+        return "it failed" if record["status"] == "failed" else "it was not finished"
+    if record["adv2e"] != __version__:
+        return f"made by adv2e {record['adv2e']}"
+    if record["seed"] != seed_of(wanted.seed, sequence.name):
+        return "the seed changed"
+    if record["settings"] != wanted.settings:
+        return "the configuration or an option changed"
+    if record["output"] != output.relative_to(wanted.dest).as_posix():
+        return "it goes to another file"
+    if record["source"] != asdict(state) and digest_of(sequence.source) != record["source_sha256"]:
+        return "its source changed"
+    if not output.exists():
+        return "its file is gone"
+    return "" if digest_of(output) == record["sha256"] else "its file changed"
+
+
+def outputs_in_the_way(
+    tasks: Sequence[Task], records: Mapping[str, Mapping[str, Any]]
+) -> list[Path]:
+    """Return files that would be replaced, though this batch never made them."""
+    return [
+        one.output
+        for one in tasks
+        if one.why and one.sequence.name not in records and one.output.exists()
+    ]

@@ -1,0 +1,265 @@
+"""A whole batch: find, plan, convert what is missing, and write down what was made from what."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from adv2e import __version__
+from adv2e.background import default_threads
+from adv2e.batch import processes
+from adv2e.batch.manifest import Manifest, check_alone, manifest_path, read_records
+from adv2e.batch.plan import Task, Wanted, outputs_in_the_way, plan, settings_digest, shard_of
+from adv2e.batch.sequences import find_sequences
+from adv2e.batch.states import state_of
+from adv2e.batch.work import Engine, Job
+from adv2e.config import load_config, to_dict
+from adv2e.config.active_effects import user_sources
+from adv2e.config.effect_files import load_effects
+from adv2e.errors import OutputError
+from adv2e.files.names import shown
+from adv2e.light.interpolation import network_of
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What all sequences of a batch are converted with.
+
+    Attributes
+    ----------
+    config_files, sets, effect_files : tuple of str
+    seed : int, optional
+        From which those of the sequences come; default: that of the configuration.
+    suffix : str
+        Of the files to write; empty: folders.
+    options : dict
+        Further arguments of :func:`adv2e.convert`.
+    """
+
+    config_files: tuple[str, ...]
+    sets: tuple[str, ...]
+    effect_files: tuple[str, ...]
+    seed: int | None
+    suffix: str
+    options: Mapping[str, Any]
+
+    def wanted(self, dest: Path) -> Wanted:
+        """Return what the files are made with; ConfigError, UsageError if that is wrong."""
+        effects = [effect for file in self.effect_files for effect in load_effects(file)]
+        config = load_config(self.config_files, self.sets, self.seed, effects)
+        network = network_of(config.sampling)
+        made = to_dict(config)
+        del made["seed"]  # each sequence has its own
+        digest = settings_digest(
+            made,
+            dict(self.options),
+            [dict(one) for one in user_sources(config)],
+            network and network.source,
+        )
+        return Wanted(dest, self.suffix, config.seed, digest)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a batch did.
+
+    Attributes
+    ----------
+    tasks : list of Task
+        All sequences, or those of the shard.
+    failed : dict
+        What went wrong, by the name of the sequence.
+    events : int
+        Made, not those that were kept.
+    """
+
+    tasks: list[Task]
+    failed: dict[str, str]
+    events: int
+
+    @property
+    def made(self) -> int:
+        """Sequences that were converted now."""
+        return sum(bool(task.why) for task in self.tasks) - len(self.failed)
+
+    @property
+    def kept(self) -> int:
+        """Sequences whose files were kept."""
+        return sum(not task.why for task in self.tasks)
+
+
+class Batch:
+    """The sequences of a batch, or of one of its shards, and what is to be done with them.
+
+    Parameters
+    ----------
+    source, dest : Path
+        Where sequences are, and where the same tree of events is made.
+    settings : Settings
+    layout : str
+        Which sequences count; see :mod:`adv2e.batch.sequences`.
+    shard : (int, int), optional
+        (I, N): only the I-th of N parts of about the same size.
+    overwrite : bool
+        Make all anew, and replace files that others made.
+
+    Raises
+    ------
+    Adv2eError
+        There is nothing to convert, or settings are wrong.
+    """
+
+    def __init__(
+        self,
+        source: Path,
+        dest: Path,
+        settings: Settings,
+        *,
+        layout: str = "auto",
+        shard: tuple[int, int] | None = None,
+        overwrite: bool = False,
+    ) -> None:
+        self._dest, self._settings, self._overwrite = dest, settings, overwrite
+        self._shard = shard
+        self._wanted = settings.wanted(dest)
+        self._sequences = find_sequences(source, layout, leave_out=dest)
+        self._states = {one.name: state_of(one.source) for one in self._sequences}
+        if shard is not None:
+            mine = shard_of(self._states, *shard)
+            self._sequences = [one for one in self._sequences if one.name in mine]
+        if not settings.suffix:
+            _check_apart({one.name for one in self._sequences})
+
+    def plan(self) -> list[Task]:
+        """Return what is to be done; files that are kept are compared with their digests.
+
+        Raises
+        ------
+        OutputError
+            A file that this batch did not make lies where one is to go.
+        """
+        records = read_records(self._dest)
+        tasks = plan(
+            self._sequences, self._states, records, self._wanted, overwrite=self._overwrite
+        )
+        strange = outputs_in_the_way(tasks, records)
+        if strange and not self._overwrite:
+            raise OutputError(
+                f"{shown(strange[0])}: exists and was not made by this batch: choose another DEST,"
+                " or --overwrite replaces it"
+            )
+        return tasks
+
+    def run(
+        self,
+        *,
+        jobs: int | None = None,
+        threads: int | None = None,
+        engine: Engine | None = None,
+        begun: Callable[[list[Task]], None] = lambda tasks: None,
+        ended: Callable[[Task, Mapping[str, Any]], None] = lambda task, record: None,
+    ) -> Outcome:
+        """Convert every sequence of which the file is missing or out of date.
+
+        Parameters
+        ----------
+        jobs : int, optional
+            Conversions at a time; default: as many as there are threads.
+        threads : int, optional
+            Threads of all together; default: all cores.
+        engine : callable, optional
+            Who converts; default: processes of this machine.
+        begun, ended : callable
+            Told what is planned, and each sequence with what the manifest says of it.
+
+        Raises
+        ------
+        Adv2eError
+            As :meth:`plan`; or another batch works there.  What is wrong with a sequence is in the
+            outcome.
+        """
+        threads = threads or default_threads()
+        failed: dict[str, str] = {}
+        events = 0
+        with Manifest(manifest_path(self._dest, self._shard)) as manifest:
+            check_alone(manifest.path)
+            tasks = self.plan()
+            begun(tasks)
+            waiting = {task.sequence.name: task for task in tasks if task.why}
+            count = max(1, min(jobs or threads, len(waiting)))
+            for task in waiting.values():
+                task.output.parent.mkdir(parents=True, exist_ok=True)
+                manifest.add({"name": task.sequence.name, "status": "started"})
+            each = max(1, threads // count)
+            work = [_job(task, self._settings, each) for task in waiting.values()]
+            for job, found in (engine or processes.run)(work, count):
+                record = _record(waiting[job.name], self._wanted, found)
+                manifest.add(record)
+                events += found.get("events", 0)
+                if "error" in found:
+                    failed[job.name] = found["error"]
+                ended(waiting[job.name], record)
+        return Outcome(tasks, failed, events)
+
+
+def _check_apart(names: set[str]) -> None:
+    """Raise OutputError if the folder of one sequence would hold that of another."""
+    for name in sorted(names):
+        above = next((str(one) for one in PurePosixPath(name).parents if str(one) in names), None)
+        if above is not None:
+            raise OutputError(
+                f"{shown(name)}: its folder would lie in that of {shown(above)}: choose another"
+                " --format, such as zip"
+            )
+
+
+def _job(task: Task, settings: Settings, threads: int) -> Job:
+    return Job(
+        task.sequence.name,
+        str(task.sequence.source),
+        str(task.output),
+        task.seed,
+        settings.config_files,
+        settings.sets,
+        settings.effect_files,
+        dict(settings.options),
+        threads,
+    )
+
+
+def _record(task: Task, wanted: Wanted, found: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "name": task.sequence.name,
+        "status": "failed" if "error" in found else "done",
+        "source": asdict(task.state),
+        "output": task.output.relative_to(wanted.dest).as_posix(),
+        "settings": wanted.settings,
+        "adv2e": __version__,
+        "seed": task.seed,
+        "why": task.why,
+        **found,
+    }
+
+
+def table(outcome: Outcome) -> list[str]:
+    """Return what a batch did, in lines for people."""
+    count = len(outcome.tasks)
+    lines = [
+        f"{count} sequences: {outcome.made} made ({outcome.events:,} events), {outcome.kept} kept,"
+        f" {len(outcome.failed)} failed"
+    ]
+    width = max((len(shown(name)) for name in outcome.failed), default=0)
+    return lines + [
+        f"  {shown(name):{width}}  {shown(error)}" for name, error in outcome.failed.items()
+    ]
+
+
+def reasons(tasks: Sequence[Task]) -> str:
+    """Return how many sequences are to be converted for which reason, and how many are kept."""
+    count = Counter(task.why or "kept" for task in tasks)
+    kept = count.pop("kept", 0)
+    told = [f"{number} {why}" for why, number in count.items()]
+    return ", ".join([*told, *([f"{kept} kept"] if kept else [])])

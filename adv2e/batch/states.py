@@ -1,0 +1,66 @@
+"""What files and folders hold, told by size and time at a glance, and by a digest for certain."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+_BLOCK = 1 << 20
+
+
+@dataclass(frozen=True)
+class State:
+    """A file or folder at a glance.
+
+    Attributes
+    ----------
+    bytes : int
+        Of all files.
+    files : int
+    changed_ns : int
+        When the last of them changed.
+    """
+
+    bytes: int
+    files: int
+    changed_ns: int
+
+
+def state_of(path: Path) -> State:
+    """Return the state of a file, or of a folder with all below it."""
+    found = [file.stat() for _, file in _files(path)]
+    return State(
+        sum(one.st_size for one in found),
+        len(found),
+        max((one.st_mtime_ns for one in found), default=0),
+    )
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file, or of the names and contents of all files below a folder."""
+    total = hashlib.sha256()
+    for name, file in _files(path):
+        own = hashlib.sha256()
+        with file.open("rb") as opened:
+            while block := opened.read(_BLOCK):
+                own.update(block)
+        if not name:
+            return own.hexdigest()
+        # the digests are of one length, so that no name can pass for a content
+        total.update(own.digest() + os.fsencode(name) + b"\0")
+    return total.hexdigest()
+
+
+def _files(path: Path) -> Iterator[tuple[str, Path]]:
+    """Yield name and path of each file, sorted by name; the name of a single file is empty."""
+    if not path.is_dir():
+        yield "", path
+        return
+    for place, folders, files in os.walk(path):
+        folders.sort()
+        here = Path(place)
+        for file in sorted(files):
+            yield (here / file).relative_to(path).as_posix(), here / file

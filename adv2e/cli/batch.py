@@ -1,0 +1,164 @@
+"""``adv2e batch``: every sequence below a folder, in such a way that it can be done again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from adv2e.cli import completion, options
+from adv2e.cli.commands import Command
+from adv2e.files.names import shown
+from adv2e.formats import lookup
+
+if TYPE_CHECKING:
+    from adv2e.batch.plan import Task
+    from adv2e.cli.options import Log
+    from adv2e.geometry import Size
+
+# adv2e.batch.sequences.LAYOUTS, without the time that importing it takes
+LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "videos")
+
+
+@click.command("batch", cls=Command)
+@click.argument(
+    "source", metavar="SOURCE", type=click.Path(path_type=Path), shell_complete=completion.files
+)
+@click.argument(
+    "dest", metavar="DEST", type=click.Path(path_type=Path), shell_complete=completion.files
+)
+@options.files_option(
+    "Configuration: a YAML file or a shipped name, such as davis346. Repeatable: a later one wins."
+)
+@options.sets_option("Set one key, such as pixel.low_pass.cutoff_hz=100. Repeatable.")
+@click.option(
+    "--seed",
+    type=options.SEED,
+    metavar="N",
+    help="Seed of the batch. Each sequence has one of its own, made of this and its name.",
+)
+@options.effect_option
+@click.option(
+    "--layout",
+    type=click.Choice(LAYOUTS),
+    default="auto",
+    show_default=True,
+    help="Which sequences count.",
+)
+@click.option(
+    "--format",
+    metavar="NAME",
+    default="h5",
+    show_default=True,
+    shell_complete=completion.formats,
+    help=f"Format of the files: {', '.join(lookup.names())}.",
+)
+@click.option("--fps", metavar="F", callback=options.rate, help="Take all frames at F a second.")
+@click.option("--size", type=options.SIZE, metavar="WxH", help="Size of the sensor.")
+@options.rotate_option()
+@click.option("--with-frames", is_flag=True, help="Store the frames, too, in HDF5.")
+@click.option("--causes", is_flag=True, help="Store what made each event, too.")
+@click.option(
+    "--jobs",
+    type=options.WholeNumber(min=1),
+    metavar="N",
+    help="Convert N sequences at a time.  [default: one for each thread]",
+)
+@click.option("--shard", metavar="I/N", help="Do only the I-th of N parts of about the same size.")
+@click.option("--dry-run", is_flag=True, help="Show what would be done, and write nothing.")
+@click.option("--overwrite", is_flag=True, help="Make all anew, and replace files of others.")
+@options.threads_option
+@options.verbosity_options
+@options.progress_option
+def command(
+    source: Path,
+    dest: Path,
+    config_files: tuple[str, ...],
+    sets: tuple[str, ...],
+    seed: int | None,
+    effect_files: tuple[str, ...],
+    layout: str,
+    format: str,
+    size: Size | None,
+    jobs: int | None,
+    shard: str | None,
+    dry_run: bool,
+    overwrite: bool,
+    threads: int | None,
+    progress: bool,
+    log: Log,
+    **given: Any,
+) -> None:
+    """Convert every sequence below the folder SOURCE, and make the same tree below DEST.
+
+    \b
+    Examples:
+      adv2e batch videos/ events/
+      adv2e batch GOPRO_Large_all/ events/ -c davis346 --seed 1 --jobs 4
+      adv2e batch videos/ events/ --dry-run
+      adv2e batch videos/ events/ --shard 2/8
+
+    Killed or done, it may be called again: it makes what is missing, and what has changed since in
+    its source, its settings or the version of adv2e. Files that it keeps are compared with what
+    DEST/manifest.jsonl says of them. A sequence that fails does not stop the others; at the end
+    all of these are listed, and the exit status is 1.
+    """
+    from adv2e.batch.plan import parse_shard
+    from adv2e.batch.run import Batch, Settings, reasons, table
+
+    part = None if shard is None else parse_shard(shard)
+    if size is not None:
+        sets = (*sets, f"sensor.width={size[0]}", f"sensor.height={size[1]}")
+    suffix = next(iter(lookup.to_write(Path("a"), format).suffixes))
+    settings = Settings(config_files, sets, effect_files, seed, suffix, {**given, "format": format})
+    work = Batch(source, dest, settings, layout=layout, shard=part, overwrite=overwrite)
+    if dry_run:
+        tasks = work.plan()
+        for task in tasks:
+            log(f"{shown(task.sequence.name)}: {task.why or 'kept'}", 0 if task.why else 1)
+        click.echo(reasons(tasks))
+        return
+    with ExitStack() as stack:
+        told = _Told(log, progress, stack)
+        outcome = work.run(jobs=jobs, threads=threads, begun=told.begun, ended=told.ended)
+    lines = table(outcome)
+    if log.level >= 0:
+        click.echo(lines[0])
+    for line in lines[1:]:
+        click.echo(line, err=True)
+    if outcome.failed:
+        raise click.exceptions.Exit(1)
+
+
+class _Told:
+    """The bar over all sequences, and a line for each failure."""
+
+    def __init__(self, log: Log, progress: bool, stack: ExitStack) -> None:
+        self._log, self._progress, self._stack = log, progress, stack
+        self._bar: Any = None
+
+    def begun(self, tasks: list[Task]) -> None:
+        from adv2e.batch.run import reasons
+
+        self._log(reasons(tasks))
+        if self._progress:
+            from tqdm import tqdm
+
+            total = sum(task.state.bytes for task in tasks if task.why)
+            self._bar = self._stack.enter_context(
+                tqdm(total=total, unit="B", unit_scale=True, desc="batch", leave=False)
+            )
+
+    def ended(self, task: Task, record: Mapping[str, Any]) -> None:
+        if self._bar is not None:
+            self._bar.update(task.state.bytes)
+        name = shown(task.sequence.name)
+        if record["status"] == "failed":
+            self._log(f"{name}: {record['error']}")
+        else:
+            self._log(f"{name}: {record['events']:,} events", 1)
+            for note in record["notes"]:
+                self._log(f"{name}: {note}", 1)

@@ -1,0 +1,158 @@
+"""Processes that convert: killed, called again, beside each other, or ended by themselves."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import trees_of_batch as trees
+from trees_of_batch import QUICK, clip, made_in
+
+from adv2e.batch import processes
+from adv2e.batch.processes import run
+from adv2e.batch.run import Batch, Settings
+from adv2e.batch.work import Job, do
+
+ENDING = """
+import os, signal
+from dataclasses import dataclass
+from adv2e.effects.hooks import Hooks
+from adv2e.parameters import Section, parameter
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Section):
+    signal: int = parameter(0, unit="-", meaning="signal that ends the process")
+
+class Ending(Hooks):
+    '''Ends the process.'''
+    name = "ending"
+    stage = "frames"
+    Parameters = Parameters
+    def light(self, frames):
+        if self.parameters.signal:
+            os.kill(os.getpid(), self.parameters.signal)
+        yield from frames
+"""
+
+
+def job(tmp_path, name, *sets, effects=()):
+    source = clip(tmp_path / f"{name}.avi")
+    return Job(
+        name, str(source), str(tmp_path / f"{name}.h5"), 1, (),
+        ("sampling.L=1", "pixel.low_pass=null", *sets), tuple(effects),
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGKILL, signal.SIGABRT])
+def test_a_process_that_dies_fails_its_sequence_alone(tmp_path, number):
+    effect = tmp_path / "ending.py"
+    effect.write_text(ENDING)
+    jobs = [
+        job(tmp_path, "a", effects=[effect]),
+        job(tmp_path, "b", f"user.ending.signal={int(number)}", effects=[effect]),
+        job(tmp_path, "c", effects=[effect]),
+    ]
+    found = {one.name: result for one, result in run(jobs, 1)}
+    assert "error" not in found["a"]
+    assert "b.avi: the process that converted it was ended from outside" in found["b"]["error"]
+    assert "error" not in found["c"]
+    assert (tmp_path / "c.h5").exists()
+    assert not (tmp_path / "b.h5").exists()
+
+
+def test_processes_stay_alive_over_many(tmp_path, monkeypatch):
+    made = []
+    whole = processes.ProcessPoolExecutor
+    monkeypatch.setattr(processes, "ProcessPoolExecutor", lambda *a: made.append(1) or whole(*a))
+    jobs = [job(tmp_path, f"s{k}") for k in range(4)]
+    found = {one.name: result for one, result in run(jobs, 1)}
+    assert sorted(found) == ["s0", "s1", "s2", "s3"]
+    assert all(result["events"] > 0 for result in found.values())
+    assert len(made) == 1
+
+
+def test_a_source_that_is_gone_is_an_error_of_its_own(tmp_path):
+    gone = job(tmp_path, "a")
+    Path(gone.source).unlink()
+    ((_, found),) = run([gone], 1)
+    assert "a.avi" in found["error"]
+    assert "\n" not in found["error"]
+
+
+def begun(*args):
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # shells ignore it in the background
+    return subprocess.Popen(
+        trees.command(*args), stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+    )
+
+
+def wait_for(condition, process, seconds=60.0):
+    until = time.monotonic() + seconds
+    while not condition():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < until
+        time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def longer(tmp_path_factory):
+    root = tmp_path_factory.mktemp("longer")
+    for k in range(4):
+        clip(root / f"{k}.avi", count=25, start=k, size=(240, 180))
+    return root
+
+
+@pytest.fixture(scope="module")
+def of_longer(longer, tmp_path_factory):
+    """What one batch makes, in one go and one process."""
+    dest = tmp_path_factory.mktemp("of_longer")
+    settings = Settings((), tuple(QUICK[1::2]), (), None, ".h5", {"format": "h5"})
+    Batch(longer, dest, settings).run(engine=lambda jobs, _: ((job, do(job)) for job in jobs))
+    return made_in(dest)
+
+
+def alive(group):
+    try:
+        os.killpg(group, 0)
+    except OSError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_ended_and_called_again_the_bytes_are_the_same(batch, longer, of_longer, tmp_path, number):
+    dest = tmp_path / "to"
+    process = begun(longer, dest, *QUICK, "--jobs", 2)
+    # events are being written
+    wait_for(lambda: any(p.stat().st_size > 100_000 for p in dest.rglob("new*.h5")), process)
+    process.send_signal(number)
+    process.communicate(timeout=30)
+    expected = {signal.SIGKILL: -9, signal.SIGINT: 130, signal.SIGTERM: 143}
+    assert process.returncode == expected[number]
+    # the processes that convert end, too
+    until = time.monotonic() + 20
+    while alive(process.pid) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not alive(process.pid)
+    assert set(made_in(dest)) <= set(of_longer)
+    done = batch(longer, dest)
+    assert done.status == 0, done.err
+    assert made_in(dest) == of_longer
+    assert not [*dest.rglob(".adv2e*")]
+
+
+def test_a_second_batch_on_the_same_folder_is_refused(batch, longer, of_longer, tmp_path):
+    dest = tmp_path / "to"
+    process = begun(longer, dest, *QUICK, "--jobs", 2)
+    wait_for(lambda: any(dest.rglob("*.part")), process)
+    second = batch(longer, dest)
+    assert second.status == 1
+    assert "manifest.jsonl: another batch writes here" in second.err
+    assert process.wait(120) == 0
+    process.stdout.close()
+    process.stderr.close()
+    assert made_in(dest) == of_longer
