@@ -12,9 +12,7 @@ from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from adv2e.config import Config
+    from adv2e.config import Family
 
 
 class _ShowByDefault(click.Group):
@@ -55,18 +53,26 @@ def group() -> None:
 
 
 @group.command()
-@options.config_options
-def show(config: Callable[[], Config]) -> None:
+@options.config_parts
+def show(
+    config_files: tuple[str, ...],
+    sets: tuple[str, ...],
+    seed: int | None,
+    effect_files: tuple[str, ...],
+) -> None:
     """Print the configuration that -c and --set make, each key explained."""
-    _print(config(), "resolved configuration")
+    from adv2e.config import load_family
+
+    family = load_family(config_files, sets, seed, options.own_effects(effect_files))
+    _print(family, "resolved configuration")
 
 
 @group.command()
 def defaults() -> None:
     """Print the default configuration, each key explained."""
-    from adv2e.config import load_config
+    from adv2e.config import load_family
 
-    _print(load_config(), "defaults")
+    _print(load_family(), "defaults")
 
 
 @group.command()
@@ -74,14 +80,15 @@ def defaults() -> None:
 @options.effect_option
 def check(file: str, effect_files: tuple[str, ...]) -> None:
     """Check a configuration file. The exit status is 0 if it is right, 1 if not."""
-    from adv2e.config import load_config
+    from adv2e.config import load_family
 
-    load_config([file], effects=options.own_effects(effect_files))
+    load_family([file], effects=options.own_effects(effect_files))
     click.echo(f"{file}: ok")
 
 
-def _print(config: Config, what: str) -> None:
+def _print(family: Family, what: str) -> None:
     from adv2e.config import to_annotated_yaml
 
-    click.echo(f"# adv2e {__version__}: {what}.  [unit] meaning; null: off")
-    click.echo(to_annotated_yaml(config), nl=False)
+    drawn = ".  'adv2e batch' draws what is in braces" if family.forms else ""
+    click.echo(f"# adv2e {__version__}: {what}{drawn}.  [unit] meaning; null: off")
+    click.echo(to_annotated_yaml(family.config, family.forms), nl=False)

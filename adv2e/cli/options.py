@@ -166,29 +166,41 @@ def sets_option(text: str) -> Callable[[Body], Body]:
     )
 
 
+def config_parts(body: Body) -> Body:
+    """Add -c, --set, --seed and --effect; the command gets config_files, sets, seed, effect_files.
+
+    See :func:`config_options`.
+    """
+    for decorator in (
+        effect_option,
+        click.option(
+            "--seed",
+            type=SEED,
+            metavar="N",
+            help="Seed of all random numbers. The same seed gives the same events.",
+        ),
+        sets_option(
+            "Set one key, such as pixel.low_pass.cutoff_hz=100. null switches an effect off:"
+            " pixel.leak=null. Repeatable."
+        ),
+        files_option(
+            "Configuration: a YAML file or a shipped name, such as davis346 (see 'adv2e config"
+            " --help'). Repeatable: a later one wins, key by key."
+        ),
+    ):
+        body = decorator(body)
+    return body
+
+
 def config_options(body: Body) -> Body:
-    """Add -c, --set, --seed and --effect; the command gets ``config``, a function.
+    """Add those of :func:`config_parts`; the command gets ``config``, a function.
 
     It returns the Config, for a sensor of a size if it is given one.  A command that has other
     things to begin with calls it after those: configurations know of all effects, and importing
     these takes its time.
     """
 
-    @files_option(
-        "Configuration: a YAML file or a shipped name, such as davis346 (see 'adv2e config"
-        " --help'). Repeatable: a later one wins, key by key."
-    )
-    @sets_option(
-        "Set one key, such as pixel.low_pass.cutoff_hz=100. null switches an effect off:"
-        " pixel.leak=null. Repeatable."
-    )
-    @click.option(
-        "--seed",
-        type=SEED,
-        metavar="N",
-        help="Seed of all random numbers. The same seed gives the same events.",
-    )
-    @effect_option
+    @config_parts
     @functools.wraps(body)
     def with_config(
         *args: Any,

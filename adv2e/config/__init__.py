@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from adv2e.config.build import Key, all_keys, build, keys_of
+from adv2e.config.distributions import Distributions, Number, replaced
 from adv2e.config.files import find, read, shipped
+from adv2e.config.forms import form_text
 from adv2e.config.merge import merge, parse_set
 from adv2e.config.model import Config
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
@@ -22,12 +24,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Config",
+    "Family",
     "Key",
     "all_keys",
     "files_among",
     "from_dict",
     "keys_of",
     "load_config",
+    "load_family",
     "names_of",
     "shipped",
     "to_annotated_yaml",
@@ -83,11 +87,92 @@ def load_config(
     >>> load_config({"pixel": {"thresholds": {"on": 0.3}}}).pixel.thresholds.on
     0.3
     """
+    return build(*_written(files, sets, seed, effects, size))
+
+
+def load_family(
+    files: Written | Sequence[Written] | None = (),
+    sets: str | Sequence[str] = (),
+    seed: int | None = None,
+    effects: Sequence[type[Hooks]] = (),
+) -> Family:
+    """Return what :func:`load_config` does, where numbers may be distributions.
+
+    Raises
+    ------
+    ConfigError, UsageError
+        As :func:`load_config`; or a distribution is wrong.
+    """
+    return Family(*_written(files, sets, seed, effects, None))
+
+
+def _written(
+    files: Written | Sequence[Written] | None,
+    sets: str | Sequence[str],
+    seed: int | None,
+    effects: Sequence[type[Hooks]],
+    size: tuple[int, int] | None,
+) -> tuple[type[Config], Value]:
+    """Return the class of a configuration, and what is written of it."""
     layers = _listed(files)
     configs = (layer for layer in layers if isinstance(layer, Config))
     own = {effect: None for config in configs for effect in user_effects(config).values()}
     added = [effect for effect in effects if effect not in own]
-    return build(config_class([*own, *added]), _merged(layers, _texts(sets), seed, size))
+    return config_class([*own, *added]), _merged(layers, _texts(sets), seed, size)
+
+
+class Family:
+    """A configuration for every seed, with numbers that are drawn from it.
+
+    Attributes
+    ----------
+    config : Config
+        That of the seed that is written.
+    forms : dict of str
+        The distributions, as they were written, by the path of the key.
+
+    Raises
+    ------
+    ConfigError, UsageError
+        A distribution is wrong, or what is drawn cannot be.
+    """
+
+    def __init__(self, section: type[Config], tree: Value) -> None:
+        self._section, self._tree = section, tree
+        self._distributions = Distributions(section, tree)
+        self.forms = {path: form_text(form) for path, form in self._distributions.forms.items()}
+        self.config = build(section, self._filled(0)[0])
+
+    def of(self, seed: int) -> tuple[Config, dict[str, Number]]:
+        """Return the configuration of a seed, and what was drawn, by the path of the key.
+
+        Raises
+        ------
+        ConfigError, UsageError
+            What was drawn cannot be.
+        """
+        tree, numbers = self._filled(seed)
+        return build(self._section, merge(tree, _tree({"seed": seed}, Origin("--seed")))), numbers
+
+    def written(self) -> dict[str, Any]:
+        """Return all keys, as :func:`to_dict` does, with the distributions in their places."""
+        whole = replaced(_tree(to_dict(self.config), Origin()), self._distributions.forms)
+        plain: dict[str, Any] = _plain(whole)
+        return plain
+
+    def _filled(self, seed: int) -> tuple[Value, dict[str, Number]]:
+        numbers = self._distributions.draw(seed)
+        forms = self._distributions.forms
+        values = {path: Value(number, forms[path].origin) for path, number in numbers.items()}
+        return replaced(self._tree, values), numbers
+
+
+def _plain(value: Value) -> Any:
+    if isinstance(value.content, dict):
+        return {key: _plain(item) for key, item in value.content.items()}
+    if isinstance(value.content, list):
+        return [_plain(item) for item in value.content]
+    return value.content
 
 
 def _texts(sets: str | Sequence[str]) -> Sequence[str]:

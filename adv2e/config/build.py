@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import MISSING
 from typing import Any, TypeVar
 
+from adv2e.config.forms import form_text, is_form
 from adv2e.config.model import Config
 from adv2e.config.yaml12 import Value, scalar_text
 from adv2e.errors import Adv2eError, ConfigError
@@ -126,9 +127,14 @@ def _tuple(key: Key, value: Value) -> tuple[Any, ...]:
             key.path, f"must be a list of {len(key.parts)} values such as"
             f" {scalar_text(key.default)}, got {value}"
         )  # fmt: skip
+    return tuple(map(_scalar, parts_of(key), value.content))
+
+
+def parts_of(key: Key) -> tuple[Key, ...]:
+    """Return the parts of a key that holds a list, each as a key of its own."""
     return tuple(
-        _scalar(dataclasses.replace(key, path=f"{key.path}[{n}]", kind=kind, parts=()), part)
-        for n, (kind, part) in enumerate(zip(key.parts, value.content, strict=True))
+        dataclasses.replace(key, path=f"{key.path}[{n}]", kind=kind, parts=())
+        for n, kind in enumerate(key.parts)
     )
 
 
@@ -136,6 +142,12 @@ def _scalar(key: Key, value: Value) -> Any:
     content = value.content
     if type(content) is key.kind or (key.kind is float and type(content) is int):
         return content
+    if key.kind in (int, float) and is_form(value):
+        raise value.origin.complaint(
+            key.path,
+            f"{form_text(value)} is a distribution, from which 'adv2e batch' draws a number for"
+            " each sequence: write a number here",
+        )
     wanted = _NAMES[key.kind]
     if key.about.choices is not None:
         wanted = f"one of {', '.join(key.about.choices)}"

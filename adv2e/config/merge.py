@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from adv2e.config.forms import is_form
 from adv2e.config.yaml12 import Origin, Value, parse
 from adv2e.errors import UsageError
 
@@ -14,10 +15,13 @@ def merge(under: Value, over: Value) -> Value:
     """Return `under` with the keys of `over` on top, section by section.
 
     Everything but two mappings is replaced: ``null`` over a section switches it off, a section
-    over ``null`` switches it on.
+    over ``null`` switches it on.  So is a distribution, which is written like a section.
     """
-    if not (isinstance(under.content, dict) and isinstance(over.content, dict)):
+    sections = isinstance(under.content, dict) and isinstance(over.content, dict)
+    if not sections or is_form(under) or is_form(over):
         return over
+    assert isinstance(under.content, dict)
+    assert isinstance(over.content, dict)
     content = dict(under.content)
     for key, value in over.content.items():
         content[key] = merge(content[key], value) if key in content else value

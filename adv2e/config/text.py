@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING
 from typing import Any
 
-from adv2e.config.build import Key, keys_of
+from adv2e.config.build import Key, keys_of, parts_of
 from adv2e.config.model import Config
 from adv2e.config.yaml12 import scalar_text
 from adv2e.parameters import Section
@@ -29,22 +29,23 @@ def _plain(value: Any) -> Any:
 def to_yaml(config: Config) -> str:
     """Return the configuration as YAML that reads back as an equal one."""
     return "".join(
-        f"{line}\n" for line, _ in _lines(type(config), config, "") if not _is_comment(line)
+        f"{line}\n" for line, _ in _lines(type(config), config, "", "", {}) if not _is_comment(line)
     )
 
 
-def to_annotated_yaml(config: Config) -> str:
+def to_annotated_yaml(config: Config, forms: Mapping[str, str] | None = None) -> str:
     """Return the configuration as YAML with a comment at each key: its unit and meaning.
 
     Short comments stand behind the value, long ones above it; the keys of a section that is off
-    are comments altogether.
+    are comments altogether.  `forms`: what is written for the numbers at some keys.
     """
-    lines = list(_lines(type(config), config, ""))
-    column = max(len(line) for line, _ in lines) + 2
+    lines = list(_lines(type(config), config, "", "", forms or {}))
+    # distributions may reach further, those of others need not
+    column = max(len(line) for line, _ in _lines(type(config), config, "", "", {})) + 2
     written = []
     for line, note in lines:
-        if column + len(note) + 2 <= _WIDTH:
-            written.append(f"{line:<{column}}# {note}")
+        if max(column, len(line) + 2) + len(note) + 2 <= _WIDTH:
+            written.append(f"{f'{line}  ':<{column}}# {note}")
             continue
         indent = line[: len(line) - len(line.lstrip())] + "# "
         written += textwrap.wrap(
@@ -55,22 +56,35 @@ def to_annotated_yaml(config: Config) -> str:
 
 
 def _lines(
-    section: type[Section], values: Section | None, indent: str
+    section: type[Section],
+    values: Section | None,
+    indent: str,
+    path: str,
+    forms: Mapping[str, str],
 ) -> Iterator[tuple[str, str]]:
     """Yield each line of YAML and its comment; without `values`, those of a section that is off."""
-    for key in keys_of(section):
+    for key in keys_of(section, path):
         name = f"{indent}{scalar_text(key.name)}"
         value = key.default if values is None else getattr(values, key.name)
         if not key.is_section:
-            yield f"{name}:{'' if value is MISSING else f' {scalar_text(value)}'}", _note(key)
+            text = "" if value is MISSING else f" {_text(key, value, forms)}"
+            yield f"{name}:{text}", _note(key)
         elif values is None or value is None:
             yield f"{name}: null", f"{_note(key)}; off"
-            yield from _lines(key.kind, None, indent + ("  " if values is None else "  # "))
+            inside = indent + ("  " if values is None else "  # ")
+            yield from _lines(key.kind, None, inside, key.path, {})
         elif keys_of(key.kind):
             yield f"{name}:", _note(key)
-            yield from _lines(key.kind, value, indent + "  ")
+            yield from _lines(key.kind, value, indent + "  ", key.path, forms)
         else:
             yield f"{name}: {{}}", _note(key)
+
+
+def _text(key: Key, value: Any, forms: Mapping[str, str]) -> str:
+    if key.parts:
+        parts = zip(parts_of(key), value, strict=True)
+        return f"[{', '.join(_text(part, number, forms) for part, number in parts)}]"
+    return forms.get(key.path) or scalar_text(value)
 
 
 def _is_comment(line: str) -> bool:

@@ -216,6 +216,28 @@ def test_config_check_knows_effects_of_ones_own(adv2e, tmp_path):
     assert "--effect FILE.py" in adv2e("config", "check", saved).err
 
 
+def test_config_takes_distributions_and_others_say_who_draws(adv2e, tmp_path):
+    path, saved = tmp_path / "c.yaml", tmp_path / "shown.yaml"
+    path.write_text('pixel: {thresholds: {"on": {uniform: [0.1, 0.5]}}}')
+    assert adv2e("config", "check", path) == (0, f"{path}: ok\n", "")
+    shown = adv2e("config", "show", "-c", path, "--set", "sampling.L={choice: [5, 10]}")
+    assert "'adv2e batch' draws what is in braces" in shown.out.splitlines()[0]
+    assert re.search(r'^    "on": \{uniform: \[0.1, 0.5\]\}  +# \[ln\]', shown.out, re.MULTILINE)
+    assert "  L: {choice: [5, 10]}" in shown.out
+    saved.write_text(shown.out)
+    assert adv2e("config", "show", "-c", saved).out == shown.out
+    path.write_text('pixel: {thresholds: {"on": {uniform: [0.5, 0.1]}}}')
+    assert ":1: pixel.thresholds.on.uniform: must be [a, b]" in adv2e("config", "check", path).err
+    for words in (
+        ("convert", "clip.mp4", "-o", tmp_path / "a.h5"),
+        ("diagnose", "a.zip", "-o", tmp_path / "found"),
+        ("compare", "a.h5", "b.h5"),
+    ):
+        outcome = adv2e(*words, "-c", saved)
+        assert outcome.status == 1
+        assert re.fullmatch(r"adv2e: error: .*'adv2e batch' draws.*\n", outcome.err)
+
+
 def test_config_help_names_what_is_shipped(adv2e):
     out = adv2e("config", "--help").out
     assert all(re.search(rf"\b{name}\b", out) for name in shipped())
