@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -12,14 +13,22 @@ from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.batch import processes
 from adv2e.batch.manifest import Manifest, check_alone, manifest_path, read_records
-from adv2e.batch.plan import Task, Wanted, outputs_in_the_way, plan, settings_digest, shard_of
+from adv2e.batch.plan import (
+    Task,
+    Wanted,
+    outputs_in_the_way,
+    plan,
+    seed_of,
+    settings_digest,
+    shard_of,
+)
 from adv2e.batch.sequences import find_sequences
 from adv2e.batch.states import state_of
 from adv2e.batch.work import Engine, Job
-from adv2e.config import load_config, to_dict
+from adv2e.config import Family, load_family, to_dict
 from adv2e.config.active_effects import user_sources
 from adv2e.config.effect_files import load_effects
-from adv2e.errors import OutputError
+from adv2e.errors import Adv2eError, OutputError
 from adv2e.files.names import shown
 from adv2e.light.interpolation import network_of
 
@@ -46,12 +55,17 @@ class Settings:
     suffix: str
     options: Mapping[str, Any]
 
+    @cached_property
+    def family(self) -> Family:
+        """The configuration for each seed; ConfigError, UsageError if it is wrong."""
+        effects = [effect for file in self.effect_files for effect in load_effects(file)]
+        return load_family(self.config_files, self.sets, self.seed, effects)
+
     def wanted(self, dest: Path) -> Wanted:
         """Return what the files are made with; ConfigError, UsageError if that is wrong."""
-        effects = [effect for file in self.effect_files for effect in load_effects(file)]
-        config = load_config(self.config_files, self.sets, self.seed, effects)
+        config = self.family.config
         network = network_of(config.sampling)
-        made = to_dict(config)
+        made = self.family.written()
         del made["seed"]  # each sequence has its own
         digest = settings_digest(
             made,
@@ -130,8 +144,19 @@ class Batch:
         if shard is not None:
             mine = shard_of(self._states, *shard)
             self._sequences = [one for one in self._sequences if one.name in mine]
+        self._check_draws()
         if not settings.suffix:
             _check_apart({one.name for one in self._sequences})
+
+    def _check_draws(self) -> None:
+        """Raise the error of the first sequence for which numbers are drawn that cannot be."""
+        name = ""
+        try:
+            for one in self._sequences if self._settings.family.forms else ():
+                name = one.name
+                self._settings.family.of(seed_of(self._wanted.seed, name))
+        except Adv2eError as error:
+            raise type(error)(f"{shown(name)}: {error}") from None
 
     def plan(self) -> list[Task]:
         """Return what is to be done; files that are kept are compared with their digests.
@@ -196,7 +221,7 @@ class Batch:
             each = max(1, threads // count)
             work = [_job(task, self._settings, each) for task in waiting.values()]
             for job, found in (engine or processes.run)(work, count):
-                record = _record(waiting[job.name], self._wanted, found)
+                record = _record(waiting[job.name], self._wanted, job, found)
                 manifest.add(record)
                 events += found.get("events", 0)
                 if "error" in found:
@@ -217,20 +242,20 @@ def _check_apart(names: set[str]) -> None:
 
 
 def _job(task: Task, settings: Settings, threads: int) -> Job:
+    config, drawn = settings.family.of(task.seed)
     return Job(
         task.sequence.name,
         str(task.sequence.source),
         str(task.output),
-        task.seed,
-        settings.config_files,
-        settings.sets,
+        to_dict(config),
+        drawn,
         settings.effect_files,
         dict(settings.options),
         threads,
     )
 
 
-def _record(task: Task, wanted: Wanted, found: Mapping[str, Any]) -> dict[str, Any]:
+def _record(task: Task, wanted: Wanted, job: Job, found: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "name": task.sequence.name,
         "status": "failed" if "error" in found else "done",
@@ -239,6 +264,7 @@ def _record(task: Task, wanted: Wanted, found: Mapping[str, Any]) -> dict[str, A
         "settings": wanted.settings,
         "adv2e": __version__,
         "seed": task.seed,
+        "drawn": job.drawn,
         "why": task.why,
         **found,
     }

@@ -21,9 +21,12 @@ class Job:
     name : str
         Of the sequence.
     source, output : str
-    seed : int
-    config_files, sets, effect_files : tuple of str
-        What the configuration is made of.
+    config : dict
+        The configuration, as :func:`adv2e.config.to_dict` gives it.
+    drawn : dict
+        Which of its numbers were drawn.
+    effect_files : tuple of str
+        Effects of the user's own.
     options : dict
         Further arguments of :func:`adv2e.convert`.
     threads : int
@@ -32,9 +35,8 @@ class Job:
     name: str
     source: str
     output: str
-    seed: int
-    config_files: tuple[str, ...]
-    sets: tuple[str, ...]
+    config: dict[str, Any]
+    drawn: dict[str, int | float]
     effect_files: tuple[str, ...]
     options: dict[str, Any] = field(default_factory=dict)
     threads: int = 1
@@ -42,14 +44,14 @@ class Job:
 
 def do(job: Job) -> dict[str, Any]:
     """Convert, and return what the manifest says of it: ``error`` where that went wrong."""
-    from adv2e.config import load_config  # noqa: PLC0415 - in the process that converts
+    from adv2e.config import from_dict  # noqa: PLC0415 - in the process that converts
     from adv2e.config.effect_files import load_effects  # noqa: PLC0415
     from adv2e.conversion.convert import convert  # noqa: PLC0415
 
     try:
         source = digest_of(Path(job.source))
         effects = [effect for file in job.effect_files for effect in load_effects(file)]
-        config = load_config(job.config_files, job.sets, job.seed, effects)
+        config = from_dict(job.config, effects=effects)
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always")
             made = convert(

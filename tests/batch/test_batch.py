@@ -125,6 +125,50 @@ def test_wrong_settings_are_told_before_anything_is_written(batch, source, tmp_p
     assert not dest.exists()
 
 
+ON = "pixel.thresholds.on"
+RANDOM = (
+    *("--set", f"{ON}={{uniform: [0.1, 0.5]}}"),
+    *("--set", f"pixel.thresholds.off={{same_as: {ON}, times: {{normal: [1, 0.1]}}}}"),
+)
+
+
+def test_each_sequence_has_numbers_of_its_own(batch, source, tmp_path):
+    dest = tmp_path / "to"
+    assert batch(source, dest, "--seed", 5, *RANDOM).status == 0
+    records = last_of(dest)
+    for name in NAMES:
+        drawn = records[name]["drawn"]
+        thresholds = read_events(dest / f"{name}.h5").metadata["config"]["pixel"]["thresholds"]
+        assert sorted(drawn) == ["pixel.thresholds.off", ON]
+        assert (drawn[ON], drawn["pixel.thresholds.off"]) == (thresholds["on"], thresholds["off"])
+        assert 0.1 < drawn[ON] < 0.5
+    assert len({records[name]["drawn"][ON] for name in NAMES}) == 3
+    assert len({records[name]["settings"] for name in NAMES}) == 1
+    # in shards, in another order
+    again = tmp_path / "again"
+    for number in (2, 1):
+        done = batch(source, again, "--seed", 5, *RANDOM[2:], *RANDOM[:2], "--shard", f"{number}/2")
+        assert done.status == 0
+    assert made_in(again) == made_in(dest)
+    assert "0 made (0 events), 3 kept" in batch(source, dest, "--seed", 5, *RANDOM).out
+    narrow = ("--set", f"{ON}={{uniform: [0.1, 0.4]}}")
+    planned = batch(source, dest, "--seed", 5, *RANDOM, *narrow, "--dry-run")
+    assert planned.out == "3 the configuration or an option changed\n"
+
+
+def test_what_cannot_be_drawn_is_told_before_anything_is_written(batch, source, tmp_path):
+    dest = tmp_path / "to"
+    done = batch(source, dest, "--set", f"{ON}={{uniform: [0.5, 0.1]}}")
+    assert done.status == 2
+    assert "pixel.thresholds.on.uniform: must be [a, b] with a below b" in done.err
+    # below 1 there is no knee of a logarithm, as only the drawn number tells
+    linear = "--set", "pixel.log_response.linear_below={uniform: [0.99, 1.03]}"
+    done = batch(source, dest, *linear, "--seed", 2)
+    assert done.status == 2
+    assert "deep/b: --set pixel.log_response.linear_below: must be 0 (pure" in done.err
+    assert not dest.exists()
+
+
 def test_folders_that_would_lie_in_each_other_are_refused(batch, tmp_path):
     root, dest = tmp_path / "from", tmp_path / "to"
     clip(root / "a.avi")

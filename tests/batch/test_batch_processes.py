@@ -15,6 +15,8 @@ from adv2e.batch import processes
 from adv2e.batch.processes import run
 from adv2e.batch.run import Batch, Settings
 from adv2e.batch.work import Job, do
+from adv2e.config import load_config, to_dict
+from adv2e.config.effect_files import load_effects
 
 ENDING = """
 import os, signal
@@ -40,10 +42,10 @@ class Ending(Hooks):
 
 def job(tmp_path, name, *sets, effects=()):
     source = clip(tmp_path / f"{name}.avi")
-    return Job(
-        name, str(source), str(tmp_path / f"{name}.h5"), 1, (),
-        ("sampling.L=1", "pixel.low_pass=null", *sets), tuple(effects),
-    )  # fmt: skip
+    loaded = [one for file in effects for one in load_effects(file)]
+    config = load_config((), ("sampling.L=1", "pixel.low_pass=null", *sets), 1, loaded)
+    output = str(tmp_path / f"{name}.h5")
+    return Job(name, str(source), output, to_dict(config), {}, tuple(map(str, effects)))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")

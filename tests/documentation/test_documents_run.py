@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from adv2e.config import load_config
+from adv2e.config import load_family
 from adv2e.conversion import demo
 from adv2e.diagnosis import prepare
 from adv2e.diagnosis.fitting.library import names
@@ -99,7 +99,7 @@ def run_block(block: Block, adv2e, said: str) -> str:
     if block.language == "yaml":
         path = Path(block.file or "example.yaml")
         path.write_text(block.text, "utf-8")
-        load_config([path])
+        load_family([path])
     if block.language == "python":
         code = compile(block.text, f"{block.document}:{block.line}", "exec")
         if not block.file and not block.needs:
