@@ -24,8 +24,8 @@ def test_wheel_holds_the_shipped_configurations(tmp_path):
     script = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
         "import adv2e; assert adv2e.__file__.startswith(sys.argv[1]), adv2e.__file__\n"
-        "from adv2e.config import load_config, shipped\n"
-        "for name in shipped(): load_config([name])\n"
+        "from adv2e.config import load_family, shipped\n"
+        "for name in shipped(): load_family([name])\n"
         "print(*shipped())\n"
     )
     outcome = subprocess.run(
@@ -35,5 +35,5 @@ def test_wheel_holds_the_shipped_configurations(tmp_path):
         cwd=tmp_path, capture_output=True, text=True, check=True,
     )  # fmt: skip
     names = outcome.stdout.split()
-    for name in ("adv2e", "paper", "v2e", "vid2e", "ideal", "davis240c", "davis346"):
+    for name in ("adv2e", "paper", "v2e", "vid2e", "ideal", "davis240c", "davis346", "train-v2e"):
         assert name in names

@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 
+import numpy as np
 import pytest
 import yaml
 
-from adv2e.config import Config, all_keys, files, from_dict, load_config, shipped, to_dict
+from adv2e.config import (
+    Config,
+    all_keys,
+    files,
+    load_config,
+    load_family,
+    shipped,
+    to_dict,
+)
 from adv2e.errors import ConfigError
 
 NAMES = ["adv2e", "davis240c", "davis346", "ideal", "paper", "v2e", "vid2e"]
+RANDOM = ["train-e2vid", "train-ecnn", "train-v2e", "train-v2e-dark"]
+"""Those from which only batches draw."""
 
 
 def test_these_are_shipped():
-    assert shipped() == NAMES
+    assert shipped() == sorted([*NAMES, *RANDOM])
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -33,17 +45,22 @@ def test_adv2e_is_the_defaults_and_gives_every_key():
                 inside = inside.content[part]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, *RANDOM])
 def test_a_reader_of_yaml_1_1_reads_the_same(name):
     text = (files.shipped_folder() / f"{name}.yaml").read_text(encoding="utf-8")
-    assert from_dict(yaml.safe_load(text)) == load_config([name])
+    assert load_family(yaml.safe_load(text)).written() == load_family(name).written()
     assert not re.search(r"^\s*(on|off):", text, re.MULTILINE)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, *RANDOM])
 def test_every_number_has_a_comment(name):
     lines = (files.shipped_folder() / f"{name}.yaml").read_text(encoding="utf-8").splitlines()
-    bare = [line for line in lines if re.fullmatch(r"\s*\"?\w+\"?:\s*[-+.\d][-+.\deE]*\s*", line)]
+    number = re.compile(r"\s*\"?\w+\"?:\s*([-+.\d][-+.\deE]*|\{.*\})\s*")
+    bare = [
+        line
+        for before, line in pairwise(lines)
+        if number.fullmatch(line) and not before.lstrip().startswith("#")
+    ]
     assert [line for line in bare if line != "seed: 0"] == []
 
 
@@ -72,6 +89,48 @@ def test_v2e_has_the_defaults_of_its_command_line():
     assert pixel.refractory.period_us == 500.0
     assert pixel.low_pass.update == "euler"
     assert pixel.low_pass.dark_cutoff_hz == pytest.approx(pixel.low_pass.cutoff_hz * 20 / 275, 1e-2)
+
+
+@pytest.mark.parametrize("name", RANDOM)
+def test_those_that_are_drawn_go_over_every_pixel_and_no_other_command_takes_them(name):
+    with pytest.raises(ConfigError, match=rf"{name}\.yaml:\d+: pixel\..* 'adv2e batch' draws"):
+        load_config([name])
+    own = load_family(name).forms
+    assert own
+    for under in NAMES:
+        family = load_family([under, name])
+        assert family.forms == own
+        first, second = family.of(1), family.of(2)
+        assert first[1].keys() == own.keys()
+        assert all(first[1][key] != second[1][key] for key in own if "choice" not in own[key])
+
+
+def test_those_that_are_drawn_are_as_their_sources_say():
+    spreads = {}
+    for name in RANDOM:
+        family = load_family(["vid2e" if name in RANDOM[:2] else "v2e", name])
+        spreads[name] = [family.of(seed)[0].pixel for seed in range(400)]
+    on = np.array([pixel.thresholds.on for pixel in spreads["train-e2vid"]])
+    off = np.array([pixel.thresholds.off for pixel in spreads["train-e2vid"]])
+    for found in (on, off):
+        assert found.mean() == pytest.approx(0.18, abs=5 * 0.03 / 20)
+        assert found.std() == pytest.approx(0.03, rel=5 / np.sqrt(2 * 400))
+    assert abs(np.corrcoef(on, off)[0, 1]) < 0.25
+    on = np.array([pixel.thresholds.on for pixel in spreads["train-ecnn"]])
+    ratios = np.array([pixel.thresholds.off for pixel in spreads["train-ecnn"]]) / on
+    assert {*on.tolist()} == {round(0.1 * k + 0.1, 1) for k in range(11)}
+    assert ratios.mean() == pytest.approx(1, abs=5 * 0.1 / 20)
+    assert ratios.std() == pytest.approx(0.1, rel=5 / np.sqrt(2 * 400))
+    for name in ("train-v2e", "train-v2e-dark"):
+        for pixel in spreads[name]:
+            assert 0.2 < pixel.thresholds.on == pixel.thresholds.off < 0.5
+            assert 0.03 < pixel.thresholds.mismatch < 0.05
+            dark = pixel.low_pass.cutoff_hz * 20 / 275
+            assert pixel.low_pass.dark_cutoff_hz == pytest.approx(dark, 5e-3)
+    for pixel in spreads["train-v2e-dark"]:
+        assert pixel.low_pass.cutoff_hz == 10 * pixel.shot_noise.rate_hz
+        assert 10 < pixel.low_pass.cutoff_hz < 100
+    assert all(0.1 < pixel.leak.rate_hz < 0.5 for pixel in spreads["train-v2e"])
 
 
 @pytest.mark.parametrize("name", ["adv2e", "davis240c", "davis346"])
