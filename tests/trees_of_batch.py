@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 from pictures import picture
 
+from adv2e.batch.work import do
+
 QUICK = ("--set", "sampling.L=1", "--set", "pixel.low_pass=null")
 
 
@@ -46,6 +48,11 @@ def stack(path):
 
 def command(*args):
     return [sys.executable, "-m", "adv2e", "batch", *map(str, args)]
+
+
+def in_this_process(jobs, count):
+    """Do what :func:`adv2e.batch.processes.run` does, without the time that processes need."""
+    return ((job, do(job)) for job in jobs)
 
 
 def lines_of(dest):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from adv2e import __version__
+from adv2e.batch.exports import Export
 from adv2e.batch.sequences import Sequence as Found
 from adv2e.batch.states import State, digest_of
 from adv2e.errors import UsageError
@@ -27,7 +28,9 @@ class Task:
     output : Path
     seed : int
     why : str
-        Why it is converted; empty: its file is kept.
+        Why something is made; empty: all is kept.
+    only_export : bool
+        Its file of events is kept, and exported.
     """
 
     sequence: Found
@@ -35,6 +38,7 @@ class Task:
     output: Path
     seed: int
     why: str
+    only_export: bool = False
 
 
 @dataclass(frozen=True)
@@ -50,16 +54,25 @@ class Wanted:
         From which those of the sequences come.
     settings : str
         Digest of the configuration and all options, less the seed.
+    export : Export, optional
+        What is made of the events.
     """
 
     dest: Path
     suffix: str
     seed: int
     settings: str
+    export: Export | None = None
 
     def output(self, sequence: Found) -> Path:
         """Return the file of a sequence: the tree below DEST is that below SOURCE."""
         return self.dest / (sequence.name + self.suffix)
+
+    def export_folder(self, sequence: Found) -> Path | None:
+        """Return where the export of a sequence goes, if there is any."""
+        if self.export is None:
+            return None
+        return self.dest / f"{sequence.name}.{self.export.kind}"
 
 
 def settings_digest(*parts: Any) -> str:
@@ -109,7 +122,10 @@ def plan(
         output, state = wanted.output(sequence), states[sequence.name]
         record = records.get(sequence.name)
         why = "all are made anew" if overwrite else _why(record, state, sequence, output, wanted)
-        tasks.append(Task(sequence, state, output, seed, why))
+        only_export = not why
+        if record is not None and only_export:
+            why = _why_export(record, sequence, wanted)
+        tasks.append(Task(sequence, state, output, seed, why, only_export and bool(why)))
     return tasks
 
 
@@ -132,15 +148,36 @@ def _why(
         return "its source changed"
     if not output.exists():
         return "its file is gone"
-    return "" if digest_of(output) == record["sha256"] else "its file changed"
+    if digest_of(output) != record["sha256"]:
+        return "its file changed"
+    for name, digest in record.get("beside", {}).items():
+        path = output.with_name(name)
+        if not path.exists() or digest_of(path) != digest:
+            return "a file beside its own changed"
+    return ""
+
+
+def _why_export(record: Mapping[str, Any], sequence: Found, wanted: Wanted) -> str:
+    folder = wanted.export_folder(sequence)
+    if wanted.export is None or folder is None:
+        return ""
+    made = record.get("export")
+    if made is None:
+        return "to be exported"
+    if any(made.get(key) != value for key, value in wanted.export.described().items()):
+        return "an option of the export changed"
+    if not folder.exists():
+        return "its export is gone"
+    return "" if digest_of(folder) == made["sha256"] else "its export changed"
 
 
 def outputs_in_the_way(
-    tasks: Sequence[Task], records: Mapping[str, Mapping[str, Any]]
+    tasks: Sequence[Task], records: Mapping[str, Mapping[str, Any]], wanted: Wanted
 ) -> list[Path]:
-    """Return files that would be replaced, though this batch never made them."""
+    """Return what would be replaced, though this batch never made it."""
     return [
-        one.output
+        path
         for one in tasks
-        if one.why and one.sequence.name not in records and one.output.exists()
+        for path in (one.output, wanted.export_folder(one.sequence))
+        if path and one.why and one.sequence.name not in records and path.exists()
     ]

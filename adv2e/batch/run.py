@@ -6,12 +6,13 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.batch import processes
+from adv2e.batch.exports import Export, write_lists
 from adv2e.batch.manifest import Manifest, check_alone, manifest_path, read_records
 from adv2e.batch.plan import (
     Task,
@@ -22,6 +23,7 @@ from adv2e.batch.plan import (
     settings_digest,
     shard_of,
 )
+from adv2e.batch.sequences import Sequence as Found
 from adv2e.batch.sequences import find_sequences
 from adv2e.batch.states import state_of
 from adv2e.batch.work import Engine, Job
@@ -46,6 +48,8 @@ class Settings:
         Of the files to write; empty: folders.
     options : dict
         Further arguments of :func:`adv2e.convert`.
+    export : Export, optional
+        What is made of the events.
     """
 
     config_files: tuple[str, ...]
@@ -54,6 +58,7 @@ class Settings:
     seed: int | None
     suffix: str
     options: Mapping[str, Any]
+    export: Export | None = None
 
     @cached_property
     def family(self) -> Family:
@@ -73,7 +78,7 @@ class Settings:
             [dict(one) for one in user_sources(config)],
             network and network.source,
         )
-        return Wanted(dest, self.suffix, config.seed, digest)
+        return Wanted(dest, self.suffix, config.seed, digest, self.export)
 
 
 @dataclass(frozen=True)
@@ -145,8 +150,7 @@ class Batch:
             mine = shard_of(self._states, *shard)
             self._sequences = [one for one in self._sequences if one.name in mine]
         self._check_draws()
-        if not settings.suffix:
-            _check_apart({one.name for one in self._sequences})
+        _check_apart(self._wanted, self._sequences)
 
     def _check_draws(self) -> None:
         """Raise the error of the first sequence for which numbers are drawn that cannot be."""
@@ -170,7 +174,7 @@ class Batch:
         tasks = plan(
             self._sequences, self._states, records, self._wanted, overwrite=self._overwrite
         )
-        strange = outputs_in_the_way(tasks, records)
+        strange = outputs_in_the_way(tasks, records, self._wanted)
         if strange and not self._overwrite:
             raise OutputError(
                 f"{shown(strange[0])}: exists and was not made by this batch: choose another DEST,"
@@ -217,23 +221,34 @@ class Batch:
             count = max(1, min(jobs or threads, len(waiting)))
             for task in waiting.values():
                 task.output.parent.mkdir(parents=True, exist_ok=True)
-                manifest.add({"name": task.sequence.name, "status": "started"})
+                if not task.only_export:
+                    manifest.add({"name": task.sequence.name, "status": "started"})
             each = max(1, threads // count)
-            work = [_job(task, self._settings, each) for task in waiting.values()]
+            work = [_job(task, self._settings, self._wanted, each) for task in waiting.values()]
+            before = read_records(self._dest)
             for job, found in (engine or processes.run)(work, count):
-                record = _record(waiting[job.name], self._wanted, job, found)
+                record = _record(waiting[job.name], self._wanted, job, found, before)
                 manifest.add(record)
                 events += found.get("events", 0)
-                if "error" in found:
-                    failed[job.name] = found["error"]
+                wrong = error_of(found)
+                if wrong:
+                    failed[job.name] = wrong
                 ended(waiting[job.name], record)
+            if self._wanted.export is not None and self._wanted.export.kind == "e2vid":
+                write_lists(self._dest, read_records(self._dest).values())
         return Outcome(tasks, failed, events)
 
 
-def _check_apart(names: set[str]) -> None:
-    """Raise OutputError if the folder of one sequence would hold that of another."""
-    for name in sorted(names):
-        above = next((str(one) for one in PurePosixPath(name).parents if str(one) in names), None)
+def _check_apart(wanted: Wanted, sequences: Sequence[Found]) -> None:
+    """Raise OutputError if the folder of one sequence would hold what another makes."""
+    owners: dict[Path, str] = {}
+    for one in sequences:
+        for path in filter(None, (wanted.output(one), wanted.export_folder(one))):
+            other = owners.setdefault(path, one.name)
+            if other != one.name:
+                raise OutputError(f"{shown(one.name)}, {shown(other)}: would both make {path}")
+    for path, name in owners.items():
+        above = next((owners[place] for place in path.parents if place in owners), None)
         if above is not None:
             raise OutputError(
                 f"{shown(name)}: its folder would lie in that of {shown(above)}: choose another"
@@ -241,7 +256,7 @@ def _check_apart(names: set[str]) -> None:
             )
 
 
-def _job(task: Task, settings: Settings, threads: int) -> Job:
+def _job(task: Task, settings: Settings, wanted: Wanted, threads: int) -> Job:
     config, drawn = settings.family.of(task.seed)
     return Job(
         task.sequence.name,
@@ -252,11 +267,22 @@ def _job(task: Task, settings: Settings, threads: int) -> Job:
         settings.effect_files,
         dict(settings.options),
         threads,
+        settings.export,
+        str(wanted.export_folder(task.sequence) or ""),
+        task.only_export,
     )
 
 
-def _record(task: Task, wanted: Wanted, job: Job, found: Mapping[str, Any]) -> dict[str, Any]:
+def _record(
+    task: Task,
+    wanted: Wanted,
+    job: Job,
+    found: Mapping[str, Any],
+    before: Mapping[str, Mapping[str, Any]],
+) -> dict[str, Any]:
+    kept = before[job.name] if task.only_export else {}
     return {
+        **{key: value for key, value in kept.items() if not key.startswith("export")},
         "name": task.sequence.name,
         "status": "failed" if "error" in found else "done",
         "source": asdict(task.state),
@@ -268,6 +294,12 @@ def _record(task: Task, wanted: Wanted, job: Job, found: Mapping[str, Any]) -> d
         "why": task.why,
         **found,
     }
+
+
+def error_of(record: Mapping[str, Any]) -> str:
+    """Return what went wrong with a sequence; empty: nothing."""
+    wrong: str = record.get("error") or record.get("export_error") or ""
+    return wrong
 
 
 def table(outcome: Outcome) -> list[str]:

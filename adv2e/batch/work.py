@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from adv2e.batch.exports import Export
 from adv2e.batch.states import digest_of
 from adv2e.errors import Adv2eError
+from adv2e.formats.lookup import to_write
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,10 @@ class Job:
     options : dict
         Further arguments of :func:`adv2e.convert`.
     threads : int
+    export : Export, optional
+        What is made of the events, in `export_folder`.
+    only_export : bool
+        The events are there.
     """
 
     name: str
@@ -40,44 +46,82 @@ class Job:
     effect_files: tuple[str, ...]
     options: dict[str, Any] = field(default_factory=dict)
     threads: int = 1
+    export: Export | None = None
+    export_folder: str = ""
+    only_export: bool = False
 
 
 def do(job: Job) -> dict[str, Any]:
-    """Convert, and return what the manifest says of it: ``error`` where that went wrong."""
+    """Do what a job says, and return what the manifest says of it.
+
+    That holds ``error`` where nothing was made, and ``export_error`` where only events were.
+    """
+    found = {} if job.only_export else _reported(job, "error", _convert)
+    if job.export is not None and "error" not in found:
+        found |= _reported(job, "export_error", _export)
+    return found
+
+
+def _reported(job: Job, error_key: str, work: Callable[[Job], dict[str, Any]]) -> dict[str, Any]:
+    """Return what `work` does, or, by `error_key`, what went wrong."""
+    try:
+        return work(job)
+    except Adv2eError as error:
+        return {error_key: str(error)}
+    except OSError as error:
+        return {error_key: f"{error.filename or job.source}: {error.strerror or error}"}
+    except Exception as error:
+        return {error_key: f"internal error: {type(error).__name__}: {error}"}
+
+
+def _convert(job: Job) -> dict[str, Any]:
     from adv2e.config import from_dict  # noqa: PLC0415 - in the process that converts
     from adv2e.config.effect_files import load_effects  # noqa: PLC0415
     from adv2e.conversion.convert import convert  # noqa: PLC0415
 
-    try:
-        source = digest_of(Path(job.source))
-        effects = [effect for file in job.effect_files for effect in load_effects(file)]
-        config = from_dict(job.config, effects=effects)
-        with warnings.catch_warnings(record=True) as doubts:
-            warnings.simplefilter("always")
-            made = convert(
-                job.source,
-                job.output,
-                config,
-                overwrite=True,
-                take="frames",
-                threads=job.threads,
-                **job.options,
-            )
-        return {
-            "source_sha256": source,
-            "sha256": digest_of(Path(job.output)),
-            "events": made.events,
-            "frames": made.frames,
-            "duration_s": made.duration_s,
-            "seconds": round(made.seconds, 3),
-            "notes": [*made.notes, *(str(one.message) for one in doubts)],
-        }
-    except Adv2eError as error:
-        return {"error": str(error)}
-    except OSError as error:
-        return {"error": f"{error.filename or job.source}: {error.strerror or error}"}
-    except Exception as error:
-        return {"error": f"internal error: {type(error).__name__}: {error}"}
+    source = digest_of(Path(job.source))
+    effects = [effect for file in job.effect_files for effect in load_effects(file)]
+    config = from_dict(job.config, effects=effects)
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always")
+        made = convert(
+            job.source,
+            job.output,
+            config,
+            overwrite=True,
+            take="frames",
+            threads=job.threads,
+            **job.options,
+        )
+    return {
+        "source_sha256": source,
+        "sha256": digest_of(Path(job.output)),
+        "beside": {path.name: digest_of(path) for path in _beside(job)},
+        "events": made.events,
+        "frames": made.frames,
+        "duration_s": made.duration_s,
+        "seconds": round(made.seconds, 3),
+        "notes": [*made.notes, *(str(one.message) for one in doubts)],
+    }
+
+
+def _beside(job: Job) -> Iterator[Path]:
+    """Yield the files that lie beside the output, of formats that have no place for all."""
+    from adv2e.formats.causes import beside  # noqa: PLC0415
+
+    output = Path(job.output)
+    format = to_write(output, job.options.get("format"))
+    if not format.holds_settings:
+        yield output.with_name(f"{output.name}.json")
+    if job.options.get("causes") and not format.causes:
+        yield beside(output)
+
+
+def _export(job: Job) -> dict[str, Any]:
+    assert job.export is not None
+    doubts: list[str] = []
+    made = job.export.make(Path(job.output), Path(job.export_folder), job.threads, doubts.append)
+    return {"export": {**made, "notes": doubts}}
 
 
 Engine = Callable[[Iterable[Job], int], Iterator[tuple[Job, dict[str, Any]]]]

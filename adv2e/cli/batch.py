@@ -15,12 +15,16 @@ from adv2e.files.names import shown
 from adv2e.formats import lookup
 
 if TYPE_CHECKING:
+    from adv2e.batch.exports import Export
     from adv2e.batch.plan import Task
     from adv2e.cli.options import Log
+    from adv2e.formats.registry import Format
     from adv2e.geometry import Size
 
 # adv2e.batch.sequences.LAYOUTS, without the time that importing it takes
 LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "videos")
+# adv2e.batch.exports.KINDS, likewise
+EXPORTS = ("e2vid", "voxel", "ev-segnet")
 
 
 @click.command("batch", cls=Command)
@@ -62,6 +66,27 @@ LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "videos")
 @click.option("--with-frames", is_flag=True, help="Store the frames, too, in HDF5.")
 @click.option("--causes", is_flag=True, help="Store what made each event, too.")
 @click.option(
+    "--export",
+    "kind",
+    type=click.Choice(EXPORTS),
+    help="Make a training set of the events of each sequence, too, as 'adv2e export' does. Stores"
+    " the frames where it needs them.",
+)
+@click.option(
+    "--window",
+    "window_us",
+    type=options.TIME,
+    metavar="TIME",
+    help="Of --export voxel: windows of TIME, such as 33ms.  [default: from image to image]"
+    "  Of --export ev-segnet: the time before each image.  [default: 50ms]",
+)
+@click.option(
+    "--bins",
+    type=options.WholeNumber(1, 10_000),
+    metavar="N",
+    help="Of --export voxel: temporal bins of a grid.  [default: 5]",
+)
+@click.option(
     "--jobs",
     type=options.WholeNumber(min=1),
     metavar="N",
@@ -83,6 +108,10 @@ def command(
     layout: str,
     format: str,
     size: Size | None,
+    with_frames: bool,
+    kind: str | None,
+    window_us: int | None,
+    bins: int | None,
     jobs: int | None,
     shard: str | None,
     dry_run: bool,
@@ -100,6 +129,7 @@ def command(
       adv2e batch GOPRO_Large_all/ events/ -c davis346 --seed 1 --jobs 4
       adv2e batch videos/ events/ --dry-run
       adv2e batch videos/ events/ --shard 2/8
+      adv2e batch videos/ training/ -c vid2e -c train-e2vid --export e2vid
 
     Killed or done, it may be called again: it makes what is missing, and what has changed since in
     its source, its settings or the version of adv2e. Files that it keeps are compared with what
@@ -112,8 +142,12 @@ def command(
     part = None if shard is None else parse_shard(shard)
     if size is not None:
         sets = (*sets, f"sensor.width={size[0]}", f"sensor.height={size[1]}")
-    suffix = next(iter(lookup.to_write(Path("a"), format).suffixes))
-    settings = Settings(config_files, sets, effect_files, seed, suffix, {**given, "format": format})
+    written = lookup.to_write(Path("a"), format)
+    export = _export(kind, window_us, bins, written)
+    with_frames = with_frames or (export is not None and export.needs_frames)
+    given |= {"format": format, "with_frames": with_frames}
+    suffix = next(iter(written.suffixes))
+    settings = Settings(config_files, sets, effect_files, seed, suffix, given, export)
     work = Batch(source, dest, settings, layout=layout, shard=part, overwrite=overwrite)
     if dry_run:
         tasks = work.plan()
@@ -131,6 +165,27 @@ def command(
         click.echo(line, err=True)
     if outcome.failed:
         raise click.exceptions.Exit(1)
+
+
+def _export(
+    kind: str | None, window_us: int | None, bins: int | None, written: Format
+) -> Export | None:
+    """Return what is to be made of the events; raise UsageError where options do not fit it."""
+    from adv2e.batch.exports import Export
+
+    if window_us is not None and kind not in ("voxel", "ev-segnet"):
+        raise click.UsageError("--window is for --export voxel and --export ev-segnet")
+    if bins is not None and kind != "voxel":
+        raise click.UsageError("--bins is for --export voxel")
+    if kind is None:
+        return None
+    export = Export(kind, window_us, bins or 5)
+    if export.needs_frames and "w" not in written.frames:
+        raise click.UsageError(
+            f"--export {kind} needs frames, and {written.what} holds events alone: leave out"
+            " --format"
+        )
+    return export
 
 
 class _Told:
@@ -153,12 +208,15 @@ class _Told:
             )
 
     def ended(self, task: Task, record: Mapping[str, Any]) -> None:
+        from adv2e.batch.run import error_of
+
         if self._bar is not None:
             self._bar.update(task.state.bytes)
         name = shown(task.sequence.name)
-        if record["status"] == "failed":
-            self._log(f"{name}: {record['error']}")
-        else:
-            self._log(f"{name}: {record['events']:,} events", 1)
-            for note in record["notes"]:
-                self._log(f"{name}: {note}", 1)
+        wrong = error_of(record)
+        if wrong:
+            self._log(f"{name}: {wrong}")
+            return
+        self._log(f"{name}: {record['events']:,} events", 1)
+        for note in [*record["notes"], *record.get("export", {}).get("notes", ())]:
+            self._log(f"{name}: {note}", 1)

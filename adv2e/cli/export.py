@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,23 +15,12 @@ if TYPE_CHECKING:
     from adv2e.cli.options import Log
     from adv2e.geometry import Size
 
-_UNITS = {"s": 1e6, "ms": 1e3, "us": 1.0}
-
 _OPTIONS = {
     "voxel": {"bins", "window_us", "count", "at", "normalise", "polarity", "span"},
     "ev-segnet": {"window_us", "split", "rows", "counts"},
     "e2vid": {"valid"},
 }
 """Options that only some exports take."""
-
-
-def _microseconds(text: str) -> int:
-    """Return the time that a text with its unit says [us]; ValueError if there is none."""
-    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*(s|ms|us)", text)
-    length = round(float(found[1]) * _UNITS[found[2]]) if found else 0
-    if length < 1:
-        raise ValueError(f"must be a time with its unit, such as 33ms, got {text!r}")
-    return length
 
 
 @click.command("export", cls=Command)
@@ -49,7 +37,7 @@ def _microseconds(text: str) -> int:
 @click.option(
     "--window",
     "window_us",
-    type=options.Parsed("time", _microseconds),
+    type=options.TIME,
     metavar="TIME",
     help="Cut the events into windows of TIME, such as 33ms. For ev-segnet: the time before each"
     " image.  [default: ev-segnet: 50ms]",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -84,6 +85,19 @@ class Parsed(click.ParamType):  # type: ignore[type-arg] # not generic in all ve
             self.fail(str(error), param, ctx)
 
 
+_UNITS = {"s": 1e6, "ms": 1e3, "us": 1.0}
+
+
+def _microseconds(text: str) -> int:
+    """Return the time that a text with its unit says [us]; ValueError if there is none."""
+    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*(s|ms|us)", text)
+    length = round(float(found[1]) * _UNITS[found[2]]) if found else 0
+    if length < 1:
+        raise ValueError(f"must be a time with its unit, such as 33ms, got {text!r}")
+    return length
+
+
+TIME = Parsed("time", _microseconds)
 # adv2e.sources.wanted.PATTERNS, without the time that importing it takes
 BAYER = ("RGGB", "BGGR", "GRBG", "GBRG")
 # adv2e.sources.pipes.raw.PIXEL_FORMATS, likewise

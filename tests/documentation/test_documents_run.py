@@ -11,7 +11,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from trees_of_batch import in_this_process
 
+from adv2e.batch import processes
 from adv2e.config import load_family
 from adv2e.conversion import demo
 from adv2e.diagnosis import prepare
@@ -47,6 +49,7 @@ def _small(monkeypatch, tmp_path):
         return [one for one in every(declared, hints) if one.name not in built_in]
 
     monkeypatch.setattr(prepare, "library", library)
+    monkeypatch.setattr(processes, "run", in_this_process)
     smaller = {"WIDTH": 64, "HEIGHT": 48, "DURATION_S": 0.5, "RECORDING_S": 0.2}
     for name, value in smaller.items():
         monkeypatch.setattr(demo, name, value)
