@@ -21,6 +21,7 @@ import difflib
 import hashlib
 import math
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass
 from typing import Any, TypeAlias
@@ -76,9 +77,10 @@ class _Law:
         if self.whole:
             return int(first) + int(share * (int(second) - int(first) + 1))
         if self.name == "log_uniform":
-            low, high = math.log(first), math.log(second)
-            return min(max(math.exp(low + (high - low) * share), first), second)
-        return min(first + (second - first) * share, second)
+            between = math.exp(math.log(first) * (1 - share) + math.log(second) * share)
+        else:
+            between = first * (1 - share) + second * share
+        return min(max(between, first), second)  # but for rounding, it is between them
 
 
 @dataclass(frozen=True)
@@ -309,7 +311,8 @@ def _law(path: str, value: Value, *, whole: bool = False) -> _Law:
 def _number(path: str, value: Value, *, whole: bool = False) -> Number:
     number = value.content
     fits = isinstance(number, int if whole else (int, float)) and not isinstance(number, bool)
-    if not fits or not math.isfinite(number):  # type: ignore[arg-type]
+    # no float is as large as some whole numbers
+    if not fits or not -sys.float_info.max <= number <= sys.float_info.max:  # type: ignore[operator]
         what = "a whole number" if whole else "a finite number"
         raise value.origin.complaint(path, f"must be {what}, got {value}")
     return number  # type: ignore[return-value]

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.config import from_dict, load_config, load_family, to_annotated_yaml, to_dict
+from adv2e.config.effect_files import load_effects
 from adv2e.errors import ConfigError, UsageError
 
 ON = "pixel.thresholds.on"
@@ -188,6 +189,7 @@ def test_nobody_else_draws():
         ("on: {uniform: [0.1, 0.2, 0.3]}", "on.uniform: must be [a, b] with a below b"),
         ("on: {uniform: [0.1, x]}", "on.uniform: must be a finite number, got 'x'"),
         ("on: {uniform: [0.1, .inf]}", "on.uniform: must be a finite number, got .inf"),
+        (f"on: {{uniform: [0.1, 1{'0' * 400}]}}", "on.uniform: must be a finite number, got 1000"),
         ("on: {uniform: [0.1, true]}", "on.uniform: must be a finite number, got true"),
         ("on: {log_uniform: [0, 1]}", "on.log_uniform: must be [a, b] with a above 0 and below b"),
         ("on: {normal: [0.2, 0]}", "on.normal: must be [mean, deviation] with a deviation above 0"),
@@ -239,6 +241,32 @@ def test_what_does_not_fit_its_key(argument, said):
         load_family(sets=[argument])
 
 
+def test_the_widest_range_is_no_end_of_it():
+    found = draws("frames.clock_offset_us", "{uniform: [-1.7e308, 1.7e308]}", 100)
+    assert np.abs(found).max() < 1.7e308
+    assert (found < 0).any()
+
+
+def test_effects_of_ones_own_take_distributions(tmp_path):
+    effect = tmp_path / "echo.py"
+    effect.write_text(
+        "from dataclasses import dataclass\n"
+        "from adv2e.effects.hooks import Hooks\n"
+        "from adv2e.parameters import Section, parameter\n"
+        "@dataclass(frozen=True, kw_only=True)\n"
+        "class Parameters(Section):\n"
+        "    share: float = parameter(unit='-', meaning='share', at_least=0, at_most=1)\n"
+        "class Echo(Hooks):\n"
+        "    'Echoes.'\n"
+        "    stage, Parameters = 'readout', Parameters\n"
+        "    def events(self, chunks):\n"
+        "        yield from chunks\n"
+    )
+    family = load_family(sets="user.echo.share={normal: [0, 1]}", effects=load_effects(str(effect)))
+    config, numbers = family.of(1)
+    assert 0 <= numbers["user.echo.share"] == config.user.echo.share <= 1
+
+
 def test_ties_that_go_round_in_a_circle_are_refused():
     sets = [f"{ON}={{same_as: {OFF}}}", f"{OFF}={{same_as: {ON}, times: 2}}"]
     with pytest.raises(UsageError, match=f"goes round in a circle: {ON} -> {OFF}"):
@@ -251,7 +279,7 @@ def test_ties_that_go_round_in_a_circle_are_refused():
 @settings(max_examples=100, deadline=None)
 @given(
     seed=st.integers(0, 2**64 - 1),
-    ends=st.lists(st.floats(1e-300, 1e300), min_size=2, max_size=2, unique=True).map(sorted),
+    ends=st.lists(st.floats(1e-300, 1.7e308), min_size=2, max_size=2, unique=True).map(sorted),
     law=st.sampled_from(["uniform", "log_uniform"]),
 )
 def test_numbers_lie_between_the_ends(seed, ends, law):
