@@ -37,7 +37,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 _PACKAGE = Path(__file__).resolve().parent
 _PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 _MAKING = threading.RLock()
+_EXTENDING = threading.Lock()
 _extensions: list[Callable[[], None]] = []
+_is_imported = threading.Event()
 _watchers: list[Callable[[Callable[..., Any]], None]] = []
 
 
@@ -110,8 +112,10 @@ def _import_compiler() -> Any:
 
     compiler.know_type(Compiled)
     compiler.listen(code_cache(), _tell)
-    for extend in _extensions:
-        extend()
+    with _EXTENDING:
+        while _extensions:
+            _extensions.pop(0)()
+        _is_imported.set()
     return compiler
 
 
@@ -137,8 +141,15 @@ def inlined(function: Function) -> Function:
 
 
 def extension(extend: Callable[[], None]) -> None:
-    """Have `extend`, which tells Numba more by its extension interface, called before the rest."""
-    _extensions.append(extend)
+    """Have `extend`, which tells Numba more by its extension interface, called before the rest.
+
+    Numba may have come already, in its own thread, while this module is still imported.
+    """
+    with _EXTENDING:
+        if _is_imported.is_set():
+            extend()
+        else:
+            _extensions.append(extend)
 
 
 @contextmanager

@@ -188,3 +188,18 @@ def test_the_digest_covers_the_constants_that_compiled_code_takes_in():
                 assert file in covered, f"{path} takes constants from {file}"
                 seen += 1
     assert seen > 20
+
+
+def test_what_is_imported_after_the_compiler_extends_it(tmp_path):
+    script = (
+        "from adv2e import compiled\n"
+        "import numpy as np\n"
+        "compiled._compiler().warm_up()\n"
+        "from adv2e.kernel.work_queue import claim, nothing_claimed\n"
+        "print(*claim(nothing_claimed(), 5000))\n"
+    )
+    none = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}  # no code is kept there
+    run = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, env=none
+    )
+    assert (run.stdout, run.returncode) == ("0 2048\n", 0), run.stderr
