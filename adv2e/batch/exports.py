@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from adv2e.batch.states import digest_of
 from adv2e.files.staging import Staging, writing
+from adv2e.files.states import digest_of
 
 KINDS = ("e2vid", "voxel", "ev-segnet")
 _VALID_SHARE = 0.2

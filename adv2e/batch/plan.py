@@ -12,8 +12,8 @@ from typing import Any
 from adv2e import __version__
 from adv2e.batch.exports import Export
 from adv2e.batch.sequences import Sequence as Found
-from adv2e.batch.states import State, digest_of
 from adv2e.errors import UsageError
+from adv2e.files.states import State, digest_of
 
 
 @dataclass(frozen=True)

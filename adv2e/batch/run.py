@@ -13,6 +13,7 @@ from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.batch import processes
 from adv2e.batch.exports import Export, write_lists
+from adv2e.batch.forecast import Forecast, forecast
 from adv2e.batch.manifest import Manifest, check_alone, manifest_path, read_records
 from adv2e.batch.plan import (
     Task,
@@ -25,13 +26,13 @@ from adv2e.batch.plan import (
 )
 from adv2e.batch.sequences import Sequence as Found
 from adv2e.batch.sequences import find_sequences
-from adv2e.batch.states import state_of
 from adv2e.batch.work import Engine, Job
 from adv2e.config import Family, load_family, to_dict
 from adv2e.config.active_effects import user_sources
 from adv2e.config.effect_files import load_effects
 from adv2e.errors import Adv2eError, OutputError
 from adv2e.files.names import shown
+from adv2e.files.states import state_of
 from adv2e.light.interpolation import network_of
 
 
@@ -72,6 +73,7 @@ class Settings:
         network = network_of(config.sampling)
         made = self.family.written()
         del made["seed"]  # each sequence has its own
+        del made["max_events"]  # what was made is within it
         digest = settings_digest(
             made,
             dict(self.options),
@@ -182,6 +184,18 @@ class Batch:
             )
         return tasks
 
+    def forecast(
+        self, tasks: Sequence[Task], jobs: int | None, threads: int | None
+    ) -> Forecast | None:
+        """Return what converting will make and take; `jobs` and `threads` as for :meth:`run`."""
+        waiting = [task for task in tasks if task.why and not task.only_export]
+        count, each = _shares(len(waiting), jobs, threads)
+
+        def job_of(task: Task) -> Job:
+            return _job(task, self._settings, self._wanted, each)
+
+        return forecast(waiting, self._dest, job_of, count)
+
     def run(
         self,
         *,
@@ -210,7 +224,6 @@ class Batch:
             As :meth:`plan`; or another batch works there.  What is wrong with a sequence is in the
             outcome.
         """
-        threads = threads or default_threads()
         failed: dict[str, str] = {}
         events = 0
         with Manifest(manifest_path(self._dest, self._shard)) as manifest:
@@ -218,12 +231,11 @@ class Batch:
             tasks = self.plan()
             begun(tasks)
             waiting = {task.sequence.name: task for task in tasks if task.why}
-            count = max(1, min(jobs or threads, len(waiting)))
+            count, each = _shares(len(waiting), jobs, threads)
             for task in waiting.values():
                 task.output.parent.mkdir(parents=True, exist_ok=True)
                 if not task.only_export:
                     manifest.add({"name": task.sequence.name, "status": "started"})
-            each = max(1, threads // count)
             work = [_job(task, self._settings, self._wanted, each) for task in waiting.values()]
             before = read_records(self._dest)
             for job, found in (engine or processes.run)(work, count):
@@ -254,6 +266,13 @@ def _check_apart(wanted: Wanted, sequences: Sequence[Found]) -> None:
                 f"{shown(name)}: its folder would lie in that of {shown(above)}: choose another"
                 " --format, such as zip"
             )
+
+
+def _shares(sequences: int, jobs: int | None, threads: int | None) -> tuple[int, int]:
+    """Return how many conversions run at a time, and with how many threads each."""
+    threads = threads or default_threads()
+    count = max(1, min(jobs or threads, sequences))
+    return count, max(1, threads // count)
 
 
 def _job(task: Task, settings: Settings, wanted: Wanted, threads: int) -> Job:

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.batch.exports import Export
-from adv2e.batch.states import digest_of
+from adv2e.config import Config, from_dict
+from adv2e.config.effect_files import load_effects
 from adv2e.errors import Adv2eError
+from adv2e.files.states import digest_of
 from adv2e.formats.lookup import to_write
 
 
@@ -51,6 +53,18 @@ class Job:
     only_export: bool = False
 
 
+def config_of(job: Job) -> Config:
+    """Return the configuration of a conversion.
+
+    Raises
+    ------
+    ConfigError, UsageError
+        As :func:`adv2e.config.from_dict`; a file of effects is wrong.
+    """
+    effects = [effect for file in job.effect_files for effect in load_effects(file)]
+    return from_dict(job.config, effects=effects)
+
+
 def do(job: Job) -> dict[str, Any]:
     """Do what a job says, and return what the manifest says of it.
 
@@ -75,13 +89,10 @@ def _reported(job: Job, error_key: str, work: Callable[[Job], dict[str, Any]]) -
 
 
 def _convert(job: Job) -> dict[str, Any]:
-    from adv2e.config import from_dict  # noqa: PLC0415 - in the process that converts
-    from adv2e.config.effect_files import load_effects  # noqa: PLC0415
-    from adv2e.conversion.convert import convert  # noqa: PLC0415
+    from adv2e.conversion.convert import convert  # noqa: PLC0415 - in the process that converts
 
     source = digest_of(Path(job.source))
-    effects = [effect for file in job.effect_files for effect in load_effects(file)]
-    config = from_dict(job.config, effects=effects)
+    config = config_of(job)
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always")
         made = convert(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from adv2e.formats import lookup
 
 if TYPE_CHECKING:
     from adv2e.batch.exports import Export
+    from adv2e.batch.forecast import Forecast
     from adv2e.batch.plan import Task
     from adv2e.cli.options import Log
     from adv2e.formats.registry import Format
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "videos")
 # adv2e.batch.exports.KINDS, likewise
 EXPORTS = ("e2vid", "voxel", "ev-segnet")
+
+_LARGE_SOURCE = 100_000_000
+"""Bytes of source from which on it is worth to look how much will come out."""
 
 
 @click.command("batch", cls=Command)
@@ -154,9 +158,11 @@ def command(
         for task in tasks:
             log(f"{shown(task.sequence.name)}: {task.why or 'kept'}", 0 if task.why else 1)
         click.echo(reasons(tasks))
+        if coming := work.forecast(tasks, jobs, threads):
+            click.echo(coming.text())
         return
     with ExitStack() as stack:
-        told = _Told(log, progress, stack)
+        told = _Told(log, progress, stack, lambda tasks: work.forecast(tasks, jobs, threads))
         outcome = work.run(jobs=jobs, threads=threads, begun=told.begun, ended=told.ended)
     lines = table(outcome)
     if log.level >= 0:
@@ -191,14 +197,26 @@ def _export(
 class _Told:
     """The bar over all sequences, and a line for each failure."""
 
-    def __init__(self, log: Log, progress: bool, stack: ExitStack) -> None:
+    def __init__(
+        self,
+        log: Log,
+        progress: bool,
+        stack: ExitStack,
+        forecast: Callable[[list[Task]], Forecast | None],
+    ) -> None:
         self._log, self._progress, self._stack = log, progress, stack
+        self._forecast = forecast
         self._bar: Any = None
 
     def begun(self, tasks: list[Task]) -> None:
         from adv2e.batch.run import reasons
+        from adv2e.conversion.estimate import MUCH
 
         self._log(reasons(tasks))
+        if sum(task.state.bytes for task in tasks if task.why) > _LARGE_SOURCE:
+            coming = self._forecast(tasks)
+            if coming is not None and coming.bytes > min(MUCH, coming.room):
+                self._log(coming.text())
         if self._progress:
             from tqdm import tqdm
 

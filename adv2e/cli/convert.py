@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from adv2e.cli.options import Log
     from adv2e.config import Config
     from adv2e.geometry import Rectangle, Size
+    from adv2e.sources.base import Source
 
 
 @click.command("convert", cls=Command)
@@ -188,16 +189,33 @@ def command(
         from adv2e.conversion.pipeline import convert_reading
 
         gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
+        chosen = config(None if crop and given["pixel_format"] else size)
+        if output != "-" and reading.is_open:
+            wanted = {**given, **part, **written, "threads": threads}
+            _tell_of_much(reading.source, chosen, Path(output or "events.h5"), wanted, log)
         summary = convert_reading(
             reading,
             output,
-            config=config(None if crop and given["pixel_format"] else size),
+            config=chosen,
             also_read=options.files_given(),
             log=log,
             **written,
         )
     if log.level >= 0:
         click.echo(summary.text(), err=output == "-")
+
+
+def _tell_of_much(
+    source: Source, config: Config, output: Path, given: dict[str, Any], log: Log
+) -> None:
+    """Tell how much will be written, if it is very much."""
+    from adv2e.conversion.estimate import estimate, may_be_much, text_of_much
+
+    if not may_be_much(source):
+        return
+    options = {key: given[key] for key in given if key not in ("overwrite", "preview", "progress")}
+    if told := text_of_much(estimate(source.path, output, config, **options), output):
+        log(told)
 
 
 _OF_SIMULATION = (

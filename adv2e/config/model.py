@@ -262,6 +262,12 @@ class Config(Section):
     seed: int = parameter(
         0, unit="-", meaning="seed of all random numbers", at_least=0, at_most=rng.LARGEST_SEED
     )
+    max_events: int = parameter(
+        10_000_000_000,
+        unit="-",
+        meaning="a simulation that makes more events ends with an error",
+        at_least=1,
+    )
     frames: Frames = subsection(Frames, meaning="the input's numbers")
     sensor: Sensor | None = subsection(
         None, meaning="size of the sensor, and how frames come to it; null: as the frames are"

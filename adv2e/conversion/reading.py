@@ -160,6 +160,11 @@ class Reading:
         return self._opened
 
     @property
+    def is_open(self) -> bool:
+        """Whether there is a source, which could be opened."""
+        return isinstance(self._opened, Source)
+
+    @property
     def inputs(self) -> tuple[str | Path, ...]:
         """What is read: the source, and the list of times if there is one."""
         timestamps = self.given["timestamps"]

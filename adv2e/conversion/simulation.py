@@ -203,7 +203,7 @@ def events_from_light(
     Raises
     ------
     DataError
-        Fewer than two frames, or times that do not increase.
+        Fewer than two frames, times that do not increase, or more events than `config.max_events`.
     """
     hooks = active_hooks(config) if hooks is None else hooks
     if causes:
@@ -228,7 +228,23 @@ def events_from_light(
         complete = None
     parts = intervals.parts(frames)
     made = _pixel_events(array, intervals, parts, table, hooks, complete)
-    yield from map_events(hooks, made, causes)
+    yield from _limited(map_events(hooks, made, causes), config.max_events)
+
+
+def _limited(made: Iterator[Events], most: int) -> Iterator[Events]:
+    """Yield the events, up to `most`; more are an error."""
+    count = 0
+    for events in made:
+        count += events.size
+        if count > most:
+            t_s = float(events["t"][-1]) * 1e-6
+            raise DataError(
+                f"max_events: more than {most:,} events were made by {t_s:.3f} s: set it higher if"
+                " they are meant; if not, look at pixel.thresholds, at the times of the frames, and"
+                " at what the frames hold"
+            )
+        yield events
+        del events  # or they would stay while the next ones are made
 
 
 def _pixel_events(

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.batch.plan import parse_shard, seed_of, shard_of
-from adv2e.batch.states import State, digest_of, state_of
 from adv2e.errors import UsageError
+from adv2e.files.states import State, digest_of, state_of
 
 
 def test_seeds_come_from_the_seed_and_the_name_alone():

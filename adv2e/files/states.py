@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,14 @@ def digest_of(path: Path) -> str:
         # the digests are of one length, so that no name can pass for a content
         total.update(own.digest() + os.fsencode(name) + b"\0")
     return total.hexdigest()
+
+
+def free_bytes(folder: Path) -> int:
+    """Return the room on the disk on which a folder lies, or will."""
+    there = folder.absolute()
+    while not there.exists():
+        there = there.parent
+    return shutil.disk_usage(there).free
 
 
 def _files(path: Path) -> Iterator[tuple[str, Path]]:

@@ -1,0 +1,113 @@
+"""What a batch will make and take, told from short parts of some of its sequences.
+
+A sequence is looked at with a chance that goes with its bytes, at even steps along all of them.
+Then the mean over these of what comes from each byte, times all bytes, is that of the whole on
+average, whichever sequences there are (Hansen and Hurwitz, 1943, doi:10.1214/aoms/1177731356).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from adv2e.batch.plan import Task
+from adv2e.batch.work import Job, config_of
+from adv2e.conversion.estimate import amount_text, estimate
+from adv2e.errors import Adv2eError
+from adv2e.files.states import free_bytes
+
+_LOOKED_AT = 6
+_FAR_APART = 5.0
+"""Factor from which on it is said how far sequences differ."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a batch will come to, about.
+
+    Attributes
+    ----------
+    events, bytes, seconds : float
+        Of all sequences that are to be converted.
+    sequences, looked_at : int
+        How many these are, and of how many it is told.
+    apart : float
+        By which factor those differ in the events from a byte of source.
+    room : int
+        Bytes that are free where the results go.
+    """
+
+    events: float
+    bytes: float
+    seconds: float
+    sequences: int
+    looked_at: int
+    apart: float
+    room: int
+
+    def text(self) -> str:
+        """Return it for people."""
+        told = amount_text(self.events, self.bytes, self.seconds)
+        text = f"{told}, by short parts of {self.looked_at} of {self.sequences} sequences"
+        if self.apart > _FAR_APART:
+            text += f"; from a byte of source, some make {self.apart:.0f} times as many as others"
+        if self.bytes > self.room:
+            text += f"; there is room for {self.room / 1e9:.1f} GB"
+        return text
+
+
+def forecast(
+    tasks: Sequence[Task], dest: Path, job_of: Callable[[Task], Job], jobs: int
+) -> Forecast | None:
+    """Return what converting the sequences of `tasks` will come to; None where nobody can tell.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+    dest : Path
+        Where the results go.
+    job_of : callable
+        Returns the conversion of a task.
+    jobs : int
+        Conversions at a time.
+    """
+    total = sum(max(1, task.state.bytes) for task in tasks)
+    rates: list[tuple[float, float, float]] = []
+    looked_at = 0
+    for task, weight in _chosen(tasks, total):
+        job = job_of(task)
+        try:
+            config = config_of(job)
+            found = estimate(job.source, job.output, config, threads=job.threads, **job.options)
+        except (Adv2eError, OSError):  # what is wrong is told when it is converted
+            continue
+        if found is not None:
+            size = max(1, task.state.bytes)
+            rates += [(found.events / size, found.bytes / size, found.seconds / size)] * weight
+            looked_at += 1
+    if not rates:
+        return None
+    events, made, seconds = (total * sum(one) / len(rates) for one in zip(*rates, strict=True))
+    least, most = min(rates)[0], max(rates)[0]
+    return Forecast(
+        events,
+        made,
+        seconds / jobs,
+        len(tasks),
+        looked_at,
+        most / least if least else 1.0,
+        free_bytes(dest),
+    )
+
+
+def _chosen(tasks: Sequence[Task], total: int) -> list[tuple[Task, int]]:
+    """Return the tasks at even steps along the bytes of all, with how many steps end in each."""
+    marks = [(k + 0.5) * total / _LOOKED_AT for k in range(_LOOKED_AT)]
+    chosen, end = [], 0
+    for task in tasks:
+        begin, end = end, end + max(1, task.state.bytes)
+        here = sum(begin <= mark < end for mark in marks)
+        if here:
+            chosen.append((task, here))
+    return chosen

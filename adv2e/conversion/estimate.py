@@ -1,0 +1,190 @@
+"""How much a conversion will make and take, told from short parts of its source.
+
+Each part is converted to a file as the whole would be, but its pixels begin anywhere on their way
+to an event: from rest, each would first have to gather a threshold, which short parts hardly do.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from adv2e.config import Written, load_config
+from adv2e.conversion.convert import convert
+from adv2e.effects.pixel.initial_reference import RANDOM
+from adv2e.errors import UsageError
+from adv2e.files.states import free_bytes, state_of
+from adv2e.formats.frames import open_frames
+from adv2e.geometry import parse_rectangle
+from adv2e.sources.base import Source
+
+MUCH = 10_000_000_000
+"""Bytes to be made that are told before the work begins."""
+
+_LARGE = 500_000_000
+"""Pixels of all frames together from which on so much may come."""
+
+_PARTS = 3
+_PART_PIXELS = 4e6
+"""Pixels of all frames of a part together: so many take about 50 ms."""
+
+_FEWEST, _MOST = 4, 128
+"""Intervals between frames that a part has."""
+
+_OF_VIDEO = 240
+"""Frames of a video are decoded in order: parts lie within so many at its beginning."""
+
+_READING = (
+    *("fps", "timestamps", "time_unit", "start_s", "stop_s", "t0", "allow_damaged", "bayer"),
+    "rotate180",
+)
+
+
+class _Part(NamedTuple):
+    intervals: int
+    events: int
+    bytes: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a conversion will come to, about.
+
+    Attributes
+    ----------
+    events, bytes, seconds : float
+    frames, seen : int
+        Frames of the source, and how many of them were looked at.
+    """
+
+    events: float
+    bytes: float
+    seconds: float
+    frames: int
+    seen: int
+
+
+def may_be_much(source: Source) -> bool:
+    """Tell whether a source is so large that :data:`MUCH` may come of it."""
+    frames = source.count or 0
+    if source.waits or source.along is not None:
+        return False
+    return int(frames * source.width * source.height) >= _LARGE
+
+
+def text_of_much(found: Estimate | None, target: Path) -> str:
+    """Return what is to be told before very much is written to a file; mostly nothing."""
+    room = free_bytes(target.absolute().parent)
+    if found is None or found.bytes < min(MUCH, room):
+        return ""
+    text = amount_text(found.events, found.bytes, found.seconds)
+    text += f", by {found.seen} of {found.frames} frames"
+    return f"{text}; there is room for {room / 1e9:.1f} GB" if found.bytes > room else text
+
+
+def amount_text(events: float, size: float, seconds: float) -> str:
+    """Return events, bytes and seconds for people, rounded as such numbers are."""
+    from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and most runs need none
+
+    told = f"{float(f'{events:.2g}'):,.0f} events, {tqdm.format_sizeof(size)}B"
+    return f"about {told} and {tqdm.format_interval(seconds)}"
+
+
+def estimate(
+    source: str | Path,
+    output: str | Path,
+    config: Written | Sequence[Written] | None = None,
+    *,
+    threads: int | None = None,
+    **options: Any,
+) -> Estimate | None:
+    """Return about how much a conversion will make and take; None where frames are not counted.
+
+    Parameters
+    ----------
+    source : str or Path
+    output : str or Path
+        What would be written.
+    config : Config, or what :func:`adv2e.load_config` takes, optional
+    threads : int, optional
+        Threads that the conversion will have.
+    **options
+        Further arguments of :func:`adv2e.convert`, but for those of the output.
+
+    Raises
+    ------
+    Adv2eError
+        As :func:`adv2e.convert`.
+    """
+    if options.get("pixel_format") is not None or options.get("motion") is not None:
+        raise UsageError("estimates are of files and folders of frames")
+    config = load_config([load_config(config), {"pixel": {"initial_reference": RANDOM}}])
+    reading = {name: options[name] for name in _READING if options.get(name) is not None}
+    if options.get("crop") is not None:
+        reading["crop"] = parse_rectangle(options["crop"])
+    opened = open_frames(source, **reading)
+    if opened.count is None:
+        return None
+    intervals = opened.count - 1
+    times_s = _times_s(opened)
+    half = int(_PART_PIXELS / 2 / (opened.width * opened.height))
+    half = max(1, min(max(half, _FEWEST // 2), _MOST // 2, (len(times_s) - 1) // 2))
+    last = max(0, len(times_s) - 1 - 2 * half)
+
+    with tempfile.TemporaryDirectory(prefix="adv2e-estimate-") as folder:
+
+        def part(begin: int, count: int) -> _Part:
+            end = min(begin + count, len(times_s) - 1)
+            margin_s = (times_s[end] - times_s[begin]) / (4 * (end - begin))
+            wanted = {
+                **options,
+                "start_s": max(0.0, times_s[begin] - margin_s),
+                "stop_s": times_s[end] + margin_s,
+                "take": "frames",
+            }
+            target = Path(folder) / Path(output).name
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the whole conversion tells them
+                made = convert(source, target, config, overwrite=True, threads=threads, **wanted)
+            return _Part(made.frames - 1, made.events, state_of(target).bytes, made.seconds)
+
+        part(0, 2 * half)  # compiles, and reads what is not in memory
+        short, whole = part(0, half), part(0, 2 * half)
+        others = [part(k * last // (_PARTS - 1), 2 * half) for k in range(1, _PARTS) if last]
+    parts = [whole, *others]
+    seen = sum(one.intervals for one in parts)
+    fixed_bytes = min(_at_none(short, short.bytes, whole, whole.bytes), float(short.bytes))
+    # a machine with other work may take longer for less
+    fixed_s = min(_at_none(short, short.seconds, whole, whole.seconds), 0.9 * whole.seconds)
+    return Estimate(
+        intervals * sum(one.events for one in parts) / seen,
+        fixed_bytes + intervals * sum(one.bytes - fixed_bytes for one in parts) / seen,
+        fixed_s + intervals * (whole.seconds - fixed_s) / whole.intervals,
+        opened.count,
+        seen + len(parts),
+    )
+
+
+def _times_s(source: Source) -> list[float]:
+    """Return the times of the frames among which parts are chosen [s after the first frame]."""
+    shots = source.shots()
+    if source.kind == "video":
+        shots = islice(shots, _OF_VIDEO)
+    times_ns = [shot.t_ns for shot in shots]
+    since_ns = [t_ns - times_ns[0] for t_ns in times_ns]
+    start_ns, stop_ns = source.selection.start_ns, source.selection.stop_ns
+    return [t_ns * 1e-9 for t_ns in since_ns if start_ns <= t_ns <= stop_ns]
+
+
+def _at_none(short: _Part, of_short: float, whole: _Part, of_whole: float) -> float:
+    """Return what a conversion without any interval takes, by two of different lengths."""
+    if whole.intervals == short.intervals:
+        return 0.0
+    slope = (of_whole - of_short) / (whole.intervals - short.intervals)
+    return max(0.0, of_short - slope * short.intervals)
