@@ -13,13 +13,15 @@ import queue
 import signal
 import threading
 import time
-from collections.abc import Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from adv2e.batch.work import Job, do
+from adv2e.files.workspace import remove_abandoned
 from adv2e.process import cleanup
 
 _LOST_S = 1.0
@@ -27,15 +29,23 @@ _END_S = 10.0
 """Time to end in: compiled code is loaded in one step that no signal interrupts."""
 
 
+class EndedError(Exception):
+    """A process ended while it converted."""
+
+
 def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
     """Yield each job with what :func:`do` returned, as they end; `count` at a time."""
-    workers = _Workers(count)
+    workers = Workers(count)
     pool = ThreadPoolExecutor(count)
     cleanup.add(workers)
     try:
         futures = {pool.submit(workers.do, job): job for job in jobs}
         for future in as_completed(futures):
-            yield futures[future], future.result()
+            try:
+                found = future.result()
+            except EndedError as error:
+                found = {"error": str(error)}
+            yield futures[future], found
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         workers.remove_now()
@@ -44,8 +54,13 @@ def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]
         cleanup.drop(workers)
 
 
-class _Workers(cleanup.Unfinished):
-    """Processes, each of which does one job after the other."""
+class Workers(cleanup.Unfinished):
+    """Processes, each of which does one job after the other.
+
+    Parameters
+    ----------
+    count : int
+    """
 
     def __init__(self, count: int) -> None:
         self._free: queue.SimpleQueue[_Worker] = queue.SimpleQueue()
@@ -54,12 +69,19 @@ class _Workers(cleanup.Unfinished):
         for worker in self._all:
             self._free.put(worker)
 
-    def do(self, job: Job) -> dict[str, Any]:
+    def do(self, job: Job, is_wanted: Callable[[], bool] = lambda: True) -> dict[str, Any]:
+        """Return what :func:`do` returned in a process that is free, once one is.
+
+        Raises
+        ------
+        EndedError
+            The process ended meanwhile: by itself, or because the job is no longer wanted.
+        """
         worker = self._free.get()
         try:
             if self._is_ending:  # no process may begin that nobody ends
                 return {"error": "not begun"}
-            return worker.do(job)
+            return worker.do(job, is_wanted)
         finally:
             self._free.put(worker)
 
@@ -76,6 +98,7 @@ class _Workers(cleanup.Unfinished):
         return True
 
     def close(self) -> None:
+        """Let go of the processes."""
         for worker in self._all:
             worker.close()
 
@@ -87,16 +110,23 @@ class _Worker:
         self._pool: ProcessPoolExecutor | None = None
         self._process = 0
 
-    def do(self, job: Job) -> dict[str, Any]:
+    def do(self, job: Job, is_wanted: Callable[[], bool]) -> dict[str, Any]:
         try:
             if self._pool is None:
                 context = multiprocessing.get_context("spawn")
                 self._pool = ProcessPoolExecutor(1, context, _begin, (os.getpid(),))
                 self._process = self._pool.submit(os.getpid).result()
-            return self._pool.submit(do, job).result()
+            future = self._pool.submit(do, job)
+            while not wait([future], timeout=_LOST_S).done:
+                if not is_wanted():
+                    self.kill(signal.SIGTERM)
+            return future.result()
         except BrokenProcessPool:
             self.close()
-            return {"error": f"{job.source}: the process that converted it was ended from outside"}
+            remove_abandoned(Path(job.output).parent)
+            raise EndedError(
+                f"{job.source}: the process that converted it was ended from outside"
+            ) from None
 
     def close(self) -> None:
         if self._pool is not None:

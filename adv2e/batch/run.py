@@ -289,6 +289,7 @@ def _job(task: Task, settings: Settings, wanted: Wanted, threads: int) -> Job:
         settings.export,
         str(wanted.export_folder(task.sequence) or ""),
         task.only_export,
+        task.state,
     )
 
 

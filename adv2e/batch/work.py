@@ -12,7 +12,7 @@ from adv2e.batch.exports import Export
 from adv2e.config import Config, from_dict
 from adv2e.config.effect_files import load_effects
 from adv2e.errors import Adv2eError
-from adv2e.files.states import digest_of
+from adv2e.files.states import State, digest_of
 from adv2e.formats.lookup import to_write
 
 
@@ -38,6 +38,8 @@ class Job:
         What is made of the events, in `export_folder`.
     only_export : bool
         The events are there.
+    state : State, optional
+        Of the source when this was planned.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Job:
     export: Export | None = None
     export_folder: str = ""
     only_export: bool = False
+    state: State | None = None
 
 
 def config_of(job: Job) -> Config:

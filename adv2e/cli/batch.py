@@ -97,6 +97,12 @@ _LARGE_SOURCE = 100_000_000
     help="Convert N sequences at a time.  [default: one for each thread]",
 )
 @click.option("--shard", metavar="I/N", help="Do only the I-th of N parts of about the same size.")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Convert on the workers of this Dask scheduler, such as tcp://node1:8786 or the file that"
+    " it wrote. --jobs N bounds how many at a time; each has --threads, 1 by default.",
+)
 @click.option("--dry-run", is_flag=True, help="Show what would be done, and write nothing.")
 @click.option("--overwrite", is_flag=True, help="Make all anew, and replace files of others.")
 @options.threads_option
@@ -118,6 +124,7 @@ def command(
     bins: int | None,
     jobs: int | None,
     shard: str | None,
+    scheduler: str | None,
     dry_run: bool,
     overwrite: bool,
     threads: int | None,
@@ -152,6 +159,14 @@ def command(
     given |= {"format": format, "with_frames": with_frames}
     suffix = next(iter(written.suffixes))
     settings = Settings(config_files, sets, effect_files, seed, suffix, given, export)
+    engine = None
+    if scheduler is not None:
+        from adv2e.batch.cluster import Cluster
+        from adv2e.batch.manifest import manifest_path
+
+        engine = Cluster(
+            scheduler, manifest_path(dest, part), at_most=jobs, threads=threads or 1, log=log
+        )
     work = Batch(source, dest, settings, layout=layout, shard=part, overwrite=overwrite)
     if dry_run:
         tasks = work.plan()
@@ -163,7 +178,9 @@ def command(
         return
     with ExitStack() as stack:
         told = _Told(log, progress, stack, lambda tasks: work.forecast(tasks, jobs, threads))
-        outcome = work.run(jobs=jobs, threads=threads, begun=told.begun, ended=told.ended)
+        outcome = work.run(
+            jobs=jobs, threads=threads, engine=engine, begun=told.begun, ended=told.ended
+        )
     lines = table(outcome)
     if log.level >= 0:
         click.echo(lines[0])

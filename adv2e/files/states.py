@@ -29,6 +29,10 @@ class State:
     files: int
     changed_ns: int
 
+    def is_alike(self, other: State) -> bool:
+        """Tell whether both may be the same, seen from two machines, which may round times."""
+        return (self.bytes, self.files) == (other.bytes, other.files)
+
 
 def state_of(path: Path) -> State:
     """Return the state of a file, or of a folder with all below it."""

@@ -13,6 +13,8 @@ ELSEWHERE = {
     r"\./scripts/demo\b": "tests/scripts/test_demo_script.py",
     r"\./scripts/test\b": "scripts/test",
     r"(git clone|cd) ": "scripts/test",
+    r"sbatch ": "tests/documentation/test_array_of_jobs.py",
+    r"dask (scheduler|worker) ": "tests/batch/test_cluster.py",
     r"python3? -m venv ": "scripts/environment.sh",
     r"(source|\.) \S+/activate$": "scripts/environment.sh",
 }

@@ -1,0 +1,392 @@
+"""Conversions on the workers of a Dask cluster: the same jobs, on other machines.
+
+The batch itself stays in one process, here, which alone plans and writes the manifest.  A worker
+has as many jobs at a time as threads, and does each in a process beside its own.  So a crash costs
+the worker nothing, and what nobody wants any more is ended at once: where the batch was stopped or
+killed, or its connection broke, the scheduler drops its jobs.
+
+If a worker is lost, the scheduler has others do its jobs again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+import math
+import multiprocessing
+import queue
+import re
+import tempfile
+import threading
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from importlib.util import find_spec
+from multiprocessing.util import Finalize
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from adv2e import __version__
+from adv2e.batch.processes import EndedError, Workers
+from adv2e.batch.work import Job
+from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError
+from adv2e.files.regular import read_text_bytes
+from adv2e.files.states import state_of
+from adv2e.files.workspace import remove_abandoned
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+CONNECT_S = 20.0
+WAIT_S = 600.0
+"""How long a batch waits when there is no worker at all."""
+
+_TICK_S = 1.0
+_ANSWER_S = 10.0
+_RETRIES = 2
+"""How often a job is begun again of which the process ended, but not the worker."""
+
+_ADDRESS = re.compile(r"([a-z]+://)?(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]]+):[0-9]{1,5}")
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What a worker must be and see so that it does what would be done here.
+
+    Attributes
+    ----------
+    version : str
+        Of adv2e.
+    manifest : str
+        The file in DEST.
+    bytes : int
+    sha256 : str
+        Of that many bytes at its start, among which are lines of this run.
+    """
+
+    version: str
+    manifest: str
+    bytes: int
+    sha256: str
+
+    @classmethod
+    def of(cls, manifest: Path) -> Proof:
+        """Return that for a manifest as it is now."""
+        text = manifest.read_bytes()
+        return cls(__version__, str(manifest), len(text), hashlib.sha256(text).hexdigest())
+
+    def complaint(self) -> str:
+        """Return what is wrong with the process that asks, or nothing."""
+        if self.version != __version__:
+            return f"has adv2e {__version__}: install {self.version}, as here"
+        try:
+            with Path(self.manifest).open("rb") as file:
+                text = file.read(self.bytes)
+        except OSError as error:
+            return f"does not see DEST: {self.manifest}: {error.strerror}"
+        if hashlib.sha256(text).hexdigest() != self.sha256:
+            return f"has another folder of the name of DEST: {Path(self.manifest).parent}"
+        return ""
+
+
+class Cluster:
+    """An engine (:data:`adv2e.batch.work.Engine`): the workers of a scheduler.
+
+    Parameters
+    ----------
+    scheduler : str
+        Its address, such as tcp://node1:8786, or the file that it wrote (``--scheduler-file``).
+    manifest : Path
+        That of the batch, which the workers must see, too.
+    at_most : int, optional
+        Conversions at a time; default: as many as the workers have threads.
+    threads : int
+        Of each conversion.
+    log : callable
+        Told how many workers there are, and when there are none.
+
+    Raises
+    ------
+    UsageError, DataError
+        `scheduler` is no address, or no such file.
+    MissingExtraError
+        There is no Dask here.
+    """
+
+    def __init__(
+        self,
+        scheduler: str,
+        manifest: Path,
+        *,
+        at_most: int | None = None,
+        threads: int = 1,
+        log: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        if find_spec("distributed") is None:
+            raise MissingExtraError("--scheduler", "cluster")
+        self._address = _address_in(scheduler)
+        self._scheduler, self._manifest = scheduler, manifest
+        self._at_most, self._threads, self._log = at_most, threads, log
+
+    def __call__(self, jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
+        """Yield each job with what :func:`adv2e.batch.work.do` returned, as they end.
+
+        Raises
+        ------
+        Adv2eError
+            There is no scheduler, no worker for :data:`WAIT_S`, or one that would do something else
+            than this process.
+        """
+        client = self._connect()
+        try:
+            workers = _Workers(client, self._scheduler, self._log)
+            yield from self._run(client, workers, deque(jobs))
+        finally:
+            with suppress(OSError, asyncio.TimeoutError):
+                client.close(timeout=_TICK_S)
+
+    def _connect(self) -> Client:
+        from distributed import Client  # noqa: PLC0415 - an extra
+
+        try:
+            return Client(self._address, timeout=CONNECT_S, set_as_default=False, name="adv2e")
+        except (OSError, asyncio.TimeoutError, ValueError) as error:
+            raise Adv2eError(
+                f"{self._scheduler}: no scheduler of Dask answers there: {_one_line(error)}"
+            ) from error
+
+    def _run(
+        self, client: Client, workers: _Workers, waiting: deque[Job]
+    ) -> Iterator[tuple[Job, dict[str, Any]]]:
+        proof = Proof.of(self._manifest.absolute())
+        # those of effects travel, so that workers need not see them
+        names = {name for job in waiting for name in job.effect_files}
+        texts = {name: Path(name).read_bytes() for name in names}
+        folders = sorted({str(Path(job.output).absolute().parent) for job in waiting})
+        done: queue.SimpleQueue[Future] = queue.SimpleQueue()
+        flying: dict[str, Job] = {}
+        while waiting or flying:
+            room = workers.room()
+            while waiting and len(flying) < min(room, self._at_most or room):
+                job = waiting.popleft()
+                sent = replace(
+                    job,
+                    source=str(Path(job.source).absolute()),
+                    output=str(Path(job.output).absolute()),
+                    threads=self._threads,
+                )
+                key = f"adv2e-{uuid.uuid4().hex}"
+                future = client.submit(
+                    _do, sent, proof, texts, key=key, pure=False, retries=_RETRIES
+                )
+                flying[key] = job
+                future.add_done_callback(done.put)
+            try:
+                future = done.get(timeout=_TICK_S)
+                found = _found(future, flying[future.key])
+            except queue.Empty:
+                continue
+            except asyncio.TimeoutError:  # its worker is lost, and another one does it again
+                done.put(future)
+                continue
+            if found is None:
+                raise workers.lost()
+            if "unfit" in found:
+                raise Adv2eError(f"{self._scheduler}: the worker {found['unfit']}")
+            yield flying.pop(future.key), found
+        if workers.some_ended:
+            workers.each(_sweep, folders)
+
+
+def _address_in(scheduler: str) -> str:
+    """Return the address that is given, or that which a file of a scheduler tells."""
+    address = scheduler
+    if Path(scheduler).is_file():
+        try:
+            address = str(json.loads(read_text_bytes(Path(scheduler), DataError))["address"])
+        except (ValueError, LookupError, TypeError):
+            raise DataError(f"{scheduler}: is not what a scheduler of Dask wrote") from None
+    if not _ADDRESS.fullmatch(address):
+        raise UsageError(
+            f"--scheduler {scheduler}: must be an address with its port, such as"
+            " tcp://node1:8786, or the file that the scheduler wrote"
+        )
+    return address
+
+
+class _Workers:
+    """The workers that there are, as the scheduler tells once a second."""
+
+    def __init__(self, client: Client, scheduler: str, log: Callable[[str], None]) -> None:
+        self._client, self._scheduler, self._log = client, scheduler, log
+        self._threads: dict[str, int] | None = None
+        self._asked = self._seen = -math.inf
+        self.some_ended = False
+
+    def room(self) -> int:
+        """Return how many jobs may be on their way: as many as threads.
+
+        More would wait at workers, and count as suspect where those end.
+        """
+        now = time.monotonic()
+        if now >= self._asked + _TICK_S:
+            self._asked = now
+            self._look(now)
+        return sum(self._threads.values()) if self._threads else 0
+
+    def _look(self, now: float) -> None:
+        before = self._threads
+        try:
+            self._threads = self._client.nthreads(callback_timeout=CONNECT_S)
+        except (OSError, RuntimeError, asyncio.TimeoutError) as error:
+            raise self.lost() from error
+        if before is None or bool(before) != bool(self._threads):
+            count = f"workers: {len(self._threads)}, threads: {sum(self._threads.values())}"
+            wait = f"waits for workers, {WAIT_S:.0f} s at most"
+            self._log(f"{self._scheduler}: {count if self._threads else wait}")
+        if before is None or self._threads:
+            self._seen = now
+        if before is not None and not before.keys() <= self._threads.keys():
+            self.some_ended = True
+        if now > self._seen + WAIT_S:
+            raise Adv2eError(
+                f"{self._scheduler}: no worker for {WAIT_S:.0f} s: start some, and call again"
+            )
+
+    def each(self, function: Callable[..., object], *arguments: object) -> None:
+        """Call a function here and on each worker, but do not wait long for it."""
+        function(*arguments)
+        self._look(time.monotonic())
+        there = [
+            self._client.submit(function, *arguments, workers=[one], pure=False)
+            for one in self._threads or ()
+        ]
+        with suppress(OSError, asyncio.TimeoutError):
+            for one in there:
+                one.exception(timeout=_ANSWER_S)
+
+    def lost(self) -> Adv2eError:
+        """Return the error to raise when the scheduler does not answer."""
+        return Adv2eError(
+            f"{self._scheduler}: the connection to the scheduler is lost: call again to go on"
+        )
+
+
+def _found(future: Future, job: Job) -> dict[str, Any] | None:
+    """Return what became of a job; None: the connection is lost.
+
+    Raises
+    ------
+    TimeoutError
+        The result is not to be had, as the worker that held it is lost.
+    """
+    from distributed import KilledWorker  # noqa: PLC0415 - an extra
+
+    if future.cancelled():
+        return None
+    try:
+        found: dict[str, Any] = future.result(timeout=_ANSWER_S)
+    except CancelledError:
+        return None
+    except asyncio.TimeoutError:
+        raise
+    except EndedError as error:
+        return {"error": str(error)}
+    except KilledWorker as error:
+        count = error.allowed_failures + 1
+        return {"error": f"{job.source}: {count} workers ended while they had it"}
+    except Exception as error:  # it could not even begin
+        return {
+            "unfit": f"or the scheduler has no adv2e {__version__}, or another Python or Dask than"
+            f" here: {type(error).__name__}: {_one_line(error)}"
+        }
+    return found
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())
+
+
+# ---- what workers run
+
+
+_lock = threading.Lock()
+_processes: list[Workers] = []
+
+
+def _do(job: Job, proof: Proof, texts: dict[str, bytes]) -> dict[str, Any]:
+    """Return what :func:`adv2e.batch.work.do` returned; or ``unfit``: this worker is of no use."""
+    from distributed import Reschedule, Status, get_worker  # noqa: PLC0415 - an extra
+
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def is_wanted() -> bool:
+        task = worker.state.tasks.get(key)
+        ending = worker.status in (Status.closing, Status.closed, Status.failed)
+        return not ending and task is not None and task.state in ("executing", "long-running")
+
+    told = _complaint(proof)
+    if told:
+        return {"unfit": f"{worker.address} {told}"}
+    on = f" (on the worker {worker.address})"
+    source = Path(job.source)
+    if job.state is not None and source.exists() and not job.state.is_alike(state_of(source)):
+        return {"error": f"{source}: is another one than where the batch runs{on}"}
+    try:
+        here = replace(
+            job, effect_files=tuple(_file(name, texts[name]) for name in job.effect_files)
+        )
+        found = _workers(worker.state.nthreads).do(here, is_wanted)
+    except EndedError:
+        if is_wanted():
+            raise
+        raise Reschedule from None
+    if "error" in found:
+        found["error"] += on
+    return found
+
+
+_complaint = lru_cache(maxsize=1)(Proof.complaint)
+
+
+def _workers(count: int) -> Workers:
+    """Return the processes of this worker."""
+    with _lock:
+        if not _processes:
+            # Dask's nanny makes workers daemons, which may have no children and would leave them
+            multiprocessing.current_process().daemon = False
+            workers = Workers(count)
+            _processes.append(workers)
+            # before the process waits for them to end by themselves
+            Finalize(None, workers.remove_now, exitpriority=1)
+        return _processes[0]
+
+
+@lru_cache(maxsize=64)
+def _file(name: str, text: bytes) -> str:
+    """Return a file of that name on this machine that holds a text: itself, or a copy."""
+    with suppress(OSError):
+        if Path(name).read_bytes() == text:
+            return name
+    copy = Path(_folder().name) / hashlib.sha256(text).hexdigest() / Path(name).name
+    copy.parent.mkdir(exist_ok=True)
+    copy.write_bytes(text)
+    return str(copy)
+
+
+@lru_cache
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="adv2e-")
+
+
+def _sweep(folders: Iterable[str]) -> None:
+    """Remove what dead processes of this machine left in folders."""
+    for folder in folders:
+        remove_abandoned(Path(folder))
