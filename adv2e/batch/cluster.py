@@ -21,6 +21,7 @@ import tempfile
 import threading
 import time
 import uuid
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
@@ -154,12 +155,15 @@ class Cluster:
     def _connect(self) -> Client:
         from distributed import Client  # noqa: PLC0415 - an extra
 
-        try:
-            return Client(self._address, timeout=CONNECT_S, set_as_default=False, name="adv2e")
-        except (OSError, asyncio.TimeoutError, ValueError) as error:
-            raise Adv2eError(
-                f"{self._scheduler}: no scheduler of Dask answers there: {_one_line(error)}"
-            ) from error
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # tables of versions, of packages that play no part
+            try:
+                return Client(self._address, timeout=CONNECT_S, set_as_default=False, name="adv2e")
+            except Exception as error:  # many kinds, where versions of Dask differ
+                raise Adv2eError(
+                    f"{self._scheduler}: no scheduler of this Dask answers there:"
+                    f" {type(error).__name__}: {_one_line(error)}"
+                ) from error
 
     def _run(
         self, client: Client, workers: _Workers, waiting: deque[Job]
@@ -168,19 +172,15 @@ class Cluster:
         # those of effects travel, so that workers need not see them
         names = {name for job in waiting for name in job.effect_files}
         texts = {name: Path(name).read_bytes() for name in names}
-        folders = sorted({str(Path(job.output).absolute().parent) for job in waiting})
+        made = {path for job in waiting for path in (job.output, job.export_folder) if path}
+        folders = sorted({str(Path(path).absolute().parent) for path in made})
         done: queue.SimpleQueue[Future] = queue.SimpleQueue()
         flying: dict[str, Job] = {}
         while waiting or flying:
             room = workers.room()
             while waiting and len(flying) < min(room, self._at_most or room):
                 job = waiting.popleft()
-                sent = replace(
-                    job,
-                    source=str(Path(job.source).absolute()),
-                    output=str(Path(job.output).absolute()),
-                    threads=self._threads,
-                )
+                sent = replace(_anywhere(job), threads=self._threads)
                 key = f"adv2e-{uuid.uuid4().hex}"
                 future = client.submit(
                     _do, sent, proof, texts, key=key, pure=False, retries=_RETRIES
@@ -202,6 +202,20 @@ class Cluster:
             yield flying.pop(future.key), found
         if workers.some_ended:
             workers.each(_sweep, folders)
+
+
+def _anywhere(job: Job) -> Job:
+    """Return the job with paths that do not depend on the folder that a process is in."""
+
+    def whole(path: str) -> str:
+        return str(Path(path).absolute()) if path else ""
+
+    return replace(
+        job,
+        source=whole(job.source),
+        output=whole(job.output),
+        export_folder=whole(job.export_folder),
+    )
 
 
 def _address_in(scheduler: str) -> str:

@@ -16,8 +16,6 @@ from trees_of_batch import QUICK, clip, last_of, made_in
 
 from adv2e.batch import cluster as engine
 from adv2e.batch.cluster import Proof
-from adv2e.batch.run import Batch, Settings
-from adv2e.batch.work import do
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
@@ -117,7 +115,8 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-GIVEN = ("source", "dest", "-c", "own.yaml", "--effect", "obeying.py", *QUICK)
+SETTINGS = ("-c", "own.yaml", "--effect", "obeying.py")
+GIVEN = ("source", "dest", *SETTINGS, *QUICK)
 
 
 def told():
@@ -125,16 +124,16 @@ def told():
     return [tuple(map(int, p.name.split("-"))) for p in Path("told").glob("*-*")]
 
 
-def local():
+@pytest.fixture
+def local(batch):
     """Return what the same batch makes in this process."""
-    Path("told/good").touch()
-    settings = Settings(
-        ("own.yaml",), tuple(QUICK[1::2]), ("obeying.py",), None, ".h5", {"format": "h5"}
-    )
-    Batch(Path("source"), Path("local"), settings).run(
-        engine=lambda jobs, _: ((job, do(job)) for job in jobs)
-    )
-    return made_in(Path("local"))
+
+    def run(*more):
+        Path("told/good").touch()
+        assert batch("source", "local", *SETTINGS, *more).status == 0
+        return made_in(Path("local"))
+
+    return run
 
 
 def strays():
@@ -148,7 +147,7 @@ def beside(task, *arguments):
     return thread
 
 
-def test_three_workers_of_which_one_is_killed(adv2e, machines, place):
+def test_three_workers_of_which_one_is_killed(adv2e, local, machines, place):
     for k in range(8):
         clip(Path(f"source/{'deep/' * (k % 2)}{k}.avi"), start=k)
     Path("told/wait").touch()
@@ -166,14 +165,15 @@ def test_three_workers_of_which_one_is_killed(adv2e, machines, place):
         Path("told/wait").unlink()
 
     thread = beside(kill)
-    done = adv2e("batch", *GIVEN, "--scheduler", machines.file)
+    more = ("--export", "voxel", "--bins", 3, "--window", "20ms")
+    done = adv2e("batch", *GIVEN, *more, "--scheduler", machines.file)
     thread.join()
     assert done.status == 0, done.err
     assert done.out.startswith("8 sequences: 8 made (")
     assert re.search(r"scheduler.json: workers: [12], threads: [12]", done.err)
-    assert made_in(Path("dest")) == local()
+    assert made_in(Path("dest")) == local(*more)
     until(lambda: not strays() and not is_there(killed[1]))
-    again = adv2e("batch", *GIVEN)
+    again = adv2e("batch", *GIVEN, *more)
     assert again.out == "8 sequences: 0 made (0 events), 8 kept, 0 failed\n"
 
 
@@ -193,7 +193,7 @@ def test_a_sequence_that_crashes_is_named_and_the_worker_goes_on(
     assert not strays()
 
 
-def test_a_sequence_that_ends_workers_is_named_and_the_others_go_on(adv2e, machines, place):
+def test_a_sequence_that_ends_workers_is_named_and_the_others_go_on(adv2e, local, machines, place):
     for name, width in (("a", 32), ("ends", 52), ("z", 32)):
         clip(Path(f"source/{name}.avi"), size=(width, 24))
     machines.workers(2)
@@ -217,7 +217,7 @@ def test_a_sequence_that_ends_workers_is_named_and_the_others_go_on(adv2e, machi
     assert made_in(Path("dest")) == local()
 
 
-def test_a_batch_that_is_stopped_ends_its_conversions(adv2e, machines, place):
+def test_a_batch_that_is_stopped_ends_its_conversions(adv2e, local, machines, place):
     clip(Path("source/a.avi"))
     (worker,) = machines.workers(1)
     Path("told/wait").touch()
@@ -345,7 +345,7 @@ def test_no_scheduler_there(adv2e, place, monkeypatch):
     monkeypatch.setattr(engine, "CONNECT_S", 0.5)
     done = adv2e("batch", *GIVEN, "--scheduler", "127.0.0.1:9")
     assert done.status == 1
-    assert "127.0.0.1:9: no scheduler of Dask answers there" in done.err.splitlines()[-1]
+    assert "127.0.0.1:9: no scheduler of this Dask answers there" in done.err.splitlines()[-1]
     for text in ("{}", "[]", "none"):
         Path("some.json").write_text(text)
         done = adv2e("batch", *GIVEN, "--scheduler", "some.json")
