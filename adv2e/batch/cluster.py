@@ -35,6 +35,7 @@ from typing import TYPE_CHECKING, Any
 
 from adv2e import __version__
 from adv2e.batch.processes import EndedError, Workers
+from adv2e.batch.transfer import is_url
 from adv2e.batch.work import Job
 from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError
 from adv2e.files.regular import read_text_bytes
@@ -77,8 +78,10 @@ class Proof:
     sha256: str
 
     @classmethod
-    def of(cls, manifest: Path) -> Proof:
-        """Return that for a manifest as it is now."""
+    def of(cls, manifest: Path | None) -> Proof:
+        """Return that for a manifest as it is now; None: DEST is a URL, which all can open."""
+        if manifest is None:
+            return cls(__version__, "", 0, "")
         text = manifest.read_bytes()
         return cls(__version__, str(manifest), len(text), hashlib.sha256(text).hexdigest())
 
@@ -86,6 +89,8 @@ class Proof:
         """Return what is wrong with the process that asks, or nothing."""
         if self.version != __version__:
             return f"has adv2e {__version__}: install {self.version}, as here"
+        if not self.manifest:
+            return ""
         try:
             with Path(self.manifest).open("rb") as file:
                 text = file.read(self.bytes)
@@ -103,8 +108,8 @@ class Cluster:
     ----------
     scheduler : str
         Its address, such as tcp://node1:8786, or the file that it wrote (``--scheduler-file``).
-    manifest : Path
-        That of the batch, which the workers must see, too.
+    manifest : Path, optional
+        That of the batch, which the workers must see, too, unless DEST is a URL.
     at_most : int, optional
         Conversions at a time; default: as many as the workers have threads.
     threads : int
@@ -123,7 +128,7 @@ class Cluster:
     def __init__(
         self,
         scheduler: str,
-        manifest: Path,
+        manifest: Path | None,
         *,
         at_most: int | None = None,
         threads: int = 1,
@@ -168,7 +173,7 @@ class Cluster:
     def _run(
         self, client: Client, workers: _Workers, waiting: deque[Job]
     ) -> Iterator[tuple[Job, dict[str, Any]]]:
-        proof = Proof.of(self._manifest.absolute())
+        proof = Proof.of(self._manifest and self._manifest.absolute())
         # those of effects travel, so that workers need not see them
         names = {name for job in waiting for name in job.effect_files}
         texts = {name: Path(name).read_bytes() for name in names}
@@ -208,7 +213,7 @@ def _anywhere(job: Job) -> Job:
     """Return the job with paths that do not depend on the folder that a process is in."""
 
     def whole(path: str) -> str:
-        return str(Path(path).absolute()) if path else ""
+        return str(Path(path).absolute()) if path and not is_url(path) else path
 
     return replace(
         job,

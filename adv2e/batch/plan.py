@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -114,23 +114,33 @@ def plan(
     wanted: Wanted,
     *,
     overwrite: bool = False,
+    digest: Callable[[Path], str] = digest_of,
 ) -> list[Task]:
-    """Return what is to be done with each sequence."""
+    """Return what is to be done with each sequence; `digest` tells that of a file or folder."""
     tasks = []
     for sequence in sequences:
         seed = seed_of(wanted.seed, sequence.name)
         output, state = wanted.output(sequence), states[sequence.name]
         record = records.get(sequence.name)
-        why = "all are made anew" if overwrite else _why(record, state, sequence, output, wanted)
+        why = (
+            "all are made anew"
+            if overwrite
+            else _why(record, state, sequence, output, wanted, digest)
+        )
         only_export = not why
         if record is not None and only_export:
-            why = _why_export(record, sequence, wanted)
+            why = _why_export(record, sequence, wanted, digest)
         tasks.append(Task(sequence, state, output, seed, why, only_export and bool(why)))
     return tasks
 
 
 def _why(
-    record: Mapping[str, Any] | None, state: State, sequence: Found, output: Path, wanted: Wanted
+    record: Mapping[str, Any] | None,
+    state: State,
+    sequence: Found,
+    output: Path,
+    wanted: Wanted,
+    digest: Callable[[Path], str],
 ) -> str:
     if record is None:
         return "new"
@@ -144,20 +154,22 @@ def _why(
         return "the configuration or an option changed"
     if record["output"] != output.relative_to(wanted.dest).as_posix():
         return "it goes to another file"
-    if record["source"] != asdict(state) and digest_of(sequence.source) != record["source_sha256"]:
+    if record["source"] != asdict(state) and digest(sequence.source) != record["source_sha256"]:
         return "its source changed"
     if not output.exists():
         return "its file is gone"
-    if digest_of(output) != record["sha256"]:
+    if digest(output) != record["sha256"]:
         return "its file changed"
-    for name, digest in record.get("beside", {}).items():
+    for name, was in record.get("beside", {}).items():
         path = output.with_name(name)
-        if not path.exists() or digest_of(path) != digest:
+        if not path.exists() or digest(path) != was:
             return "a file beside its own changed"
     return ""
 
 
-def _why_export(record: Mapping[str, Any], sequence: Found, wanted: Wanted) -> str:
+def _why_export(
+    record: Mapping[str, Any], sequence: Found, wanted: Wanted, digest: Callable[[Path], str]
+) -> str:
     folder = wanted.export_folder(sequence)
     if wanted.export is None or folder is None:
         return ""
@@ -168,7 +180,7 @@ def _why_export(record: Mapping[str, Any], sequence: Found, wanted: Wanted) -> s
         return "an option of the export changed"
     if not folder.exists():
         return "its export is gone"
-    return "" if digest_of(folder) == made["sha256"] else "its export changed"
+    return "" if digest(folder) == made["sha256"] else "its export changed"
 
 
 def outputs_in_the_way(

@@ -32,7 +32,7 @@ from adv2e.config.active_effects import user_sources
 from adv2e.config.effect_files import load_effects
 from adv2e.errors import Adv2eError, OutputError
 from adv2e.files.names import shown
-from adv2e.files.states import state_of
+from adv2e.files.states import digest_of, state_of
 from adv2e.light.interpolation import network_of
 
 
@@ -126,6 +126,9 @@ class Batch:
         (I, N): only the I-th of N parts of about the same size.
     overwrite : bool
         Make all anew, and replace files that others made.
+    digest : callable, optional
+        `source` or `dest` is a shadow (:class:`adv2e.batch.remote.Remote`), in which no file may be
+        read: this tells the digest of what it stands for, as far as it is known.
 
     Raises
     ------
@@ -142,11 +145,12 @@ class Batch:
         layout: str = "auto",
         shard: tuple[int, int] | None = None,
         overwrite: bool = False,
+        digest: Callable[[Path], str] | None = None,
     ) -> None:
         self._dest, self._settings, self._overwrite = dest, settings, overwrite
-        self._shard = shard
+        self._shard, self._digest = shard, digest
         self._wanted = settings.wanted(dest)
-        self._sequences = find_sequences(source, layout, leave_out=dest)
+        self._sequences = find_sequences(source, layout, leave_out=dest, by_name=digest is not None)
         self._states = {one.name: state_of(one.source) for one in self._sequences}
         if shard is not None:
             mine = shard_of(self._states, *shard)
@@ -174,7 +178,12 @@ class Batch:
         """
         records = read_records(self._dest)
         tasks = plan(
-            self._sequences, self._states, records, self._wanted, overwrite=self._overwrite
+            self._sequences,
+            self._states,
+            records,
+            self._wanted,
+            overwrite=self._overwrite,
+            digest=self._digest or digest_of,
         )
         strange = outputs_in_the_way(tasks, records, self._wanted)
         if strange and not self._overwrite:
@@ -188,6 +197,8 @@ class Batch:
         self, tasks: Sequence[Task], jobs: int | None, threads: int | None
     ) -> Forecast | None:
         """Return what converting will make and take; `jobs` and `threads` as for :meth:`run`."""
+        if self._digest is not None:
+            return None
         waiting = [task for task in tasks if task.why and not task.only_export]
         count, each = _shares(len(waiting), jobs, threads)
 

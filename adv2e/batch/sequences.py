@@ -33,6 +33,7 @@ from adv2e.sources.images.source import found_list, natural_key
 LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "videos")
 
 _DDD = ("ddd", "ddd20")
+_RECORDINGS = {"ddd17": (".h5", ".hdf5"), "davis240c": (".zip",)}
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Sequence:
 
 
 def find_sequences(
-    root: Path, layout: str = "auto", *, leave_out: Path | None = None
+    root: Path, layout: str = "auto", *, leave_out: Path | None = None, by_name: bool = False
 ) -> list[Sequence]:
     """Return the sequences below a folder, in natural order of their names; or that of a file.
 
@@ -67,6 +68,8 @@ def find_sequences(
         One of LAYOUTS.
     leave_out : Path, optional
         Folder in which nothing is looked for: that of the results.
+    by_name : bool
+        Files cannot be read: recordings are told by the layout and their suffix.
 
     Raises
     ------
@@ -76,7 +79,9 @@ def find_sequences(
     if not root.exists():
         raise DataError(f"{root}: no such file or folder")
     avoided = None if leave_out is None else leave_out.resolve()
-    found = [(path, kind) for path, kind in _walk(root, avoided) if layout in ("auto", kind)]
+    trusted = layout if by_name else ""
+    walked = _walk(root, avoided, trusted)
+    found = [(path, kind) for path, kind in walked if layout in ("auto", kind)]
     if not found:
         raise DataError(f"{root}: {_nothing(layout)}")
     names = _names(root, [path for path, _ in found])
@@ -92,14 +97,14 @@ def _nothing(layout: str) -> str:
     return f"holds no sequence of the layout {layout}"
 
 
-def _walk(root: Path, avoided: Path | None) -> Iterator[tuple[Path, str]]:
+def _walk(root: Path, avoided: Path | None, trusted: str) -> Iterator[tuple[Path, str]]:
     """Yield each sequence with its layout; nothing is looked for inside of one."""
 
     def fail(error: OSError) -> None:
         raise DataError(f"{error.filename}: {error.strerror}") from error
 
     if root.is_file():
-        if kind := _kind_of_file(root):
+        if kind := _kind_of_file(root, trusted):
             yield root, kind
         return
     for place, folders, files in os.walk(root, onerror=fail):
@@ -115,7 +120,9 @@ def _walk(root: Path, avoided: Path | None) -> Iterator[tuple[Path, str]]:
         )
         for file in sorted(files):
             path = here / file
-            if not file.startswith(".") and path.is_file() and (kind := _kind_of_file(path)):
+            if file.startswith(".") or not path.is_file():
+                continue
+            if kind := _kind_of_file(path, trusted):
                 yield path, kind
 
 
@@ -130,10 +137,12 @@ def _kind_of_folder(path: Path) -> str:
     return "auto" if is_bag else ""
 
 
-def _kind_of_file(path: Path) -> str:
+def _kind_of_file(path: Path, trusted: str) -> str:
     suffix = path.suffix.lower()
     if suffix in VIDEO_SUFFIXES:
         return "videos"
+    if suffix in _RECORDINGS.get(trusted, ()):
+        return trusted
     if not may_hold_events(path):
         return ""
     try:

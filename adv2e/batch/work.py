@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.batch.exports import Export
+from adv2e.batch.transfer import is_url, through
 from adv2e.config import Config, from_dict
 from adv2e.config.effect_files import load_effects
 from adv2e.errors import Adv2eError
@@ -25,6 +26,7 @@ class Job:
     name : str
         Of the sequence.
     source, output : str
+        Paths, or URLs.
     config : dict
         The configuration, as :func:`adv2e.config.to_dict` gives it.
     drawn : dict
@@ -73,6 +75,8 @@ def do(job: Job) -> dict[str, Any]:
 
     That holds ``error`` where nothing was made, and ``export_error`` where only events were.
     """
+    if is_url(job.source) or is_url(job.output):
+        return _reported(job, "error", lambda job: through(job, do))
     found = {} if job.only_export else _reported(job, "error", _convert)
     if job.export is not None and "error" not in found:
         found |= _reported(job, "export_error", _export)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from adv2e.batch.exports import Export
     from adv2e.batch.forecast import Forecast
     from adv2e.batch.plan import Task
+    from adv2e.batch.work import Engine
     from adv2e.cli.options import Log
     from adv2e.formats.registry import Format
     from adv2e.geometry import Size
@@ -33,10 +34,10 @@ _LARGE_SOURCE = 100_000_000
 
 @click.command("batch", cls=Command)
 @click.argument(
-    "source", metavar="SOURCE", type=click.Path(path_type=Path), shell_complete=completion.files
+    "source", metavar="SOURCE", type=click.Path(path_type=str), shell_complete=completion.files
 )
 @click.argument(
-    "dest", metavar="DEST", type=click.Path(path_type=Path), shell_complete=completion.files
+    "dest", metavar="DEST", type=click.Path(path_type=str), shell_complete=completion.files
 )
 @options.files_option(
     "Configuration: a YAML file or a shipped name, such as davis346. Repeatable: a later one wins."
@@ -109,8 +110,8 @@ _LARGE_SOURCE = 100_000_000
 @options.verbosity_options
 @options.progress_option
 def command(
-    source: Path,
-    dest: Path,
+    source: str,
+    dest: str,
     config_files: tuple[str, ...],
     sets: tuple[str, ...],
     seed: int | None,
@@ -134,6 +135,8 @@ def command(
 ) -> None:
     """Convert every sequence below the folder SOURCE, and make the same tree below DEST.
 
+    Both may be URLs, such as s3://bucket/videos, with the extra 'remote'.
+
     \b
     Examples:
       adv2e batch videos/ events/
@@ -147,8 +150,10 @@ def command(
     DEST/manifest.jsonl says of them. A sequence that fails does not stop the others; at the end
     all of these are listed, and the exit status is 1.
     """
+    from adv2e.batch.manifest import manifest_path
     from adv2e.batch.plan import parse_shard
     from adv2e.batch.run import Batch, Settings, reasons, table
+    from adv2e.batch.transfer import is_url
 
     part = None if shard is None else parse_shard(shard)
     if size is not None:
@@ -159,24 +164,34 @@ def command(
     given |= {"format": format, "with_frames": with_frames}
     suffix = next(iter(written.suffixes))
     settings = Settings(config_files, sets, effect_files, seed, suffix, given, export)
-    engine = None
-    if scheduler is not None:
-        from adv2e.batch.cluster import Cluster
-        from adv2e.batch.manifest import manifest_path
-
-        engine = Cluster(
-            scheduler, manifest_path(dest, part), at_most=jobs, threads=threads or 1, log=log
-        )
-    work = Batch(source, dest, settings, layout=layout, shard=part, overwrite=overwrite)
-    if dry_run:
-        tasks = work.plan()
-        for task in tasks:
-            log(f"{shown(task.sequence.name)}: {task.why or 'kept'}", 0 if task.why else 1)
-        click.echo(reasons(tasks))
-        if coming := work.forecast(tasks, jobs, threads):
-            click.echo(coming.text())
-        return
     with ExitStack() as stack:
+        remote = None
+        if is_url(source) or is_url(dest):
+            from adv2e.batch.remote import Remote
+
+            if export is not None and is_url(dest):
+                raise click.UsageError("--export makes folders: DEST must be a folder, too, no URL")
+            remote = stack.enter_context(Remote(source, dest))
+        work = Batch(
+            remote.source if remote else Path(source),
+            remote.dest if remote else Path(dest),
+            settings,
+            layout=layout,
+            shard=part,
+            overwrite=overwrite,
+            digest=remote.digest if remote else None,
+        )
+        engine = _engine(scheduler, None if is_url(dest) else Path(dest), part, jobs, threads, log)
+        if remote is not None:
+            engine = remote.engine(engine, manifest_path(remote.dest, part))
+        if dry_run:
+            tasks = work.plan()
+            for task in tasks:
+                log(f"{shown(task.sequence.name)}: {task.why or 'kept'}", 0 if task.why else 1)
+            click.echo(reasons(tasks))
+            if coming := work.forecast(tasks, jobs, threads):
+                click.echo(coming.text())
+            return
         told = _Told(log, progress, stack, lambda tasks: work.forecast(tasks, jobs, threads))
         outcome = work.run(
             jobs=jobs, threads=threads, engine=engine, begun=told.begun, ended=told.ended
@@ -188,6 +203,24 @@ def command(
         click.echo(line, err=True)
     if outcome.failed:
         raise click.exceptions.Exit(1)
+
+
+def _engine(
+    scheduler: str | None,
+    dest: Path | None,
+    shard: tuple[int, int] | None,
+    jobs: int | None,
+    threads: int | None,
+    log: Log,
+) -> Engine | None:
+    """Return who converts; None: processes of this machine."""
+    if scheduler is None:
+        return None
+    from adv2e.batch.cluster import Cluster
+    from adv2e.batch.manifest import manifest_path
+
+    manifest = dest and manifest_path(dest, shard)
+    return Cluster(scheduler, manifest, at_most=jobs, threads=threads or 1, log=log)
 
 
 def _export(

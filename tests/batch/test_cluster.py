@@ -237,6 +237,15 @@ def test_a_batch_that_is_stopped_ends_its_conversions(adv2e, local, machines, pl
     assert made_in(Path("dest")) == local()
 
 
+def test_urls_go_to_the_workers_as_they_are(adv2e, local, machines, place):
+    clip(Path("source/deep/a.avi"))
+    machines.workers(1)
+    urls = (f"file://{place}/source", f"file://{place}/dest")
+    done = adv2e("batch", *urls, *SETTINGS, *QUICK, "--scheduler", machines.file)
+    assert done.status == 0, done.err
+    assert made_in(Path("dest")) == local()
+
+
 def test_a_source_that_the_workers_do_not_see_fails(adv2e, machines, place):
     clip(Path("source/a.avi"))
     clip(Path("source/b.avi"))
