@@ -1,0 +1,161 @@
+#!/usr/bin/env python
+"""How long a batch of short clips takes: beside the pixel alone, and beside shell loops.
+
+Makes 200 clips of 346x260 at 30 frames a second, one second each, and converts them in four ways:
+by the pixel alone, frames in memory to events in memory; by ``adv2e batch``; by a shell loop of
+``adv2e convert``; and by a shell loop of EventCV with 10 sub-steps, if that is installed::
+
+    python scripts/benchmarks/batches.py -o out/batches.md
+    python scripts/benchmarks/batches.py --quick        # 20 clips
+
+Prints a table; ``-o FILE.md`` also writes it, with the raw numbers in ``FILE.json``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import shlex
+import shutil
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import click
+from writing import output_option, table, write_report
+
+from adv2e.background import default_threads
+from benchmarks.clips import Clip, as_srgb, encoded, stored
+from benchmarks.machine import about
+from benchmarks.options import of_a_plan
+from benchmarks.processes import Job, Log, Measured, number, run_rounds
+from benchmarks.settings import ALL, CUTOFF_HZ, THRESHOLD, Plan
+
+CLIPS, QUICK_CLIPS = 200, 20
+FRAMES, FPS = 31, 30.0
+SETS = (f"pixel.thresholds={{on: {THRESHOLD:g}, off: {THRESHOLD:g}}}", *ALL)
+PEER = {
+    "pos_thres": THRESHOLD, "neg_thres": THRESHOLD, "cutoff_hz": CUTOFF_HZ, "sigma_thres": 0.03,
+    "leak_rate_hz": 0.1, "shot_noise_rate_hz": 5.0, "refractory_us": 500, "upsample": "10",
+}  # fmt: skip
+
+_EVENTCV_FILE = "benchmarks.tools.eventcv_file"
+
+ABOUT = (
+    f"Clips of 346x260, {FRAMES} frames at {FPS:g} a second, as MP4 (mp4v). All effects, thresholds"
+    " 0.2, shot noise 5 Hz, in both tools. Whole processes, from start to end, compiled beforehand;"
+    " of the pixel, the time after warming up. Median (least..most); ratios are paired by round."
+)
+
+
+@dataclass(frozen=True)
+class Ways:
+    """The ways to convert the same clips, as jobs."""
+
+    pixel: Job
+    batch: Job
+    loop: Job
+    peer: Job | None
+
+    def jobs(self) -> list[Job]:
+        """Return those that there are."""
+        return [one for one in (self.pixel, self.batch, self.loop, self.peer) if one is not None]
+
+
+def make_clips(folder: Path, count: int) -> Path:
+    """Return a folder of so many videos, none like the other; make it if need be."""
+    made = folder / f"batch-{count}"
+    made.mkdir(parents=True, exist_ok=True)
+    for seed in range(count):
+        target = made / f"{seed:03}.mp4"
+        if target.exists():
+            continue
+        clip = Clip(width=346, height=260, frames=FRAMES, fps=FPS, seed=seed)
+        with tempfile.TemporaryDirectory(dir=folder) as scratch:
+            video = encoded(as_srgb(stored(clip, Path(scratch))), FPS)
+            shutil.move(video, target)
+    return made
+
+
+def ways(clips: Path, scratch: Path, threads: int) -> Ways:
+    """Return the jobs."""
+    program = [sys.executable, "-m", "adv2e"]
+    sets = [word for one in SETS for word in ("--set", one)]
+    paths = sorted(str(path) for path in clips.glob("*.mp4"))
+
+    def job(name: str, folder: str, script: str) -> Job:
+        options = {"script": script, "target": str(scratch / folder)}
+        return Job(name=name, action="benchmarks.batching:shell", options=options, threads=threads)
+
+    def loop(command: Sequence[str], folder: str, after: Sequence[str]) -> str:
+        out = shlex.quote(str(scratch / folder)) + '/"$(basename "$f" .mp4)".h5'
+        option = "-o " if "convert" in command else ""
+        call = f'{shlex.join(command)} "$f" {option}{out} {shlex.join(after)}'
+        return f"for f in {shlex.quote(str(clips))}/*.mp4; do {call}; done"
+
+    whole = [*program, "batch", str(clips), str(scratch / "batch"), *sets, "-q"]
+    found = importlib.util.find_spec("eventcv") is not None
+    return Ways(
+        Job(
+            name="the pixel alone",
+            action="benchmarks.batching:pixel",
+            options={"clips": paths, "sets": list(SETS), "threads": threads},
+            threads=threads,
+        ),
+        job("`adv2e batch`", "batch", shlex.join(whole)),
+        job(
+            "shell loop of `adv2e convert`",
+            "loop",
+            loop([*program, "convert"], "loop", [*sets, "-q", "--threads", str(threads)]),
+        ),
+        job(
+            "shell loop of EventCV, 10 sub-steps",
+            "peer",
+            loop(
+                [sys.executable, "-m", "benchmarks.tools.eventcv_file"], "peer", [json.dumps(PEER)]
+            ),
+        )
+        if found
+        else None,
+    )
+
+
+def report(found: Sequence[Measured], count: int) -> str:
+    """Return the table."""
+    size = count * FRAMES * 346 * 260 / 1e6
+    pixel = found[0]
+    rows = [
+        [
+            one.job.name,
+            str(one.wall_s()),
+            number(one.cpu_s().median),
+            str(one.wall_s().inverse(size)),
+            str(pixel.ratio(one)),
+        ]
+        for one in found
+    ]
+    head = (f"{count} clips", "wall s", "CPU s", "Mpx-frames/s", "rate of the pixel alone")
+    return "\n\n".join([ABOUT, table(head, rows)])
+
+
+@click.command(help=__doc__, context_settings={"max_content_width": 100})
+@output_option
+@of_a_plan(rounds=3, quick_rounds=2)
+def main(plan: Plan, log: Log, output: Path | None) -> None:
+    """Measure, and report."""
+    count = QUICK_CLIPS if plan.quick else CLIPS
+    clips = make_clips(plan.folder, count)
+    with tempfile.TemporaryDirectory(prefix="adv2e-batches-") as folder:
+        made = ways(clips, Path(folder), plan.threads or default_threads())
+        warm = [made.pixel]
+        found = run_rounds(made.jobs(), plan.rounds, log, warm=warm)
+    text = f"{report(found, count)}\n\n{about(found)}"
+    write_report(text, output, {"measured": [one.as_dict() for one in found]})
+
+
+if __name__ == "__main__":
+    main()
