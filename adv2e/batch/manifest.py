@@ -83,7 +83,7 @@ class Manifest:
     Raises
     ------
     OutputError
-        Another process writes it, or it cannot be written.
+        Another process writes it, it is a link, or it cannot be written.
     DataError
         A line before the last is no such object.
     """
@@ -91,7 +91,10 @@ class Manifest:
     def __init__(self, path: Path) -> None:
         self.path = path
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = path.open("a+b")
+        if path.is_symlink():
+            raise OutputError(f"{path}: is a link, and must be a file: remove it")
+        # not buffered: what could not be written would be tried again when it is closed
+        self._file = path.open("a+b", buffering=0)
         try:
             if not lock_file(self._file, wait=False):
                 raise OutputError(f"{path}: another batch writes here: wait for it, or end it")
@@ -125,8 +128,9 @@ class Manifest:
         line = json.dumps({**record, "at": now}, ensure_ascii=True, allow_nan=False) + "\n"
         end = self._file.seek(0, os.SEEK_END)
         try:
-            self._file.write(line.encode("ascii"))
-            self._file.flush()
+            rest = line.encode("ascii")
+            while rest:
+                rest = rest[self._file.write(rest) :]
             os.fsync(self._file.fileno())
         except OSError:
             self._file.truncate(end)

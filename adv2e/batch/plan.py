@@ -193,3 +193,14 @@ def outputs_in_the_way(
         for path in (one.output, wanted.export_folder(one.sequence))
         if path and one.why and one.sequence.name not in records and path.exists()
     ]
+
+
+def outputs_outside(tasks: Sequence[Task], wanted: Wanted) -> list[Path]:
+    """Return what would be written outside of DEST, as links in it lead there."""
+    dest = wanted.dest.resolve()
+    return [
+        path
+        for one in tasks
+        for path in (one.output, wanted.export_folder(one.sequence))
+        if path and one.why and dest not in path.resolve().parents
+    ]

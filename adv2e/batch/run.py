@@ -19,6 +19,7 @@ from adv2e.batch.plan import (
     Task,
     Wanted,
     outputs_in_the_way,
+    outputs_outside,
     plan,
     seed_of,
     settings_digest,
@@ -174,7 +175,7 @@ class Batch:
         Raises
         ------
         OutputError
-            A file that this batch did not make lies where one is to go.
+            A file that this batch did not make lies where one is to go, or a link leads out.
         """
         records = read_records(self._dest)
         tasks = plan(
@@ -185,6 +186,8 @@ class Batch:
             overwrite=self._overwrite,
             digest=self._digest or digest_of,
         )
+        for path in outputs_outside(tasks, self._wanted):
+            raise OutputError(f"{shown(path)}: a link leads out of {shown(self._dest)}: remove it")
         strange = outputs_in_the_way(tasks, records, self._wanted)
         if strange and not self._overwrite:
             raise OutputError(

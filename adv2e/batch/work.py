@@ -15,6 +15,7 @@ from adv2e.config.effect_files import load_effects
 from adv2e.errors import Adv2eError
 from adv2e.files.states import State, digest_of
 from adv2e.formats.lookup import to_write
+from adv2e.process.machine import machine_complaint
 
 
 @dataclass(frozen=True)
@@ -89,10 +90,12 @@ def _reported(job: Job, error_key: str, work: Callable[[Job], dict[str, Any]]) -
         return work(job)
     except Adv2eError as error:
         return {error_key: str(error)}
-    except OSError as error:
-        return {error_key: f"{error.filename or job.source}: {error.strerror or error}"}
     except Exception as error:
-        return {error_key: f"internal error: {type(error).__name__}: {error}"}
+        if told := machine_complaint(error):
+            return {error_key: f"{job.source}: {told}"}
+        if isinstance(error, OSError):
+            return {error_key: f"{error.filename or job.source}: {error.strerror or error}"}
+        return {error_key: f"{job.source}: internal error: {type(error).__name__}: {error}"}
 
 
 def _convert(job: Job) -> dict[str, Any]:

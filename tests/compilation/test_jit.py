@@ -8,10 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import adv2e
 from adv2e import compiled as jit
+from adv2e.compilation.code_cache import CodeCache
 
 INNER = """
 from adv2e.compiled import kernel
@@ -203,3 +205,31 @@ def test_what_is_imported_after_the_compiler_extends_it(tmp_path):
         [sys.executable, "-c", script], capture_output=True, text=True, check=False, env=none
     )
     assert (run.stdout, run.returncode) == ("0 2048\n", 0), run.stderr
+
+
+def test_what_has_one_byte_changed_is_not_loaded_but_made_again(start, tmp_path, monkeypatch):
+    """Flip a byte 200 times: nothing damaged stays, and some of these times it runs."""
+    said(start(1))
+    (folder,) = tmp_path.glob("cache/adv2e/kernels-*")
+    files = (path for path in folder.rglob("*") if path.is_file() and path.stat().st_size)
+    whole = {path: path.read_bytes() for path in files}
+    assert {path.suffix for path in whole} >= {".nbi", ".nbc", ".json"}
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    rng = np.random.default_rng(8)
+    for turn in range(200):
+        for path, data in whole.items():
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(data)
+        path = sorted(whole)[rng.integers(len(whole))]
+        data = bytearray(whole[path])
+        data[rng.integers(len(data))] ^= 1 << rng.integers(8)
+        path.write_bytes(data)
+        if turn % 50 == 0:
+            assert said(start(1))[0] == "20"
+            continue
+        assert CodeCache(folder.name).folder == folder.resolve()
+        if path.suffix != ".json":
+            assert not path.exists()
+        for one in folder.rglob("*.nb?"):
+            assert one.read_bytes() == whole[one]
