@@ -197,7 +197,7 @@ class Cluster:
                 found = _found(future, flying[future.key])
             except queue.Empty:
                 continue
-            except asyncio.TimeoutError:  # its worker is lost, and another one does it again
+            except (asyncio.TimeoutError, OSError):  # its worker is lost, and another does it again
                 done.put(future)
                 continue
             if found is None:
@@ -302,8 +302,8 @@ def _found(future: Future, job: Job) -> dict[str, Any] | None:
 
     Raises
     ------
-    TimeoutError
-        The result is not to be had, as the worker that held it is lost.
+    TimeoutError, OSError
+        The result is not to be had yet, as the worker that held it is lost.
     """
     from distributed import KilledWorker  # noqa: PLC0415 - an extra
 
@@ -313,19 +313,21 @@ def _found(future: Future, job: Job) -> dict[str, Any] | None:
         found: dict[str, Any] = future.result(timeout=_ANSWER_S)
     except CancelledError:
         return None
-    except asyncio.TimeoutError:
-        raise
-    except EndedError as error:
+    except Exception:
+        if future.status != "error":
+            raise
+    else:
+        return found
+    error = future.exception()
+    if isinstance(error, EndedError):
         return {"error": str(error)}
-    except KilledWorker as error:
+    if isinstance(error, KilledWorker):
         count = error.allowed_failures + 1
         return {"error": f"{job.source}: {count} workers ended while they had it"}
-    except Exception as error:  # it could not even begin
-        return {
-            "unfit": f"or the scheduler has no adv2e {__version__}, or another Python or Dask than"
-            f" here: {type(error).__name__}: {_one_line(error)}"
-        }
-    return found
+    return {  # it could not even begin
+        "unfit": f"or the scheduler has no adv2e {__version__}, or another Python or Dask than"
+        f" here: {type(error).__name__}: {_one_line(error)}"
+    }
 
 
 def _one_line(error: BaseException) -> str:
