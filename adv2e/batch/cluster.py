@@ -11,13 +11,13 @@ If a worker is lost, the scheduler has others do its jobs again.
 from __future__ import annotations
 
 import asyncio
+import atexit
 import hashlib
 import json
 import math
 import multiprocessing
 import queue
 import re
-import tempfile
 import threading
 import time
 import uuid
@@ -25,7 +25,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Any
 
 from adv2e import __version__
 from adv2e.batch.processes import EndedError, Workers
-from adv2e.batch.transfer import is_url
+from adv2e.batch.transfer import Scratch, is_url
 from adv2e.batch.work import Job
 from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError
 from adv2e.files.regular import read_text_bytes
@@ -396,15 +396,17 @@ def _file(name: str, text: bytes) -> str:
     with suppress(OSError):
         if Path(name).read_bytes() == text:
             return name
-    copy = Path(_folder().name) / hashlib.sha256(text).hexdigest() / Path(name).name
+    copy = _folder() / hashlib.sha256(text).hexdigest() / Path(name).name
     copy.parent.mkdir(exist_ok=True)
     copy.write_bytes(text)
     return str(copy)
 
 
 @lru_cache
-def _folder() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="adv2e-")
+def _folder() -> Path:
+    stack = ExitStack()
+    atexit.register(stack.close)
+    return stack.enter_context(Scratch())
 
 
 def _sweep(folders: Iterable[str]) -> None:

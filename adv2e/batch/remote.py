@@ -84,7 +84,8 @@ class Remote:
 
     def _shadow(self, url: str, *, is_dest: bool = False) -> Path:
         system, path = open_url(url)
-        root = self._stack.enter_context(Scratch()) / (PurePosixPath(path).name or "root")
+        scratch = self._stack.enter_context(Scratch())
+        root = scratch / "shadow" / (PurePosixPath(path).name or "root")
         try:
             found = files_below(system, path)
         except FileNotFoundError:
@@ -104,7 +105,7 @@ class Remote:
             if is_dest:
                 self._tokens[name] = token(about)
         if not found:
-            root.mkdir()
+            root.mkdir(parents=True)
         self._urls[root] = url.rstrip("/")
         return root
 

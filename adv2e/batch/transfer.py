@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError
+from adv2e.files.workspace import Workspace, remove_abandoned
 from adv2e.process import cleanup
 
 if TYPE_CHECKING:
@@ -119,15 +120,17 @@ def put(system: Any, source: Path, target: str) -> None:
 
 
 class Scratch(cleanup.Unfinished):
-    """A temporary folder that goes, however this process is told to end."""
+    """A temporary folder; if this process is killed, the next one that makes one removes it."""
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="adv2e-", ignore_cleanup_errors=True)
-        self.path = Path(self._folder.name)
+        self._base = Path(tempfile.gettempdir())
+        self._folder = Workspace(self._base)
 
     def __enter__(self) -> Path:
+        remove_abandoned(self._base)
         cleanup.add(self)
-        return self.path
+        self._folder.make()
+        return self._folder.path
 
     def __exit__(self, *_: object) -> None:
         self.remove_now()
@@ -135,7 +138,7 @@ class Scratch(cleanup.Unfinished):
 
     def remove_now(self) -> bool:
         """Remove it with all that is in it."""
-        self._folder.cleanup()
+        self._folder.remove()
         return True
 
 

@@ -1,6 +1,9 @@
 """Batches whose SOURCE or DEST is a URL: fetched, converted here, put there whole or not at all."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -171,6 +174,21 @@ def test_temporary_folders_are_removed(batch, store, source, tmp_path, monkeypat
     upload(store, source, "/from")
     assert batch(*URLS).status == 0
     assert not [*here.iterdir()]
+
+
+def test_what_a_killed_process_left_is_removed(tmp_path, monkeypatch):
+    monkeypatch.setattr(transfer.tempfile, "tempdir", str(tmp_path))
+    script = (
+        "import os; from adv2e.batch.transfer import Scratch\n"
+        "with Scratch() as folder: (folder / 'source').mkdir(); os._exit(1)"
+    )
+    subprocess.run(
+        [sys.executable, "-c", script], env={**os.environ, "TMPDIR": str(tmp_path)}, check=False
+    )
+    assert len([*tmp_path.iterdir()]) == 1
+    with transfer.Scratch() as folder:
+        assert [*tmp_path.iterdir()] == [folder]
+    assert not [*tmp_path.iterdir()]
 
 
 def test_recordings_are_told_by_the_layout_where_they_cannot_be_read(tmp_path):
