@@ -22,7 +22,6 @@ import threading
 import time
 import uuid
 import warnings
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, suppress
@@ -140,7 +139,9 @@ class Cluster:
         self._scheduler, self._manifest = scheduler, manifest
         self._at_most, self._threads, self._log = at_most, threads, log
 
-    def __call__(self, jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
+    def __call__(
+        self, jobs: Iterable[Job | None], count: int
+    ) -> Iterator[tuple[Job, dict[str, Any]]]:
         """Yield each job with what :func:`adv2e.batch.work.do` returned, as they end.
 
         Raises
@@ -152,7 +153,7 @@ class Cluster:
         client = self._connect()
         try:
             workers = _Workers(client, self._scheduler, self._log)
-            yield from self._run(client, workers, deque(jobs))
+            yield from self._run(client, workers, iter(jobs))
         finally:
             with suppress(OSError, asyncio.TimeoutError):
                 client.close(timeout=_TICK_S)
@@ -171,27 +172,30 @@ class Cluster:
                 ) from error
 
     def _run(
-        self, client: Client, workers: _Workers, waiting: deque[Job]
+        self, client: Client, workers: _Workers, coming: Iterator[Job | None]
     ) -> Iterator[tuple[Job, dict[str, Any]]]:
         proof = Proof.of(self._manifest and self._manifest.absolute())
         # those of effects travel, so that workers need not see them
-        names = {name for job in waiting for name in job.effect_files}
-        texts = {name: Path(name).read_bytes() for name in names}
-        made = {path for job in waiting for path in (job.output, job.export_folder) if path}
-        folders = sorted({str(Path(path).absolute().parent) for path in made})
+        texts: dict[str, bytes] = {}
+        folders: set[str] = set()
         done: queue.SimpleQueue[Future] = queue.SimpleQueue()
         flying: dict[str, Job] = {}
-        while waiting or flying:
+        job = next(coming, None)
+        while job is not None or flying:
             room = workers.room()
-            while waiting and len(flying) < min(room, self._at_most or room):
-                job = waiting.popleft()
+            while job is not None and len(flying) < min(room, self._at_most or room):
+                missing = set(job.effect_files) - texts.keys()
+                texts |= {name: Path(name).read_bytes() for name in missing}
                 sent = replace(_anywhere(job), threads=self._threads)
+                made = filter(None, (sent.output, sent.export_folder))
+                folders |= {str(Path(path).parent) for path in made}
                 key = f"adv2e-{uuid.uuid4().hex}"
                 future = client.submit(
                     _do, sent, proof, texts, key=key, pure=False, retries=_RETRIES
                 )
                 flying[key] = job
                 future.add_done_callback(done.put)
+                job = next(coming, None)
             try:
                 future = done.get(timeout=_TICK_S)
                 found = _found(future, flying[future.key])
@@ -205,8 +209,9 @@ class Cluster:
             if "unfit" in found:
                 raise Adv2eError(f"{self._scheduler}: the worker {found['unfit']}")
             yield flying.pop(future.key), found
+            job = job or next(coming, None)
         if workers.some_ended:
-            workers.each(_sweep, folders)
+            workers.each(_sweep, sorted(folders))
 
 
 def _anywhere(job: Job) -> Job:
@@ -220,6 +225,7 @@ def _anywhere(job: Job) -> Job:
         source=whole(job.source),
         output=whole(job.output),
         export_folder=whole(job.export_folder),
+        parts=tuple(map(whole, job.parts)),
     )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from adv2e import __version__
+from adv2e.batch.divided import parts_folder
 from adv2e.batch.exports import Export
 from adv2e.batch.sequences import Sequence as Found
 from adv2e.errors import UsageError
@@ -201,6 +202,10 @@ def outputs_outside(tasks: Sequence[Task], wanted: Wanted) -> list[Path]:
     return [
         path
         for one in tasks
-        for path in (one.output, wanted.export_folder(one.sequence))
+        for path in (
+            one.output,
+            wanted.export_folder(one.sequence),
+            parts_folder(wanted.dest, one.sequence.name),
+        )
         if path and one.why and dest not in path.resolve().parents
     ]

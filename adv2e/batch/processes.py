@@ -14,7 +14,13 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
@@ -33,19 +39,28 @@ class EndedError(Exception):
     """A process ended while it converted."""
 
 
-def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
-    """Yield each job with what :func:`do` returned, as they end; `count` at a time."""
+def run(jobs: Iterable[Job | None], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
+    """Yield each job with what :func:`do` returned, as they end; `count` at a time.
+
+    See :data:`adv2e.batch.work.Engine`.
+    """
     workers = Workers(count)
     pool = ThreadPoolExecutor(count)
     cleanup.add(workers)
     try:
-        futures = {pool.submit(workers.do, job): job for job in jobs}
-        for future in as_completed(futures):
-            try:
-                found = future.result()
-            except EndedError as error:
-                found = {"error": str(error)}
-            yield futures[future], found
+        coming = iter(jobs)
+        flying: dict[Future[dict[str, Any]], Job] = {}
+        while True:
+            while len(flying) < count and (job := next(coming, None)) is not None:
+                flying[pool.submit(workers.do, job)] = job
+            if not flying:
+                break
+            for future in wait(flying, return_when=FIRST_COMPLETED).done:
+                try:
+                    found = future.result()
+                except EndedError as error:
+                    found = {"error": str(error)}
+                yield flying.pop(future), found
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         workers.remove_now()

@@ -128,8 +128,8 @@ class Remote:
     def engine(self, base: Engine | None, manifest: Path) -> Engine:
         """Return an engine that hands the jobs with their URLs to another one."""
 
-        def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
-            given = {job.name: job for job in jobs}
+        def run(jobs: Iterable[Job | None], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
+            given = {job.name: job for job in jobs if job is not None}
             sent = [
                 replace(job, source=self._url(job.source), output=self._url(job.output))
                 for job in given.values()

@@ -12,6 +12,7 @@ from typing import Any
 from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.batch import processes
+from adv2e.batch.divided import Jobs, remove_parts
 from adv2e.batch.exports import Export, write_lists
 from adv2e.batch.forecast import Forecast, forecast
 from adv2e.batch.manifest import Manifest, check_alone, manifest_path, read_records
@@ -29,8 +30,9 @@ from adv2e.batch.sequences import Sequence as Found
 from adv2e.batch.sequences import find_sequences
 from adv2e.batch.work import Engine, Job
 from adv2e.config import Family, load_family, to_dict
-from adv2e.config.active_effects import user_sources
+from adv2e.config.active_effects import active_hooks, user_sources
 from adv2e.config.effect_files import load_effects
+from adv2e.effects.composition import check_divisible
 from adv2e.errors import Adv2eError, OutputError
 from adv2e.files.names import shown
 from adv2e.files.states import digest_of, state_of
@@ -127,6 +129,8 @@ class Batch:
         (I, N): only the I-th of N parts of about the same size.
     overwrite : bool
         Make all anew, and replace files that others made.
+    split : int
+        Parts of the pixels in which each sequence is converted; the bytes do not depend on it.
     digest : callable, optional
         `source` or `dest` is a shadow (:class:`adv2e.batch.remote.Remote`), in which no file may be
         read: this tells the digest of what it stands for, as far as it is known.
@@ -146,11 +150,14 @@ class Batch:
         layout: str = "auto",
         shard: tuple[int, int] | None = None,
         overwrite: bool = False,
+        split: int = 1,
         digest: Callable[[Path], str] | None = None,
     ) -> None:
         self._dest, self._settings, self._overwrite = dest, settings, overwrite
-        self._shard, self._digest = shard, digest
+        self._shard, self._split, self._digest = shard, split, digest
         self._wanted = settings.wanted(dest)
+        if split > 1:
+            check_divisible(active_hooks(settings.family.config))
         self._sequences = find_sequences(source, layout, leave_out=dest, by_name=digest is not None)
         self._states = {one.name: state_of(one.source) for one in self._sequences}
         if shard is not None:
@@ -203,7 +210,7 @@ class Batch:
         if self._digest is not None:
             return None
         waiting = [task for task in tasks if task.why and not task.only_export]
-        count, each = _shares(len(waiting), jobs, threads)
+        count, each = _shares(len(waiting) * self._split, jobs, threads)
 
         def job_of(task: Task) -> Job:
             return _job(task, self._settings, self._wanted, each)
@@ -217,6 +224,7 @@ class Batch:
         threads: int | None = None,
         engine: Engine | None = None,
         begun: Callable[[list[Task]], None] = lambda tasks: None,
+        moved: Callable[[Task, float], None] = lambda task, share: None,
         ended: Callable[[Task, Mapping[str, Any]], None] = lambda task, record: None,
     ) -> Outcome:
         """Convert every sequence of which the file is missing or out of date.
@@ -229,8 +237,9 @@ class Batch:
             Threads of all together; default: all cores.
         engine : callable, optional
             Who converts; default: processes of this machine.
-        begun, ended : callable
-            Told what is planned, and each sequence with what the manifest says of it.
+        begun, moved, ended : callable
+            Told what is planned, which share more of a sequence is done, and each sequence with
+            what the manifest says of it.
 
         Raises
         ------
@@ -243,22 +252,34 @@ class Batch:
         with Manifest(manifest_path(self._dest, self._shard)) as manifest:
             check_alone(manifest.path)
             tasks = self.plan()
+            for task in tasks:
+                if not task.why:  # a batch may have ended before it did that
+                    remove_parts(self._dest, task.sequence.name)
             begun(tasks)
             waiting = {task.sequence.name: task for task in tasks if task.why}
-            count, each = _shares(len(waiting), jobs, threads)
+            count, each = _shares(len(waiting) * self._split, jobs, threads)
             for task in waiting.values():
                 task.output.parent.mkdir(parents=True, exist_ok=True)
                 if not task.only_export:
                     manifest.add({"name": task.sequence.name, "status": "started"})
-            work = [_job(task, self._settings, self._wanted, each) for task in waiting.values()]
+            work = (_job(task, self._settings, self._wanted, each) for task in waiting.values())
+            queue = Jobs(work, self._dest, self._split)
             before = read_records(self._dest)
-            for job, found in (engine or processes.run)(work, count):
+            for job, found in (engine or processes.run)(queue, count):
+                wrong = error_of(found)
+                if job.share is not None and not wrong:
+                    queue.part_made(job)
+                    moved(waiting[job.name], 1 / (self._split + 1))
+                    continue
+                if wrong and not queue.give_up(job):
+                    continue
                 record = _record(waiting[job.name], self._wanted, job, found, before)
                 manifest.add(record)
                 events += found.get("events", 0)
-                wrong = error_of(found)
                 if wrong:
                     failed[job.name] = wrong
+                if "error" not in found:
+                    remove_parts(self._dest, job.name)
                 ended(waiting[job.name], record)
             if self._wanted.export is not None and self._wanted.export.kind == "e2vid":
                 write_lists(self._dest, read_records(self._dest).values())

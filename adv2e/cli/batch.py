@@ -104,6 +104,14 @@ _LARGE_SOURCE = 100_000_000
     help="Convert on the workers of this Dask scheduler, such as tcp://node1:8786 or the file that"
     " it wrote. --jobs N bounds how many at a time; each has --threads, 1 by default.",
 )
+@click.option(
+    "--split",
+    type=options.WholeNumber(1, 256),
+    metavar="N",
+    default=1,
+    help="Convert each sequence in N parts of its rows, beside each other, and merge them: for few"
+    " large or long ones. The bytes are the same.",
+)
 @click.option("--dry-run", is_flag=True, help="Show what would be done, and write nothing.")
 @click.option("--overwrite", is_flag=True, help="Make all anew, and replace files of others.")
 @options.threads_option
@@ -126,6 +134,7 @@ def command(
     jobs: int | None,
     shard: str | None,
     scheduler: str | None,
+    split: int,
     dry_run: bool,
     overwrite: bool,
     threads: int | None,
@@ -169,6 +178,8 @@ def command(
         if is_url(source) or is_url(dest):
             from adv2e.batch.remote import Remote
 
+            if split > 1:
+                raise click.UsageError("--split: SOURCE and DEST must be folders, no URLs")
             if export is not None and is_url(dest):
                 raise click.UsageError("--export makes folders: DEST must be a folder, too, no URL")
             remote = stack.enter_context(Remote(source, dest))
@@ -179,6 +190,7 @@ def command(
             layout=layout,
             shard=part,
             overwrite=overwrite,
+            split=split,
             digest=remote.digest if remote else None,
         )
         engine = _engine(scheduler, None if is_url(dest) else Path(dest), part, jobs, threads, log)
@@ -194,7 +206,12 @@ def command(
             return
         told = _Told(log, progress, stack, lambda tasks: work.forecast(tasks, jobs, threads))
         outcome = work.run(
-            jobs=jobs, threads=threads, engine=engine, begun=told.begun, ended=told.ended
+            jobs=jobs,
+            threads=threads,
+            engine=engine,
+            begun=told.begun,
+            moved=told.moved,
+            ended=told.ended,
         )
     lines = table(outcome)
     if log.level >= 0:
@@ -257,6 +274,7 @@ class _Told:
         self._log, self._progress, self._stack = log, progress, stack
         self._forecast = forecast
         self._bar: Any = None
+        self._done: dict[str, float] = {}
 
     def begun(self, tasks: list[Task]) -> None:
         from adv2e.batch.run import reasons
@@ -275,11 +293,16 @@ class _Told:
                 tqdm(total=total, unit="B", unit_scale=True, desc="batch", leave=False)
             )
 
+    def moved(self, task: Task, share: float) -> None:
+        name = task.sequence.name
+        self._done[name] = self._done.get(name, 0.0) + share
+        if self._bar is not None:
+            self._bar.update(task.state.bytes * share)
+
     def ended(self, task: Task, record: Mapping[str, Any]) -> None:
         from adv2e.batch.run import error_of
 
-        if self._bar is not None:
-            self._bar.update(task.state.bytes)
+        self.moved(task, 1.0 - self._done.get(task.sequence.name, 0.0))
         name = shown(task.sequence.name)
         wrong = error_of(record)
         if wrong:

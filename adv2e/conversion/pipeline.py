@@ -43,6 +43,7 @@ from adv2e.sources import STDIN
 from adv2e.sources.base import Source
 
 if TYPE_CHECKING:
+    from adv2e.light.sensor import Fitting
     from adv2e.rendering.timeline import Timeline
 
 BEHIND_BYTES = 16 << 20
@@ -157,6 +158,7 @@ def convert_reading(
     causes: bool = False,
     progress: bool = False,
     also_read: Iterable[str | Path] = (),
+    of_pixels: Iterator[Events] | None = None,
     log: Callable[[str], None] = lambda text: None,
     doubt: Callable[[str], None] | None = None,
 ) -> Summary:
@@ -180,6 +182,9 @@ def convert_reading(
         Show a progress bar on stderr.
     also_read : iterable of str or Path
         Files that `config` is made of, which must not be written over.
+    of_pixels : iterator of events, optional
+        All that comes of the pixels, where it was made before; see
+        :func:`adv2e.conversion.simulation.events_from_light`.
     log, doubt : callable
         Take lines for people; `doubt` those that ask for a look, by default `log`.
 
@@ -191,24 +196,15 @@ def convert_reading(
     began = time.perf_counter()
     doubt = doubt or log
     recording, workers = reading.source, reading.threads
-    if recording.largest is not None and recording.dtype.kind == "f":
-        check_white(recording.largest, recording.path, config.frames.full_scale)
+    decoder, fitting = decoding_of(recording, config)
     target = output or default_output(reading.path, format)
     chosen = to_write(Path(target), format, layout)
     if with_frames:
         check_frames(chosen)
     keeps_all_bits = chosen.is_davis240c
     with_frames = with_frames or keeps_all_bits
-    decoder = decoder_for(
-        config.frames,
-        recording.dtype,
-        recording.colour,
-        auto=recording.encoding,
-        white=recording.full_scale,
-    )
     white = picture_white(recording.dtype, decoder.full_scale, not keeps_all_bits)
     frames = Size(recording.width, recording.height)
-    fitting = fitting_of(*frames, config.sensor, recording.path, recording.along)
     width, height = frames if fitting is None else fitting.size
     # events and preview come into place together, when all is written
     inputs = (*reading.inputs, *also_read)
@@ -257,6 +253,7 @@ def convert_reading(
             table=table,
             complete=out.complete_until,
             causes=causes,
+            of_pixels=of_pixels,
         )
         for events in chunks:
             out.add(events)
@@ -289,6 +286,27 @@ def convert_reading(
         on=out.on,
         seconds=time.perf_counter() - began,
     )
+
+
+def decoding_of(recording: Source, config: Config) -> tuple[LightDecoder, Fitting | None]:
+    """Return how the frames of a source become light, and how they are brought to the sensor.
+
+    Raises
+    ------
+    Adv2eError
+        They do not fit the configuration.
+    """
+    if recording.largest is not None and recording.dtype.kind == "f":
+        check_white(recording.largest, recording.path, config.frames.full_scale)
+    decoder = decoder_for(
+        config.frames,
+        recording.dtype,
+        recording.colour,
+        auto=recording.encoding,
+        white=recording.full_scale,
+    )
+    frames = Size(recording.width, recording.height)
+    return decoder, fitting_of(*frames, config.sensor, recording.path, recording.along)
 
 
 def _doubt_of_white(recording: Source, largest: float | None, config: Config) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from adv2e.events import Events, empty_events, sort_events
 
 
-def _before(events: Events, t_us: int) -> int:
+def count_before(events: Events, t_us: int) -> int:
     """Return how many of the sorted events come before a time [us]."""
     # NumPy's search would copy the column
     return bisect_left(range(events.size), t_us, key=lambda k: int(events["t"][k]))
@@ -35,14 +35,14 @@ class InOrder:
         if self._held is None:
             self._held = events[:0]
         if self._held.size:
-            split = _before(events, int(self._held["t"].max()) + 1)
+            split = count_before(events, int(self._held["t"].max()) + 1)
             border = sort_events(np.concatenate([self._held, events[:split]]))
-            keep = _before(border, end_us)
+            keep = count_before(border, end_us)
             self._held = border[keep:]
             if keep:
                 yield border[:keep]
             events = events[split:]
-        keep = _before(events, end_us)
+        keep = count_before(events, end_us)
         if keep < events.size:
             self._held = np.concatenate([self._held, events[keep:]])
         if keep:

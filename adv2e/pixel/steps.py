@@ -121,7 +121,9 @@ class Stepping:
     Parameters
     ----------
     circuit : Circuit
-    pixels, columns : int
+    pixels : int
+        Those that are advanced: the first so many.
+    columns : int
     additions : Additions, optional
     drift_per_s : float
         Of the thresholds.
@@ -221,7 +223,7 @@ class Stepping:
         if course is None:
             return _NONE
         values = np.asarray(course(self._seconds(times)), np.float64)
-        return np.ascontiguousarray(values.reshape(times.size, -1))
+        return np.ascontiguousarray(values.reshape(times.size, -1)[:, : self._pixels])
 
     def _factors(self, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the factors on a threshold, drift and course together."""

@@ -177,6 +177,24 @@ def test_three_workers_of_which_one_is_killed(adv2e, local, machines, place):
     assert again.out == "8 sequences: 0 made (0 events), 8 kept, 0 failed\n"
 
 
+def test_one_sequence_in_parts_while_a_worker_is_killed(adv2e, local, machines, place):
+    clip(Path("source/a.avi"), size=(40, 240))
+    Path("told/wait").touch()
+    first, _ = machines.workers(2)
+
+    def kill():
+        until(lambda: len(told()) == 2)
+        first.kill()
+        Path("told/wait").unlink()
+
+    thread = beside(kill)
+    done = adv2e("batch", *GIVEN, "--scheduler", machines.file, "--split", 3)
+    thread.join()
+    assert done.status == 0, done.err
+    assert made_in(Path("dest")) == local()
+    until(lambda: not strays())
+
+
 def test_a_sequence_that_crashes_is_named_and_the_worker_goes_on(
     adv2e, machines, place, monkeypatch
 ):
