@@ -6,27 +6,22 @@ import hashlib
 import shutil
 from collections import deque
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from adv2e.batch.work import Job
 
-_FOLDER = ".adv2e-parts"
-
 
 def parts_folder(dest: Path, name: str) -> Path:
     """Return the folder of the parts of a sequence."""
-    return dest / _FOLDER / hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:16]
+    # one each, so that nobody removes a folder in which another is about to make one
+    digest = hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()
+    return dest / f".adv2e-parts-{digest[:16]}"
 
 
 def remove_parts(dest: Path, name: str) -> None:
-    """Remove the parts of a sequence, and their folder when nothing is in it any more."""
-    folder = parts_folder(dest, name)
-    if not folder.parent.is_symlink():
-        shutil.rmtree(folder, ignore_errors=True)
-        with suppress(OSError):
-            folder.parent.rmdir()
+    """Remove the parts of a sequence."""
+    shutil.rmtree(parts_folder(dest, name), ignore_errors=True)
 
 
 class Jobs(Iterator[Job | None]):
@@ -67,7 +62,10 @@ class Jobs(Iterator[Job | None]):
             return self._ready.popleft()
         while self._waiting:
             job = self._waiting.popleft()
-            if job.share is None or job.name in self._merging:
+            if job.share is None:
+                return job
+            if job.name in self._merging:
+                Path(job.output).parent.mkdir(exist_ok=True)
                 return job
         if self._merging:
             return None

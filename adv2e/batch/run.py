@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.batch import processes
-from adv2e.batch.divided import Jobs, remove_parts
+from adv2e.batch.divided import Jobs, parts_folder, remove_parts
 from adv2e.batch.exports import Export, write_lists
 from adv2e.batch.forecast import Forecast, forecast
 from adv2e.batch.manifest import Manifest, check_alone, manifest_path, read_records
@@ -281,6 +282,9 @@ class Batch:
                 if "error" not in found:
                     remove_parts(self._dest, job.name)
                 ended(waiting[job.name], record)
+            for name in failed:
+                with suppress(OSError):  # what is in it is for the next call
+                    parts_folder(self._dest, name).rmdir()
             if self._wanted.export is not None and self._wanted.export.kind == "e2vid":
                 write_lists(self._dest, read_records(self._dest).values())
         return Outcome(tasks, failed, events)

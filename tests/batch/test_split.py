@@ -186,20 +186,21 @@ def test_links_lead_no_part_out_of_the_folder(batch, tmp_path):
     root, dest, other = (tmp_path / name for name in ("from", "to", "other"))
     clip(root / "a.avi")
     folder = parts_folder(dest, "a")
-    (other / folder.name).mkdir(parents=True)
-    (other / folder.name / "kept").touch()
+    other.mkdir()
+    (other / "kept").touch()
     dest.mkdir()
-    folder.parent.symlink_to(other)
+    folder.symlink_to(other)
     done = batch(root, dest, "--split", 2)
     assert done.status == 1
     assert f"{folder.name}: a link leads out of" in done.err
-    folder.parent.unlink()
-    folder.mkdir(parents=True)
+    assert batch(root, dest).status == 1
+    folder.unlink()
+    folder.mkdir()
     (folder / "1-of-2.part").symlink_to(other / "part")
     (other / "part").write_bytes(b"mine")
     assert batch(root, dest, "--split", 2).status == 0
     assert (other / "part").read_bytes() == b"mine"
-    assert (other / folder.name / "kept").exists()
+    assert (other / "kept").exists()
 
 
 def test_urls_cannot_be_divided(batch, tmp_path):
@@ -233,6 +234,9 @@ def test_parts_are_merged_as_soon_as_all_are_made(tmp_path):
     jobs.part_made(flying[2])
     assert next(jobs).name == "c"
     assert next(jobs, "no more") == "no more"
+    assert {path.name for path in tmp_path.iterdir()} == {
+        parts_folder(tmp_path, name).name for name in "ab"
+    }
     jobs = Jobs([job("a")], tmp_path, 1)
     assert (next(jobs).parts, next(jobs, None)) == ((), None)
 
