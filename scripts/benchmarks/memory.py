@@ -9,7 +9,8 @@ Makes its own clips, a scene in motion and a burst of about 100 million events a
     python scripts/benchmarks/memory.py --long 600
 
 ``--long SECONDS`` converts that many seconds of 1280x720 at 30 frames a second instead, mostly
-still, and compares the last tenth with the first (Linux only).  Writes Markdown to standard output
+still, and compares the last tenth with the first (Linux only).  ``--lengths`` converts clips of the
+same kind, of 12, 120 and 1,200 frames, of four sizes.  Writes Markdown to standard output
 and with ``-o FILE.md`` also to that file, with the raw numbers in ``FILE.json``.
 """
 
@@ -22,8 +23,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -88,6 +87,11 @@ SIZES = (
     Size(1280, 720, 500.0, 30.0, 1.2, 8),
     Size(3840, 2160, 1536.0, 30.0, 0.32, 12),
 )
+
+LENGTHS = (12, 120, 1200)
+"""Frames of clips that differ in nothing else."""
+
+LENGTH_SIZES = ((240, 180), (346, 260), (1280, 720), (3840, 2160))
 
 LONG_SIZE = SIZES[1]
 LONG_FPS = 30.0
@@ -165,18 +169,44 @@ def cases(sizes: Sequence[str], formats: Sequence[str]) -> Iterator[Case]:
     "--long", "long_s", type=click.FloatRange(min=10), metavar="SECONDS",
     help="One long clip instead, to the first format named.",
 )  # fmt: skip
+@click.option("--lengths", is_flag=True, help="Clips of three lengths instead, to HDF5.")
 @output_option
 def main(
     plan: Plan, log: Log, sizes: tuple[str, ...], formats: tuple[str, ...], long_s: float | None,
-    output: Path | None,
+    lengths: bool, output: Path | None,
 ) -> None:  # fmt: skip
     """Measure the memory of conversions."""
     with tempfile.TemporaryDirectory(prefix="adv2e-memory-") as scratch:
-        if long_s is None:
+        if lengths:
+            text, raw = measure_lengths(plan, Path(scratch), log)
+        elif long_s is None:
             text, raw = measure(plan, list(cases(sizes, formats)), Path(scratch), log)
         else:
             text, raw = measure_long(plan, long_s, (formats or FORMATS)[0], Path(scratch))
     write_report(text, output, raw)
+
+
+def measure_lengths(plan: Plan, scratch: Path, log: Log) -> tuple[str, list[dict[str, Any]]]:
+    """Convert clips that differ in length alone; return the report and the raw numbers."""
+    jobs = []
+    for width, height in LENGTH_SIZES:
+        for frames in LENGTHS:
+            name = f"{width}x{height}-{frames}"
+            clip = long_clip(scratch / name, width, height, frames)
+            arguments = [
+                *converting(clip, LONG_FPS, scratch / f"{name}.h5", plan),
+                "--overwrite", "--no-progress", "--set", "sampling.L=1",
+            ]  # fmt: skip
+            jobs.append(Job(name=name, options={"arguments": arguments}, action=ACTION))
+    found = run_rounds(jobs, plan.rounds, log, warm=jobs[:1])
+    peaks = {one.job.name: one.last["peak_mib"] for one in found}
+    rows = [
+        [f"{width}x{height}", *(f"{peaks[f'{width}x{height}-{n}']:.0f}" for n in LENGTHS)]
+        for width, height in LENGTH_SIZES
+    ]
+    head = ("most memory [MiB]", *(f"{frames:,} frames" for frames in LENGTHS))
+    text = "\n\n".join([f"# Memory by length\n\n{about(found)}", table(head, rows)])
+    return text, [one.as_dict() for one in found]
 
 
 def measure(
@@ -213,7 +243,7 @@ def measure_long(
 ) -> tuple[str, dict[str, Any]]:
     """Convert a long clip; return the report and the raw numbers."""
     frames = round(seconds * LONG_FPS)
-    clip = long_clip(scratch / "long", frames)
+    clip = long_clip(scratch / "long", LONG_SIZE.width, LONG_SIZE.height, frames)
     arguments = converting(clip, LONG_FPS, scratch / f"long.{format_}", plan)
     command = [sys.executable, "-m", "adv2e", *arguments, "--progress", "--set", "sampling.L=1"]
     # the compiler's memory is no part of a conversion's
@@ -228,12 +258,12 @@ def measure_long(
     return text, {"frames": frames, "moments": [asdict(moment) for moment in moments]}
 
 
-def long_clip(folder: Path, frames: int) -> Path:
+def long_clip(folder: Path, width: int, height: int, frames: int) -> Path:
     """Make a folder of so many images, which are links to a few, to and fro; return it."""
     folder.mkdir()
     recipe = Clip(
-        width=LONG_SIZE.width,
-        height=LONG_SIZE.height,
+        width=width,
+        height=height,
         frames=min(LONG_CYCLE, frames),
         fps=LONG_FPS,
         moving=LONG_MOVING,

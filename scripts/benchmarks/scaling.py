@@ -20,8 +20,6 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 import click
 from writing import load_pyplot, output_option, save_figure, table, write_report
 
