@@ -66,15 +66,15 @@ class Ways:
         return [one for one in (self.pixel, self.batch, self.loop, self.peer) if one is not None]
 
 
-def make_clips(folder: Path, count: int) -> Path:
+def make_clips(folder: Path, count: int, moving: float) -> Path:
     """Return a folder of so many videos, none like the other; make it if need be."""
-    made = folder / f"batch-{count}"
+    made = folder / f"batch-{count}-{moving:g}"
     made.mkdir(parents=True, exist_ok=True)
     for seed in range(count):
         target = made / f"{seed:03}.mp4"
         if target.exists():
             continue
-        clip = Clip(width=346, height=260, frames=FRAMES, fps=FPS, seed=seed)
+        clip = Clip(width=346, height=260, frames=FRAMES, fps=FPS, seed=seed, moving=moving)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             video = encoded(as_srgb(stored(clip, Path(scratch))), FPS)
             shutil.move(video, target)
@@ -143,17 +143,22 @@ def report(found: Sequence[Measured], count: int) -> str:
 
 
 @click.command(help=__doc__, context_settings={"max_content_width": 100})
+@click.option(
+    "--moving", type=click.FloatRange(0, 1), default=1.0, show_default=True,
+    help="Share of the rows of each clip in which anything moves.",
+)  # fmt: skip
 @output_option
 @of_a_plan(rounds=3, quick_rounds=2)
-def main(plan: Plan, log: Log, output: Path | None) -> None:
+def main(plan: Plan, log: Log, moving: float, output: Path | None) -> None:
     """Measure, and report."""
     count = QUICK_CLIPS if plan.quick else CLIPS
-    clips = make_clips(plan.folder, count)
+    clips = make_clips(plan.folder, count, moving)
     with tempfile.TemporaryDirectory(prefix="adv2e-batches-") as folder:
         made = ways(clips, Path(folder), plan.threads or default_threads())
         warm = [made.pixel]
         found = run_rounds(made.jobs(), plan.rounds, log, warm=warm)
-    text = f"{report(found, count)}\n\n{about(found)}"
+    part = f"Something moves in {100 * moving:g} % of the rows."
+    text = f"{report(found, count)}\n\n{part} {about(found)}"
     write_report(text, output, {"measured": [one.as_dict() for one in found]})
 
 
