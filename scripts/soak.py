@@ -2,7 +2,7 @@
 """Convert for an hour over random clips, configurations and formats, and end it at random moments.
 
 Each trial makes a few clips, converts them undisturbed, and converts them again while a signal, a
-killed worker or a full disk ends the work, up to three times.  Then the work is called once more,
+killed process or a full disk ends the work, up to three times.  Then the work is called once more,
 and every byte is compared::
 
     python scripts/soak.py --minutes 60
@@ -225,7 +225,7 @@ class Trial:
 
     def _disturb(self, dest: Path, took_s: float) -> None:
         kinds = ["SIGKILL", "SIGINT", "SIGTERM", "full disk"]
-        kind = self._draw.choice([*kinds, "worker killed"] if self._is_batch else kinds)
+        kind = self._draw.choice([*kinds, "a process killed"] if self._is_batch else kinds)
         begin: Callable[[], None] = as_in_front
         if kind == "full disk":
             begin = partial(small_disk, int(10 ** self._draw.uniform(2, 6)))
@@ -243,7 +243,7 @@ class Trial:
         self._record.counts[f"ended by {kind}"] += 1
         if kind != "full disk":
             time.sleep(self._draw.uniform(0, 1.1 * took_s))
-            if kind == "worker killed":
+            if kind == "a process killed":
                 workers = children_of(process.pid)
                 if workers:
                     kill(self._draw.choice(workers), signal.SIGKILL)
@@ -270,7 +270,7 @@ class Trial:
             "SIGINT": {130, 0, -2},  # as soon as Python itself begins, it is its own
             "SIGTERM": {143, 0, -15},
             "full disk": {0, 1},
-            "worker killed": {0, 1},
+            "a process killed": {0, 1},
         }
         if status not in allowed[kind]:
             self.lose(f"exit status {status} after {kind}: {told[-300:]}")
