@@ -63,6 +63,42 @@ def test_a_full_disk_and_then_room_again(batch, source, undisturbed, tmp_path, m
     assert made_in(dest) == undisturbed
 
 
+def mount(*words):
+    try:
+        done = subprocess.run(["mount", *words], capture_output=True, text=True, check=False)
+    except OSError as error:
+        pytest.skip(str(error))
+    if done.returncode:
+        pytest.skip(done.stderr)
+
+
+@pytest.fixture
+def disk(tmp_path):
+    """A disk of 300 kB, where one may be had."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mount("-t", "tmpfs", "-o", "size=300k", "tmpfs", str(place))
+    yield place
+    subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def test_a_disk_that_is_really_full(batch, source, undisturbed, disk):
+    done = batch(source, disk / "to")
+    assert done.status == 1
+    assert "No space left on device" in done.err
+    assert set(made_in(disk / "to").items()) < set(undisturbed.items())
+    assert not [*disk.rglob(".adv2e*")]
+    mount("-o", "remount,size=100m", str(disk))
+    done = batch(source, disk / "to")
+    assert done.status == 0, done.err
+    assert made_in(disk / "to") == undisturbed
+    mount("-o", "remount,ro", str(disk))
+    done = batch(source, disk / "to", "--overwrite")
+    assert done.status == 1
+    assert "Read-only file system" in done.err
+    assert done.err.count("\n") == 1
+
+
 def test_a_source_that_vanishes_meanwhile_fails_alone(
     batch, source, undisturbed, tmp_path, monkeypatch
 ):
