@@ -33,22 +33,34 @@ from benchmarks.clips import Clip, as_srgb, encoded, stored
 from benchmarks.machine import about
 from benchmarks.options import of_a_plan
 from benchmarks.processes import Job, Log, Measured, number, run_rounds
-from benchmarks.settings import ALL, CUTOFF_HZ, THRESHOLD, Plan
+from benchmarks.settings import ALL, CUTOFF_HZ, IDEAL, THRESHOLD, Plan
 
 CLIPS, QUICK_CLIPS = 200, 20
 FRAMES, FPS = 31, 30.0
-SETS = (f"pixel.thresholds={{on: {THRESHOLD:g}, off: {THRESHOLD:g}}}", *ALL)
+LEVELS = f"pixel.thresholds={{on: {THRESHOLD:g}, off: {THRESHOLD:g}}}"
+SETS = {
+    "all effects": (LEVELS, *ALL),
+    "noise off": (LEVELS, *(one for one in IDEAL if one.startswith("pixel.") and "=null" in one)),
+}
+_PEER = {"pos_thres": THRESHOLD, "neg_thres": THRESHOLD, "cutoff_hz": CUTOFF_HZ, "upsample": "10"}
 PEER = {
-    "pos_thres": THRESHOLD, "neg_thres": THRESHOLD, "cutoff_hz": CUTOFF_HZ, "sigma_thres": 0.03,
-    "leak_rate_hz": 0.1, "shot_noise_rate_hz": 5.0, "refractory_us": 500, "upsample": "10",
+    "all effects": {
+        **_PEER, "sigma_thres": 0.03, "leak_rate_hz": 0.1, "shot_noise_rate_hz": 5.0,
+        "refractory_us": 500,
+    },
+    "noise off": {
+        **_PEER, "sigma_thres": 0.0, "leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0,
+        "refractory_us": 0,
+    },
 }  # fmt: skip
 
 _EVENTCV_FILE = "benchmarks.tools.eventcv_file"
 
 ABOUT = (
-    f"Clips of 346x260, {FRAMES} frames at {FPS:g} a second, as MP4 (mp4v). All effects, thresholds"
-    " 0.2, shot noise 5 Hz, in both tools. Whole processes, from start to end, compiled beforehand;"
-    " of the pixel, the time after warming up. Median (least..most); ratios are paired by round."
+    f"Clips of 346x260, {FRAMES} frames at {FPS:g} a second, as MP4 (mp4v). Thresholds 0.2 and the"
+    " same effects in both tools; all effects: with shot noise of 5 Hz. Whole processes, from start"
+    " to end, compiled beforehand; of the pixel, the time after warming up. Median (least..most);"
+    " ratios are paired by round."
 )
 
 
@@ -81,10 +93,10 @@ def make_clips(folder: Path, count: int, moving: float) -> Path:
     return made
 
 
-def ways(clips: Path, scratch: Path, threads: int) -> Ways:
-    """Return the jobs."""
+def ways(clips: Path, scratch: Path, threads: int, pixel: str) -> Ways:
+    """Return the jobs; `pixel`: which of SETS."""
     program = [sys.executable, "-m", "adv2e"]
-    sets = [word for one in SETS for word in ("--set", one)]
+    sets = [word for one in SETS[pixel] for word in ("--set", one)]
     paths = sorted(str(path) for path in clips.glob("*.mp4"))
 
     def job(name: str, folder: str, script: str) -> Job:
@@ -103,7 +115,7 @@ def ways(clips: Path, scratch: Path, threads: int) -> Ways:
         Job(
             name="the pixel alone",
             action="benchmarks.batching:pixel",
-            options={"clips": paths, "sets": list(SETS), "threads": threads},
+            options={"clips": paths, "sets": list(SETS[pixel]), "threads": threads},
             threads=threads,
         ),
         job("`adv2e batch`", "batch", shlex.join(whole)),
@@ -115,9 +127,7 @@ def ways(clips: Path, scratch: Path, threads: int) -> Ways:
         job(
             "shell loop of EventCV, 10 sub-steps",
             "peer",
-            loop(
-                [sys.executable, "-m", "benchmarks.tools.eventcv_file"], "peer", [json.dumps(PEER)]
-            ),
+            loop([sys.executable, "-m", _EVENTCV_FILE], "peer", [json.dumps(PEER[pixel])]),
         )
         if found
         else None,
@@ -147,17 +157,21 @@ def report(found: Sequence[Measured], count: int) -> str:
     "--moving", type=click.FloatRange(0, 1), default=1.0, show_default=True,
     help="Share of the rows of each clip in which anything moves.",
 )  # fmt: skip
+@click.option(
+    "--pixel", type=click.Choice([*SETS]), default=next(iter(SETS)), show_default=True,
+    help="What the pixels have.",
+)  # fmt: skip
 @output_option
 @of_a_plan(rounds=3, quick_rounds=2)
-def main(plan: Plan, log: Log, moving: float, output: Path | None) -> None:
+def main(plan: Plan, log: Log, moving: float, pixel: str, output: Path | None) -> None:
     """Measure, and report."""
     count = QUICK_CLIPS if plan.quick else CLIPS
     clips = make_clips(plan.folder, count, moving)
     with tempfile.TemporaryDirectory(prefix="adv2e-batches-") as folder:
-        made = ways(clips, Path(folder), plan.threads or default_threads())
+        made = ways(clips, Path(folder), plan.threads or default_threads(), pixel)
         warm = [made.pixel]
         found = run_rounds(made.jobs(), plan.rounds, log, warm=warm)
-    part = f"Something moves in {100 * moving:g} % of the rows."
+    part = f"{pixel.capitalize()}; something moves in {100 * moving:g} % of the rows."
     text = f"{report(found, count)}\n\n{part} {about(found)}"
     write_report(text, output, {"measured": [one.as_dict() for one in found]})
 
