@@ -29,6 +29,7 @@ from typing import Any
 from adv2e.batch.work import Job, do
 from adv2e.files.workspace import remove_abandoned
 from adv2e.process import cleanup
+from adv2e.process.signals import Terminated, stop_on_signals
 
 _LOST_S = 1.0
 _END_S = 10.0
@@ -131,7 +132,7 @@ class _Worker:
                 context = multiprocessing.get_context("spawn")
                 self._pool = ProcessPoolExecutor(1, context, _begin, (os.getpid(),))
                 self._process = self._pool.submit(os.getpid).result()
-            future = self._pool.submit(do, job)
+            future = self._pool.submit(_do, job)
             while not wait([future], timeout=_LOST_S).done:
                 if not is_wanted():
                     self.kill(signal.SIGTERM)
@@ -165,10 +166,22 @@ class _Worker:
         return not ended
 
 
+def _do(job: Job) -> dict[str, Any]:
+    """Return what :func:`do` does, unless a signal came: then end this process.
+
+    A signal that comes while files come into place arrives as an exception, see
+    :mod:`adv2e.process.signals`.  The pool would take it for a result, and the process would stay.
+    """
+    try:
+        return do(job)
+    except KeyboardInterrupt:
+        os._exit(128 + signal.SIGINT)
+    except Terminated as ending:
+        os._exit(ending.exit_status)
+
+
 def _begin(parent: int) -> None:
     """Make a process of conversions ready: signals end it, and so does the end of its parent."""
-    from adv2e.process.signals import stop_on_signals  # noqa: PLC0415
-
     stop_on_signals()
 
     def watch() -> None:

@@ -23,6 +23,7 @@ import os, signal
 from dataclasses import dataclass
 from adv2e.effects.hooks import Hooks
 from adv2e.parameters import Section, parameter
+from adv2e.process.signals import Terminated
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Section):
@@ -34,8 +35,11 @@ class Ending(Hooks):
     stage = "frames"
     Parameters = Parameters
     def light(self, frames):
-        if self.parameters.signal:
-            os.kill(os.getpid(), self.parameters.signal)
+        number = self.parameters.signal
+        if number < 0:  # as a signal comes while files come into place
+            raise KeyboardInterrupt if number == -signal.SIGINT else Terminated(-number)
+        if number:
+            os.kill(os.getpid(), number)
         yield from frames
 """
 
@@ -49,7 +53,10 @@ def job(tmp_path, name, *sets, effects=()):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
-@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGKILL, signal.SIGABRT])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGSEGV, signal.SIGKILL, signal.SIGABRT, -signal.SIGTERM, -signal.SIGINT],
+)
 def test_a_process_that_dies_fails_its_sequence_alone(tmp_path, number):
     effect = tmp_path / "ending.py"
     effect.write_text(ENDING)

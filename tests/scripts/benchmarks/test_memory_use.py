@@ -76,7 +76,7 @@ def test_the_long_clip_goes_to_and_fro(monkeypatch, tmp_path):
     small = memory.Size(32, 24, 1.0, 30.0, 1.0, 4)
     monkeypatch.setattr(memory, "LONG_SIZE", small)
     monkeypatch.setattr(memory, "LONG_CYCLE", 4)
-    folder = memory.long_clip(tmp_path / "long", 9)
+    folder = memory.long_clip(tmp_path / "long", 32, 24, 9)
     files = sorted(folder.iterdir())
     content = [file.read_bytes() for file in files]
     assert len(files) == 9
