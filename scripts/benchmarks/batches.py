@@ -20,7 +20,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -169,7 +169,8 @@ def main(plan: Plan, log: Log, moving: float, pixel: str, output: Path | None) -
     clips = make_clips(plan.folder, count, moving)
     with tempfile.TemporaryDirectory(prefix="adv2e-batches-") as folder:
         made = ways(clips, Path(folder), plan.threads or default_threads(), pixel)
-        warm = [made.pixel]
+        first = {**made.pixel.options, "clips": made.pixel.options["clips"][:1]}
+        warm = [replace(made.pixel, options=first)]
         found = run_rounds(made.jobs(), plan.rounds, log, warm=warm)
     part = f"{pixel.capitalize()}; something moves in {100 * moving:g} % of the rows."
     text = f"{report(found, count)}\n\n{part} {about(found)}"
