@@ -13,7 +13,7 @@ from pathlib import Path
 
 from adv2e.batch.plan import Task
 from adv2e.batch.work import Job, config_of
-from adv2e.conversion.estimate import amount_text, estimate
+from adv2e.conversion.estimate import amount_text, estimate, room_text
 from adv2e.errors import Adv2eError
 from adv2e.files.states import free_bytes
 
@@ -52,9 +52,7 @@ class Forecast:
         text = f"{told}, by short parts of {self.looked_at} of {self.sequences} sequences"
         if self.apart > _FAR_APART:
             text += f"; from a byte of source, some make {self.apart:.0f} times as many as others"
-        if self.bytes > self.room:
-            text += f"; there is room for {self.room / 1e9:.1f} GB"
-        return text
+        return text + room_text(self.bytes, self.room)
 
 
 def forecast(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -30,8 +29,8 @@ class Task:
     seed : int
     why : str
         Why something is made; empty: all is kept.
-    only_export : bool
-        Its file of events is kept, and exported.
+    record : mapping, optional
+        What the manifest says of its file of events, which is kept and only exported.
     """
 
     sequence: Found
@@ -39,7 +38,12 @@ class Task:
     output: Path
     seed: int
     why: str
-    only_export: bool = False
+    record: Mapping[str, Any] | None = None
+
+    @property
+    def only_export(self) -> bool:
+        """Whether its file of events is kept, and exported."""
+        return self.record is not None
 
 
 @dataclass(frozen=True)
@@ -74,12 +78,6 @@ class Wanted:
         if self.export is None:
             return None
         return self.dest / f"{sequence.name}.{self.export.kind}"
-
-
-def settings_digest(*parts: Any) -> str:
-    """Return the SHA-256 of what can be written as JSON."""
-    text = json.dumps(parts, sort_keys=True, ensure_ascii=True, allow_nan=False)
-    return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
 def seed_of(seed: int, name: str) -> int:
@@ -128,10 +126,11 @@ def plan(
             if overwrite
             else _why(record, state, sequence, output, wanted, digest)
         )
-        only_export = not why
-        if record is not None and only_export:
+        kept = None
+        if record is not None and not why:
             why = _why_export(record, sequence, wanted, digest)
-        tasks.append(Task(sequence, state, output, seed, why, only_export and bool(why)))
+            kept = record if why else None
+        tasks.append(Task(sequence, state, output, seed, why, kept))
     return tasks
 
 

@@ -24,7 +24,6 @@ from adv2e.batch.plan import (
     outputs_outside,
     plan,
     seed_of,
-    settings_digest,
     shard_of,
 )
 from adv2e.batch.sequences import Sequence as Found
@@ -36,7 +35,7 @@ from adv2e.config.effect_files import load_effects
 from adv2e.effects.composition import check_divisible
 from adv2e.errors import Adv2eError, OutputError
 from adv2e.files.names import shown
-from adv2e.files.states import digest_of, state_of
+from adv2e.files.states import digest_of, digest_of_values, state_of
 from adv2e.light.interpolation import network_of
 
 
@@ -78,7 +77,7 @@ class Settings:
         made = self.family.written()
         del made["seed"]  # each sequence has its own
         del made["max_events"]  # what was made is within it
-        digest = settings_digest(
+        digest = digest_of_values(
             made,
             dict(self.options),
             [dict(one) for one in user_sources(config)],
@@ -265,7 +264,6 @@ class Batch:
                     manifest.add({"name": task.sequence.name, "status": "started"})
             work = (_job(task, self._settings, self._wanted, each) for task in waiting.values())
             queue = Jobs(work, self._dest, self._split)
-            before = read_records(self._dest)
             for job, found in (engine or processes.run)(queue, count):
                 wrong = error_of(found)
                 if job.share is not None and not wrong:
@@ -274,7 +272,7 @@ class Batch:
                     continue
                 if wrong and not queue.give_up(job):
                     continue
-                record = _record(waiting[job.name], self._wanted, job, found, before)
+                record = _record(waiting[job.name], self._wanted, job, found)
                 manifest.add(record)
                 events += found.get("events", 0)
                 if wrong:
@@ -337,9 +335,8 @@ def _record(
     wanted: Wanted,
     job: Job,
     found: Mapping[str, Any],
-    before: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, Any]:
-    kept = before[job.name] if task.only_export else {}
+    kept = task.record or {}
     return {
         **{key: value for key, value in kept.items() if not key.startswith("export")},
         "name": task.sequence.name,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -17,7 +15,7 @@ from adv2e.config import Config, from_dict
 from adv2e.config.active_effects import user_sources
 from adv2e.config.effect_files import load_effects
 from adv2e.errors import Adv2eError
-from adv2e.files.states import State, digest_of
+from adv2e.files.states import State, digest_of, digest_of_values
 from adv2e.formats.lookup import to_write
 from adv2e.light.interpolation import network_of
 from adv2e.process.machine import machine_complaint
@@ -25,12 +23,6 @@ from adv2e.process.machine import machine_complaint
 if TYPE_CHECKING:
     from adv2e.conversion.pipeline import Summary
     from adv2e.conversion.reading import Reading
-
-_READING = (
-    *("fps", "timestamps", "time_unit", "start_s", "stop_s", "t0", "allow_damaged", "bayer"),
-    "rotate180",
-)
-"""Options that say how a source is read."""
 
 
 @dataclass(frozen=True)
@@ -137,9 +129,9 @@ def _make_part(job: Job) -> dict[str, Any]:
 
 
 def _reading(job: Job) -> Reading:
-    from adv2e.conversion.reading import Reading  # noqa: PLC0415
+    from adv2e.conversion.reading import READING, Reading  # noqa: PLC0415
 
-    given = {name: value for name, value in job.options.items() if name in _READING}
+    given = {name: value for name, value in job.options.items() if name in READING}
     return Reading(job.source, threads=job.threads, **given)
 
 
@@ -150,11 +142,10 @@ def _key(job: Job, config: Config, source: str, share: tuple[int, int]) -> str:
     options = {
         key: value for key, value in job.options.items() if key not in ("format", "with_frames")
     }
-    made_of = [
+    return digest_of_values(
         *(__version__, source, settings, options, share),
         *([dict(one) for one in user_sources(config)], network and network.source),
-    ]
-    return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode("ascii")).hexdigest()
+    )
 
 
 def _convert(job: Job) -> dict[str, Any]:
@@ -192,6 +183,7 @@ def _merged(job: Job, config: Config, source: str) -> tuple[Summary, float]:
     """Write what comes of all parts; return how long these took, too."""
     from adv2e.conversion.parts import merged, read_part  # noqa: PLC0415
     from adv2e.conversion.pipeline import convert_reading  # noqa: PLC0415
+    from adv2e.conversion.reading import READING  # noqa: PLC0415
 
     causes, count = bool(job.options.get("causes")), len(job.parts)
     notes: list[str] = []
@@ -200,7 +192,7 @@ def _merged(job: Job, config: Config, source: str) -> tuple[Summary, float]:
         read_part(Path(path), _key(job, config, source, (k + 1, count)), causes, told[k])
         for k, path in enumerate(job.parts)
     ]
-    given = {key: value for key, value in job.options.items() if key not in _READING}
+    given = {key: value for key, value in job.options.items() if key not in READING}
     with _reading(job) as reading:
         made = convert_reading(
             *(reading, job.output),

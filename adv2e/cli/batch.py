@@ -278,17 +278,17 @@ class _Told:
 
     def begun(self, tasks: list[Task]) -> None:
         from adv2e.batch.run import reasons
-        from adv2e.conversion.estimate import MUCH
+        from adv2e.conversion.estimate import is_much
 
         self._log(reasons(tasks))
-        if sum(task.state.bytes for task in tasks if task.why) > _LARGE_SOURCE:
+        total = sum(task.state.bytes for task in tasks if task.why)
+        if total > _LARGE_SOURCE:
             coming = self._forecast(tasks)
-            if coming is not None and coming.bytes > min(MUCH, coming.room):
+            if coming is not None and is_much(coming.bytes, coming.room):
                 self._log(coming.text())
         if self._progress:
             from tqdm import tqdm
 
-            total = sum(task.state.bytes for task in tasks if task.why)
             self._bar = self._stack.enter_context(
                 tqdm(total=total, unit="B", unit_scale=True, desc="batch", leave=False)
             )

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from adv2e.config import Written, load_config
-from adv2e.conversion.convert import convert
+from adv2e.conversion.reading import READING
 from adv2e.effects.pixel.initial_reference import RANDOM
 from adv2e.errors import UsageError
 from adv2e.files.states import free_bytes, state_of
@@ -38,11 +38,6 @@ _FEWEST, _MOST = 4, 128
 
 _OF_VIDEO = 240
 """Frames of a video are decoded in order: parts lie within so many at its beginning."""
-
-_READING = (
-    *("fps", "timestamps", "time_unit", "start_s", "stop_s", "t0", "allow_damaged", "bayer"),
-    "rotate180",
-)
 
 
 class _Part(NamedTuple):
@@ -81,11 +76,20 @@ def may_be_much(source: Source) -> bool:
 def text_of_much(found: Estimate | None, target: Path) -> str:
     """Return what is to be told before very much is written to a file; mostly nothing."""
     room = free_bytes(target.absolute().parent)
-    if found is None or found.bytes < min(MUCH, room):
+    if found is None or not is_much(found.bytes, room):
         return ""
     text = amount_text(found.events, found.bytes, found.seconds)
-    text += f", by {found.seen} of {found.frames} frames"
-    return f"{text}; there is room for {room / 1e9:.1f} GB" if found.bytes > room else text
+    return f"{text}, by {found.seen} of {found.frames} frames{room_text(found.bytes, room)}"
+
+
+def is_much(size: float, room: int) -> bool:
+    """Tell whether so many bytes are to be told before they are written where `room` is free."""
+    return size >= min(MUCH, room)
+
+
+def room_text(size: float, room: int) -> str:
+    """Return what is to be told where so many bytes have no room; else nothing."""
+    return f"; there is room for {room / 1e9:.1f} GB" if size > room else ""
 
 
 def amount_text(events: float, size: float, seconds: float) -> str:
@@ -122,10 +126,12 @@ def estimate(
     Adv2eError
         As :func:`adv2e.convert`.
     """
+    from adv2e.conversion.convert import convert  # noqa: PLC0415 - most conversions ask nothing
+
     if options.get("pixel_format") is not None or options.get("motion") is not None:
         raise UsageError("estimates are of files and folders of frames")
     config = load_config([load_config(config), {"pixel": {"initial_reference": RANDOM}}])
-    reading = {name: options[name] for name in _READING if options.get(name) is not None}
+    reading = {name: options[name] for name in READING if options.get(name) is not None}
     if options.get("crop") is not None:
         reading["crop"] = parse_rectangle(options["crop"])
     opened = open_frames(source, **reading)

@@ -36,6 +36,12 @@ if TYPE_CHECKING:
 AHEAD_BYTES, AHEAD_FRAMES = 16 << 20, 256
 """Memory for frames that were decoded and not taken yet, light and what is seen of them."""
 
+READING = (
+    *("fps", "timestamps", "time_unit", "start_s", "stop_s", "t0", "allow_damaged", "bayer"),
+    "rotate180",
+)
+"""Arguments of a conversion that a :class:`Reading` takes as they are."""
+
 EARLY_BYTES = 32 << 20
 """Memory for frames that were read before it was known what they are to become."""
 

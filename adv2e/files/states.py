@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 _BLOCK = 1 << 20
 
@@ -57,6 +59,12 @@ def digest_of(path: Path) -> str:
         # the digests are of one length, so that no name can pass for a content
         total.update(own.digest() + os.fsencode(name) + b"\0")
     return total.hexdigest()
+
+
+def digest_of_values(*values: Any) -> str:
+    """Return the SHA-256 of what can be written as JSON."""
+    text = json.dumps(values, sort_keys=True, ensure_ascii=True, allow_nan=False)
+    return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
 def free_bytes(folder: Path) -> int:

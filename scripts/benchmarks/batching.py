@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
-from benchmarks.measuring import children_cpu_s, measured
+from benchmarks.conversion import run_command
+from benchmarks.measuring import measured
 
 
 def pixel(spec: dict[str, Any]) -> dict[str, Any]:
@@ -35,22 +35,9 @@ def pixel(spec: dict[str, Any]) -> dict[str, Any]:
 
 
 def shell(spec: dict[str, Any]) -> dict[str, Any]:
-    """Time a shell script, and tell how many bytes it wrote to the folder `target`.
-
-    Raises
-    ------
-    RuntimeError
-        It failed.
-    """
+    """Run a shell script that writes to the folder `target`, empty before; as `run_command`."""
     target = Path(spec["options"]["target"])
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir()
     command = ["sh", "-e", "-c", spec["options"]["script"]]
-    before = children_cpu_s()
-    done, cost = measured(
-        lambda: subprocess.run(command, capture_output=True, text=True, check=False)
-    )
-    if done.returncode:
-        raise RuntimeError((done.stderr.strip().splitlines() or ["it failed without a word"])[-1])
-    size = sum(path.stat().st_size for path in target.rglob("*.h5"))
-    return {"wall_s": cost.wall_s, "cpu_s": children_cpu_s() - before, "bytes": size}
+    return run_command({"options": {"command": command, "target": str(target)}})

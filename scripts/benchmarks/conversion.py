@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from adv2e.files.states import state_of
 from benchmarks.measuring import children_cpu_s, children_peak_mib, measured, peak_mib
 
 _NO_BYTECODE = "PYTHONDONTWRITEBYTECODE"
@@ -23,7 +24,7 @@ def _as_users() -> dict[str, str]:
 
 
 def run_command(spec: dict[str, Any]) -> dict[str, Any]:
-    """Run a command line; return its cost and the size of what it wrote.
+    """Run a command line; return its cost and the size of the file or folder that it wrote.
 
     Raises
     ------
@@ -43,7 +44,7 @@ def run_command(spec: dict[str, Any]) -> dict[str, Any]:
         "wall_s": cost.wall_s,
         "cpu_s": children_cpu_s() - before,
         "peak_mib": children_peak_mib(),
-        "bytes": target.stat().st_size,
+        "bytes": state_of(target).bytes,
     }
 
 

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 import trees_of_batch as trees
-from trees_of_batch import QUICK, clip, made_in
+from trees_of_batch import QUICK, clip, in_this_process, made_in
 
 from adv2e.batch import processes
 from adv2e.batch.processes import run
 from adv2e.batch.run import Batch, Settings
-from adv2e.batch.work import Job, do
+from adv2e.batch.work import Job
 from adv2e.config import load_config, to_dict
 from adv2e.config.effect_files import load_effects
 
@@ -120,7 +120,7 @@ def of_longer(longer, tmp_path_factory):
     """What one batch makes, in one go and one process."""
     dest = tmp_path_factory.mktemp("of_longer")
     settings = Settings((), tuple(QUICK[1::2]), (), None, ".h5", {"format": "h5"})
-    Batch(longer, dest, settings).run(engine=lambda jobs, _: ((job, do(job)) for job in jobs))
+    Batch(longer, dest, settings).run(engine=in_this_process)
     return made_in(dest)
 
 
