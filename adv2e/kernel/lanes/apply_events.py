@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel
+from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.causes import cause_by_leak, note_reset
 from adv2e.kernel.comparator import TIE, fire
 from adv2e.kernel.lanes import rows
@@ -128,6 +129,7 @@ def _change_leak(j, share, lanes):
 @kernel
 def fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n):
     """Write the events of the thresholds that were found."""
+    keys, times = borrowed(keys, times)
     for j in range(m):
         event = lanes[rows.EVENT + j]
         if event != 0.0:

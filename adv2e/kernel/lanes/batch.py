@@ -12,6 +12,7 @@ others one by one (:mod:`adv2e.kernel.lanes.slow_path`).  Pixels get into lanes,
 from __future__ import annotations
 
 from adv2e.compiled import kernel
+from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.apply_events import cross, fire_found, note_releases, release
 from adv2e.kernel.lanes.exchange import sort_out
@@ -42,6 +43,7 @@ def decide(
 
     Returns (lanes that look for something, events so far); at most one event a lane is written.
     """
+    keys, times = borrowed(keys, times)
     while True:
         if waiting > 0:
             release(whole(waiting), length, circuit, rule, lanes)
