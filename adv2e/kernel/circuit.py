@@ -38,7 +38,8 @@ class Circuit(NamedTuple):
     leak_jitter: float
     shot_rate: float  # candidates a us
     shot_fall: float  # share of them that is lost, a DN
-    hot_rate: float  # events of a hot pixel a us
+    hot_rate: float  # events of the median hot pixel a us
+    hot_spread: float  # standard deviation of the logarithm of that over the hot pixels
     noise_rms: float  # photoreceptor noise
     noise_step: float
     causes: bool  # whether events know their causes

@@ -10,6 +10,7 @@ import math
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, rng
 from adv2e.kernel.borrowing import borrowed
+from adv2e.kernel.noise import hot_rate_of
 
 _MOST = 3.0
 """Largest deviation of a period, in standard deviations."""
@@ -103,7 +104,7 @@ def fill_running(lo, hi, circuit, start, light, level, state):
         if rate > 0.0 and way > 0.0:
             noise = circuit.shot_rate * max(1.0 - circuit.shot_fall * light[i], 0.0)
             if circuit.hot_rate > 0.0 and state[per_pixel.HOT_TIME, i] < per_pixel.NEVER:
-                noise += circuit.hot_rate
+                noise += hot_rate_of(i, seed, circuit.hot_rate, circuit.hot_spread)
             longest = way / rate * (1.0 + jitter * _MOST)
             most = _met(dead, noise, longest)
             for draw in range(_TRIES):

@@ -22,11 +22,20 @@ def _next_candidate(i, circuit, state):
     state[per_pixel.SHOT_TIME, i] += wait / circuit.shot_rate
 
 
+@kernel
+def hot_rate_of(i, seed, rate, spread):
+    """Rate of hot pixel i, in events a us."""
+    if spread == 0.0:
+        return rate
+    return rate * math.exp(spread * rng.normal(seed, rng.HOT_RATE, i, 0))
+
+
 @inlined
 def _next_hot(i, circuit, state):
     state[per_pixel.HOT_DRAW, i] += 1
     wait = rng.exponential(circuit.seed, rng.HOT_TIME, i, state[per_pixel.HOT_DRAW, i])
-    state[per_pixel.HOT_TIME, i] += wait / circuit.hot_rate
+    rate = hot_rate_of(i, circuit.seed, circuit.hot_rate, circuit.hot_spread)
+    state[per_pixel.HOT_TIME, i] += wait / rate
 
 
 @kernel
@@ -88,12 +97,13 @@ def fill_first_candidates(lo, hi, seed, rate, start, times, draws):
 
 
 @kernel
-def fill_first_hot_times(seed, fraction, rate, start, times):
+def fill_first_hot_times(seed, fraction, rate, spread, start, times):
     """Choose the hot pixels and draw their first times [us]; the others never fire."""
     for i in range(times.shape[0]):
         times[i] = per_pixel.NEVER
         if rng.uniforms(seed, rng.HOT_CHOICE, i, 0)[0] < fraction:
-            times[i] = start + rng.exponential(seed, rng.HOT_TIME, i, 0) / rate
+            own = hot_rate_of(i, seed, rate, spread)
+            times[i] = start + rng.exponential(seed, rng.HOT_TIME, i, 0) / own
 
 
 @kernel

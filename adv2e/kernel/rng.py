@@ -36,6 +36,7 @@ LOSS = 12
 REQUEST = 13
 LEAK_AGE = 14
 LEAK_RUNNING = 15
+HOT_RATE = 16
 
 LARGEST_SEED = (1 << 64) - 1
 """Seeds are the 64 bits of the generator's key."""

@@ -58,6 +58,7 @@ def make_circuit(
             if pixel.hot_pixels and pixel.hot_pixels.fraction > 0
             else 0.0
         ),
+        hot_spread=math.log(10.0) * pixel.hot_pixels.spread if pixel.hot_pixels else 0.0,
         noise_rms=noise.rms if noise else 0.0,
         noise_step=noise.step if noise else 0.1,
         causes=causes,

@@ -57,7 +57,8 @@ def initial_state(
         fill(fill_first_candidates, seed, circuit.shot_rate, start, times, draws)
     if pixel.hot_pixels and circuit.hot_rate > 0:
         share, times = pixel.hot_pixels.fraction, state[per_pixel.HOT_TIME]
-        fill_first_hot_times(seed, share, circuit.hot_rate, start, times)
+        rate, spread = circuit.hot_rate, circuit.hot_spread
+        fill_first_hot_times(seed, share, rate, spread, start, times)
     if circuit.noise_rms > 0:
         fill_first_noise(seed, circuit.noise_rms, state[per_pixel.NOISE])
     if stepping is not None:

@@ -57,6 +57,17 @@ def test_shot_noise_loses_what_falls_into_dead_time():
         assert np.diff(np.sort(exact[events["x"] == x])).min() >= 2000.0
 
 
+def test_rates_of_hot_pixels_are_spread_over_decades():
+    hot = HotPixels(fraction=0.5, rate_hz=100.0, spread=0.6)
+    events, _ = still(0.0, quiet(hot_pixels=hot))
+    rates = np.bincount(events["x"], minlength=PIXELS) / SECONDS
+    logs = np.log10(rates[rates > 0])
+    assert events["p"].all()
+    assert within(logs.size, PIXELS * 0.5)
+    deviations = stats.kstest(logs, stats.norm(2.0, 0.6).cdf).statistic
+    assert deviations < 2.0 / np.sqrt(logs.size)
+
+
 @pytest.mark.parametrize(("dn", "photo"), [(0.0, 0.0), (128.0, 1.5), (255.0, 1.5)])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
 def test_leak(dn, photo, jitter):

@@ -1,7 +1,12 @@
 """Hot pixels: a few pixels fire ON by themselves, whatever the light.
 
 Each pixel is hot with the probability given by fraction, drawn once.  A hot pixel fires Poisson ON
-events at rate_hz.
+events at its own rate, drawn once:
+
+    R = rate_hz 10^(spread z),    z normal with mean 0 and variance 1
+
+so that rate_hz is the median over the hot pixels, and their mean is 10^(1.15 spread^2) times that.
+In a camera such rates lie decades apart [1].
 
 References
 ----------
@@ -30,7 +35,14 @@ class HotPixels(Section):
     )
     rate_hz: float = parameter(
         unit="Hz",
-        meaning="ON events a hot pixel a second",
+        meaning="ON events a hot pixel a second; the median of them, where rates are spread",
         at_least=0,
         fit=Fit(1.0, 2e4, 150.0, log=True),
+    )
+    spread: float = parameter(
+        0.0,
+        unit="decades",
+        meaning="standard deviation of log10 of that rate over the hot pixels",
+        at_least=0,
+        at_most=2,
     )
