@@ -45,4 +45,5 @@ class HotPixels(Section):
         meaning="standard deviation of log10 of that rate over the hot pixels",
         at_least=0,
         at_most=2,
+        fit=Fit(0.05, 2.0, 0.6, log=True),
     )
