@@ -1,18 +1,27 @@
-r"""Rates of noise events of a pixel at rest, against light.
+r"""Rates of noise events of pixels at rest, against light.
 
-With l = DN/255, of the typical pixel
+With l = DN/255
 
 .. math:: R_{leak} = R_0 + R_1 l, \qquad R_{shot} = R_s\,(1 - 0.75\,l)
 
 shot noise being half ON, half OFF; leak events are ON.  Photoreceptor noise of standard deviation
-sigma crosses the thresholds at a rate that is the corner of the low-pass times a function of
-C/sigma (:mod:`adv2e.diagnosis.tables.threshold_noise`).  Every event takes the reference anew, so
-that leak, which needs a time 1/R_leak without another event, becomes rarer beside noise of rate
-lambda:
+sigma behind the first pole f_1, whose corner follows the light, is
+
+.. math:: \sigma \sqrt{\frac{f_2}{f_1 + f_2}}
+
+behind the second pole f_2, whose corner does not.  How often it crosses the thresholds is told in
+:mod:`adv2e.diagnosis.tables.threshold_noise`; here its rates are interpolated between thresholds,
+corners and dead times at which they are kept (`Law`).
+
+Every event takes the reference anew, so that leak, which needs a time 1/R_leak without another
+event, becomes rarer beside shot noise of rate lambda:
 
 .. math:: \frac{\lambda}{e^{\lambda/R_{leak}} - 1}
 
-Hot pixels raise the mean over pixels by fraction times rate, ON, and leave the median.
+Leak and photoreceptor noise are one process.  Shot noise beside both is added to it.
+
+Pixels differ: by their thresholds (normal), and some are hot, with ON rates of their own
+(log-normal).  Means and medians are over all of them.
 
 References
 ----------
@@ -20,24 +29,36 @@ References
    sensors", IEEE TED 64(8), 2017, doi:10.1109/TED.2017.2717848.
 .. [2] R. Graca, T. Delbruck, "Unraveling the paradox of intensity-dependent DVS pixel noise",
    International Image Sensor Workshop 2021, arXiv:2109.08640.
+.. [3] E. B. Wilson, M. M. Hilferty, "The distribution of chi-square", PNAS 17(12), 1931,
+   doi:10.1073/pnas.17.12.684.
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.tables.threshold_noise import SAMPLING_SHIFT, event_rates
+from adv2e.diagnosis.tables.threshold_noise import (
+    HIGHEST,
+    POLE_SHIFT,
+    SAMPLING_SHIFT,
+    event_rates,
+)
 from adv2e.effects.courses import LONGEST_US
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
+from adv2e.effects.pixel.thresholds import FLOOR
 
 Array = NDArray[np.float64]
 
-
-_RMS_STEP = 0.02
-"""Step of ln(rms) at which rates of photoreceptor noise are computed; between, interpolated."""
+_NORMAL = np.linspace(-3.2, 3.2, 9)
+"""Deviations at which pixels are taken, of one threshold; `_HOT`: of the rates of hot ones."""
+_HOT = np.linspace(-4.0, 4.0, 21)
 
 
 @dataclass(frozen=True)
@@ -53,76 +74,302 @@ class NoisySources:
     """At which that noise is sampled, in correlation times at white; 0: not sampled."""
     cutoff_hz: float = 0.0
     dark_cutoff_hz: float = 0.0
+    follower_hz: float = 0.0
+    """Corner of the second pole; 0: none."""
     on: float = 0.2
     off: float = 0.2
+    mismatch: float = 0.0
+    """Standard deviation of the thresholds over the pixels [ln]."""
     dead_time_s: float = 0.0
+    hot_fraction: float = 0.0
     hot_hz: float = 0.0
-    """Fraction of hot pixels times their rate."""
+    """Median rate of the hot pixels."""
+    hot_spread: float = 0.0
+    """Standard deviation of log10 of it."""
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Rates against light, (n,) each [Hz]: of the typical pixel, and the mean of all."""
+    """Rates against light, (n,) or, of each kind of pixel, (n, kinds) [Hz]."""
 
-    leak: Array
-    noise_on: Array
-    noise_off: Array
-    on_mean: Array
+    weights: Array
+    """Share of the pixels that is of each kind, hot ones left out, (kinds,)."""
+    leak_of: Array
+    on_of: Array
+    """ON events by noise."""
+    off_of: Array
+    hot_fraction: float
+    hot_hz: Array
+    """ON events that hot pixels have beside the others', at deviations of `_HOT`."""
+
+    @property
+    def leak(self) -> Array:
+        """Leak events of the typical pixel."""
+        return _typical(self.leak_of, self.weights)
+
+    @property
+    def noise_on(self) -> Array:
+        """ON events by noise, of the typical pixel."""
+        return _typical(self.on_of, self.weights)
 
     @property
     def on(self) -> Array:
         """ON events of the typical pixel."""
-        return self.leak + self.noise_on
+        return _typical(self.leak_of + self.on_of, self.weights)
 
     @property
     def off(self) -> Array:
-        """OFF events, of the typical pixel and of all."""
-        return self.noise_off
+        """OFF events of the typical pixel."""
+        return _typical(self.off_of, self.weights)
+
+    @property
+    def on_mean(self) -> Array:
+        """ON events, mean over all pixels."""
+        base: Array = (self.leak_of + self.on_of) @ self.weights
+        return base + self.hot_fraction * float(self.hot_hz @ _density(_HOT))
+
+    @property
+    def off_mean(self) -> Array:
+        """OFF events, mean over all pixels."""
+        mean: Array = self.off_of @ self.weights
+        return mean
+
+    def on_share(self, seconds: Array) -> Array:
+        """Return the share of the pixels that have ON events in so many seconds, (n,)."""
+        return self._reached(0.5, seconds, on=True)
+
+    def quantile(self, share: float, seconds: Array, on: bool) -> Array:
+        """Return how many events a share of the pixels has at most, (n,).
+
+        Numbers of events are whole; between two, at n + 1/2, a share lies that has n at most.
+        """
+        low = np.full(seconds.shape, -0.5)
+        high = 10.0 + 2.0 * seconds * (self.leak_of + self.on_of + self.off_of).max(axis=1)
+        high += 10.0 * seconds * float(self.hot_hz.max())
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            enough = 1.0 - self._reached(middle, seconds, on) >= share
+            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        middle = 0.5 * (low + high)
+        return np.asarray(middle, dtype=np.float64)
+
+    def _reached(self, number: Array | float, seconds: Array, on: bool) -> Array:
+        """Return the share of the pixels with more events than a number in so many seconds."""
+        number = np.broadcast_to(np.asarray(number, np.float64), seconds.shape)[:, None]
+        time = seconds[:, None]
+        if not on:
+            below: Array = _poisson_below(number, self.off_of * time) @ self.weights
+            return 1.0 - below
+        noise, leak = self.on_of * time, self.leak_of * time
+        phases = np.linspace(-0.4, 0.4, 5)[:, None, None] * np.minimum(leak, 1.0)  # it is regular
+        below = np.mean(_poisson_below(number - leak - phases, noise), axis=0) @ self.weights
+        if self.hot_fraction > 0.0:
+            usual = ((self.leak_of + self.on_of) @ self.weights)[:, None]
+            hot = _poisson_below(number, (usual + self.hot_hz) * time) @ _density(_HOT)
+            below = (1.0 - self.hot_fraction) * below + self.hot_fraction * hot
+        return 1.0 - below
 
 
 def noise_rates(sources: NoisySources, light: Array) -> Rates:
     """Return the rates at `light`, (n,) in shares of white."""
     shot = sources.shot_hz * np.maximum(1.0 - FALL_AT_WHITE * light, 0.0)
-    crossing_on, crossing_off = _crossings(sources, light)
-    noise_on, noise_off = 0.5 * shot + crossing_on, 0.5 * shot + crossing_off
-    leak = np.asarray(sources.leak_hz + sources.photo_leak_hz * light, dtype=np.float64)
-    others = noise_on + noise_off
-    present = (leak > 0.0) & (others > 0.0)
-    exponent = np.minimum(others[present] / leak[present], 500.0)
-    leak[present] = others[present] / np.expm1(exponent)
-    busy = 1.0 / (1.0 + (leak + others) * sources.dead_time_s)
-    leak, noise_on, noise_off = leak * busy, noise_on * busy, noise_off * busy
-    return Rates(leak, noise_on, noise_off, leak + noise_on + sources.hot_hz)
+    leak = sources.leak_hz + sources.photo_leak_hz * light
+    weights, on, off = _kinds(sources)
+    noise = np.repeat(shot[:, None], weights.size, axis=1)
+    if sources.rms > 0.0:
+        laws = _laws(sources, light, leak)
+        by_on, by_off = np.stack([law.rates(on, off) for law in laws], axis=1)
+        both = by_on + by_off
+        by_leak = np.minimum(_rare(leak[:, None], both - leak[:, None]), by_on)
+        by_on = by_on - by_leak
+        busy = 1.0 / (1.0 + noise * sources.dead_time_s)
+    else:
+        by_on, by_off = np.zeros_like(noise), np.zeros_like(noise)
+        by_leak = _rare(leak[:, None], noise)
+        busy = 1.0 / (1.0 + (noise + by_leak) * sources.dead_time_s)
+    by_on, by_off = by_on + 0.5 * noise, by_off + 0.5 * noise
+    by_leak, by_on, by_off = by_leak * busy, by_on * busy, by_off * busy
+    hot = sources.hot_hz * 10.0 ** (sources.hot_spread * _HOT)
+    return Rates(weights, by_leak, by_on, by_off, sources.hot_fraction, hot)
 
 
-def _crossings(sources: NoisySources, light: Array) -> tuple[Array, Array]:
-    """Return the ON and OFF rates of photoreceptor noise [Hz], dead time left out."""
-    on, off = np.zeros_like(light), np.zeros_like(light)
-    if sources.rms <= 0.0:
-        return on, off
+def _kinds(sources: NoisySources) -> tuple[Array, Array, Array]:
+    """Return the shares of the pixels of each kind, and their thresholds, (kinds,) each."""
+    if sources.mismatch <= 0.0 or sources.rms <= 0.0:
+        return np.ones(1), np.array([sources.on]), np.array([sources.off])
+    part = _density(_NORMAL)
+    weights = np.outer(part, part).ravel()
+    moved = sources.mismatch * _NORMAL
+    on = np.repeat(np.maximum(sources.on + moved, FLOOR), _NORMAL.size)
+    off = np.tile(np.maximum(sources.off + moved, FLOOR), _NORMAL.size)
+    return weights, on, off
+
+
+def _density(places: Array) -> Array:
+    weights = np.exp(-0.5 * places**2)
+    return np.asarray(weights / weights.sum(), dtype=np.float64)
+
+
+def _typical(values: Array, weights: Array) -> Array:
+    """Return the median over kinds, (n,), of values (n, kinds)."""
+    if weights.size == 1:
+        return np.asarray(values[:, 0], dtype=np.float64)
+    order = np.argsort(values, axis=1)
+    ranked = np.take_along_axis(values, order, axis=1)
+    below = np.cumsum(weights[order], axis=1) - 0.5 * weights[order]
+    return np.array([np.interp(0.5, b, v) for b, v in zip(below, ranked, strict=True)])
+
+
+def _rare(leak: Array, noise: Array) -> Array:
+    """Return what is left of leak events beside noise that takes the reference anew [Hz]."""
+    leak, noise = np.broadcast_arrays(leak, np.maximum(noise, 0.0))
+    left = np.array(leak, dtype=np.float64)
+    both = (leak > 0.0) & (noise > 1e-12 * leak)
+    left[both] = noise[both] / np.expm1(np.minimum(noise[both] / leak[both], 500.0))
+    return left
+
+
+def _poisson_below(number: Array, mean: Array) -> Array:
+    """Return the probability of less than number + 1/2 Poisson events, smooth in the number [3]."""
+    n = np.maximum(number + 0.5, 1e-9)
+    mean = np.maximum(mean, 1e-9)
+    spread = 1.0 / (9.0 * n)
+    below: Array = _normal_above((np.cbrt(mean / n) - (1.0 - spread)) / np.sqrt(spread))
+    return np.where(number > -0.5, below, 0.0)
+
+
+_STEP = 0.01
+_PLACES = np.arange(-9.0, 9.0 + _STEP, _STEP)
+_BELOW = np.cumsum(np.exp(-0.5 * (_PLACES - 0.5 * _STEP) ** 2)) * _STEP / math.sqrt(2.0 * math.pi)
+
+
+def _normal_above(x: Array) -> Array:
+    above: Array = np.interp(-x, _PLACES, _BELOW)
+    return above
+
+
+class Law:
+    """Rates of ON and OFF events by noise and leak at one light, against both thresholds.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation of the noise behind the poles [ln].
+    slow : float
+        Corner of the slower pole [rad/s].
+    ratio : float
+        Over that of the faster one; 0: there is but one.
+    dead_time_s, leak_hz : float
+    shift : float
+        How much farther levels are, in standard deviations, as the noise is sampled.
+    """
+
+    def __init__(
+        self,
+        sigma: float,
+        slow: float,
+        ratio: float,
+        dead_time_s: float,
+        leak_hz: float,
+        shift: float,
+    ) -> None:
+        self._sigma, self._slow, self._shift = sigma, slow, shift
+        kept = (
+            _kept(ratio, _RATIOS),
+            _kept(max(slow * dead_time_s, 1e-12), _DEAD_TIMES),
+            _kept(leak_hz / slow, _LEAKS),
+        )
+        self._parts = [
+            (_table(first[0], second[0], third[0]), first[1] * second[1] * third[1])
+            for first, second, third in itertools.product(*kept)
+        ]
+
+    def rates(self, on: Array, off: Array) -> Array:
+        """Return the rates [Hz], (2, ...), of pixels with these thresholds [ln]."""
+        first, on_weights = _cubic(on / self._sigma + self._shift - _LEAST)
+        second, off_weights = _cubic(off / self._sigma + self._shift - _LEAST - _APART)
+        logs = np.zeros((2, *np.shape(on)))
+        for table, share in self._parts:
+            for i, p in enumerate(on_weights):
+                for j, q in enumerate(off_weights):
+                    logs += share * p * q * _filled(table, first + i, second + j)
+        return np.asarray(self._slow * np.exp(logs), dtype=np.float64)
+
+
+_LEAST, _GRID, _APART = 0.5, 0.75, 0.375
+"""Least threshold that is kept, step, and how much larger OFF is: equal ones are exceptional."""
+_COUNT = 1 + round((HIGHEST - _LEAST) / _GRID)
+_RATIOS, _DEAD_TIMES, _LEAKS = (2.0, -12, 0), (4.0, -4, 3), (8.0, -6, -1)
+"""Base, and least and largest exponent, of what is kept: ratios of corners; dead times and leaks in
+units of the slower pole."""
+
+
+class Table(NamedTuple):
+    """ln of ON and OFF rates against both thresholds, (2, _COUNT, _COUNT), NaN where not needed."""
+
+    ratio: float
+    dead_time: float
+    leak: float
+    logs: Array
+
+
+@lru_cache(maxsize=1024)
+def _table(ratio: float, dead_time: float, leak: float) -> Table:
+    return Table(ratio, dead_time, leak, np.full((2, _COUNT, _COUNT), np.nan))
+
+
+def _filled(table: Table, i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
+    """Return values of a table, (2, ...), those which are not there yet being computed."""
+    values: Array = table.logs[:, i, j]
+    missing = np.isnan(values[0])
+    if missing.any():
+        for at, to in {*zip(i[missing].tolist(), j[missing].tolist(), strict=True)}:
+            on, off = _LEAST + _GRID * at, _LEAST + _GRID * to + _APART
+            found = event_rates(on, off, table.dead_time, table.ratio, table.leak)
+            table.logs[:, at, to] = np.log(np.maximum(found, 1e-15))
+        values = table.logs[:, i, j]
+    return values
+
+
+def _kept(value: float, kept: tuple[float, int, int]) -> list[tuple[float, float]]:
+    """Return the values that are kept beside one, with what they weigh there; 0 is kept."""
+    if value <= 0.0:
+        return [(0.0, 1.0)]
+    base, least, largest = kept
+    place = min(max(math.log(value, base), least), largest)
+    below = math.floor(place)
+    share = place - below
+    parts = [(base**below, 1.0 - share), (base ** (below + 1), share)]
+    return parts if share > 0.0 else parts[:1]
+
+
+def _cubic(x: Array) -> tuple[NDArray[np.int64], list[Array]]:
+    """Return the first of four kept thresholds about each of `x`, and their weights (Lagrange)."""
+    place = np.clip(x / _GRID, 0.0, _COUNT - 1.0)
+    first = np.clip(place.astype(np.int64) - 1, 0, _COUNT - 4)
+    t = place - first
+    return first, [
+        -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
+        t * (t - 2.0) * (t - 3.0) / 2.0,
+        -t * (t - 1.0) * (t - 3.0) / 2.0,
+        t * (t - 1.0) * (t - 2.0) / 6.0,
+    ]
+
+
+def _laws(sources: NoisySources, light: Array, leak: Array) -> list[Law]:
+    """Return the law at each light, with its leak [Hz]."""
     corner = sources.dark_cutoff_hz + (sources.cutoff_hz - sources.dark_cutoff_hz) * light
     white = 2.0 * np.pi * max(sources.cutoff_hz, sources.dark_cutoff_hz)
-    step_s = min(sources.noise_step / white, LONGEST_US * 1e-6)
-    for k, w in enumerate(2.0 * np.pi * corner):
-        dead = float(w * sources.dead_time_s)
-        a, b = _tabulated(sources, dead, w * step_s)
-        free = 1.0 - (a + b) * dead  # the caller takes the dead time out again
-        on[k], off[k] = w * a / free, w * b / free
-    return on, off
-
-
-def _tabulated(sources: NoisySources, dead: float, step: float) -> tuple[float, float]:
-    """Return ON and OFF events a correlation time, between rms values at which they are kept.
-
-    Dead time and time between samples are in correlation times.
-    """
-    place = np.log(sources.rms) / _RMS_STEP
-    below = int(np.floor(place))
-    shift = SAMPLING_SHIFT * np.sqrt(2.0 * step)
-    ends = []
-    for number in (below, below + 1):
-        rms = float(np.exp(number * _RMS_STEP))
-        ends.append(event_rates(sources.on / rms + shift, sources.off / rms + shift, dead))
-    first, second = np.log(np.maximum(ends, 1e-300))
-    a, b = np.exp(first + (place - below) * (second - first))
-    return float(a), float(b)
+    sampled_s = min(sources.noise_step / white, LONGEST_US * 1e-6)
+    second = 2.0 * np.pi * sources.follower_hz
+    laws = []
+    for first, leak_hz in zip((2.0 * np.pi * corner).tolist(), leak.tolist(), strict=True):
+        slow, ratio, sigma = first, 0.0, sources.rms
+        if second > 0.0:
+            slow, ratio = min(first, second), min(first, second) / max(first, second)
+            sigma *= math.sqrt(second / (first + second))
+        # a second pole that is slower than the samples hides them
+        sampling = SAMPLING_SHIFT * math.sqrt(2.0 * slow * sampled_s)
+        shift = max(sampling - POLE_SHIFT * math.sqrt(ratio), 0.0)
+        laws.append(Law(sigma, slow, ratio, sources.dead_time_s, leak_hz, shift))
+    return laws

@@ -124,7 +124,8 @@ class NoiseProblem(Problem):
             on=pixel.thresholds.on,
             off=pixel.thresholds.off,
             dead_time_s=0.0 if pixel.refractory is None else 1e-6 * pixel.refractory.period_us,
-            hot_hz=self.hot_fraction * self._number(values, HOT_RATE),
+            hot_fraction=self.hot_fraction,
+            hot_hz=self._number(values, HOT_RATE),
         )
         return noise_rates(sources, light / self.white)
 
