@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from adv2e.cli.options import Log
     from adv2e.config import Config
+    from adv2e.geometry import Size
 
 
 @click.command("diagnose", cls=Command)
@@ -33,15 +34,29 @@ if TYPE_CHECKING:
     is_flag=True,
     help="The contrast thresholds are not known: fit them first, to the totals of ON and OFF.",
 )
+@click.option(
+    "--light",
+    metavar="TABLE",
+    shell_complete=completion.files,
+    help="What the light was, in the place of frames: columns time_s and light_dn (255 is white).",
+)
+@click.option(
+    "--size",
+    type=options.SIZE,
+    metavar="WxH",
+    help="Size of the sensor (sensor.width and sensor.height), where the file does not tell it.",
+)
 @options.time_unit_option
 @options.rotate_option()
 def command(
     recording: str,
-    config: Callable[[], Config],
+    config: Callable[[Size | None], Config],
     output: str | None,
     overwrite: bool,
     without: tuple[str, ...],
     fit_thresholds: bool,
+    light: str | None,
+    size: Size | None,
     time_unit: str | None,
     rotate180: bool,
     threads: int | None,
@@ -55,6 +70,12 @@ def command(
     where the recording differs from all simulations by more than chance, the effect that the
     declared model lacks is looked for, fitted, and judged on data that it was not fitted to.
 
+    With --light, RECORDING holds events alone, in any format that adv2e reads, of a light that is
+    known: an LED that leaps, a lamp with a photodiode. TABLE is delimited text: time_s on the clock
+    of the events, and light_dn. Between two rows the light is a line; two rows of the same time are
+    a leap. A column 'light_dn X Y COLUMNS ROWS' is the light of a rectangle. 'adv2e protocol' says
+    what to record.
+
     DIR (-o; default: <stem>.diagnosis) gets report.html with the pictures, report.json, and
     model.yaml, the declared model with what was found, for 'adv2e convert -c'.
 
@@ -62,6 +83,7 @@ def command(
     Examples:
       adv2e diagnose recording.zip -c declared.yaml -o diagnosis
       adv2e diagnose recording.zip -c davis346 --without flicker
+      adv2e diagnose led.raw --light stimulus.csv -c declared.yaml --fit-thresholds
     """
     from pathlib import Path
 
@@ -70,7 +92,7 @@ def command(
     from adv2e.files.names import shown
     from adv2e.reports.summary import summary_text
 
-    declared = config()
+    declared = config(size)
     options_given = click.get_current_context().params
     given = options_given["config_files"], options_given["sets"]
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
@@ -80,6 +102,7 @@ def command(
         name=names_of(*given),
         written=written_keys(*given),
         also_read=options.files_given(),
+        light=light,
         output=folder,
         without=without,
         fit_thresholds=fit_thresholds,

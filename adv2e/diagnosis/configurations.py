@@ -9,9 +9,11 @@ from dataclasses import replace
 from typing import Any
 
 from adv2e.config import Config, from_dict, to_dict
+from adv2e.config.model import Frames, Sampling
 from adv2e.config.paths import get_key, set_key
 from adv2e.config.user_effects import user_effects
 from adv2e.effects.readout.frame_coupling import FrameCoupling
+from adv2e.errors import ConfigError
 from adv2e.reports.keys import Own, known_keys
 
 
@@ -45,6 +47,40 @@ def without_coupling(config: Config) -> Config:
     if config.readout is None or coupling_of(config) is None:
         return config
     return replace(config, readout=replace(config.readout, frame_coupling=None))
+
+
+def of_known_light(config: Config) -> Config:
+    """Return `config` for light that is known: nothing is between it and the pixels but its clock.
+
+    Raises
+    ------
+    ConfigError
+        Its low-pass is not solved, but stepped from instant to instant.
+    """
+    low_pass = config.pixel.low_pass
+    if low_pass is not None and low_pass.update != "exact":
+        raise ConfigError(
+            f"pixel.low_pass.update: must be exact where the light is known, got {low_pass.update}"
+        )
+    clock = config.frames
+    frames = Frames(
+        encoding="linear",
+        clock_offset_us=clock.clock_offset_us,
+        clock_drift_ppm=clock.clock_drift_ppm,
+    )
+    return replace(without_coupling(config), frames=frames, sampling=Sampling(L=1))
+
+
+def of_frames_again(config: Config, given: Config) -> Config:
+    """Return what :func:`of_known_light` made of `given`, and changed, with what it took away."""
+    found = config.frames
+    frames = replace(
+        given.frames, clock_offset_us=found.clock_offset_us, clock_drift_ppm=found.clock_drift_ppm
+    )
+    readout = config.readout
+    if readout is not None:
+        readout = replace(readout, frame_coupling=coupling_of(given))
+    return replace(config, frames=frames, sampling=given.sampling, readout=readout or given.readout)
 
 
 def own_of(config: Config) -> Own:

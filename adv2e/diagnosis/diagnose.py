@@ -9,7 +9,14 @@ from contextlib import closing
 from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.config import Config
-from adv2e.diagnosis.configurations import as_found, declared_of, defaults_of, own_of
+from adv2e.diagnosis.configurations import (
+    as_found,
+    declared_of,
+    defaults_of,
+    of_frames_again,
+    of_known_light,
+    own_of,
+)
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.fitting.nuisances import thresholds_of
@@ -79,7 +86,10 @@ def diagnose(
         Too few events are left of a recording that would take too long.
     """
     began = time.perf_counter()
-    evidence, given = affordable(evidence, declared), declared
+    given, known = declared, evidence.stimulus is not None
+    if known:
+        declared = of_known_light(declared)
+    evidence = affordable(evidence, declared)
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
         simulator.begin(DECLARED)
         prepared = prepare(evidence, declared, simulator, without, free_thresholds, log)
@@ -117,12 +127,12 @@ def diagnose(
                 *about_frames(prepared),
                 *about_drifts(evidence, kept.config),
             ],
-            model=as_found(kept.config),
+            model=as_found(of_frames_again(kept.config, given) if known else kept.config),
             facts={
                 "sensor": f"{evidence.width}x{evidence.height}",
                 "length": f"{evidence.seconds:.3f} s",
                 "events": f"{len(evidence.stream):,}",
-                "frames": _frames_text(evidence),
+                **_light_facts(evidence),
                 "simulations": f"{simulator.done:,}",
                 "seed": str(declared.seed),
                 "time taken": f"{time.perf_counter() - began:.0f} s",
@@ -135,8 +145,11 @@ def diagnose(
         )
 
 
-def _frames_text(evidence: Evidence) -> str:
-    before = len(evidence.run_in.frames)
-    return f"{len(evidence.frames):,}" + (
-        f", and {before:,} before for pixels to settle" * (before > 0)
-    )
+def _light_facts(evidence: Evidence) -> dict[str, str]:
+    before, known = evidence.run_in, evidence.stimulus
+    if known is not None:
+        settling = f", from {evidence.before_s:.3g} s before for pixels to settle"
+        return {"light": known.name + settling * bool(len(before.times_s))}
+    count = len(before.frames)
+    settling = f", and {count:,} before for pixels to settle"
+    return {"frames": f"{len(evidence.frames):,}" + settling * (count > 0)}

@@ -10,11 +10,11 @@ import numpy as np
 from adv2e.config import Config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.input_checks import check_inputs
+from adv2e.diagnosis.data.input_checks import check_inputs, check_known_light
 from adv2e.diagnosis.data.scene import Placed, Scene
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate
-from adv2e.diagnosis.fitting.library import library
+from adv2e.diagnosis.fitting.library import OF_FRAMES, library
 from adv2e.diagnosis.fitting.nuisances import (
     TOLERANCE,
     fit_thresholds,
@@ -78,7 +78,9 @@ def prepare(
     """
     scene = Scene.of_evidence(evidence, declared)
     notes = [*evidence.notes]
-    notes += check_inputs(Placed.of(evidence.stream, scene), scene, evidence.light(declared))
+    known = evidence.stimulus is not None
+    check = check_known_light if known else check_inputs
+    notes += check(Placed.of(evidence.stream, scene), scene, evidence.light(declared))
     if free_thresholds:
         simulator.begin("matching the thresholds to the numbers of events")
 
@@ -100,7 +102,7 @@ def prepare(
     statistics = SummaryStatistics(scene, streams)
     by_seed = dict(zip(PILOT_SEEDS, streams, strict=True))
     pilot = Pilot(evidence, declared, statistics, by_seed, simulator.of)
-    frames, levels = between_frames(pilot), between_levels(pilot)
+    frames, levels = (None, None) if known else (between_frames(pilot), between_levels(pilot))
     hints = hints_of(evidence, declared, scene, streams, simulator)
     if hints.pulse and not has_pulse(declared):
         notes.append(hints.pulse.text())
@@ -115,6 +117,7 @@ def prepare(
         threshold_nuisance(declared) if free_thresholds else NOTHING,
         simulator.begin,
     )
+    without = [*without, *(OF_FRAMES if known else ())]
     candidates = [one for one in library(declared, hints) if one.name not in without]
     evidence = replace(evidence, notes=notes)
     return Prepared(evidence, scene, reference, candidates, frames, levels)

@@ -15,6 +15,7 @@ from adv2e.diagnosis.configurations import without_user_effects
 from adv2e.diagnosis.data.evidence import read_evidence
 from adv2e.diagnosis.diagnose import diagnose as diagnose_evidence
 from adv2e.diagnosis.fitting.library import names
+from adv2e.diagnosis.known_light import read_known_light
 from adv2e.errors import UsageError
 from adv2e.reports.files import check_folder, write_reports
 from adv2e.reports.result import Diagnosis
@@ -24,6 +25,7 @@ def diagnose(
     recording: str | Path,
     declared: Written | Sequence[Written] | None = None,
     *,
+    light: str | Path | None = None,
     output: str | Path | None = None,
     without: Sequence[str] = (),
     fit_thresholds: bool = False,
@@ -40,9 +42,13 @@ def diagnose(
     Parameters
     ----------
     recording : str or Path
-        Frames and events on one clock: a DAVIS240C folder or zip, or HDF5.
+        Frames and events on one clock: a DAVIS240C folder or zip, or HDF5.  With `light`, events
+        of any format.
     declared : Config, or what :func:`adv2e.load_config` takes, optional
         What is known of the camera.  A `sensor` must have the size of the recording.
+    light : str or Path, optional
+        Table of what the light was, in the place of frames: see
+        :mod:`adv2e.diagnosis.known_light`.
     output : str or Path, optional
         Folder for report.html, report.json and model.yaml.  Default: none is written.
     without : sequence of str
@@ -85,6 +91,7 @@ def diagnose(
         name=names_of(declared),
         written=written_keys(declared),
         also_read=files_among(declared),
+        light=light,
         output=output,
         without=without,
         fit_thresholds=fit_thresholds,
@@ -103,6 +110,7 @@ def diagnose_file(
     name: str,
     written: Collection[str],
     also_read: Iterable[str | Path],
+    light: str | Path | None,
     output: str | Path | None,
     without: Sequence[str],
     fit_thresholds: bool,
@@ -122,10 +130,17 @@ def diagnose_file(
     _check_own_names(declared)
     declared = without_user_effects(declared, written)
     if output is not None:
-        check_folder(output, overwrite=overwrite, inputs=[recording, *also_read])
+        inputs = [recording, *([] if light is None else [light]), *also_read]
+        check_folder(output, overwrite=overwrite, inputs=inputs)
     with _stages(progress) as tell:
+        given = time_unit, declared.sensor
+        evidence = (
+            read_evidence(recording, *given, rotate180=rotate180)
+            if light is None
+            else read_known_light(recording, light, *given, rotate180=rotate180)
+        )
         found = diagnose_evidence(
-            read_evidence(recording, time_unit, declared.sensor, rotate180=rotate180),
+            evidence,
             declared,
             declared_name=name or "the defaults",
             without=without,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.config.model import Sensor
+from adv2e.diagnosis.data.stimulus import Seen, Stimulus, joined
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
@@ -36,19 +37,19 @@ _UNCOVERED = 10.0
 class RunIn:
     """Frames before the first that is looked at, with their times [s]: pixels saw them."""
 
-    frames: list[NDArray[Any]] = field(default_factory=list)
+    frames: Sequence[NDArray[Any]] = field(default_factory=list)
     times_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Frames and events of one recording on one clock.
+    """Frames, or known light, and events of one recording on one clock.
 
     Attributes
     ----------
     name : str
-    frames : list of (rows, columns[, 3]) arrays
-        As stored.
+    frames : sequence of (rows, columns[, 3]) arrays
+        As stored; of known light, evenly spaced instants of it.
     times_s : (frames,)
         Their stamps [s].
     stream : Stream
@@ -62,10 +63,12 @@ class Evidence:
         What pixels saw before; events of that time are of no recording and no simulation.
     white : float, optional
         Number that means white in the frames; None: that of their data type.
+    stimulus : Stimulus, optional
+        Light that is known at all times: what is simulated, in the place of frames.
     """
 
     name: str
-    frames: list[NDArray[Any]]
+    frames: Sequence[NDArray[Any]]
     times_s: NDArray[np.float64]
     stream: Stream
     width: int
@@ -75,6 +78,7 @@ class Evidence:
     notes: list[str] = field(default_factory=list)
     run_in: RunIn = field(default_factory=RunIn)
     white: float | None = None
+    stimulus: Stimulus | None = None
 
     @property
     def times_ns(self) -> list[int]:
@@ -96,9 +100,11 @@ class Evidence:
     def simulated(self) -> Evidence:
         """The same with the frames that are simulated: after those of the run-in."""
         before = self.run_in
+        if not before.frames:
+            return self
         return replace(
             self,
-            frames=[*before.frames, *self.frames],
+            frames=joined(before.frames, self.frames),
             times_s=np.concatenate([before.times_s, self.times_s]),
             run_in=RunIn(),
         )
@@ -120,6 +126,38 @@ class Evidence:
         """Return the step of the frames' numbers [DN]; zero for floating-point frames."""
         decoder = self._decoder(declared)
         return 255.0 / decoder.full_scale if np.issubdtype(decoder.dtype, np.integer) else 0.0
+
+    def instants(self, declared: Config) -> tuple[list[int], NDArray[np.float32]]:
+        """Return times [ns] and light [DN] of what is simulated, (instants, rows, columns).
+
+        Those of the frames, with the run-in; of a known light, all instants at which it bends.
+        """
+        shown = self.simulated
+        if self.stimulus is None:
+            return shown.times_ns, shown.light(declared)
+        course = self.stimulus.between(shown.times_ns[0], shown.times_ns[-1])
+        return course.times_ns.tolist(), course.light.astype(np.float32)[:, course.region]
+
+    def cut(self, rows: slice, columns: slice) -> Evidence:
+        """Return what some of the pixels saw and sent, those of slices of rows and columns."""
+        number = np.arange(self.width * self.height).reshape(self.height, self.width)
+        chosen = number[rows, columns]
+        place = np.full(number.size, -1, np.int32)
+        place[chosen.ravel()] = np.arange(chosen.size)
+        pixel, (height, width) = place[self.stream.pixel], chosen.shape
+        inside = pixel >= 0
+        stream = self.stream
+        kept = Stream(stream.t[inside], pixel[inside], stream.on[inside], width, height)
+        part = replace(self, stream=kept, width=width, height=height)
+        if self.stimulus is None:
+            return part.with_frames(lambda frame: frame[rows, columns])
+        seen = self.stimulus.cut(rows, columns)
+
+        def of_part(frames: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+            return Seen(frames.light, seen.region) if isinstance(frames, Seen) else frames
+
+        before = replace(self.run_in, frames=of_part(self.run_in.frames))
+        return replace(part, stimulus=seen, frames=of_part(self.frames), run_in=before)
 
     def with_frames(self, changed: Callable[[NDArray[Any]], NDArray[Any]]) -> Evidence:
         """Return the recording with all frames changed, those of the run-in as well."""
@@ -209,13 +247,10 @@ def read_evidence(
         notes=list(recording.problems),
         white=white,
     )
-    first, last = _covered(kept, times_s)
-    if (first, last) == (0, len(frames) - 1):
+    first, last, text = covered(kept, times_s)
+    if not text:
         return whole
-    ends = (times_s[first] - times_s[0], "first"), (times_s[-1] - times_s[last], "last")
-    which = " and ".join(f"{time:.3g} s at the {end} frames" for time, end in ends if time > 0.0)
-    uncovered = Masked(f"{which}, which the events do not cover", 0.0)
-    return replace(whole.during(first, last), masked=[*masked, uncovered])
+    return replace(whole.during(first, last), masked=[*masked, Masked(text, 0.0)])
 
 
 def _check_alike(path: str | Path, frames: list[NDArray[Any]]) -> None:
@@ -241,17 +276,20 @@ def check_events(number: int, name: object, where: str) -> None:
         raise DataError(f"{name}: {number} events {where}; at least {LEAST_EVENTS} are needed")
 
 
-def _covered(events: Events, times_s: NDArray[np.float64]) -> tuple[int, int]:
-    """Return the first and the last frame of the time that the events cover.
+def covered(events: Events, times_s: NDArray[np.float64]) -> tuple[int, int, str]:
+    """Return the first and the last frame of the time that the events cover, and what they do not.
 
     Streams are often cut, or begin late; what no event was kept of did not happen without any.
     """
-    everything = 0, len(times_s) - 1
+    first, last = 0, len(times_s) - 1
     t_s = events["t"] * 1e-6
     usual = max(_UNCOVERED * float(np.diff(t_s).max()), 2.0 * float(np.diff(times_s).max()))
-    first, last = everything
     if t_s[0] - times_s[0] > usual:
         first = int(np.searchsorted(times_s, t_s[0], "right")) - 1
     if times_s[-1] - t_s[-1] > usual:
         last = int(np.searchsorted(times_s, t_s[-1]))
-    return (first, last) if last - first >= 2 else everything
+    ends = (times_s[first] - times_s[0], "first"), (times_s[-1] - times_s[last], "last")
+    which = [f"{time:.3g} s at the {end} frames" for time, end in ends if time > 0.0]
+    if last - first < 2 or not which:
+        return 0, len(times_s) - 1, ""
+    return first, last, f"{' and '.join(which)}, which the events do not cover"

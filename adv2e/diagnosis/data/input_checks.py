@@ -34,6 +34,23 @@ def check_inputs(measured: Placed, scene: Scene, light: NDArray[np.float32]) -> 
     return [line for line in found if line]
 
 
+def check_known_light(measured: Placed, scene: Scene, light: NDArray[np.float32]) -> list[str]:
+    """Return what may be wrong with a recording of known light, as :func:`check_inputs` does."""
+    found, brightest = [], float(light.max()) / _WHITE_DN
+    if np.all(light == light[0]):
+        found.append("the light never changes: it tells of noise, and of nothing else")
+    if brightest < _DIM:
+        found.append(
+            f"the brightest light is {brightest:.2g} of white: is its unit right? light_dn has 255"
+            " for white, light has 1"
+        )
+    if _direction(measured, scene).startswith("ON"):
+        found.append(
+            "ON events come where the light falls: are polarities, or the light, inverted?"
+        )
+    return found
+
+
 def _brightness(light: NDArray[np.float32]) -> str:
     brightest = float(light.max()) / _WHITE_DN
     if np.all(light == light[0]):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.splits import Split
+from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.data.stream import Stream
 
 STILL = 0
@@ -37,6 +38,8 @@ class Scene:
         Thirds of what moves.
     split : Split
     width, height : int
+    leaps : Leaps, optional
+        Of known light; None: what there is are frames.
     """
 
     times_us: NDArray[np.float64]
@@ -46,6 +49,7 @@ class Scene:
     split: Split
     width: int
     height: int
+    leaps: Leaps | None = None
 
     @classmethod
     def of(
@@ -71,7 +75,8 @@ class Scene:
     def of_evidence(cls, evidence: Evidence, declared: Config) -> Scene:
         """Return the scene of a recording's frames, as the declared model reads them."""
         light, quantum_dn = evidence.light(declared), evidence.quantum_dn(declared)
-        return cls.of(light, evidence.times_s, quantum_dn)
+        scene, known = cls.of(light, evidence.times_s, quantum_dn), evidence.stimulus
+        return scene if known is None else replace(scene, leaps=known.leaps)
 
     @property
     def intervals(self) -> int:

@@ -26,6 +26,11 @@ from adv2e.effects.pixel.initial_reference import RANDOM, SETTLED
 from adv2e.parameters import Fit
 from adv2e.reports.keys import BUILT_IN
 
+OF_FRAMES = (
+    *("black_level", "exposure_blur", "misregistration", "flicker", "frame_encoding"),
+    "frame_coupling",
+)
+"""Effects on light that frames tell; of known light there are none, but its clock may be off."""
 _LEAST_DN = 0.02
 """Of a black level, either way."""
 _USUAL, _FARTHEST = 2.0, 10.0

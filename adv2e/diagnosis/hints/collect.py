@@ -72,6 +72,15 @@ def hints_of(
         return scene.split.chosen(stream, splits.TRAIN)
 
     stream = evidence.stream
+    too_many = _too_many(stream, pilot, 1), _too_many(stream, pilot, 0)
+    if evidence.stimulus is not None:  # no lamp that it does not tell, no frame that is read out
+        return Hints(
+            evidence.seconds,
+            (),
+            tick_of(stream.t),
+            service=service_times(stream),
+            too_many=too_many,
+        )
     looked_at = scene.split.chosen(stream, splits.TRAIN, splits.VALIDATION)
     lines = strongest_lines(train(stream), list(map(train, pilot)), scene)
     lamps = lamps_of(
@@ -85,7 +94,7 @@ def hints_of(
         service_times(stream),
         readouts_of(looked_at, evidence.times_s),
         pulse_of(looked_at, evidence.times_s, evidence.before_s),
-        (_too_many(stream, pilot, 1), _too_many(stream, pilot, 0)),
+        too_many,
     )
 
 

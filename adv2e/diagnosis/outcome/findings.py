@@ -77,7 +77,9 @@ def about_frames(prepared: Prepared) -> list[str]:
     """Say how uncertain statistics are for what the frames do not tell."""
     reference = prepared.reference
     chance = reference.error.chance(reference.scales[BOTH].sd, BOTH)
-    notes = []
+    notes: list[str] = []
+    if prepared.evidence.stimulus is not None:
+        return notes
     if prepared.between_frames is None:
         notes.append(
             "too few frames to leave any out: what the interpolation between them does to the"

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
+from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.statistics.groups import excess
 from adv2e.diagnosis.statistics.intervals import BORDERS_MS
 from adv2e.diagnosis.statistics.rates import by_load, rate_hz
@@ -29,6 +30,7 @@ _POLARITIES = (("ON", 1), ("OFF", 0))
 _LOADS = 8
 _PHASES = np.linspace(0.0, 100.0, 11)
 _GAPS_MS = np.array([0.05, *BORDERS_MS, 512.0])
+_SINCE_LEAP_MS = 0.01 * 2.0 ** (0.5 * np.arange(31.0))
 _STAMPS_US = np.r_[0.5, 2.0 ** np.arange(14.0) + 0.5]
 """Borders between whole numbers of microseconds, the first for none and one together."""
 
@@ -162,9 +164,15 @@ def _by_time(scene: Scene, before: Sequence[Placed]) -> Iterator[_Axes]:
         number / np.bincount(load, scene.seconds),
         lambda placed: scene.pixels * of_load(placed),
     )
-    for text, moving in _MOTION:
-        title, label = f"Place between two frames, {text}", "place [% of the frame interval]"
-        yield _Axes(title, label, "events", _PHASES, _phases(scene, moving))
+    if scene.leaps is not None:
+        for name, on in _POLARITIES:
+            title, label = f"Events after a leap of the light, {name}", "time since the leap [ms]"
+            measure = _since_leap(scene.leaps, on)
+            yield _Axes(title, label, "events", _SINCE_LEAP_MS, measure, x_log=True)
+    else:
+        for text, moving in _MOTION:
+            title, label = f"Place between two frames, {text}", "place [% of the frame interval]"
+            yield _Axes(title, label, "events", _PHASES, _phases(scene, moving))
     borders_s = np.linspace(0.0, float(scene.seconds.sum()), 25)
     yield _Axes("Events over time", "time [s]", _PER_SENSOR, borders_s, _course(scene, borders_s))
 
@@ -262,6 +270,18 @@ def _phases(scene: Scene, moving: bool) -> Measure:
         used = (placed.speed != STILL) == moving
         phase = scene.phase_of(placed.stream.t[used], placed.interval[used])
         return np.histogram(100.0 * phase, _PHASES)[0].astype(np.float64)
+
+    return measure
+
+
+def _since_leap(leaps: Leaps, on: int) -> Measure:
+    """Count events of a polarity by the time since the light leapt."""
+
+    def measure(placed: Placed) -> Array:
+        since = leaps.since(placed.stream)
+        used = (since >= 0) & (placed.stream.on == on)
+        after = np.maximum(since[used] * 1e-3, _SINCE_LEAP_MS[0])
+        return np.histogram(after, _SINCE_LEAP_MS)[0].astype(np.float64)
 
     return measure
 

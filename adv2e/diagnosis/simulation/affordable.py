@@ -6,17 +6,15 @@ machine.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.config.active_effects import active_hooks
 from adv2e.diagnosis.data.evidence import Evidence, check_events
-from adv2e.diagnosis.data.stream import Stream
 from adv2e.effects.composition import additions_of, begin
 from adv2e.kernel.circuit import EXACT
 from adv2e.light.interpolation.sequence import instant_ns
@@ -43,6 +41,8 @@ STEP_S = 3e-9
 _BLOCK = 8
 _SMALLEST = 48
 _FEWEST = 12  # frame intervals
+_FEWEST_PIXELS = 256
+"""Of known light; its time is worth more than more of them."""
 
 
 def affordable(evidence: Evidence, declared: Config) -> Evidence:
@@ -51,7 +51,8 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
     A rectangle of the sensor's proportions is kept that holds as many events as any.  A pixel does
     not depend on its neighbours, so that the crop sees what it saw in the whole, but for load of
     the readout and for interpolation along motion at its border.  Where the smallest rectangle is
-    too much, the stretch of time that holds the most events is kept of it.
+    too much, the stretch of time that holds the most events is kept of it.  Of known light, which
+    many pixels see alike, every n-th pixel of every n-th row is kept in place of a rectangle.
 
     Raises
     ------
@@ -63,11 +64,16 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
 
     def cost_s(part: Evidence) -> float:
         shown = part.simulated
-        of_pixel = of_frame * (len(shown.frames) - 1) + of_second * shown.seconds
+        instants = len(shown.frames) - 1
+        if part.stimulus is not None:
+            instants = max(instants, part.stimulus.instants(shown.times_ns))
+        of_pixel = of_frame * instants + of_second * shown.seconds
         return of_pixel * part.width * part.height + EVENT_S * len(part.stream)
 
     kept, share = evidence, 1.0
-    while cost_s(kept) > AFFORDABLE_S:
+    if evidence.stimulus is not None:
+        kept = _thinned(evidence, lambda part: cost_s(part) <= AFFORDABLE_S)
+    while evidence.stimulus is None and cost_s(kept) > AFFORDABLE_S:
         # where events crowd, a part of the pixels costs more than its share
         share *= 0.98 * AFFORDABLE_S / cost_s(kept)
         width, height = (
@@ -129,21 +135,29 @@ def _busiest(evidence: Evidence, width: int, height: int) -> tuple[int, int]:
 
 
 def _cropped(evidence: Evidence, left: int, top: int, width: int, height: int) -> Evidence:
-    stream = evidence.stream
-    y, x = np.divmod(stream.pixel, evidence.width)
-    inside = (x >= left) & (x < left + width) & (y >= top) & (y < top + height)
-    pixel = ((y - top) * width + (x - left))[inside].astype(np.int32)
-    kept = Stream(stream.t[inside], pixel, stream.on[inside], width, height)
-
-    def cropped(frame: NDArray[Any]) -> NDArray[Any]:
-        return frame[top : top + height, left : left + width]
-
     return _partial(
-        replace(evidence.with_frames(cropped), stream=kept, width=width, height=height),
+        evidence.cut(slice(top, top + height), slice(left, left + width)),
         evidence,
         f"pixels outside the {width}x{height} at column {left}, row {top}",
         f"cropped from {evidence.width}x{evidence.height} pixels",
     )
+
+
+def _thinned(evidence: Evidence, is_enough: Callable[[Evidence], bool]) -> Evidence:
+    """Return every n-th pixel of every n-th row: where all see the same, any are as good.
+
+    Unlike the busiest ones, they have their share of hot pixels.
+    """
+    kept, step = evidence, 1
+    while not is_enough(kept):
+        step += 1
+        some = slice(step // 2, None, step)
+        part = evidence.cut(some, some)
+        if part.width * part.height < _FEWEST_PIXELS:
+            break
+        what = f"one pixel of each {step}x{step}"
+        kept = _partial(part, evidence, f"all but {what}", f"{what} was looked at")
+    return kept
 
 
 def _shortened(evidence: Evidence, intervals: int) -> Evidence:

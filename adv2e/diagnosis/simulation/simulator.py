@@ -92,8 +92,7 @@ class Simulator:
 
     def _recorded(self, config: Config) -> Instants:
         """Return the light of the recording's frames, and what is made of them once."""
-        shown = self._evidence.simulated
-        return self._frames.of(config, lambda: (shown.times_ns, shown.light(config)))
+        return self._frames.of(config, lambda: self._evidence.instants(config))
 
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
+from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.statistics.groups import (
     LIGHT_NAMES,
     POLARITIES,
@@ -22,6 +23,10 @@ from adv2e.diagnosis.statistics.groups import (
 
 _MOTION = ("at rest", "in motion")
 _COURSE, _LOADS, _PHASES = 6, 5, 10
+SINCE_LEAP_MS = (
+    *(0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0),
+    *(64.0, 128.0),
+)
 
 
 def rates() -> Group:
@@ -126,3 +131,27 @@ def phase(scene: Scene) -> Group:
         return excess(number, number.sum(axis=0) / _PHASES).ravel()
 
     return Group("time since the last frame", 0.6, entries, count, values)
+
+
+def since_leap(leaps: Leaps) -> Group:
+    """Return numbers of events by the time since the light leapt, polarity and brightness."""
+    bins = list(zip((0.0, *SINCE_LEAP_MS), SINCE_LEAP_MS, strict=False))
+    entries = numbers(
+        (
+            f"{p} events {a:g}-{b:g} ms after a leap, {light}",
+            f"{p} events {a:g} to {b:g} ms after the light leapt, where it is {light}",
+        )
+        for a, b in bins
+        for light in LIGHT_NAMES
+        for p in POLARITIES
+    )
+    borders_us = np.array(SINCE_LEAP_MS) * 1e3
+
+    def count(placed: Placed) -> Array:
+        since = leaps.since(placed.stream)
+        used = (since >= 0) & (since < borders_us[-1])
+        step = np.searchsorted(borders_us, since[used], "right")
+        cell = (step * BRIGHTNESSES + placed.brightness[used]) * 2 + placed.stream.on[used]
+        return counts(placed.part[used], cell, len(entries))
+
+    return Group("time since the light leapt", 0.6, entries, count)

@@ -12,7 +12,7 @@ from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.statistics.groups import Array, Entry, Group
 from adv2e.diagnosis.statistics.intervals import intervals, neighbours, runs
 from adv2e.diagnosis.statistics.pixels import count_pixels, pixels
-from adv2e.diagnosis.statistics.rates import course, load, phase, rate_hz, rates
+from adv2e.diagnosis.statistics.rates import course, load, phase, rate_hz, rates, since_leap
 from adv2e.diagnosis.statistics.spectrum import spectrum
 from adv2e.diagnosis.statistics.stamps import gaps, row_gaps, ticks
 from adv2e.diagnosis.statistics.timing import Slopes, drift, lag, shift
@@ -45,6 +45,12 @@ class SummaryStatistics:
         expected = np.mean([count_pixels(one, scene) for one in placed], axis=0)
         slopes = Slopes(scene)
         self.scene = scene
+        # of light that is known when it leaps, nothing hangs on when frames were
+        of_light = (
+            [shift(slopes), phase(scene), spectrum(scene)]
+            if scene.leaps is None
+            else [since_leap(scene.leaps)]
+        )
         self.groups: list[Group] = [
             rates(),
             course(scene.times_us[0], scene.times_us[-1]),
@@ -54,9 +60,7 @@ class SummaryStatistics:
             runs(),
             lag(slopes),
             drift(slopes),
-            shift(slopes),
-            phase(scene),
-            spectrum(scene),
+            *of_light,
             ticks(),
             gaps(),
             row_gaps(),

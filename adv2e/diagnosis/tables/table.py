@@ -83,7 +83,9 @@ class Table:
             except ValueError:
                 raise self.wrong(k, column, "must be a number") from None
             if not math.isfinite(value):
-                raise self.wrong(k, column, "must be a finite number, or empty")
+                raise self.wrong(
+                    k, column, "must be a finite number" + ", or empty" * (not required)
+                )
             if not value > above:
                 raise self.wrong(k, column, f"must be above {above:g}")
             if not value >= at_least:

@@ -1,0 +1,175 @@
+"""Light that is known at all times, in the place of frames: an LED's steps, a lamp with a trace.
+
+Every pixel of a region sees the same light.  It is a line between two instants; where it leaps, two
+of them are 0.1 us apart, which is less than a stamp tells.  The pixels' own simulation takes the
+logarithm of the light for a line, so that instants are put between two that are far apart: what is
+left is at most 2e-4 ln.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.diagnosis.data.stream import Stream
+
+LEAP_NS = 100
+"""Time that a leap takes."""
+_NEAR_LN = 0.04
+"""Most by which the light of neighbouring instants differs: a line is off by its square / 8 [ln]"""
+_DARK_DN = 0.1
+"""Light below which no difference counts."""
+_GRID_S, _FINEST_S = 2e-3, 1e-4
+_OF_A_STEP = 0.25
+"""Time between instants that are looked at, where leaps are near, as a share of that between two"""
+_MOST = 4000
+"""Times between instants that are looked at."""
+_LEAST_LN, _QUICK_NS, _APART_US = 0.05, 100_000, 200
+"""A leap: by at least so much, within so long, and not so soon after another."""
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """The course of a known light.
+
+    Attributes
+    ----------
+    name : str
+        Its file.
+    times_ns : (instants,) int64
+        Increasing.
+    light : (instants, regions)
+        Light at them [DN].
+    region : (rows, columns)
+        Which of the regions each pixel is in.
+    """
+
+    name: str
+    times_ns: NDArray[np.int64]
+    light: NDArray[np.float64]
+    region: NDArray[np.intp]
+
+    def at(self, times_ns: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the light at some times, (times, regions); of a leap, that before it."""
+        columns = [np.interp(times_ns, self.times_ns, one) for one in self.light.T]
+        return np.stack(columns, axis=1)
+
+    def cut(self, rows: slice, columns: slice) -> Stimulus:
+        """Return what some of the pixels see."""
+        return replace(self, region=self.region[rows, columns])
+
+    def between(self, start_ns: int, stop_ns: int) -> Stimulus:
+        """Return the course from one time to another, which are instants of it then."""
+        inner = self.times_ns[(self.times_ns > start_ns) & (self.times_ns < stop_ns)]
+        times = np.array([start_ns, *inner.tolist(), stop_ns], np.int64)
+        return replace(self, times_ns=times, light=self.at(times))
+
+    def instants(self, span_ns: Sequence[int]) -> int:
+        """Return how many instants there are from the first to the last of some times."""
+        first, last = np.searchsorted(self.times_ns, [span_ns[0], span_ns[-1]])
+        return int(last - first)
+
+    @cached_property
+    def leaps(self) -> Leaps:
+        """When the light of each pixel leaps."""
+        each = [_leaps_us(self.times_ns, one) for one in self.light.T]
+        return Leaps(tuple(each), self.region.ravel())
+
+    def looked_at_ns(self) -> NDArray[np.int64]:
+        """Return evenly spaced instants, near enough that a change and its events are together."""
+        first, last = int(self.times_ns[0]), int(self.times_ns[-1])
+        apart_us = [np.diff(one) for one in self.leaps.times_us if len(one) > 1]
+        step_s = _GRID_S
+        if apart_us:
+            step_s = min(step_s, _OF_A_STEP * 1e-6 * float(np.median(np.concatenate(apart_us))))
+        step_s = max(step_s, _FINEST_S, 1e-9 * (last - first) / _MOST)
+        count = max(int(np.ceil(1e-9 * (last - first) / step_s - 1e-6)), 2)
+        return np.rint(np.linspace(first, last, count + 1)).astype(np.int64)
+
+
+def refined(times_ns: NDArray[np.int64], light: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the instants of a course, and more where a line of its logarithm would be another.
+
+    `times_ns`: (instants,); `light`: (instants, regions).
+    """
+    found = [times_ns]
+    for course in light.T:
+        log = np.log(np.maximum(course, _DARK_DN))
+        pieces = np.ceil(np.abs(np.diff(log)) / _NEAR_LN).astype(np.int64)
+        for k in np.flatnonzero((pieces > 1) & (np.diff(times_ns) > pieces * LEAP_NS)):
+            dn = np.exp(np.linspace(log[k], log[k + 1], pieces[k] + 1)[1:-1])
+            share = (dn - course[k]) / (course[k + 1] - course[k])
+            inside = times_ns[k] + np.rint(share * (times_ns[k + 1] - times_ns[k]))
+            found.append(inside.astype(np.int64))
+    every = np.unique(np.concatenate(found))
+    # of several regions, instants may nearly meet; those of the course stay
+    keep = np.r_[True, np.diff(every) >= LEAP_NS // 2] | np.isin(every, times_ns)
+    return np.asarray(every[keep])
+
+
+def _leaps_us(times_ns: NDArray[np.int64], course: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the times [us] at which a course leaps."""
+    change = np.abs(np.diff(np.log(np.maximum(course, _DARK_DN))))
+    quick = (change > _LEAST_LN) & (np.diff(times_ns) <= _QUICK_NS)
+    found: list[int] = []
+    for t_us in (times_ns[:-1][quick] // 1000).tolist():
+        if not found or t_us - found[-1] >= _APART_US:
+            found.append(t_us)
+    return np.array(found, np.int64)
+
+
+@dataclass(frozen=True)
+class Leaps:
+    """Times [us] at which the light leaps, of each region, and the region of each pixel."""
+
+    times_us: tuple[NDArray[np.int64], ...]
+    region: NDArray[np.intp]
+
+    def since(self, stream: Stream) -> NDArray[np.int64]:
+        """Return the time from the last leap that its pixel saw to each event [us].
+
+        -1: there was none.
+        """
+        since = np.full(len(stream), -1, np.int64)
+        of_region = self.region[stream.pixel]
+        for number, leaps in enumerate(self.times_us):
+            which = np.flatnonzero(of_region == number) if len(self.times_us) > 1 else slice(None)
+            before = np.searchsorted(leaps, stream.t[which], "right") - 1
+            if len(leaps):
+                after = stream.t[which] - leaps[np.maximum(before, 0)]
+                since[which] = np.where(before >= 0, after, -1)
+        return since
+
+
+class Seen(Sequence[NDArray[Any]]):
+    """Frames of a known light, each made when it is asked for: those of a whole sensor are many.
+
+    `light`: (frames, regions) float32 [DN]; `region`: (rows, columns).
+    """
+
+    def __init__(self, light: NDArray[np.float32], region: NDArray[np.intp]) -> None:
+        self.light, self.region = light, region
+
+    def __len__(self) -> int:
+        return len(self.light)
+
+    @overload
+    def __getitem__(self, which: int) -> NDArray[Any]: ...
+    @overload
+    def __getitem__(self, which: slice) -> Seen: ...
+    def __getitem__(self, which: int | slice) -> NDArray[Any] | Seen:
+        if isinstance(which, slice):
+            return Seen(self.light[which], self.region)
+        return np.asarray(self.light[which][self.region])
+
+
+def joined(before: Sequence[NDArray[Any]], after: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+    """Return two sequences of frames, one after the other."""
+    if isinstance(before, Seen) and isinstance(after, Seen):
+        return Seen(np.concatenate([before.light, after.light]), after.region)
+    return [*before, *after]
