@@ -14,7 +14,7 @@ from adv2e.diagnosis.data.input_checks import check_inputs, check_known_light
 from adv2e.diagnosis.data.scene import Placed, Scene
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate
-from adv2e.diagnosis.fitting.library import OF_FRAMES, library
+from adv2e.diagnosis.fitting.library import library, of_known_light
 from adv2e.diagnosis.fitting.nuisances import (
     TOLERANCE,
     fit_thresholds,
@@ -117,7 +117,7 @@ def prepare(
         threshold_nuisance(declared) if free_thresholds else NOTHING,
         simulator.begin,
     )
-    without = [*without, *(OF_FRAMES if known else ())]
-    candidates = [one for one in library(declared, hints) if one.name not in without]
+    every = of_known_light(declared, hints) if known else library(declared, hints)
+    candidates = [one for one in every if one.name not in without]
     evidence = replace(evidence, notes=notes)
     return Prepared(evidence, scene, reference, candidates, frames, levels)

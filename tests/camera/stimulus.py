@@ -38,10 +38,10 @@ def bench(duration_s: float, seed: int) -> Rows:
         rows += [(time, rows[-1][1]), (time, dn)]
         time = round(time + 0.1 * duration_s, 6)
     rows += [(time, rows[-1][1])]
-    swing = np.linspace(0.0, 1.0, 101)[1:]
+    swing = np.linspace(0.0, 1.0, 61)[1:]
     left = duration_s - time
     rows += [
-        (round(time + left * at, 6), float(120.0 * np.exp(-1.5 * np.sin(2 * np.pi * 2 * at) ** 2)))
+        (round(time + left * at, 6), float(120.0 * np.exp(-1.5 * np.sin(2 * np.pi * at) ** 2)))
         for at in swing.tolist()
     ]
     return rows

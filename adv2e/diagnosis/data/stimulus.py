@@ -3,7 +3,7 @@
 Every pixel of a region sees the same light.  It is a line between two instants; where it leaps, two
 of them are 0.1 us apart, which is less than a stamp tells.  The pixels' own simulation takes the
 logarithm of the light for a line, so that instants are put between two that are far apart: what is
-left is at most 2e-4 ln.
+left is at most 5e-5 ln.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ from adv2e.diagnosis.data.stream import Stream
 
 LEAP_NS = 100
 """Time that a leap takes."""
-_NEAR_LN = 0.04
+_NEAR_LN = 0.02
 """Most by which the light of neighbouring instants differs: a line is off by its square / 8 [ln]"""
+_LENGTHS_NS = tuple(k * 10**e for e in range(9, 1, -1) for k in (5, 2, 1))
+_OFTEN, _ALIKE = 50, 1e-3
+"""Of times between instants: those that a trace has, or that all others are made of, nearly."""
 _DARK_DN = 0.1
 """Light below which no difference counts."""
 _GRID_S, _FINEST_S = 2e-3, 1e-4
@@ -95,21 +98,43 @@ class Stimulus:
 def refined(times_ns: NDArray[np.int64], light: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the instants of a course, and more where a line of its logarithm would be another.
 
-    `times_ns`: (instants,); `light`: (instants, regions).
+    `times_ns`: (instants,); `light`: (instants, regions).  Between them lie times of few lengths,
+    as what solves an interval is made anew for each length that there is, by every model.
     """
-    found = [times_ns]
-    for course in light.T:
-        log = np.log(np.maximum(course, _DARK_DN))
-        pieces = np.ceil(np.abs(np.diff(log)) / _NEAR_LN).astype(np.int64)
-        for k in np.flatnonzero((pieces > 1) & (np.diff(times_ns) > pieces * LEAP_NS)):
-            dn = np.exp(np.linspace(log[k], log[k + 1], pieces[k] + 1)[1:-1])
-            share = (dn - course[k]) / (course[k + 1] - course[k])
-            inside = times_ns[k] + np.rint(share * (times_ns[k + 1] - times_ns[k]))
-            found.append(inside.astype(np.int64))
-    every = np.unique(np.concatenate(found))
-    # of several regions, instants may nearly meet; those of the course stay
-    keep = np.r_[True, np.diff(every) >= LEAP_NS // 2] | np.isin(every, times_ns)
-    return np.asarray(every[keep])
+    log = np.log(np.maximum(light, _DARK_DN))
+    apart = np.diff(times_ns)
+    lengths, which, often = np.unique(apart, return_inverse=True, return_counts=True)
+    kept = (often[which] >= _OFTEN) | (lengths[which] <= LEAP_NS)
+    kept &= np.abs(np.diff(log, axis=0)).max(axis=1) <= _NEAR_LN
+    kept |= apart <= LEAP_NS
+    found = times_ns.tolist()
+    for k in np.flatnonzero(~kept).tolist():
+        found += _between(found[k], found[k + 1], light[k], light[k + 1])
+    return np.unique(np.array(found, np.int64))
+
+
+def _between(
+    start_ns: int, stop_ns: int, first: NDArray[np.float64], last: NDArray[np.float64]
+) -> list[int]:
+    """Return instants between two of a course, the light of which is given, (regions,)."""
+    slope = (last - first) / (stop_ns - start_ns)
+    rests, found, t_ns = not slope.any(), [], start_ns
+
+    def log(at_ns: int) -> NDArray[np.float64]:
+        return np.log(np.maximum(first + slope * (at_ns - start_ns), _DARK_DN))
+
+    while True:
+        left_ns = stop_ns - t_ns
+        here = log(t_ns)
+        for length in _LENGTHS_NS:
+            if length * (1.0 - _ALIKE) > left_ns:
+                continue
+            if rests or np.abs(log(t_ns + length) - here).max() <= _NEAR_LN:
+                break
+        t_ns += length
+        if t_ns > stop_ns - _LENGTHS_NS[-1] or t_ns > stop_ns - _ALIKE * length:
+            return found
+        found.append(t_ns)
 
 
 def _leaps_us(times_ns: NDArray[np.int64], course: NDArray[np.float64]) -> NDArray[np.int64]:

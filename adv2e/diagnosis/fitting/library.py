@@ -14,6 +14,8 @@ from dataclasses import replace
 from itertools import zip_longest
 from typing import Any
 
+import numpy as np
+
 from adv2e.config import Config, to_dict
 from adv2e.config.build import keys_of
 from adv2e.config.paths import get_key
@@ -31,6 +33,8 @@ OF_FRAMES = (
     "frame_coupling",
 )
 """Effects on light that frames tell; of known light there are none, but its clock may be off."""
+_BETWEEN, _BEYOND, _MOST_STARTS = 0.25, 0.5, 16
+"""Of the values where fits under known light begin, on the fitted scale."""
 _LEAST_DN = 0.02
 """Of a black level, either way."""
 _USUAL, _FARTHEST = 2.0, 10.0
@@ -45,6 +49,26 @@ def library(declared: Config, hints: Hints) -> list[Candidate]:
     return [replace(one, pulse=hints.pulse) for one in every]
 
 
+def of_known_light(declared: Config, hints: Hints) -> list[Candidate]:
+    """Return the candidates of :func:`library` that there are where the light is known.
+
+    All pixels do the same at the same time, so that statistics follow keys in steps: a fit that
+    does not begin near does not arrive.  What has one key begins at many values.
+    """
+    every = [one for one in library(declared, hints) if one.name not in OF_FRAMES]
+    return [_from_many(one) if len(one.parameters) == 1 else one for one in every]
+
+
+def _from_many(candidate: Candidate) -> Candidate:
+    """Return a candidate of one parameter that begins at more values, about those that it has."""
+    (parameter,) = candidate.parameters
+    given = [parameter.scaled(start) for (start,) in candidate.starts]
+    low, high = min(given) - _BEYOND, max(given) + _BEYOND
+    count = min(round((high - low) / _BETWEEN) + 1, _MOST_STARTS)
+    more = (parameter.value_at(at) for at in np.linspace(low, high, count).tolist())
+    return replace(candidate, starts=(*candidate.starts, *((value,) for value in more)))
+
+
 def names(config: Config | None = None) -> list[str]:
     """Return the names of all effects that can be found, with those of the user's own."""
     built_in = (one.name for one in _built_in(Config(), Hints(1.0, (Lamp(100.0),), 10)))
@@ -55,7 +79,7 @@ def _built_in(declared: Config, hints: Hints) -> Iterator[Candidate]:
     values = to_dict(declared)
     yield from _of_the_thresholds(values, hints)
     yield from _of_the_photoreceptor(values)
-    yield from _of_the_comparator()
+    yield from _of_the_comparator(hints)
     yield from _of_the_readout(values, hints)
     yield from _of_the_frames(values, hints)
 
@@ -167,8 +191,10 @@ def _of_the_photoreceptor(values: dict[str, Any]) -> Iterator[Candidate]:
         yield _of_one("photoreceptor_noise", "pixel.photoreceptor_noise.rms", *rms)
 
 
-def _of_the_comparator() -> Iterator[Candidate]:
-    yield _of_one("refractory", "pixel.refractory.period_us", 1500.0, 5000.0, 15000.0)
+def _of_the_comparator(hints: Hints) -> Iterator[Candidate]:
+    dead, seen = "pixel.refractory.period_us", hints.shortest_us
+    read_off = () if seen is None else (max(seen, _fit_of(dead).low),)
+    yield _of_one("refractory", dead, 1500.0, 5000.0, 15000.0, *read_off)
     overshoot = _parameter("pixel.reset_overshoot.fraction", 0.1)
     yield _of_one("reset_overshoot", overshoot, -0.1, 0.1, 0.25)
     yield _of_one("leak", "pixel.leak.rate_hz", 0.6, 2.0, 6.0)

@@ -18,6 +18,7 @@ from adv2e.diagnosis.hints.stamps import Service, service_times, tick_of
 from adv2e.diagnosis.simulation.simulator import Simulator
 
 _LAMP_SEED = 9_998
+_HARDLY_ANY = 0.01
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,9 @@ class Hints:
     readouts: Readouts | None = None
     pulse: Pulse | None = None
     too_many: tuple[float, float] = (1.0, 1.0)
+    shortest_us: float | None = None
+    """Time between events of a pixel that hardly any two are nearer than, under known light: where
+    all pixels do the same at the same time, fits find a dead time from near alone."""
 
 
 def hints_of(
@@ -74,12 +78,14 @@ def hints_of(
     stream = evidence.stream
     too_many = _too_many(stream, pilot, 1), _too_many(stream, pilot, 0)
     if evidence.stimulus is not None:  # no lamp that it does not tell, no frame that is read out
+        apart = stream.since[stream.since >= 0]
         return Hints(
             evidence.seconds,
             (),
             tick_of(stream.t),
             service=service_times(stream),
             too_many=too_many,
+            shortest_us=float(np.quantile(apart, _HARDLY_ANY)) if len(apart) else None,
         )
     looked_at = scene.split.chosen(stream, splits.TRAIN, splits.VALIDATION)
     lines = strongest_lines(train(stream), list(map(train, pilot)), scene)
