@@ -107,7 +107,7 @@ def refined(times_ns: NDArray[np.int64], light: NDArray[np.float64]) -> NDArray[
     kept = (often[which] >= _OFTEN) | (lengths[which] <= LEAP_NS)
     kept &= np.abs(np.diff(log, axis=0)).max(axis=1) <= _NEAR_LN
     kept |= apart <= LEAP_NS
-    found = times_ns.tolist()
+    found: list[int] = times_ns.tolist()
     for k in np.flatnonzero(~kept).tolist():
         found += _between(found[k], found[k + 1], light[k], light[k + 1])
     return np.unique(np.array(found, np.int64))

@@ -192,9 +192,9 @@ def _of_the_photoreceptor(values: dict[str, Any]) -> Iterator[Candidate]:
 
 
 def _of_the_comparator(hints: Hints) -> Iterator[Candidate]:
-    dead, seen = "pixel.refractory.period_us", hints.shortest_us
-    read_off = () if seen is None else (max(seen, _fit_of(dead).low),)
-    yield _of_one("refractory", dead, 1500.0, 5000.0, 15000.0, *read_off)
+    period, seen = "pixel.refractory.period_us", hints.shortest_us
+    read_off = () if seen is None else (max(seen, _fit_of(period).low),)
+    yield _of_one("refractory", period, 1500.0, 5000.0, 15000.0, *read_off)
     overshoot = _parameter("pixel.reset_overshoot.fraction", 0.1)
     yield _of_one("reset_overshoot", overshoot, -0.1, 0.1, 0.25)
     yield _of_one("leak", "pixel.leak.rate_hz", 0.6, 2.0, 6.0)
