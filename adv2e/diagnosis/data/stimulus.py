@@ -107,7 +107,7 @@ def refined(times_ns: NDArray[np.int64], light: NDArray[np.float64]) -> NDArray[
     kept = (often[which] >= _OFTEN) | (lengths[which] <= LEAP_NS)
     kept &= np.abs(np.diff(log, axis=0)).max(axis=1) <= _NEAR_LN
     kept |= apart <= LEAP_NS
-    found: list[int] = times_ns.tolist()
+    found = times_ns.tolist()
     for k in np.flatnonzero(~kept).tolist():
         found += _between(found[k], found[k + 1], light[k], light[k + 1])
     return np.unique(np.array(found, np.int64))
@@ -118,7 +118,8 @@ def _between(
 ) -> list[int]:
     """Return instants between two of a course, the light of which is given, (regions,)."""
     slope = (last - first) / (stop_ns - start_ns)
-    rests, found, t_ns = not slope.any(), [], start_ns
+    found: list[int] = []
+    rests, t_ns = not slope.any(), start_ns
 
     def log(at_ns: int) -> NDArray[np.float64]:
         return np.log(np.maximum(first + slope * (at_ns - start_ns), _DARK_DN))
