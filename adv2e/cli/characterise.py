@@ -66,8 +66,8 @@ def command(
     TABLE is delimited text with a header. Columns are known by their names: light (irradiance_W_m2,
     illuminance_lux or light_dn) and either latency_us (_ms, _s), with latency_error_us or
     latency_sd_us and number, contrast_ln, polarity and bias where known; or on_rate_hz and
-    off_rate_hz, with on_median_hz, off_median_hz, on_share, off_share, pixels and duration_s where
-    known. Other columns are labels.
+    off_rate_hz, with on_median_hz, off_median_hz, on_share, off_share, on_share_5 (of the pixels
+    with 5 events or more; any number), pixels and duration_s where known. Other columns are labels.
 
     The declared model is the circuit of the paper (corner proportional to light, no noise) with the
     keys written in -c and --set. An effect is named only where it lowers the error on light that it

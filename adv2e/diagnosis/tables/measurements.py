@@ -23,6 +23,7 @@ Noise tables
 ``on_rate_hz``, ``off_rate_hz`` events a pixel a second, mean over the pixels
 ``on_median_hz``, ``off_...``   median over the pixels
 ``on_share``, ``off_share``     share of the pixels with at least one event
+``on_share_5``, ``off_...``     with at least five; any whole number
 ``pixels``, ``duration_s``      how many pixels were watched, and how long
 ``least_hz``                    least rate that would have shown; default: 1/(pixels duration)
 =============================== ==================================================================
@@ -30,6 +31,7 @@ Noise tables
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +51,8 @@ TIMES = {"us": 1.0, "ms": 1e3, "s": 1e6}
 POLARITIES = {"1": 1, "on": 1, "+": 1, "0": 0, "off": 0, "-": 0, "-1": 0}
 
 LEAST_LEVELS = 3
+
+_RATE = re.compile(r"(on|off)_(rate_hz|median_hz|share|share_[1-9][0-9]*)")
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,7 @@ def measurements_of(table: Table) -> Latencies | Noise:
     """
     there = f"(there: {', '.join(table.columns)})"
     times = [f"latency_{unit}" for unit in TIMES if f"latency_{unit}" in table.columns]
-    rates = [name for name in ("on_rate_hz", "off_rate_hz") if name in table.columns]
+    rates = [name for name in table.columns if _RATE.fullmatch(name)]
     if bool(times) == bool(rates):
         raise DataError(
             f"{table.name}: must have either a column latency_us (or _ms, _s) or columns"
@@ -171,9 +175,9 @@ def _standard_error_us(table: Table) -> Array:
 
 
 def _noise(table: Table, light: Array, unit: str) -> Noise:
-    names = [f"{p}_{kind}" for p in ("on", "off") for kind in ("rate_hz", "median_hz", "share")]
-    rates = {name: table.numbers(name, at_least=0.0) for name in names if name in table.columns}
-    shares = [name for name in rates if name.endswith("_share")]
+    names = [name for name in table.columns if _RATE.fullmatch(name)]
+    rates = {name: table.numbers(name, at_least=0.0) for name in names}
+    shares = [name for name in rates if "_share" in name]
     for name in shares:
         for k in np.flatnonzero(rates[name] > 1.0):
             raise table.wrong(int(k), name, "must be a share from 0 to 1")

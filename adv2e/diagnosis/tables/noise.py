@@ -39,7 +39,6 @@ import itertools
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,9 +55,9 @@ from adv2e.effects.pixel.thresholds import FLOOR
 
 Array = NDArray[np.float64]
 
-_NORMAL = np.linspace(-3.2, 3.2, 9)
+_NORMAL = np.linspace(-2.7, 2.7, 7)
 """Deviations at which pixels are taken, of one threshold; `_HOT`: of the rates of hot ones."""
-_HOT = np.linspace(-4.0, 4.0, 21)
+_HOT = np.linspace(-3.5, 3.5, 15)
 
 
 @dataclass(frozen=True)
@@ -134,40 +133,27 @@ class Rates:
         mean: Array = self.off_of @ self.weights
         return mean
 
-    def on_share(self, seconds: Array) -> Array:
-        """Return the share of the pixels that have ON events in so many seconds, (n,)."""
-        return self._reached(0.5, seconds, on=True)
+    def at(self, lights: NDArray[np.int64]) -> Rates:
+        """Return the rates at some of the lights, by their numbers."""
+        parts = (self.leak_of[lights], self.on_of[lights], self.off_of[lights])
+        return Rates(self.weights, *parts, self.hot_fraction, self.hot_hz)
 
-    def quantile(self, share: float, seconds: Array, on: bool) -> Array:
-        """Return how many events a share of the pixels has at most, (n,).
-
-        Numbers of events are whole; between two, at n + 1/2, a share lies that has n at most.
-        """
-        low = np.full(seconds.shape, -0.5)
-        high = 10.0 + 2.0 * seconds * (self.leak_of + self.on_of + self.off_of).max(axis=1)
-        high += 10.0 * seconds * float(self.hot_hz.max())
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            enough = 1.0 - self._reached(middle, seconds, on) >= share
-            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        middle = 0.5 * (low + high)
-        return np.asarray(middle, dtype=np.float64)
-
-    def _reached(self, number: Array | float, seconds: Array, on: bool) -> Array:
-        """Return the share of the pixels with more events than a number in so many seconds."""
-        number = np.broadcast_to(np.asarray(number, np.float64), seconds.shape)[:, None]
+    def share_having(self, number: int, seconds: Array, on: bool) -> Array:
+        """Return the share of all pixels that have so many events or more in (n,) seconds."""
         time = seconds[:, None]
         if not on:
-            below: Array = _poisson_below(number, self.off_of * time) @ self.weights
-            return 1.0 - below
+            off: Array = at_least(number, self.off_of * time) @ self.weights
+            return off
         noise, leak = self.on_of * time, self.leak_of * time
-        phases = np.linspace(-0.4, 0.4, 5)[:, None, None] * np.minimum(leak, 1.0)  # it is regular
-        below = np.mean(_poisson_below(number - leak - phases, noise), axis=0) @ self.weights
+        whole = np.floor(leak)  # leak is regular: one number of events, or one more
+        more = leak - whole
+        share = (1.0 - more) * at_least(number - whole, noise)
+        share = (share + more * at_least(number - whole - 1.0, noise)) @ self.weights
         if self.hot_fraction > 0.0:
             usual = ((self.leak_of + self.on_of) @ self.weights)[:, None]
-            hot = _poisson_below(number, (usual + self.hot_hz) * time) @ _density(_HOT)
-            below = (1.0 - self.hot_fraction) * below + self.hot_fraction * hot
-        return 1.0 - below
+            hot = at_least(number, (usual + self.hot_hz) * time) @ _density(_HOT)
+            share = (1.0 - self.hot_fraction) * share + self.hot_fraction * hot
+        return np.asarray(share, dtype=np.float64)
 
 
 def noise_rates(sources: NoisySources, light: Array) -> Rates:
@@ -229,23 +215,28 @@ def _rare(leak: Array, noise: Array) -> Array:
     return left
 
 
-def _poisson_below(number: Array, mean: Array) -> Array:
-    """Return the probability of less than number + 1/2 Poisson events, smooth in the number [3]."""
-    n = np.maximum(number + 0.5, 1e-9)
-    mean = np.maximum(mean, 1e-9)
-    spread = 1.0 / (9.0 * n)
-    below: Array = _normal_above((np.cbrt(mean / n) - (1.0 - spread)) / np.sqrt(spread))
-    return np.where(number > -0.5, below, 0.0)
+def at_least(number: Array | float, mean: Array) -> Array:
+    """Return the probability of so many Poisson events or more; of many by normal numbers [3]."""
+    number = np.broadcast_to(np.asarray(number, np.float64), np.shape(mean))
+    mean = np.maximum(mean, 1e-12)
+    few = np.clip(number, 1.0, _FEW)
+    spread = 1.0 / (9.0 * np.maximum(number, 1.0))
+    far = (np.cbrt(mean / np.maximum(number, 1.0)) - (1.0 - spread)) / np.sqrt(spread)
+    terms = few[..., None] + np.arange(24.0)
+    logs = terms * np.log(mean)[..., None] - mean[..., None] - _LOG_FACTORIALS[terms.astype(int)]
+    below = np.arange(_FEW)
+    logs_below = below * np.log(mean)[..., None] - mean[..., None] - _LOG_FACTORIALS[below]
+    fewer = (np.exp(logs_below) * (below < few[..., None])).sum(axis=-1)
+    tail = np.where(mean < few, np.exp(logs).sum(axis=-1), 1.0 - fewer)
+    found = np.where(number > _FEW, np.interp(far, _PLACES, _BELOW), np.clip(tail, 0.0, 1.0))
+    return np.asarray(np.where(number <= 0.0, 1.0, found), dtype=np.float64)
 
 
+_FEW = 8
+_LOG_FACTORIALS = np.cumsum(np.log(np.maximum(np.arange(64), 1)))
 _STEP = 0.01
 _PLACES = np.arange(-9.0, 9.0 + _STEP, _STEP)
 _BELOW = np.cumsum(np.exp(-0.5 * (_PLACES - 0.5 * _STEP) ** 2)) * _STEP / math.sqrt(2.0 * math.pi)
-
-
-def _normal_above(x: Array) -> Array:
-    above: Array = np.interp(-x, _PLACES, _BELOW)
-    return above
 
 
 class Law:
@@ -279,20 +270,19 @@ class Law:
             _kept(max(slow * dead_time_s, 1e-12), _DEAD_TIMES),
             _kept(leak_hz / slow, _LEAKS),
         )
-        self._parts = [
-            (_table(first[0], second[0], third[0]), first[1] * second[1] * third[1])
-            for first, second, third in itertools.product(*kept)
-        ]
+        self._logs = np.zeros((2, _COUNT, _COUNT))
+        for first, second, third in itertools.product(*kept):
+            share = first[1] * second[1] * third[1]
+            self._logs += share * _tabulated(first[0], second[0], third[0])
 
     def rates(self, on: Array, off: Array) -> Array:
         """Return the rates [Hz], (2, ...), of pixels with these thresholds [ln]."""
         first, on_weights = _cubic(on / self._sigma + self._shift - _LEAST)
         second, off_weights = _cubic(off / self._sigma + self._shift - _LEAST - _APART)
         logs = np.zeros((2, *np.shape(on)))
-        for table, share in self._parts:
-            for i, p in enumerate(on_weights):
-                for j, q in enumerate(off_weights):
-                    logs += share * p * q * _filled(table, first + i, second + j)
+        for i, p in enumerate(on_weights):
+            for j, q in enumerate(off_weights):
+                logs += p * q * self._logs[:, first + i, second + j]
         return np.asarray(self._slow * np.exp(logs), dtype=np.float64)
 
 
@@ -304,31 +294,16 @@ _RATIOS, _DEAD_TIMES, _LEAKS = (2.0, -12, 0), (4.0, -4, 3), (8.0, -6, -1)
 units of the slower pole."""
 
 
-class Table(NamedTuple):
-    """ln of ON and OFF rates against both thresholds, (2, _COUNT, _COUNT), NaN where not needed."""
-
-    ratio: float
-    dead_time: float
-    leak: float
-    logs: Array
-
-
-@lru_cache(maxsize=1024)
-def _table(ratio: float, dead_time: float, leak: float) -> Table:
-    return Table(ratio, dead_time, leak, np.full((2, _COUNT, _COUNT), np.nan))
-
-
-def _filled(table: Table, i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
-    """Return values of a table, (2, ...), those which are not there yet being computed."""
-    values: Array = table.logs[:, i, j]
-    missing = np.isnan(values[0])
-    if missing.any():
-        for at, to in {*zip(i[missing].tolist(), j[missing].tolist(), strict=True)}:
-            on, off = _LEAST + _GRID * at, _LEAST + _GRID * to + _APART
-            found = event_rates(on, off, table.dead_time, table.ratio, table.leak)
-            table.logs[:, at, to] = np.log(np.maximum(found, 1e-15))
-        values = table.logs[:, i, j]
-    return values
+@lru_cache(maxsize=2048)
+def _tabulated(ratio: float, dead_time: float, leak: float) -> Array:
+    """Return ln of ON and OFF rates against both thresholds, (2, _COUNT, _COUNT)."""
+    thresholds = (_LEAST + _GRID * np.arange(_COUNT)).tolist()
+    found = [
+        [event_rates(on, off + _APART, dead_time, ratio, leak) for off in thresholds]
+        for on in thresholds
+    ]
+    logs: Array = np.log(np.maximum(np.array(found), 1e-15)).transpose(2, 0, 1)
+    return logs
 
 
 def _kept(value: float, kept: tuple[float, int, int]) -> list[tuple[float, float]]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate, FitParameter
 from adv2e.diagnosis.tables.measurements import Noise
-from adv2e.diagnosis.tables.noise import NoisySources, Rates, noise_rates
+from adv2e.diagnosis.tables.noise import NoisySources, Rates, at_least, noise_rates
 from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, row_errors
 
 LEAK = "pixel.leak.rate_hz"
@@ -19,16 +20,28 @@ SHOT = "pixel.shot_noise.rate_hz"
 RMS = "pixel.photoreceptor_noise.rms"
 HOT_FRACTION = "pixel.hot_pixels.fraction"
 HOT_RATE = "pixel.hot_pixels.rate_hz"
+HOT_SPREAD = "pixel.hot_pixels.spread"
+CUTOFF = "pixel.low_pass.cutoff_hz"
+DARK_CUTOFF = "pixel.low_pass.dark_cutoff_hz"
+FOLLOWER = "pixel.source_follower.cutoff_hz"
+OFF = "pixel.thresholds.off"
+MISMATCH = "pixel.thresholds.mismatch"
 
 LEAST_ERROR = 0.05
 """Relative error of a rate, at the least: that of the light and the camera's temperature."""
 ASSUMED_ERROR = 0.1
 USUAL_FRACTION = 0.01
-"""Share of hot pixels where none is declared: only its product with their rate shows."""
+"""Share of hot pixels where none is declared and only its product with their rate shows."""
 
 Extra = tuple[tuple[str, Any], ...]
+_Several = tuple[str, float, float, tuple[float, ...]]
+"""Key, least and largest value, starts."""
 
-_WORDS = {"rate_hz": "mean", "median_hz": "median", "share": "from the share of pixels"}
+_WORDS = {"rate_hz": "mean", "median_hz": "median"}
+
+_SHAPE = ((CUTOFF, 3.0, 1e6), (DARK_CUTOFF, 0.03, 3e3), (FOLLOWER, 3.0, 1e5))
+"""What shapes photoreceptor noise beside the thresholds, and between which values it is fitted."""
+_SHAPE_STARTS = ((300.0, 3.0, 100.0), (2000.0, 10.0, 300.0), (300.0, 30.0, 30.0))
 
 
 class NoiseProblem(Problem):
@@ -39,7 +52,12 @@ class NoiseProblem(Problem):
     say how many pixels were watched for how long), so that a rate of 0 counts as what it is.  A
     median over pixels is that of whole numbers of events, however many pixels there are: of Poisson
     numbers with mean m it is within half an event of m - 1/3 [1]_, which is its error, and the
-    third its floor.
+    third its floor.  A share of the pixels counts as the rate of Poisson events at which as many
+    would have so many; its error is binomial.
+
+    Photoreceptor noise is tried with its rms alone, or, where shares tell how rates are spread
+    over the pixels, with all that shapes it and is not declared: the corners of both poles, the OFF
+    threshold beside ON, and the mismatch.  Then hot pixels have a fraction and a spread of rates.
 
     Parameters
     ----------
@@ -74,7 +92,7 @@ class NoiseProblem(Problem):
         white = settings.white or float(data.light.max())
         super().__init__(declared, data.light[rows], data.unit, test[rows], white)
         self.hot_fraction = declared.held(HOT_FRACTION, USUAL_FRACTION) or USUAL_FRACTION
-        self._duration = data.duration_s[rows]
+        self._duration, self._pixels = data.duration_s[rows], data.pixels[rows]
         rate = np.array([_rate(data, kind, int(k)) for kind, k in cells])
         watched = data.pixels[rows] * self._duration
         smallest = rate[rate > 0].min() if (rate > 0).any() else 1.0
@@ -82,29 +100,35 @@ class NoiseProblem(Problem):
         floor = np.where(np.isnan(data.least_hz[rows]), floor, data.least_hz[rows])
         medians = np.array([kind.endswith("_median_hz") for kind in self._kinds], np.bool_)
         whole = np.where(medians, 1.0 / self._duration, np.nan)  # rate of one event, if known
-        self.floor = np.fmax(floor, whole / 3.0)
+        self._numbers = [_number_of(kind) for kind in self._kinds]
+        shares = np.array([number > 0 for number in self._numbers])
+        self.spread_shows = self.one_by_one = max(self._numbers) > 1
+        self.floor = np.where(shares, 0.0, np.fmax(floor, whole / 3.0))
         self.measured = np.log(rate + self.floor)
         events = np.sqrt((rate + self.floor) / watched)
         given = np.where(np.isnan(whole), events, np.hypot(events, 0.5 * whole))
         given /= rate + self.floor
+        for k in np.flatnonzero(shares):
+            given[k] = _share_error(data, cells[k][0], int(cells[k][1]))
         repeats = [(kind, data.light[k]) for kind, k in cells]
         self.error, self.error_source = row_errors(
             given, self.measured, repeats, ASSUMED_ERROR, LEAST_ERROR, settings.error
         )
-        self.groups = {
-            _title(kind): np.array([k for k, at in enumerate(self._kinds) if at == kind])
+        self._rows = {
+            kind: np.array([k for k, at in enumerate(self._kinds) if at == kind])
             for kind in dict.fromkeys(self._kinds)
         }
+        self.groups = {_title(kind): rows for kind, rows in self._rows.items()}
         self.nuisances = NOTHING
         self.candidates = list(self._candidates(rate))
-        known = (LEAK, PHOTO_LEAK, SHOT)
+        known = (LEAK, PHOTO_LEAK, SHOT, MISMATCH)
         self.neutral = {key: 0.0 for key in known if declared.held(key, None) is None}
         self.notes = [
             f"255 DN stand for {white:g} {data.unit}.",
             "Errors are of ln(rate + floor), the floor being"
             f" {self.floor.min():.2g} to {self.floor.max():.2g} Hz.",
         ]
-        if HOT_FRACTION not in declared.written:
+        if HOT_FRACTION not in declared.written and not self.spread_shows:
             self.notes.append(
                 f"hot_pixels: only fraction times rate shows; the fraction is {USUAL_FRACTION:g}."
             )
@@ -119,38 +143,47 @@ class NoiseProblem(Problem):
             shot_hz=self._number(values, SHOT),
             rms=self._number(values, RMS),
             noise_step=0.1 if noise is None else noise.step,
-            cutoff_hz=0.0 if corner is None else corner.cutoff_hz,
-            dark_cutoff_hz=0.0 if corner is None else corner.dark_cutoff_hz,
+            cutoff_hz=values.get(CUTOFF, 0.0 if corner is None else corner.cutoff_hz),
+            dark_cutoff_hz=values.get(
+                DARK_CUTOFF, 0.0 if corner is None else corner.dark_cutoff_hz
+            ),
+            follower_hz=self._number(values, FOLLOWER),
             on=pixel.thresholds.on,
-            off=pixel.thresholds.off,
+            off=values.get(OFF, pixel.thresholds.off),
+            mismatch=self._number(values, MISMATCH),
             dead_time_s=0.0 if pixel.refractory is None else 1e-6 * pixel.refractory.period_us,
-            hot_fraction=self.hot_fraction,
+            hot_fraction=values.get(HOT_FRACTION, self.hot_fraction),
             hot_hz=self._number(values, HOT_RATE),
+            hot_spread=self._number(values, HOT_SPREAD),
         )
         return noise_rates(sources, light / self.white)
 
     def predict(self, values: Mapping[str, float]) -> Array:
         """Return ln(rate + floor) [Hz], (rows,)."""
-        rates = self.rates(values, self.light)
-        share = np.minimum(
-            rates.leak * np.where(np.isnan(self._duration), 0, self._duration), 0.999
-        )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            seldom = -np.log1p(-share) / self._duration
+        first = np.unique(self.level, return_index=True)[1]
+        rates = self.rates(values, self.light[first])
+        seconds = np.where(np.isnan(self._duration), 1.0, self._duration)
         by_kind = {
             "on_rate_hz": rates.on_mean,
-            "off_rate_hz": rates.off,
+            "off_rate_hz": rates.off_mean,
             "on_median_hz": rates.on,
             "off_median_hz": rates.off,
-            "on_share": rates.noise_on + seldom,
-            "off_share": rates.off,
         }
-        rate = np.array([by_kind[kind][k] for k, kind in enumerate(self._kinds)])
+        rate = np.empty(self.level.size)
+        for k, rows in self._rows.items():
+            number, at = self._numbers[rows[0]], self.level[rows]
+            if number == 0:
+                rate[rows] = by_kind[k][at]
+            else:
+                share = rates.at(at).share_having(number, seconds[rows], k.startswith("on"))
+                share, _ = _drawn_share(share, self._pixels[rows])
+                rate[rows] = _as_poisson(number, share) / seconds[rows]
         logs: Array = np.log(rate + self.floor)
         return logs
 
     def _candidates(self, rate: Array) -> Iterator[Candidate]:
-        least, most = float(self.floor.min()), float(max(rate.max(), 10 * self.floor.max()))
+        least = float(np.where(self.floor > 0.0, self.floor, rate).min())
+        most = float(max(rate.max(), 10 * self.floor.max()))
         typical = float(np.exp(np.median(np.log(rate + self.floor))))
 
         def of_rate(name: str, key: str, factor: float = 1.0, extra: Extra = ()) -> Candidate:
@@ -161,25 +194,97 @@ class NoiseProblem(Problem):
         yield of_rate("leak", LEAK)
         yield of_rate("photo_leak", PHOTO_LEAK)
         yield of_rate("shot_noise", SHOT)
-        fraction = ((HOT_FRACTION, self.hot_fraction),)
-        yield of_rate("hot_pixels", HOT_RATE, 1.0 / self.hot_fraction, extra=fraction)
+        if not self.spread_shows:
+            fraction = ((HOT_FRACTION, self.hot_fraction),)
+            yield of_rate("hot_pixels", HOT_RATE, 1.0 / self.hot_fraction, extra=fraction)
+        else:
+            yield _several(
+                "hot_pixels",
+                [
+                    (HOT_FRACTION, 1e-3, 0.5, (0.02, 0.1)),
+                    (HOT_RATE, least, 1e3, (typical, 1.0)),
+                    (HOT_SPREAD, 0.05, 2.0, (0.7, 0.7)),
+                ],
+            )
         thresholds = self.declared.config.pixel.thresholds
-        if self.declared.config.pixel.low_pass is not None:
-            level = min(thresholds.on, thresholds.off)
-            starts = ((level / 3,), (level / 5,))
-            yield Candidate("photoreceptor_noise", (FitParameter(RMS, level / 9, level),), starts)
+        if self.declared.config.pixel.low_pass is None:
+            return
+        level = min(thresholds.on, thresholds.off)
+        rms = RMS, level / 9, level
+        if not self.spread_shows:
+            yield _several("photoreceptor_noise", [(*rms, (level / 3, level / 5))])
+        else:
+            starts = zip(*_SHAPE_STARTS, strict=True)
+            shape = [(*one, first) for one, first in zip(_SHAPE, starts, strict=True)]
+            off = OFF, 0.3 * thresholds.on, 3.0 * thresholds.on, (1.1 * thresholds.on,) * 3
+            spread = (
+                MISMATCH,
+                0.01 * thresholds.on,
+                0.5 * thresholds.on,
+                (0.15 * thresholds.on,) * 3,
+            )
+            written = self.declared.written
+            free = [one for one in (*shape, off, spread) if one[0] not in written]
+            free = [(*rms, (level / 3, level / 4, level / 2)), *free]
+            yield _several("photoreceptor_noise", free)
+
+
+def _several(name: str, parameters: Sequence[_Several]) -> Candidate:
+    """Return an effect of several parameters."""
+    keys = tuple(FitParameter(key, low, high) for key, low, high, _ in parameters)
+    return Candidate(name, keys, tuple(zip(*(starts for *_, starts in parameters), strict=True)))
+
+
+def _number_of(kind: str) -> int:
+    """Return how many events a share of the pixels has; 0: it is no share."""
+    what, _, number = kind.partition("_share")
+    return 0 if what == kind else int(number[1:] or 1)
 
 
 def _rate(data: Noise, kind: str, row: int) -> float:
     """Return a cell as a rate [Hz]; a share as that of Poisson events which gives it."""
-    value = float(data.rates[kind][row])
-    if not kind.endswith("_share"):
+    value, number = float(data.rates[kind][row]), _number_of(kind)
+    if number == 0:
         return value
-    pixels = data.pixels[row]
-    most = 1.0 - (0.001 if np.isnan(pixels) else 0.5 / pixels)
-    return float(-np.log1p(-min(value, most)) / data.duration_s[row])
+    share, _ = _drawn_share(value, float(data.pixels[row]))
+    return float(_as_poisson(number, share) / data.duration_s[row])
+
+
+def _drawn_share(share: Array | float, pixels: Array | float) -> tuple[Array, Array]:
+    """Return the mean and standard error of a share that so many pixels tell; of few, kept off 0.
+
+    Measured and predicted alike, so that a share which no pixel has is met by any that is too
+    small to show.
+    """
+    mean = (share * pixels + 0.5) / (pixels + 1.0)
+    mean = np.where(np.isnan(pixels), np.clip(share, 0.001, 0.999), mean)
+    return mean, np.sqrt(mean * (1.0 - mean) / (pixels + 1.0))
+
+
+def _share_error(data: Noise, kind: str, row: int) -> float:
+    """Return the relative error of the rate that a share counts as."""
+    share, error = _drawn_share(float(data.rates[kind][row]), float(data.pixels[row]))
+    ends = np.clip([share - 0.5 * error, share + 0.5 * error], 1e-9, 1.0 - 1e-9)
+    return float(np.diff(np.log(_as_poisson(_number_of(kind), ends)))[0])
+
+
+@lru_cache(maxsize=256)
+def _shares_of_poisson(number: int) -> tuple[Array, Array]:
+    """Return logits of the shares that have so many events, growing, and ln of the means."""
+    logs = np.linspace(-16.0, np.log(number) + 4.0, 800)
+    share = np.clip(at_least(number, np.exp(logs)), 1e-12, 1.0 - 1e-12)
+    return np.maximum.accumulate(np.log(share / (1.0 - share))), logs
+
+
+def _as_poisson(number: int, share: Array) -> Array:
+    """Return the mean of Poisson numbers of which a share is so large, or larger."""
+    logits, logs = _shares_of_poisson(number)
+    share = np.clip(share, 1e-12, 1.0 - 1e-12)
+    return np.exp(np.interp(np.log(share / (1.0 - share)), logits, logs))
 
 
 def _title(kind: str) -> str:
     polarity, what = kind.split("_", 1)
-    return f"{polarity.upper()}, {_WORDS[what]}"
+    number = _number_of(kind)
+    text = _WORDS.get(what) or f"from the share of pixels with {number} or more"
+    return f"{polarity.upper()}, {text}"

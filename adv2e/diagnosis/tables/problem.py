@@ -128,6 +128,9 @@ class Problem(ABC):
     neutral : mapping of str to float
         Keys that this model has at a value other than the default, where not written.
     notes : list of str
+    one_by_one : bool
+        Whether fits take seconds, so that effects are added to the best set so far, up to four,
+        rather than all sets being tried.
     """
 
     what: ClassVar[str]
@@ -142,6 +145,7 @@ class Problem(ABC):
     candidates: list[Candidate]
     neutral: dict[str, float]
     notes: list[str]
+    one_by_one: bool = False
 
     def __init__(
         self, declared: Declared, light: Array, unit: str, test: NDArray[np.bool_], white: float

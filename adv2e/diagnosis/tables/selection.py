@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,6 +29,8 @@ from adv2e.diagnosis.tables.problem import Array, Problem, Settings
 from adv2e.reports.result import Rejected, Verdict
 
 MOST_EFFECTS = 3
+FEW_DRAWS = 39
+"""Tables drawn where a fit takes seconds."""
 SIGNIFICANT = 0.05
 LOOK_ALIKE = 9.0
 """Difference in the sum of squares, in units of its spread: three standard errors."""
@@ -134,13 +136,18 @@ class Selector:
             return Choice(before, before, "consistent", [], [])
         after = before
         tried: list[list[FittedSet]] = []
-        for size in range(1, min(MOST_EFFECTS, len(candidates)) + 1):
-            sets = itertools.combinations(candidates, size)
+        most = MOST_EFFECTS + 1 if self.problem.one_by_one else MOST_EFFECTS
+        base: tuple[Candidate, ...] = ()
+        for size in range(1, min(most, len(candidates)) + 1):
+            sets: Iterable[tuple[Candidate, ...]] = itertools.combinations(candidates, size)
+            if self.problem.one_by_one:
+                sets = [(*base, one) for one in candidates if one not in base]
             found = [self.fitted(chosen) for chosen in sets if self._determined(chosen)]
             if not found:
                 break
             tried.append(found)
             best = min(found, key=lambda one: one.error)
+            base = best.effects
             log(f"{size}: {' + '.join(best.names)}, held-out error {best.error:.3f}")
             if lower(best, after, len(found)):
                 after = best
@@ -193,7 +200,8 @@ class Selector:
         for k, (fold, unit) in enumerate(zip(self._folds, self._units, strict=True)):
             part = point
             if not self.problem.test.any():
-                part, _ = self._fit(joint, fold, [point, starts[0]])
+                again = [point] if self.problem.one_by_one else [point, starts[0]]
+                part, _ = self._fit(joint, fold, again)
             gap = self.problem.measured - self.predicted(joint, part)
             errors[k] = self._mean_square(gap, unit)
         return FittedSet(effects, joint, point, misfit, errors)
@@ -210,6 +218,8 @@ class Selector:
 
     def _draw(self, model: FittedSet) -> Draws:
         count = self._settings.draws
+        if self.problem.one_by_one:
+            count = min(count, FEW_DRAWS)
         rng = np.random.default_rng([self._settings.seed, len(model.effects)])
         ideal = self.predicted(model.joint, model.point)
         logs = np.empty((count, len(model.point)))

@@ -102,11 +102,14 @@ def test_rates_over_the_pixels_are_those_of_our_pixels():
     time = np.array([0.5 * seconds])
     assert rates.on_mean[0] * time[0] == pytest.approx(on.mean(), rel=0.1)
     assert rates.off_mean[0] * time[0] == pytest.approx(off.mean(), rel=0.15)
-    for share in (0.25, 0.5, 0.9, 0.98):
-        for counts, is_on in ((on, True), (off, False)):
-            found = rates.quantile(share, time, is_on)[0]
-            slack = 1.0 + 0.2 * np.quantile(counts, share)
-            assert abs(found - np.quantile(counts, share)) < slack
-    # all alike, the quarter of the most sensitive would have hardly more than the others
+    few = []
+    for counts, is_on in ((on, True), (off, False)):
+        for number in (1, 2, 4, 8, 16, 32):
+            found = rates.share_having(number, time, is_on)[0]
+            measured = (counts >= number).mean()
+            few.append(measured)
+            assert abs(found - measured) < 0.05 + 0.1 * measured
+    assert min(few) < 0.1 and max(few) > 0.9
+    # all alike, the most sensitive would have hardly more than the others
     alike = noise_rates(NoisySources(**{**vars(sources), "mismatch": 0.0}), np.ones(1))
-    assert alike.quantile(0.98, time, False)[0] < 0.6 * np.quantile(off, 0.98)
+    assert alike.share_having(8, time, False)[0] < 0.3 * (off >= 8).mean()
