@@ -200,7 +200,8 @@ def event_rates(
         rested = np.exp(_interpolated(here, np.log(time_rest)))
         at_rest = np.minimum(time / rested, 1.0)
         still = np.concatenate([np.diag(on_rest), np.diag(off_rest)], axis=1)
-        chain += _spread(here, at_rest) @ (crossed - still)
+        # products by BLAS would start threads, which wait long for each other where cores are busy
+        chain += np.einsum("ij,jk->ik", _spread(here, at_rest), crossed - still)
         early = np.clip(time - at_rest * rested, 0.0, _FORGOTTEN)
         time = early + at_rest * np.exp(_interpolated(here, np.log(waited)))
     share = _stationary(chain)
@@ -242,7 +243,7 @@ def _drift(
     lasted = np.concatenate([time[:1], (ended / hazard).sum(axis=1)])
     total = np.concatenate([[0.0], np.cumsum(passed[:, -1])])
     reached = np.exp(-np.maximum(total[:, None] - total, 0.0)) * np.tri(count)
-    crossed, waited = reached @ own, reached @ lasted
+    crossed, waited = np.einsum("ij,jk->ik", reached, own), reached @ lasted
     return crossed, waited
 
 
