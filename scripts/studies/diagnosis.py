@@ -15,6 +15,7 @@ pairs           two effects at once
     python scripts/studies/diagnosis.py run results
     python scripts/studies/diagnosis.py run results --kinds library --sizes middle --shard 3/16
     python scripts/studies/diagnosis.py run ordinary --fps 60 --bits 8 --interpolation flow
+    python scripts/studies/diagnosis.py run light --known-light --size 24x18
     python scripts/studies/diagnosis.py report results -o diagnosis.md
     python scripts/studies/diagnosis.py record echo.zip echo
 
@@ -99,16 +100,26 @@ def _of_recordings(command: Callable[..., None]) -> Callable[..., None]:
             "--interpolation", type=click.Choice(["linear", "flow"]), default="linear",
             show_default=True,
         ),
+        click.option(
+            "--known-light", is_flag=True, help="No frames: a lamp that leaps, rests and swings."
+        ),
     ]  # fmt: skip
     for option in reversed(options):
         command = option(command)
     return command
 
 
-def _setup(size: tuple[int, int], seconds: float, fps: float, bits: str, interpolation: str) -> Any:
+def _setup(
+    size: tuple[int, int],
+    seconds: float,
+    fps: float,
+    bits: str,
+    interpolation: str,
+    known_light: bool,
+) -> Any:
     from studies.verdicts.run import Setup  # noqa: PLC0415 - it loads the simulator
 
-    return Setup(*size, seconds, fps, int(bits), interpolation)
+    return Setup(*size, seconds, fps, int(bits), interpolation, known_light)
 
 
 @click.group()
@@ -143,13 +154,14 @@ def run(
     **recording: Any,
 ) -> None:
     """Record and diagnose the cases that FOLDER does not have yet."""
+    from adv2e.diagnosis.fitting.library import OF_FRAMES  # noqa: PLC0415
     from adv2e.diagnosis.fitting.library import names as library_names  # noqa: PLC0415
     from studies.verdicts import run as running  # noqa: PLC0415 - it loads the simulator
     from studies.verdicts.camera import catalogue  # noqa: PLC0415
 
     say = partial(click.echo, err=True)
     setup = _setup(**recording)
-    known = library_names()
+    known = [one for one in library_names() if not (setup.known_light and one in OF_FRAMES)]
     lacking = [name for name in catalogue.LIBRARY if name not in known]
     if lacking:
         say(f"not in adv2e's library, skipped: {', '.join(lacking)}")
@@ -191,7 +203,8 @@ def record(
 ) -> None:
     """Keep the study's recording with EFFECTs that are not declared.
 
-    Beside FILE.zip come FILE.declared.yaml, what a diagnosis may know, and FILE.truth.yaml.
+    Beside FILE.zip come FILE.declared.yaml, what a diagnosis may know, and FILE.truth.yaml; with
+    --known-light also FILE.stimulus.csv, for 'adv2e diagnose --light'.
     """
     from studies.verdicts.camera import catalogue  # noqa: PLC0415 - it loads the camera
 
@@ -213,7 +226,10 @@ def record(
         kind = NOTHING
     case = Case(kind, effects, effect_size if effects else NO_SIZE, 0)
     path.parent.mkdir(parents=True, exist_ok=True)
-    _setup(**recording).camera_for(case, seed).record(path)
+    setup = _setup(**recording)
+    setup.camera_for(case, seed).record(path)
+    if setup.known_light:
+        setup.read(path, case, seed)
     click.echo(f"{path}: {case.key}, scene {case.scene(seed)}")
 
 

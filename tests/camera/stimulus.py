@@ -15,6 +15,8 @@ from camera.scene import Flat
 
 Rows = list[tuple[float, float]]
 
+_LAST_S = 0.01
+"""Rest at the end."""
 LEVELS_DN = (4.0, 9.0, 20.0, 55.0, 150.0, 60.0, 25.0, 8.0)
 """What the lamp leaps between, in turn: by 0.8 to 1.1 ln, in the dark and in bright light."""
 
@@ -23,7 +25,7 @@ def bench(duration_s: float, seed: int) -> Rows:
     """Return what a bench does: leaps between levels, rests, and slow swings.
 
     Two thirds of the time are leaps, 20 to 60 ms apart; then the light rests dark and bright for a
-    while, and swings.
+    while, and swings once.
     """
     random = np.random.default_rng([seed, 41])
     rows = [(0.0, LEVELS_DN[0])]
@@ -39,12 +41,21 @@ def bench(duration_s: float, seed: int) -> Rows:
         time = round(time + 0.1 * duration_s, 6)
     rows += [(time, rows[-1][1])]
     swing = np.linspace(0.0, 1.0, 61)[1:]
-    left = duration_s - time
+    left = duration_s - time - _LAST_S
     rows += [
         (round(time + left * at, 6), float(120.0 * np.exp(-1.5 * np.sin(2 * np.pi * at) ** 2)))
         for at in swing.tolist()
     ]
-    return rows
+    return [*rows, (duration_s, rows[-1][1])]
+
+
+def stamped(rows: Rows, offset_us: float, drift_ppm: float) -> Rows:
+    """Return the rows by a clock that is late and slow as that of frames is: see the shutter.
+
+    The light rests at both ends, which stay where they are.
+    """
+    inner = [((time - 1e-6 * offset_us) / (1.0 + 1e-6 * drift_ppm), dn) for time, dn in rows[1:-1]]
+    return [rows[0], *inner, rows[-1]]
 
 
 def scene(rows: Rows) -> Flat:
@@ -63,5 +74,5 @@ def scene(rows: Rows) -> Flat:
 
 def write_table(path: Path, rows: Rows) -> None:
     """Write the table that a diagnosis reads."""
-    lines = [f"{time:.6f},{light:.6f}\n" for time, light in rows]
+    lines = [f"{time:.9f},{light:.6f}\n" for time, light in rows]
     path.write_text("time_s,light_dn\n" + "".join(lines), "ascii")

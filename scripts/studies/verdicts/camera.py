@@ -20,3 +20,4 @@ def _module(name: str) -> Any:
 camera = _module("camera")
 catalogue = _module("camera.catalogue")
 settings = _module("camera.settings")
+stimulus = _module("camera.stimulus")

@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.config import load_config
-from adv2e.diagnosis.data.evidence import read_evidence
+from adv2e.diagnosis.data.evidence import Evidence, read_evidence
 from adv2e.diagnosis.diagnose import diagnose
+from adv2e.diagnosis.known_light import read_known_light
 from adv2e.reports.result import Diagnosis
-from studies.verdicts.camera import REPOSITORY, camera, settings
+from studies.verdicts.camera import REPOSITORY, camera, settings, stimulus
 from studies.verdicts.cases import Case
 from studies.verdicts.options import sampling
 from studies.verdicts.results import Line
@@ -33,7 +34,8 @@ STUDIED = (
 class Setup:
     """How recordings are made: columns and rows [px], length [s], frames a second.
 
-    And how many bits a pixel of a frame has, and what is simulated between two frames.
+    And how many bits a pixel of a frame has, and what is simulated between two frames; or whether
+    there are none, but a lamp of which the light is known.
     """
 
     width: int = 48
@@ -42,12 +44,18 @@ class Setup:
     fps: float = 500.0
     bits: int = 16
     interpolation: str = "linear"
+    known_light: bool = False
 
     def camera_for(self, case: Case, study_seed: int) -> Any:
         """Return the camera of a case, with a scene before it."""
         size, seed = (self.width, self.height), case.seed(study_seed)
+        scene = (
+            stimulus.scene(stimulus.bench(self.seconds, seed))
+            if self.known_light
+            else camera.SCENES[case.scene(study_seed)](size, seed=seed)
+        )
         return camera.Camera(
-            camera.SCENES[case.scene(study_seed)](size, seed=seed),
+            scene,
             settings.merged(settings.BENCH, self._declared()),
             hidden=case.hidden,
             size=size,
@@ -55,6 +63,19 @@ class Setup:
             fps=self.fps,
             seed=seed,
         )
+
+    def read(self, path: Path, case: Case, study_seed: int) -> Evidence:
+        """Return the recording of a case, which lies at `path`; a table of light comes beside."""
+        if not self.known_light:
+            return read_evidence(path)
+        clock = (
+            settings.find(case.hidden, f"frames.clock_{name}", 0.0)
+            for name in ("offset_us", "drift_ppm")
+        )
+        rows = stimulus.bench(self.seconds, case.seed(study_seed))
+        table = path.with_suffix(".stimulus.csv")
+        stimulus.write_table(table, stimulus.stamped(rows, *clock))
+        return read_known_light(path, table)
 
     def _declared(self) -> dict[str, Any]:
         """Return what is declared of the frames."""
@@ -113,7 +134,7 @@ def diagnosed(
             recorded = time.perf_counter()
             declared = load_config([path.with_name("recording.declared.yaml")])
             found = diagnose(
-                read_evidence(path),
+                setup.read(path, case, study_seed),
                 declared,
                 without=case.without,
                 sizes=False,
