@@ -29,6 +29,7 @@ COMMANDS = {
     "export": "Make training sets and representations of events.",
     "diagnose": "Find what a recording holds that its simulation lacks.",
     "characterise": "Name the effect that tables of latency or noise ask for.",
+    "protocol": "Print what to record with an LED to know a camera.",
     "config": "Show or check a configuration, and explain its keys.",
     "effects": "List the effects, or explain one with its equation.",
     "demo": "Make a sample clip, convert it and render the events.",
