@@ -136,6 +136,7 @@ def test_light_of_a_rectangle_alone_is_a_recording_of_its_pixels(table, recordin
         ("time_s,light_dn\n0,1\n1,1\n1,2\n1,3\n2,1\n", r"csv:5: time_s: must not stand more than"),
         ("time_s,light_dn\n0,1\n1,-1\n", r"csv:3: light_dn: must be at least 0, got '-1'"),
         ("time_s,light_dn\n0,nan\n1,1\n", r"csv:2: light_dn: must be a finite number, got 'nan'"),
+        ("time_s,light\n0,1\n1,2e3\n", r"csv:3: light: must be at most 255,000 DN, 1000 times"),
         ("time_s,light_dn\n0,\n1,1\n", r"csv:2: light_dn: is empty, must be a number"),
         ("time_s,light_dn\n0,1\n", r"csv: has 1 row, at least 2 are needed"),
         ("seconds,light_dn\n0,1\n1,1\n", r"needs one column time_s, time_ms or time_us"),

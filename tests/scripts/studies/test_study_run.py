@@ -4,6 +4,7 @@ import json
 import subprocess
 import zipfile
 
+import numpy as np
 import pytest
 from camera.catalogue import LIBRARY
 from click.testing import CliRunner
@@ -176,3 +177,25 @@ def test_a_recording_that_cannot_be_kept_is_told(name, effects, message, tmp_pat
     assert message in outcome.output
     assert sorted(tmp_path.iterdir()) == held
     assert all(one.read_bytes() == b"mine" for one in held)
+
+
+def test_of_a_known_light_the_table_is_what_the_pixels_saw_by_its_clock(tmp_path):
+    setup = study_run.Setup(8, 8, 0.5, known_light=True)
+    path = tmp_path / "one.zip"
+    for name, late_us in (("leak", 0), ("clock_offset", 1500)):
+        case = cases.Case("library", (name,), "middle", 0)
+        setup.camera_for(case, 0).record(path)
+        rows = study_run.stimulus.bench(0.5, case.seed(0))
+        evidence = setup.read(path, case, 0)
+        leaps = sorted({time for time, _ in rows if [one[0] for one in rows].count(time) == 2})
+        told = evidence.stimulus.leaps.times_us[0]
+        assert told == pytest.approx(1e6 * np.array(leaps) - late_us, abs=1.0)
+        # most events come soon after the light has leapt, whenever that is said to be
+        since = evidence.stimulus.leaps.since(evidence.stream)
+        assert np.quantile(since[since >= 0], 0.05) == pytest.approx(100 + late_us, abs=150)
+
+
+def test_effects_on_frames_are_not_studied_where_there_are_none(quick_run):
+    done = quick_run("--sizes", "middle", "--known-light")
+    assert len(done) == len(LIBRARY) - 6
+    assert not any("exposure_blur" in key or "flicker" in key for key in done)
