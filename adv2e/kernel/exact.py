@@ -1,7 +1,8 @@
-"""The exact circuit over a tile: a screen for all pixels of a strip, lanes for those that may fire.
+"""The exact circuit over a tile: a screen for all pixels of a strip, then those that may fire.
 
-A strip's rows stay in cache from frame to frame, so the state of the pixels is read and written
-once a call, and only the frames stream through memory.
+One pole is solved in lanes, several pixels side by side; a second pole, and what else lanes do not
+have, by :mod:`adv2e.kernel.cascade`.  A strip's rows stay in cache from frame to frame, so the
+state of the pixels is read and written once a call, and only the frames stream through memory.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from numpy.typing import NDArray
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, screen, special, static_pixels
 from adv2e.kernel.borrowing import borrowed
+from adv2e.kernel.cascade import pixel as alone
+from adv2e.kernel.cascade import screen as cascade
 from adv2e.kernel.circuit import EXACT, Circuit
 from adv2e.kernel.event_buffer import with_room
 from adv2e.kernel.frames import load
@@ -34,19 +37,23 @@ class Scratch(NamedTuple):
     pixels: NDArray[np.int64]  # numbers of the lanes' pixels
     falls: NDArray[np.float64]
     means: NDArray[np.float64]
+    x: NDArray[np.float64]  # log intensity at the start of an interval, how far it goes, and the
+    dx: NDArray[np.float64]  # light at its end, where the interval is cut into pieces
+    light: NDArray[np.float32]
 
 
 def scratch() -> Scratch:
     """Return fresh memory."""
     pixels = np.zeros(STRIP + rows.WIDTH, np.int64)
-    return Scratch(screen.scratch(), rows.scratch(), pixels, np.zeros(STRIP), np.zeros(STRIP))
+    falls, means, x, dx = (np.zeros(STRIP) for _ in range(4))
+    light = np.ones(STRIP, np.float32)
+    return Scratch(cascade.scratch(), rows.scratch(), pixels, falls, means, x, dx, light)
 
 
 def covers(circuit: Circuit) -> bool:
     """Tell whether this module advances the circuit; if not, it is solved in steps of time."""
-    one_pole = circuit.filtered and circuit.follower == 0.0
-    plain = circuit.slew == 0.0 and circuit.overshoot == 0.0 and circuit.noise_rms == 0.0
-    return circuit.update == EXACT and one_pole and plain and not circuit.printed
+    plain = circuit.slew == 0.0 and circuit.noise_rms == 0.0 and not circuit.printed
+    return circuit.update == EXACT and circuit.filtered and plain
 
 
 @kernel
@@ -81,6 +88,7 @@ def _open_strip(lo, count, start, circuit, state, strip):
     for k in range(count):
         strip[screen.LIGHT_0 + k] = strip[screen.LIGHT_1 + k]
         strip[screen.LAG_0 + k] = state[per_pixel.LAG, lo + k]
+        strip[cascade.SECOND + k] = state[per_pixel.SECOND, lo + k]
     for k in range(count):
         i = lo + k
         exchange.watch(k, i, state[per_pixel.X, i], start, circuit, state, strip)
@@ -90,6 +98,7 @@ def _open_strip(lo, count, start, circuit, state, strip):
         strip[screen.LIGHT_0 + k] = 1.0
         strip[screen.LIGHT_1 + k] = 1.0
         strip[screen.LAG_0 + k] = 0.0
+        strip[cascade.SECOND + k] = 0.0
         strip[screen.AWAY_0 + k] = 0.0
         strip[screen.FALL + k] = 0.0
         strip[screen.ON + k] = screen.NEVER
@@ -102,6 +111,7 @@ def _close_strip(lo, count, circuit, state, strip):
     """State of a strip at the end of a call."""
     for k in range(count):
         state[per_pixel.LAG, lo + k] = strip[screen.LAG_0 + k]
+        state[per_pixel.SECOND, lo + k] = strip[cascade.SECOND + k]
         state[per_pixel.X, lo + k] = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
 
 
@@ -185,6 +195,76 @@ def _advance_strip(
 
 
 @kernel
+def _begin_pieces(strip, circuit, scratch):
+    """Keep how the light goes from LIGHT_0 to LIGHT_1."""
+    for k in range(STRIP):
+        x0 = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
+        x1 = exchange.log_of(np.float64(strip[screen.LIGHT_1 + k]), circuit)
+        scratch.x[k], scratch.dx[k] = x0, x1 - x0
+        scratch.light[k] = strip[screen.LIGHT_1 + k]
+
+
+@kernel
+def _end_piece(share, strip, circuit, scratch):
+    """Row LIGHT_1 at `share` of the interval."""
+    for k in range(STRIP):
+        x = scratch.x[k] + scratch.dx[k] * share
+        light = special.exp(x)
+        light = light if x >= circuit.knee else circuit.slope * x
+        strip[screen.LIGHT_1 + k] = _f(light) if share < 1.0 else scratch.light[k]
+
+
+@kernel
+def _advance_cascade(
+    lo, count, start, ta, length, f, still, circuit, plan, t_base, state, scratch, keys, times, n
+):  # fmt: skip
+    """Advance one strip over interval f, piece by piece; `still`: nothing moves or lags in it."""
+    strip, falls, pixels = scratch.strip, scratch.falls, scratch.pixels
+    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
+    pieces, substeps, weights = plan.pieces[f], plan.substeps[f], plan.weights[f]
+    on, off = plan.on[f : f + 2], plan.off[f : f + 2]
+    knee_dn, slope = _f(circuit.slope * circuit.knee), _f(circuit.slope)
+    piece = length / pieces
+    if pieces > 1:
+        _begin_pieces(strip, circuit, scratch)
+    for p in range(pieces):
+        a, b, t0 = p / pieces, (p + 1) / pieces, ta + p * piece
+        levels = (
+            on[0] + (on[1] - on[0]) * a, on[0] + (on[1] - on[0]) * b,
+            off[0] + (off[1] - off[0]) * a, off[0] + (off[1] - off[0]) * b,
+        )  # fmt: skip
+        if pieces > 1:
+            _end_piece(b, strip, circuit, scratch)
+        if leaks:
+            _leak_strip(lo, count, piece, circuit, state, strip, falls, scratch.means)
+        if still:
+            cascade.stay(strip, substeps)
+        else:
+            h = piece / substeps
+            cascade.follow(
+                strip, substeps, _f(circuit.dark * h), _f(circuit.per_dn * h), knee_dn, slope,
+                weights,
+            )  # fmt: skip
+        screen.flag(
+            strip, _f(t0 + piece - start), _f(circuit.dark * piece), _f(circuit.per_dn * piece),
+            knee_dn, cascade.SECOND, _f(min(levels[0], levels[1])), _f(min(levels[2], levels[3])),
+            cascade.LARGEST,
+        )  # fmt: skip
+        m, j, s = screen.flagged(strip, pixels), np.int64(0), 0.0
+        while j < m:
+            n, j, s = alone.solve_flagged(
+                lo, j, m, s, t0, piece, start, substeps, levels, t_base, circuit, state, strip,
+                pixels, keys, times, n,
+            )  # fmt: skip
+            if j < m:
+                keys, times = with_room(keys, times, n, n + 1)
+        if leaks:
+            _lower_references(lo, count, state, strip, falls)
+        cascade.step_on(strip, substeps)
+    return n, keys, times
+
+
+@kernel
 def _rule(rules, f):
     """Return the quadrature of interval f."""
     count, dead = rules.counts[f], rules.counts_dead[f]
@@ -214,12 +294,15 @@ def _rest_strip(
 
 @kernel
 def _strip(
-    lo, count, frames, before, share, starts, circuit, rules, t_base,
+    lo, count, frames, before, share, starts, circuit, rules, plan, t_base,
     state, scratch, keys, times, n,
 ):  # fmt: skip
     """Advance one strip of the exact circuit over all intervals."""
     frames, before, share, starts = borrowed(frames, before, share, starts)
-    rules, state, scratch = borrowed(rules, state, scratch)
+    rules, plan, state, scratch = borrowed(rules, plan, state, scratch)
+    by_cascade = plan.pieces.shape[0] > 0
+    # what rests for long is gone through in closed form, where only leak and noise can fire
+    may_rest = not by_cascade or (plan.simple and not circuit.causes)
     strip = scratch.strip
     light = strip[screen.LIGHT_1 : screen.LIGHT_1 + count]
     floor = 0.0 if circuit.slope > 0.0 else circuit.floor
@@ -228,14 +311,14 @@ def _strip(
     _open_strip(lo, count, start, circuit, state, strip)
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     intervals = starts.shape[0] - 1
-    settled, resting = screen.is_settled(strip), False
+    settled, resting = cascade.is_settled(strip), False
     f = np.int64(0)
     while f < intervals:
         still = _rests(frames, f, before, share, lo, count)
         if not still:
             load(frames, before[f + 1], share[f + 1], lo, floor, light)
             still = screen.is_still(strip)
-        if still and settled:
+        if still and settled and may_rest:
             if not resting:
                 if leaks:
                     _leak_strip(lo, count, 1.0, circuit, state, strip, scratch.falls, scratch.means)
@@ -252,11 +335,17 @@ def _strip(
         if resting and leaks:
             static_pixels.end_rest(lo, count, circuit, state, strip)
         resting = False
-        n, keys, times = _advance_strip(
-            lo, count, start, starts[f], starts[f + 1] - starts[f], circuit, _rule(rules, f),
-            t_base, state, scratch, keys, times, n,
-        )  # fmt: skip
-        settled = still and (settled or screen.is_settled(strip))
+        if by_cascade:
+            n, keys, times = _advance_cascade(
+                lo, count, start, starts[f], starts[f + 1] - starts[f], f, still and settled,
+                circuit, plan, t_base, state, scratch, keys, times, n,
+            )  # fmt: skip
+        else:
+            n, keys, times = _advance_strip(
+                lo, count, start, starts[f], starts[f + 1] - starts[f], circuit, _rule(rules, f),
+                t_base, state, scratch, keys, times, n,
+            )  # fmt: skip
+        settled = still and (settled or cascade.is_settled(strip))
         f += 1
     _close_strip(lo, count, circuit, state, strip)
     return n, keys, times
@@ -264,7 +353,7 @@ def _strip(
 
 @kernel
 def run_exact(
-    claimed, most, frames, before, share, starts, begins, last, circuit, rules, t_base,
+    claimed, most, frames, before, share, starts, begins, last, circuit, rules, plan, t_base,
     state, scratch, keys, times,
 ):  # fmt: skip
     """Advance strips that nobody else works on over the intervals between neighbouring frames.
@@ -288,7 +377,8 @@ def run_exact(
         interval (the final entry looks ahead); else all False.
     rules : Rules
         Quadrature for each interval.
-
+    plan : Plan
+        How each interval is cut for the cascade; of no interval where lanes do.
     keys, times : (n,)
         Memory for events; see :mod:`adv2e.kernel.event_buffer`.
 
@@ -302,7 +392,7 @@ def run_exact(
         if lo == hi:
             break
         n, keys, times = _strip(
-            lo, hi - lo, frames, before, share, starts, circuit, rules, t_base,
+            lo, hi - lo, frames, before, share, starts, circuit, rules, plan, t_base,
             state, scratch, keys, times, n,
         )  # fmt: skip
     return n, keys, times

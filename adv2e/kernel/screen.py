@@ -93,7 +93,7 @@ _REACH = _f(REACH)
 _MORE = _f(0.6)
 _AT_REST = _f(AT_REST)
 _STRAIGHT = _f(0.9)  # lag below which y is convex up to its turn
-_LARGEST_RATIO = _f(np.tanh(0.5 * LARGEST_STEP))
+_LARGEST = (_ONE, _f(np.tanh(0.5 * LARGEST_STEP)))
 _LARGEST_LIGHT = _f(LARGEST_LIGHT)
 
 
@@ -174,8 +174,26 @@ def _end_lags(strip):
 
 
 @kernel
-def _flag(strip, end, dark, per_dn, knee_dn):
-    """Rows AWAY_1 and HIT: distance at the end, and which pixels are to be looked at."""
+def flag(strip, end, dark, per_dn, knee_dn, seen, on_factor, off_factor, largest_step):
+    """Rows AWAY_1 and HIT: distance at the end, and which pixels are to be looked at.
+
+    Parameters
+    ----------
+    strip : flat float32
+    end : float32
+        End of the interval [us], on the clock of row DUE.
+    dark, per_dn : float32
+        Corner in darkness, and for each DN, times the interval [rad].
+    knee_dn : float32
+        Knee of the log map [DN].
+    seen : int
+        Row of the lag that the comparator sees at the start: that of a second pole follows.
+    on_factor, off_factor : float32
+        Least factors on the thresholds.
+    largest_step : (2,) float32
+        Change of log intensity above which a pixel is looked at in any case, on the foot and on the
+        log branch; the latter as a ratio, (b - a)/(b + a).
+    """
     for k in range(STRIP):
         i0, i1 = strip[LIGHT_0 + k], strip[LIGHT_1 + k]
         u0, u1 = strip[LAG_0 + k], strip[LAG_1 + k]
@@ -193,10 +211,12 @@ def _flag(strip, end, dark, per_dn, knee_dn):
         turns = u0 * u1 < _ZERO
         low = min(low, turn) if turns else low
         high = max(high, turn) if turns else high
-        hit = (high + fall >= strip[ON + k]) | (-low >= strip[OFF + k]) | (strip[DUE + k] < end)
+        low, high = min(low, d0 + strip[seen + k]), max(high, d0 + strip[seen + k])
+        hit = (high + fall >= strip[ON + k] * on_factor) | (strip[DUE + k] < end)
+        hit |= -low >= strip[OFF + k] * off_factor
         mixed = (i0 < knee_dn) != (i1 < knee_dn)
-        steep = (min(i0, i1) >= knee_dn) & (abs(i1 - i0) > _LARGEST_RATIO * (i0 + i1))
-        far = steep | (abs(dx) > _ONE) | (i1 > _LARGEST_LIGHT)
+        steep = (min(i0, i1) >= knee_dn) & (abs(i1 - i0) > largest_step[1] * (i0 + i1))
+        far = steep | (abs(dx) > largest_step[0]) | (i1 > _LARGEST_LIGHT)
         strip[HIT + k] = _ONE if hit | mixed | far else _ZERO
 
 
@@ -220,7 +240,7 @@ def screen(strip, end, dark, per_dn, knee_dn, slope, rule):
     for c in range(rule.nodes.shape[0]):
         _node(strip, _f(rule.nodes[c]), _f(rule.weights[c]))
     _end_lags(strip)
-    _flag(strip, end, dark, per_dn, knee_dn)
+    flag(strip, end, dark, per_dn, knee_dn, LAG_0, _ONE, _ONE, _LARGEST)
 
 
 @kernel

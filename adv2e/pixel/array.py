@@ -15,10 +15,12 @@ from adv2e.background import default_threads
 from adv2e.causes import CAUSE_BITS, CAUSED_DTYPE, FRAME_COUPLING
 from adv2e.config.model import Pixel, Sampling
 from adv2e.effects.courses import Additions
+from adv2e.effects.pixel.threshold_drift import drift_factors
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.kernel import exact
 from adv2e.kernel import packing as order
+from adv2e.kernel.cascade.plan import no_plan, plan_for
 from adv2e.kernel.frames import Frames, frames_of
 from adv2e.kernel.packing import PIXEL_BITS, pack_limit_us
 from adv2e.kernel.quadrature import rules_for
@@ -129,7 +131,8 @@ class PixelArray:
         self.circuit = make_circuit(pixel, sampling, seed, causes, added)
         self.threads = default_threads() if threads is None else max(1, threads)
         self.started = False
-        start = self._relative(t_ns)
+        self._drift_per_s = pixel.thresholds.drift_per_s
+        self._start = start = self._relative(t_ns)
         stepped = driver_of(pixel, self.circuit, additions, method) == "run_stepped"
         self._stepping: Stepping | None = None
         # all pixels up to the last one have a state, so that each keeps its number
@@ -207,8 +210,14 @@ class PixelArray:
         """Return what the solver is told besides, for each call of it."""
         if self._stepping is not None:
             return self._stepping.runs(part, frames, starts)
-        fastest = max(self.circuit.dark + 255.0 * self.circuit.per_dn, self.circuit.dark)
-        return [(rules_for(np.diff(starts), fastest, self.circuit.dead_time),)]
+        circuit, lengths = self.circuit, np.diff(starts)
+        fastest = max(circuit.dark + 255.0 * circuit.per_dn, circuit.dark)
+        simple = circuit.overshoot == 0.0 and self._drift_per_s == 0.0
+        if circuit.follower == 0.0 and simple:
+            return [(rules_for(lengths, fastest, circuit.dead_time), no_plan())]
+        factors = drift_factors((starts - self._start) * 1e-6, self._drift_per_s)
+        plan = plan_for(lengths, fastest, circuit.follower, factors, simple)
+        return [(rules_for(lengths[:0], fastest, 0.0), plan)]
 
     def _by_tiles(
         self, arguments: tuple[Any, ...], per_us: float, pool: ThreadPoolExecutor | None

@@ -71,6 +71,5 @@ def driver_of(pixel: Pixel, circuit: Circuit, additions: Additions | None, metho
     """Return the name of the compiled function that advances these pixels."""
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
-    drifts = pixel.thresholds.drift_per_s != 0
-    steps = method == "stepped" or additions is not None or drifts or not covers(circuit)
+    steps = method == "stepped" or additions is not None or not covers(circuit)
     return "run_stepped" if steps else "run_exact"

@@ -23,6 +23,13 @@ ALL = {
     "thresholds": Thresholds(on=0.2, off=0.25, mismatch=0.03, drift_per_s=2.0),
 }
 
+CASCADE = {
+    name: section
+    for name, section in ALL.items()
+    if name not in ("photoreceptor_noise", "slew_limit")
+}
+"""Two poles, overshoot and drift."""
+
 
 def clip():
     draw = np.random.default_rng(1)
@@ -59,6 +66,7 @@ def additions():
 CASES = {
     "exact": {},
     "in lanes": IN_LANES,
+    "cascade": CASCADE,
     "all": ALL,
     "all and additions": {**ALL, "additions": additions()},
     "Euler": {**IN_LANES, "low_pass": LowPass(update="euler")},
@@ -123,7 +131,7 @@ def test_shares_are_about_as_large():
     assert max(sizes) - min(sizes) <= 2048
 
 
-@pytest.mark.parametrize("sections", [{}, IN_LANES, EVERYTHING])
+@pytest.mark.parametrize("sections", [{}, IN_LANES, CASCADE, EVERYTHING])
 def test_exact_does_not_depend_on_K(sections):
     light = clip()
     assert run(Pixel(**sections), light, K=1).tobytes() == (
@@ -170,7 +178,7 @@ _PLAIN = """
 import numpy as np, sys
 sys.path[:0] = [{tests!r}, {tests!r} + "/kernel"]
 from harness import EVERYTHING, IN_LANES, STEPPED_FORM, advance, start
-from test_invariance import ALL
+from test_invariance import ALL, CASCADE
 from adv2e.effects.courses import Additions
 from adv2e.config.model import Pixel, LowPass
 draw = np.random.default_rng(2)
@@ -183,8 +191,8 @@ added = Additions(
 )
 paper = LowPass(update="paper")
 for sections, additions in (
-    ({{}}, None), (IN_LANES, None), (STEPPED_FORM, None), (EVERYTHING, None), (ALL, added),
-    ({{**ALL, "low_pass": paper}}, added),
+    ({{}}, None), (IN_LANES, None), (STEPPED_FORM, None), (CASCADE, None), (EVERYTHING, None),
+    (ALL, added), ({{**ALL, "low_pass": paper}}, added),
 ):
     array = start(light, times, Pixel(**sections), exact_times=True, additions=additions)
     events, exact = advance(array, light, times)

@@ -1,0 +1,157 @@
+"""The distance of one pixel's signal from its reference within a substep, and where it is reached.
+
+With t = 0..1 over the substep it is a polynomial of degree 5 and an exponential of the second pole:
+f(t) = c0 + c1 t + ... + c5 t^5 + swing e^(-b t).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from adv2e.compiled import kernel
+from adv2e.kernel import special
+
+NOWHERE = 2.0
+"""Place of what does not happen in a substep."""
+
+_NARROW = 1e-7
+"""Part of a substep within which two crossings are not told apart."""
+
+_NEWTON = 30
+_SETTLED = 1e-4
+"""Step of Newton's method after which the next one is below 1e-8: half its square at most, as the
+slope where it is used changes by less than itself."""
+
+
+class Curve(NamedTuple):
+    """Coefficients of a polynomial, swing and corner b of an exponential."""
+
+    c0: float
+    c1: float
+    c2: float
+    c3: float
+    c4: float
+    c5: float
+    swing: float
+    b: float
+
+
+@kernel
+def lag_curve(u0, slope0, bend0, u1, slope1, bend1, q0, d, b):
+    """Lag of the second pole: `q0` at the start, for the lag of the first one as its input.
+
+    That one is given by value, slope and curvature at both ends; `d` is what x moves by, `b` the
+    corner of the second pole in the substep, 0: there is none.
+    """
+    p0, p1, p2 = u0, slope0, 0.5 * bend0
+    rise, turn, bend = u1 - p0 - p1 - p2, slope1 - p1 - 2.0 * p2, bend1 - 2.0 * p2
+    p3 = 10.0 * rise - 4.0 * turn + 0.5 * bend
+    p4 = -15.0 * rise + 7.0 * turn - bend
+    p5 = 6.0 * rise - 3.0 * turn + 0.5 * bend
+    if b == 0.0:
+        return Curve(p0, p1, p2, p3, p4, p5, 0.0, 0.0)
+    lag = 1.0 / b
+    p4 -= 5.0 * p5 * lag
+    p3 -= 4.0 * p4 * lag
+    p2 -= 3.0 * p3 * lag
+    p1 -= 2.0 * p2 * lag
+    p0 -= (p1 + d) * lag
+    return Curve(p0, p1, p2, p3, p4, p5, q0 - p0, b)
+
+
+@kernel
+def plus(curve, c0, c1, c2, c3):
+    """Add a cubic to a curve."""
+    return Curve(
+        curve.c0 + c0, curve.c1 + c1, curve.c2 + c2, curve.c3 + c3, curve.c4, curve.c5,
+        curve.swing, curve.b,
+    )  # fmt: skip
+
+
+@kernel
+def mirrored(curve):
+    """Return the curve of the opposite sign."""
+    return Curve(
+        -curve.c0, -curve.c1, -curve.c2, -curve.c3, -curve.c4, -curve.c5, -curve.swing, curve.b
+    )
+
+
+@kernel
+def _at(curve, t):
+    """Value and slope at t, and what is left of the swing."""
+    swing = curve.swing * special.exp(-curve.b * t) if curve.swing != 0.0 else 0.0
+    p = curve.c3 + t * (curve.c4 + t * curve.c5)
+    p = curve.c0 + t * (curve.c1 + t * (curve.c2 + t * p))
+    slope = 3.0 * curve.c3 + t * (4.0 * curve.c4 + t * 5.0 * curve.c5)
+    slope = curve.c1 + t * (2.0 * curve.c2 + t * slope)
+    return p + swing, slope - curve.b * swing, swing
+
+
+@kernel
+def value(curve, t):
+    """Value at t."""
+    return _at(curve, t)[0]
+
+
+@kernel
+def _bent(curve, swing):
+    """Most curvature behind a place where `swing` is left of the swing."""
+    bent = 2.0 * abs(curve.c2) + 6.0 * abs(curve.c3) + 12.0 * abs(curve.c4) + 20.0 * abs(curve.c5)
+    return bent + curve.b * curve.b * abs(swing)
+
+
+@kernel
+def bounds(curve, start, end):
+    """Bounds of the value in [start, end]."""
+    v0, _, swing = _at(curve, start)
+    v1 = value(curve, end)
+    room = _bent(curve, swing) * (end - start) * (end - start) * 0.125
+    return min(v0, v1) - room, max(v0, v1) + room
+
+
+@kernel
+def _root(curve, low, v_low, high, v_high):
+    """Where a curve that rises through zero once in [low, high] does so: Newton, else halving."""
+    t = low - v_low * (high - low) / (v_high - v_low)
+    for _ in range(_NEWTON):
+        v, slope, _ = _at(curve, t)
+        if v >= 0.0:
+            high = t
+        else:
+            low = t
+        after = t - v / slope if slope > 0.0 else -1.0
+        if not low <= after <= high:
+            after = 0.5 * (low + high)
+        if abs(after - t) < _SETTLED:
+            return after
+        t = after
+    return t
+
+
+@kernel
+def first_reach(curve, start, end):
+    """Where a curve is first at or above zero in [start, end]; beyond 1: nowhere.
+
+    What is looked at next gets shorter until its curvature says that nothing is hidden in it: no
+    crossing, or one.
+    """
+    t, width = start, end - start
+    v, slope, swing = _at(curve, t)
+    if v >= 0.0:
+        return start
+    while t < end:
+        most = _bent(curve, swing)
+        ahead = end if width >= end - t else t + width
+        width = ahead - t
+        v1, slope1, swing1 = _at(curve, ahead)
+        if v1 >= 0.0:
+            if min(slope, slope1) > 0.0 and max(slope, slope1) > most * width:
+                return _root(curve, t, v, ahead, v1)
+            if width <= _NARROW:
+                return ahead
+        elif max(v, v1) + most * width * width * 0.125 < 0.0 or width <= _NARROW:
+            t, v, slope, swing = ahead, v1, slope1, swing1
+            width *= 2.0
+            continue
+        width *= 0.5
+    return NOWHERE

@@ -1,0 +1,177 @@
+"""The first pass of the cascade: all pixels of a strip over one piece of an interval.
+
+It moves every pixel through the substeps of the piece, keeps both lags at the end of each, and
+tells which pixels may fire.  All of it is single precision and free of branches, as in
+:mod:`adv2e.kernel.screen`, whose rows these follow.
+
+Bound.  The second pole moves its output towards its input, so over the piece it stays between its
+value at the start and the extremes of its input, which :mod:`adv2e.kernel.screen` bounds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.compiled import kernel
+from adv2e.kernel import screen, special
+from adv2e.kernel.cascade.plan import MOST
+from adv2e.kernel.screen import STRIDE
+from adv2e.kernel.work_queue import STRIP
+
+LARGEST_STEP = 0.3
+"""Change of log intensity over a piece above which a pixel is solved by itself [ln units]."""
+
+LARGEST = (np.float32(LARGEST_STEP), np.float32(np.tanh(0.5 * LARGEST_STEP)))
+"""The same on the foot, and as a ratio on the log branch, as :func:`adv2e.kernel.screen.flag`
+takes it."""
+
+_BEGIN = screen.SIZE
+LIGHT = _BEGIN  # at the start of the substep [DN]
+GROWTH = _BEGIN + STRIDE  # what the light becomes in half a substep: growth * light + rise
+RISE = _BEGIN + 2 * STRIDE
+BEND = _BEGIN + 3 * STRIDE  # change of the logarithm of the light in a substep, 0 on the foot
+MOVE = _BEGIN + 4 * STRIDE  # change of x in a substep
+FIRST = _BEGIN + 5 * STRIDE  # lag of the first pole at the start, and after each substep
+SECOND = FIRST + (MOST + 1) * STRIDE  # the same of the second pole: y - x
+SIZE = SECOND + (MOST + 1) * STRIDE
+
+_f = np.float32
+_ZERO, _ONE, _HALF, _TINY = _f(0.0), _f(1.0), _f(0.5), _f(1e-30)
+_FOUR, _TWO, _SIXTH = _f(4.0), _f(2.0), _f(1.0 / 6.0)
+_AT_REST = _f(screen.AT_REST)
+_P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
+    _f(c)
+    for c in (
+        *(0.9999999905459108, -0.4999993866158137, 0.1666601111568939, -0.04163981341361955),
+        *(0.008278784004239178, -0.001327672549396723, 0.0001590395143157818),
+        -1.0502782956506526e-05,
+    )
+)
+_M0, _M1, _M2, _M3, _M4 = (
+    _f(c)
+    for c in (
+        *(0.1666619514550658, -0.08321197508047128, 0.02449272805990381),
+        *(-0.004791065575097462, 0.00048696300379811474),
+    )
+)
+
+
+def scratch() -> NDArray[np.float32]:
+    """Return the flat array of rows of one strip."""
+    strip = np.zeros(SIZE, np.float32)
+    strip[: screen.SIZE] = screen.scratch()
+    return strip
+
+
+@kernel
+def phi32(a):
+    """(1 - e^-a)/a in single precision for 0 <= a <= 2."""
+    p = _P3 + a * (_P4 + a * (_P5 + a * (_P6 + a * _P7)))
+    return _P0 + a * (_P1 + a * (_P2 + a * p))
+
+
+@kernel
+def _turn32(a):
+    """Half the integral of v (1 - v) e^(-a v) over 0..1 for 0 <= a <= 2, to 6e-5 of it."""
+    return _HALF * (_M0 + a * (_M1 + a * (_M2 + a * (_M3 + a * _M4))))
+
+
+@kernel
+def _prepare(strip, share, knee_dn, inverse_slope):
+    """Rows DX, of the piece, and those of the light; `share` of the piece is a substep."""
+    half = _HALF * share
+    for k in range(STRIP):
+        i0, i1 = strip[screen.LIGHT_0 + k], strip[screen.LIGHT_1 + k]
+        change = i1 - i0
+        on_log = min(i0, i1) >= knee_dn
+        ratio = change / (i1 + i0 + _TINY)
+        ratio = min(max(ratio, -LARGEST[1]), LARGEST[1])  # beyond, it is solved by itself
+        dx = special.log_ratio32(ratio) if on_log else change * inverse_slope
+        strip[screen.DX + k] = dx
+        strip[LIGHT + k] = i0
+        strip[GROWTH + k] = special.exp32(dx * half) if on_log else _ONE
+        strip[RISE + k] = _ZERO if on_log else change * half
+        strip[BEND + k] = dx * share if on_log else _ZERO
+        strip[MOVE + k] = dx * share
+
+
+@kernel
+def _substep(strip, first, second, dark, per_dn, weights):
+    """Rows `first` and `second` after the one substep that begins with the rows of that name.
+
+    dark, per_dn : corner in darkness, and for each DN, times the substep [rad].
+    """
+    # slices: indices that count from zero need no test of their sign, which vectors bear ill
+    lag, lag_after = strip[first : first + STRIP], strip[first + STRIDE : first + STRIDE + STRIP]
+    seen = strip[second : second + STRIP]
+    seen_after = strip[second + STRIDE : second + STRIDE + STRIP]
+    keep, ramp = _f(weights[0]), _f(weights[7])
+    p0, s0, c0 = _f(weights[1]), _f(weights[2]), _f(weights[3])
+    p1, s1, c1 = _f(weights[4]), _f(weights[5]), _f(weights[6])
+    for k in range(STRIP):
+        growth, rise, bend = strip[GROWTH + k], strip[RISE + k], strip[BEND + k]
+        d, i0 = strip[MOVE + k], strip[LIGHT + k]
+        middle = i0 * growth + rise
+        i1 = middle * growth + rise
+        a = dark + per_dn * ((i0 + _FOUR * middle + i1) * _SIXTH)
+        a = min(a, _TWO)
+        c = per_dn * (i1 - i0)
+        u0 = lag[k]
+        shape = phi32(a)
+        u1 = (_ONE - a * shape) * u0 - d * (shape - c * _turn32(a))
+        u1 = u1 if abs(u1) > _AT_REST else _ZERO
+        w0, w1 = dark + per_dn * i0, dark + per_dn * i1
+        # how the corner changes at both ends: with the light, which grows by itself or in a line
+        g0, g1 = per_dn * (i0 * bend + _TWO * rise), per_dn * (i1 * bend + _TWO * rise)
+        slope0, slope1 = -(w0 * u0 + d), -(w1 * u1 + d)
+        curve0, curve1 = -(g0 * u0 + w0 * slope0), -(g1 * u1 + w1 * slope1)
+        q1 = keep * seen[k] - ramp * d
+        q1 += (p0 * u0 + p1 * u1) + (s0 * slope0 + s1 * slope1) + (c0 * curve0 + c1 * curve1)
+        strip[LIGHT + k] = i1
+        lag_after[k] = u1
+        seen_after[k] = q1 if abs(q1) > _AT_REST else _ZERO
+
+
+@kernel
+def follow(strip, substeps, dark, per_dn, knee_dn, slope, weights):
+    """Move every pixel through the substeps of a piece; dark, per_dn : of a substep [rad]."""
+    inverse_slope = _ONE / slope if slope > _ZERO else _ZERO
+    _prepare(strip, _ONE / _f(substeps), knee_dn, inverse_slope)
+    for k in range(STRIP):
+        strip[FIRST + k] = strip[screen.LAG_0 + k]
+    for j in range(substeps):
+        _substep(strip, FIRST + j * STRIDE, SECOND + j * STRIDE, dark, per_dn, weights)
+    last = FIRST + substeps * STRIDE
+    for k in range(STRIP):
+        strip[screen.LAG_1 + k] = strip[last + k]
+
+
+@kernel
+def stay(strip, substeps):
+    """Rows of a piece over which nothing moves and no lag is left."""
+    for k in range(STRIP):
+        strip[screen.DX + k] = _ZERO
+        strip[screen.LAG_1 + k] = _ZERO
+    for j in range(substeps + 1):
+        for k in range(STRIP):
+            strip[FIRST + j * STRIDE + k] = _ZERO
+            strip[SECOND + j * STRIDE + k] = _ZERO
+
+
+@kernel
+def step_on(strip, substeps):
+    """Make the end of this piece the start of the next."""
+    screen.step_on(strip)
+    last = SECOND + substeps * STRIDE
+    for k in range(STRIP):
+        strip[SECOND + k] = strip[last + k]
+
+
+@kernel
+def is_settled(strip):
+    """Tell whether no pixel has a lag."""
+    lags = 0
+    for k in range(STRIP):
+        lags += (strip[screen.LAG_0 + k] != _ZERO) | (strip[SECOND + k] != _ZERO)
+    return lags == 0
