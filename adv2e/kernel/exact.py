@@ -247,8 +247,8 @@ def _advance_cascade(
             )  # fmt: skip
         screen.flag(
             strip, _f(t0 + piece - start), _f(circuit.dark * piece), _f(circuit.per_dn * piece),
-            knee_dn, cascade.SECOND, _f(min(levels[0], levels[1])), _f(min(levels[2], levels[3])),
-            cascade.LARGEST,
+            knee_dn, cascade.SECOND, cascade.SECOND + substeps * screen.STRIDE,
+            _f(min(levels[0], levels[1])), _f(min(levels[2], levels[3])), cascade.LARGEST,
         )  # fmt: skip
         m, j, s = screen.flagged(strip, pixels), np.int64(0), 0.0
         while j < m:

@@ -174,7 +174,7 @@ def _end_lags(strip):
 
 
 @kernel
-def flag(strip, end, dark, per_dn, knee_dn, seen, on_factor, off_factor, largest_step):
+def flag(strip, end, dark, per_dn, knee_dn, seen, seen_after, on_factor, off_factor, largest_step):
     """Rows AWAY_1 and HIT: distance at the end, and which pixels are to be looked at.
 
     Parameters
@@ -186,8 +186,9 @@ def flag(strip, end, dark, per_dn, knee_dn, seen, on_factor, off_factor, largest
         Corner in darkness, and for each DN, times the interval [rad].
     knee_dn : float32
         Knee of the log map [DN].
-    seen : int
-        Row of the lag that the comparator sees at the start: that of a second pole follows.
+    seen, seen_after : int
+        Rows of the lag that the comparator sees, at the start and at the end: that of a second pole
+        follows the first one's.
     on_factor, off_factor : float32
         Least factors on the thresholds.
     largest_step : (2,) float32
@@ -211,7 +212,11 @@ def flag(strip, end, dark, per_dn, knee_dn, seen, on_factor, off_factor, largest
         turns = u0 * u1 < _ZERO
         low = min(low, turn) if turns else low
         high = max(high, turn) if turns else high
-        low, high = min(low, d0 + strip[seen + k]), max(high, d0 + strip[seen + k])
+        # a second pole that is on its way to a first one that runs away from it does not turn
+        q0, q1 = strip[seen + k], strip[seen_after + k]
+        flees = ((u0 + u1 <= _ZERO) & (q0 <= u0)) | ((u0 + u1 >= _ZERO) & (q0 >= u0))
+        low = min(d0 + q0, d1 + q1 if flees & (not turns) else low)
+        high = max(d0 + q0, d1 + q1 if flees & (not turns) else high)
         hit = (high + fall >= strip[ON + k] * on_factor) | (strip[DUE + k] < end)
         hit |= -low >= strip[OFF + k] * off_factor
         mixed = (i0 < knee_dn) != (i1 < knee_dn)
@@ -240,7 +245,7 @@ def screen(strip, end, dark, per_dn, knee_dn, slope, rule):
     for c in range(rule.nodes.shape[0]):
         _node(strip, _f(rule.nodes[c]), _f(rule.weights[c]))
     _end_lags(strip)
-    flag(strip, end, dark, per_dn, knee_dn, LAG_0, _ONE, _ONE, _LARGEST)
+    flag(strip, end, dark, per_dn, knee_dn, LAG_0, LAG_1, _ONE, _ONE, _LARGEST)
 
 
 @kernel

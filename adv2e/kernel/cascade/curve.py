@@ -8,8 +8,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from adv2e.compiled import kernel
-from adv2e.kernel import special
+
+_LOG2E = 1.4426950408889634
+_LN2_HIGH = 0.693147180369123816490
+_LN2_LOW = 1.90821492927058770002e-10
 
 NOWHERE = 2.0
 """Place of what does not happen in a substep."""
@@ -77,44 +82,70 @@ def mirrored(curve):
 
 
 @kernel
-def _at(curve, t):
+def _exp(t):
+    """e^t for t <= 0: that of :mod:`adv2e.kernel.special`, with less to wait for in a row."""
+    t = t if t > -700.0 else -700.0
+    n = np.floor(t * _LOG2E + 0.5)
+    r = (t - n * _LN2_HIGH) - n * _LN2_LOW
+    r2 = r * r
+    r4 = r2 * r2
+    low = (1.0 + r) + r2 * (1 / 2 + r * (1 / 6))
+    middle = (1 / 24 + r * (1 / 120)) + r2 * (1 / 720 + r * (1 / 5040))
+    high = (1 / 40320 + r * (1 / 362880)) + r2 * (1 / 3628800 + r * (1 / 39916800))
+    p = low + r4 * (middle + r4 * (high + r4 * (1 / 479001600)))
+    scale = np.int64((np.int64(n) + np.int64(1023)) << np.int64(52)).view(np.float64)
+    return scale * p
+
+
+@kernel
+def at(curve, t):
     """Value and slope at t, and what is left of the swing."""
-    swing = curve.swing * special.exp(-curve.b * t) if curve.swing != 0.0 else 0.0
-    p = curve.c3 + t * (curve.c4 + t * curve.c5)
-    p = curve.c0 + t * (curve.c1 + t * (curve.c2 + t * p))
-    slope = 3.0 * curve.c3 + t * (4.0 * curve.c4 + t * 5.0 * curve.c5)
-    slope = curve.c1 + t * (2.0 * curve.c2 + t * slope)
+    swing = curve.swing
+    if swing != 0.0 and t > 0.0:
+        swing *= _exp(-curve.b * t)
+    t2 = t * t
+    p = (curve.c0 + t * curve.c1) + t2 * (
+        (curve.c2 + t * curve.c3) + t2 * (curve.c4 + t * curve.c5)
+    )
+    slope = (curve.c1 + t * (2.0 * curve.c2)) + t2 * (
+        (3.0 * curve.c3 + t * (4.0 * curve.c4)) + t2 * (5.0 * curve.c5)
+    )
     return p + swing, slope - curve.b * swing, swing
 
 
 @kernel
 def value(curve, t):
     """Value at t."""
-    return _at(curve, t)[0]
+    return at(curve, t)[0]
 
 
 @kernel
-def _bent(curve, swing):
+def bent(curve, swing):
     """Most curvature behind a place where `swing` is left of the swing."""
-    bent = 2.0 * abs(curve.c2) + 6.0 * abs(curve.c3) + 12.0 * abs(curve.c4) + 20.0 * abs(curve.c5)
-    return bent + curve.b * curve.b * abs(swing)
+    most = 2.0 * abs(curve.c2) + 6.0 * abs(curve.c3) + 12.0 * abs(curve.c4) + 20.0 * abs(curve.c5)
+    return most + curve.b * curve.b * abs(swing)
 
 
 @kernel
-def bounds(curve, start, end):
-    """Bounds of the value in [start, end]."""
-    v0, _, swing = _at(curve, start)
-    v1 = value(curve, end)
-    room = _bent(curve, swing) * (end - start) * (end - start) * 0.125
-    return min(v0, v1) - room, max(v0, v1) + room
+def _guess(v0, slope0, v1, slope1, width):
+    """Return about where a cubic through values and slopes passes zero, from its start."""
+    t = v0 / (v0 - v1)
+    s0, s1 = slope0 * width, slope1 * width
+    c2, c3 = 3.0 * (v1 - v0) - 2.0 * s0 - s1, s0 + s1 - 2.0 * (v1 - v0)
+    for _ in range(2):
+        slope = s0 + t * (2.0 * c2 + t * 3.0 * c3)
+        t -= (v0 + t * (s0 + t * (c2 + t * c3))) / (slope if slope != 0.0 else 1.0)
+    return t * width
 
 
 @kernel
-def _root(curve, low, v_low, high, v_high):
+def _root(curve, low, v_low, slope_low, high, v_high, slope_high):
     """Where a curve that rises through zero once in [low, high] does so: Newton, else halving."""
-    t = low - v_low * (high - low) / (v_high - v_low)
+    t = low + _guess(v_low, slope_low, v_high, slope_high, high - low)
+    if not low <= t <= high:
+        t = 0.5 * (low + high)
     for _ in range(_NEWTON):
-        v, slope, _ = _at(curve, t)
+        v, slope, _ = at(curve, t)
         if v >= 0.0:
             high = t
         else:
@@ -129,29 +160,32 @@ def _root(curve, low, v_low, high, v_high):
 
 
 @kernel
-def first_reach(curve, start, end):
+def first_reach(curve, start, at_start, end, at_end):
     """Where a curve is first at or above zero in [start, end]; beyond 1: nowhere.
 
-    What is looked at next gets shorter until its curvature says that nothing is hidden in it: no
-    crossing, or one.
+    `at_start` and `at_end` are what `at` returns there.  What is looked at next gets shorter until
+    its curvature says that nothing is hidden in it: no crossing, or one.
     """
     t, width = start, end - start
-    v, slope, swing = _at(curve, t)
+    v, slope, swing = at_start
     if v >= 0.0:
         return start
-    while t < end:
-        most = _bent(curve, swing)
-        ahead = end if width >= end - t else t + width
-        width = ahead - t
-        v1, slope1, swing1 = _at(curve, ahead)
+    ahead, (v1, slope1, swing1) = end, at_end
+    while True:
+        most = bent(curve, swing) * width
         if v1 >= 0.0:
-            if min(slope, slope1) > 0.0 and max(slope, slope1) > most * width:
-                return _root(curve, t, v, ahead, v1)
+            if min(slope, slope1) > 0.0 and max(slope, slope1) > most:
+                return _root(curve, t, v, slope, ahead, v1, slope1)
             if width <= _NARROW:
                 return ahead
-        elif max(v, v1) + most * width * width * 0.125 < 0.0 or width <= _NARROW:
+            width *= 0.5
+        elif max(v, v1) + most * width * 0.125 < 0.0 or width <= _NARROW:
             t, v, slope, swing = ahead, v1, slope1, swing1
+            if t >= end:
+                return NOWHERE
             width *= 2.0
-            continue
-        width *= 0.5
-    return NOWHERE
+        else:
+            width *= 0.5
+        ahead = end if width >= end - t else t + width
+        width = ahead - t
+        v1, slope1, swing1 = at(curve, ahead)

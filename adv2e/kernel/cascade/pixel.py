@@ -11,13 +11,15 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import screen as cascade
 from adv2e.kernel.cascade.curve import (
     NOWHERE,
-    bounds,
+    at,
+    bent,
     first_reach,
     lag_curve,
     mirrored,
     plus,
     value,
 )
+from adv2e.kernel.cascade.plan import FEWEST, LONGEST
 from adv2e.kernel.causes import cause_by_most, note_parts
 from adv2e.kernel.comparator import TIE, fire
 from adv2e.kernel.lanes.exchange import log_of, watch
@@ -54,41 +56,38 @@ class _Way(NamedTuple):
     x0: float  # log intensity at its start
     dx: float  # by which that changes
     knee: float  # where the light passes the knee of the log map; 1: nowhere
-    substeps: int  # before the knee, and as many behind it
-    share: float  # one over their number
+    before: int  # substeps before the knee,
+    behind: int  # and behind it
     alone: bool  # whether the lags that the screen keeps do not hold
 
 
 @kernel
-def _way(k, substeps, circuit, strip):
-    """Return how pixel k of a strip goes through its piece."""
+def _way(k, length, substeps, circuit, strip):
+    """Return how pixel k of a strip goes through its piece of `length` us."""
     i0, i1 = float(strip[screen.LIGHT_0 + k]), float(strip[screen.LIGHT_1 + k])
     x0 = log_of(i0, circuit)
     dx = log_of(i1, circuit) - x0
     knee_dn = circuit.slope * circuit.knee
     mixed = (i0 < knee_dn) != (i1 < knee_dn)
-    brightest = max(i0, i1) / screen.LARGEST_LIGHT
+    brightest, steep = max(i0, i1), abs(dx) / cascade.LARGEST_STEP
     # a little less than what the screen takes for steep, which rounds otherwise
-    steep = max(abs(dx) / cascade.LARGEST_STEP, 0.0)
-    steep_light = abs(i1 - i0) > 0.99 * _LARGEST_RATIO * (i0 + i1)
-    alone = mixed or steep > 0.99 or steep_light or brightest > 0.99
-    knee = 1.0
-    if alone:
-        substeps = math.ceil(substeps * max(steep, brightest, 1.0))
-        if mixed and dx != 0.0:
-            knee = min(max((circuit.knee - x0) / dx, 0.0), 1.0)
-    return _Way(x0, dx, knee, substeps, 1.0 / substeps, alone)
+    alone = abs(i1 - i0) > 0.99 * _LARGEST_RATIO * (i0 + i1) or steep > 0.99
+    if not (alone or mixed or brightest > 0.99 * screen.LARGEST_LIGHT):
+        return _Way(x0, dx, 1.0, substeps, 0, False)
+    corner = (circuit.dark + circuit.per_dn * brightest) * length
+    needed = max(corner / LONGEST, FEWEST * max(steep, 1.0))
+    knee = min(max((circuit.knee - x0) / dx, 0.0), 1.0) if mixed and dx != 0.0 else 1.0
+    return _Way(x0, dx, knee, math.ceil(needed * knee), math.ceil(needed * (1.0 - knee)), True)
 
 
 @kernel
 def _place(way, j):
     """Where substep j of a piece begins."""
-    m = way.substeps
-    if j == m:
-        return way.knee
-    return (
-        way.knee * (j * way.share) if j < m else way.knee + (1.0 - way.knee) * ((j - m) * way.share)
-    )
+    if j < way.before:
+        return way.knee * (j / way.before)
+    if j == way.before + way.behind:
+        return 1.0
+    return way.knee + (1.0 - way.knee) * ((j - way.before) / way.behind)
 
 
 @kernel
@@ -111,17 +110,39 @@ def _after(u0, d, a, c):
 
 
 @kernel
-def _may_fire(u0, u1, q0, away0, away1, fallen0, fallen1, on, off):
-    """Tell whether the signal may reach a level in a substep.
+def _may_fire(u0, u1, q0, q1, away0, away1, fallen0, fallen1, on, off):
+    """Tell whether the signal may reach a level in a substep; see the bounds of the screens.
 
     away0, away1 : distance of x from the reference at its ends, fallen0, fallen1 : what leak adds
     """
-    high = away0 + max(u0, q0)
-    low = away0 + min(u0, q0)
-    high, low = max(high, away1 + u1), min(low, away1 + u1)
-    if u0 * u1 < 0.0:  # the first pole turns where it meets x
-        high, low = max(high, away0, away1), min(low, away0, away1)
+    turns = u0 * u1 < 0.0
+    if not turns and ((u0 + u1 <= 0.0 and q0 <= u0) or (u0 + u1 >= 0.0 and q0 >= u0)):
+        high, low = max(away0 + q0, away1 + q1), min(away0 + q0, away1 + q1)
+    else:
+        high, low = away0 + max(u0, q0), away0 + min(u0, q0)
+        high, low = max(high, away1 + u1), min(low, away1 + u1)
+        if turns:  # the first pole turns where it meets x
+            high, low = max(high, away0, away1), min(low, away0, away1)
     return high + fallen1 >= on or low + fallen0 <= -off
+
+
+@kernel
+def _first_busy(k, j, count, away, d, fall, on, off, strip):
+    """Return the first substep from j on in which pixel k may fire by its signal, else `count`.
+
+    away : distance of x from the reference at the start of the piece; d, fall : what x and leak
+    move it by in each substep.
+    """
+    u1 = float(strip[cascade.FIRST + j * STRIDE + k])
+    q1 = float(strip[cascade.SECOND + j * STRIDE + k])
+    while j < count:
+        u0, q0, away_j = u1, q1, away + (d + fall) * j
+        u1 = float(strip[cascade.FIRST + (j + 1) * STRIDE + k])
+        q1 = float(strip[cascade.SECOND + (j + 1) * STRIDE + k])
+        if _may_fire(u0, u1, q0, q1, away_j, away_j + d, 0.0, fall, on, off):
+            break
+        j += 1
+    return j
 
 
 @kernel
@@ -134,6 +155,12 @@ def _fallen(step, t):
 def _light_at(x, circuit):
     """Light [DN] that log intensity x stands for."""
     return _light(x, x >= circuit.knee, circuit)
+
+
+@kernel
+def _shifted(found, sign, level, slope):
+    """Return what `at` finds of a curve or its mirror with a line, `level` there, added to it."""
+    return sign * found[0] + level, sign * found[1] + slope, sign * found[2]
 
 
 @kernel
@@ -162,14 +189,23 @@ def _fire(i, t, step, lag, reference, factor, t_base, circuit, state, keys, time
             signal, factor * step.fallen - reference, factor * step.leak1, factor * step.leak2,
             factor * step.leak3,
         )  # fmt: skip
-        low, high = bounds(away, t, end)
+        at_t, at_end = at(away, t), at(away, end)
+        room = bent(away, at_t[2]) * (end - t) * (end - t) * 0.125
         up, down = NOWHERE, NOWHERE
-        if high >= min(step.on0, step.on1):
-            above = plus(away, -step.on0 - TIE, step.on0 - step.on1, 0.0, 0.0)
-            up = first_reach(above, t, end)
-        if -low >= min(step.off0, step.off1):
-            below = plus(mirrored(away), -step.off0 - TIE, step.off0 - step.off1, 0.0, 0.0)
-            down = first_reach(below, t, min(up, end))
+        if max(at_t[0], at_end[0]) + room >= min(step.on0, step.on1):
+            rise = step.on1 - step.on0
+            level = plus(away, -step.on0 - TIE, -rise, 0.0, 0.0)
+            up = first_reach(
+                level, t, _shifted(at_t, 1.0, -step.on0 - TIE - rise * t, -rise),
+                end, _shifted(at_end, 1.0, -step.on0 - TIE - rise * end, -rise),
+            )  # fmt: skip
+        if room - min(at_t[0], at_end[0]) >= min(step.off0, step.off1):
+            rise = step.off1 - step.off0
+            level = plus(mirrored(away), -step.off0 - TIE, -rise, 0.0, 0.0)
+            down = first_reach(
+                level, t, _shifted(at_t, -1.0, -step.off0 - TIE - rise * t, -rise),
+                end, _shifted(at_end, -1.0, -step.off0 - TIE - rise * end, -rise),
+            )  # fmt: skip
         polarity, by_signal = 1 if up <= down else -1, min(up, down) <= 1.0
         if by_signal:
             t = min(up, down)
@@ -181,10 +217,10 @@ def _fire(i, t, step, lag, reference, factor, t_base, circuit, state, keys, time
             polarity = take_noise(i, kind, light, circuit, state)
             if polarity == 0:
                 continue
-        when, cause, seen = step.t0 + t * h, kind, value(signal, t)
+        when, cause = step.t0 + t * h, kind
         if circuit.causes and by_signal:
             now = reference - factor * _fallen(step, t)
-            cause = cause_by_most(i, polarity, now, seen, 0.0, 0.0, circuit, state)
+            cause = cause_by_most(i, polarity, now, value(signal, t), 0.0, 0.0, circuit, state)
         n = fire(i, when, polarity, cause, t_base, circuit, state, keys, times, n)
         before = factor
         factor = state[per_pixel.LEAK_FACTOR, i] if jitter else 1.0
@@ -197,9 +233,8 @@ def _fire(i, t, step, lag, reference, factor, t_base, circuit, state, keys, time
                 state[per_pixel.BEYOND, i] = beyond
                 return n, DONE, reference, factor
             t = (hold - step.t0) / h
-            seen = value(signal, t)
         if circuit.dead_time > 0.0 or not by_signal:
-            reference = seen + factor * _fallen(step, t) + beyond
+            reference = value(signal, t) + factor * _fallen(step, t) + beyond
         else:
             level = (
                 step.on0 + (step.on1 - step.on0) * t
@@ -209,7 +244,8 @@ def _fire(i, t, step, lag, reference, factor, t_base, circuit, state, keys, time
             reference += level * (1.0 + circuit.overshoot)
             reference += (factor - before) * _fallen(step, t)
         if circuit.causes:
-            note_parts(i, reference - factor * _fallen(step, t), seen, 0.0, 0.0, state)
+            now = reference - factor * _fallen(step, t)
+            note_parts(i, now, value(signal, t), 0.0, 0.0, state)
 
 
 @kernel
@@ -236,7 +272,7 @@ def _solve(
     which to go on.  The rows of the pixel are then those at the end of the piece.
     """
     i = lo + k
-    way = _way(k, substeps, circuit, strip)
+    way = _way(k, length, substeps, circuit, strip)
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
     on_0, on_rise = on_level * levels[0], on_level * (levels[1] - levels[0])
     off_0, off_rise = off_level * levels[2], off_level * (levels[3] - levels[2])
@@ -244,14 +280,36 @@ def _solve(
     reference = state[per_pixel.REFERENCE, i]
     light1, fallen1, s1 = float(strip[screen.LIGHT_0 + k]), 0.0, 0.0
     u1, q1 = float(strip[cascade.FIRST + k]), float(strip[cascade.SECOND + k])
-    total = 2 * way.substeps if way.knee < 1.0 else way.substeps
     follows_light = way.alone or circuit.photo_leak > 0.0
-    for j in range(total):
+    count, share = way.before + way.behind, 1.0 / substeps
+    hold, due = state[per_pixel.HOLD, i], next_noise(i, circuit, state)[1]
+    # where each substep is like the other, those in which nothing happens are passed quickly
+    skims, fall_each = not follows_light, on_level * circuit.leak * length * share
+    least_on, least_off = min(on_0, on_0 + on_rise), min(off_0, off_0 + off_rise)
+    j = 0
+    while j < count:
+        if skims and hold < 0.0 and s1 >= s_from:
+            busy = _first_busy(
+                k, j, count, way.x0 - reference, way.dx * share, factor * fall_each, least_on,
+                least_off, strip,
+            )  # fmt: skip
+            if due < ta + length:
+                busy = min(busy, max(j, int((due - ta) / (length * share))))
+            if busy > j:
+                j, s1, fallen1 = busy, busy * share, fall_each * busy
+                u1 = float(strip[cascade.FIRST + j * STRIDE + k])
+                q1 = float(strip[cascade.SECOND + j * STRIDE + k])
+                if j == count:
+                    break
+        j += 1
         s0, u0, q0, light0, fallen0 = s1, u1, q1, light1, fallen1
-        s1 = _place(way, j + 1)
+        if way.alone:
+            s1 = _place(way, j)
+        else:
+            s1 = j * share if j < count else 1.0
+            u1 = float(strip[cascade.FIRST + j * STRIDE + k])
+            q1 = float(strip[cascade.SECOND + j * STRIDE + k])
         span = s1 - s0
-        if span <= 0.0:
-            continue
         h, d, x = span * length, span * way.dx, way.x0 + s0 * way.dx
         t0 = ta + s0 * length
         on_log = x + 0.5 * d >= circuit.knee
@@ -265,20 +323,16 @@ def _solve(
         fallen1 = fallen0 + fall
         if way.alone:
             u1 = _after(u0, d, dark + per_dn * mean, per_dn * (light1 - light0))
-        else:
-            u1 = float(strip[cascade.FIRST + (j + 1) * STRIDE + k])
         on0, on1 = on_0 + on_rise * s0, on_0 + on_rise * s1
         off0, off1 = off_0 + off_rise * s0, off_0 + off_rise * s1
-        hold = state[per_pixel.HOLD, i]
         idle = hold >= t0 + h or s1 <= s_from
-        if hold < 0.0 and next_noise(i, circuit, state)[1] >= t0 + h:
+        if hold < 0.0 and due >= t0 + h and follows_light and not way.alone:
             away = x - reference
             idle |= not _may_fire(
-                u0, u1, q0, away, away + d, factor * fallen0, factor * fallen1, min(on0, on1),
+                u0, u1, q0, q1, away, away + d, factor * fallen0, factor * fallen1, min(on0, on1),
                 min(off0, off1),
             )  # fmt: skip
         if idle and not way.alone:
-            q1 = float(strip[cascade.SECOND + (j + 1) * STRIDE + k])
             continue
         if not follows_light:
             light0, light1 = _light(x, on_log, circuit), _light(x + d, on_log, circuit)
@@ -292,10 +346,8 @@ def _solve(
         if way.alone:
             q1 = value(lag, 1.0)
             q1 = q1 if abs(q1) > screen.AT_REST else 0.0
-        else:
-            q1 = float(strip[cascade.SECOND + (j + 1) * STRIDE + k])
-        if idle:
-            continue
+            if idle:
+                continue
         l0 = on_level * (circuit.leak + circuit.photo_leak * light0) * h
         l1 = on_level * (circuit.leak + circuit.photo_leak * light1) * h
         step = _Substep(
@@ -309,6 +361,7 @@ def _solve(
         if place != DONE:
             state[per_pixel.REFERENCE, i] = reference
             return n, s0 + place * span
+        hold, due = state[per_pixel.HOLD, i], next_noise(i, circuit, state)[1]
     state[per_pixel.REFERENCE, i] = reference - factor * fallen1
     strip[screen.LAG_1 + k] = u1
     strip[cascade.SECOND + substeps * STRIDE + k] = q1

@@ -15,11 +15,11 @@ MOST = 10
 WEIGHTS = 8
 """Of the second pole: what it keeps, six for its input, and the lag behind a ramp."""
 
-_LONGEST = 0.8
+LONGEST = 0.8
 """Longest substep, in time constants at white: with 1.25, events that a leak of 9 Hz made after a
 step to white were 1.8 us off; with 0.8, a tenth of that."""
 
-_FEWEST = 2
+FEWEST = 2
 """Substeps of an interval: the light may change by a third in it."""
 
 _NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(40)
@@ -64,7 +64,7 @@ def plan_for(
     simple : bool
         See :class:`Plan`.
     """
-    needed = np.maximum(np.ceil(1.001 * lengths * fastest / _LONGEST), _FEWEST).astype(np.int64)
+    needed = np.maximum(np.ceil(1.001 * lengths * fastest / LONGEST), FEWEST).astype(np.int64)
     pieces = -(-needed // MOST)
     substeps = -(-needed // pieces)
     corners = follower * lengths / (pieces * substeps)
