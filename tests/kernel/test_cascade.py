@@ -163,7 +163,8 @@ def test_curves_reach_zero_where_dense_samples_do():
         values = sum(c * t**k for k, c in enumerate(one[:6])) + swing * np.exp(-b * t)
         inside = (t >= start_at) & (t <= end)
         at = t[inside][values[inside] >= 0.0]
-        found = curve.first_reach(one, start_at, end)
+        ends = curve.at(one, start_at), curve.at(one, end)
+        found = curve.first_reach(one, start_at, ends[0], end, ends[1])
         if at.size:
             reached += 1
             assert found <= at[0]
@@ -171,8 +172,10 @@ def test_curves_reach_zero_where_dense_samples_do():
             assert found >= at[0] - 1.01 * (t[1] - t[0]) or abs(curve.value(one, found)) < 1e-6
         elif found != curve.NOWHERE:
             assert abs(curve.value(one, found)) < 1e-6
-        low, high = curve.bounds(one, start_at, end)
-        assert np.all((values[inside] >= low - 1e-12) & (values[inside] <= high + 1e-12))
+        np.testing.assert_allclose(ends[1][0], np.interp(end, t, values), atol=1e-6 * (1 + b * b))
+        room = curve.bent(one, ends[0][2]) * (end - start_at) ** 2 / 8 + 1e-9
+        assert values[inside].max(initial=-9) <= max(ends[0][0], ends[1][0]) + room
+        assert values[inside].min(initial=9) >= min(ends[0][0], ends[1][0]) - room
     assert reached > 100
 
 
