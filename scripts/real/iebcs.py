@@ -33,6 +33,8 @@ class Level:
     lux: float
     intervals: dict[str, Array]
     duration_s: float
+    by_frequency: dict[str, Array]
+    """Intervals of all pixels, ON and OFF, by frequency (`interval_bins`)."""
 
     @property
     def pixels(self) -> int:
@@ -77,6 +79,12 @@ class Level:
         return float(low) / self.duration_s, float(high) / self.duration_s
 
 
+def interval_bins() -> Array:
+    """Return the borders of the frequencies of the files [Hz]."""
+    borders: Array = np.outer(10.0 ** np.arange(-3, 5), np.arange(1, 10)).ravel()
+    return borders
+
+
 def read_levels(folder: Path) -> list[Level]:
     """Return the three light levels."""
     try:
@@ -87,12 +95,13 @@ def read_levels(folder: Path) -> list[Level]:
 
 
 def _level(folder: Path, name: str, lux: float, bins: Array) -> Level:
-    intervals, lengths = {}, []
+    intervals, lengths, by_frequency = {}, [], {}
     period = 1.0 / np.sqrt(bins[:-1] * bins[1:])  # the last bin is unused
     for polarity, short in POLARITIES.items():
         with np.load(folder / f"noise_{short}_{name}.npz") as file:
             below = file["cdf"].astype(np.float64)
         counts = np.diff(below.reshape(-1, below.shape[-1])[:, :-1], axis=1, prepend=0.0)
         intervals[polarity] = counts.sum(axis=1)
+        by_frequency[polarity] = counts.sum(axis=0)
         lengths.append((counts @ period)[intervals[polarity] >= MANY])
-    return Level(lux, intervals, float(np.median(np.concatenate(lengths))))
+    return Level(lux, intervals, float(np.median(np.concatenate(lengths))), by_frequency)

@@ -26,8 +26,9 @@ from adv2e.diagnosis.tables.noise_problem import NoiseProblem
 from adv2e.diagnosis.tables.problem import Settings, read_declared
 from adv2e.diagnosis.tables.table import Table, parse_table
 from adv2e.reports.result import Diagnosis
-from real.cradle import still_rates, top_share
+from real.cradle import still_pixels, still_rates, top_share
 from real.iebcs import Level, read_levels
+from real.noise_shares import compared_intervals, iebcs_shares, three_ways, two_halves, values_of
 
 DECLARED = "v2e"
 OPEN = 0.25
@@ -45,10 +46,25 @@ CHECKED = (
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.argument("cradle_folder", required=False, type=click.Path(path_type=Path))
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option(
+    "--picture",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.png",
+    help="Draw the distributions of intervals here; needs Matplotlib.",
+)
 @one_line_errors()
-def main(folder: Path, cradle_folder: Path | None, seed: int) -> None:
+def main(folder: Path, cradle_folder: Path | None, seed: int, picture: Path | None) -> None:
     """Fit noise at two light levels, judge at the third."""
     levels = read_levels(folder)
+    errors, found = three_ways(iebcs_shares(levels), max(level.lux for level in levels))
+    print(errors, end="\n\n")
+    for lux, parts in found.items():
+        for part in parts:
+            print(f"{f'without {lux} lux' if lux else 'all'}, {part.model}: {values_of(part)}")
+    print(f"\n{compared_intervals(levels, found, seed, picture)}", end="\n\n")
+    if cradle_folder is not None:
+        judged, rates, last = two_halves(still_pixels(cradle_folder))
+        print(f"{judged}\n\n{rates}\n\n{last.model}: {values_of(last)}", end="\n\n")
     print(measured_rates(levels), end="\n\n")
     print(per_pixel(levels), end="\n\n")
     measured = iebcs_table(levels)

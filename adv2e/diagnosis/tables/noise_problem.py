@@ -41,7 +41,7 @@ _WORDS = {"rate_hz": "mean", "median_hz": "median"}
 
 _SHAPE = ((CUTOFF, 3.0, 1e6), (DARK_CUTOFF, 0.03, 3e3), (FOLLOWER, 3.0, 1e5))
 """What shapes photoreceptor noise beside the thresholds, and between which values it is fitted."""
-_SHAPE_STARTS = ((300.0, 3.0, 100.0), (2000.0, 10.0, 300.0), (300.0, 30.0, 30.0))
+_SHAPE_STARTS = ((3e3, 10.0, 100.0), (1e5, 10.0, 50.0), (1e4, 3.0, 30.0))
 
 
 class NoiseProblem(Problem):
@@ -185,6 +185,10 @@ class NoiseProblem(Problem):
         least = float(np.where(self.floor > 0.0, self.floor, rate).min())
         most = float(max(rate.max(), 10 * self.floor.max()))
         typical = float(np.exp(np.median(np.log(rate + self.floor))))
+        if self.spread_shows:  # of the most quiet light: rates of many events are of few pixels
+            few = np.array(self._numbers) == min(number for number in self._numbers if number)
+            typical, most = float(rate[few].min()), float(rate[few].max())
+            typical = max(typical, 1e-2 * most)
 
         def of_rate(name: str, key: str, factor: float = 1.0, extra: Extra = ()) -> Candidate:
             parameter = FitParameter(key, 1e-3 * least * factor, 1e3 * most * factor)
@@ -201,9 +205,9 @@ class NoiseProblem(Problem):
             yield _several(
                 "hot_pixels",
                 [
-                    (HOT_FRACTION, 1e-3, 0.5, (0.02, 0.1)),
-                    (HOT_RATE, least, 1e3, (typical, 1.0)),
-                    (HOT_SPREAD, 0.05, 2.0, (0.7, 0.7)),
+                    (HOT_FRACTION, 1e-3, 0.5, (0.02, 0.1, 0.3)),
+                    (HOT_RATE, 1e-3, 1e3, (1.0, 0.1, 0.02)),
+                    (HOT_SPREAD, 0.05, 2.0, (0.7, 1.0, 1.0)),
                 ],
             )
         thresholds = self.declared.config.pixel.thresholds
@@ -216,16 +220,12 @@ class NoiseProblem(Problem):
         else:
             starts = zip(*_SHAPE_STARTS, strict=True)
             shape = [(*one, first) for one, first in zip(_SHAPE, starts, strict=True)]
-            off = OFF, 0.3 * thresholds.on, 3.0 * thresholds.on, (1.1 * thresholds.on,) * 3
-            spread = (
-                MISMATCH,
-                0.01 * thresholds.on,
-                0.5 * thresholds.on,
-                (0.15 * thresholds.on,) * 3,
-            )
+            on = thresholds.on
+            off = OFF, 0.3 * on, 3.0 * on, (1.1 * on,) * 3
+            spread = MISMATCH, 0.01 * on, 0.5 * on, (0.3 * on,) * 3
             written = self.declared.written
             free = [one for one in (*shape, off, spread) if one[0] not in written]
-            free = [(*rms, (level / 3, level / 4, level / 2)), *free]
+            free = [(*rms, (level / 3, level / 2, level / 2)), *free]
             yield _several("photoreceptor_noise", free)
 
 
