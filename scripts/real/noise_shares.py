@@ -116,8 +116,8 @@ def cradle_shares(still: Still) -> Table:
     rows, counts = [], []
     for low, high in itertools.pairwise(FINE_EDGES_DN):
         for half in (0, 1):
+            grey = float(still.grey[(still.grey >= low) & (still.grey < high)].mean())
             inside = (still.grey >= low) & (still.grey < high) & (still.half == half)
-            grey = float(still.grey[inside].mean())
             row = {"light_dn": grey, "pixels": int(inside.sum()), "duration_s": still.duration_s}
             rows.append({**row, "half": half})
             counts.append({p: number[inside] for p, number in still.counts.items()})

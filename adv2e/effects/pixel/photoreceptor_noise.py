@@ -12,6 +12,13 @@ mostly alternate in polarity, which Poisson events do not.  The process is sampl
 linear between the samples.  Samples are at most step times the shortest correlation time apart,
 which is the one at white.
 
+Behind a second pole of corner f_s (source_follower) the variance is
+
+    sigma^2 f_s/(f + f_s)
+
+so that noise falls as the light rises.  That is what two cameras do (scripts/real/README.md);
+behind the low-pass alone, rates rise with the corner.
+
 References
 ----------
 [1] R. Graca, T. Delbruck, "Unraveling the paradox of intensity-dependent DVS pixel noise",
