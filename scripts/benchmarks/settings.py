@@ -35,6 +35,9 @@ SHOT = ("pixel.shot_noise.rate_hz=5",)
 SHOT_WEAK = ("pixel.shot_noise.rate_hz=0.1",)
 ALL = (*MISMATCH, *LEAK, *DEAD_TIME, *SHOT)
 ALL_WEAK = (*MISMATCH, *LEAK, *DEAD_TIME, *SHOT_WEAK)
+POLES_HZ = 300, 1000, 10_000
+POLE = "pixel.source_follower.cutoff_hz=1000"
+NOISE = "pixel.photoreceptor_noise.rms=0.03"
 
 EVERYTHING = (
     *ALL,
@@ -115,11 +118,18 @@ def settings() -> Iterator[Setting]:
     for form in ("first_order_hold", "paper"):
         for K, share in ((1, 1.0), (10, 0.5), (100, 0.1)):
             yield Setting(name=f"{form}, K = {K}", clip=one, sets=stepped(form, K), share=share)
-    slow = {
-        "photoreceptor noise 0.03": ("pixel.photoreceptor_noise.rms=0.03",),
-        "second pole 1 kHz": ("pixel.source_follower.cutoff_hz=1000",),
+    cascade = {
+        **{f"second pole {hz} Hz": (f"pixel.source_follower.cutoff_hz={hz}",) for hz in POLES_HZ},
+        "overshoot 0.1": ("pixel.reset_overshoot.fraction=0.1",),
+        "second pole 1000 Hz, all effects, shot 0.1 Hz": (*ALL_WEAK, POLE),
     }
-    for name, sets in slow.items():
+    for name, sets in cascade.items():
+        yield Setting(name=name, clip=one, sets=sets)
+    noisy = {
+        "photoreceptor noise 0.03": (NOISE,),
+        "photoreceptor noise 0.03, second pole 1000 Hz": (NOISE, POLE),
+    }
+    for name, sets in noisy.items():
         yield Setting(name=name, clip=one, sets=sets, share=0.1)
     shipped = f"pixel.log_response.linear_below={SHIPPED_KNEE_DN:g}"
     decoded = ("frames.encoding=srgb", shipped, "sampling.L=10")
