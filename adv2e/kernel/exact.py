@@ -219,6 +219,7 @@ def _advance_cascade(
     lo, count, start, ta, length, f, still, circuit, plan, t_base, state, scratch, keys, times, n
 ):  # fmt: skip
     """Advance one strip over interval f, piece by piece; `still`: nothing moves or lags in it."""
+    (plan,) = borrowed(plan)
     strip, falls, pixels = scratch.strip, scratch.falls, scratch.pixels
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     pieces, substeps, weights = plan.pieces[f], plan.substeps[f], plan.weights[f]
@@ -299,10 +300,11 @@ def _strip(
 ):  # fmt: skip
     """Advance one strip of the exact circuit over all intervals."""
     frames, before, share, starts = borrowed(frames, before, share, starts)
-    rules, plan, state, scratch = borrowed(rules, plan, state, scratch)
-    by_cascade = plan.pieces.shape[0] > 0
+    rules, state, scratch = borrowed(rules, state, scratch)
     # what rests for long is gone through in closed form, where only leak and noise can fire
-    may_rest = not by_cascade or (plan.simple and not circuit.causes)
+    may_rest = True
+    if plan is not None:
+        may_rest = plan.simple and not circuit.causes
     strip = scratch.strip
     light = strip[screen.LIGHT_1 : screen.LIGHT_1 + count]
     floor = 0.0 if circuit.slope > 0.0 else circuit.floor
@@ -335,15 +337,17 @@ def _strip(
         if resting and leaks:
             static_pixels.end_rest(lo, count, circuit, state, strip)
         resting = False
-        if by_cascade:
-            n, keys, times = _advance_cascade(
-                lo, count, start, starts[f], starts[f + 1] - starts[f], f, still and settled,
-                circuit, plan, t_base, state, scratch, keys, times, n,
+        ta, length = starts[f], starts[f + 1] - starts[f]
+        # of None the compiler knows that it is none: it compiles one of the two
+        if plan is None:
+            n, keys, times = _advance_strip(
+                lo, count, start, ta, length, circuit, _rule(rules, f), t_base, state, scratch,
+                keys, times, n,
             )  # fmt: skip
         else:
-            n, keys, times = _advance_strip(
-                lo, count, start, starts[f], starts[f + 1] - starts[f], circuit, _rule(rules, f),
-                t_base, state, scratch, keys, times, n,
+            n, keys, times = _advance_cascade(
+                lo, count, start, ta, length, f, still and settled, circuit, plan, t_base, state,
+                scratch, keys, times, n,
             )  # fmt: skip
         settled = still and (settled or cascade.is_settled(strip))
         f += 1
@@ -377,8 +381,8 @@ def run_exact(
         interval (the final entry looks ahead); else all False.
     rules : Rules
         Quadrature for each interval.
-    plan : Plan
-        How each interval is cut for the cascade; of no interval where lanes do.
+    plan : Plan or None
+        How each interval is cut for the cascade; None where lanes do.
     keys, times : (n,)
         Memory for events; see :mod:`adv2e.kernel.event_buffer`.
 

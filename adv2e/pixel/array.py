@@ -20,7 +20,7 @@ from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.kernel import exact
 from adv2e.kernel import packing as order
-from adv2e.kernel.cascade.plan import no_plan, plan_for
+from adv2e.kernel.cascade.plan import plan_for
 from adv2e.kernel.frames import Frames, frames_of
 from adv2e.kernel.packing import PIXEL_BITS, pack_limit_us
 from adv2e.kernel.quadrature import rules_for
@@ -214,7 +214,7 @@ class PixelArray:
         fastest = max(circuit.dark + 255.0 * circuit.per_dn, circuit.dark)
         simple = circuit.overshoot == 0.0 and self._drift_per_s == 0.0
         if circuit.follower == 0.0 and simple:
-            return [(rules_for(lengths, fastest, circuit.dead_time), no_plan())]
+            return [(rules_for(lengths, fastest, circuit.dead_time), None)]
         factors = drift_factors((starts - self._start) * 1e-6, self._drift_per_s)
         plan = plan_for(lengths, fastest, circuit.follower, factors, simple)
         return [(rules_for(lengths[:0], fastest, 0.0), plan)]

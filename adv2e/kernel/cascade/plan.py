@@ -36,12 +36,6 @@ class Plan(NamedTuple):
     simple: bool  # whether nothing but a second pole needs the cascade
 
 
-def no_plan() -> Plan:
-    """Return the plan of no interval."""
-    none = np.zeros(0, np.int64)
-    return Plan(none, none, np.zeros((0, WEIGHTS)), np.zeros(0), np.zeros(0), True)
-
-
 def plan_for(
     lengths: NDArray[np.float64],
     fastest: float,
