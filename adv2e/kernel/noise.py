@@ -111,3 +111,16 @@ def fill_first_noise(seed, rms, noise):
     """Draw the noise of every pixel at the start from its stationary distribution."""
     for i in range(noise.shape[0]):
         noise[i] = rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)
+
+
+@kernel
+def fill_first_seen(seed, rms, follower, corner, noise, seen):
+    """Draw what every pixel's noise is behind the second pole at the start.
+
+    The two are stationary together: behind a pole of corner f2 [rad/us], noise of corner f1 has the
+    share c = f2/(f1 + f2) of its variance, and c times that is what both have in common.
+    """
+    for i in range(noise.shape[0]):
+        share = follower / (follower + corner[i])
+        own = rms * math.sqrt(share * (1.0 - share))
+        seen[i] = share * noise[i] + own * rng.normal(seed, rng.PHOTORECEPTOR_BEHIND, i, 0)

@@ -37,6 +37,7 @@ REQUEST = 13
 LEAK_AGE = 14
 LEAK_RUNNING = 15
 HOT_RATE = 16
+PHOTORECEPTOR_BEHIND = 17
 
 LARGEST_SEED = (1 << 64) - 1
 """Seeds are the 64 bits of the generator's key."""

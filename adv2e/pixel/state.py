@@ -18,7 +18,12 @@ from adv2e.kernel import per_pixel
 from adv2e.kernel.circuit import Circuit
 from adv2e.kernel.first_state import fill_levels, fill_random_reference
 from adv2e.kernel.leak import fill_first_factors, fill_running
-from adv2e.kernel.noise import fill_first_candidates, fill_first_hot_times, fill_first_noise
+from adv2e.kernel.noise import (
+    fill_first_candidates,
+    fill_first_hot_times,
+    fill_first_noise,
+    fill_first_seen,
+)
 from adv2e.kernel.stepped.signal import log_of_light
 from adv2e.pixel.steps import Stepping
 
@@ -62,7 +67,7 @@ def initial_state(
     if circuit.noise_rms > 0:
         fill_first_noise(seed, circuit.noise_rms, state[per_pixel.NOISE])
     if stepping is not None:
-        _rest_poles(state, circuit, stepping)
+        _rest_poles(state, circuit, stepping, light)
     reset = state[per_pixel.REFERENCE].copy() if circuit.causes else None
     leaks = circuit.leak > 0 or circuit.photo_leak > 0
     if leaks and pixel.initial_reference == RUNNING:
@@ -88,7 +93,6 @@ def _note_resets(
     Where references are random, the light has moved from there.
     """
     seen = state[per_pixel.SEEN]
-    seen[:] = state[per_pixel.NOISE]
     added = 0.0 if stepping is None else stepping.first_signal()
     state[per_pixel.RESET_LIGHT] = reference - seen - added
     state[per_pixel.RESET_NOISE] = seen
@@ -99,7 +103,12 @@ def _note_resets(
     state[per_pixel.RESET] = np.where(held, per_pixel.NEVER, reference + beyond)
 
 
-def _rest_poles(state: NDArray[np.float64], circuit: Circuit, stepping: Stepping) -> None:
+def _rest_poles(
+    state: NDArray[np.float64],
+    circuit: Circuit,
+    stepping: Stepping,
+    light: NDArray[np.float64],
+) -> None:
     """Fill the rows of a state that only steps of time have; all poles are at rest."""
     driven = stepping.first_driven(state[per_pixel.X])
     state[per_pixel.FIRST] = driven
@@ -108,8 +117,15 @@ def _rest_poles(state: NDArray[np.float64], circuit: Circuit, stepping: Stepping
     if circuit.noise_rms > 0:
         # the noise was there before the first frame: a second pole without it, and references
         # in the middle of its course, would take seconds to forget that
-        state[per_pixel.SECOND] += state[per_pixel.NOISE]
-        state[per_pixel.REFERENCE] += state[per_pixel.NOISE]
+        noise = state[per_pixel.NOISE]
+        seen = noise.copy()
+        if circuit.follower > 0:
+            corner = circuit.dark + circuit.per_dn * stepping.first_light(light)
+            fill_first_seen(circuit.seed, circuit.noise_rms, circuit.follower, corner, noise, seen)
+        state[per_pixel.SECOND] += seen
+        state[per_pixel.REFERENCE] += seen
+        if circuit.causes:
+            state[per_pixel.SEEN] = seen
 
 
 def _over_pixels(threads: int, pixels: int, fill: Callable[..., None], *arguments: Any) -> None:

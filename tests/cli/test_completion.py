@@ -50,7 +50,7 @@ def offered(adv2e, monkeypatch):
         ("adv2e convert --layout ", lookup.layouts()),
         (
             "adv2e convert --set pixel.hot",
-            ["pixel.hot_pixels.fraction=", "pixel.hot_pixels.rate_hz="],
+            [f"pixel.hot_pixels.{name}=" for name in ("fraction", "rate_hz", "spread")],
         ),
         ("adv2e effects ", [name for item in EFFECTS for name in (item.name, *item.told_as)]),
         ("adv2e effects refr", ["refractory"]),

@@ -234,8 +234,8 @@ def test_photoreceptor_noise_beside_light_and_leak(dead_us, follower_hz):
         taken.append(first_draws(array))
         steps.extend([steps_of(1e4, array.circuit)] * (knots - 1))
         if follower_hz:  # the twin's second pole begins without noise
-            array.state[per_pixel.SECOND] -= array.state[per_pixel.NOISE]
-            array.state[per_pixel.REFERENCE] -= array.state[per_pixel.NOISE]
+            array.state[per_pixel.SECOND] -= array.state[per_pixel.SEEN]
+            array.state[per_pixel.REFERENCE] -= array.state[per_pixel.SEEN]
             array.state[per_pixel.SEEN] = 0.0
             array.state[per_pixel.RESET] = array.state[per_pixel.REFERENCE]
             array.state[per_pixel.RESET_NOISE] = 0.0

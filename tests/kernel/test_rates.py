@@ -232,3 +232,28 @@ def test_photoreceptor_noise_alternates():
         opposite += np.count_nonzero(np.diff(p))
     assert pairs > 500
     assert opposite / pairs > 0.75
+
+
+def test_noise_behind_a_second_pole_begins_as_it_goes_on():
+    """Its variance, and what it has in common with that before the pole, as theory has them."""
+    rms, follower_hz = 0.1, 60.0
+    dn = np.repeat([10.0, 200.0], 4000)
+    light = np.tile(dn, (3, 1)).astype(np.float32)
+    times = [0, 30_000_000, 60_000_000]
+    pixel = quiet(
+        thresholds=Thresholds(on=9.0, off=9.0, mismatch=0.0),
+        source_follower=SourceFollower(cutoff_hz=follower_hz),
+        photoreceptor_noise=PhotoreceptorNoise(rms=rms, step=0.3),
+    )
+    array = start(light, times, pixel)
+    share = follower_hz / (follower_hz + 21.8 + (300.0 - 21.8) * dn / 255.0)
+    for _ in range(2):
+        x, noise = array.state[per_pixel.X], array.state[per_pixel.NOISE]
+        seen = array.state[per_pixel.SECOND] - x
+        for half in (slice(0, 4000), slice(4000, 8000)):
+            expected = rms**2 * share[half][0]
+            # five standard errors
+            assert np.var(seen[half]) == pytest.approx(expected, rel=0.12)
+            both = np.mean(seen[half] * noise[half])
+            assert both == pytest.approx(expected, rel=0.12 / np.sqrt(share[half][0]))
+        advance(array, light, times)
