@@ -18,8 +18,9 @@ of the boundary layer,
 .. math:: \ln\theta(u) = \ln(\sqrt{2\pi}\,u) + \frac{u^2}{2} + \lim_{N\to\infty}
    \left[\sum_{n=1}^{N} 2\,\mathrm{asinh}\frac{u}{2\sqrt n} - 2u\sqrt N\right]
 
-which begins with -zeta(1/2) sqrt(rho) for the shift (Milne's length) and ends at theta = 1.  It
-holds for small rho; one term, fitted to simulations with rho from 0.2 to 1, is added for the rest.
+which begins with -zeta(1/2) sqrt(rho) for the shift (Milne's length) and ends at theta = 1.  That
+form follows from both ends and agrees with simulations; it is not proved.  It holds for small rho;
+one term, fitted to simulations with rho from 0.2 to 1, is added for the rest.
 
 **From event to event.**  With S' = e^{x^2/2} (scale) and m = e^{-x^2/2} (speed), from y on between
 the levels v and w,
