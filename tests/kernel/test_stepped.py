@@ -120,6 +120,9 @@ def test_photoreceptor_noise_moves_the_signal(follower_hz):
     if follower_hz:
         b = 2 * np.pi * follower_hz * STEP_S
         z = signal.copy()
+        share = 2 * np.pi * follower_hz / (2 * np.pi * follower_hz + corner)
+        own = [rng.normal(seed, rng.PHOTORECEPTOR_BEHIND, i, 0) for i in range(pixels)]
+        z[0] = share * knots[0] + rms * np.sqrt(share * (1 - share)) * np.array(own)
         for k in range(len(z) - 1):
             z[k + 1] = z[k] + b / (1 + b / 2) * (0.5 * (signal[k] + signal[k + 1]) - z[k])
         signal = z

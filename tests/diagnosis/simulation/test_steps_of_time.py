@@ -53,10 +53,10 @@ def recording(times_s=TIMES_S, run_in=None):
         ["pixel.photoreceptor_noise.rms=0.02"],
         ["pixel.photoreceptor_noise.rms=0.02", "frames.full_scale=16"],  # brighter than white
         ["pixel.photoreceptor_noise.rms=0.02", "frames.full_scale=50", "sampling.L=1"],
-        ["pixel.source_follower.cutoff_hz=900"],
+        ["pixel.source_follower.cutoff_hz=900", "pixel.slew_limit.per_s=50"],
         ["pixel.slew_limit.per_s=50"],
         ["pixel.low_pass.update=paper", "sampling.K=6"],
-        ["pixel.thresholds.drift_per_s=0.1", "sampling.L=1"],
+        ["pixel.thresholds.drift_per_s=0.1", "pixel.slew_limit.per_s=50", "sampling.L=1"],
         ["pixel.reset_overshoot.fraction=0.1", "pixel.low_pass.update=euler", "sampling.K=7"],
         ["frames.flicker.frequency_hz=100", "frames.flicker.depth=0.1"],
         COUPLED,
@@ -76,8 +76,11 @@ def test_as_many_steps_are_counted_as_the_pixel_takes(keys):
     assert steps_of_time(shown, config) == taken
 
 
-def test_no_steps_where_the_pixel_is_solved_from_event_to_event():
-    assert steps_of_time(recording(), load_config(["davis346"])) == 0
+@pytest.mark.parametrize(
+    "keys", [[], ["pixel.source_follower.cutoff_hz=900"], ["pixel.thresholds.drift_per_s=0.1"]]
+)
+def test_no_steps_where_the_pixel_is_solved_from_event_to_event(keys):
+    assert steps_of_time(recording(), load_config(["davis346"], keys)) == 0
 
 
 def test_what_pixels_saw_before_is_counted():
