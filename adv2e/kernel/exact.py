@@ -223,17 +223,14 @@ def _advance_cascade(
     strip, falls, pixels = scratch.strip, scratch.falls, scratch.pixels
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     pieces, substeps, weights = plan.pieces[f], plan.substeps[f], plan.weights[f]
-    on, off = plan.on[f : f + 2], plan.off[f : f + 2]
+    first, rise = plan.factors[f], plan.factors[f + 1] - plan.factors[f]
     knee_dn, slope = _f(circuit.slope * circuit.knee), _f(circuit.slope)
     piece = length / pieces
     if pieces > 1:
         _begin_pieces(strip, circuit, scratch)
     for p in range(pieces):
         a, b, t0 = p / pieces, (p + 1) / pieces, ta + p * piece
-        levels = (
-            on[0] + (on[1] - on[0]) * a, on[0] + (on[1] - on[0]) * b,
-            off[0] + (off[1] - off[0]) * a, off[0] + (off[1] - off[0]) * b,
-        )  # fmt: skip
+        levels = first + rise * a, first + rise * b
         if pieces > 1:
             _end_piece(b, strip, circuit, scratch)
         if leaks:
@@ -249,7 +246,7 @@ def _advance_cascade(
         screen.flag(
             strip, _f(t0 + piece - start), _f(circuit.dark * piece), _f(circuit.per_dn * piece),
             knee_dn, cascade.SECOND, cascade.SECOND + substeps * screen.STRIDE,
-            _f(min(levels[0], levels[1])), _f(min(levels[2], levels[3])), cascade.LARGEST,
+            _f(min(levels[0], levels[1])), cascade.LARGEST,
         )  # fmt: skip
         m, j, s = screen.flagged(strip, pixels), np.int64(0), 0.0
         while j < m:

@@ -25,3 +25,9 @@ def test_psi_has_no_cancellation():
     for v in z:
         series = sum(v**k / math.factorial(k + 2) for k in range(30))
         assert abs(special.psi(v) - series) < 2e-11
+
+
+def test_exponential_of_one_number():
+    t = -np.concatenate([np.linspace(0.0, 2.0, 2001), np.geomspace(2.0, 690.0, 500)])
+    found = np.array([special.exp_alone(one) for one in t])
+    np.testing.assert_allclose(found, np.exp(t), rtol=1e-15)

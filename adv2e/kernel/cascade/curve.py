@@ -8,13 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from adv2e.compiled import kernel
-
-_LOG2E = 1.4426950408889634
-_LN2_HIGH = 0.693147180369123816490
-_LN2_LOW = 1.90821492927058770002e-10
+from adv2e.kernel import special
 
 NOWHERE = 2.0
 """Place of what does not happen in a substep."""
@@ -82,27 +77,11 @@ def mirrored(curve):
 
 
 @kernel
-def _exp(t):
-    """e^t for t <= 0: that of :mod:`adv2e.kernel.special`, with less to wait for in a row."""
-    t = t if t > -700.0 else -700.0
-    n = np.floor(t * _LOG2E + 0.5)
-    r = (t - n * _LN2_HIGH) - n * _LN2_LOW
-    r2 = r * r
-    r4 = r2 * r2
-    low = (1.0 + r) + r2 * (1 / 2 + r * (1 / 6))
-    middle = (1 / 24 + r * (1 / 120)) + r2 * (1 / 720 + r * (1 / 5040))
-    high = (1 / 40320 + r * (1 / 362880)) + r2 * (1 / 3628800 + r * (1 / 39916800))
-    p = low + r4 * (middle + r4 * (high + r4 * (1 / 479001600)))
-    scale = np.int64((np.int64(n) + np.int64(1023)) << np.int64(52)).view(np.float64)
-    return scale * p
-
-
-@kernel
 def at(curve, t):
     """Value and slope at t, and what is left of the swing."""
     swing = curve.swing
     if swing != 0.0 and t > 0.0:
-        swing *= _exp(-curve.b * t)
+        swing *= special.exp_alone(-curve.b * t)
     t2 = t * t
     p = (curve.c0 + t * curve.c1) + t2 * (
         (curve.c2 + t * curve.c3) + t2 * (curve.c4 + t * curve.c5)

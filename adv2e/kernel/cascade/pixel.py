@@ -263,8 +263,8 @@ def _solve(
         Time that row DUE counts from [us].
     substeps : int
         Of the piece, in the rows of the screen.
-    levels : (4,) float
-        Factors on the ON threshold at both ends of the piece, and on the OFF threshold.
+    levels : (2,) float
+        Factors on both thresholds at the ends of the piece.
 
     Returns
     -------
@@ -275,7 +275,7 @@ def _solve(
     way = _way(k, length, substeps, circuit, strip)
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
     on_0, on_rise = on_level * levels[0], on_level * (levels[1] - levels[0])
-    off_0, off_rise = off_level * levels[2], off_level * (levels[3] - levels[2])
+    off_0, off_rise = off_level * levels[0], off_level * (levels[1] - levels[0])
     factor = state[per_pixel.LEAK_FACTOR, i] if circuit.leak_jitter > 0.0 else 1.0
     reference = state[per_pixel.REFERENCE, i]
     light1, fallen1, s1 = float(strip[screen.LIGHT_0 + k]), 0.0, 0.0

@@ -31,8 +31,7 @@ class Plan(NamedTuple):
     pieces: NDArray[np.int64]  # (intervals,)
     substeps: NDArray[np.int64]  # (intervals,): of a piece
     weights: NDArray[np.float64]  # (intervals, WEIGHTS)
-    on: NDArray[np.float64]  # (intervals + 1,): factors on the thresholds at the ends
-    off: NDArray[np.float64]
+    factors: NDArray[np.float64]  # (intervals + 1,): on both thresholds, at the ends
     simple: bool  # whether nothing but a second pole needs the cascade
 
 
@@ -63,7 +62,7 @@ def plan_for(
     substeps = -(-needed // pieces)
     corners = follower * lengths / (pieces * substeps)
     weights = np.array([_weights(corner) for corner in corners.tolist()]).reshape(-1, WEIGHTS)
-    return Plan(pieces, substeps, weights, factors, factors, simple)
+    return Plan(pieces, substeps, weights, factors, simple)
 
 
 @lru_cache(maxsize=512)
