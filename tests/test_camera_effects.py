@@ -100,9 +100,12 @@ def test_what_is_drawn_leaves_as_many_events_as_in_the_camera(hidden, share, tmp
     ],
     ids=["leap", "pulse before the frame", "pulse downwards"],
 )
+@pytest.mark.parametrize("period_us", [2000, 6650])
 def test_readout_of_frames_makes_as_many_events_as_long_after_it_as_in_the_camera(
-    coupling, tmp_path
+    coupling, period_us, tmp_path
 ):
+    if period_us != 2000:  # other frames than those recorded
+        coupling = {**coupling, "amplitude": 2.0 * coupling["amplitude"], "period_us": period_us}
     # which of them a pixel makes hangs on details: each one decides where the next ones fall
     hidden = {"readout": {"frame_coupling": coupling}}
     camera = camera_with(hidden)
@@ -110,7 +113,8 @@ def test_readout_of_frames_makes_as_many_events_as_long_after_it_as_in_the_camer
 
     def after_readouts(events):
         # a leap has the width of a step: what comes just before the next frame belongs to it
-        since = (events["t"] + 100) % 2000
+        leap = 0.0 if period_us == 2000 else coupling.get("delay_us", 0.0)
+        since = (events["t"] - leap + 100) % period_us
         both = [np.histogram(since[events["p"] == p], edges)[0] for p in (0, 1)]
         return np.concatenate(both) / camera.size[0] / camera.size[1]
 

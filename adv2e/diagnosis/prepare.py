@@ -21,10 +21,12 @@ from adv2e.diagnosis.fitting.nuisances import (
     threshold_nuisance,
     thresholds_of,
 )
-from adv2e.diagnosis.hints.collect import hints_of
+from adv2e.diagnosis.hints.collect import hints_of, looked_at_by
+from adv2e.diagnosis.hints.own_period import own_period_of
 from adv2e.diagnosis.hints.readouts import has_pulse
 from adv2e.diagnosis.selection.reference import Reference
 from adv2e.diagnosis.simulation.simulator import Simulator
+from adv2e.diagnosis.statistics.rates import since_burst
 from adv2e.diagnosis.statistics.sampler import Sampler
 from adv2e.diagnosis.statistics.summary import SummaryStatistics
 from adv2e.diagnosis.statistics.uncertainty import (
@@ -99,13 +101,17 @@ def prepare(
             notes.append(f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}")
         simulator.begin(DECLARED)
     streams = simulator.streams(declared, PILOT_SEEDS)
-    statistics = SummaryStatistics(scene, streams)
+    own_period = None if known else own_period_of(looked_at_by(evidence, scene), evidence.times_s)
+    bursts = [since_burst(own_period.period_us, own_period.first.begins_us)] if own_period else []
+    statistics = SummaryStatistics(scene, streams, bursts)
     by_seed = dict(zip(PILOT_SEEDS, streams, strict=True))
     pilot = Pilot(evidence, declared, statistics, by_seed, simulator.of)
     frames, levels = (None, None) if known else (between_frames(pilot), between_levels(pilot))
-    hints = hints_of(evidence, declared, scene, streams, simulator)
+    hints = hints_of(evidence, declared, scene, streams, simulator, own_period)
     if hints.pulse and not has_pulse(declared):
         notes.append(hints.pulse.text())
+    if own_period is not None:
+        notes.append(own_period.text())
     observed = statistics.measure(evidence.stream)
     none = FrameError.none(observed.shape)
     reference = Reference(

@@ -9,6 +9,7 @@ library         one effect that adv2e knows: is it named, and fitted?
 leave-one-out   the same, with the effect left out of adv2e's library: is a wrong name given?
 outside         one effect that adv2e does not know
 pairs           two effects at once
+own-period      (if asked for) the readout of frames that are not those of the recording
 
 ::
 
@@ -46,6 +47,7 @@ from studies.verdicts.cases import (
     NO_SIZE,
     NOTHING,
     OUTSIDE,
+    OWN_PERIOD,
     PAIRS,
     SIZES,
     Case,
@@ -129,7 +131,7 @@ def main() -> None:
 
 @main.command("run")
 @click.argument("folder", type=click.Path(file_okay=False, path_type=Path))
-@click.option("--kinds", type=Names(KINDS), default=ALL(KINDS), show_default=True)
+@click.option("--kinds", type=Names((*KINDS, OWN_PERIOD)), default=ALL(KINDS), show_default=True)
 @click.option("--sizes", type=Names(SIZES), default=ALL(SIZES), show_default=True)
 @click.option("--only", multiple=True, metavar="EFFECT", help="Only with this effect. Repeatable.")
 @click.option("--shard", "part", type=Shard(), default="1/1", show_default=True)

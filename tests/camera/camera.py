@@ -162,7 +162,10 @@ class _Run:
         tau = self._truth["readout"]["frame_coupling"]["tau_us"] * 1e-6
         delay = find(self._truth, "readout.frame_coupling.delay_us", 0.0) * 1e-6
         width = find(self._truth, "readout.frame_coupling.width_us", 0.0) * 1e-6
+        period = find(self._truth, "readout.frame_coupling.period_us", 0.0) * 1e-6
         leaps = camera.frame_times + 0.5 * exposure + delay
+        if period:  # another camera's frames, whatever was filmed
+            leaps = np.arange(delay % period, camera.duration_s, period)
         disturbance = frame_coupling(amplitude, tau, leaps[leaps >= 0.0], ends)
         if width:
             disturbance -= frame_coupling(amplitude, tau, leaps[leaps >= 0.0] + width, ends)

@@ -107,11 +107,30 @@ _OUTSIDE: dict[str, dict[str, tuple[Any, Any, Any]]] = {
     "sign_flips": {"outside.sign_flips.share": (0.02, 0.06, 0.15)},
 }
 
+_OWN_PERIOD: dict[str, dict[str, tuple[Any, Any, Any]]] = {
+    "frame_coupling": {
+        "readout.frame_coupling.amplitude": (0.02, 0.05, -0.12),
+        "readout.frame_coupling.tau_us": (300.0, 300.0, 300.0),
+        "readout.frame_coupling.period_us": (40_000.0, 33_333.3, 50_000.0),
+        "readout.frame_coupling.delay_us": (13_310.0, 7100.0, 31_900.0),
+    },
+}
+
 LIBRARY, OUTSIDE = tuple(_LIBRARY), tuple(_OUTSIDE)
 """Names of the effects that the package's library has, and of those that it does not have."""
 
 NOTHING = Case("nothing", "none", {})
 """A camera that is just as declared."""
+
+
+OWN_PERIOD = tuple(_OWN_PERIOD)
+"""Names of the effects that may keep time with frames which are not those of the recording."""
+
+
+def with_own_period(name: str, size: str) -> Case:
+    """Return the case of an effect with a period of its own."""
+    values = _OWN_PERIOD[name]
+    return Case(name, size, _keys({path: of[SIZES.index(size)] for path, of in values.items()}))
 
 
 def cases(*names: str, size: str | None = None) -> Iterator[Case]:
@@ -126,4 +145,14 @@ def cases(*names: str, size: str | None = None) -> Iterator[Case]:
                     yield Case(name, this, hidden, in_library)
 
 
-__all__ = ["BENCH", "LIBRARY", "NOTHING", "OUTSIDE", "SIZES", "Case", "cases"]
+__all__ = [
+    "BENCH",
+    "LIBRARY",
+    "NOTHING",
+    "OUTSIDE",
+    "OWN_PERIOD",
+    "SIZES",
+    "Case",
+    "cases",
+    "with_own_period",
+]

@@ -39,7 +39,7 @@ _NAMES = {
     "pixel.photoreceptor_noise": ("rms",),
     "pixel.hot_pixels": ("fraction", "rate_hz"),
     "pixel.dead_pixels": ("fraction",),
-    "readout.frame_coupling": ("amplitude", "tau_us", "delay_us", "width_us"),
+    "readout.frame_coupling": ("amplitude", "tau_us", "delay_us", "width_us", "period_us"),
     "readout.arbiter": ("event_ns", "row_ns"),
     "readout.loss": ("fraction",),
     "readout": ("tick_us",),

@@ -309,6 +309,31 @@ def test_frames_that_were_made_between_others_are_not_read_out():
     assert not np.array_equal(signal(9, 3), signal(9, 1))
 
 
+@pytest.mark.parametrize("start_s", [0.0, 5.0021, 1.4689e9])
+def test_leaps_with_a_period_of_their_own(start_s):
+    """They keep to the clock, whatever the frames, their exposure and where they begin."""
+    period_us, delay_us, tau_s = 3100.0, 700.0, 300e-6
+    coupling = FrameCoupling(amplitude=0.1, tau_us=300.0, delay_us=delay_us, period_us=period_us)
+    hook = FrameCouplingHooks(coupling, 4000.0)
+    start_ns = round(start_s * 1e9)
+    hook.begin(View(2, 2, 0, start_ns * 1e-9))
+    times_ns = [start_ns + 4_000_000 * k for k in range(6)]
+    assert [t for t, _ in hook.light((t, None) for t in times_ns)] == times_ns
+    # by whole nanoseconds, of which Python loses none
+    first = -((700_000 - start_ns) // 3_100_000)
+    leaps = [first * 3_100_000 + 700_000 + 3_100_000 * k - start_ns for k in range(7)]
+    leaps = 1e-9 * np.array([leap for leap in leaps if leap <= 20_000_000])
+    assert len(leaps) >= 6
+    assert 0.0 <= leaps[0] < 3.1e-3
+    since = np.array([50e-6, 100e-6, 600e-6])
+    for leap in leaps:
+        found = hook.signal(start_s + leap + since)
+        rounded = 2e-6 if start_s > 1e9 else 1e-9  # as much as seconds since 1970 are
+        wanted = 0.1 * np.exp(-(since - 25e-6) / tau_s)
+        np.testing.assert_allclose(found, wanted, rtol=1e-4 + rounded / tau_s)
+        assert hook.signal(np.array([start_s + leap - 5e-6]))[0] < 0.1 * np.exp(-9.0)
+
+
 @pytest.mark.parametrize("tau_us", [150.0, 600.0])
 def test_where_the_coupling_has_decayed_long_steps_make_the_same_events(monkeypatch, tau_us):
     planned = []

@@ -113,6 +113,8 @@ class Candidate:
     pulse : Pulse, optional
         That bursts of events tell: where it is in a model stays with them, whatever this effect
         does to the times of the frames.
+    read_off : tuple of (str, float)
+        Standard deviations of those keys of `extra` that were read off the recording.
     of_chance : bool
         It makes chance larger or smaller more than it moves any mean, which no misfit of a few
         simulations shows: it is always simulated often.
@@ -127,6 +129,7 @@ class Candidate:
     known: tuple[tuple[float, float], ...] = ()
     readouts: Readouts | None = None
     pulse: Pulse | None = None
+    read_off: tuple[tuple[str, float], ...] = ()
     of_chance: bool = False
 
     @classmethod

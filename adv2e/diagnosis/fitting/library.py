@@ -20,6 +20,7 @@ from adv2e.config import Config, to_dict
 from adv2e.config.build import keys_of
 from adv2e.config.paths import get_key
 from adv2e.config.user_effects import user_effects
+from adv2e.diagnosis.configurations import coupling_of
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.diagnosis.hints.collect import Hints
 from adv2e.diagnosis.hints.lamps import Lamp
@@ -43,8 +44,11 @@ _USUAL, _FARTHEST = 2.0, 10.0
 
 def library(declared: Config, hints: Hints) -> list[Candidate]:
     """Return all candidates for what `declared` may lack, with effects of the user's own."""
+    coupling = coupling_of(declared)
     if has_pulse(declared):  # it stays where it is
         hints = replace(hints, pulse=None)
+    if coupling is not None and (coupling.width_us or coupling.period_us):
+        hints = replace(hints, own_period=None)
     every = [*_built_in(declared, hints), *_of_the_user(declared)]
     return [replace(one, pulse=hints.pulse) for one in every]
 
@@ -232,19 +236,29 @@ def _frame_coupling(hints: Hints) -> Iterator[Candidate]:
     amplitude = _parameter("readout.frame_coupling.amplitude", 0.05)
     tau = _parameter("readout.frame_coupling.tau_us")
     starts: tuple[tuple[float, ...], ...]
-    if hints.pulse is None:
+    own, pulse = hints.own_period, hints.pulse
+    if pulse is None:
         starts = ((0.05, 300.0), (-0.05, 300.0), (0.05, 1200.0), (0.15, 300.0))
-        yield Candidate("frame_coupling", (amplitude, tau), starts, readouts=hints.readouts)
-        return
+        leaps = Candidate("frame_coupling", (amplitude, tau), starts, readouts=hints.readouts)
+        if own is None:
+            yield leaps
+        else:
+            extra = tuple(own.keys.items())
+            yield replace(leaps, extra=extra, readouts=None, read_off=own.read_off)
     up, down = replace(amplitude, low=0.0), replace(amplitude, high=0.0)
     for sign, leap in ((1.0, up), (-1.0, down)):
-        keys = hints.pulse.keys(up=leap is up)
+        of_pulse = pulse.keys(up=leap is up) if pulse else None
+        keys = own.keys_of_pulse(up=leap is up) if own else of_pulse
+        if keys is None:
+            continue
         starts = tuple(
             (sign * size, min(max(widths * keys[WIDTH], tau.low), tau.high))
             for size in (0.03, 0.1)
             for widths in (2.0, 20.0)
         )
-        yield Candidate("frame_coupling", (leap, tau), starts, tuple(keys.items()))
+        read_off = own.read_off if own else ()
+        extra = tuple(keys.items())
+        yield Candidate("frame_coupling", (leap, tau), starts, extra, read_off=read_off)
 
 
 def _either_way(*sizes: float) -> tuple[float, ...]:

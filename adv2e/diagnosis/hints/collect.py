@@ -13,6 +13,7 @@ from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.hints.lamps import Lamp, lamps_of, strongest_lines
+from adv2e.diagnosis.hints.own_period import OwnPeriod
 from adv2e.diagnosis.hints.readouts import Pulse, Readouts, pulse_of, readouts_of
 from adv2e.diagnosis.hints.stamps import Service, service_times, tick_of
 from adv2e.diagnosis.simulation.simulator import Simulator
@@ -41,6 +42,8 @@ class Hints:
         Of frames, where all pixels fire at once after each.
     pulse : Pulse, optional
         Where they fire twice: as the signal leaps, and as it leaps back.
+    own_period : OwnPeriod, optional
+        Where all pixels fire at once, but not with the frames.
     too_many : (float, float)
         ON and OFF events that the declared model makes, over those measured.
     """
@@ -52,6 +55,7 @@ class Hints:
     service: Service | None = None
     readouts: Readouts | None = None
     pulse: Pulse | None = None
+    own_period: OwnPeriod | None = None
     too_many: tuple[float, float] = (1.0, 1.0)
     shortest_us: float | None = None
     """Time between events of a pixel that hardly any two are nearer than, under known light: where
@@ -64,12 +68,13 @@ def hints_of(
     scene: Scene,
     pilot: Sequence[Stream],
     simulator: Simulator,
+    own_period: OwnPeriod | None = None,
 ) -> Hints:
     """Return hints from a recording.
 
     Lamps are told by the data that effects are fitted to, and what happens at each frame by all but
     those that are looked at once; but how stamps follow one another shows in no part.  The `pilot`
-    is simulations of the declared model.
+    is simulations of the declared model; `own_period` was found before.
     """
 
     def train(stream: Stream) -> Stream:
@@ -87,7 +92,7 @@ def hints_of(
             too_many=too_many,
             shortest_us=float(np.quantile(apart, _HARDLY_ANY)) if len(apart) else None,
         )
-    looked_at = scene.split.chosen(stream, splits.TRAIN, splits.VALIDATION)
+    looked_at = looked_at_by(evidence, scene)
     lines = strongest_lines(train(stream), list(map(train, pilot)), scene)
     lamps = lamps_of(
         lines, train(stream), declared, lambda lit: train(simulator.stream(lit, _LAMP_SEED))
@@ -99,9 +104,15 @@ def hints_of(
         evidence.encoding,
         service_times(stream),
         readouts_of(looked_at, evidence.times_s),
-        pulse_of(looked_at, evidence.times_s, evidence.before_s),
+        None if own_period else pulse_of(looked_at, evidence.times_s, evidence.before_s),
+        own_period,
         too_many,
     )
+
+
+def looked_at_by(evidence: Evidence, scene: Scene) -> Stream:
+    """Return the events that tell what happens at each frame: all but those looked at once."""
+    return scene.split.chosen(evidence.stream, splits.TRAIN, splits.VALIDATION)
 
 
 def _too_many(stream: Stream, pilot: Sequence[Stream], polarity: int) -> float:

@@ -210,7 +210,7 @@ def pulse_of(stream: Stream, times_s: Array, before_s: float = 0.0) -> Pulse | N
     parts = [since[stream.on == on] for on in (1, 0)]
     interval = _interval(parts, declared, float(times_us[-1]))
     bin_us = _bin_us(interval)
-    on, off = (_burst(_folded(part, interval, bin_us), bin_us) for part in parts)
+    on, off = (burst_of(folded(part, interval, bin_us), bin_us) for part in parts)
     if on is None or off is None:
         return None
     apart = (off.begins_us - on.begins_us) % interval
@@ -230,7 +230,7 @@ def _bin_us(interval: float) -> float:
     return float(interval / np.ceil(interval / longest))
 
 
-def _folded(since: Array, interval: float, bin_us: float) -> NDArray[np.int64]:
+def folded(since: Array, interval: float, bin_us: float) -> NDArray[np.int64]:
     """Return how many events come how long after a frame."""
     bins = round(interval / bin_us)
     place = (since % interval / bin_us).astype(np.int64)
@@ -249,7 +249,7 @@ def _interval(parts: list[Array], declared: float, span_us: float) -> float:
         for part in parts:
             some = part[: np.searchsorted(part, until_us)]
             some = some[:: 1 + len(some) // _ENOUGH]
-            count = _folded(some, interval, bin_us * interval / declared)
+            count = folded(some, interval, bin_us * interval / declared)
             above = count - np.median(count)
             total += float(np.square(above + np.roll(above, 1)).sum())
         return total
@@ -267,7 +267,7 @@ def _interval(parts: list[Array], declared: float, span_us: float) -> float:
     return interval if is_sharper else declared
 
 
-def _burst(count: NDArray[np.int64], bin_us: float) -> Burst | None:
+def burst_of(count: NDArray[np.int64], bin_us: float) -> Burst | None:
     """Return the burst that stands out of how many events come when; None: there is none."""
     level = float(np.median(count))
     top = int(np.argmax(count))

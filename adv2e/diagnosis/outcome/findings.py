@@ -20,7 +20,7 @@ from adv2e.reports.result import Finding, Rejected, Signature
 
 
 def finding_of(fit: Fitted, pixels: int, config: Config) -> Finding:
-    """Return an effect that was added, with 95 % intervals of what was fitted.
+    """Return an effect that was added, with 95 % intervals of what was fitted or read off.
 
     Of a share of the recording's `pixels`, no more can be known than so many draws tell; `config`,
     the model, tells what was set besides.
@@ -38,6 +38,8 @@ def finding_of(fit: Fitted, pixels: int, config: Config) -> Finding:
         else:  # parts of a list come in their order
             below, above = interval.get(one.key, ((), ()))
             interval[one.key] = (*below, low), (*above, high)
+    for key, sd in fit.candidate.read_off:
+        interval[key] = settings[key] - 1.96 * sd, settings[key] + 1.96 * sd
     return Finding(fit.candidate.name, settings, interval)
 
 

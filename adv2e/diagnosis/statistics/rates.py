@@ -23,6 +23,9 @@ from adv2e.diagnosis.statistics.groups import (
 
 _MOTION = ("at rest", "in motion")
 _COURSE, _LOADS, _PHASES = 6, 5, 10
+_SINCE_BURST_US = (150, 300, 600, 1200, 2400, 4800)
+_BEFORE_US = 50.0
+"""A burst may begin earlier than it was found to by so much."""
 SINCE_LEAP_MS = (
     *(0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0),
     *(64.0, 128.0),
@@ -155,3 +158,29 @@ def since_leap(leaps: Leaps) -> Group:
         return counts(placed.part[used], cell, len(entries))
 
     return Group("time since the light leapt", 0.6, entries, count)
+
+
+def since_burst(period_us: float, begins_us: float) -> Group:
+    """Return numbers of events by the time since the last burst of all pixels.
+
+    Bursts begin `begins_us` after zero of the clock, and come again after `period_us`.
+    """
+    borders = np.array([border for border in _SINCE_BURST_US if border < period_us])
+    entries = numbers(
+        (
+            f"{p} events {a}-{b} us after a burst, {where}",
+            f"{p} events {where} that come {a} to {b} us after a burst of all pixels begins",
+        )
+        for a, b in zip((0, *borders[:-1]), borders, strict=True)
+        for where in _MOTION
+        for p in POLARITIES
+    )
+
+    def count(placed: Placed) -> Array:
+        since = (placed.stream.t - begins_us + _BEFORE_US) % period_us
+        step = np.searchsorted(borders, since - _BEFORE_US, "right")
+        used = step < len(borders)
+        cell = ((step * 2 + (placed.speed != STILL)) * 2 + placed.stream.on)[used]
+        return counts(placed.part[used], cell, len(entries))
+
+    return Group("time since a burst of all pixels", 0.6, entries, count)

@@ -12,7 +12,14 @@ from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.statistics.groups import Array, Entry, Group
 from adv2e.diagnosis.statistics.intervals import intervals, neighbours, runs
 from adv2e.diagnosis.statistics.pixels import count_pixels, pixels
-from adv2e.diagnosis.statistics.rates import course, load, phase, rate_hz, rates, since_leap
+from adv2e.diagnosis.statistics.rates import (
+    course,
+    load,
+    phase,
+    rate_hz,
+    rates,
+    since_leap,
+)
 from adv2e.diagnosis.statistics.spectrum import spectrum
 from adv2e.diagnosis.statistics.stamps import gaps, row_gaps, ticks
 from adv2e.diagnosis.statistics.timing import Slopes, drift, lag, shift
@@ -31,6 +38,8 @@ class SummaryStatistics:
     scene : Scene
     pilot : sequence of Stream
         Simulations of the declared model, from which is known what to expect.
+    besides : sequence of Group
+        Of what only some recordings have.
 
     Attributes
     ----------
@@ -40,7 +49,9 @@ class SummaryStatistics:
         Deviation below which each does not count as known.
     """
 
-    def __init__(self, scene: Scene, pilot: Sequence[Stream]) -> None:
+    def __init__(
+        self, scene: Scene, pilot: Sequence[Stream], besides: Sequence[Group] = ()
+    ) -> None:
         placed = [Placed.of(stream, scene) for stream in pilot]
         expected = np.mean([count_pixels(one, scene) for one in placed], axis=0)
         slopes = Slopes(scene)
@@ -61,6 +72,7 @@ class SummaryStatistics:
             lag(slopes),
             drift(slopes),
             *of_light,
+            *besides,
             ticks(),
             gaps(),
             row_gaps(),

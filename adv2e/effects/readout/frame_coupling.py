@@ -13,6 +13,9 @@ t_f         time at which a frame was read out: the end of its exposure, and del
 The end of an exposure is the time of the frame on the camera's clock (after clock offset and drift)
 plus half of frames.exposure_us.
 
+With period_us, other frames than those of the recording are read out, such as every 20th of a
+film's: t_f = delay_us + k period_us on the camera's clock, for all whole k.
+
 All pixels that are within A of a threshold fire at the leap, and others when the signal leaps back.
 When a DAVIS240C watches a scene in motion, these are a tenth of all events: ON in the 0.4 ms before
 each frame, OFF in about a millisecond after it.
@@ -70,7 +73,8 @@ class FrameCoupling(Section):
     delay_us: float = parameter(
         0.0,
         unit="us",
-        meaning="from the end of an exposure to the leap; below 0: before it",
+        meaning="from the end of an exposure to the leap, below 0: before it; with period_us: the"
+        " time of a leap, on the clock of the events",
         fit=Fit(-1e5, 1e5, 0.0),
     )
     width_us: float = parameter(
@@ -86,6 +90,13 @@ class FrameCoupling(Section):
         meaning="time that a leap takes; 0: a twelfth of tau_us or width_us",
         at_least=0,
         fit=Fit(1.0, 1e4, 30.0, log=True),
+    )
+    period_us: float = parameter(
+        0.0,
+        unit="us",
+        meaning="from leap to leap; 0: a leap at each frame",
+        at_least=0,
+        fit=Fit(1e3, 1e6, 40_000.0, log=True),
     )
 
 
@@ -106,7 +117,8 @@ class FrameCouplingHooks(Hooks):
 
     def __init__(self, parameters: FrameCoupling, exposed_us: float = 0.0, every: int = 1) -> None:
         super().__init__(parameters)
-        self._delay_s, self._every = (exposed_us + parameters.delay_us) * 1e-6, every
+        self._period_s, self._every = parameters.period_us * 1e-6, every
+        self._delay_s = (parameters.delay_us + (0.0 if self._period_s else exposed_us)) * 1e-6
         self._width_s = parameters.width_us * 1e-6
         self._tau_s = parameters.tau_us * 1e-6
         shorter_us = min(parameters.tau_us, parameters.width_us or math.inf)
@@ -120,9 +132,14 @@ class FrameCouplingHooks(Hooks):
         # of each leap: its time, and the sum of what all up to it have left at that time
         self._leaps: list[float] = []
         self._sums: list[float] = []
+        if self._period_s:
+            self._next = math.ceil((view.start_s - _SAME_S - self._delay_s) / self._period_s)
 
     def light(self, frames: Frames) -> Frames:
         """Yield the frames as they are, each once all leaps before it are known."""
+        if self._period_s:
+            yield from self._light_beside(frames)
+            return
         ahead_ns = max(0, math.ceil(-self._delay_s * 1e9))
         held: deque[tuple[int, NDArray[Any]]] = deque()
         for number, frame in enumerate(frames):
@@ -132,6 +149,14 @@ class FrameCouplingHooks(Hooks):
             while held and held[0][0] + ahead_ns <= frame[0]:
                 yield held.popleft()
         yield from held
+
+    def _light_beside(self, frames: Frames) -> Frames:
+        """Yield frames that are not those read out."""
+        for frame in frames:
+            while (leap_s := self._next * self._period_s + self._delay_s) <= frame[0] * 1e-9:
+                self._leap(leap_s)
+                self._next += 1
+            yield frame
 
     def _leap(self, time: float) -> None:
         if time < self.view.start_s - _SAME_S:

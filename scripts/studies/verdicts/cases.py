@@ -18,6 +18,8 @@ NOTHING, LIBRARY, LEFT_OUT, OUTSIDE, PAIRS = KINDS = (
     "outside",
     "pairs",
 )
+OWN_PERIOD = "own-period"
+"""A kind that is studied where it is asked for: an effect at frames of another rate."""
 SMALL, MIDDLE, LARGE = SIZES = catalogue.SIZES
 SCENES: tuple[str, ...] = tuple(camera.SCENES)
 
@@ -35,7 +37,7 @@ class Case:
     Attributes
     ----------
     kind : str
-        One of ``KINDS``.
+        One of ``KINDS``, or ``OWN_PERIOD``.
     effects : tuple of str
         Effects in the recording that are not declared.
     size : str
@@ -62,6 +64,9 @@ class Case:
     @property
     def hidden(self) -> dict[str, Any]:
         """What the camera does and the declared configuration does not say."""
+        if self.kind == OWN_PERIOD:
+            held = [catalogue.with_own_period(name, self.size).hidden for name in self.effects]
+            return dict(settings.merged({}, *held))
         parts = chain.from_iterable(catalogue.cases(name, size=self.size) for name in self.effects)
         return dict(settings.merged({}, *(part.hidden for part in parts)))
 
@@ -124,7 +129,8 @@ class Plan:
 
     def _sets(self, kind: str) -> list[tuple[str, ...]]:
         """Return the effects of each recording of a kind, those that are wanted."""
-        names = list(catalogue.OUTSIDE if kind == OUTSIDE else self.library)
+        table = {OUTSIDE: catalogue.OUTSIDE, OWN_PERIOD: catalogue.OWN_PERIOD}
+        names = list(table.get(kind, self.library))
         random.Random(f"{self.seed}/{kind}").shuffle(names)
         sets = pairs(names) if kind == PAIRS else [(name,) for name in names]
         return [one for one in sets if not self.only or set(one) & set(self.only)]

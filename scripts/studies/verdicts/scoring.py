@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from studies.verdicts.cases import LIBRARY, NOTHING, PAIRS
+from studies.verdicts.cases import LIBRARY, NOTHING, OWN_PERIOD, PAIRS
 from studies.verdicts.results import Line
 
 ALONE, ALIKE, PARTLY = "named alone", "among look-alikes", "named, something left"
@@ -46,7 +46,7 @@ def outcome(line: Line) -> str:
     if line["verdict"] in ("consistent", "unexplained"):
         return MISSED if line["verdict"] == "consistent" else UNEXPLAINED
     added = [one["name"] for one in line["found"]]
-    true = set(line["effects"]) if line["kind"] in (LIBRARY, PAIRS) else set()
+    true = set(line["effects"]) if line["kind"] in (LIBRARY, PAIRS, OWN_PERIOD) else set()
     left = line["verdict"] == "partly_explained"
     right = true & set(added)
     wrong = [name for name in added if name not in true]

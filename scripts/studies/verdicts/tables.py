@@ -17,6 +17,7 @@ from studies.verdicts.cases import (
     MIDDLE,
     NOTHING,
     OUTSIDE,
+    OWN_PERIOD,
     PAIRS,
     SAME,
     SIZES,
@@ -39,6 +40,7 @@ def report(lines: Sequence[Line], commit: str) -> str:
         *_by_size("Effect left out of the library", lines, LEFT_OUT, left_out_table),
         *_by_size("Effects outside the library", lines, OUTSIDE, outside_table),
         *_by_size("Two effects", lines, PAIRS, pair_table),
+        *_by_size("Frames of another rate read out", lines, OWN_PERIOD, effect_table),
     ]
     failures = failure_list(lines)
     if failures:
