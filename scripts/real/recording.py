@@ -94,14 +94,15 @@ class Real:
 
 
 def read(folder: str) -> Real:
-    """Return the recording in a folder.
+    """Return the recording in a folder: DAVIS240C, or with ``events.npz`` for ``events.txt``.
 
     Raises
     ------
     DataError
         It has no frames or no events, is damaged, or its events cover no frame interval.
     """
-    recording = read_events(folder)
+    apart = Path(folder) / "events.npz"
+    recording = read_events(apart if apart.is_file() else folder)
     source = open_source(folder)
     if (source.width, source.height) != (recording.width, recording.height):
         raise DataError(
