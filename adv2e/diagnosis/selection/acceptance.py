@@ -33,6 +33,8 @@ BY_CHANCE = "what it gains on data it was not fitted to, chance could gain"
 CLOSE = 5.0
 """Log likelihood that tells two models apart where simulations tell it: a factor of 150."""
 _DEVIATIONS = 2.0
+_OF_ONE = 2.0
+"""Of what chance gains, where nothing was chosen by it."""
 _OFTEN = (*range(1, MANY + 1), *range(2 * MANY + 1, 4 * MANY + 1))
 """Seeds, where the first are too few; between them are those of the scales."""
 
@@ -70,7 +72,9 @@ def gain(after: Ensemble, before: Ensemble, observed: Array) -> float:
     return after.log_likelihood(observed) - before.log_likelihood(observed)
 
 
-def chance_gain(after: Ensemble, before: Ensemble, observed: Array) -> float:
+def chance_gain(
+    after: Ensemble, before: Ensemble, observed: Array, deviations: float = 3.0
+) -> float:
     """Return what a model gains by chance over the one before it, at most.
 
     On recordings of the one before it, and as far as the gain hangs on which simulations the two
@@ -79,7 +83,18 @@ def chance_gain(after: Ensemble, before: Ensemble, observed: Array) -> float:
     rows = before.sample
     gains = after.likelihood_of_others(rows) - before.likelihood_of_others(rows)
     deviation = np.hypot(gains.std(), after.parted_by_chance(before, observed))
-    return float(max(gains.mean() + 3.0 * deviation, 3.0))
+    return float(max(gains.mean() + deviations * deviation, 3.0))
+
+
+def gain_held_out(state: State, without: State, reference: Reference) -> tuple[float, float]:
+    """Return what a model gains over the same without one of its effects, and by chance at most.
+
+    On data that neither was fitted to.  The effect was chosen by other data, so that what it gains
+    here is no best of many.
+    """
+    observed = reference.observed[splits.TEST]
+    after, before = state.ensembles[splits.TEST], without.ensembles[splits.TEST]
+    return gain(after, before, observed), chance_gain(after, before, observed, _OF_ONE)
 
 
 def loudness(after: Ensemble, before: Ensemble, observed: Array) -> float:

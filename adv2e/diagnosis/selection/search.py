@@ -21,7 +21,7 @@ import numpy as np
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted
-from adv2e.diagnosis.selection.acceptance import CLOSE
+from adv2e.diagnosis.selection.acceptance import CLOSE, gain_held_out
 from adv2e.diagnosis.selection.joint_fits import (
     CATCHES_UP,
     JointFit,
@@ -245,15 +245,37 @@ class Search:
         return made
 
     def _backward(self, state: State) -> State:
-        """Drop effects without which the others, fitted again, do as well, one after another."""
-        for fit in state.fits[:-1]:
+        """Drop effects that do not earn their place, one after another."""
+        if len(state.fits) < 2:
+            return state
+        for fit in state.fits:
             without = self._without(state, fit)
-            loss = self.reference.likelihood(state) - self.reference.likelihood(without)
-            if loss < CLOSE:
-                self.reference.log(f"dropped {fit.candidate.name}: the others do without it")
-                self.reference.rejections.add(fit, "not needed beside the others", final=True)
+            why = self._why_spare(state, without)
+            if why:
+                self.reference.log(f"dropped {fit.candidate.name}: {why}")
+                self.reference.rejections.add(fit, why, final=True)
                 return self._backward(without)
         return state
+
+    def _why_spare(self, state: State, without: State) -> str:
+        """Return why a model does without one of its effects, the others fitted again; or nothing.
+
+        The data that it was fitted to are not enough: there, what has more keys is always nearer.
+        """
+        loss = self.reference.likelihood(state) - self.reference.likelihood(without)
+        if loss < CLOSE:
+            return "not needed beside the others"
+        left = min(self.probability(without, view) for view in (BOTH, splits.TEST))
+        held_out, by_chance = gain_held_out(state, without, self.reference)
+        self.reference.log(
+            f"  {', '.join(without.names)} alone: {loss:.0f} less likely, held-out data"
+            f" {held_out:.0f} (chance makes {by_chance:.0f}), probability {left:.2g}"
+        )
+        if left >= PER_LOOK:
+            return "without it, the others leave nothing that chance could not make"
+        if held_out < by_chance:
+            return "on data that nothing was fitted to, the others do as well without it"
+        return ""
 
     def _with_another(self, state: State) -> State | None:
         """Return the model with another effect in the place of the one that was added first.

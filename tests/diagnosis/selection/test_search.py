@@ -20,6 +20,7 @@ from made_up.sampler import (
 )
 
 from adv2e.config import Config, load_config
+from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.fitting.nuisances import threshold_nuisance, thresholds_of
@@ -224,6 +225,34 @@ def test_backward_drops_what_the_others_do_without():
     assert state.names == ("dark_current", "leak")
     assert search._backward(state).names == ("leak",)
     assert "not needed" in search.reference.rejections.held["dark_current"].reason
+
+
+@pytest.mark.parametrize("last", [True, False])
+@pytest.mark.parametrize(
+    ("dark_dn", "in_test_dn", "reason"),
+    [
+        (1.0, 0.0, "on data that nothing was fitted to, the others do as well without it"),
+        (0.2, 0.2, "without it, the others leave nothing that chance could not make"),
+        (1.0, 1.0, None),
+    ],
+)
+def test_a_name_earns_its_place_by_what_it_explains_alone(dark_dn, in_test_dn, reason, last):
+    """Not where all that it gains is in the data fitted to, nor where the others leave nothing."""
+    sampler, leak = MadeUpSampler(), "pixel.leak.rate_hz=4"
+    truth, of_test = (
+        load_config([], [leak, f"pixel.dark_current={{dn: {dn}}}"]) for dn in (dark_dn, in_test_dn)
+    )
+    observed = sampler.measure(truth, RECORDING)
+    observed[splits.TEST] = sampler.measure(of_test, RECORDING)[splits.TEST]
+    search = search_of(sampler, observed, Config(), candidates())
+    effects = [("leak", 4.0), ("dark_current", dark_dn)]
+    state = refitted(search, fits_of(*(effects if last else effects[::-1])))
+    found = search._backward(state)
+    if reason is None:
+        assert found is state
+    else:
+        assert found.names == ("leak",)
+        assert search.reference.rejections.held["dark_current"].reason == reason
 
 
 def test_alternatives_of_what_is_dropped_go_with_it():
