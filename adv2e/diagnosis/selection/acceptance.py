@@ -47,7 +47,7 @@ def objections(fit: Fitted, grown: State, ground: State, reference: Reference) -
     observed = reference.observed[splits.VALIDATION]
     after, before = grown.ensembles[splits.VALIDATION], ground.ensembles[splits.VALIDATION]
     # as often as what is tried, by the same seeds: most of chance falls out of the difference
-    as_often = reference.tried(ground.config)[splits.VALIDATION]
+    as_often = reference.tried(ground.config, grown.config)[splits.VALIDATION]
     found = []
     if gain(after, as_often, observed) < chance_gain(after, as_often, observed):
         found.append(BY_CHANCE)

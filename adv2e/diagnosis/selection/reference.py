@@ -143,21 +143,39 @@ class Reference:
         goal = self.observed[view] + (0.0 if shifted is None else shifted.bias[view])
         return Fitter(sampler, self.scales[view], goal, view, sd)
 
-    def ensembles(self, config: Config, sample: Array) -> tuple[Ensemble, ...]:
-        """Return, for each view, a configuration's simulations, (seeds, views, statistics)."""
+    def ensembles(
+        self, config: Config, sample: Array, beside: Config | None = None
+    ) -> tuple[Ensemble, ...]:
+        """Return, for each view, a configuration's simulations, (seeds, views, statistics).
+
+        `beside`: another that they are compared with.  What is as uncertain in that one, as its
+        frames are shifted, is so in these, too: or else it would gain by its doubt alone.
+        """
         shifted = self._resampling.error(config)
+        doubted = None
+        if shifted is None and beside is not None:
+            doubted = self._resampling.error(beside)
 
         def of(view: int) -> Ensemble:
             rows = self.error.blurred(sample[:, view], view, _OF_MODELS)
             if shifted is not None:
                 rows = shifted.blurred(rows - shifted.bias[view], view, _OF_SHIFTED)
+            elif doubted is not None:
+                rows = doubted.blurred(rows, view, _OF_SHIFTED)
             return Ensemble.of(self.scales[view], rows)
 
         return tuple(map(of, range(VIEWS)))
 
-    def tried(self, config: Config) -> tuple[Ensemble, ...]:
-        """Return simulations of a configuration, often enough to judge it."""
-        return self.ensembles(config, self.sampler.sample(config, range(1, SOME + 1)))
+    def tried(self, config: Config, beside: Config | None = None) -> tuple[Ensemble, ...]:
+        """Return simulations of a configuration, often enough to judge it; see `ensembles`."""
+        return self.ensembles(config, self.sampler.sample(config, range(1, SOME + 1)), beside)
+
+    def compared(self, state: State, beside: State) -> State:
+        """Return a model as it is compared with another; see :meth:`ensembles`."""
+        sample = self.sampler.sample(state.config, range(1, MANY + 1))
+        return dataclasses.replace(
+            state, ensembles=self.ensembles(state.config, sample, beside.config)
+        )
 
     def state(self, config: Config, fits: tuple[Fitted, ...] = ()) -> State:
         """Return a model, simulated often enough to build on it."""

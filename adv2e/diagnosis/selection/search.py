@@ -262,6 +262,7 @@ class Search:
 
         The data that it was fitted to are not enough: there, what has more keys is always nearer.
         """
+        without = self.reference.compared(without, state)
         loss = self.reference.likelihood(state) - self.reference.likelihood(without)
         if loss < CLOSE:
             return "not needed beside the others"

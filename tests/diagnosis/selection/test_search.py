@@ -8,7 +8,9 @@ import pytest
 from made_up.sampler import (
     EFFECTS,
     GONE,
+    HINTS,
     RECORDING,
+    STATISTICS,
     MadeUpSampler,
     candidates,
     error,
@@ -23,15 +25,18 @@ from adv2e.config import Config, load_config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.diagnosis.fitting.fitted import Fitted
+from adv2e.diagnosis.fitting.library import library
 from adv2e.diagnosis.fitting.nuisances import threshold_nuisance, thresholds_of
 from adv2e.diagnosis.outcome.detectable import detectable
 from adv2e.diagnosis.outcome.findings import finding_of
 from adv2e.diagnosis.outcome.verdict import verdict_of
 from adv2e.diagnosis.selection import joint_fits as joint_fits_module
+from adv2e.diagnosis.selection.acceptance import BY_CHANCE, objections
 from adv2e.diagnosis.selection.reference import Rejections
 from adv2e.diagnosis.selection.search import LEVEL
 from adv2e.diagnosis.selection.shortlist import best_forms, shortlisted
-from adv2e.diagnosis.statistics.summary import BOTH
+from adv2e.diagnosis.statistics.summary import BOTH, VIEWS
+from adv2e.diagnosis.statistics.uncertainty import FrameError
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -388,3 +393,30 @@ def test_the_reason_of_the_best_form_is_kept():
     reasons.add(fit(4.0), "next round")
     assert reasons.held["leak"].reason == "next round"
     assert reasons.held["leak"].parameters == {"pixel.leak.rate_hz": pytest.approx(4.0)}
+
+
+class Doubted:
+    """Frames that are shifted by parts of a pixel make all statistics uncertain."""
+
+    def __init__(self, sd):
+        self._error = FrameError(np.zeros((VIEWS, STATISTICS)), np.full((VIEWS, STATISTICS), sd))
+
+    def error(self, config):
+        return self._error if any(config.frames.shift_px) else None
+
+
+def test_a_shift_of_the_frames_gains_nothing_by_the_doubt_that_it_brings():
+    """Beside what is missing, something stands out that no effect makes, nor a shift."""
+    sampler = MadeUpSampler()
+    truth = load_config([], ["pixel.leak.rate_hz=4"])
+    observed = sampler.measure(truth, RECORDING, outside(12.0))
+    shift = next(one for one in library(Config(), HINTS) if one.name == "misregistration")
+    search = search_of(sampler, observed, Config(), [*candidates("leak"), shift])
+    search.reference._resampling = Doubted(2.0)
+    alone = refitted(search, fits_of(("leak", 4.0)))
+    moved = Fitted(shift, Config(), np.array(shift.scaled((0.3, 0.1))))
+    both = refitted(search, (*alone.fits, moved))
+    assert search.reference.likelihood(both) > search.reference.likelihood(alone) + 20.0
+    grown = dataclasses.replace(both, ensembles=search.reference.tried(both.config))
+    assert BY_CHANCE in objections(moved, grown, alone, search.reference)
+    assert search._backward(both).names == ("leak",)
