@@ -131,6 +131,11 @@ class Reference:
             for view in range(VIEWS)
         )
 
+    @property
+    def doubt(self) -> float:
+        """What frames leave uncertain in deviations of chance, root mean square."""
+        return self.error.doubt(self.error.chance(self.scales[BOTH].sd, BOTH), BOTH)
+
     def fitter(
         self, view: int, near: Config, sd: Array | None = None, *, rough: bool = False
     ) -> Fitter:

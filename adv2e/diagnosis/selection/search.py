@@ -21,7 +21,7 @@ import numpy as np
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted
-from adv2e.diagnosis.selection.acceptance import CLOSE, gain_held_out
+from adv2e.diagnosis.selection.acceptance import BY_FRAMES, CLOSE, gain_held_out, stands_out
 from adv2e.diagnosis.selection.joint_fits import (
     CATCHES_UP,
     JointFit,
@@ -50,6 +50,8 @@ _LEAST_OF_THE_LEFT = 0.5 / MOST_EFFECTS
 """Least share of what is left that an effect must take away for the search to go on."""
 _OF_FITS = 1e-6
 """Probability of what is left below which it is looked into, though it may be the fit's."""
+_MUCH_DOUBT = 0.5
+"""Of what frames leave uncertain, in deviations of chance: from there on it hides effects."""
 _MOST_OF_THE_FIT = 0.5
 """Least share of that which an effect must take away."""
 
@@ -101,6 +103,8 @@ class Search:
         chance = self.probability(self.declared)
         self.reference.log(f"declared model: probability of the residual {chance:.2g}")
         state = self._backward(self._forward(self.declared))
+        if state is self.declared and not self._is_left(state):
+            state = self._beneath_doubt()
         held = self.reference.rejections.held
         rejected = {name: why for name, why in held.items() if name not in state.names}
         return Outcome(
@@ -108,9 +112,37 @@ class Search:
             self.probability(state),
             self.probability(state, splits.TEST),
             self.explained(state),
-            not any(self._is_something_left(state, view) for view in (BOTH, splits.TEST)),
+            not self._is_left(state),
             rejected,
         )
+
+    def _is_left(self, state: State) -> bool:
+        """Tell whether something is left for another effect, in either part of the data."""
+        return any(self._is_something_left(state, view) for view in (BOTH, splits.TEST))
+
+    def _beneath_doubt(self) -> State:
+        """Return the declared model, or that with an effect that is likely beyond doubt.
+
+        Where frames leave much uncertain, it may make all that is left.  How well one effect does
+        what is left tells more than how much that is: in both parts of the data that it was not
+        fitted to, that must be far more than what is made up between the frames could gain.
+        """
+        declared, reasons = self.declared, self.reference.rejections
+        if self.reference.doubt < _MUCH_DOUBT:
+            return declared
+        self.reference.log("beneath what the frames leave uncertain:")
+        made = with_one_more(self.reference, declared, self._trials(declared), [declared])
+        told = [
+            one
+            if stands_out(one.state, declared, self.reference, splits.VALIDATION)
+            else dataclasses.replace(one, objections=[*one.objections, BY_FRAMES])
+            for one in made
+        ]
+        found = best_of(self.reference, told, declared)
+        if found is not None and stands_out(found, declared, self.reference, splits.TEST):
+            return found
+        reasons.held = {}  # none was needed
+        return declared
 
     def _forward(self, state: State) -> State:
         """Return the model with effects more, until nothing is left or nothing holds.
