@@ -176,8 +176,9 @@ class Reference:
         return self.ensembles(config, self.sampler.sample(config, range(1, SOME + 1)), beside)
 
     def compared(self, state: State, beside: State) -> State:
-        """Return a model as it is compared with another; see :meth:`ensembles`."""
-        sample = self.sampler.sample(state.config, range(1, MANY + 1))
+        """Return a model as it is compared with another, as often; see :meth:`ensembles`."""
+        count = len(beside.ensembles[BOTH].sample)
+        sample = self.sampler.sample(state.config, range(1, count + 1))
         return dataclasses.replace(
             state, ensembles=self.ensembles(state.config, sample, beside.config)
         )
