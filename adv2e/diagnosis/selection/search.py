@@ -21,7 +21,7 @@ import numpy as np
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted
-from adv2e.diagnosis.selection.acceptance import BY_FRAMES, CLOSE, gain_held_out, stands_out
+from adv2e.diagnosis.selection.acceptance import BY_FRAMES, CLOSE, gain, gain_held_out, stands_out
 from adv2e.diagnosis.selection.joint_fits import (
     CATCHES_UP,
     JointFit,
@@ -131,7 +131,8 @@ class Search:
         if self.reference.doubt < _MUCH_DOUBT:
             return declared
         self.reference.log("beneath what the frames leave uncertain:")
-        made = with_one_more(self.reference, declared, self._trials(declared), [declared])
+        likely = [trial for trial in self._trials(declared) if self._gains(trial)]
+        made = with_one_more(self.reference, declared, likely, [declared])
         told = [
             one
             if stands_out(one.state, declared, self.reference, splits.VALIDATION)
@@ -143,6 +144,12 @@ class Search:
             return found
         reasons.held = {}  # none was needed
         return declared
+
+    def _gains(self, trial: Trial) -> bool:
+        """Tell whether a trial gains anything on the data for validation."""
+        view, reference = splits.VALIDATION, self.reference
+        before = reference.tried(self.declared.config, trial.fit.config)[view]
+        return gain(trial.ensembles[view], before, reference.observed[view]) > 0.0
 
     def _forward(self, state: State) -> State:
         """Return the model with effects more, until nothing is left or nothing holds.
