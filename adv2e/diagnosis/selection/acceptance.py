@@ -27,9 +27,9 @@ _SIGNATURE = 12
 _WORSE = 9.0
 """Deviations by which a statistic gets worse that is not put down to details of a simulation."""
 
-_OF_FRAMES = 30.0
+_OF_FRAMES = 60.0
 """Log likelihood that what is made up between frames may give to an effect: on data that it was not
-fitted to, up to 10 in one part and 41 in the other, never both, of frames at 60 a second."""
+fitted to, up to 59 in one part and 41 in another, never in both, of frames at 60 a second."""
 _MOST_TURNS = 3.0
 """What frames leave uncertain, in parts of what is known of it and taken off."""
 

@@ -12,7 +12,7 @@ from adv2e.diagnosis.selection.search import PER_LOOK
 from adv2e.diagnosis.statistics.summary import VIEWS
 from adv2e.diagnosis.statistics.uncertainty import FrameError
 
-SAMPLER = MadeUpSampler(strength=35.0)
+SAMPLER = MadeUpSampler(strength=40.0)
 HIDDEN = ["pixel.leak.rate_hz=4"]
 
 
