@@ -119,7 +119,11 @@ def stands_out(grown: State, ground: State, reference: Reference, view: int) -> 
         rows = before.scale.of_values(values)
         gains = after.likelihood_of_others(rows) - before.likelihood_of_others(rows)
         least = max(least, float(gains.mean() + 3.0 * gains.std()))
-    return gain(after, before, reference.observed[view]) >= least
+    gained = gain(after, before, reference.observed[view])
+    part = "held-out data" if view == splits.TEST else "data for validation"
+    told = f"{gained:.0f} more likely on {part} (frames may make {least:.0f})"
+    reference.log(f"  {' and '.join(grown.names)}: {told}")
+    return gained >= least
 
 
 def loudness(after: Ensemble, before: Ensemble, observed: Array) -> float:
