@@ -35,8 +35,8 @@ _SHORTEST = 15
 """Bins of a period: what comes more often has no background to stand out of."""
 _HIGH, _HIGHER = 4.0, 12.0
 """Deviations of a bin that count as a burst, and of which more do not count as more."""
-_MOST = 0.8
-"""Share of the times at which there must be one."""
+_MOST = 0.5
+"""Share of the times at which there must be one: small leaps make few events where little moves."""
 _AROUND_US = (400.0, 200.0, 100.0)
 """Of a burst as known by then: events that tell its time better."""
 _FINE_US = 10.0
