@@ -209,7 +209,7 @@ class Pixel(Section):
     thresholds: Thresholds = subsection(Thresholds, meaning="contrast thresholds")
     refractory: Refractory | None = subsection(Refractory, meaning="dead time")
     reset_overshoot: ResetOvershoot | None = subsection(None, meaning="reference after an event")
-    leak: Leak | None = subsection(Leak, meaning="leak of the reference")
+    leak: Leak | None = subsection(None, meaning="leak of the reference")
     shot_noise: ShotNoise | None = subsection(ShotNoise, meaning="Poisson background events")
     hot_pixels: HotPixels | None = subsection(None, meaning="pixels that fire by themselves")
     dead_pixels: DeadPixels | None = subsection(None, meaning="pixels that never fire")

@@ -137,8 +137,14 @@ def test_those_that_are_drawn_are_as_their_sources_say():
 def test_cameras_have_run_before_in_good_light(name):
     pixel = load_config([name]).pixel
     assert pixel.initial_reference == "running"
-    assert pixel.leak.jitter == 0.1
+    assert pixel.leak is None
     assert pixel.shot_noise.rate_hz == 0.01
+
+
+def test_the_davis_cameras_see_light_that_their_frames_lack():
+    for name in ("davis240c", "davis346"):
+        pixel = load_config([name]).pixel
+        assert (pixel.dark_current.dn, pixel.log_response.linear_below) == (10, 0)
 
 
 @pytest.mark.parametrize("name", ["vid2e", "ideal"])

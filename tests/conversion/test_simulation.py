@@ -107,7 +107,7 @@ def test_bad_input_is_one_clear_line(images, at, text):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("config", ["ideal", {"pixel": {"leak": None, "shot_noise": None}}])
+@pytest.mark.parametrize("config", ["ideal", {"pixel": {"refractory": None, "shot_noise": None}}])
 def test_a_configuration_is_whatever_load_config_takes(config):
     events = run(frames(), times(), config)
     assert events.tobytes() == run(frames(), times(), adv2e.load_config(config)).tobytes()

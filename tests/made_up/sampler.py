@@ -31,7 +31,7 @@ HINTS = Hints(1.0, (Lamp(100.0),), 1)
 
 RESPONSES = {
     "pixel.refractory.period_us": lambda value: np.log(value / 500.0),
-    "pixel.leak.rate_hz": lambda value: np.sqrt(value) - np.sqrt(0.1),
+    "pixel.leak.rate_hz": lambda value: np.sqrt(value or 0.1) - np.sqrt(0.1),
     "pixel.shot_noise.rate_hz": lambda value: np.sqrt(value) - 0.1,
     "pixel.dark_current.dn": lambda value: np.log1p(value or 0.0),
     "readout.loss.fraction": lambda value: 5.0 * (value or 0.0),
