@@ -67,7 +67,7 @@ def test_again_it_keeps_what_is_there_and_makes_what_changed(batch, source, tmp_
     (dest / "b.h5").write_bytes(b"spoiled")
     assert "1 its file changed, 1 kept" in batch(*call).err
     assert (
-        "2 the configuration or an option changed" in batch(*call, "--set", "pixel.leak=null").err
+        "2 the configuration or an option changed" in batch(*call, "--set", "pixel.refractory=null").err
     )
     assert "2 the seed changed" in batch(*call, "--set", "pixel.leak=null", "--seed", 3).err
     clip(root / "c.avi")
