@@ -22,6 +22,8 @@ from adv2e.kernel.event_buffer import with_room
 from adv2e.kernel.frames import load
 from adv2e.kernel.lanes import batch, exchange, rows
 from adv2e.kernel.leak import fill_falls
+from adv2e.kernel.photoreceptor import bridge
+from adv2e.kernel.photoreceptor import strip as photoreceptor
 from adv2e.kernel.quadrature import Rule
 from adv2e.kernel.work_queue import STRIP, claim
 
@@ -40,6 +42,8 @@ class Scratch(NamedTuple):
     x: NDArray[np.float64]  # log intensity at the start of an interval, how far it goes, and the
     dx: NDArray[np.float64]  # light at its end, where the interval is cut into pieces
     light: NDArray[np.float32]
+    noise: photoreceptor.Scratch
+    own: NDArray[np.float64]  # of one pixel's noise
 
 
 def scratch() -> Scratch:
@@ -47,12 +51,15 @@ def scratch() -> Scratch:
     pixels = np.zeros(STRIP + rows.WIDTH, np.int64)
     falls, means, x, dx = (np.zeros(STRIP) for _ in range(4))
     light = np.ones(STRIP, np.float32)
-    return Scratch(cascade.scratch(), rows.scratch(), pixels, falls, means, x, dx, light)
+    return Scratch(
+        cascade.scratch(), rows.scratch(), pixels, falls, means, x, dx, light,
+        photoreceptor.scratch(), bridge.own(),
+    )  # fmt: skip
 
 
 def covers(circuit: Circuit) -> bool:
     """Tell whether this module advances the circuit; if not, it is solved in steps of time."""
-    plain = circuit.slew == 0.0 and circuit.noise_rms == 0.0 and not circuit.printed
+    plain = circuit.slew == 0.0 and not circuit.printed
     return circuit.update == EXACT and circuit.filtered and plain
 
 
@@ -83,8 +90,11 @@ def _rests(frames, f, before, share, first, count):
 
 
 @kernel
-def _open_strip(lo, count, start, circuit, state, strip):
+def _open_strip(lo, count, start, circuit, state, strip, noise):
     """Rows of a strip at the start of a call, its light being in LIGHT_1."""
+    for k in range(count):
+        noise[photoreceptor.NOISE_0 + k] = state[per_pixel.NOISE, lo + k]
+        noise[photoreceptor.SEEN_0 + k] = state[per_pixel.SEEN, lo + k]
     for k in range(count):
         strip[screen.LIGHT_0 + k] = strip[screen.LIGHT_1 + k]
         strip[screen.LAG_0 + k] = state[per_pixel.LAG, lo + k]
@@ -107,8 +117,13 @@ def _open_strip(lo, count, start, circuit, state, strip):
 
 
 @kernel
-def _close_strip(lo, count, circuit, state, strip):
-    """State of a strip at the end of a call."""
+def _close_strip(lo, count, piece, circuit, state, strip, noise):
+    """State of a strip at the end of a call, before piece number `piece` of all."""
+    if circuit.noise_rms > 0.0:
+        for k in range(count):
+            state[per_pixel.NOISE, lo + k] = noise[photoreceptor.NOISE_0 + k]
+            state[per_pixel.SEEN, lo + k] = noise[photoreceptor.SEEN_0 + k]
+            state[per_pixel.NOISE_DRAW, lo + k] = piece
     for k in range(count):
         state[per_pixel.LAG, lo + k] = strip[screen.LAG_0 + k]
         state[per_pixel.SECOND, lo + k] = strip[cascade.SECOND + k]
@@ -216,20 +231,25 @@ def _end_piece(share, strip, circuit, scratch):
 
 @kernel
 def _advance_cascade(
-    lo, count, start, ta, length, f, still, circuit, plan, t_base, state, scratch, keys, times, n
+    lo, count, start, ta, length, f, number, still, circuit, plan, t_base, state, scratch, keys,
+    times, n,
 ):  # fmt: skip
-    """Advance one strip over interval f, piece by piece; `still`: nothing moves or lags in it."""
+    """Advance one strip over interval f, piece by piece; `still`: nothing moves or lags in it.
+
+    number : of its first piece, of all in the recording
+    """
     (plan,) = borrowed(plan)
-    strip, falls, pixels = scratch.strip, scratch.falls, scratch.pixels
+    strip, falls, pixels, noise = scratch.strip, scratch.falls, scratch.pixels, scratch.noise
+    laws, cut = plan.laws, plan.cut[f]
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
-    pieces, substeps, weights = plan.pieces[f], plan.substeps[f], plan.weights[f]
+    pieces = plan.pieces[cut]
     first, rise = plan.factors[f], plan.factors[f + 1] - plan.factors[f]
-    knee_dn, slope = _f(circuit.slope * circuit.knee), _f(circuit.slope)
-    piece = length / pieces
     if pieces > 1:
         _begin_pieces(strip, circuit, scratch)
     for p in range(pieces):
-        a, b, t0 = p / pieces, (p + 1) / pieces, ta + p * piece
+        substeps, places, which = plan.substeps[cut, p], plan.places[cut, p], plan.law[cut, p]
+        a, b = plan.ends[cut, p], plan.ends[cut, p + 1]
+        t0, piece = ta + a * length, (b - a) * length
         levels = first + rise * a, first + rise * b
         if pieces > 1:
             _end_piece(b, strip, circuit, scratch)
@@ -238,27 +258,34 @@ def _advance_cascade(
         if still:
             cascade.stay(strip, substeps)
         else:
-            h = piece / substeps
-            cascade.follow(
-                strip, substeps, _f(circuit.dark * h), _f(circuit.per_dn * h), knee_dn, slope,
-                weights,
-            )  # fmt: skip
+            cascade.follow(strip, substeps, places, piece, circuit, plan.weights[cut, p])
+        on, off, factor = screen.ON, screen.OFF, _f(min(levels[0], levels[1]))
+        if circuit.noise_rms > 0.0:
+            photoreceptor.draw(lo, count, number + p, which, circuit, laws, strip, noise)
+            cascade.leave_room(strip, factor, noise.rows)
+            on, off, factor = cascade.ON, cascade.OFF, _f(1.0)
         screen.flag(
             strip, _f(t0 + piece - start), _f(circuit.dark * piece), _f(circuit.per_dn * piece),
-            knee_dn, cascade.SECOND, cascade.SECOND + substeps * screen.STRIDE,
-            _f(min(levels[0], levels[1])), cascade.LARGEST,
+            _f(circuit.slope * circuit.knee), cascade.SECOND,
+            cascade.SECOND + substeps * screen.STRIDE, on, off, factor, cascade.LARGEST,
+        )  # fmt: skip
+        drawn = bridge.Drawn(
+            number + p, laws.samples[which], laws.cells[which], laws.coarse[which],
+            laws.fine[which], noise.entries, noise.rows,
         )  # fmt: skip
         m, j, s = screen.flagged(strip, pixels), np.int64(0), 0.0
         while j < m:
             n, j, s = alone.solve_flagged(
-                lo, j, m, s, t0, piece, start, substeps, levels, t_base, circuit, state, strip,
-                pixels, keys, times, n,
+                lo, j, m, s, t0, piece, start, a / (b - a), substeps, places, levels, t_base,
+                circuit, drawn, state, strip, scratch.own, pixels, keys, times, n,
             )  # fmt: skip
             if j < m:
                 keys, times = with_room(keys, times, n, n + 1)
         if leaks:
             _lower_references(lo, count, state, strip, falls)
         cascade.step_on(strip, substeps)
+        if circuit.noise_rms > 0.0:
+            photoreceptor.step_on(noise.rows)
     return n, keys, times
 
 
@@ -307,7 +334,8 @@ def _strip(
     floor = 0.0 if circuit.slope > 0.0 else circuit.floor
     start = starts[0]
     load(frames, before[0], share[0], lo, floor, light)
-    _open_strip(lo, count, start, circuit, state, strip)
+    _open_strip(lo, count, start, circuit, state, strip, scratch.noise.rows)
+    number = np.int64(state[per_pixel.NOISE_DRAW, lo])
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     intervals = starts.shape[0] - 1
     settled, resting = cascade.is_settled(strip), False
@@ -343,12 +371,13 @@ def _strip(
             )  # fmt: skip
         else:
             n, keys, times = _advance_cascade(
-                lo, count, start, ta, length, f, still and settled, circuit, plan, t_base, state,
-                scratch, keys, times, n,
+                lo, count, start, ta, length, f, number, still and settled, circuit, plan, t_base,
+                state, scratch, keys, times, n,
             )  # fmt: skip
+            number += plan.pieces[plan.cut[f]]
         settled = still and (settled or cascade.is_settled(strip))
         f += 1
-    _close_strip(lo, count, circuit, state, strip)
+    _close_strip(lo, count, number, circuit, state, strip, scratch.noise.rows)
     return n, keys, times
 
 

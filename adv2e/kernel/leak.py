@@ -124,10 +124,13 @@ def fill_running(lo, hi, circuit, start, light, level, state):
                     age = -math.log1p(-noise * age) / noise
                 fallen = way * min(age / period, 1.0) - circuit.overshoot
                 if circuit.noise_rms > 0.0:
-                    on, now = state[per_pixel.ON, i], state[per_pixel.NOISE, i]
-                    corner = circuit.dark + circuit.per_dn * light[i]
+                    on, now = state[per_pixel.ON, i], state[per_pixel.SEEN, i]
+                    rms, corner = circuit.noise_rms, circuit.dark + circuit.per_dn * light[i]
+                    if circuit.follower > 0.0:  # the slower of two poles decides
+                        rms *= math.sqrt(circuit.follower / (circuit.follower + corner))
+                        corner = min(corner, circuit.follower)
                     crossed = _crossed(
-                        on * way + now, on * (level[i] - fallen) + now, circuit.noise_rms, corner,
+                        on * way + now, on * (level[i] - fallen) + now, rms, corner,
                         on * way / period,
                     )  # fmt: skip
                     if u * most >= mean * math.exp(-crossed):

@@ -20,7 +20,8 @@ ROWS = 22
     HOT_DRAW,
     LEAK_FACTOR,  # leak speed of this cycle
     LEAK_DRAW,
-    NOISE,
+    NOISE,  # of the photoreceptor
+    SEEN,  # the same as the comparator sees it
     NOISE_DRAW,
     FIRST,  # signal behind the first pole, as the stepped solver keeps it
     SECOND,  # the same behind the second pole
@@ -30,5 +31,4 @@ ROWS = 22
     RESET_LIGHT,  # and what it was made of: signal by the light alone,
     RESET_NOISE,  # photoreceptor noise,
     RESET_ADDED,  # what is added to the signal
-    SEEN,  # photoreceptor noise as the comparator sees it
 ) = range(ROWS)

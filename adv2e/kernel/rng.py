@@ -38,6 +38,8 @@ LEAK_AGE = 14
 LEAK_RUNNING = 15
 HOT_RATE = 16
 PHOTORECEPTOR_BEHIND = 17
+PHOTORECEPTOR_SAMPLES = 18
+PHOTORECEPTOR_BETWEEN = 19
 
 LARGEST_SEED = (1 << 64) - 1
 """Seeds are the 64 bits of the generator's key."""
@@ -213,3 +215,70 @@ def normals_of_four(seed, stream, first, count, block, out):
         x, y = _cos_sin((np.float64(w3) + 0.5) * scale)
         c[k] = r * x
         e[k] = r * y
+
+
+_f = np.float32
+_HALF_32, _SCALE_32, _TURN_32 = _f(0.5), _f(1.0 / 2147483648.0), _f(1.0 / 1073741824.0)
+_SIN_32 = tuple(_f(c) for c in (1.5707963, -0.64596409, 0.07969258, -0.0046817, 0.00016044))
+_COS_32 = tuple(_f(c) for c in (1.0, -1.2337005, 0.25366950, -0.02086348, 0.00091926, -0.0000252))
+
+
+@kernel
+def _pair32(a, b):
+    """Two standard normal numbers in single precision from two 32-bit words; tails end at 6.6."""
+    u = (_f(np.int32(a >> np.uint32(1))) + _HALF_32) * _SCALE_32
+    r = _f(math.sqrt(_f(-2.0) * special.log32(u)))
+    # an angle within an eighth of a turn, a sign of its cosine, and which of the two comes first
+    low = np.int32(np.int32(b & np.uint32(0x3FFFFFFF)) - np.int32(0x20000000))
+    t = (_f(low) + _HALF_32) * _TURN_32
+    g = t * t
+    s, c = _SIN_32, _COS_32
+    sine = t * (s[0] + g * (s[1] + g * (s[2] + g * (s[3] + g * s[4]))))
+    cosine = c[0] + g * (c[1] + g * (c[2] + g * (c[3] + g * (c[4] + g * c[5]))))
+    cosine = -cosine if (b & np.uint32(0x80000000)) != np.uint32(0) else cosine
+    swapped = (b & np.uint32(0x40000000)) != np.uint32(0)
+    return r * (sine if swapped else cosine), r * (cosine if swapped else sine)
+
+
+@kernel
+def words_of_pixels(seed, stream, pixels, block, words):
+    """Draw the four 32-bit words of a block for each of `pixels` into `words`, (4, pixels)."""
+    s, d, stream = np.uint64(seed), np.uint64(block), np.uint64(stream)
+    low, high, k0, k1 = d & _LOW, d >> _32, s & _LOW, s >> _32
+    a, b, c, e = words[0], words[1], words[2], words[3]
+    for k in range(pixels.shape[0]):
+        w0, w1, w2, w3 = philox(np.uint64(pixels[k]) & _LOW, stream, low, high, k0, k1)
+        a[k], b[k], c[k], e[k] = np.uint32(w0), np.uint32(w1), np.uint32(w2), np.uint32(w3)
+
+
+@kernel
+def normals32_of_pixels(seed, stream, pixels, block, words, normals):
+    """Draw four standard normal numbers for each of `pixels` into `normals`, (4, pixels) float32.
+
+    In two loops: words of 32 bits, and then numbers of 32 bits, as many at a time as fit a vector.
+    """
+    words_of_pixels(seed, stream, pixels, block, words)
+    for h in range(2):
+        a, b, x, y = words[2 * h], words[2 * h + 1], normals[2 * h], normals[2 * h + 1]
+        for k in range(pixels.shape[0]):
+            x[k], y[k] = _pair32(a[k], b[k])
+
+
+@kernel
+def normals32(seed, stream, pixel, block):
+    """Return the four numbers that `normals32_of_pixels` draws for one pixel."""
+    s, d, stream = np.uint64(seed), np.uint64(block), np.uint64(stream)
+    pixel = np.uint64(pixel) & _LOW
+    a, b, c, e = philox(pixel, stream, d & _LOW, d >> _32, s & _LOW, s >> _32)
+    x, y = _pair32(np.uint32(a), np.uint32(b))
+    z, v = _pair32(np.uint32(c), np.uint32(e))
+    return x, y, z, v
+
+
+@kernel
+def normal_pair(seed, stream, pixel, draw):
+    """Return two standard normal numbers."""
+    u, v = uniforms(seed, stream, pixel, draw)
+    r = math.sqrt(-2.0 * special.log(u))
+    x, y = _cos_sin(v)
+    return r * x, r * y

@@ -174,7 +174,7 @@ def _end_lags(strip):
 
 
 @kernel
-def flag(strip, end, dark, per_dn, knee_dn, seen, seen_after, factor, largest_step):
+def flag(strip, end, dark, per_dn, knee_dn, seen, seen_after, on, off, factor, largest_step):
     """Rows AWAY_1 and HIT: distance at the end, and which pixels are to be looked at.
 
     Parameters
@@ -189,8 +189,10 @@ def flag(strip, end, dark, per_dn, knee_dn, seen, seen_after, factor, largest_st
     seen, seen_after : int
         Rows of the lag that the comparator sees, at the start and at the end: that of a second pole
         follows the first one's.
+    on, off : int
+        Rows of thresholds.
     factor : float32
-        Least factor on the thresholds.
+        Least factor on these.
     largest_step : (2,) float32
         Change of log intensity above which a pixel is looked at in any case, on the foot and on the
         log branch; the latter as a ratio, (b - a)/(b + a).
@@ -217,8 +219,8 @@ def flag(strip, end, dark, per_dn, knee_dn, seen, seen_after, factor, largest_st
         flees = ((u0 + u1 <= _ZERO) & (q0 <= u0)) | ((u0 + u1 >= _ZERO) & (q0 >= u0))
         low = min(d0 + q0, d1 + q1 if flees & (not turns) else low)
         high = max(d0 + q0, d1 + q1 if flees & (not turns) else high)
-        hit = (high + fall >= strip[ON + k] * factor) | (strip[DUE + k] < end)
-        hit |= -low >= strip[OFF + k] * factor
+        hit = (high + fall >= strip[on + k] * factor) | (strip[DUE + k] < end)
+        hit |= -low >= strip[off + k] * factor
         mixed = (i0 < knee_dn) != (i1 < knee_dn)
         steep = (min(i0, i1) >= knee_dn) & (abs(i1 - i0) > largest_step[1] * (i0 + i1))
         far = steep | (abs(dx) > largest_step[0]) | (i1 > _LARGEST_LIGHT)
@@ -245,7 +247,7 @@ def screen(strip, end, dark, per_dn, knee_dn, slope, rule):
     for c in range(rule.nodes.shape[0]):
         _node(strip, _f(rule.nodes[c]), _f(rule.weights[c]))
     _end_lags(strip)
-    flag(strip, end, dark, per_dn, knee_dn, LAG_0, LAG_1, _ONE, _LARGEST)
+    flag(strip, end, dark, per_dn, knee_dn, LAG_0, LAG_1, ON, OFF, _ONE, _LARGEST)
 
 
 @kernel

@@ -75,6 +75,8 @@ _f = np.float32
 _LOG2E_32 = _f(1.4426950408889634)
 _LN2_HIGH_32 = _f(0.693359375)
 _LN2_LOW_32 = _f(-2.12194440e-4)
+_LN2_32 = _f(0.6931471805599453)
+_HALF_ROOT_32 = np.int32(0x3F3504F3)  # bits of sqrt(1/2)
 _ROUND_32 = _f(12582912.0)  # 1.5 2^23: added to a small number, it leaves the nearest whole one
 _E0, _E1, _E2, _E3, _E4, _E5, _E6 = (
     _f(c)
@@ -101,6 +103,15 @@ def exp32(t):
     p = _E0 + r * (_E1 + r * (_E2 + r * (_E3 + r * (_E4 + r * (_E5 + r * _E6)))))
     exponent = np.int32(shifted.view(np.int32) + np.int32(127))
     return np.int32(exponent << np.int32(23)).view(np.float32) * p
+
+
+@kernel
+def log32(v):
+    """Natural logarithm of a positive normal number in single precision."""
+    bits = _f(v).view(np.int32)
+    e = np.int32(np.int32(bits - _HALF_ROOT_32) >> np.int32(23))
+    m = np.int32(bits - np.int32(e << np.int32(23))).view(np.float32)
+    return _f(e) * _LN2_32 + log_ratio32((m - _f(1.0)) / (m + _f(1.0)))
 
 
 @kernel

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from adv2e.background import default_threads
 from adv2e.causes import CAUSE_BITS, CAUSED_DTYPE, FRAME_COUPLING
 from adv2e.config.model import Pixel, Sampling
-from adv2e.effects.courses import Additions
+from adv2e.effects.courses import LONGEST_US, Additions
 from adv2e.effects.pixel.threshold_drift import drift_factors
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events
@@ -23,6 +23,7 @@ from adv2e.kernel import packing as order
 from adv2e.kernel.cascade.plan import plan_for
 from adv2e.kernel.frames import Frames, frames_of
 from adv2e.kernel.packing import PIXEL_BITS, pack_limit_us
+from adv2e.kernel.photoreceptor.law import noise_of
 from adv2e.kernel.quadrature import rules_for
 from adv2e.kernel.stepped import driver
 from adv2e.kernel.work_queue import STRIP, nothing_claimed
@@ -132,6 +133,7 @@ class PixelArray:
         self.threads = default_threads() if threads is None else max(1, threads)
         self.started = False
         self._drift_per_s = pixel.thresholds.drift_per_s
+        self._level = min(pixel.thresholds.on, pixel.thresholds.off)
         self._start = start = self._relative(t_ns)
         stepped = driver_of(pixel, self.circuit, additions, method) == "run_stepped"
         self._stepping: Stepping | None = None
@@ -212,11 +214,12 @@ class PixelArray:
             return self._stepping.runs(part, frames, starts)
         circuit, lengths = self.circuit, np.diff(starts)
         fastest = max(circuit.dark + 255.0 * circuit.per_dn, circuit.dark)
-        simple = circuit.overshoot == 0.0 and self._drift_per_s == 0.0
+        simple = max(abs(circuit.overshoot), self._drift_per_s, circuit.noise_rms) == 0.0
         if circuit.follower == 0.0 and simple:
             return [(rules_for(lengths, fastest, circuit.dead_time), None)]
+        noise = noise_of(circuit, self._level, LONGEST_US) if circuit.noise_rms > 0.0 else None
         factors = drift_factors((starts - self._start) * 1e-6, self._drift_per_s)
-        plan = plan_for(lengths, fastest, circuit.follower, factors, simple)
+        plan = plan_for(lengths, fastest, circuit.follower, factors, simple, noise)
         return [(rules_for(lengths[:0], fastest, 0.0), plan)]
 
     def _by_tiles(

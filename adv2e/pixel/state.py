@@ -64,10 +64,10 @@ def initial_state(
         share, times = pixel.hot_pixels.fraction, state[per_pixel.HOT_TIME]
         rate, spread = circuit.hot_rate, circuit.hot_spread
         fill_first_hot_times(seed, share, rate, spread, start, times)
-    if circuit.noise_rms > 0:
-        fill_first_noise(seed, circuit.noise_rms, state[per_pixel.NOISE])
     if stepping is not None:
-        _rest_poles(state, circuit, stepping, light)
+        _rest_poles(state, stepping)
+    if circuit.noise_rms > 0:
+        _start_noise(state, circuit, stepping, light)
     reset = state[per_pixel.REFERENCE].copy() if circuit.causes else None
     leaks = circuit.leak > 0 or circuit.photo_leak > 0
     if leaks and pixel.initial_reference == RUNNING:
@@ -103,29 +103,36 @@ def _note_resets(
     state[per_pixel.RESET] = np.where(held, per_pixel.NEVER, reference + beyond)
 
 
-def _rest_poles(
-    state: NDArray[np.float64],
-    circuit: Circuit,
-    stepping: Stepping,
-    light: NDArray[np.float64],
-) -> None:
+def _rest_poles(state: NDArray[np.float64], stepping: Stepping) -> None:
     """Fill the rows of a state that only steps of time have; all poles are at rest."""
     driven = stepping.first_driven(state[per_pixel.X])
     state[per_pixel.FIRST] = driven
     state[per_pixel.SECOND] = driven
     state[per_pixel.REFERENCE] += driven - state[per_pixel.X] + stepping.first_signal()
-    if circuit.noise_rms > 0:
-        # the noise was there before the first frame: a second pole without it, and references
-        # in the middle of its course, would take seconds to forget that
-        noise = state[per_pixel.NOISE]
-        seen = noise.copy()
-        if circuit.follower > 0:
-            corner = circuit.dark + circuit.per_dn * stepping.first_light(light)
-            fill_first_seen(circuit.seed, circuit.noise_rms, circuit.follower, corner, noise, seen)
+
+
+def _start_noise(
+    state: NDArray[np.float64],
+    circuit: Circuit,
+    stepping: Stepping | None,
+    light: NDArray[np.float64],
+) -> None:
+    """Fill the rows of photoreceptor noise, which was there before the first frame.
+
+    A second pole without it, and references in the middle of its course, would take seconds to
+    forget that.
+    """
+    noise = state[per_pixel.NOISE]
+    fill_first_noise(circuit.seed, circuit.noise_rms, noise)
+    seen = noise.copy()
+    if circuit.follower > 0:
+        lit = light if stepping is None else stepping.first_light(light)
+        corner = circuit.dark + circuit.per_dn * lit
+        fill_first_seen(circuit.seed, circuit.noise_rms, circuit.follower, corner, noise, seen)
+    state[per_pixel.SEEN] = seen
+    state[per_pixel.REFERENCE] += seen
+    if stepping is not None:
         state[per_pixel.SECOND] += seen
-        state[per_pixel.REFERENCE] += seen
-        if circuit.causes:
-            state[per_pixel.SEEN] = seen
 
 
 def _over_pixels(threads: int, pixels: int, fill: Callable[..., None], *arguments: Any) -> None:

@@ -14,8 +14,8 @@ and what the signal lacks is many times that in time: steps are half as long (at
 event of 50 was 5 us off; 0.8 us at 1/4).  Against dense solutions of the circuit all times agree
 within 1 us, most within 0.05 us.
 
-Photoreceptor noise is drawn at each step, so in every pixel at most ``photoreceptor_noise.step`` of
-the correlation time at white apart.
+Photoreceptor noise is drawn at each step here, so in every pixel at most
+``photoreceptor_noise.step`` of the correlation time at white apart.
 """
 
 from __future__ import annotations

@@ -38,6 +38,13 @@ ALL_WEAK = (*MISMATCH, *LEAK, *DEAD_TIME, *SHOT_WEAK)
 POLES_HZ = 300, 1000, 10_000
 POLE = "pixel.source_follower.cutoff_hz=1000"
 NOISE = "pixel.photoreceptor_noise.rms=0.03"
+TWO_POLES = (
+    "pixel.dark_current.dn=10",
+    "pixel.low_pass={cutoff_hz: 2200, dark_cutoff_hz: 0.1}",
+    "pixel.source_follower.cutoff_hz=100",
+)
+"""What still pixels of a DAVIS346 say; see configs/davis346.yaml."""
+MEASURED_NOISE = "pixel.photoreceptor_noise.rms=0.055"
 
 EVERYTHING = (
     *ALL,
@@ -128,9 +135,11 @@ def settings() -> Iterator[Setting]:
     noisy = {
         "photoreceptor noise 0.03": (NOISE,),
         "photoreceptor noise 0.03, second pole 1000 Hz": (NOISE, POLE),
+        "two poles as measured": TWO_POLES,
+        "two poles and noise as measured": (*TWO_POLES, MEASURED_NOISE),
     }
     for name, sets in noisy.items():
-        yield Setting(name=name, clip=one, sets=sets, share=0.1)
+        yield Setting(name=name, clip=one, sets=sets)
     shipped = f"pixel.log_response.linear_below={SHIPPED_KNEE_DN:g}"
     decoded = ("frames.encoding=srgb", shipped, "sampling.L=10")
     yield Setting(name="sRGB decoded, L = 10, noise off", clip=one, sets=decoded, stride=10)

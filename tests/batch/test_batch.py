@@ -66,9 +66,8 @@ def test_again_it_keeps_what_is_there_and_makes_what_changed(batch, source, tmp_
     assert "1 its file is gone, 1 kept" in batch(*call).err
     (dest / "b.h5").write_bytes(b"spoiled")
     assert "1 its file changed, 1 kept" in batch(*call).err
-    assert (
-        "2 the configuration or an option changed" in batch(*call, "--set", "pixel.refractory=null").err
-    )
+    changed = batch(*call, "--set", "pixel.refractory=null")
+    assert "2 the configuration or an option changed" in changed.err
     assert "2 the seed changed" in batch(*call, "--set", "pixel.leak=null", "--seed", 3).err
     clip(root / "c.avi")
     planned = batch(*call, "--set", "pixel.leak=null", "--seed", 3, "--dry-run")

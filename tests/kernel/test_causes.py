@@ -240,7 +240,7 @@ def test_photoreceptor_noise_beside_light_and_leak(dead_us, follower_hz):
             array.state[per_pixel.RESET] = array.state[per_pixel.REFERENCE]
             array.state[per_pixel.RESET_NOISE] = 0.0
 
-    found, causes = caused(light, times, pixel, begin=begin, seed=SEED, chunk=3)
+    found, causes = caused(light, times, pixel, begin=begin, seed=SEED, chunk=3, method="stepped")
     paths = [noise_path(light, times, steps, rms, i) for i in range(pixels)]
     draws = Draws(signal_noise=paths)
     circuit = Circuit(dead_time_us=dead_us, leak_hz=40.0, follower_hz=follower_hz)
@@ -398,7 +398,6 @@ def test_without_causes_nothing_more_is_kept():
         per_pixel.RESET_LIGHT,
         per_pixel.RESET_NOISE,
         per_pixel.RESET_ADDED,
-        per_pixel.SEEN,
     )
     assert not np.any(array.state[list(rows)])
 

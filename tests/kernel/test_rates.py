@@ -248,8 +248,7 @@ def test_noise_behind_a_second_pole_begins_as_it_goes_on():
     array = start(light, times, pixel)
     share = follower_hz / (follower_hz + 21.8 + (300.0 - 21.8) * dn / 255.0)
     for _ in range(2):
-        x, noise = array.state[per_pixel.X], array.state[per_pixel.NOISE]
-        seen = array.state[per_pixel.SECOND] - x
+        noise, seen = array.state[per_pixel.NOISE], array.state[per_pixel.SEEN]
         for half in (slice(0, 4000), slice(4000, 8000)):
             expected = rms**2 * share[half][0]
             # five standard errors

@@ -126,14 +126,17 @@ def test_photoreceptor_noise_moves_the_signal(follower_hz):
         for k in range(len(z) - 1):
             z[k + 1] = z[k] + b / (1 + b / 2) * (0.5 * (signal[k] + signal[k + 1]) - z[k])
         signal = z
-    found = count_and_time_errors(solve(light, times, pixel, seed=seed), Truth(signal).events())
+    found = count_and_time_errors(
+        solve(light, times, pixel, seed=seed, method="stepped"), Truth(signal).events()
+    )
     assert found.count_b > 30
     assert not found.differing
     assert found.max_dt_us < 0.5
 
 
+@pytest.mark.parametrize("method", ["auto", "stepped"])
 @pytest.mark.parametrize("follower_hz", [None, 300.0])
-def test_photoreceptor_noise_makes_as_many_events_as_the_camera_has(follower_hz):
+def test_photoreceptor_noise_makes_as_many_events_as_the_camera_has(follower_hz, method):
     follower = {"cutoff_hz": follower_hz} if follower_hz else None
     dead = {"period_us": 500.0}
     given = {
@@ -150,7 +153,7 @@ def test_photoreceptor_noise_makes_as_many_events_as_the_camera_has(follower_hz)
         refractory=Refractory(**dead),
     )
     light, times = np.full((4, 500), 60.0), np.arange(4) * 0.1
-    events = sum(map(len, solve(light, times, pixel, seed=1)))
+    events = sum(map(len, solve(light, times, pixel, seed=1, method=method)))
     assert events > 3000
     assert events == pytest.approx(len(stream.time), rel=0.06)
 

@@ -45,7 +45,6 @@ from numpy.typing import NDArray
 
 from adv2e.diagnosis.tables.threshold_noise import (
     HIGHEST,
-    POLE_SHIFT,
     SAMPLING_SHIFT,
     event_rates,
 )
@@ -70,7 +69,7 @@ class NoisySources:
     rms: float = 0.0
     """Photoreceptor noise [ln]."""
     noise_step: float = 0.0
-    """At which that noise is sampled, in correlation times at white; 0: not sampled."""
+    """At which that noise is sampled behind one pole, in correlation times at white; 0: not."""
     cutoff_hz: float = 0.0
     dark_cutoff_hz: float = 0.0
     follower_hz: float = 0.0
@@ -343,8 +342,7 @@ def _laws(sources: NoisySources, light: Array, leak: Array) -> list[Law]:
         if second > 0.0:
             slow, ratio = min(first, second), min(first, second) / max(first, second)
             sigma *= math.sqrt(second / (first + second))
-        # a second pole that is slower than the samples hides them
-        sampling = SAMPLING_SHIFT * math.sqrt(2.0 * slow * sampled_s)
-        shift = max(sampling - POLE_SHIFT * math.sqrt(ratio), 0.0)
+        # behind two poles the noise is not sampled
+        shift = SAMPLING_SHIFT * math.sqrt(2.0 * slow * sampled_s) if second == 0.0 else 0.0
         laws.append(Law(sigma, slow, ratio, sources.dead_time_s, leak_hz, shift))
     return laws

@@ -8,11 +8,14 @@ f           corner of the low-pass
 W           Wiener process
 
 The correlation time of the noise is that of the low-pass.  Noise events of one pixel therefore
-mostly alternate in polarity, which Poisson events do not.  The process is sampled exactly and is
-linear between the samples.  Samples are at most step times the shortest correlation time apart,
-which is the one at white.
+mostly alternate in polarity, which Poisson events do not.
 
-Behind a second pole of corner f_s (source_follower) the variance is
+Behind the low-pass alone the noise is a line between exact samples.  They are at most step times
+the shortest correlation time apart, which is the one at white, and at most 0.1 ms.  This is a part
+of the model: the more samples, the more often white noise crosses a threshold, without end.
+
+Behind a second pole of corner f_s (source_follower) it has a speed, and so a rate of crossings.
+Then it is not sampled: it is drawn as finely as events need it.  Its variance is
 
     sigma^2 f_s/(f + f_s)
 
@@ -47,7 +50,8 @@ class PhotoreceptorNoise(Section):
     step: float = parameter(
         0.1,
         unit="-",
-        meaning="longest step of the sampled noise, as a share of its correlation time at white",
+        meaning="longest step of the sampled noise, as a share of its correlation time at white;"
+        " without source_follower",
         above=0,
         at_most=1,
     )

@@ -8,46 +8,26 @@ from typing import NamedTuple
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, screen, special
 from adv2e.kernel.borrowing import borrowed
+from adv2e.kernel.cascade import noisy
 from adv2e.kernel.cascade import screen as cascade
-from adv2e.kernel.cascade.curve import (
-    NOWHERE,
-    at,
-    bent,
-    first_reach,
-    lag_curve,
-    mirrored,
-    plus,
-    value,
+from adv2e.kernel.cascade.curve import lag_curve, value
+from adv2e.kernel.cascade.plan import FEWEST, GROWTH, LONGEST
+from adv2e.kernel.cascade.substep import (
+    DONE,
+    NO_NOISE,
+    Substep,
+    fire_until,
+    hull,
+    light_of,
+    may_fire,
 )
-from adv2e.kernel.cascade.plan import FEWEST, LONGEST
-from adv2e.kernel.causes import cause_by_most, note_parts
-from adv2e.kernel.comparator import TIE, fire
 from adv2e.kernel.lanes.exchange import log_of, watch
-from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
+from adv2e.kernel.noise import next_noise
+from adv2e.kernel.photoreceptor import bridge
 from adv2e.kernel.screen import STRIDE
-
-DONE = -1.0
-"""Place of a pixel that is at the end of its piece."""
 
 _SIXTH = 1.0 / 6.0
 _LARGEST_RATIO = math.tanh(0.5 * cascade.LARGEST_STEP)
-
-
-class _Substep(NamedTuple):
-    """What a pixel meets in a substep."""
-
-    t0: float  # its start [us]
-    h: float  # its length [us]
-    x: float  # log intensity at its start
-    d: float  # by which that changes
-    on0: float  # thresholds at its ends
-    on1: float
-    off0: float
-    off1: float
-    fallen: float  # what leak at its nominal speed has taken from the reference before
-    leak1: float  # coefficients of the cubic that it takes in the substep
-    leak2: float
-    leak3: float
 
 
 class _Way(NamedTuple):
@@ -55,15 +35,20 @@ class _Way(NamedTuple):
 
     x0: float  # log intensity at its start
     dx: float  # by which that changes
+    rests: bool  # whether neither light nor lag changes
+    alone: bool  # whether the lags that the screen keeps do not hold; then:
     knee: float  # where the light passes the knee of the log map; 1: nowhere
-    before: int  # substeps before the knee,
-    behind: int  # and behind it
-    alone: bool  # whether the lags that the screen keeps do not hold
+    bend: float  # where the light bent before that; at the start of the piece or before
+    shortest: float  # substep at a bend,
+    longest: float  # and anywhere
 
 
 @kernel
-def _way(k, length, substeps, circuit, strip):
-    """Return how pixel k of a strip goes through its piece of `length` us."""
+def _way(k, length, before, circuit, strip):
+    """Return how pixel k of a strip goes through its piece of `length` us.
+
+    before : time since the interval's start at the start of the piece, in lengths of the piece
+    """
     i0, i1 = float(strip[screen.LIGHT_0 + k]), float(strip[screen.LIGHT_1 + k])
     x0 = log_of(i0, circuit)
     dx = log_of(i1, circuit) - x0
@@ -73,26 +58,21 @@ def _way(k, length, substeps, circuit, strip):
     # a little less than what the screen takes for steep, which rounds otherwise
     alone = abs(i1 - i0) > 0.99 * _LARGEST_RATIO * (i0 + i1) or steep > 0.99
     if not (alone or mixed or brightest > 0.99 * screen.LARGEST_LIGHT):
-        return _Way(x0, dx, 1.0, substeps, 0, False)
+        rests = i0 == i1 and strip[screen.LAG_0 + k] == 0.0 and strip[cascade.SECOND + k] == 0.0
+        return _Way(x0, dx, rests, False, 1.0, 0.0, 1.0, 1.0)
     corner = (circuit.dark + circuit.per_dn * brightest) * length
-    needed = max(corner / LONGEST, FEWEST * max(steep, 1.0))
     knee = min(max((circuit.knee - x0) / dx, 0.0), 1.0) if mixed and dx != 0.0 else 1.0
-    return _Way(x0, dx, knee, math.ceil(needed * knee), math.ceil(needed * (1.0 - knee)), True)
+    shortest = LONGEST / corner if corner > LONGEST else 1.0
+    return _Way(x0, dx, False, True, knee, -before, shortest, 1.0 / (FEWEST * max(steep, 1.0)))
 
 
 @kernel
-def _place(way, j):
-    """Where substep j of a piece begins."""
-    if j < way.before:
-        return way.knee * (j / way.before)
-    if j == way.before + way.behind:
-        return 1.0
-    return way.knee + (1.0 - way.knee) * ((j - way.before) / way.behind)
-
-
-@kernel
-def _light(x, on_log, circuit):
-    return special.exp(x) if on_log else circuit.slope * x
+def _next_place(way, s):
+    """Where the substep of a lone pixel ends that begins at s."""
+    bend, end = (way.bend, way.knee) if s < way.knee else (way.knee, 1.0)
+    after = s + min(max(way.shortest, GROWTH * (s - bend)), way.longest)
+    # no short one at the end
+    return after if end - after > 0.1 * (after - s) else end
 
 
 @kernel
@@ -110,148 +90,31 @@ def _after(u0, d, a, c):
 
 
 @kernel
-def _may_fire(u0, u1, q0, q1, away0, away1, fallen0, fallen1, on, off):
-    """Tell whether the signal may reach a level in a substep; see the bounds of the screens.
+def _first_busy(k, j, count, places, away, dx, fall, on, off, due, strip):
+    """Return the first substep from j on in which pixel k may fire, else `count`.
 
-    away0, away1 : distance of x from the reference at its ends, fallen0, fallen1 : what leak adds
-    """
-    turns = u0 * u1 < 0.0
-    if not turns and ((u0 + u1 <= 0.0 and q0 <= u0) or (u0 + u1 >= 0.0 and q0 >= u0)):
-        high, low = max(away0 + q0, away1 + q1), min(away0 + q0, away1 + q1)
-    else:
-        high, low = away0 + max(u0, q0), away0 + min(u0, q0)
-        high, low = max(high, away1 + u1), min(low, away1 + u1)
-        if turns:  # the first pole turns where it meets x
-            high, low = max(high, away0, away1), min(low, away0, away1)
-    return high + fallen1 >= on or low + fallen0 <= -off
-
-
-@kernel
-def _first_busy(k, j, count, away, d, fall, on, off, strip):
-    """Return the first substep from j on in which pixel k may fire by its signal, else `count`.
-
-    away : distance of x from the reference at the start of the piece; d, fall : what x and leak
-    move it by in each substep.
+    places : of the ends of substeps in the piece; away : distance of x from the reference at its
+    start; dx, fall : what x and leak move it by over the piece; due : place at which something
+    happens by itself.
     """
     u1 = float(strip[cascade.FIRST + j * STRIDE + k])
     q1 = float(strip[cascade.SECOND + j * STRIDE + k])
-    while j < count:
-        u0, q0, away_j = u1, q1, away + (d + fall) * j
+    while j < count and due >= places[j + 1]:
+        u0, q0, span = u1, q1, places[j + 1] - places[j]
+        away_j = away + (dx + fall) * places[j]
         u1 = float(strip[cascade.FIRST + (j + 1) * STRIDE + k])
         q1 = float(strip[cascade.SECOND + (j + 1) * STRIDE + k])
-        if _may_fire(u0, u1, q0, q1, away_j, away_j + d, 0.0, fall, on, off):
+        high, low = hull(u0, u1, q0, q1, dx * span)
+        if may_fire(away_j + high, away_j + low, 0.0, fall * span, on, off):
             break
         j += 1
     return j
 
 
 @kernel
-def _fallen(step, t):
-    """Return what leak at its nominal speed has taken from the reference until t."""
-    return step.fallen + t * (step.leak1 + t * (step.leak2 + t * step.leak3))
-
-
-@kernel
-def _light_at(x, circuit):
-    """Light [DN] that log intensity x stands for."""
-    return _light(x, x >= circuit.knee, circuit)
-
-
-@kernel
-def _shifted(found, sign, level, slope):
-    """Return what `at` finds of a curve or its mirror with a line, `level` there, added to it."""
-    return sign * found[0] + level, sign * found[1] + slope, sign * found[2]
-
-
-@kernel
-def _fire(i, t, step, lag, reference, factor, t_base, circuit, state, keys, times, n):
-    """Fire the events of pixel i in a substep from t on.
-
-    Returns the number of events, DONE or the place where there is no room left for them, and the
-    reference, as if leak had always had its present speed, and that speed.
-    """
-    jitter, h = circuit.leak_jitter > 0.0, step.h
-    on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
-    signal = plus(lag, step.x, step.d, 0.0, 0.0)
-    if state[per_pixel.HOLD, i] >= 0.0:
-        t = max(t, (state[per_pixel.HOLD, i] - step.t0) / h)
-        seen = value(signal, t)
-        reference = seen + factor * _fallen(step, t) + state[per_pixel.BEYOND, i]
-        state[per_pixel.HOLD, i] = -1.0
-        if circuit.causes:
-            note_parts(i, reference - factor * _fallen(step, t), seen, 0.0, 0.0, state)
-    while True:
-        if n == keys.shape[0]:
-            return n, t, reference, factor
-        kind, t_end = noise_within(i, step.t0 + t * h, step.t0 + h, circuit, state)
-        end = 1.0 if kind == NONE else max(t, (t_end - step.t0) / h)
-        away = plus(
-            signal, factor * step.fallen - reference, factor * step.leak1, factor * step.leak2,
-            factor * step.leak3,
-        )  # fmt: skip
-        at_t, at_end = at(away, t), at(away, end)
-        room = bent(away, at_t[2]) * (end - t) * (end - t) * 0.125
-        up, down = NOWHERE, NOWHERE
-        if max(at_t[0], at_end[0]) + room >= min(step.on0, step.on1):
-            rise = step.on1 - step.on0
-            level = plus(away, -step.on0 - TIE, -rise, 0.0, 0.0)
-            up = first_reach(
-                level, t, _shifted(at_t, 1.0, -step.on0 - TIE - rise * t, -rise),
-                end, _shifted(at_end, 1.0, -step.on0 - TIE - rise * end, -rise),
-            )  # fmt: skip
-        if room - min(at_t[0], at_end[0]) >= min(step.off0, step.off1):
-            rise = step.off1 - step.off0
-            level = plus(mirrored(away), -step.off0 - TIE, -rise, 0.0, 0.0)
-            down = first_reach(
-                level, t, _shifted(at_t, -1.0, -step.off0 - TIE - rise * t, -rise),
-                end, _shifted(at_end, -1.0, -step.off0 - TIE - rise * end, -rise),
-            )  # fmt: skip
-        polarity, by_signal = 1 if up <= down else -1, min(up, down) <= 1.0
-        if by_signal:
-            t = min(up, down)
-        elif kind == NONE:
-            return n, DONE, reference, factor
-        else:
-            t = end
-            light = _light_at(step.x + step.d * t, circuit)
-            polarity = take_noise(i, kind, light, circuit, state)
-            if polarity == 0:
-                continue
-        when, cause = step.t0 + t * h, kind
-        if circuit.causes and by_signal:
-            now = reference - factor * _fallen(step, t)
-            cause = cause_by_most(i, polarity, now, value(signal, t), 0.0, 0.0, circuit, state)
-        n = fire(i, when, polarity, cause, t_base, circuit, state, keys, times, n)
-        before = factor
-        factor = state[per_pixel.LEAK_FACTOR, i] if jitter else 1.0
-        level = on_level if polarity > 0 else -off_level
-        beyond = circuit.overshoot * level
-        if circuit.dead_time > 0.0:
-            hold = when + circuit.dead_time
-            if hold >= step.t0 + h:
-                state[per_pixel.HOLD, i] = hold
-                state[per_pixel.BEYOND, i] = beyond
-                return n, DONE, reference, factor
-            t = (hold - step.t0) / h
-        if circuit.dead_time > 0.0 or not by_signal:
-            reference = value(signal, t) + factor * _fallen(step, t) + beyond
-        else:
-            level = (
-                step.on0 + (step.on1 - step.on0) * t
-                if polarity > 0
-                else (step.off1 - step.off0) * -t - step.off0
-            )
-            reference += level * (1.0 + circuit.overshoot)
-            reference += (factor - before) * _fallen(step, t)
-        if circuit.causes:
-            now = reference - factor * _fallen(step, t)
-            note_parts(i, now, value(signal, t), 0.0, 0.0, state)
-
-
-@kernel
 def _solve(
-    lo, k, s_from, ta, length, start, substeps, levels, t_base, circuit, state, strip, keys, times,
-    n,
+    lo, k, s_from, ta, length, start, before, substeps, places, levels, t_base, circuit, drawn,
+    state, strip, own, keys, times, n,
 ):  # fmt: skip
     """Events of pixel k of the strip that begins at pixel `lo`, over a piece [ta, ta + length] us.
 
@@ -261,10 +124,14 @@ def _solve(
         Place to go on from; 0 at first.
     start : float
         Time that row DUE counts from [us].
+    before : float
+        Time since the start of the interval at that of the piece, in lengths of the piece.
     substeps : int
-        Of the piece, in the rows of the screen.
+        Of the piece, in the rows of the screen; they end at `places` of it.
     levels : (2,) float
         Factors on both thresholds at the ends of the piece.
+    drawn : Drawn
+        What is known of photoreceptor noise; `own` is memory for it.
 
     Returns
     -------
@@ -272,7 +139,7 @@ def _solve(
     which to go on.  The rows of the pixel are then those at the end of the piece.
     """
     i = lo + k
-    way = _way(k, length, substeps, circuit, strip)
+    way = _way(k, length, before, circuit, strip)
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
     on_0, on_rise = on_level * levels[0], on_level * (levels[1] - levels[0])
     off_0, off_rise = off_level * levels[0], off_level * (levels[1] - levels[0])
@@ -281,32 +148,31 @@ def _solve(
     light1, fallen1, s1 = float(strip[screen.LIGHT_0 + k]), 0.0, 0.0
     u1, q1 = float(strip[cascade.FIRST + k]), float(strip[cascade.SECOND + k])
     follows_light = way.alone or circuit.photo_leak > 0.0
-    count, share = way.before + way.behind, 1.0 / substeps
     hold, due = state[per_pixel.HOLD, i], next_noise(i, circuit, state)[1]
-    # where each substep is like the other, those in which nothing happens are passed quickly
-    skims, fall_each = not follows_light, on_level * circuit.leak * length * share
+    # substeps in which nothing happens are passed quickly, where they differ in lags alone
+    is_noisy = circuit.noise_rms > 0.0
+    if is_noisy:
+        bridge.begin(i, k, drawn, circuit, own)
+    skims, fall_all = not (follows_light or is_noisy), on_level * circuit.leak * length
     least_on, least_off = min(on_0, on_0 + on_rise), min(off_0, off_0 + off_rise)
     j = 0
-    while j < count:
-        if skims and hold < 0.0 and s1 >= s_from:
-            busy = _first_busy(
-                k, j, count, way.x0 - reference, way.dx * share, factor * fall_each, least_on,
-                least_off, strip,
+    while s1 < 1.0:
+        if skims and hold < 0.0 and s1 >= s_from and not way.rests:
+            j = _first_busy(
+                k, j, substeps, places, way.x0 - reference, way.dx, factor * fall_all, least_on,
+                least_off, (due - ta) / length, strip,
             )  # fmt: skip
-            if due < ta + length:
-                busy = min(busy, max(j, int((due - ta) / (length * share))))
-            if busy > j:
-                j, s1, fallen1 = busy, busy * share, fall_each * busy
-                u1 = float(strip[cascade.FIRST + j * STRIDE + k])
-                q1 = float(strip[cascade.SECOND + j * STRIDE + k])
-                if j == count:
-                    break
-        j += 1
+            s1, fallen1 = places[j], fall_all * places[j]
+            u1 = float(strip[cascade.FIRST + j * STRIDE + k])
+            q1 = float(strip[cascade.SECOND + j * STRIDE + k])
+            if j == substeps:
+                break
         s0, u0, q0, light0, fallen0 = s1, u1, q1, light1, fallen1
         if way.alone:
-            s1 = _place(way, j)
+            s1 = _next_place(way, s0)
         else:
-            s1 = j * share if j < count else 1.0
+            j = substeps if way.rests else j + 1
+            s1 = places[j]
             u1 = float(strip[cascade.FIRST + j * STRIDE + k])
             q1 = float(strip[cascade.SECOND + j * STRIDE + k])
         span = s1 - s0
@@ -316,8 +182,8 @@ def _solve(
         dark, per_dn = circuit.dark * h, circuit.per_dn * h
         fall = on_level * circuit.leak * h
         if follows_light:
-            middle = _light(x + 0.5 * d, on_log, circuit)
-            light1 = _light(x + d, on_log, circuit)
+            middle = light_of(x + 0.5 * d, on_log, circuit)
+            light1 = light_of(x + d, on_log, circuit)
             mean = (light0 + 4.0 * middle + light1) * _SIXTH
             fall += on_level * circuit.photo_leak * mean * h
         fallen1 = fallen0 + fall
@@ -326,16 +192,19 @@ def _solve(
         on0, on1 = on_0 + on_rise * s0, on_0 + on_rise * s1
         off0, off1 = off_0 + off_rise * s0, off_0 + off_rise * s1
         idle = hold >= t0 + h or s1 <= s_from
-        if hold < 0.0 and due >= t0 + h and follows_light and not way.alone:
-            away = x - reference
-            idle |= not _may_fire(
-                u0, u1, q0, q1, away, away + d, factor * fallen0, factor * fallen1, min(on0, on1),
-                min(off0, off1),
+        if hold < 0.0 and due >= t0 + h and not (skims or way.alone):
+            high, low = hull(u0, u1, q0, q1, d)
+            if is_noisy:
+                noise_high, noise_low = noisy.bounds_over(s0, s1, own)
+                high, low = high + noise_high, low + noise_low
+            idle |= not may_fire(
+                x - reference + high, x - reference + low, factor * fallen0, factor * fallen1,
+                min(on0, on1), min(off0, off1),
             )  # fmt: skip
         if idle and not way.alone:
             continue
         if not follows_light:
-            light0, light1 = _light(x, on_log, circuit), _light(x + d, on_log, circuit)
+            light0, light1 = light_of(x, on_log, circuit), light_of(x + d, on_log, circuit)
         w0, w1 = dark + per_dn * light0, dark + per_dn * light1
         slope0, slope1 = -(w0 * u0 + d), -(w1 * u1 + d)
         # how the corner changes: with the light, which grows by itself or in a line
@@ -350,14 +219,21 @@ def _solve(
                 continue
         l0 = on_level * (circuit.leak + circuit.photo_leak * light0) * h
         l1 = on_level * (circuit.leak + circuit.photo_leak * light1) * h
-        step = _Substep(
+        step = Substep(
             t0, h, x, d, on0, on1, off0, off1, fallen0, l0, 3.0 * fall - 2.0 * l0 - l1,
             l0 + l1 - 2.0 * fall,
         )  # fmt: skip
         place = max((s_from - s0) / span, 0.0)
-        n, place, reference, factor = _fire(
-            i, place, step, lag, reference, factor, t_base, circuit, state, keys, times, n
-        )
+        if is_noisy:
+            n, place, reference, factor = noisy.fire_in_cells(
+                i, place, s0, span, hull(u0, u1, q0, q1, d), step, lag, reference, factor, t_base,
+                circuit, state, own, keys, times, n,
+            )  # fmt: skip
+        else:
+            n, place, reference, factor = fire_until(
+                i, place, 1.0, step, lag, NO_NOISE, reference, factor, t_base, circuit, state, keys,
+                times, n,
+            )  # fmt: skip
         if place != DONE:
             state[per_pixel.REFERENCE, i] = reference
             return n, s0 + place * span
@@ -371,18 +247,19 @@ def _solve(
 
 @kernel
 def solve_flagged(
-    lo, j, m, s, ta, length, start, substeps, levels, t_base, circuit, state, strip, pixels, keys,
-    times, n,
+    lo, j, m, s, ta, length, start, before, substeps, places, levels, t_base, circuit, drawn, state,
+    strip, own, pixels, keys, times, n,
 ):  # fmt: skip
     """Events of the flagged pixels, from the j-th of m on, which is solved from place s on.
 
     Returns the number of events, and j and s where it stopped: j = m, or there was no room left.
     """
     state, strip, pixels, keys, times = borrowed(state, strip, pixels, keys, times)
+    drawn, own, places = borrowed(drawn, own, places)
     while j < m:
         n, s = _solve(
-            lo, pixels[j], s, ta, length, start, substeps, levels, t_base, circuit, state, strip,
-            keys, times, n,
+            lo, pixels[j], s, ta, length, start, before, substeps, places, levels, t_base, circuit,
+            drawn, state, strip, own, keys, times, n,
         )  # fmt: skip
         if s != DONE:
             break

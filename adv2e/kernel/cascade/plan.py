@@ -1,13 +1,27 @@
-"""How intervals are cut for :mod:`adv2e.kernel.cascade`, and what is the same for all pixels."""
+"""How intervals are cut for :mod:`adv2e.kernel.cascade`, and what is the same for all pixels.
+
+What lags from before a bend of the light dies out, in each pixel at the pace of its own corner:
+whatever of it is left after a time t changes little in a part of t.  So substeps grow.  They are as
+short as white needs at the start of an interval, where the light bends, and then a share of the
+time since, however fast white is.
+"""
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from adv2e.kernel.photoreceptor.law import (
+    MOST_CELLS,
+    Laws,
+    Noise,
+    cells_of,
+    laws_for,
+    no_laws,
+    rounded,
+)
 
 MOST = 10
 """Most substeps of a piece: those whose lags are kept at a time."""
@@ -16,31 +30,43 @@ WEIGHTS = 8
 """Of the second pole: what it keeps, six for its input, and the lag behind a ramp."""
 
 LONGEST = 0.8
-"""Longest substep, in time constants at white: with 1.25, events that a leak of 9 Hz made after a
-step to white were 1.8 us off; with 0.8, a tenth of that."""
+"""Longest substep at a bend, in time constants at white: with 1.25, events that a leak of 9 Hz made
+after a step to white were 1.8 us off; with 0.8, a tenth of that."""
+
+GROWTH = 0.3
+"""Longest substep later on, as a share of the time since.  A lag with time constants x behind the
+bend is e^-x of what it was, and a substep misses 2.2e-5 (0.3 x)^6 of that, at most 2e-6."""
 
 FEWEST = 2
 """Substeps of an interval: the light may change by a third in it."""
 
 _NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(40)
 
+_Array = NDArray[np.float64]
+
 
 class Plan(NamedTuple):
-    """How each interval is cut."""
+    """How each interval is cut: into pieces of at most MOST substeps."""
 
-    pieces: NDArray[np.int64]  # (intervals,)
-    substeps: NDArray[np.int64]  # (intervals,): of a piece
-    weights: NDArray[np.float64]  # (intervals, WEIGHTS)
-    factors: NDArray[np.float64]  # (intervals + 1,): on both thresholds, at the ends
+    cut: NDArray[np.int64]  # (intervals,): which of the ways that follow
+    pieces: NDArray[np.int64]  # (ways,)
+    substeps: NDArray[np.int64]  # (ways, pieces)
+    ends: _Array  # (ways, pieces + 1): of pieces, as shares of the interval
+    places: _Array  # (ways, pieces, MOST + 1): of the ends of substeps, as shares of their piece
+    weights: _Array  # (ways, pieces, MOST, WEIGHTS)
+    factors: _Array  # (intervals + 1,): on both thresholds, at the ends
     simple: bool  # whether nothing but a second pole needs the cascade
+    laws: Laws  # of photoreceptor noise,
+    law: NDArray[np.int64]  # (ways, pieces): which of them
 
 
 def plan_for(
-    lengths: NDArray[np.float64],
+    lengths: _Array,
     fastest: float,
     follower: float,
-    factors: NDArray[np.float64],
+    factors: _Array,
     simple: bool,
+    noise: Noise | None = None,
 ) -> Plan:
     """Return the plan of intervals.
 
@@ -56,25 +82,72 @@ def plan_for(
         On both thresholds.
     simple : bool
         See :class:`Plan`.
+    noise : Noise, optional
+        Of the photoreceptor.
     """
-    needed = np.maximum(np.ceil(1.001 * lengths * fastest / LONGEST), FEWEST).astype(np.int64)
-    pieces = -(-needed // MOST)
-    substeps = -(-needed // pieces)
-    corners = follower * lengths / (pieces * substeps)
-    weights = np.array([_weights(corner) for corner in corners.tolist()]).reshape(-1, WEIGHTS)
-    return Plan(pieces, substeps, weights, factors, simple)
+    distinct, cut = np.unique(lengths, return_inverse=True)
+    ways = [_pieces(length, fastest, noise) for length in distinct.tolist()]
+    count = max((len(way) for way in ways), default=1)
+    shape = len(ways), count
+    substeps, law = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    ends, places = np.ones((len(ways), count + 1)), np.ones((*shape, MOST + 1))
+    for w, way in enumerate(ways):
+        for p, piece in enumerate(way):
+            ends[w, p], span = piece[0], piece[-1] - piece[0]
+            substeps[w, p] = piece.size - 1
+            places[w, p, : piece.size] = (piece - piece[0]) / span
+            places[w, p, piece.size - 1] = 1.0
+    lasting = np.diff(ends) * distinct[:, None]
+    corners = follower * lasting[..., None] * np.diff(places)
+    weights = weights_of(corners.reshape(-1)).reshape(*corners.shape, WEIGHTS)
+    laws, pieces = no_laws(), np.array([len(way) for way in ways], np.int64)
+    if noise is not None:
+        is_piece = substeps > 0
+        roughly = np.array([rounded(length) for length in lasting[is_piece].tolist()])
+        tabled, law[is_piece] = np.unique(roughly, return_inverse=True)
+        laws = laws_for(tabled, noise)
+    return Plan(
+        cut.astype(np.int64), pieces, substeps, ends, places, weights, factors, simple, laws, law
+    )
 
 
-@lru_cache(maxsize=512)
-def _weights(b: float) -> tuple[float, ...]:
-    """Return what a pole of corner `b` in a substep takes.
+def _pieces(length: float, fastest: float, noise: Noise | None) -> list[_Array]:
+    """Return the places of the ends of substeps, piece by piece, in an interval of `length` us."""
+    upto = 1.001 * length * fastest
+    ends = [0.0]
+    while ends[-1] < upto:
+        ends.append(ends[-1] + max(LONGEST, GROWTH * ends[-1]))
+    if len(ends) <= FEWEST:
+        ends = list(range(FEWEST + 1))
+    places = np.array(ends) / ends[-1]
+    cells = np.zeros(places.size - 1)
+    if noise is not None:
+        cells = np.array([cells_of(length * span, noise) for span in np.diff(places).tolist()])
+        parts = np.maximum(np.ceil(cells / MOST_CELLS), 1).astype(int).tolist()
+        split = [
+            np.linspace(a, b, n, endpoint=False)
+            for a, b, n in zip(places[:-1], places[1:], parts, strict=True)
+        ]
+        places = np.append(np.concatenate(split), 1.0)
+        cells = np.repeat(cells / parts, parts)
+    pieces, first, held = [], 0, 0.0
+    for j, more in enumerate(cells.tolist()):
+        if j - first == MOST or (j > first and held + more > MOST_CELLS):
+            pieces.append(places[first : j + 1])
+            first, held = j, 0.0
+        held += more
+    pieces.append(places[first:])
+    return pieces
+
+
+def weights_of(corners: _Array) -> _Array:
+    """Return what a pole of each of `corners` in a substep takes, (corners, WEIGHTS).
 
     Of its lag at the start; of value, slope and curvature of its input at the start, and at the
     end; and of what x moves by.
     """
-    if b == 0.0:
-        return (0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    upto = min(1.0, 40.0 / b)
+    b = np.maximum(corners, 1e-300)[:, None]
+    upto = np.minimum(1.0, 40.0 / b)
     v = 0.5 * upto * (_NODES + 1.0)
     part = 0.5 * upto * _NODE_WEIGHTS * b * np.exp(-b * v)
     t = 1.0 - v
@@ -86,5 +159,7 @@ def _weights(b: float) -> tuple[float, ...]:
         -(t**3) * (4.0 - t * (7.0 - 3.0 * t)),
         0.5 * t**3 * v * v,
     )
-    ramp = -math.expm1(-b) / b
-    return (math.exp(-b), *(float(part @ values) for values in basis), ramp)
+    taken = [(part * values).sum(1) for values in basis]
+    weights = np.stack([np.exp(-b[:, 0]), *taken, -np.expm1(-b[:, 0]) / b[:, 0]], axis=1)
+    weights[corners == 0.0] = (0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    return weights

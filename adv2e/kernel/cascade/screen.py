@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from adv2e.compiled import kernel
 from adv2e.kernel import screen, special
 from adv2e.kernel.cascade.plan import MOST
+from adv2e.kernel.photoreceptor import strip as photoreceptor
 from adv2e.kernel.screen import STRIDE
 from adv2e.kernel.work_queue import STRIP
 
@@ -28,18 +29,19 @@ takes it."""
 
 _BEGIN = screen.SIZE
 LIGHT = _BEGIN  # at the start of the substep [DN]
-GROWTH = _BEGIN + STRIDE  # what the light becomes in half a substep: growth * light + rise
-RISE = _BEGIN + 2 * STRIDE
-BEND = _BEGIN + 3 * STRIDE  # change of the logarithm of the light in a substep, 0 on the foot
-MOVE = _BEGIN + 4 * STRIDE  # change of x in a substep
-FIRST = _BEGIN + 5 * STRIDE  # lag of the first pole at the start, and after each substep
+GROWS = _BEGIN + STRIDE  # change of its logarithm in the piece, 0 on the foot
+RISES = _BEGIN + 2 * STRIDE  # change of the light itself there, 0 on the log branch
+FIRST = _BEGIN + 3 * STRIDE  # lag of the first pole at the start, and after each substep
 SECOND = FIRST + (MOST + 1) * STRIDE  # the same of the second pole: y - x
-SIZE = SECOND + (MOST + 1) * STRIDE
+ON = SECOND + (MOST + 1) * STRIDE  # what noise leaves of the thresholds
+OFF = ON + STRIDE
+SIZE = OFF + STRIDE
 
 _f = np.float32
 _ZERO, _ONE, _HALF, _TINY = _f(0.0), _f(1.0), _f(0.5), _f(1e-30)
 _FOUR, _TWO, _SIXTH = _f(4.0), _f(2.0), _f(1.0 / 6.0)
 _AT_REST = _f(screen.AT_REST)
+_FORGOTTEN = _f(80.0)
 _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
     _f(c)
     for c in (
@@ -65,22 +67,33 @@ def scratch() -> NDArray[np.float32]:
 
 
 @kernel
-def phi32(a):
-    """(1 - e^-a)/a in single precision for 0 <= a <= 2."""
-    p = _P3 + a * (_P4 + a * (_P5 + a * (_P6 + a * _P7)))
-    return _P0 + a * (_P1 + a * (_P2 + a * p))
+def decay32(a):
+    """e^-a, (1 - e^-a)/a, and half the integral of v (1 - v) e^(-a v) over 0..1.
+
+    In single precision, for a >= 0; the last one is good to 6e-5 of it.
+    """
+    decay = special.exp32(-min(a, _FORGOTTEN))
+    short = min(a, _TWO)
+    p = _P3 + short * (_P4 + short * (_P5 + short * (_P6 + short * _P7)))
+    p = _P0 + short * (_P1 + short * (_P2 + short * p))
+    turn = _M0 + short * (_M1 + short * (_M2 + short * (_M3 + short * _M4)))
+    one_over = _ONE / max(a, _TWO)
+    is_short = a < _TWO
+    p = p if is_short else (_ONE - decay) * one_over
+    long_turn = ((a - _TWO) + (a + _TWO) * decay) * one_over * one_over * one_over
+    return decay, p, _HALF * (turn if is_short else long_turn)
 
 
 @kernel
-def _turn32(a):
-    """Half the integral of v (1 - v) e^(-a v) over 0..1 for 0 <= a <= 2, to 6e-5 of it."""
-    return _HALF * (_M0 + a * (_M1 + a * (_M2 + a * (_M3 + a * _M4))))
+def _grow32(z):
+    """e^z in single precision for |z| < 0.16."""
+    p = _ONE + z * (_HALF + z * (_SIXTH + z * (_f(1 / 24) + z * _f(1 / 120))))
+    return _ONE + z * p
 
 
 @kernel
-def _prepare(strip, share, knee_dn, inverse_slope):
-    """Rows DX, of the piece, and those of the light; `share` of the piece is a substep."""
-    half = _HALF * share
+def _prepare(strip, knee_dn, inverse_slope):
+    """Rows DX, of the piece, and those of the light."""
     for k in range(STRIP):
         i0, i1 = strip[screen.LIGHT_0 + k], strip[screen.LIGHT_1 + k]
         change = i1 - i0
@@ -90,16 +103,15 @@ def _prepare(strip, share, knee_dn, inverse_slope):
         dx = special.log_ratio32(ratio) if on_log else change * inverse_slope
         strip[screen.DX + k] = dx
         strip[LIGHT + k] = i0
-        strip[GROWTH + k] = special.exp32(dx * half) if on_log else _ONE
-        strip[RISE + k] = _ZERO if on_log else change * half
-        strip[BEND + k] = dx * share if on_log else _ZERO
-        strip[MOVE + k] = dx * share
+        strip[GROWS + k] = dx if on_log else _ZERO
+        strip[RISES + k] = _ZERO if on_log else change
 
 
 @kernel
-def _substep(strip, first, second, dark, per_dn, weights):
+def _substep(strip, first, second, share, dark, per_dn, weights):
     """Rows `first` and `second` after the one substep that begins with the rows of that name.
 
+    share : of the piece that the substep takes
     dark, per_dn : corner in darkness, and for each DN, times the substep [rad].
     """
     # slices: indices that count from zero need no test of their sign, which vectors bear ill
@@ -109,21 +121,22 @@ def _substep(strip, first, second, dark, per_dn, weights):
     keep, ramp = _f(weights[0]), _f(weights[7])
     p0, s0, c0 = _f(weights[1]), _f(weights[2]), _f(weights[3])
     p1, s1, c1 = _f(weights[4]), _f(weights[5]), _f(weights[6])
+    half = _HALF * share
     for k in range(STRIP):
-        growth, rise, bend = strip[GROWTH + k], strip[RISE + k], strip[BEND + k]
-        d, i0 = strip[MOVE + k], strip[LIGHT + k]
-        middle = i0 * growth + rise
-        i1 = middle * growth + rise
+        bend, rise = strip[GROWS + k] * share, strip[RISES + k] * share
+        growth = _grow32(strip[GROWS + k] * half)
+        d, i0 = strip[screen.DX + k] * share, strip[LIGHT + k]
+        middle = i0 * growth + _HALF * rise
+        i1 = middle * growth + _HALF * rise
         a = dark + per_dn * ((i0 + _FOUR * middle + i1) * _SIXTH)
-        a = min(a, _TWO)
         c = per_dn * (i1 - i0)
         u0 = lag[k]
-        shape = phi32(a)
-        u1 = (_ONE - a * shape) * u0 - d * (shape - c * _turn32(a))
+        decay, shape, turn = decay32(a)
+        u1 = decay * u0 - d * (shape - c * turn)
         u1 = u1 if abs(u1) > _AT_REST else _ZERO
         w0, w1 = dark + per_dn * i0, dark + per_dn * i1
         # how the corner changes at both ends: with the light, which grows by itself or in a line
-        g0, g1 = per_dn * (i0 * bend + _TWO * rise), per_dn * (i1 * bend + _TWO * rise)
+        g0, g1 = per_dn * (i0 * bend + rise), per_dn * (i1 * bend + rise)
         slope0, slope1 = -(w0 * u0 + d), -(w1 * u1 + d)
         curve0, curve1 = -(g0 * u0 + w0 * slope0), -(g1 * u1 + w1 * slope1)
         q1 = keep * seen[k] - ramp * d
@@ -134,14 +147,23 @@ def _substep(strip, first, second, dark, per_dn, weights):
 
 
 @kernel
-def follow(strip, substeps, dark, per_dn, knee_dn, slope, weights):
-    """Move every pixel through the substeps of a piece; dark, per_dn : of a substep [rad]."""
+def follow(strip, substeps, places, length, circuit, weights):
+    """Move every pixel through the substeps of a piece of `length` us, which end at `places` of it.
+
+    weights : (substeps, WEIGHTS)
+    """
+    slope = _f(circuit.slope)
     inverse_slope = _ONE / slope if slope > _ZERO else _ZERO
-    _prepare(strip, _ONE / _f(substeps), knee_dn, inverse_slope)
+    _prepare(strip, _f(circuit.slope * circuit.knee), inverse_slope)
     for k in range(STRIP):
         strip[FIRST + k] = strip[screen.LAG_0 + k]
     for j in range(substeps):
-        _substep(strip, FIRST + j * STRIDE, SECOND + j * STRIDE, dark, per_dn, weights)
+        span = places[j + 1] - places[j]
+        h = span * length
+        _substep(
+            strip, FIRST + j * STRIDE, SECOND + j * STRIDE, _f(span), _f(circuit.dark * h),
+            _f(circuit.per_dn * h), weights[j],
+        )  # fmt: skip
     last = FIRST + substeps * STRIDE
     for k in range(STRIP):
         strip[screen.LAG_1 + k] = strip[last + k]
@@ -157,6 +179,14 @@ def stay(strip, substeps):
         for k in range(STRIP):
             strip[FIRST + j * STRIDE + k] = _ZERO
             strip[SECOND + j * STRIDE + k] = _ZERO
+
+
+@kernel
+def leave_room(strip, factor, noise):
+    """Rows ON and OFF: what is left of the thresholds, which have a factor, beside noise."""
+    for k in range(STRIP):
+        strip[ON + k] = strip[screen.ON + k] * factor - noise[photoreceptor.HIGH + k]
+        strip[OFF + k] = strip[screen.OFF + k] * factor + noise[photoreceptor.LOW + k]
 
 
 @kernel

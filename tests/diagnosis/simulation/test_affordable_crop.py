@@ -112,16 +112,17 @@ def test_time_costs_too(monkeypatch):
 
 def test_steps_of_time_of_the_declared_model_cost_too(monkeypatch):
     whole = recording()
-    noisy = load_config(["adv2e"], ["pixel.photoreceptor_noise.rms=0.02"])
+    quick = ["pixel.slew_limit.per_s=80", "pixel.low_pass.cutoff_hz=9000"]
+    slewed = load_config(["adv2e"], quick)
     limit(monkeypatch, WIDTH * HEIGHT)
     monkeypatch.setattr(affordable_module, "STEP_S", 0.0)
-    assert affordable(whole, noisy) is whole
+    assert affordable(whole, slewed) is whole
     instants = (len(TIMES) - 1) * CONFIG.sampling.L
-    steps = affordable_module.steps_of_time(whole, noisy)
+    steps = affordable_module.steps_of_time(whole, slewed)
     assert steps > instants
     monkeypatch.setattr(affordable_module, "STEP_S", instants / steps)
     assert affordable(whole, CONFIG) is whole
-    crop = affordable(whole, noisy)
+    crop = affordable(whole, slewed)
     assert crop.width * crop.height == pytest.approx(0.5 * WIDTH * HEIGHT, rel=0.15)
     assert "cropped from 96x80" in crop.notes[-1]
 

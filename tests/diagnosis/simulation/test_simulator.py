@@ -118,7 +118,6 @@ ADDED = {
         *AT_ANY_TIME,
     ],
     "flicker": ["frames.flicker.frequency_hz=400", "frames.flicker.depth=0.2"],
-    "noise": ["pixel.photoreceptor_noise.rms=0.05"],
 }
 
 

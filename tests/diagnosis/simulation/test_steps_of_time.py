@@ -50,9 +50,9 @@ def recording(times_s=TIMES_S, run_in=None):
 @pytest.mark.parametrize(
     "keys",
     [
-        ["pixel.photoreceptor_noise.rms=0.02"],
-        ["pixel.photoreceptor_noise.rms=0.02", "frames.full_scale=16"],  # brighter than white
-        ["pixel.photoreceptor_noise.rms=0.02", "frames.full_scale=50", "sampling.L=1"],
+        ["pixel.slew_limit.per_s=80"],
+        ["pixel.slew_limit.per_s=80", "frames.full_scale=16"],  # brighter than white
+        ["pixel.slew_limit.per_s=80", "frames.full_scale=50", "sampling.L=1"],
         ["pixel.source_follower.cutoff_hz=900", "pixel.slew_limit.per_s=50"],
         ["pixel.slew_limit.per_s=50"],
         ["pixel.low_pass.update=paper", "sampling.K=6"],
@@ -84,7 +84,7 @@ def test_no_steps_where_the_pixel_is_solved_from_event_to_event(keys):
 
 
 def test_what_pixels_saw_before_is_counted():
-    config = load_config(["adv2e"], ["pixel.photoreceptor_noise.rms=0.02"])
+    config = load_config(["adv2e"], ["pixel.slew_limit.per_s=80"])
     before = recording(TIMES_S[:3]), recording(TIMES_S[2:])
     parted = recording(TIMES_S[3:], RunIn(before[0].frames, TIMES_S[:3]))
     assert steps_of_time(parted, config) == steps_of_time(recording(), config)
@@ -102,7 +102,7 @@ def test_effects_of_ones_own_see_the_frames():
                 seen.append(light.copy())
                 yield t_ns, light
 
-    config = load_config(["adv2e"], ["pixel.photoreceptor_noise.rms=0.02"], effects=[Looks])
+    config = load_config(["adv2e"], ["pixel.slew_limit.per_s=80"], effects=[Looks])
     shown = recording()
     assert steps_of_time(shown, config) > 0
     np.testing.assert_array_equal(seen, list(shown.lights(config)))
