@@ -137,9 +137,9 @@ def test_leak_goes_on_from_the_first_moment_as_later(circuit, jitter, noise_hz):
 
 
 @pytest.mark.parametrize("sections", [{}, {"shot_noise": None}])
-def test_a_camera_by_default_keeps_what_leak_promises(sections):
+def test_a_camera_that_leaks_keeps_what_leak_promises(sections):
     """Of 3000 pixels at rest some 300 events a second, and never all pixels at once."""
-    pixel = Pixel(**sections)
+    pixel = Pixel(leak=Leak(), **sections)
     events, _ = still(128.0, pixel, 40.0)
     shot = pixel.shot_noise.rate_hz if pixel.shot_noise else 0.0
     sources = NoisySources(leak_hz=0.1, shot_hz=shot, dead_time_s=5e-4)
