@@ -70,7 +70,7 @@ def test_again_it_keeps_what_is_there_and_makes_what_changed(batch, source, tmp_
     assert "2 the configuration or an option changed" in changed.err
     assert "2 the seed changed" in batch(*call, "--set", "pixel.leak=null", "--seed", 3).err
     clip(root / "c.avi")
-    planned = batch(*call, "--set", "pixel.refractory=null", "--seed", 3, "--dry-run")
+    planned = batch(*call, "--set", "pixel.leak=null", "--seed", 3, "--dry-run")
     assert planned.out.startswith("1 new, 2 kept\nabout ")
     assert not (dest / "c.h5").exists()
 
