@@ -59,11 +59,12 @@ EVERYTHING = (
 OFF_NAME = "exact, noise off"
 """The setting that others are compared with."""
 
+AT_REST = "346x260, 9/10 at rest"
 CAMERAS = {
     "240x180": Clip(width=240, height=180, frames=480),
     "346x260": Clip(width=346, height=260, frames=480),
     "1280x720": Clip(width=1280, height=720, frames=97),
-    "346x260, 9/10 at rest": Clip(width=346, height=260, frames=1920, moving=0.1),
+    AT_REST: Clip(width=346, height=260, frames=1920, moving=0.1),
 }
 """Clips by name."""
 
@@ -140,6 +141,7 @@ def settings() -> Iterator[Setting]:
     }
     for name, sets in noisy.items():
         yield Setting(name=name, clip=one, sets=sets)
+        yield Setting(name=name, clip=AT_REST, sets=sets, share=0.25)
     shipped = f"pixel.log_response.linear_below={SHIPPED_KNEE_DN:g}"
     decoded = ("frames.encoding=srgb", shipped, "sampling.L=10")
     yield Setting(name="sRGB decoded, L = 10, noise off", clip=one, sets=decoded, stride=10)
