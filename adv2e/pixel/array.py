@@ -214,7 +214,7 @@ class PixelArray:
             return self._stepping.runs(part, frames, starts)
         circuit, lengths = self.circuit, np.diff(starts)
         fastest = max(circuit.dark + 255.0 * circuit.per_dn, circuit.dark)
-        simple = max(abs(circuit.overshoot), self._drift_per_s, circuit.noise_rms) == 0.0
+        simple = max(abs(circuit.overshoot), abs(self._drift_per_s), circuit.noise_rms) == 0.0
         if circuit.follower == 0.0 and simple:
             return [(rules_for(lengths, fastest, circuit.dead_time), None)]
         noise = noise_of(circuit, self._level, LONGEST_US) if circuit.noise_rms > 0.0 else None

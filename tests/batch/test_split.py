@@ -113,7 +113,7 @@ def test_parts_that_are_there_are_kept_unless_they_are_damaged(
     text = left.read_bytes()
     assert again() == 2
     assert made_in(dest) == made_in(whole)
-    for wrong, options in ((text[:-1], ()), (text, ("--set", "pixel.leak=null"))):
+    for wrong, options in ((text[:-1], ()), (text, ("--set", "pixel.refractory=null"))):
         (dest / "deep" / "b.h5").unlink()
         left.parent.mkdir(parents=True)
         left.write_bytes(wrong)

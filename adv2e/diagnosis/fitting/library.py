@@ -177,7 +177,8 @@ def _far_off(ratio: float) -> tuple[float, ...]:
 
 def _of_the_photoreceptor(values: dict[str, Any]) -> Iterator[Candidate]:
     white, dark = "pixel.low_pass.cutoff_hz", "pixel.low_pass.dark_cutoff_hz"
-    a, b = _now(values, white), _now(values, dark)
+    # dark corners near none are tried from a little above the least that is fitted
+    a, b = _now(values, white), max(_now(values, dark), 5.0 * _fit_of(dark).low)
     off = get_key(values, "pixel.low_pass") is None
     # of a low-pass that is off, the other corner is nothing that was declared
     extra = ((dark, b),) if off else ()
