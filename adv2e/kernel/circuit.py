@@ -45,3 +45,8 @@ class Circuit(NamedTuple):
     causes: bool  # whether events know their causes
     added: int  # cause of events by what is added to the signal
     seed: np.uint64
+
+
+def fastest_corner(circuit: Circuit, brightest: float = 255.0) -> float:
+    """Return the fastest corner of the low-pass, `brightest` [DN] being the most light [rad/us]."""
+    return max(circuit.dark + brightest * circuit.per_dn, circuit.dark)

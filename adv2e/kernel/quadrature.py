@@ -63,16 +63,21 @@ def rules_for(lengths: NDArray[np.float64], fastest: float, dead_time: float) ->
         np.zeros(shape), np.zeros(shape), np.zeros(lengths.size, np.int64),
     )  # fmt: skip
     # rounded up so that jitter of the frame times does not miss the cache
-    roughly = np.array([float(f"{length:.2e}") for length in (1.005 * lengths).tolist()])
-    for rounded in dict.fromkeys(roughly.tolist()):
-        own = roughly == rounded
-        node, weight = _remembered(rounded, fastest, WITHIN_US, 1.0)
+    roughly = np.array([rounded(length) for length in (1.005 * lengths).tolist()])
+    for lasts in dict.fromkeys(roughly.tolist()):
+        own = roughly == lasts
+        node, weight = _remembered(lasts, fastest, WITHIN_US, 1.0)
         _put(node, weight, own, rules.nodes, rules.weights, rules.counts)
         if dead_time > 0.0:
-            dead = min(dead_time, rounded)
-            node, weight = _remembered(dead, fastest, WITHIN_DEAD_US, dead / rounded)
+            dead = min(dead_time, lasts)
+            node, weight = _remembered(dead, fastest, WITHIN_DEAD_US, dead / lasts)
             _put(node, weight, own, rules.nodes_dead, rules.weights_dead, rules.counts_dead)
     return rules
+
+
+def rounded(length: float) -> float:
+    """Return a length that jitter of the frame times hardly changes [us]."""
+    return float(f"{length:.2e}")
 
 
 def _put(node: Any, weight: Any, own: Any, nodes: Any, weights: Any, counts: Any) -> None:

@@ -21,6 +21,7 @@ from adv2e.events import EVENT_DTYPE, Events
 from adv2e.kernel import exact
 from adv2e.kernel import packing as order
 from adv2e.kernel.cascade.plan import plan_for
+from adv2e.kernel.circuit import fastest_corner
 from adv2e.kernel.frames import Frames, frames_of
 from adv2e.kernel.packing import PIXEL_BITS, pack_limit_us
 from adv2e.kernel.photoreceptor.law import noise_of
@@ -213,7 +214,7 @@ class PixelArray:
         if self._stepping is not None:
             return self._stepping.runs(part, frames, starts)
         circuit, lengths = self.circuit, np.diff(starts)
-        fastest = max(circuit.dark + 255.0 * circuit.per_dn, circuit.dark)
+        fastest = fastest_corner(circuit)
         simple = max(abs(circuit.overshoot), abs(self._drift_per_s), circuit.noise_rms) == 0.0
         if circuit.follower == 0.0 and simple:
             return [(rules_for(lengths, fastest, circuit.dead_time), None)]

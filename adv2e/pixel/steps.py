@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.courses import LONGEST_US, Additions, Course
 from adv2e.effects.pixel.threshold_drift import drift_factors
-from adv2e.kernel.circuit import EXACT, Circuit
+from adv2e.kernel.circuit import EXACT, Circuit, fastest_corner
 from adv2e.kernel.frames import Frames
 from adv2e.kernel.stepped.driver import BLOCK, Run
 from adv2e.kernel.stepped.events import Injected, injected_of
@@ -99,7 +99,7 @@ def steps_of(
     if not curved and step_us == math.inf:
         return 1
     limit = min(solved * LONGEST_US, added * step_us)
-    fastest = max(circuit.dark + max(brightest, _WHITE) * circuit.per_dn, circuit.dark)
+    fastest = fastest_corner(circuit, max(brightest, _WHITE))
     share = min(_SHARE, solved * _SHARE_OF_TWO) if circuit.follower > 0.0 else _SHARE
     if circuit.filtered:
         limit = min(limit, share / fastest if fastest > 0 else limit)

@@ -24,6 +24,7 @@ from adv2e.effects.courses import LONGEST_US
 from adv2e.kernel import per_pixel, rng
 from adv2e.kernel.cascade.plan import plan_for
 from adv2e.kernel.photoreceptor import law
+from adv2e.kernel.quadrature import rounded
 from adv2e.pixel.circuit import make_circuit
 
 RAD_US = 2 * math.pi * 1e-6
@@ -198,10 +199,10 @@ def drawn_path(pixel, light, interval_us, intervals, i, seed):
         p = piece % pieces
         which = int(plan.law[0, p])
         m, q = int(plan.laws.samples[which, entry]), int(plan.laws.cells[which, entry])
-        rounded = law.rounded(interval_us * (plan.ends[0, p + 1] - plan.ends[0, p]))
-        matrix, spread = transition(w, b, rounded / m)
+        lasts = rounded(interval_us * (plan.ends[0, p + 1] - plan.ends[0, p]))
+        matrix, spread = transition(w, b, lasts / m)
         root = rms * np.linalg.cholesky(spread)
-        cell = rounded / (m * q)
+        cell = lasts / (m * q)
         begin, end = piece // pieces + plan.ends[0, p : p + 2]
         at += (np.linspace(begin, end, m * q + 1)[1:] * interval_us).tolist()
         for c in range(m):

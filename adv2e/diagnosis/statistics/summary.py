@@ -12,14 +12,7 @@ from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.statistics.groups import Array, Entry, Group
 from adv2e.diagnosis.statistics.intervals import intervals, neighbours, runs
 from adv2e.diagnosis.statistics.pixels import count_pixels, pixels
-from adv2e.diagnosis.statistics.rates import (
-    course,
-    load,
-    phase,
-    rate_hz,
-    rates,
-    since_leap,
-)
+from adv2e.diagnosis.statistics.rates import course, load, phase, rate_hz, rates, since_leap
 from adv2e.diagnosis.statistics.spectrum import spectrum
 from adv2e.diagnosis.statistics.stamps import gaps, row_gaps, ticks
 from adv2e.diagnosis.statistics.timing import Slopes, drift, lag, shift

@@ -6,7 +6,7 @@ import numpy as np
 
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel
-from adv2e.kernel.cascade.curve import bent, plus, value
+from adv2e.kernel.cascade.curve import bent, value
 from adv2e.kernel.cascade.substep import DONE, Cubic, fire_until, may_fire
 from adv2e.kernel.noise import next_noise
 from adv2e.kernel.photoreceptor import bridge
@@ -48,8 +48,8 @@ def _bounds(x0, x1, room, most, least):
 
 @kernel
 def _fire_between(
-    i, c, place, s0, span, signal, curved, most, least, step, lag, reference, factor, t_base,
-    circuit, state, own, keys, times, n,
+    i, c, place, s0, span, signal, curved, most, least, step, reference, factor, t_base, circuit,
+    state, own, keys, times, n,
 ):  # fmt: skip
     """Fire the events between samples c and c + 1 as far as they are in the substep.
 
@@ -89,8 +89,8 @@ def _fire_between(
         if not clear:
             c0, c1, c2, c3 = bridge.cubic_of(a, begin + a * width, width, corner, own)
             n, stopped, reference, factor = fire_until(
-                i, max(begin + a * width, place), t1, step, lag, Cubic(c0, c1, c2, c3), reference,
-                factor, t_base, circuit, state, keys, times, n,
+                i, max(begin + a * width, place), t1, step, signal, Cubic(c0, c1, c2, c3),
+                reference, factor, t_base, circuit, state, keys, times, n,
             )  # fmt: skip
             if stopped != DONE:
                 return n, stopped, reference, factor
@@ -101,7 +101,7 @@ def _fire_between(
 
 @kernel
 def fire_in_cells(
-    i, place, s0, span, hull, step, lag, reference, factor, t_base, circuit, state, own, keys,
+    i, place, s0, span, hull, step, signal, reference, factor, t_base, circuit, state, own, keys,
     times, n,
 ):  # fmt: skip
     """Fire the events of pixel i in a substep from `place` on.
@@ -119,8 +119,7 @@ def fire_in_cells(
     :func:`adv2e.kernel.cascade.substep.fire_until`.
     """
     m = own[bridge.SAMPLES]
-    signal = plus(lag, step.x, step.d, 0.0, 0.0)
-    curved, most, least = 0.125 * bent(lag, lag.swing), step.x + hull[0], step.x + hull[1]
+    curved, most, least = 0.125 * bent(signal, signal.swing), step.x + hull[0], step.x + hull[1]
     hold, due = state[per_pixel.HOLD, i], next_noise(i, circuit, state)[1]
     c = np.int64(min((s0 + place * span) * m, m - 1.0))
     t0 = max((c / m - s0) / span, 0.0)
@@ -133,7 +132,7 @@ def fire_in_cells(
         until = step.t0 + t1 * step.h
         if not _is_clear(hold, due, until, high, low, step, reference, factor):
             n, stopped, reference, factor = _fire_between(
-                i, c, place, s0, span, signal, curved, most, least, step, lag, reference, factor,
+                i, c, place, s0, span, signal, curved, most, least, step, reference, factor,
                 t_base, circuit, state, own, keys, times, n,
             )  # fmt: skip
             if stopped != DONE:

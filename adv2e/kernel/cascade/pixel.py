@@ -10,7 +10,7 @@ from adv2e.kernel import per_pixel, screen, special
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import noisy
 from adv2e.kernel.cascade import screen as cascade
-from adv2e.kernel.cascade.curve import lag_curve, value
+from adv2e.kernel.cascade.curve import lag_curve, plus, value
 from adv2e.kernel.cascade.plan import FEWEST, GROWTH, LONGEST
 from adv2e.kernel.cascade.substep import (
     DONE,
@@ -223,16 +223,17 @@ def _solve(
             t0, h, x, d, on0, on1, off0, off1, fallen0, l0, 3.0 * fall - 2.0 * l0 - l1,
             l0 + l1 - 2.0 * fall,
         )  # fmt: skip
+        signal = plus(lag, x, d, 0.0, 0.0)
         place = max((s_from - s0) / span, 0.0)
         if is_noisy:
             n, place, reference, factor = noisy.fire_in_cells(
-                i, place, s0, span, hull(u0, u1, q0, q1, d), step, lag, reference, factor, t_base,
-                circuit, state, own, keys, times, n,
+                i, place, s0, span, hull(u0, u1, q0, q1, d), step, signal, reference, factor,
+                t_base, circuit, state, own, keys, times, n,
             )  # fmt: skip
         else:
             n, place, reference, factor = fire_until(
-                i, place, 1.0, step, lag, NO_NOISE, reference, factor, t_base, circuit, state, keys,
-                times, n,
+                i, place, 1.0, step, signal, NO_NOISE, reference, factor, t_base, circuit, state,
+                keys, times, n,
             )  # fmt: skip
         if place != DONE:
             state[per_pixel.REFERENCE, i] = reference

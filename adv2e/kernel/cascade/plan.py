@@ -20,8 +20,8 @@ from adv2e.kernel.photoreceptor.law import (
     cells_of,
     laws_for,
     no_laws,
-    rounded,
 )
+from adv2e.kernel.quadrature import rounded
 
 MOST = 10
 """Most substeps of a piece: those whose lags are kept at a time."""

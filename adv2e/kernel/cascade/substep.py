@@ -108,18 +108,18 @@ def _shifted(found, sign, level, slope):
 
 @kernel
 def fire_until(
-    i, t, upto, step, lag, noise, reference, factor, t_base, circuit, state, keys, times, n
+    i, t, upto, step, signal, noise, reference, factor, t_base, circuit, state, keys, times, n
 ):  # fmt: skip
     """Fire the events of pixel i in a substep from t on, until `upto`.
 
-    lag, noise : what the light and the photoreceptor's noise add to x
+    signal, noise : what the light makes, and the photoreceptor's noise adds to it
 
     Returns the number of events, DONE or the place where there is no room left for them, and the
     reference, as if leak had always had its present speed, and that speed.
     """
     jitter, h = circuit.leak_jitter > 0.0, step.h
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
-    signal = plus(lag, step.x + noise.c0, step.d + noise.c1, noise.c2, noise.c3)
+    signal = plus(signal, noise.c0, noise.c1, noise.c2, noise.c3)
     if state[per_pixel.HOLD, i] >= 0.0:
         t = max(t, (state[per_pixel.HOLD, i] - step.t0) / h)
         seen = value(signal, t)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.kernel.circuit import Circuit
+from adv2e.kernel.circuit import Circuit, fastest_corner
 
 SHIFT = 16
 """Bits of a corner in single precision that its entry does not depend on."""
@@ -47,29 +47,9 @@ The share of events that this loses is about as small."""
 _SLOWEST, _BRIGHTEST = 2.0**-12, 1000.0
 _INNER = np.arange(1, 8) / 8.0
 _CELLS_BETWEEN = (
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    8,
-    10,
-    12,
-    16,
-    20,
-    24,
-    32,
-    48,
-    64,
-    96,
-    128,
-    192,
-    256,
-    384,
-    512,
-    1024,
-)
+    2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 1024,
+)  # fmt: skip
+"""Tried between two samples, where one is too few."""
 
 
 class Laws(NamedTuple):
@@ -85,11 +65,9 @@ class Laws(NamedTuple):
 class Noise(NamedTuple):
     """What the tables follow from, but for the length."""
 
-    dark: (
-        float  # corners of the low-pass in darkness and at the fastest, of the second pole [rad/us]
-    )
-    fastest: float
-    follower: float
+    dark: float  # corner of the low-pass in darkness [rad/us],
+    fastest: float  # at white or in darkness, whichever is faster,
+    follower: float  # and of the second pole
     rms: float
     cell: float  # longest cell behind one pole [us]
     level: float  # the lower threshold [ln]
@@ -97,7 +75,7 @@ class Noise(NamedTuple):
 
 def noise_of(circuit: Circuit, level: float, longest: float) -> Noise:
     """Return what tables follow from; cells are at most `longest` us, whatever the circuit says."""
-    fastest = max(circuit.dark + 255.0 * circuit.per_dn, circuit.dark)
+    fastest = fastest_corner(circuit)
     cell = min(circuit.noise_step / fastest, longest)
     return Noise(circuit.dark, fastest, circuit.follower, circuit.noise_rms, cell, level)
 
@@ -107,11 +85,6 @@ def laws_for(lengths: NDArray[np.float64], noise: Noise) -> Laws:
     tables = [_table(length, noise) for length in lengths.tolist()]
     stacked = [np.stack(column) for column in zip(*tables, strict=True)]
     return Laws(_entries(noise)[0], *stacked)
-
-
-def rounded(length: float) -> float:
-    """Return a length that jitter of the frame times does not change [us]."""
-    return float(f"{length:.2e}")
 
 
 def no_laws() -> Laws:
@@ -209,7 +182,7 @@ def _table(length: float, noise: Noise) -> tuple[NDArray[Any], ...]:
     needed = np.clip(_needed(length, w, noise), 1, MOST_CELLS).astype(np.int64)
     far = np.maximum(noise.level / (noise.rms * seen) - _CLEAR, _LEAST) * seen
     cells, samples = np.ones_like(needed), needed.copy()
-    for between in _CELLS_BETWEEN[1:]:
+    for between in _CELLS_BETWEEN:
         count = -(-needed // between)
         reach = _SURE * np.sqrt(_bridge(0.5, length / count, w, b)[0])
         good = (reach <= far) & (between <= needed)
