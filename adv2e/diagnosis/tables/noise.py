@@ -21,7 +21,9 @@ event, becomes rarer beside shot noise of rate lambda:
 Leak and photoreceptor noise are one process.  Shot noise beside both is added to it.
 
 Pixels differ: by their thresholds (normal), and some are hot, with ON rates of their own
-(log-normal).  Means and medians are over all of them.
+(log-normal).  Means and medians are over all of them.  In the bright, the few pixels with the
+lowest thresholds have most of the events, and those whose thresholds are equal have more than
+others: pixels are taken down to 4.5 standard deviations, and closely where both are equal.
 
 References
 ----------
@@ -54,9 +56,16 @@ from adv2e.effects.pixel.thresholds import FLOOR
 
 Array = NDArray[np.float64]
 
-_NORMAL = np.linspace(-2.7, 2.7, 7)
-"""Deviations at which pixels are taken, of one threshold; `_HOT`: of the rates of hot ones."""
 _HOT = np.linspace(-3.5, 3.5, 15)
+"""Deviations at which the rates of hot pixels are taken."""
+_LEVELS = np.linspace(-4.5, 2.7, 9)
+"""The same of the mean of both thresholds: few pixels with low ones may have most of the events."""
+_APART_STEP, _APART_REACH = 0.8, 4.0
+"""Of the difference between them: largest step, and how far pixels are taken."""
+_ALIKE = 0.01
+"""Share of the threshold by which both may differ before their equality has no more effect."""
+_FEWEST = 1e-8
+"""Share of the pixels below which a kind of them is left out."""
 
 
 @dataclass(frozen=True)
@@ -182,12 +191,51 @@ def _kinds(sources: NoisySources) -> tuple[Array, Array, Array]:
     """Return the shares of the pixels of each kind, and their thresholds, (kinds,) each."""
     if sources.mismatch <= 0.0 or sources.rms <= 0.0:
         return np.ones(1), np.array([sources.on]), np.array([sources.off])
-    part = _density(_NORMAL)
-    weights = np.outer(part, part).ravel()
-    moved = sources.mismatch * _NORMAL
-    on = np.repeat(np.maximum(sources.on + moved, FLOOR), _NORMAL.size)
-    off = np.tile(np.maximum(sources.off + moved, FLOOR), _NORMAL.size)
-    return weights, on, off
+    spread = sources.mismatch * math.sqrt(2.0)  # of the difference; half of it: of the mean
+    reach, fine = _APART_REACH * spread, _ALIKE * min(sources.on, sources.off)
+    middle = sources.off - sources.on
+    ruler = Ruler(_APART_STEP * spread, fine, abs(middle) + reach + fine)
+    apart, share = ruler.marks(middle)
+    share *= np.exp(-0.5 * ((apart - middle) / spread) ** 2)
+    weights = np.outer(_density(_LEVELS), share / share.sum())
+    level = 0.5 * (sources.on + sources.off + spread * _LEVELS[:, None])
+    kept = weights >= _FEWEST
+    on = np.maximum(level - 0.5 * apart, FLOOR)[kept]
+    off = np.maximum(level + 0.5 * apart, FLOOR)[kept]
+    return weights[kept] / weights[kept].sum(), on, off
+
+
+class Ruler:
+    """Marks along the difference of the thresholds, close to each other where both are equal.
+
+    There rates have a peak: every event leads to where the last one began (threshold_noise).
+
+    Parameters
+    ----------
+    step : float
+        Largest distance of marks.
+    fine : float
+        Distance of those about 0.
+    reach : float
+        Difference of the thresholds up to which there are marks.
+    """
+
+    def __init__(self, step: float, fine: float, reach: float) -> None:
+        self._step, self._fine = step, fine
+        self._along = reach * np.sinh(np.linspace(-8.0, 8.0, 2001)) / np.sinh(8.0)
+
+    def place(self, apart: Array) -> Array:
+        """Return at which mark a difference is, 0 at 0."""
+        return np.asarray(apart / self._step + np.arcsinh(apart / self._fine))
+
+    def marks(self, middle: float = 0.0) -> tuple[Array, Array]:
+        """Return differences at marks, one of them `middle`, and distances there, (marks,) each."""
+        first, last = self.place(self._along[[0, -1]])
+        at = float(self.place(np.array(middle)))
+        numbers = np.arange(math.ceil(first - at), math.floor(last - at) + 1)
+        found = np.interp(at + numbers, self.place(self._along), self._along)
+        found[numbers == 0] = middle
+        return found, 1.0 / (1.0 / self._step + 1.0 / np.hypot(found, self._fine))
 
 
 def _density(places: Array) -> Array:
@@ -269,39 +317,58 @@ class Law:
             _kept(max(slow * dead_time_s, 1e-12), _DEAD_TIMES),
             _kept(leak_hz / slow, _LEAKS),
         )
-        self._logs = np.zeros((2, _COUNT, _COUNT))
+        self._logs = np.zeros((2, _COUNT, _APART.size))
         for first, second, third in itertools.product(*kept):
             share = first[1] * second[1] * third[1]
             self._logs += share * _tabulated(first[0], second[0], third[0])
 
     def rates(self, on: Array, off: Array) -> Array:
         """Return the rates [Hz], (2, ...), of pixels with these thresholds [ln]."""
-        first, on_weights = _cubic(on / self._sigma + self._shift - _LEAST)
-        second, off_weights = _cubic(off / self._sigma + self._shift - _LEAST - _APART)
+        on, off = on / self._sigma + self._shift, off / self._sigma + self._shift
+        first, weights = _cubic((np.minimum(on, off) - _LEAST) / _GRID, _COUNT)
+        second, apart_weights = _cubic(_RULER.place(off - on) + _APART.size // 2, _APART.size)
         logs = np.zeros((2, *np.shape(on)))
-        for i, p in enumerate(on_weights):
-            for j, q in enumerate(off_weights):
+        for i, p in enumerate(weights):
+            for j, q in enumerate(apart_weights):
                 logs += p * q * self._logs[:, first + i, second + j]
         return np.asarray(self._slow * np.exp(logs), dtype=np.float64)
 
 
-_LEAST, _GRID, _APART = 0.5, 0.75, 0.375
-"""Least threshold that is kept, step, and how much larger OFF is: equal ones are exceptional."""
+_LEAST, _GRID = 0.5, 0.75
+"""Least lower threshold that is kept, and step."""
 _COUNT = 1 + round((HIGHEST - _LEAST) / _GRID)
-_RATIOS, _DEAD_TIMES, _LEAKS = (2.0, -12, 0), (4.0, -4, 3), (8.0, -6, -1)
+_RULER = Ruler(1.5, 0.05, HIGHEST)
+_APART = _RULER.marks()[0]
+"""By how much OFF is larger than ON, where it is kept."""
+_RATIOS, _DEAD_TIMES, _LEAKS = (2.0, -12, 0), (2.0, -8, 6), (8.0, -6, -1)
 """Base, and least and largest exponent, of what is kept: ratios of corners; dead times and leaks in
 units of the slower pole."""
 
 
 @lru_cache(maxsize=2048)
 def _tabulated(ratio: float, dead_time: float, leak: float) -> Array:
-    """Return ln of ON and OFF rates against both thresholds, (2, _COUNT, _COUNT)."""
-    thresholds = (_LEAST + _GRID * np.arange(_COUNT)).tolist()
+    """Return ln of ON and OFF rates against the lower threshold and what OFF is larger by.
+
+    (2, _COUNT, marks).
+    """
     found = [
-        [event_rates(on, off + _APART, dead_time, ratio, leak) for off in thresholds]
-        for on in thresholds
+        [
+            event_rates(
+                min(low + max(-apart, 0.0), HIGHEST),
+                min(low + max(apart, 0.0), HIGHEST),
+                dead_time,
+                ratio,
+                leak,
+            )
+            for apart in _APART.tolist()
+        ]
+        for low in (_LEAST + _GRID * np.arange(_COUNT)).tolist()
     ]
-    logs: Array = np.log(np.maximum(np.array(found), 1e-15)).transpose(2, 0, 1)
+    rates = np.array(found)
+    # where the reference stays on a lattice the law may fail: as right beside it
+    equal = _APART.size // 2
+    rates[:, equal] = np.maximum(rates[:, equal], rates[:, equal - 1 : equal + 2 : 2].min(axis=1))
+    logs: Array = np.log(np.maximum(rates, 1e-15)).transpose(2, 0, 1)
     return logs
 
 
@@ -317,10 +384,10 @@ def _kept(value: float, kept: tuple[float, int, int]) -> list[tuple[float, float
     return parts if share > 0.0 else parts[:1]
 
 
-def _cubic(x: Array) -> tuple[NDArray[np.int64], list[Array]]:
-    """Return the first of four kept thresholds about each of `x`, and their weights (Lagrange)."""
-    place = np.clip(x / _GRID, 0.0, _COUNT - 1.0)
-    first = np.clip(place.astype(np.int64) - 1, 0, _COUNT - 4)
+def _cubic(place: Array, count: int) -> tuple[NDArray[np.int64], list[Array]]:
+    """Return the first of four kept values about each place, and their weights (Lagrange)."""
+    place = np.clip(place, 0.0, count - 1.0)
+    first = np.clip(place.astype(np.int64) - 1, 0, count - 4)
     t = place - first
     return first, [
         -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,

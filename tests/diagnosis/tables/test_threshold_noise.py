@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adv2e import load_config, simulate
-from adv2e.diagnosis.tables.noise import NoisySources, noise_rates
+from adv2e.diagnosis.tables.noise import NoisySources, _laws, noise_rates
 from adv2e.diagnosis.tables.threshold_noise import event_rates
 
 ROWS, COLUMNS = 30, 40
@@ -18,6 +18,7 @@ def simulated(sources: NoisySources, seconds: float, seed: int = 1) -> np.ndarra
     References forget how they began only as leak and noise take them anew, so that the first half
     is left out.
     """
+    follower = f"{{cutoff_hz: {sources.follower_hz}}}" if sources.follower_hz else "null"
     config = load_config(
         [],
         [
@@ -30,7 +31,7 @@ def simulated(sources: NoisySources, seconds: float, seed: int = 1) -> np.ndarra
             f"pixel.thresholds.mismatch={sources.mismatch}",
             f"pixel.low_pass.cutoff_hz={sources.cutoff_hz}",
             f"pixel.low_pass.dark_cutoff_hz={sources.dark_cutoff_hz}",
-            f"pixel.source_follower.cutoff_hz={sources.follower_hz}",
+            f"pixel.source_follower={follower}",
             f"pixel.photoreceptor_noise.rms={sources.rms}",
             f"pixel.refractory.period_us={1e6 * sources.dead_time_s}",
         ],
@@ -113,3 +114,48 @@ def test_rates_over_the_pixels_are_those_of_our_pixels():
     # all alike, the most sensitive would have hardly more than the others
     alike = noise_rates(NoisySources(**{**vars(sources), "mismatch": 0.0}), np.ones(1))
     assert alike.share_having(8, time, False)[0] < 0.3 * (off >= 8).mean()
+
+
+@pytest.mark.parametrize(
+    "sources",
+    [
+        NoisySources(
+            rms=0.06, cutoff_hz=28, dark_cutoff_hz=28, dead_time_s=5e-4, noise_step=0.1,
+        ),
+        NoisySources(
+            rms=0.1, cutoff_hz=200, dark_cutoff_hz=200, follower_hz=100, mismatch=0.015,
+            dead_time_s=5e-4,
+        ),
+        NoisySources(
+            rms=0.06, cutoff_hz=105, dark_cutoff_hz=105, off=0.22, dead_time_s=5e-3,
+            noise_step=0.1,
+        ),
+    ],
+    ids=["one pole", "two poles, thresholds nearly equal", "long dead time"],
+)  # fmt: skip
+def test_equal_thresholds_lead_back_to_where_the_last_event_began(sources):
+    seconds = 6.0
+    off, on = simulated(sources, seconds).mean(axis=1) / (0.5 * seconds)
+    rates = noise_rates(sources, np.ones(1))
+    assert rates.on_mean[0] == pytest.approx(on, rel=0.1)
+    assert rates.off_mean[0] == pytest.approx(off, rel=0.1)
+
+
+def test_the_most_sensitive_pixels_are_in_the_mean():
+    """Thresholds that differ by 22 %: one pixel in a thousand has most of the events."""
+    sources = NoisySources(
+        rms=0.1, cutoff_hz=2200, dark_cutoff_hz=86, follower_hz=100, mismatch=0.044,
+        dead_time_s=5e-4,
+    )  # fmt: skip
+    light, many = np.array([120.0 / 255.0]), 101
+    rates = noise_rates(sources, light)
+    away = np.linspace(-5.0, 4.0, many)
+    on, off = (np.maximum(level + 0.044 * away, 0.01) for level in (sources.on, sources.off))
+    law = _laws(sources, light, np.zeros(1))[0]
+    weights = np.exp(-0.5 * away**2)
+    weights /= weights.sum()
+    found = law.rates(np.repeat(on, many), np.tile(off, many))
+    means = found @ np.outer(weights, weights).ravel()
+    assert rates.on_mean[0] == pytest.approx(means[0], rel=0.02)
+    assert rates.off_mean[0] == pytest.approx(means[1], rel=0.02)
+    assert rates.on[0] < 0.01 * rates.on_mean[0]
