@@ -17,13 +17,15 @@ from adv2e.kernel import per_pixel, screen, special, static_pixels
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import pixel as alone
 from adv2e.kernel.cascade import screen as cascade
+from adv2e.kernel.cascade import second_look
 from adv2e.kernel.circuit import EXACT, Circuit
 from adv2e.kernel.event_buffer import with_room
 from adv2e.kernel.frames import load
 from adv2e.kernel.lanes import batch, exchange, rows
 from adv2e.kernel.leak import fill_falls
-from adv2e.kernel.photoreceptor import bridge
+from adv2e.kernel.photoreceptor import path as noise_path
 from adv2e.kernel.photoreceptor import strip as photoreceptor
+from adv2e.kernel.photoreceptor.path import LANES
 from adv2e.kernel.quadrature import Rule
 from adv2e.kernel.work_queue import STRIP, claim
 
@@ -43,7 +45,11 @@ class Scratch(NamedTuple):
     dx: NDArray[np.float64]  # light at its end, where the interval is cut into pieces
     light: NDArray[np.float32]
     noise: photoreceptor.Scratch
-    own: NDArray[np.float64]  # of one pixel's noise
+    path: noise_path.Path  # and of that of a few pixels,
+    places: NDArray[np.int64]  # which are at these places of the sorted strip
+    look: second_look.Look
+    nothing: NDArray[np.float64]  # places in a piece from which on pixels may fire: its start
+    whole: NDArray[np.float64]  # ends of the one substep of a piece in which nothing moves
 
 
 def scratch() -> Scratch:
@@ -53,7 +59,8 @@ def scratch() -> Scratch:
     light = np.ones(STRIP, np.float32)
     return Scratch(
         cascade.scratch(), rows.scratch(), pixels, falls, means, x, dx, light,
-        photoreceptor.scratch(), bridge.own(),
+        photoreceptor.scratch(), noise_path.path(), np.zeros(LANES, np.int64),
+        second_look.memory(), np.zeros(STRIP), np.arange(2.0),
     )  # fmt: skip
 
 
@@ -92,9 +99,10 @@ def _rests(frames, f, before, share, first, count):
 @kernel
 def _open_strip(lo, count, start, circuit, state, strip, noise):
     """Rows of a strip at the start of a call, its light being in LIGHT_1."""
+    noise.kept[0] = 0
     for k in range(count):
-        noise[photoreceptor.NOISE_0 + k] = state[per_pixel.NOISE, lo + k]
-        noise[photoreceptor.SEEN_0 + k] = state[per_pixel.SEEN, lo + k]
+        noise.rows[photoreceptor.NOISE + k] = state[per_pixel.NOISE, lo + k]
+        noise.rows[photoreceptor.SEEN + k] = state[per_pixel.SEEN, lo + k]
     for k in range(count):
         strip[screen.LIGHT_0 + k] = strip[screen.LIGHT_1 + k]
         strip[screen.LAG_0 + k] = state[per_pixel.LAG, lo + k]
@@ -120,9 +128,10 @@ def _open_strip(lo, count, start, circuit, state, strip, noise):
 def _close_strip(lo, count, piece, circuit, state, strip, noise):
     """State of a strip at the end of a call, before piece number `piece` of all."""
     if circuit.noise_rms > 0.0:
+        photoreceptor.put_back(count, noise)
         for k in range(count):
-            state[per_pixel.NOISE, lo + k] = noise[photoreceptor.NOISE_0 + k]
-            state[per_pixel.SEEN, lo + k] = noise[photoreceptor.SEEN_0 + k]
+            state[per_pixel.NOISE, lo + k] = noise.rows[photoreceptor.NOISE + k]
+            state[per_pixel.SEEN, lo + k] = noise.rows[photoreceptor.SEEN + k]
             state[per_pixel.NOISE_DRAW, lo + k] = piece
     for k in range(count):
         state[per_pixel.LAG, lo + k] = strip[screen.LAG_0 + k]
@@ -230,6 +239,56 @@ def _end_piece(share, strip, circuit, scratch):
 
 
 @kernel
+def _solve_alone(
+    lo, m, ta, length, start, before, substeps, places, levels, t_base, circuit, samples, depth,
+    state, scratch, pixels, found, keys, times, n,
+):  # fmt: skip
+    """Solve m pixels over a piece one by one; `samples` and `depth`: of their noise."""
+    j, s = np.int64(0), 0.0
+    while j < m:
+        n, j, s = alone.solve_flagged(
+            lo, j, m, s, ta, length, start, before, substeps, places, levels, t_base, circuit,
+            samples, depth, scratch.path, state, scratch.strip, pixels, found, keys, times, n,
+        )  # fmt: skip
+        if j < m:
+            keys, times = with_room(keys, times, n, n + 1)
+    return n, keys, times
+
+
+@kernel
+def _solve_beside_noise(
+    lo, number, which, ta, length, start, before, substeps, places, levels, t_base, circuit,
+    laws, state, scratch, keys, times, n,
+):  # fmt: skip
+    """Solve the flagged pixels of a strip over piece `number` of all, which has law `which`."""
+    strip, noise, path, pixels = scratch.strip, scratch.noise, scratch.path, scratch.pixels
+    factor = _f(min(levels[0], levels[1]))
+    for g in range(laws.samples.shape[1]):
+        samples, depth, p = laws.samples[which, g], laws.levels[which, g], noise.ends[g]
+        while p < noise.ends[g + 1]:
+            size = np.int64(0)
+            while p < noise.ends[g + 1] and size < LANES:
+                k = noise.order[p]
+                scratch.places[size], pixels[size] = p, k
+                size += 1 if strip[screen.HIT + k] > 0.0 else 0
+                p += 1
+            if size == 0:
+                break
+            noise_path.sample(
+                size, scratch.places, number, samples, depth, circuit, laws.fine[which], noise, path
+            )
+            second_look.find_places(
+                size, pixels, substeps, places, length, samples, depth, factor, circuit, strip,
+                path, scratch.look,
+            )  # fmt: skip
+            n, keys, times = _solve_alone(
+                lo, size, ta, length, start, before, substeps, places, levels, t_base, circuit,
+                samples, depth, state, scratch, pixels, scratch.look.found, keys, times, n,
+            )  # fmt: skip
+    return n, keys, times
+
+
+@kernel
 def _advance_cascade(
     lo, count, start, ta, length, f, number, still, circuit, plan, t_base, state, scratch, keys,
     times, n,
@@ -242,50 +301,53 @@ def _advance_cascade(
     strip, falls, pixels, noise = scratch.strip, scratch.falls, scratch.pixels, scratch.noise
     laws, cut = plan.laws, plan.cut[f]
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
+    is_noisy = circuit.noise_rms > 0.0
     pieces = plan.pieces[cut]
     first, rise = plan.factors[f], plan.factors[f + 1] - plan.factors[f]
-    if pieces > 1:
+    if pieces > 1 and not still:
         _begin_pieces(strip, circuit, scratch)
     for p in range(pieces):
         substeps, places, which = plan.substeps[cut, p], plan.places[cut, p], plan.law[cut, p]
         a, b = plan.ends[cut, p], plan.ends[cut, p + 1]
         t0, piece = ta + a * length, (b - a) * length
         levels = first + rise * a, first + rise * b
-        if pieces > 1:
+        if pieces > 1 and not still:
             _end_piece(b, strip, circuit, scratch)
         if leaks:
             _leak_strip(lo, count, piece, circuit, state, strip, falls, scratch.means)
         if still:
-            cascade.stay(strip, substeps)
+            substeps, places = np.int64(1), scratch.whole
+            cascade.stay(strip)
         else:
             cascade.follow(strip, substeps, places, piece, circuit, plan.weights[cut, p])
         on, off, factor = screen.ON, screen.OFF, _f(min(levels[0], levels[1]))
-        if circuit.noise_rms > 0.0:
-            photoreceptor.draw(lo, count, number + p, which, circuit, laws, strip, noise)
+        if is_noisy:
+            photoreceptor.draw(lo, count, number + p, which, still, circuit, laws, strip, noise)
             cascade.leave_room(strip, factor, noise.rows)
             on, off, factor = cascade.ON, cascade.OFF, _f(1.0)
-        screen.flag(
-            strip, _f(t0 + piece - start), _f(circuit.dark * piece), _f(circuit.per_dn * piece),
-            _f(circuit.slope * circuit.knee), cascade.SECOND,
-            cascade.SECOND + substeps * screen.STRIDE, on, off, factor, cascade.LARGEST,
-        )  # fmt: skip
-        drawn = bridge.Drawn(
-            number + p, laws.samples[which], laws.cells[which], laws.coarse[which],
-            laws.fine[which], noise.entries, noise.rows,
-        )  # fmt: skip
-        m, j, s = screen.flagged(strip, pixels), np.int64(0), 0.0
-        while j < m:
-            n, j, s = alone.solve_flagged(
-                lo, j, m, s, t0, piece, start, a / (b - a), substeps, places, levels, t_base,
-                circuit, drawn, state, strip, scratch.own, pixels, keys, times, n,
+        end = _f(t0 + piece - start)
+        if still:
+            cascade.flag_still(strip, end, on, off, factor)
+        else:
+            screen.flag(
+                strip, end, _f(circuit.dark * piece), _f(circuit.per_dn * piece),
+                _f(circuit.slope * circuit.knee), cascade.SECOND,
+                cascade.SECOND + substeps * screen.STRIDE, on, off, factor, cascade.LARGEST,
             )  # fmt: skip
-            if j < m:
-                keys, times = with_room(keys, times, n, n + 1)
+        if is_noisy:
+            n, keys, times = _solve_beside_noise(
+                lo, number + p, which, t0, piece, start, a / (b - a), substeps, places, levels,
+                t_base, circuit, laws, state, scratch, keys, times, n,
+            )  # fmt: skip
+        else:
+            m = screen.flagged(strip, pixels)
+            n, keys, times = _solve_alone(
+                lo, m, t0, piece, start, a / (b - a), substeps, places, levels, t_base, circuit,
+                np.int64(1), np.int64(0), state, scratch, pixels, scratch.nothing, keys, times, n,
+            )  # fmt: skip
         if leaks:
             _lower_references(lo, count, state, strip, falls)
-        cascade.step_on(strip, substeps)
-        if circuit.noise_rms > 0.0:
-            photoreceptor.step_on(noise.rows)
+        cascade.step_on(strip, substeps, still)
     return n, keys, times
 
 
@@ -334,7 +396,7 @@ def _strip(
     floor = 0.0 if circuit.slope > 0.0 else circuit.floor
     start = starts[0]
     load(frames, before[0], share[0], lo, floor, light)
-    _open_strip(lo, count, start, circuit, state, strip, scratch.noise.rows)
+    _open_strip(lo, count, start, circuit, state, strip, scratch.noise)
     number = np.int64(state[per_pixel.NOISE_DRAW, lo])
     leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
     intervals = starts.shape[0] - 1
@@ -377,7 +439,7 @@ def _strip(
             number += plan.pieces[plan.cut[f]]
         settled = still and (settled or cascade.is_settled(strip))
         f += 1
-    _close_strip(lo, count, number, circuit, state, strip, scratch.noise.rows)
+    _close_strip(lo, count, number, circuit, state, strip, scratch.noise)
     return n, keys, times
 
 

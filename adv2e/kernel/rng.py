@@ -83,6 +83,18 @@ def philox(c0, c1, c2, c3, k0, k1):
     return _round(c0, c1, c2, c3, k0 + _W0 * _9 & _LOW, k1 + _W1 * _9 & _LOW)
 
 
+@inlined
+def philox_7(c0, c1, c2, c3, k0, k1):
+    """Philox4x32-7, the fewest rounds that pass BigCrush (Salmon et al., table 2)."""
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 & _LOW, k1 + _W1 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _2 & _LOW, k1 + _W1 * _2 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _3 & _LOW, k1 + _W1 * _3 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _4 & _LOW, k1 + _W1 * _4 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _5 & _LOW, k1 + _W1 * _5 & _LOW)
+    return _round(c0, c1, c2, c3, k0 + _W0 * _6 & _LOW, k1 + _W1 * _6 & _LOW)
+
+
 @kernel
 def _uniforms_of(a, b, c, d):
     """Two uniform numbers in (0, 1), 53 bits each, from four 32-bit words."""
@@ -247,38 +259,43 @@ def words_of_pixels(seed, stream, pixels, block, words):
     low, high, k0, k1 = d & _LOW, d >> _32, s & _LOW, s >> _32
     a, b, c, e = words[0], words[1], words[2], words[3]
     for k in range(pixels.shape[0]):
-        w0, w1, w2, w3 = philox(np.uint64(pixels[k]) & _LOW, stream, low, high, k0, k1)
+        w0, w1, w2, w3 = philox_7(np.uint64(pixels[k]) & _LOW, stream, low, high, k0, k1)
         a[k], b[k], c[k], e[k] = np.uint32(w0), np.uint32(w1), np.uint32(w2), np.uint32(w3)
 
 
 @kernel
-def normals32_of_pixels(seed, stream, pixels, block, words, normals):
-    """Draw four standard normal numbers for each of `pixels` into `normals`, (4, pixels) float32.
+def words_of_blocks(seed, stream, pixels, blocks, more, words):
+    """Draw the words of block blocks[k] + `more` of each of `pixels` into `words`, (4, pixels)."""
+    s, stream, more = np.uint64(seed), np.uint64(stream), np.int64(more)
+    k0, k1 = s & _LOW, s >> _32
+    a, b, c, e = words[0], words[1], words[2], words[3]
+    for k in range(pixels.shape[0]):
+        d = np.uint64(blocks[k] + more)
+        w0, w1, w2, w3 = philox_7(np.uint64(pixels[k]) & _LOW, stream, d & _LOW, d >> _32, k0, k1)
+        a[k], b[k], c[k], e[k] = np.uint32(w0), np.uint32(w1), np.uint32(w2), np.uint32(w3)
 
-    In two loops: words of 32 bits, and then numbers of 32 bits, as many at a time as fit a vector.
+
+@kernel
+def normals_of_words(count, words, normals):
+    """Make four standard normal numbers of four words each: (4, count) of both.
+
+    In a loop of its own: numbers of 32 bits, as many at a time as fit a vector.
     """
-    words_of_pixels(seed, stream, pixels, block, words)
     for h in range(2):
         a, b, x, y = words[2 * h], words[2 * h + 1], normals[2 * h], normals[2 * h + 1]
-        for k in range(pixels.shape[0]):
+        for k in range(count):
             x[k], y[k] = _pair32(a[k], b[k])
 
 
 @kernel
-def normals32(seed, stream, pixel, block):
-    """Return the four numbers that `normals32_of_pixels` draws for one pixel."""
-    s, d, stream = np.uint64(seed), np.uint64(block), np.uint64(stream)
-    pixel = np.uint64(pixel) & _LOW
-    a, b, c, e = philox(pixel, stream, d & _LOW, d >> _32, s & _LOW, s >> _32)
-    x, y = _pair32(np.uint32(a), np.uint32(b))
-    z, v = _pair32(np.uint32(c), np.uint32(e))
-    return x, y, z, v
+def normals32_of_pixels(seed, stream, pixels, block, words, normals):
+    """Draw four standard normal numbers for each of `pixels`: `normals`, (4, pixels) float32."""
+    words_of_pixels(seed, stream, pixels, block, words)
+    normals_of_words(pixels.shape[0], words, normals)
 
 
 @kernel
-def normal_pair(seed, stream, pixel, draw):
-    """Return two standard normal numbers."""
-    u, v = uniforms(seed, stream, pixel, draw)
-    r = math.sqrt(-2.0 * special.log(u))
-    x, y = _cos_sin(v)
-    return r * x, r * y
+def normals32_of_blocks(seed, stream, pixels, blocks, more, words, normals):
+    """Draw the numbers of block blocks[k] + `more` of each of `pixels`."""
+    words_of_blocks(seed, stream, pixels, blocks, more, words)
+    normals_of_words(pixels.shape[0], words, normals)

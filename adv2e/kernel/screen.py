@@ -81,7 +81,7 @@ STRIDE = STRIP + 16  # one cache line more: rows must not share cache sets
     Z,
     UPTO,
     TOTAL,
-    HIT,  # 1: to be looked at
+    HIT,  # whether a pixel is to be looked at, and why: see below
     WHEN,  # at rest: when a pixel is to be looked at, on the clock of DUE
     SOONEST,  # the earliest of these in each block
 ) = (row * STRIDE for row in range(19))
@@ -89,6 +89,8 @@ SIZE = 19 * STRIDE
 
 _f = np.float32
 _ZERO, _ONE, _TINY = _f(0.0), _f(1.0), _f(1e-30)
+BY_SIGNAL, WHEN_DUE, BY_ITSELF = _f(1.0), _f(2.0), _f(3.0)
+"""Of row HIT: its signal may reach a threshold, something else is due, or bounds do not hold."""
 _REACH = _f(REACH)
 _MORE = _f(0.6)
 _AT_REST = _f(AT_REST)
@@ -219,12 +221,13 @@ def flag(strip, end, dark, per_dn, knee_dn, seen, seen_after, on, off, factor, l
         flees = ((u0 + u1 <= _ZERO) & (q0 <= u0)) | ((u0 + u1 >= _ZERO) & (q0 >= u0))
         low = min(d0 + q0, d1 + q1 if flees & (not turns) else low)
         high = max(d0 + q0, d1 + q1 if flees & (not turns) else high)
-        hit = (high + fall >= strip[on + k] * factor) | (strip[DUE + k] < end)
-        hit |= -low >= strip[off + k] * factor
+        hit = (high + fall >= strip[on + k] * factor) | (-low >= strip[off + k] * factor)
         mixed = (i0 < knee_dn) != (i1 < knee_dn)
         steep = (min(i0, i1) >= knee_dn) & (abs(i1 - i0) > largest_step[1] * (i0 + i1))
         far = steep | (abs(dx) > largest_step[0]) | (i1 > _LARGEST_LIGHT)
-        strip[HIT + k] = _ONE if hit | mixed | far else _ZERO
+        reason = BY_SIGNAL if hit else _ZERO
+        reason = WHEN_DUE if strip[DUE + k] < end else reason
+        strip[HIT + k] = BY_ITSELF if mixed | far else reason
 
 
 @kernel

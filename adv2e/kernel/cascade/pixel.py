@@ -23,7 +23,7 @@ from adv2e.kernel.cascade.substep import (
 )
 from adv2e.kernel.lanes.exchange import log_of, watch
 from adv2e.kernel.noise import next_noise
-from adv2e.kernel.photoreceptor import bridge
+from adv2e.kernel.photoreceptor import path as noise
 from adv2e.kernel.screen import STRIDE
 
 _SIXTH = 1.0 / 6.0
@@ -113,15 +113,17 @@ def _first_busy(k, j, count, places, away, dx, fall, on, off, due, strip):
 
 @kernel
 def _solve(
-    lo, k, s_from, ta, length, start, before, substeps, places, levels, t_base, circuit, drawn,
-    state, strip, own, keys, times, n,
+    lo, k, c, s_from, ta, length, start, before, substeps, places, levels, t_base, circuit,
+    samples, depth, path, state, strip, keys, times, n,
 ):  # fmt: skip
     """Events of pixel k of the strip that begins at pixel `lo`, over a piece [ta, ta + length] us.
 
     Parameters
     ----------
+    c : int
+        Lane of its noise.
     s_from : float
-        Place to go on from; 0 at first.
+        Place before which nothing happens, or to go on from.
     start : float
         Time that row DUE counts from [us].
     before : float
@@ -130,8 +132,10 @@ def _solve(
         Of the piece, in the rows of the screen; they end at `places` of it.
     levels : (2,) float
         Factors on both thresholds at the ends of the piece.
-    drawn : Drawn
-        What is known of photoreceptor noise; `own` is memory for it.
+    samples, depth : int
+        Of photoreceptor noise: between two samples are 2^depth cells.
+    path : Path
+        Of that noise.
 
     Returns
     -------
@@ -150,18 +154,21 @@ def _solve(
     follows_light = way.alone or circuit.photo_leak > 0.0
     hold, due = state[per_pixel.HOLD, i], next_noise(i, circuit, state)[1]
     # substeps in which nothing happens are passed quickly, where they differ in lags alone
-    is_noisy = circuit.noise_rms > 0.0
-    if is_noisy:
-        bridge.begin(i, k, drawn, circuit, own)
-    skims, fall_all = not (follows_light or is_noisy), on_level * circuit.leak * length
+    skims, fall_all = not (follows_light or way.rests), on_level * circuit.leak * length
     least_on, least_off = min(on_0, on_0 + on_rise), min(off_0, off_0 + off_rise)
+    is_noisy, noise_high, noise_low = circuit.noise_rms > 0.0, 0.0, 0.0
+    if is_noisy:
+        noise_high, noise_low = float(path.rows[noise.HIGH + c]), float(path.rows[noise.LOW + c])
     j = 0
     while s1 < 1.0:
-        if skims and hold < 0.0 and s1 >= s_from and not way.rests:
-            j = _first_busy(
-                k, j, substeps, places, way.x0 - reference, way.dx, factor * fall_all, least_on,
-                least_off, (due - ta) / length, strip,
-            )  # fmt: skip
+        if skims and (hold < 0.0 or s1 < s_from):
+            while j < substeps and places[j + 1] <= s_from:
+                j += 1
+            if hold < 0.0:
+                j = _first_busy(
+                    k, j, substeps, places, way.x0 - reference, way.dx, factor * fall_all,
+                    least_on - noise_high, least_off + noise_low, (due - ta) / length, strip,
+                )  # fmt: skip
             s1, fallen1 = places[j], fall_all * places[j]
             u1 = float(strip[cascade.FIRST + j * STRIDE + k])
             q1 = float(strip[cascade.SECOND + j * STRIDE + k])
@@ -194,9 +201,7 @@ def _solve(
         idle = hold >= t0 + h or s1 <= s_from
         if hold < 0.0 and due >= t0 + h and not (skims or way.alone):
             high, low = hull(u0, u1, q0, q1, d)
-            if is_noisy:
-                noise_high, noise_low = noisy.bounds_over(s0, s1, own)
-                high, low = high + noise_high, low + noise_low
+            high, low = high + noise_high, low + noise_low
             idle |= not may_fire(
                 x - reference + high, x - reference + low, factor * fallen0, factor * fallen1,
                 min(on0, on1), min(off0, off1),
@@ -227,8 +232,8 @@ def _solve(
         place = max((s_from - s0) / span, 0.0)
         if is_noisy:
             n, place, reference, factor = noisy.fire_in_cells(
-                i, place, s0, span, hull(u0, u1, q0, q1, d), step, signal, reference, factor,
-                t_base, circuit, state, own, keys, times, n,
+                i, c, place, s0, span, hull(u0, u1, q0, q1, d), samples, depth, step, signal,
+                reference, factor, t_base, circuit, state, path, keys, times, n,
             )  # fmt: skip
         else:
             n, place, reference, factor = fire_until(
@@ -248,21 +253,27 @@ def _solve(
 
 @kernel
 def solve_flagged(
-    lo, j, m, s, ta, length, start, before, substeps, places, levels, t_base, circuit, drawn, state,
-    strip, own, pixels, keys, times, n,
+    lo, j, m, s, ta, length, start, before, substeps, places, levels, t_base, circuit, samples,
+    depth, path, state, strip, pixels, found, keys, times, n,
 ):  # fmt: skip
     """Events of the flagged pixels, from the j-th of m on, which is solved from place s on.
+
+    found : (m,)
+        Places from which on something may happen; beyond 1: nowhere.
 
     Returns the number of events, and j and s where it stopped: j = m, or there was no room left.
     """
     state, strip, pixels, keys, times = borrowed(state, strip, pixels, keys, times)
-    drawn, own, places = borrowed(drawn, own, places)
+    path, found, places = borrowed(path, found, places)
     while j < m:
-        n, s = _solve(
-            lo, pixels[j], s, ta, length, start, before, substeps, places, levels, t_base, circuit,
-            drawn, state, strip, own, keys, times, n,
-        )  # fmt: skip
-        if s != DONE:
-            break
+        if found[j] > 1.0:
+            strip[screen.HIT + pixels[j]] = 0.0
+        else:
+            n, s = _solve(
+                lo, pixels[j], j, max(s, found[j]), ta, length, start, before, substeps, places,
+                levels, t_base, circuit, samples, depth, path, state, strip, keys, times, n,
+            )  # fmt: skip
+            if s != DONE:
+                break
         j, s = j + 1, 0.0
     return n, j, s

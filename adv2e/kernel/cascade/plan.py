@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.kernel.photoreceptor.law import (
-    MOST_CELLS,
+    CELLS_AT_WHITE,
     Laws,
     Noise,
     cells_of,
@@ -23,7 +23,7 @@ from adv2e.kernel.photoreceptor.law import (
 )
 from adv2e.kernel.quadrature import rounded
 
-MOST = 10
+MOST = 16
 """Most substeps of a piece: those whose lags are kept at a time."""
 
 WEIGHTS = 8
@@ -123,7 +123,7 @@ def _pieces(length: float, fastest: float, noise: Noise | None) -> list[_Array]:
     cells = np.zeros(places.size - 1)
     if noise is not None:
         cells = np.array([cells_of(length * span, noise) for span in np.diff(places).tolist()])
-        parts = np.maximum(np.ceil(cells / MOST_CELLS), 1).astype(int).tolist()
+        parts = np.maximum(np.ceil(cells / CELLS_AT_WHITE), 1).astype(int).tolist()
         split = [
             np.linspace(a, b, n, endpoint=False)
             for a, b, n in zip(places[:-1], places[1:], parts, strict=True)
@@ -132,7 +132,7 @@ def _pieces(length: float, fastest: float, noise: Noise | None) -> list[_Array]:
         cells = np.repeat(cells / parts, parts)
     pieces, first, held = [], 0, 0.0
     for j, more in enumerate(cells.tolist()):
-        if j - first == MOST or (j > first and held + more > MOST_CELLS):
+        if j - first == MOST or (j > first and held + more > CELLS_AT_WHITE):
             pieces.append(places[first : j + 1])
             first, held = j, 0.0
         held += more

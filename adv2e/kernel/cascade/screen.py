@@ -170,15 +170,28 @@ def follow(strip, substeps, places, length, circuit, weights):
 
 
 @kernel
-def stay(strip, substeps):
-    """Rows of a piece over which nothing moves and no lag is left."""
+def stay(strip):
+    """Rows of a piece over which nothing moves and no lag is left, as one substep."""
     for k in range(STRIP):
         strip[screen.DX + k] = _ZERO
         strip[screen.LAG_1 + k] = _ZERO
-    for j in range(substeps + 1):
-        for k in range(STRIP):
-            strip[FIRST + j * STRIDE + k] = _ZERO
-            strip[SECOND + j * STRIDE + k] = _ZERO
+        strip[FIRST + k] = _ZERO
+        strip[SECOND + k] = _ZERO
+    for k in range(STRIP):
+        strip[FIRST + STRIDE + k] = _ZERO
+        strip[SECOND + STRIDE + k] = _ZERO
+
+
+@kernel
+def flag_still(strip, end, on, off, factor):
+    """Rows AWAY_1 and HIT of :func:`adv2e.kernel.screen.flag`, where nothing moves or lags."""
+    for k in range(STRIP):
+        away = strip[screen.AWAY_0 + k]
+        after = away + strip[screen.FALL + k]
+        strip[screen.AWAY_1 + k] = after
+        hit = (after >= strip[on + k] * factor) | (-away >= strip[off + k] * factor)
+        reason = screen.BY_SIGNAL if hit else _ZERO
+        strip[screen.HIT + k] = screen.WHEN_DUE if strip[screen.DUE + k] < end else reason
 
 
 @kernel
@@ -190,8 +203,12 @@ def leave_room(strip, factor, noise):
 
 
 @kernel
-def step_on(strip, substeps):
-    """Make the end of this piece the start of the next."""
+def step_on(strip, substeps, still):
+    """Make the end of this piece the start of the next; `still`: nothing moves or lags."""
+    if still:
+        for k in range(STRIP):
+            strip[screen.AWAY_0 + k] = strip[screen.AWAY_1 + k]
+        return
     screen.step_on(strip)
     last = SECOND + substeps * STRIDE
     for k in range(STRIP):

@@ -18,8 +18,11 @@ from adv2e.kernel.circuit import Circuit, fastest_corner
 SHIFT = 16
 """Bits of a corner in single precision that its entry does not depend on."""
 
-MOST_CELLS = 4096
+MOST_CELLS = 256
 """Most cells of a piece."""
+
+CELLS_AT_WHITE = 128
+"""Most cells of a piece for white: brighter pixels need more."""
 
 COARSE = 9
 (KEPT_N, GIVEN, KEPT_S, BY_N, BY_N_S, BY_S, BEND, PULL, REACH) = range(COARSE)
@@ -27,16 +30,17 @@ COARSE = 9
 keeps; the factors of two normal numbers; how far the mean bends between for each of n - s, what it
 is drawn to zero, and how far the rest may reach."""
 
-FINE = 5
-(CELL_N, CELL_GIVEN, CELL_S, SHARE, CELL_REACH) = range(FINE)
-"""Columns of the fine table: the first three for a cell, the share of variance behind both poles,
-and how far the bridge over a cell may reach.  Over n cells it reaches at most n^(3/2) times as far,
-behind one pole n^(1/2) times."""
+FINE = 11
+(N_OF_N0, N_OF_S0, N_OF_N1, N_OF_S1, S_OF_N0, S_OF_S0, S_OF_N1, S_OF_S1, NEW_N, NEW_N_S, NEW_S) = (
+    range(FINE)
+)
+"""Columns of the fine table, for the middle of 2, 4, 8 ... cells: the means of n and s there by
+what n and s are at both ends, and the factors of two normal numbers."""
 
 _SURE = 6.0
 """Standard deviations that the bridge does not leave: one of a billion does."""
 
-_CLEAR, _LEAST = 5.5, 0.7
+_CLEAR, _LEAST = 4.5, 1.0
 """How far the bridge may reach, in standard deviations of the noise: so that noise below _CLEAR of
 them stays clear of a threshold, but at least _LEAST.  More samples cost as much as they save."""
 
@@ -46,20 +50,28 @@ The share of events that this loses is about as small."""
 
 _SLOWEST, _BRIGHTEST = 2.0**-12, 1000.0
 _INNER = np.arange(1, 8) / 8.0
-_CELLS_BETWEEN = (
-    2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 1024,
-)  # fmt: skip
-"""Tried between two samples, where one is too few."""
+_COUNTS = np.array([
+    1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160,
+    192, 224, 256,
+])  # fmt: skip
+"""Cells of a piece: few different ones, so that many pixels have as many."""
+
+MOST_LEVELS = 8
+"""Of halves, of what is between two samples."""
+
+MOST_GROUPS = _COUNTS.size * (MOST_LEVELS + 1)
+"""Of entries that have as many samples and cells."""
 
 
 class Laws(NamedTuple):
     """Tables of some lengths of pieces."""
 
     lowest: int  # bits of the corner of the first entry
-    samples: NDArray[np.int64]  # (lengths, entries) of a piece
-    cells: NDArray[np.int64]  # (lengths, entries) between two samples
+    group: NDArray[np.int64]  # (lengths, entries): which entries have as many samples and cells
+    samples: NDArray[np.int64]  # (lengths, groups) of a piece
+    levels: NDArray[np.int64]  # (lengths, groups): 2^levels cells lie between two samples
     coarse: NDArray[np.float32]  # (lengths, entries, COARSE)
-    fine: NDArray[np.float64]  # (lengths, entries, FINE)
+    fine: NDArray[np.float32]  # (lengths, entries, levels, FINE)
 
 
 class Noise(NamedTuple):
@@ -83,15 +95,24 @@ def noise_of(circuit: Circuit, level: float, longest: float) -> Noise:
 def laws_for(lengths: NDArray[np.float64], noise: Noise) -> Laws:
     """Return the tables for pieces of these lengths [us], (lengths,)."""
     tables = [_table(length, noise) for length in lengths.tolist()]
-    stacked = [np.stack(column) for column in zip(*tables, strict=True)]
-    return Laws(_entries(noise)[0], *stacked)
+    group, coarse, fine = (np.stack([table[c] for table in tables]) for c in (0, 3, 4))
+    shape = len(tables), max(table[1].size for table in tables)
+    samples, levels = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    for row, table in enumerate(tables):
+        samples[row, : table[1].size], levels[row, : table[2].size] = table[1], table[2]
+    deepest = max(int(levels.max()), 1)
+    return Laws(
+        _entries(noise)[0], group, samples, levels, coarse,
+        np.ascontiguousarray(fine[:, :, :deepest]),
+    )  # fmt: skip
 
 
 def no_laws() -> Laws:
     """Return what stands in the place of tables where there is no noise."""
+    none = np.zeros((1, 0), np.int64)
     return Laws(
-        0, np.zeros((1, 0), np.int64), np.zeros((1, 0), np.int64),
-        np.zeros((1, 0, COARSE), np.float32), np.zeros((1, 0, FINE)),
+        0, none, none, none, np.zeros((1, 0, COARSE), np.float32),
+        np.zeros((1, 0, 1, FINE), np.float32),
     )  # fmt: skip
 
 
@@ -146,71 +167,100 @@ def step_over(h: NDArray[Any], w: NDArray[Any], b: float) -> Step:
     return Step(kept_n, given, kept_s, nn, np.maximum(ns, 0.0), np.maximum(ss, 0.0))
 
 
-def _bridge(
-    t: float, h: NDArray[Any], w: NDArray[Any], b: float
-) -> tuple[NDArray[Any], list[NDArray[Any]]]:
-    """Return variance, and weights in the mean, of what is seen at share t between two samples.
+class Bridge(NamedTuple):
+    """What is at an instant between two others, for each corner, of noise of rms 1."""
 
-    The weights are those of n and s at the start, and at the end.
-    """
+    n: list[NDArray[Any]]  # weights of n and s at the start, and at the end, in the mean of n
+    s: list[NDArray[Any]]  # and in that of s
+    nn: NDArray[Any]  # covariances
+    ns: NDArray[Any]
+    ss: NDArray[Any]
+
+
+def bridge_over(t: float, h: NDArray[Any], w: NDArray[Any], b: float) -> Bridge:
+    """Return what is known at share t of `h` us; without a second pole (b = 0), s is n."""
     first, rest, whole = (step_over(part * h, w, b) for part in (t, 1.0 - t, 1.0))
     if b == 0.0:
         by_end = first.nn * rest.kept_n / whole.nn
         none = np.zeros_like(by_end)
-        return first.nn * (1.0 - by_end * rest.kept_n), [
-            first.kept_n - by_end * whole.kept_n, none, by_end, none,
-        ]  # fmt: skip
-    # covariance of s at t with (n, s) at the end, and from it the gain
-    cn = first.ns * rest.kept_n
-    cs = first.ns * rest.given + first.ss * rest.kept_s
+        weights = [first.kept_n - by_end * whole.kept_n, none, by_end, none]
+        left = first.nn * (1.0 - by_end * rest.kept_n)
+        return Bridge(weights, weights, left, left, left)
     size = np.maximum(whole.nn * whole.ss - whole.ns**2, 1e-300)
-    gn = (cn * whole.ss - cs * whole.ns) / size
-    gs = (cs * whole.nn - cn * whole.ns) / size
-    variance = np.maximum(first.ss - gn * cn - gs * cs, 0.0)
-    by_n = first.given - gn * whole.kept_n - gs * whole.given
-    by_s = first.kept_s - gs * whole.kept_s
-    return variance, [by_n, by_s, gn, gs]
+    # covariances of n, and of s, there with both at the end, and from them the gains
+    n_n, n_s = first.nn * rest.kept_n, first.nn * rest.given + first.ns * rest.kept_s
+    s_n, s_s = first.ns * rest.kept_n, first.ns * rest.given + first.ss * rest.kept_s
+    k_nn, k_ns = (n_n * whole.ss - n_s * whole.ns) / size, (n_s * whole.nn - n_n * whole.ns) / size
+    k_sn, k_ss = (s_n * whole.ss - s_s * whole.ns) / size, (s_s * whole.nn - s_n * whole.ns) / size
+    return Bridge(
+        [first.kept_n - k_nn * whole.kept_n - k_ns * whole.given, -k_ns * whole.kept_s, k_nn, k_ns],
+        [
+            first.given - k_sn * whole.kept_n - k_ss * whole.given,
+            first.kept_s - k_ss * whole.kept_s, k_sn, k_ss,
+        ],
+        np.maximum(first.nn - k_nn * n_n - k_ns * n_s, 0.0),
+        first.ns - k_sn * n_n - k_ss * n_s,
+        np.maximum(first.ss - k_sn * s_n - k_ss * s_s, 0.0),
+    )  # fmt: skip
+
+
+def _factors(nn: NDArray[Any], ns: NDArray[Any], ss: NDArray[Any]) -> list[NDArray[Any]]:
+    """Return the factors of two normal numbers that have these covariances."""
+    by_n = np.sqrt(nn)
+    by_n_s = ns / np.maximum(by_n, 1e-150)
+    return [by_n, by_n_s, np.sqrt(np.maximum(ss - by_n_s**2, 0.0))]
 
 
 @lru_cache(maxsize=64)
 def _table(length: float, noise: Noise) -> tuple[NDArray[Any], ...]:
-    """Return samples, cells, coarse and fine table of a piece of `length` us."""
+    """Return group of each entry, samples and levels of each group, coarse and fine table.
+
+    length : of the piece [us]
+    """
     w = _entries(noise)[1]
-    b = noise.follower
+    b, rms = noise.follower, noise.rms
     share = b / (w + b) if b > 0.0 else np.ones_like(w)
     seen = np.sqrt(share)
-    needed = np.clip(_needed(length, w, noise), 1, MOST_CELLS).astype(np.int64)
-    far = np.maximum(noise.level / (noise.rms * seen) - _CLEAR, _LEAST) * seen
-    cells, samples = np.ones_like(needed), needed.copy()
-    for between in _CELLS_BETWEEN:
-        count = -(-needed // between)
-        reach = _SURE * np.sqrt(_bridge(0.5, length / count, w, b)[0])
-        good = (reach <= far) & (between <= needed)
-        cells[good], samples[good] = between, count[good]
+    needed = np.minimum(_needed(length, w, noise), MOST_CELLS)
+    cells = _COUNTS[np.searchsorted(_COUNTS, needed)]
+    if b == 0.0:  # as many in all pixels, and their length matters
+        part = 1 << int(math.log2(max(needed[0] / 12, 1)))
+        cells = (-(-needed // part) * part).astype(np.int64)
+    far = np.maximum(noise.level / (rms * seen) - _CLEAR, _LEAST) * seen
+    levels = np.zeros_like(cells)
+    for level in range(1, MOST_LEVELS + 1):
+        count = 1 << level
+        reach = _SURE * np.sqrt(bridge_over(0.5, length * count / cells, w, b).ss)
+        levels[(reach <= far) & (cells % count == 0)] = level
+    samples = cells >> levels
     h = length / samples
     bend, pull, reach = (np.zeros_like(w) for _ in range(3))
     for t in _INNER.tolist():
-        variance, (n0, s0, n1, s1) = _bridge(t, h, w, b)
+        between = bridge_over(t, h, w, b)
+        n0, s0, n1, s1 = between.s
         if b > 0.0:
             bend = np.maximum(bend, np.maximum(np.abs(n0), np.abs(n1)))
         of_ends = n0 + s0 + n1 + s1
         pull = np.maximum(pull, 1.0 - of_ends)
         # where the means of both poles do not fall towards zero, what they rise is in the reach
         more = np.maximum(of_ends - 1.0, 0.0) * _SURE * seen
-        reach = np.maximum(reach, _SURE * np.sqrt(variance) + more)
-    alone = cells == 1  # nothing is drawn between
+        reach = np.maximum(reach, _SURE * np.sqrt(between.ss) + more)
+    alone = levels == 0  # nothing is drawn between
     reach[alone] = 0.0
     bend[alone & (b == 0.0)], pull[alone & (b == 0.0)] = 0.0, 0.0
     step = step_over(h, w, b)
-    by_n = np.sqrt(step.nn)
-    by_n_s = step.ns / by_n
-    by_s = np.sqrt(np.maximum(step.ss - by_n_s**2, 0.0))
-    rms = noise.rms
     coarse = np.stack(
-        [step.kept_n, step.given, step.kept_s, rms * by_n, rms * by_n_s, rms * by_s, bend,
-         np.clip(pull, 0.0, 1.0), rms * reach], axis=1,
+        [step.kept_n, step.given, step.kept_s,
+         *(rms * factor for factor in _factors(step.nn, step.ns, step.ss)),
+         bend, np.clip(pull, 0.0, 1.0), rms * reach], axis=1,
     )  # fmt: skip
-    cell = step_over(h / cells, w, b)
-    of_cell = rms * _SURE * np.sqrt(_bridge(0.5, h / cells, w, b)[0])
-    fine = np.stack([cell.kept_n, cell.given, cell.kept_s, share, of_cell], axis=1)
-    return samples, cells, np.ascontiguousarray(coarse, np.float32), np.ascontiguousarray(fine)
+    fine = []
+    for level in range(1, MOST_LEVELS + 1):
+        middle = bridge_over(0.5, length * (1 << level) / cells, w, b)
+        new = [rms * factor for factor in _factors(middle.nn, middle.ns, middle.ss)]
+        fine.append(np.stack([*middle.n, *middle.s, *new], axis=1))
+    pairs, group = np.unique(samples * (MOST_LEVELS + 1) + levels, return_inverse=True)
+    return (
+        group.reshape(-1).astype(np.int64), *divmod(pairs, MOST_LEVELS + 1),
+        coarse.astype(np.float32), np.stack(fine, axis=1).astype(np.float32),
+    )  # fmt: skip

@@ -1,7 +1,6 @@
 """Photoreceptor noise of a strip over one piece of an interval.
 
-Pixels that take as many samples go together: they lie side by side in a pack, for which the loops
-have no branches.
+Pixels that take as many samples lie side by side, sorted, so that the loops have no branches.
 """
 
 from __future__ import annotations
@@ -15,24 +14,23 @@ from adv2e.compiled import kernel
 from adv2e.kernel import rng, screen
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.photoreceptor import law
-from adv2e.kernel.photoreceptor.law import COARSE, MOST_CELLS, SHIFT
+from adv2e.kernel.photoreceptor.law import COARSE, MOST_CELLS, MOST_GROUPS, SHIFT
 from adv2e.kernel.screen import STRIDE
 from adv2e.kernel.work_queue import STRIP
 
-NOISE_0, NOISE_1, SEEN_0, SEEN_1, HIGH, LOW = (row * STRIDE for row in range(6))
-"""Rows: noise behind the first pole and as the comparator sees it, at the start and the end of a
-piece; and bounds of the latter in between."""
+NOISE, SEEN, HIGH, LOW = (row * STRIDE for row in range(4))
+"""Rows: noise behind the first pole and as the comparator sees it, before the next piece; and
+bounds of the latter over the last one."""
 
-_OF_PACK = 6 * STRIDE
-_N, _S, _HIGH, _LOW = (_OF_PACK + row * STRIDE for row in range(4))
-_BY = _OF_PACK + 4 * STRIDE
-"""Rows of the pack; from the last one on, a column of the coarse table each."""
+NOISE_0, SEEN_0, NOISE_1, SEEN_1, _HIGH, _LOW, BY = (row * STRIDE for row in range(4, 11))
+"""Rows of the sorted pixels: noise at the start and at the end of the piece, bounds; from the last
+one on, a column of the coarse table each."""
 
 BLOCKS = MOST_CELLS // 2
 """Most blocks of random numbers of a piece."""
 
 _f = np.float32
-_ZERO, _ONE, _HALF = _f(0.0), _f(1.0), _f(0.5)
+_ZERO, _ONE = _f(0.0), _f(1.0)
 
 
 class Scratch(NamedTuple):
@@ -40,9 +38,10 @@ class Scratch(NamedTuple):
 
     rows: NDArray[np.float32]
     entries: NDArray[np.int64]  # of each pixel in the tables
-    order: NDArray[np.int64]  # pixels by their number of samples
-    pixels: NDArray[np.int64]  # numbers of the pack's pixels
-    starts: NDArray[np.int64]  # of each number of samples in that order
+    order: NDArray[np.int64]  # sorted pixels,
+    pixels: NDArray[np.int64]  # their numbers of all,
+    ends: NDArray[np.int64]  # and where each group ends, from the second entry on; the first is 0
+    kept: NDArray[np.int64]  # (1,): 1 + the law by which they are sorted; 0: they are not
     words: NDArray[np.uint32]
     normals: NDArray[np.float32]
 
@@ -51,9 +50,9 @@ def scratch() -> Scratch:
     """Return fresh memory."""
     entries, order, pixels = (np.zeros(STRIP, np.int64) for _ in range(3))
     return Scratch(
-        np.zeros(_BY + COARSE * STRIDE, np.float32), entries, order, pixels,
-        np.zeros(MOST_CELLS + 2, np.int64), np.zeros((4, STRIDE), np.uint32),
-        np.zeros((4, STRIDE), np.float32),
+        np.zeros(BY + COARSE * STRIDE, np.float32), entries, order, pixels,
+        np.zeros(MOST_GROUPS + 1, np.int64), np.zeros(1, np.int64),
+        np.zeros((4, STRIDE), np.uint32), np.zeros((4, STRIDE), np.float32),
     )  # fmt: skip
 
 
@@ -69,73 +68,85 @@ def _find_entries(count, dark, per_dn, lowest, most, strip, entries):
 
 
 @kernel
-def _sort(count, samples, entries, starts, order):
-    """Pixels by their number of samples; returns the largest number."""
-    for j in range(starts.shape[0]):
-        starts[j] = 0
-    largest = np.int64(0)
+def _sort(lo, count, group, groups, coarse, scratch):
+    """Sort the pixels by group, and what is known of them."""
+    order, ends, entries, rows = scratch.order, scratch.ends, scratch.entries, scratch.rows
+    for g in range(groups + 1):
+        ends[g] = 0
     for k in range(count):
-        m = samples[entries[k]]
-        largest = max(largest, m)
-        starts[m + 1] += 1
-    for m in range(largest + 1):
-        starts[m + 1] += starts[m]
+        ends[group[entries[k]] + 1] += 1
+    for g in range(groups):
+        ends[g + 1] += ends[g]
     for k in range(count):
-        m = samples[entries[k]]
-        order[starts[m]] = k
-        starts[m] += 1
-    # each start is now that of the next number
-    return largest
-
-
-@kernel
-def _pack(lo, first, size, seen, coarse, scratch):
-    """Fill the pack with the pixels from the `first` of the order on."""
-    rows, order, entries, pixels = scratch.rows, scratch.order, scratch.entries, scratch.pixels
-    for c in range(size):
-        k = order[first + c]
-        pixels[c] = lo + k
-        rows[_N + c] = rows[NOISE_0 + k]
-        rows[_S + c] = rows[SEEN_0 + k]
-        rows[_HIGH + c] = rows[seen + k]
-        rows[_LOW + c] = rows[seen + k]
-        entry = entries[k]
+        g = group[entries[k]]
+        order[ends[g]] = k
+        ends[g] += 1
+    # each is the end of its group now
+    for g in range(groups, 0, -1):
+        ends[g] = ends[g - 1]
+    ends[0] = 0
+    for p in range(count):
+        k = order[p]
+        scratch.pixels[p] = lo + k
+        rows[NOISE_1 + p] = rows[NOISE + k]
+        rows[SEEN_1 + p] = rows[SEEN + k]
+    for p in range(count):
+        entry = entries[order[p]]
         for column in range(COARSE):
-            rows[_BY + column * STRIDE + c] = coarse[entry, column]
+            rows[BY + column * STRIDE + p] = coarse[entry, column]
 
 
 @kernel
-def _sample(size, normals, rows):
-    """Advance the pack to the next sample, behind one pole."""
-    keep, by_n = rows[_BY + law.KEPT_N * STRIDE :], rows[_BY + law.BY_N * STRIDE :]
-    pull = rows[_BY + law.PULL * STRIDE :]
+def put_back(count, scratch):
+    """Rows NOISE and SEEN, of the pixels in their own order."""
+    rows, order = scratch.rows, scratch.order
+    if scratch.kept[0] > 0:
+        for p in range(count):
+            rows[NOISE + order[p]] = rows[NOISE_1 + p]
+            rows[SEEN + order[p]] = rows[SEEN_1 + p]
+    scratch.kept[0] = 0
+
+
+@kernel
+def _sample(first, size, normals, rows):
+    """Advance sorted pixels from `first` on to the next sample, behind one pole."""
+    noise = rows[NOISE_1 + first : NOISE_1 + first + size]
+    top, bottom = rows[_HIGH + first :], rows[_LOW + first :]
+    keep = rows[BY + law.KEPT_N * STRIDE + first :]
+    by_n = rows[BY + law.BY_N * STRIDE + first :]
+    pull = rows[BY + law.PULL * STRIDE + first :]
     for c in range(size):
-        n0 = rows[_N + c]
+        n0 = noise[c]
         n1 = keep[c] * n0 + by_n[c] * normals[c]
-        rows[_N + c] = n1
+        noise[c] = n1
         low, high = min(n0, n1), max(n0, n1)
         high = high if high > _ZERO else high * (_ONE - pull[c])
         low = low if low < _ZERO else low * (_ONE - pull[c])
-        rows[_HIGH + c] = max(rows[_HIGH + c], high)
-        rows[_LOW + c] = min(rows[_LOW + c], low)
+        top[c] = max(top[c], high)
+        bottom[c] = min(bottom[c], low)
 
 
 @kernel
-def _sample_of_two(size, first, second, rows):
-    """Advance the pack to the next sample, behind two poles, by two normal numbers each."""
-    keep, by_n = rows[_BY + law.KEPT_N * STRIDE :], rows[_BY + law.BY_N * STRIDE :]
-    given, keep_s = rows[_BY + law.GIVEN * STRIDE :], rows[_BY + law.KEPT_S * STRIDE :]
-    by_n_s, by_s = rows[_BY + law.BY_N_S * STRIDE :], rows[_BY + law.BY_S * STRIDE :]
-    bend, pull = rows[_BY + law.BEND * STRIDE :], rows[_BY + law.PULL * STRIDE :]
+def _sample_of_two(first, size, z, v, rows):
+    """Advance sorted pixels to the next sample, behind two poles, by two normal numbers each."""
+    noise, seen = rows[NOISE_1 + first : NOISE_1 + first + size], rows[SEEN_1 + first :]
+    top, bottom = rows[_HIGH + first :], rows[_LOW + first :]
+    keep = rows[BY + law.KEPT_N * STRIDE + first :]
+    by_n = rows[BY + law.BY_N * STRIDE + first :]
+    given = rows[BY + law.GIVEN * STRIDE + first :]
+    keep_s = rows[BY + law.KEPT_S * STRIDE + first :]
+    by_n_s = rows[BY + law.BY_N_S * STRIDE + first :]
+    by_s = rows[BY + law.BY_S * STRIDE + first :]
+    bend, pull = rows[BY + law.BEND * STRIDE + first :], rows[BY + law.PULL * STRIDE + first :]
     for c in range(size):
-        n0, s0 = rows[_N + c], rows[_S + c]
-        n1 = keep[c] * n0 + by_n[c] * first[c]
-        s1 = given[c] * n0 + keep_s[c] * s0 + by_n_s[c] * first[c] + by_s[c] * second[c]
-        rows[_N + c] = n1
-        rows[_S + c] = s1
+        n0, s0 = noise[c], seen[c]
+        n1 = keep[c] * n0 + by_n[c] * z[c]
+        s1 = given[c] * n0 + keep_s[c] * s0 + by_n_s[c] * z[c] + by_s[c] * v[c]
+        noise[c] = n1
+        seen[c] = s1
         high, low = bounds(s0, n0 - s0, s1, n1 - s1, bend[c], pull[c])
-        rows[_HIGH + c] = max(rows[_HIGH + c], high)
-        rows[_LOW + c] = min(rows[_LOW + c], low)
+        top[c] = max(top[c], high)
+        bottom[c] = min(bottom[c], low)
 
 
 @kernel
@@ -154,58 +165,60 @@ def bounds(s0, v0, s1, v1, bend, pull):
 
 
 @kernel
-def _unpack(first, size, follows, scratch):
-    """Rows of the pixels of the pack at the end of the piece."""
-    rows, order = scratch.rows, scratch.order
-    for c in range(size):
-        k = order[first + c]
-        reach = rows[_BY + law.REACH * STRIDE + c]
-        rows[NOISE_1 + k] = rows[_N + c]
-        rows[SEEN_1 + k] = rows[_S + c] if follows else rows[_N + c]
-        rows[HIGH + k] = rows[_HIGH + c] + reach
-        rows[LOW + k] = rows[_LOW + c] - reach
+def _begin(count, seen, rows):
+    """Rows of sorted pixels at the start of a piece; `seen`: row of what the comparator sees."""
+    for p in range(count):
+        rows[NOISE_0 + p] = rows[NOISE_1 + p]
+        rows[SEEN_0 + p] = rows[SEEN_1 + p]
+    for p in range(count):
+        rows[_HIGH + p] = rows[seen + p]
+        rows[_LOW + p] = rows[seen + p]
 
 
 @kernel
-def draw(lo, count, piece, which, circuit, laws, strip, scratch):
+def _end(count, follows, order, rows):
+    """Rows SEEN_1 of sorted pixels, and HIGH and LOW, at the end of a piece."""
+    if not follows:
+        for p in range(count):
+            rows[SEEN_1 + p] = rows[NOISE_1 + p]
+    for p in range(count):
+        k, reach = order[p], rows[BY + law.REACH * STRIDE + p]
+        rows[HIGH + k] = rows[_HIGH + p] + reach
+        rows[LOW + k] = rows[_LOW + p] - reach
+
+
+@kernel
+def draw(lo, count, piece, which, rests, circuit, laws, strip, scratch):
     """Draw the noise of a strip over piece number `piece` of all, which has law `which`.
 
-    The light at both ends is in the rows of the screen.  Fills rows NOISE_1, SEEN_1, HIGH and LOW.
+    The light at both ends is in the rows of the screen; `rests`: it is that of the piece before.
+    Fills rows HIGH and LOW.
     """
     strip, laws, scratch = borrowed(strip, laws, scratch)
-    rows = scratch.rows
-    follows = circuit.follower > 0.0
-    _find_entries(
-        count, _f(circuit.dark), _f(circuit.per_dn), laws.lowest, laws.samples.shape[1] - 1, strip,
-        scratch.entries,
-    )  # fmt: skip
-    samples, coarse = laws.samples[which], laws.coarse[which]
-    largest = _sort(count, samples, scratch.entries, scratch.starts, scratch.order)
-    begin = np.int64(0)
-    for m in range(largest + 1):
-        size = scratch.starts[m] - begin
+    rows, normals, follows = scratch.rows, scratch.normals, circuit.follower > 0.0
+    if not rests or scratch.kept[0] != which + 1:
+        put_back(count, scratch)
+        _find_entries(
+            count, _f(circuit.dark), _f(circuit.per_dn), laws.lowest, laws.group.shape[1] - 1,
+            strip, scratch.entries,
+        )  # fmt: skip
+        _sort(lo, count, laws.group[which], laws.samples.shape[1], laws.coarse[which], scratch)
+        scratch.kept[0] = which + 1
+    _begin(count, SEEN_1 if follows else NOISE_1, rows)
+    a_block = 2 if follows else 4
+    for g in range(laws.samples.shape[1]):
+        first, size = scratch.ends[g], scratch.ends[g + 1] - scratch.ends[g]
         if size == 0:
             continue
-        _pack(lo, begin, size, SEEN_0 if follows else NOISE_0, coarse, scratch)
-        a_block = 2 if follows else 4
-        for j in range(m):
+        for j in range(laws.samples[which, g]):
             r = j % a_block
             if r == 0:
                 rng.normals32_of_pixels(
-                    circuit.seed, rng.PHOTORECEPTOR_SAMPLES, scratch.pixels[:size],
-                    piece * BLOCKS + j // a_block, scratch.words, scratch.normals,
+                    circuit.seed, rng.PHOTORECEPTOR_SAMPLES, scratch.pixels[first : first + size],
+                    piece * BLOCKS + j // a_block, scratch.words, normals,
                 )  # fmt: skip
             if follows:
-                _sample_of_two(size, scratch.normals[2 * r], scratch.normals[2 * r + 1], rows)
+                _sample_of_two(first, size, normals[2 * r], normals[2 * r + 1], rows)
             else:
-                _sample(size, scratch.normals[r], rows)
-        _unpack(begin, size, follows, scratch)
-        begin = scratch.starts[m]
-
-
-@kernel
-def step_on(rows):
-    """Make the end of this piece the start of the next."""
-    for k in range(STRIP):
-        rows[NOISE_0 + k] = rows[NOISE_1 + k]
-        rows[SEEN_0 + k] = rows[SEEN_1 + k]
+                _sample(first, size, normals[r], rows)
+    _end(count, follows, scratch.order, rows)

@@ -1,0 +1,347 @@
+"""All of the photoreceptor noise of some pixels over a piece, cell by cell, side by side in lanes.
+
+The samples are drawn once more, and what is between two of them by halves: in the middle of what is
+not known yet it is normal, given both ends.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.compiled import kernel
+from adv2e.kernel import rng
+from adv2e.kernel.borrowing import borrowed
+from adv2e.kernel.photoreceptor import law, strip
+from adv2e.kernel.photoreceptor.law import COARSE, FINE, MOST_CELLS, MOST_LEVELS
+from adv2e.kernel.screen import STRIDE
+
+_f = np.float32
+_ZERO, _ONE = _f(0.0), _f(1.0)
+
+LANES = 64
+"""Pixels side by side."""
+
+NOISE = 0
+SEEN = (MOST_CELLS + 1) * LANES
+"""Rows of a path, one for each end of a cell: noise behind the first pole, and as the comparator
+sees it.  Behind one pole the latter are the former."""
+
+HIGH = 2 * (MOST_CELLS + 1) * LANES
+LOW = HIGH + LANES
+"""Bounds of the latter over the piece."""
+
+_KNOWN = LOW + LANES
+"""1 where what is between a sample and the next is drawn, a row for each sample."""
+
+_BY = _KNOWN + MOST_CELLS * LANES
+_MIDDLE = _BY + COARSE * LANES
+"""Columns of the tables."""
+
+THERE = _MIDDLE + MOST_LEVELS * FINE * LANES
+"""From here on the same rows of stretches between two samples: each is the first of a lane."""
+
+PIXELS, BLOCKS, FROM, SAMPLE = (row * LANES for row in range(4))
+"""Whole numbers: of the pixel among all, and of its first block of random numbers; of a stretch
+also the lane that it comes from, and the sample that it begins with."""
+
+_NUMBERS = 4 * LANES
+
+
+class Path(NamedTuple):
+    """Memory for the noise of some pixels."""
+
+    rows: NDArray[np.float32]
+    numbers: NDArray[np.int64]
+    words: NDArray[np.uint32]  # (4, LANES)
+    normals: NDArray[np.float32]  # (4, LANES)
+
+
+def path() -> Path:
+    """Return fresh memory."""
+    return Path(
+        np.zeros(2 * THERE, np.float32), np.zeros(2 * _NUMBERS, np.int64),
+        np.zeros((4, LANES), np.uint32), np.zeros((4, LANES), np.float32),
+    )  # fmt: skip
+
+
+@kernel
+def seen_from(circuit):
+    """Return the first of the rows of what the comparator sees."""
+    return SEEN if circuit.follower > 0.0 else NOISE
+
+
+@kernel
+def _next_sample(size, at, after, z, rows):
+    """Row `after` of NOISE, the sample that follows row `at`, behind one pole."""
+    n0, n1 = rows[at : at + size], rows[after : after + size]
+    keep = rows[_BY + law.KEPT_N * LANES : _BY + (law.KEPT_N + 1) * LANES]
+    by_n = rows[_BY + law.BY_N * LANES : _BY + (law.BY_N + 1) * LANES]
+    for c in range(size):
+        n1[c] = keep[c] * n0[c] + by_n[c] * z[c]
+
+
+@kernel
+def _next_sample_of_two(size, at, after, z, v, rows):
+    """Rows `after`, the sample that follows rows `at`, behind two poles."""
+    n0, n1 = rows[at : at + size], rows[after : after + size]
+    s0, s1 = rows[SEEN + at : SEEN + at + size], rows[SEEN + after : SEEN + after + size]
+    keep = rows[_BY + law.KEPT_N * LANES : _BY + (law.KEPT_N + 1) * LANES]
+    by_n = rows[_BY + law.BY_N * LANES : _BY + (law.BY_N + 1) * LANES]
+    given = rows[_BY + law.GIVEN * LANES : _BY + (law.GIVEN + 1) * LANES]
+    keep_s = rows[_BY + law.KEPT_S * LANES : _BY + (law.KEPT_S + 1) * LANES]
+    by_n_s = rows[_BY + law.BY_N_S * LANES : _BY + (law.BY_N_S + 1) * LANES]
+    by_s = rows[_BY + law.BY_S * LANES : _BY + (law.BY_S + 1) * LANES]
+    for c in range(size):
+        n1[c] = keep[c] * n0[c] + by_n[c] * z[c]
+        s1[c] = given[c] * n0[c] + keep_s[c] * s0[c] + by_n_s[c] * z[c] + by_s[c] * v[c]
+
+
+@kernel
+def _column(column, size, rows):
+    return rows[column * LANES : column * LANES + size]
+
+
+@kernel
+def _middle(size, at, r, after, first, z, rows):
+    """Row r of NOISE, in the middle of rows `at` and `after`, behind one pole.
+
+    first : number of the row that holds the first of the level's columns
+    """
+    n0, n, n1 = rows[at : at + size], rows[r : r + size], rows[after : after + size]
+    by_0, by_1 = _column(first + law.N_OF_N0, size, rows), _column(first + law.N_OF_N1, size, rows)
+    new = _column(first + law.NEW_N, size, rows)
+    for c in range(size):
+        n[c] = by_0[c] * n0[c] + by_1[c] * n1[c] + new[c] * z[c]
+
+
+@kernel
+def _middle_of_two(size, at, r, after, first, z, v, rows):
+    """Rows r, in the middle of rows `at` and `after`, behind two poles; `first`: as above."""
+    n0, n, n1 = rows[at : at + size], rows[r : r + size], rows[after : after + size]
+    s0, s = rows[SEEN + at : SEEN + at + size], rows[SEEN + r : SEEN + r + size]
+    s1 = rows[SEEN + after : SEEN + after + size]
+    n_n0, n_s0 = _column(first + law.N_OF_N0, size, rows), _column(first + law.N_OF_S0, size, rows)
+    n_n1, n_s1 = _column(first + law.N_OF_N1, size, rows), _column(first + law.N_OF_S1, size, rows)
+    s_n0, s_s0 = _column(first + law.S_OF_N0, size, rows), _column(first + law.S_OF_S0, size, rows)
+    s_n1, s_s1 = _column(first + law.S_OF_N1, size, rows), _column(first + law.S_OF_S1, size, rows)
+    new_n, new_s = _column(first + law.NEW_N, size, rows), _column(first + law.NEW_S, size, rows)
+    new_n_s = _column(first + law.NEW_N_S, size, rows)
+    for c in range(size):
+        a, b, d, e = n0[c], s0[c], n1[c], s1[c]
+        n[c] = (n_n0[c] * a + n_s0[c] * b) + (n_n1[c] * d + n_s1[c] * e) + new_n[c] * z[c]
+        mean = (s_n0[c] * a + s_s0[c] * b) + (s_n1[c] * d + s_s1[c] * e)
+        s[c] = mean + (new_n_s[c] * z[c] + new_s[c] * v[c])
+
+
+@kernel
+def _halve(size, begin, levels, more, circuit, rows, numbers, path):
+    """Draw what is between two samples, the first of which is in row `begin`, of all lanes.
+
+    more : added to the number of each lane's first block of random numbers
+    """
+    words, normals, follows = path.words, path.normals, circuit.follower > 0.0
+    pixels, blocks = numbers[PIXELS : PIXELS + size], numbers[BLOCKS : BLOCKS + size]
+    a_block, drawn = 2 if follows else 4, np.int64(0)
+    for level in range(levels - 1, -1, -1):
+        half, first = LANES << level, _MIDDLE // LANES + level * FINE
+        for j in range(1 << (levels - 1 - level)):
+            r = drawn % a_block
+            if r == 0:
+                rng.normals32_of_blocks(
+                    circuit.seed, rng.PHOTORECEPTOR_BETWEEN, pixels, blocks,
+                    more + drawn // a_block, words, normals,
+                )  # fmt: skip
+            at = begin + 2 * j * half
+            if follows:
+                _middle_of_two(
+                    size, at, at + half, at + 2 * half, first, normals[2 * r], normals[2 * r + 1],
+                    rows,
+                )  # fmt: skip
+            else:
+                _middle(size, at, at + half, at + 2 * half, first, normals[r], rows)
+            drawn += 1
+
+
+@kernel
+def _blocks_between(levels, circuit):
+    """Blocks of random numbers of what is between two samples."""
+    a_block = 2 if circuit.follower > 0.0 else 4
+    return ((1 << levels) - 2) // a_block + 1
+
+
+@kernel
+def sample(size, places, piece, samples, levels, circuit, fine, noise, path):
+    """Draw the samples of some pixels over piece number `piece` of all, once more.
+
+    Parameters
+    ----------
+    size : int
+        Number of pixels.
+    places : (LANES,) int64
+        Where they are among the sorted ones of the strip.
+    samples, levels : int
+        Of their group.
+    fine : (entries, levels, FINE) float32
+    noise : Scratch
+        Of the strip.
+    path : Path
+    """
+    fine, noise, path = borrowed(fine, noise, path)
+    rows, normals, follows = path.rows, path.normals, circuit.follower > 0.0
+    for c in range(size):
+        p = places[c]
+        path.numbers[PIXELS + c] = noise.pixels[p]
+        path.numbers[BLOCKS + c] = piece * strip.BLOCKS
+        rows[HIGH + c] = noise.rows[strip.HIGH + noise.order[p]]
+        rows[LOW + c] = noise.rows[strip.LOW + noise.order[p]]
+        rows[NOISE + c] = noise.rows[strip.NOISE_0 + p]
+        rows[SEEN + c] = noise.rows[strip.SEEN_0 + p]
+        entry = noise.entries[noise.order[p]]
+        for level in range(levels):
+            for column in range(FINE):
+                row = _MIDDLE + (level * FINE + column) * LANES
+                rows[row + c] = fine[entry, level, column]
+    for column in range(COARSE):
+        for c in range(size):
+            rows[_BY + column * LANES + c] = noise.rows[strip.BY + column * STRIDE + places[c]]
+    a_block, q = 2 if follows else 4, np.int64(1) << levels
+    for j in range(samples):
+        r, at = j % a_block, NOISE + j * q * LANES
+        if r == 0:
+            rng.normals32_of_pixels(
+                circuit.seed, rng.PHOTORECEPTOR_SAMPLES, path.numbers[PIXELS : PIXELS + size],
+                piece * strip.BLOCKS + j // a_block, path.words, normals,
+            )  # fmt: skip
+        if follows:
+            _next_sample_of_two(size, at, at + q * LANES, normals[2 * r], normals[2 * r + 1], rows)
+        else:
+            _next_sample(size, at, at + q * LANES, normals[r], rows)
+        for c in range(size):
+            rows[_KNOWN + j * LANES + c] = _ONE if levels == 0 else _ZERO
+
+
+@kernel
+def bounds_of_stretch(j, c, levels, seen, rows):
+    """Bounds of what is seen from sample j of lane c to the next."""
+    at, after = (j << levels) * LANES + c, ((j + 1) << levels) * LANES + c
+    a, b = rows[seen + at], rows[seen + after]
+    high, low = strip.bounds(
+        a, rows[at] - a, b, rows[after] - b, rows[_BY + law.BEND * LANES + c],
+        rows[_BY + law.PULL * LANES + c],
+    )  # fmt: skip
+    reach = rows[_BY + law.REACH * LANES + c]
+    return high + reach, low - reach
+
+
+@kernel
+def bound_stretch(size, j, levels, seen, high, low, rows):
+    """Fill `high` and `low` with bounds of what is seen from sample j to the next; (LANES,)."""
+    at, after = (j << levels) * LANES, ((j + 1) << levels) * LANES
+    n0, n1 = rows[at : at + size], rows[after : after + size]
+    s0, s1 = rows[seen + at : seen + at + size], rows[seen + after : seen + after + size]
+    bend = rows[_BY + law.BEND * LANES : _BY + (law.BEND + 1) * LANES]
+    pull = rows[_BY + law.PULL * LANES : _BY + (law.PULL + 1) * LANES]
+    reach = rows[_BY + law.REACH * LANES : _BY + (law.REACH + 1) * LANES]
+    for c in range(size):
+        a, b = s0[c], s1[c]
+        most, least = strip.bounds(a, n0[c] - a, b, n1[c] - b, bend[c], pull[c])
+        high[c], low[c] = most + reach[c], least - reach[c]
+
+
+@kernel
+def is_known(j, c, rows):
+    """Tell whether what is between sample j of lane c and the next is drawn."""
+    return rows[_KNOWN + j * LANES + c] > _ZERO
+
+
+@kernel
+def draw_between(size, j, levels, circuit, path):
+    """Draw what is between sample j and the next, of all pixels of a path."""
+    (path,) = borrowed(path)
+    if levels > 0:
+        more = j * _blocks_between(levels, circuit)
+        begin = (j << levels) * LANES
+        _halve(size, begin, levels, more, circuit, path.rows, path.numbers, path)
+    for c in range(size):
+        path.rows[_KNOWN + j * LANES + c] = _ONE
+
+
+@kernel
+def draw_stretches(count, levels, circuit, path):
+    """Draw the first `count` stretches, whose numbers FROM and SAMPLE are given."""
+    (path,) = borrowed(path)
+    rows, there = path.rows, path.rows[THERE:]
+    own, numbers = path.numbers, path.numbers[_NUMBERS:]
+    lanes, samples = numbers[FROM : FROM + count], numbers[SAMPLE : SAMPLE + count]
+    end, poles = LANES << levels, 2 if circuit.follower > 0.0 else 1
+    for t in range(count):
+        c, j = lanes[t], samples[t]
+        begin = (j << levels) * LANES + c
+        numbers[PIXELS + t] = own[PIXELS + c]
+        numbers[BLOCKS + t] = own[BLOCKS + c] + j * _blocks_between(levels, circuit)
+        rows[_KNOWN + j * LANES + c] = _ONE
+        for pole in range(poles):
+            there[pole * SEEN + t] = rows[pole * SEEN + begin]
+            there[pole * SEEN + end + t] = rows[pole * SEEN + begin + end]
+    for row in range(levels * FINE):
+        first = _MIDDLE + row * LANES
+        for t in range(count):
+            there[first + t] = rows[first + lanes[t]]
+    _halve(count, 0, levels, 0, circuit, there, numbers, path)
+    for pole in range(poles):
+        for t in range(count):
+            begin = pole * SEEN + (samples[t] << levels) * LANES + lanes[t]
+            for r in range(LANES, end, LANES):
+                rows[begin + r] = there[pole * SEEN + r + t]
+
+
+@kernel
+def wait(t, c, j, path):
+    """Make what is between sample j of lane c and the next stretch number t."""
+    path.numbers[_NUMBERS + FROM + t] = c
+    path.numbers[_NUMBERS + SAMPLE + t] = j
+
+
+@kernel
+def origin(t, path):
+    """Return lane and sample of stretch number t."""
+    return path.numbers[_NUMBERS + FROM + t], path.numbers[_NUMBERS + SAMPLE + t]
+
+
+@kernel
+def cubic_of(r, c, start, width, corner, seen, rows):
+    """Coefficients of what is seen in cell r of lane c, as a cubic of the place in a substep.
+
+    The cell begins at place `start` of the substep, and is `width` of it.
+    corner : of the second pole, in the cell [rad]; 0: there is none, and what is seen is a line
+    seen : first of the rows of what is seen
+    """
+    at, after = r * LANES + c, (r + 1) * LANES + c
+    s0, s1 = float(rows[seen + at]), float(rows[seen + after])
+    v0 = corner * (float(rows[NOISE + at]) - s0)
+    v1 = corner * (float(rows[NOISE + after]) - s1)
+    rise = s1 - s0
+    a1, a2, a3 = v0, 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
+    if corner == 0.0:
+        a1, a2, a3 = rise, 0.0, 0.0
+    scale = 1.0 / width
+    a1, a2, a3 = a1 * scale, a2 * scale * scale, a3 * scale * scale * scale
+    return (
+        s0 - start * (a1 - start * (a2 - start * a3)),
+        a1 - start * (2.0 * a2 - 3.0 * start * a3),
+        a2 - 3.0 * start * a3,
+        a3,
+    )
+
+
+@kernel
+def bounds_of_cell(r, c, corner, seen, rows):
+    """Bounds of what is seen in cell r of lane c: those of the Bezier points of its cubic."""
+    at, after = r * LANES + c, (r + 1) * LANES + c
+    s0, s1 = rows[seen + at], rows[seen + after]
+    b0 = s0 + corner * (rows[NOISE + at] - s0)
+    b1 = s1 - corner * (rows[NOISE + after] - s1)
+    return max(s0, s1, b0, b1), min(s0, s1, b0, b1)
