@@ -44,7 +44,7 @@ OFF events at 0.93 to 1.2 (the latter where nearly all events are by leak).
 
 These are rates long after the start.  Only leak and noise take references anew, and till then rates
 are those of references taken at random moments of the noise: of a pixel without leak that has
-0.02 events a second, five times as many come in the first seconds, twice as many after a minute.
+0.02 events a second, four times as many come in the first seconds, twice as many after a minute.
 
 References
 ----------

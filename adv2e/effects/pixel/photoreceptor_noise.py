@@ -19,8 +19,8 @@ Then it is not sampled: it is drawn as finely as events need it.  Its variance i
 
     sigma^2 f_s/(f + f_s)
 
-so that noise falls as the light rises.  That is what two cameras do (scripts/real/README.md);
-behind the low-pass alone, rates rise with the corner.
+so that noise falls as the light rises.  That is what two cameras do
+(adv2e/diagnosis/tables/README.md); behind the low-pass alone, rates rise with the corner.
 
 References
 ----------
