@@ -334,7 +334,7 @@ class Law:
         return np.asarray(self._slow * np.exp(logs), dtype=np.float64)
 
 
-_LEAST, _GRID = 0.5, 0.75
+_LEAST, _GRID = 0.2, 0.78
 """Least lower threshold that is kept, and step."""
 _COUNT = 1 + round((HIGHEST - _LEAST) / _GRID)
 _RULER = Ruler(1.5, 0.05, HIGHEST)

@@ -8,6 +8,8 @@ import pytest
 from adv2e import load_config, simulate
 from adv2e.diagnosis.tables.noise import NoisySources, _laws, noise_rates
 from adv2e.diagnosis.tables.threshold_noise import event_rates
+from adv2e.effects.pixel.thresholds import FLOOR
+from adv2e.kernel.first_state import fill_levels
 
 ROWS, COLUMNS = 30, 40
 
@@ -159,3 +161,21 @@ def test_the_most_sensitive_pixels_are_in_the_mean():
     assert rates.on_mean[0] == pytest.approx(means[0], rel=0.02)
     assert rates.off_mean[0] == pytest.approx(means[1], rel=0.02)
     assert rates.on[0] < 0.01 * rates.on_mean[0]
+
+
+def test_a_mean_over_few_pixels_is_that_of_their_own_thresholds():
+    """In the bright few pixels have all events, and how many of them there are is chance."""
+    sources = NoisySources(
+        rms=0.06, cutoff_hz=156, dark_cutoff_hz=156, follower_hz=60, off=0.227, mismatch=0.062,
+        dead_time_s=5e-4,
+    )  # fmt: skip
+    seconds, pixels = 8.0, ROWS * COLUMNS
+    on, off, spare = np.zeros((3, pixels))
+    fill_levels(0, pixels, 1, sources.on, sources.off, sources.mismatch, FLOOR, on, off, spare)
+    found = _laws(sources, np.ones(1), np.zeros(1))[0].rates(on, off)
+    counts = simulated(sources, seconds, seed=1)[::-1] / (0.5 * seconds)
+    busiest = np.argsort(found.sum(axis=0))[-10:]
+    assert counts[:, busiest].sum() > 0.5 * counts.sum()
+    assert found[:, busiest].mean(axis=1) == pytest.approx(
+        counts[:, busiest].mean(axis=1), rel=0.15
+    )
