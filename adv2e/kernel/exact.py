@@ -13,20 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.compiled import kernel
-from adv2e.kernel import per_pixel, screen, special, static_pixels
+from adv2e.kernel import per_pixel, screen, static_pixels
 from adv2e.kernel.borrowing import borrowed
-from adv2e.kernel.cascade import pixel as alone
-from adv2e.kernel.cascade import screen as cascade
-from adv2e.kernel.cascade import second_look
+from adv2e.kernel.cascade import advance as cascade
+from adv2e.kernel.cascade import screen as cascade_screen
 from adv2e.kernel.circuit import EXACT, Circuit
 from adv2e.kernel.event_buffer import with_room
 from adv2e.kernel.frames import load
 from adv2e.kernel.lanes import batch, exchange, rows
-from adv2e.kernel.leak import fill_falls
-from adv2e.kernel.photoreceptor import path as noise_path
 from adv2e.kernel.photoreceptor import strip as photoreceptor
-from adv2e.kernel.photoreceptor.path import LANES
 from adv2e.kernel.quadrature import Rule
+from adv2e.kernel.strip_leak import leak_strip, leaks, lower_references
 from adv2e.kernel.work_queue import STRIP, claim
 
 _f = np.float32
@@ -41,27 +38,16 @@ class Scratch(NamedTuple):
     pixels: NDArray[np.int64]  # numbers of the lanes' pixels
     falls: NDArray[np.float64]
     means: NDArray[np.float64]
-    x: NDArray[np.float64]  # log intensity at the start of an interval, how far it goes, and the
-    dx: NDArray[np.float64]  # light at its end, where the interval is cut into pieces
-    light: NDArray[np.float32]
-    noise: photoreceptor.Scratch
-    path: noise_path.Path  # and of that of a few pixels,
-    places: NDArray[np.int64]  # which are at these places of the sorted strip
-    look: second_look.Look
-    nothing: NDArray[np.float64]  # places in a piece from which on pixels may fire: its start
-    whole: NDArray[np.float64]  # ends of the one substep of a piece in which nothing moves
+    cascade: cascade.Scratch
 
 
 def scratch() -> Scratch:
     """Return fresh memory."""
     pixels = np.zeros(STRIP + rows.WIDTH, np.int64)
-    falls, means, x, dx = (np.zeros(STRIP) for _ in range(4))
-    light = np.ones(STRIP, np.float32)
+    falls, means = np.zeros(STRIP), np.zeros(STRIP)
     return Scratch(
-        cascade.scratch(), rows.scratch(), pixels, falls, means, x, dx, light,
-        photoreceptor.scratch(), noise_path.path(), np.zeros(LANES, np.int64),
-        second_look.memory(), np.zeros(STRIP), np.arange(2.0),
-    )  # fmt: skip
+        cascade_screen.scratch(), rows.scratch(), pixels, falls, means, cascade.scratch()
+    )
 
 
 def covers(circuit: Circuit) -> bool:
@@ -106,7 +92,7 @@ def _open_strip(lo, count, start, circuit, state, strip, noise):
     for k in range(count):
         strip[screen.LIGHT_0 + k] = strip[screen.LIGHT_1 + k]
         strip[screen.LAG_0 + k] = state[per_pixel.LAG, lo + k]
-        strip[cascade.SECOND + k] = state[per_pixel.SECOND, lo + k]
+        strip[cascade_screen.SECOND + k] = state[per_pixel.SECOND, lo + k]
     for k in range(count):
         i = lo + k
         exchange.watch(k, i, state[per_pixel.X, i], start, circuit, state, strip)
@@ -116,7 +102,7 @@ def _open_strip(lo, count, start, circuit, state, strip, noise):
         strip[screen.LIGHT_0 + k] = 1.0
         strip[screen.LIGHT_1 + k] = 1.0
         strip[screen.LAG_0 + k] = 0.0
-        strip[cascade.SECOND + k] = 0.0
+        strip[cascade_screen.SECOND + k] = 0.0
         strip[screen.AWAY_0 + k] = 0.0
         strip[screen.FALL + k] = 0.0
         strip[screen.ON + k] = screen.NEVER
@@ -135,37 +121,8 @@ def _close_strip(lo, count, piece, circuit, state, strip, noise):
             state[per_pixel.NOISE_DRAW, lo + k] = piece
     for k in range(count):
         state[per_pixel.LAG, lo + k] = strip[screen.LAG_0 + k]
-        state[per_pixel.SECOND, lo + k] = strip[cascade.SECOND + k]
+        state[per_pixel.SECOND, lo + k] = strip[cascade_screen.SECOND + k]
         state[per_pixel.X, lo + k] = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
-
-
-@kernel
-def _mean_lights(strip, knee_dn, means):
-    """Mean light of each pixel over the interval [DN]."""
-    for k in range(STRIP):
-        i0, i1 = strip[screen.LIGHT_0 + k], strip[screen.LIGHT_1 + k]
-        dx = special.log_ratio32((i1 - i0) / (i1 + i0 + _f(1e-30)))
-        grown = i1 * (_f(1.0) - dx * special.psi32(-dx))
-        means[k] = grown if min(i0, i1) >= knee_dn else _f(0.5) * (i0 + i1)
-
-
-@kernel
-def _leak_strip(lo, count, length, circuit, state, strip, falls, means):
-    """Fall of the reference of a strip over the interval."""
-    if circuit.photo_leak > 0.0:
-        _mean_lights(strip, _f(circuit.slope * circuit.knee), means)
-    fill_falls(lo, count, length, means, circuit, state, falls)
-    for k in range(count):
-        strip[screen.FALL + k] = falls[k]
-
-
-@kernel
-def _lower_references(lo, count, state, strip, falls):
-    """Take the fall from the references of the pixels that are done."""
-    reference = state[per_pixel.REFERENCE, lo : lo + count]
-    for k in range(count):
-        fall = falls[k] if strip[screen.HIT + k] == 0.0 else 0.0
-        reference[k] -= fall
 
 
 @kernel
@@ -203,151 +160,18 @@ def _advance_strip(
 ):  # fmt: skip
     """Advance one strip over one interval, whose light is in LIGHT_0 and LIGHT_1."""
     strip, falls = scratch.strip, scratch.falls
-    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
-    if leaks:
-        _leak_strip(lo, count, length, circuit, state, strip, falls, scratch.means)
+    has_leak = leaks(circuit)
+    if has_leak:
+        leak_strip(lo, count, length, circuit, state, strip, falls, scratch.means)
     _screen(strip, _f(ta + length - start), length, circuit, rule)
     m = screen.flagged(strip, scratch.pixels)
     if m > 0:
         n, keys, times = _solve_flagged(
             lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
         )
-    if leaks:
-        _lower_references(lo, count, state, strip, falls)
+    if has_leak:
+        lower_references(lo, count, state, strip, falls)
     screen.step_on(strip)
-    return n, keys, times
-
-
-@kernel
-def _begin_pieces(strip, circuit, scratch):
-    """Keep how the light goes from LIGHT_0 to LIGHT_1."""
-    for k in range(STRIP):
-        x0 = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
-        x1 = exchange.log_of(np.float64(strip[screen.LIGHT_1 + k]), circuit)
-        scratch.x[k], scratch.dx[k] = x0, x1 - x0
-        scratch.light[k] = strip[screen.LIGHT_1 + k]
-
-
-@kernel
-def _end_piece(share, strip, circuit, scratch):
-    """Row LIGHT_1 at `share` of the interval."""
-    for k in range(STRIP):
-        x = scratch.x[k] + scratch.dx[k] * share
-        light = special.exp(x)
-        light = light if x >= circuit.knee else circuit.slope * x
-        strip[screen.LIGHT_1 + k] = _f(light) if share < 1.0 else scratch.light[k]
-
-
-@kernel
-def _solve_alone(
-    lo, m, ta, length, start, before, substeps, places, levels, t_base, circuit, samples, depth,
-    state, scratch, pixels, found, keys, times, n,
-):  # fmt: skip
-    """Solve m pixels over a piece one by one; `samples` and `depth`: of their noise."""
-    j, s = np.int64(0), 0.0
-    while j < m:
-        n, j, s = alone.solve_flagged(
-            lo, j, m, s, ta, length, start, before, substeps, places, levels, t_base, circuit,
-            samples, depth, scratch.path, state, scratch.strip, pixels, found, keys, times, n,
-        )  # fmt: skip
-        if j < m:
-            keys, times = with_room(keys, times, n, n + 1)
-    return n, keys, times
-
-
-@kernel
-def _solve_beside_noise(
-    lo, number, which, ta, length, start, before, substeps, places, levels, t_base, circuit,
-    laws, state, scratch, keys, times, n,
-):  # fmt: skip
-    """Solve the flagged pixels of a strip over piece `number` of all, which has law `which`."""
-    strip, noise, path, pixels = scratch.strip, scratch.noise, scratch.path, scratch.pixels
-    factor = _f(min(levels[0], levels[1]))
-    for g in range(laws.samples.shape[1]):
-        samples, depth, p = laws.samples[which, g], laws.levels[which, g], noise.ends[g]
-        while p < noise.ends[g + 1]:
-            size = np.int64(0)
-            while p < noise.ends[g + 1] and size < LANES:
-                k = noise.order[p]
-                scratch.places[size], pixels[size] = p, k
-                size += 1 if strip[screen.HIT + k] > 0.0 else 0
-                p += 1
-            if size == 0:
-                break
-            noise_path.sample(
-                size, scratch.places, number, samples, depth, circuit, laws.fine[which], noise, path
-            )
-            second_look.find_places(
-                size, pixels, substeps, places, length, samples, depth, factor, circuit, strip,
-                path, scratch.look,
-            )  # fmt: skip
-            n, keys, times = _solve_alone(
-                lo, size, ta, length, start, before, substeps, places, levels, t_base, circuit,
-                samples, depth, state, scratch, pixels, scratch.look.found, keys, times, n,
-            )  # fmt: skip
-    return n, keys, times
-
-
-@kernel
-def _advance_cascade(
-    lo, count, start, ta, length, f, number, still, circuit, plan, t_base, state, scratch, keys,
-    times, n,
-):  # fmt: skip
-    """Advance one strip over interval f, piece by piece; `still`: nothing moves or lags in it.
-
-    number : of its first piece, of all in the recording
-    """
-    (plan,) = borrowed(plan)
-    strip, falls, pixels, noise = scratch.strip, scratch.falls, scratch.pixels, scratch.noise
-    laws, cut = plan.laws, plan.cut[f]
-    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
-    is_noisy = circuit.noise_rms > 0.0
-    pieces = plan.pieces[cut]
-    first, rise = plan.factors[f], plan.factors[f + 1] - plan.factors[f]
-    if pieces > 1 and not still:
-        _begin_pieces(strip, circuit, scratch)
-    for p in range(pieces):
-        substeps, places, which = plan.substeps[cut, p], plan.places[cut, p], plan.law[cut, p]
-        a, b = plan.ends[cut, p], plan.ends[cut, p + 1]
-        t0, piece = ta + a * length, (b - a) * length
-        levels = first + rise * a, first + rise * b
-        if pieces > 1 and not still:
-            _end_piece(b, strip, circuit, scratch)
-        if leaks:
-            _leak_strip(lo, count, piece, circuit, state, strip, falls, scratch.means)
-        if still:
-            substeps, places = np.int64(1), scratch.whole
-            cascade.stay(strip)
-        else:
-            cascade.follow(strip, substeps, places, piece, circuit, plan.weights[cut, p])
-        on, off, factor = screen.ON, screen.OFF, _f(min(levels[0], levels[1]))
-        if is_noisy:
-            photoreceptor.draw(lo, count, number + p, which, still, circuit, laws, strip, noise)
-            cascade.leave_room(strip, factor, noise.rows)
-            on, off, factor = cascade.ON, cascade.OFF, _f(1.0)
-        end = _f(t0 + piece - start)
-        if still:
-            cascade.flag_still(strip, end, on, off, factor)
-        else:
-            screen.flag(
-                strip, end, _f(circuit.dark * piece), _f(circuit.per_dn * piece),
-                _f(circuit.slope * circuit.knee), cascade.SECOND,
-                cascade.SECOND + substeps * screen.STRIDE, on, off, factor, cascade.LARGEST,
-            )  # fmt: skip
-        if is_noisy:
-            n, keys, times = _solve_beside_noise(
-                lo, number + p, which, t0, piece, start, a / (b - a), substeps, places, levels,
-                t_base, circuit, laws, state, scratch, keys, times, n,
-            )  # fmt: skip
-        else:
-            m = screen.flagged(strip, pixels)
-            n, keys, times = _solve_alone(
-                lo, m, t0, piece, start, a / (b - a), substeps, places, levels, t_base, circuit,
-                np.int64(1), np.int64(0), state, scratch, pixels, scratch.nothing, keys, times, n,
-            )  # fmt: skip
-        if leaks:
-            _lower_references(lo, count, state, strip, falls)
-        cascade.step_on(strip, substeps, still)
     return n, keys, times
 
 
@@ -396,11 +220,11 @@ def _strip(
     floor = 0.0 if circuit.slope > 0.0 else circuit.floor
     start = starts[0]
     load(frames, before[0], share[0], lo, floor, light)
-    _open_strip(lo, count, start, circuit, state, strip, scratch.noise)
+    _open_strip(lo, count, start, circuit, state, strip, scratch.cascade.noise)
     number = np.int64(state[per_pixel.NOISE_DRAW, lo])
-    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
+    has_leak = leaks(circuit)
     intervals = starts.shape[0] - 1
-    settled, resting = cascade.is_settled(strip), False
+    settled, resting = cascade_screen.is_settled(strip), False
     f = np.int64(0)
     while f < intervals:
         still = _rests(frames, f, before, share, lo, count)
@@ -409,8 +233,8 @@ def _strip(
             still = screen.is_still(strip)
         if still and settled and may_rest:
             if not resting:
-                if leaks:
-                    _leak_strip(lo, count, 1.0, circuit, state, strip, scratch.falls, scratch.means)
+                if has_leak:
+                    leak_strip(lo, count, 1.0, circuit, state, strip, scratch.falls, scratch.means)
                 static_pixels.begin_rest(_f(starts[f] - start), strip)
                 resting = True
             last = f + 1
@@ -421,7 +245,7 @@ def _strip(
             )
             f = last
             continue
-        if resting and leaks:
+        if resting and has_leak:
             static_pixels.end_rest(lo, count, circuit, state, strip)
         resting = False
         ta, length = starts[f], starts[f + 1] - starts[f]
@@ -432,14 +256,14 @@ def _strip(
                 keys, times, n,
             )  # fmt: skip
         else:
-            n, keys, times = _advance_cascade(
+            n, keys, times = cascade.advance(
                 lo, count, start, ta, length, f, number, still and settled, circuit, plan, t_base,
                 state, scratch, keys, times, n,
             )  # fmt: skip
             number += plan.pieces[plan.cut[f]]
-        settled = still and (settled or cascade.is_settled(strip))
+        settled = still and (settled or cascade_screen.is_settled(strip))
         f += 1
-    _close_strip(lo, count, number, circuit, state, strip, scratch.noise)
+    _close_strip(lo, count, number, circuit, state, strip, scratch.cascade.noise)
     return n, keys, times
 
 

@@ -1,0 +1,182 @@
+"""A strip advances through the cascade: over an interval, piece by piece."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.compiled import kernel
+from adv2e.kernel import screen, special
+from adv2e.kernel.borrowing import borrowed
+from adv2e.kernel.cascade import pixel as alone
+from adv2e.kernel.cascade import screen as cascade
+from adv2e.kernel.cascade import second_look
+from adv2e.kernel.event_buffer import with_room
+from adv2e.kernel.lanes import exchange
+from adv2e.kernel.photoreceptor import path as noise_path
+from adv2e.kernel.photoreceptor import strip as photoreceptor
+from adv2e.kernel.photoreceptor.path import LANES
+from adv2e.kernel.screen import STRIDE
+from adv2e.kernel.strip_leak import leak_strip, leaks, lower_references
+from adv2e.kernel.work_queue import STRIP
+
+_f = np.float32
+
+
+class Scratch(NamedTuple):
+    """Memory for the cascade of whoever works on a strip."""
+
+    x: NDArray[np.float64]  # log intensity at the start of an interval, how far it goes, and the
+    dx: NDArray[np.float64]  # light at its end, where the interval is cut into pieces
+    light: NDArray[np.float32]
+    nothing: NDArray[np.float64]  # places in a piece from which on pixels may fire: its start
+    whole: NDArray[np.float64]  # ends of the one substep of a piece in which nothing moves
+    noise: photoreceptor.Scratch
+    path: noise_path.Path  # noise of a few pixels,
+    places: NDArray[np.int64]  # which are at these places of the sorted strip
+    look: second_look.Look
+
+
+def scratch() -> Scratch:
+    """Return fresh memory."""
+    x, dx, nothing = (np.zeros(STRIP) for _ in range(3))
+    return Scratch(
+        x, dx, np.ones(STRIP, np.float32), nothing, np.arange(2.0), photoreceptor.scratch(),
+        noise_path.path(), np.zeros(LANES, np.int64), second_look.memory(),
+    )  # fmt: skip
+
+
+@kernel
+def _begin_pieces(strip, circuit, scratch):
+    """Keep how the light goes from LIGHT_0 to LIGHT_1."""
+    for k in range(STRIP):
+        x0 = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
+        x1 = exchange.log_of(np.float64(strip[screen.LIGHT_1 + k]), circuit)
+        scratch.x[k], scratch.dx[k] = x0, x1 - x0
+        scratch.light[k] = strip[screen.LIGHT_1 + k]
+
+
+@kernel
+def _end_piece(share, strip, circuit, scratch):
+    """Row LIGHT_1 at `share` of the interval."""
+    for k in range(STRIP):
+        x = scratch.x[k] + scratch.dx[k] * share
+        light = special.exp(x)
+        light = light if x >= circuit.knee else circuit.slope * x
+        strip[screen.LIGHT_1 + k] = _f(light) if share < 1.0 else scratch.light[k]
+
+
+@kernel
+def _solve_alone(
+    lo, m, ta, length, start, before, substeps, places, levels, t_base, circuit, samples, depth,
+    state, scratch, pixels, found, keys, times, n,
+):  # fmt: skip
+    """Solve m pixels over a piece one by one; `samples` and `depth`: of their noise."""
+    j, s = np.int64(0), 0.0
+    while j < m:
+        n, j, s = alone.solve_flagged(
+            lo, j, m, s, ta, length, start, before, substeps, places, levels, t_base, circuit,
+            samples, depth, scratch.cascade.path, state, scratch.strip, pixels, found, keys, times,
+            n,
+        )  # fmt: skip
+        if j < m:
+            keys, times = with_room(keys, times, n, n + 1)
+    return n, keys, times
+
+
+@kernel
+def _solve_beside_noise(
+    lo, number, which, ta, length, start, before, substeps, places, levels, t_base, circuit,
+    laws, state, scratch, keys, times, n,
+):  # fmt: skip
+    """Solve the flagged pixels of a strip over piece `number` of all, which has law `which`."""
+    strip, pixels, own = scratch.strip, scratch.pixels, scratch.cascade
+    noise, path = own.noise, own.path
+    factor = _f(min(levels[0], levels[1]))
+    for g in range(laws.samples.shape[1]):
+        samples, depth, p = laws.samples[which, g], laws.levels[which, g], noise.ends[g]
+        while p < noise.ends[g + 1]:
+            size = np.int64(0)
+            while p < noise.ends[g + 1] and size < LANES:
+                k = noise.order[p]
+                own.places[size], pixels[size] = p, k
+                size += 1 if strip[screen.HIT + k] > 0.0 else 0
+                p += 1
+            if size == 0:
+                break
+            noise_path.sample(
+                size, own.places, number, samples, depth, circuit, laws.fine[which], noise, path
+            )
+            second_look.find_places(
+                size, pixels, substeps, places, length, samples, depth, factor, circuit, strip,
+                path, own.look,
+            )  # fmt: skip
+            n, keys, times = _solve_alone(
+                lo, size, ta, length, start, before, substeps, places, levels, t_base, circuit,
+                samples, depth, state, scratch, pixels, own.look.found, keys, times, n,
+            )  # fmt: skip
+    return n, keys, times
+
+
+@kernel
+def advance(
+    lo, count, start, ta, length, f, number, still, circuit, plan, t_base, state, scratch, keys,
+    times, n,
+):  # fmt: skip
+    """Advance one strip over interval f, piece by piece; `still`: nothing moves or lags in it.
+
+    number : of its first piece, of all in the recording
+    """
+    (plan,) = borrowed(plan)
+    strip, falls, means, pixels = scratch.strip, scratch.falls, scratch.means, scratch.pixels
+    own, laws, cut = scratch.cascade, plan.laws, plan.cut[f]
+    noise, has_leak, is_noisy = own.noise, leaks(circuit), circuit.noise_rms > 0.0
+    pieces = plan.pieces[cut]
+    first, rise = plan.factors[f], plan.factors[f + 1] - plan.factors[f]
+    if pieces > 1 and not still:
+        _begin_pieces(strip, circuit, own)
+    for p in range(pieces):
+        substeps, places, which = plan.substeps[cut, p], plan.places[cut, p], plan.law[cut, p]
+        a, b = plan.ends[cut, p], plan.ends[cut, p + 1]
+        t0, piece = ta + a * length, (b - a) * length
+        levels = first + rise * a, first + rise * b
+        if pieces > 1 and not still:
+            _end_piece(b, strip, circuit, own)
+        if has_leak:
+            leak_strip(lo, count, piece, circuit, state, strip, falls, means)
+        if still:
+            substeps, places = np.int64(1), own.whole
+            cascade.stay(strip)
+        else:
+            cascade.follow(strip, substeps, places, piece, circuit, plan.weights[cut, p])
+        on, off, factor = screen.ON, screen.OFF, _f(min(levels[0], levels[1]))
+        if is_noisy:
+            photoreceptor.draw(lo, count, number + p, which, still, circuit, laws, strip, noise)
+            cascade.leave_room(strip, factor, noise.rows)
+            on, off, factor = cascade.ON, cascade.OFF, _f(1.0)
+        end = _f(t0 + piece - start)
+        if still:
+            cascade.flag_still(strip, end, on, off, factor)
+        else:
+            screen.flag(
+                strip, end, _f(circuit.dark * piece), _f(circuit.per_dn * piece),
+                _f(circuit.slope * circuit.knee), cascade.SECOND,
+                cascade.SECOND + substeps * STRIDE, on, off, factor, cascade.LARGEST,
+            )  # fmt: skip
+        if is_noisy:
+            n, keys, times = _solve_beside_noise(
+                lo, number + p, which, t0, piece, start, a / (b - a), substeps, places, levels,
+                t_base, circuit, laws, state, scratch, keys, times, n,
+            )  # fmt: skip
+        else:
+            m = screen.flagged(strip, pixels)
+            n, keys, times = _solve_alone(
+                lo, m, t0, piece, start, a / (b - a), substeps, places, levels, t_base, circuit,
+                np.int64(1), np.int64(0), state, scratch, pixels, own.nothing, keys, times, n,
+            )  # fmt: skip
+        if has_leak:
+            lower_references(lo, count, state, strip, falls)
+        cascade.step_on(strip, substeps, still)
+    return n, keys, times
