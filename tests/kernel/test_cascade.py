@@ -56,11 +56,15 @@ def test_dead_time_and_leak(hz):
 
 
 @pytest.mark.parametrize(
-    ("cutoff", "dark"), [(20.0, 1.0), (3000.0, 200.0), (300.0, 0.0), (40_000.0, 20.0)]
-)
-def test_whichever_pole_is_slower(cutoff, dark):
+    ("cutoff", "dark", "hz"),
+    [
+        (20.0, 1.0, 400.0), (3000.0, 200.0, 400.0), (300.0, 0.0, 400.0), (40_000.0, 20.0, 400.0),
+        (10_000.0, 200.0, 10.0),
+    ],
+)  # fmt: skip
+def test_whichever_pole_is_slower(cutoff, dark, hz):
     stimulus = stimuli.texture(pixels=16, frames=5, fps=30.0, L=10)
-    circuit, sections = second_pole(400.0, cutoff_hz=cutoff, dark_cutoff_hz=dark)
+    circuit, sections = second_pole(hz, cutoff_hz=cutoff, dark_cutoff_hz=dark)
     sections["low_pass"] = LowPass(cutoff_hz=cutoff, dark_cutoff_hz=dark)
     agreement = agreement_with_ode(stimulus, circuit, sections)
     assert agreement.count_b > 8
@@ -179,6 +183,24 @@ def test_curves_reach_zero_where_dense_samples_do():
         assert values[inside].max(initial=-9) <= max(ends[0][0], ends[1][0]) + room
         assert values[inside].min(initial=9) >= min(ends[0][0], ends[1][0]) - room
     assert reached > 100
+
+
+@pytest.mark.parametrize("a", [0.05, 0.8])
+@pytest.mark.parametrize("b", [1e-6, 1e-4, 0.009, 0.011, 0.3, 2.0, 40.0])
+def test_lag_of_a_second_pole_slow_or_fast(a, b):
+    """Behind an exponential lag of the first one, a in the substep, and a ramp: Gauss's rule."""
+    d, q0, swing = 0.01, -0.06, 0.05
+    u, slope, bend = (
+        lambda t, k=k: (-a) ** k * swing * np.exp(-a * t) - (d / a if k == 0 else 0.0)
+        for k in range(3)
+    )
+    found = curve.lag_curve(u(0), slope(0), bend(0), u(1), slope(1), bend(1), q0, d, b)
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    for t in np.linspace(0.0, 1.0, 11):
+        at = 0.5 * t * (nodes + 1.0)
+        taken = (b * u(at) - d) * np.exp(-b * (t - at))
+        expected = q0 * math.exp(-b * t) + 0.5 * t * (weights @ taken)
+        assert curve.value(found, t) == pytest.approx(expected, abs=2e-7)
 
 
 @pytest.mark.parametrize("b", [1e-3, 0.3, 2.0, 40.0, 3000.0])

@@ -17,6 +17,9 @@ NOWHERE = 2.0
 _NARROW = 1e-7
 """Part of a substep within which two crossings are not told apart."""
 
+_SLOW = 0.01
+"""Corner in a substep below which the exact answer is a difference of large numbers."""
+
 _NEWTON = 30
 _SETTLED = 1e-4
 """Step of Newton's method after which the next one is below 1e-8: half its square at most, as the
@@ -50,6 +53,14 @@ def lag_curve(u0, slope0, bend0, u1, slope1, bend1, q0, d, b):
     p5 = 6.0 * rise - 3.0 * turn + 0.5 * bend
     if b == 0.0:
         return Curve(p0, p1, p2, p3, p4, p5, 0.0, 0.0)
+    if b < _SLOW:
+        # the series, whose seventh term is taken for one like the sixth
+        s1 = b * (p0 - q0) - d
+        s2 = b * (p1 - s1) / 2.0
+        s3 = b * (p2 - s2) / 3.0
+        s4 = b * (p3 - s3) / 4.0
+        s5 = b * (p4 - s4) / 5.0
+        return Curve(q0, s1, s2, s3, s4, s5 + b * (p5 - s5) / 6.0, 0.0, 0.0)
     lag = 1.0 / b
     p4 -= 5.0 * p5 * lag
     p3 -= 4.0 * p4 * lag

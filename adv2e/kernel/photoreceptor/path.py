@@ -37,6 +37,7 @@ _KNOWN = LOW + LANES
 """1 where what is between a sample and the next is drawn, a row for each sample."""
 
 _BY = _KNOWN + MOST_CELLS * LANES
+_FIRST_BY = _BY // LANES
 _MIDDLE = _BY + COARSE * LANES
 """Columns of the tables."""
 
@@ -74,11 +75,16 @@ def seen_from(circuit):
 
 
 @kernel
+def _column(column, size, rows):
+    return rows[column * LANES : column * LANES + size]
+
+
+@kernel
 def _next_sample(size, at, after, z, rows):
     """Row `after` of NOISE, the sample that follows row `at`, behind one pole."""
     n0, n1 = rows[at : at + size], rows[after : after + size]
-    keep = rows[_BY + law.KEPT_N * LANES : _BY + (law.KEPT_N + 1) * LANES]
-    by_n = rows[_BY + law.BY_N * LANES : _BY + (law.BY_N + 1) * LANES]
+    keep = _column(_FIRST_BY + law.KEPT_N, size, rows)
+    by_n = _column(_FIRST_BY + law.BY_N, size, rows)
     for c in range(size):
         n1[c] = keep[c] * n0[c] + by_n[c] * z[c]
 
@@ -88,20 +94,16 @@ def _next_sample_of_two(size, at, after, z, v, rows):
     """Rows `after`, the sample that follows rows `at`, behind two poles."""
     n0, n1 = rows[at : at + size], rows[after : after + size]
     s0, s1 = rows[SEEN + at : SEEN + at + size], rows[SEEN + after : SEEN + after + size]
-    keep = rows[_BY + law.KEPT_N * LANES : _BY + (law.KEPT_N + 1) * LANES]
-    by_n = rows[_BY + law.BY_N * LANES : _BY + (law.BY_N + 1) * LANES]
-    given = rows[_BY + law.GIVEN * LANES : _BY + (law.GIVEN + 1) * LANES]
-    keep_s = rows[_BY + law.KEPT_S * LANES : _BY + (law.KEPT_S + 1) * LANES]
-    by_n_s = rows[_BY + law.BY_N_S * LANES : _BY + (law.BY_N_S + 1) * LANES]
-    by_s = rows[_BY + law.BY_S * LANES : _BY + (law.BY_S + 1) * LANES]
+    keep = _column(_FIRST_BY + law.KEPT_N, size, rows)
+    by_n = _column(_FIRST_BY + law.BY_N, size, rows)
+    given = _column(_FIRST_BY + law.GIVEN, size, rows)
+    keep_s = _column(_FIRST_BY + law.KEPT_S, size, rows)
+    by_n_s = _column(_FIRST_BY + law.BY_N_S, size, rows)
+    by_s = _column(_FIRST_BY + law.BY_S, size, rows)
     for c in range(size):
-        n1[c] = keep[c] * n0[c] + by_n[c] * z[c]
-        s1[c] = given[c] * n0[c] + keep_s[c] * s0[c] + by_n_s[c] * z[c] + by_s[c] * v[c]
-
-
-@kernel
-def _column(column, size, rows):
-    return rows[column * LANES : column * LANES + size]
+        n1[c], s1[c] = strip.next_of_two(
+            n0[c], s0[c], keep[c], given[c], keep_s[c], by_n[c], by_n_s[c], by_s[c], z[c], v[c]
+        )
 
 
 @kernel
@@ -239,16 +241,8 @@ def bounds_of_stretch(j, c, levels, seen, rows):
 @kernel
 def bound_stretch(size, j, levels, seen, high, low, rows):
     """Fill `high` and `low` with bounds of what is seen from sample j to the next; (LANES,)."""
-    at, after = (j << levels) * LANES, ((j + 1) << levels) * LANES
-    n0, n1 = rows[at : at + size], rows[after : after + size]
-    s0, s1 = rows[seen + at : seen + at + size], rows[seen + after : seen + after + size]
-    bend = rows[_BY + law.BEND * LANES : _BY + (law.BEND + 1) * LANES]
-    pull = rows[_BY + law.PULL * LANES : _BY + (law.PULL + 1) * LANES]
-    reach = rows[_BY + law.REACH * LANES : _BY + (law.REACH + 1) * LANES]
     for c in range(size):
-        a, b = s0[c], s1[c]
-        most, least = strip.bounds(a, n0[c] - a, b, n1[c] - b, bend[c], pull[c])
-        high[c], low[c] = most + reach[c], least - reach[c]
+        high[c], low[c] = bounds_of_stretch(j, c, levels, seen, rows)
 
 
 @kernel

@@ -108,6 +108,12 @@ def put_back(count, scratch):
 
 
 @kernel
+def next_of_two(n, s, keep, given, keep_s, by_n, by_n_s, by_s, z, v):
+    """Return what noise n and s become behind two poles, by two normal numbers; see the law."""
+    return keep * n + by_n * z, given * n + keep_s * s + by_n_s * z + by_s * v
+
+
+@kernel
 def _sample(first, size, normals, rows):
     """Advance sorted pixels from `first` on to the next sample, behind one pole."""
     noise = rows[NOISE_1 + first : NOISE_1 + first + size]
@@ -140,8 +146,9 @@ def _sample_of_two(first, size, z, v, rows):
     bend, pull = rows[BY + law.BEND * STRIDE + first :], rows[BY + law.PULL * STRIDE + first :]
     for c in range(size):
         n0, s0 = noise[c], seen[c]
-        n1 = keep[c] * n0 + by_n[c] * z[c]
-        s1 = given[c] * n0 + keep_s[c] * s0 + by_n_s[c] * z[c] + by_s[c] * v[c]
+        n1, s1 = next_of_two(
+            n0, s0, keep[c], given[c], keep_s[c], by_n[c], by_n_s[c], by_s[c], z[c], v[c]
+        )
         noise[c] = n1
         seen[c] = s1
         high, low = bounds(s0, n0 - s0, s1, n1 - s1, bend[c], pull[c])
