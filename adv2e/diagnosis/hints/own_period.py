@@ -85,8 +85,8 @@ class OwnPeriod:
         """Return the keys of leaps upwards or downwards, and back.
 
         None: one burst is missing, or it is sooner from the other to this one.  Leaps the other
-        way, and back after the rest of the period, are the same signal.  Told so, fits would begin
-        at time constants of some periods, far from those that pulses have, and end on the way.
+        way, and back after the rest of the period, are the same signal, with starts of its time
+        constant that are far from those that pulses have.
         """
         first, second = (self.on, self.off) if up else (self.off, self.on)
         if first is None or second is None or first is not self.first:
