@@ -89,12 +89,8 @@ def _leave_room(size, a, b, room, pixels, places, strip, rows):
     begin, end, span = _f(places[a]), _f(places[b]), _f(places[b] - places[a])
     for c in range(size):
         k = pixels[c]
-        u0, q0, u1, q1 = (
-            strip[first + k],
-            strip[second + k],
-            strip[first + on + k],
-            strip[second + on + k],
-        )
+        u0, u1 = strip[first + k], strip[first + on + k]
+        q0, q1 = strip[second + k], strip[second + on + k]
         d = rows[_DX + c] * span
         # as in substep.hull
         turns = u0 * u1 < _ZERO
@@ -139,10 +135,7 @@ def _look_at_cells(size, first, count, shift, scale, third, seen, rows, up, down
         s0 = rows[seen + at : seen + at + size]
         s1 = rows[seen + at + LANES : seen + at + LANES + size]
         for c in range(size):
-            # the Bezier points of the cubic
-            a, b = s0[c], s1[c]
-            d, e = a + third * (n0[c] - a), b - third * (n1[c] - b)
-            high, low = max(a, b, d, e), min(a, b, d, e)
+            high, low = noise.bounds_in_cell(n0[c], s0[c], n1[c], s1[c], third)
             hit = (high >= up[c]) | (-low >= down[c])
             found[c] = place if hit & (found[c] > place) else found[c]
 

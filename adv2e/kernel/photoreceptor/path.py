@@ -332,10 +332,20 @@ def cubic_of(r, c, start, width, corner, seen, rows):
 
 
 @kernel
-def bounds_of_cell(r, c, corner, seen, rows):
-    """Bounds of what is seen in cell r of lane c: those of the Bezier points of its cubic."""
+def bounds_in_cell(n0, s0, n1, s1, third):
+    """Bounds of what is seen in a cell: those of the Bezier points of its cubic.
+
+    n0, s0, n1, s1 : noise behind the first pole and as seen, at both ends
+    third : of the corner of the second pole in the cell [rad]
+    """
+    a, b = s0 + third * (n0 - s0), s1 - third * (n1 - s1)
+    return max(s0, s1, a, b), min(s0, s1, a, b)
+
+
+@kernel
+def bounds_of_cell(r, c, third, seen, rows):
+    """Bounds of what is seen in cell r of lane c."""
     at, after = r * LANES + c, (r + 1) * LANES + c
-    s0, s1 = rows[seen + at], rows[seen + after]
-    b0 = s0 + corner * (rows[NOISE + at] - s0)
-    b1 = s1 - corner * (rows[NOISE + after] - s1)
-    return max(s0, s1, b0, b1), min(s0, s1, b0, b1)
+    return bounds_in_cell(
+        rows[NOISE + at], rows[seen + at], rows[NOISE + after], rows[seen + after], third
+    )
