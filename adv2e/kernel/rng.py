@@ -66,26 +66,8 @@ def _round(c0, c1, c2, c3, k0, k1):
 
 
 @inlined
-def philox(c0, c1, c2, c3, k0, k1):
-    """Philox4x32-10: four 32-bit words (in uint64) from a counter and a key of 32-bit words.
-
-    Written out so that a loop over pixels vectorises.
-    """
-    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
-    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 & _LOW, k1 + _W1 & _LOW)
-    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _2 & _LOW, k1 + _W1 * _2 & _LOW)
-    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _3 & _LOW, k1 + _W1 * _3 & _LOW)
-    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _4 & _LOW, k1 + _W1 * _4 & _LOW)
-    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _5 & _LOW, k1 + _W1 * _5 & _LOW)
-    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _6 & _LOW, k1 + _W1 * _6 & _LOW)
-    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _7 & _LOW, k1 + _W1 * _7 & _LOW)
-    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _8 & _LOW, k1 + _W1 * _8 & _LOW)
-    return _round(c0, c1, c2, c3, k0 + _W0 * _9 & _LOW, k1 + _W1 * _9 & _LOW)
-
-
-@inlined
 def philox_7(c0, c1, c2, c3, k0, k1):
-    """Philox4x32-7, the fewest rounds that pass BigCrush (Salmon et al., table 2)."""
+    """Philox4x32-7, the fewest rounds that pass BigCrush (Salmon et al.), as :func:`philox`."""
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 & _LOW, k1 + _W1 & _LOW)
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _2 & _LOW, k1 + _W1 * _2 & _LOW)
@@ -93,6 +75,18 @@ def philox_7(c0, c1, c2, c3, k0, k1):
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _4 & _LOW, k1 + _W1 * _4 & _LOW)
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _5 & _LOW, k1 + _W1 * _5 & _LOW)
     return _round(c0, c1, c2, c3, k0 + _W0 * _6 & _LOW, k1 + _W1 * _6 & _LOW)
+
+
+@inlined
+def philox(c0, c1, c2, c3, k0, k1):
+    """Philox4x32-10: four 32-bit words (in uint64) from a counter and a key of 32-bit words.
+
+    Written out so that a loop over pixels vectorises.
+    """
+    c0, c1, c2, c3 = philox_7(c0, c1, c2, c3, k0, k1)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _7 & _LOW, k1 + _W1 * _7 & _LOW)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0 + _W0 * _8 & _LOW, k1 + _W1 * _8 & _LOW)
+    return _round(c0, c1, c2, c3, k0 + _W0 * _9 & _LOW, k1 + _W1 * _9 & _LOW)
 
 
 @kernel
