@@ -1,10 +1,12 @@
-"""Networks that interpolate between two frames, and the files of ONNX that hold them.
+"""Networks: two that interpolate between frames, as files of ONNX, and those that events go into.
 
-Every file keeps the same contract.  Its inputs are ``img0`` and ``img1`` of shape (1, channels,
-rows, columns) in [0, 1], and ``timestep`` of shape (1,), strictly between 0 and 1: 0 is the instant
-of ``img0``.  Its output is ``output``, shaped like ``img0``.  All are float32.  Rows and columns
-are free, but must be multiples of ``multiple`` in the metadata.  ``encoding`` there says what the
-numbers are: ``srgb``, as in video files.  ``source`` and ``sha256`` name the file of the weights.
+FireNet (:mod:`networks.firenet`) and others are built where they are used.  RIFE and Super SloMo
+are exported, and every file of ONNX keeps the same contract.  Its inputs are ``img0`` and ``img1``
+of shape (1, channels, rows, columns) in [0, 1], and ``timestep`` of shape (1,), strictly between 0
+and 1: 0 is the instant of ``img0``.  Its output is ``output``, shaped like ``img0``.  All are
+float32.  Rows and columns are free, but must be multiples of ``multiple`` in the metadata.
+``encoding`` there says what the numbers are: ``srgb``, as in video files.  ``source`` and
+``sha256`` name the file of the weights.
 """
 
 from __future__ import annotations
@@ -40,3 +42,17 @@ def late(name: str) -> Any:
         return importlib.import_module(f"networks.{name}")
     except ImportError as error:
         raise MissingExtraError("the export of a network", "torch") from error
+
+
+def torch_module() -> Any:
+    """Return PyTorch.
+
+    Raises
+    ------
+    MissingExtraError
+        It is not installed.
+    """
+    try:
+        return importlib.import_module("torch")
+    except ImportError as error:
+        raise MissingExtraError("a network of PyTorch", "experiments") from error

@@ -2,8 +2,8 @@
 """How near configurations are to real cameras, by several measures together.
 
 DATA holds recordings with frames (folders in the DAVIS240C layout, or with ``events.npz``), WEIGHTS
-those of :mod:`real.networks`.  The frames go in at their own times; what comes out is judged on the
-second half of the frame intervals.  Nothing is fitted to that half.  Prints a Markdown table a
+those of :mod:`networks.firenet`.  The frames go in at their own times; what comes out is judged on
+the second half of the frame intervals.  Nothing is fitted to that half.  Prints a Markdown table a
 recording, and with ``--match-totals`` a second one that takes out the difference in thresholds::
 
     python scripts/real/judge.py real weights --match-totals -o judged.md
@@ -45,6 +45,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 import cv2
 import numpy as np
+from networks.firenet import NETWORKS, Images, Network
 from numpy.typing import NDArray
 from writing import one_line_errors, output_option, table, threads_option, write_report
 
@@ -54,8 +55,8 @@ from adv2e.config import Config, load_config
 from adv2e.errors import DataError
 from adv2e.events import Events, Window, cut, empty_events
 from real.compare import Case, with_totals
+from real.measures import likeness, similarity
 from real.model import SCORE, Bench
-from real.networks import NETWORKS, Images, Network, likeness, similarity
 from real.recording import Real, halves, read
 
 CONFIGS = "ideal,adv2e,paper,v2e,vid2e,davis240c,davis346"

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from networks.firenet import NETWORKS, Network, firenet
 from real import judge
 from real.compare import Case
-from real.networks import NETWORKS, Network, layers, likeness, similarity
+from real.measures import likeness, similarity
 from real.recording import read
 from written_recordings import write_recording
 
@@ -148,7 +149,7 @@ def test_without_pytorch_one_line_says_so(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "torch", None)
     result = CliRunner().invoke(judge.main, [str(tmp_path), str(tmp_path)])
     assert result.exit_code == 1
-    assert "torch" in result.stderr
+    assert "adv2e[experiments]" in result.stderr
     assert len(result.stderr.splitlines()) == 1
 
 
@@ -160,7 +161,7 @@ def checkpoint(folder, name, state):
 def of_chance():
     torch = pytest.importorskip("torch", reason=WEIGHTS_NEEDED)
     torch.manual_seed(0)
-    state = layers(torch).state_dict()
+    state = firenet().state_dict()
     state["pred.bias"] += 0.5  # so that images are grey, not clipped
     return state
 
