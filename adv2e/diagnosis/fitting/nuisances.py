@@ -49,8 +49,6 @@ def fit_thresholds(
 ) -> tuple[Config, float]:
     """Return the declared model with thresholds that match the totals, and what they miss by.
 
-    By the secant method on logarithms.
-
     Parameters
     ----------
     simulate : callable
@@ -74,18 +72,50 @@ def fit_thresholds(
     """
     pixel = declared.pixel
 
-    def with_levels(logs: NDArray[Any]) -> Config:
-        on, off = np.exp(logs).tolist()
-        return replace(
-            declared, pixel=replace(pixel, thresholds=replace(pixel.thresholds, on=on, off=off))
-        )
+    def with_levels(on: float, off: float) -> Config:
+        levels = replace(pixel.thresholds, on=on, off=off)
+        return replace(declared, pixel=replace(pixel, thresholds=levels))
 
+    levels, miss = match_totals(
+        lambda on, off: simulate(with_levels(on, off)),
+        (pixel.thresholds.on, pixel.thresholds.off), measured,
+        within=(FLOOR, LARGEST), tolerance=tolerance, rounds=rounds,
+    )  # fmt: skip
+    return with_levels(*levels), miss
+
+
+def match_totals(
+    simulate: Callable[[float, float], tuple[int, int]],
+    start: tuple[float, float],
+    measured: tuple[int, int],
+    *,
+    within: tuple[float, float],
+    tolerance: float = TOLERANCE,
+    rounds: int = ROUNDS,
+) -> tuple[tuple[float, float], float]:
+    """Return the pair of thresholds that matches the totals, and what it misses by.
+
+    By the secant method on logarithms.
+
+    Parameters
+    ----------
+    simulate : callable
+        Returns the counts of ON and OFF events for thresholds of ON and OFF, in any unit.
+    start : (float, float)
+        Thresholds tried first.
+    measured : (int, int)
+        Counts wanted.
+    within : (float, float)
+        Smallest and largest threshold tried.
+    tolerance, rounds
+        See :func:`fit_thresholds`.
+    """
     wanted = np.log(np.maximum(measured, 0.5))
-    levels, slope = np.log([pixel.thresholds.on, pixel.thresholds.off]), np.full(2, -1.0)
+    levels, slope = np.log(start), np.full(2, -1.0)
     best = np.inf, levels
     before: tuple[NDArray[Any], NDArray[Any]] | None = None
     for _ in range(rounds):
-        miss = np.log(np.maximum(simulate(with_levels(levels)), 0.5)) - wanted
+        miss = np.log(np.maximum(simulate(*np.exp(levels).tolist()), 0.5)) - wanted
         if np.abs(miss).max() < best[0]:
             best = float(np.abs(miss).max()), levels
         if best[0] <= np.log1p(tolerance):
@@ -97,5 +127,6 @@ def fit_thresholds(
             slope = np.clip(secant, -6.0, -0.7)
         before = levels, miss
         step = np.clip(-miss / slope, -1.0, 1.0)
-        levels = np.clip(levels + step, np.log(FLOOR), np.log(LARGEST))
-    return with_levels(best[1]), float(np.expm1(best[0]))
+        levels = np.clip(levels + step, *np.log(within))
+    on, off = np.exp(best[1]).tolist()
+    return (on, off), float(np.expm1(best[0]))

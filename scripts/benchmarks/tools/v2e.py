@@ -29,7 +29,7 @@ def simulator(options: dict[str, Any]) -> Callable[[Any, float], Any]:
         torch.set_num_threads(options["threads"])
 
     def run(frames: Any, fps: float) -> Any:
-        emulator = EventEmulator(device="cpu", seed=1, **options["arguments"])
+        emulator = EventEmulator(device="cpu", **{"seed": 1, **options["arguments"]})
         found = [
             emulator.generate_events(frame.astype(np.float32), k / fps)
             for k, frame in enumerate(frames)

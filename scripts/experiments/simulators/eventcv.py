@@ -1,0 +1,72 @@
+"""EventCV, the tool itself (PyPI ``eventcv``), with its defaults or without its noise.
+
+It undoes the coding of sRGB, so it is given light coded so; and it knows a frame rate alone, so it
+is given light at even times.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from adv2e.effects.frames.encoding import encode_light
+from adv2e.errors import MissingExtraError
+from adv2e.events import Events, make_events, sort_events
+from experiments.simulators.clip import Clip
+
+QUIET = {"leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0}
+THRESHOLDS = {"pos_thres": 0.2, "neg_thres": 0.2}
+"""Its defaults [ln]."""
+
+
+@dataclass(frozen=True)
+class EventCV:
+    """EventCV.
+
+    Attributes
+    ----------
+    arguments : dict
+        Of ``eventcv.simulate``.
+    parts : int
+        Even steps of an interval.
+
+    Raises
+    ------
+    MissingExtraError
+        It is not installed.
+    """
+
+    name: str = "eventcv"
+    arguments: dict[str, Any] = field(default_factory=dict)
+    parts: int = 10
+
+    def __post_init__(self) -> None:
+        if importlib.util.find_spec("eventcv") is None:
+            raise MissingExtraError("simulator eventcv", "experiments")
+
+    @property
+    def nature(self) -> str:
+        """The tool and its version."""
+        from benchmarks.tools.eventcv import versions  # noqa: PLC0415 - only where it is used
+
+        how = ", without its noise" if QUIET.items() <= self.arguments.items() else ""
+        return f"the tool itself, EventCV {versions()['eventcv']}{how}"
+
+    def events(self, clip: Clip, seed: int) -> Events:
+        """Return the events of a clip."""
+        from benchmarks.tools.eventcv import columns, simulator  # noqa: PLC0415
+
+        light, rate = clip.even(self.parts)
+        coded = encode_light(np.clip(light, 0.0, 255.0), "srgb").astype(np.float32)
+        run = simulator({"arguments": {**THRESHOLDS, **self.arguments, "seed": seed}})
+        t, x, y, p = columns(run(coded, float(rate)))
+        return sort_events(make_events(t + int(clip.times_ns[0]) // 1000, x, y, p))
+
+    def scaled(self, on: float, off: float) -> EventCV:
+        """Return it with its thresholds times these factors."""
+        held = {**THRESHOLDS, **self.arguments}
+        levels = {"pos_thres": held["pos_thres"] * on, "neg_thres": held["neg_thres"] * off}
+        return replace(self, arguments={**self.arguments, **levels})

@@ -1,0 +1,54 @@
+"""Configurations of adv2e: its own, and the parameters of other tools in its pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from adv2e.comparison.resimulation import resimulator
+from adv2e.config import Config
+from adv2e.events import Events
+from adv2e.sources import Frame
+from experiments.simulators.clip import Clip
+
+OWN = "a configuration of adv2e"
+OF_A_TOOL = "its parameters in the pixel of adv2e, not the tool"
+
+
+@dataclass(frozen=True)
+class Pixel:
+    """The pixel of adv2e.
+
+    Attributes
+    ----------
+    name, nature : str
+    config : Config
+        Its seed and sensor do not count.
+    threads : int, optional
+        Default: all cores.
+    """
+
+    name: str
+    nature: str
+    config: Config
+    threads: int | None = None
+
+    def events(self, clip: Clip, seed: int) -> Events:
+        """Return the events of a clip."""
+
+        def frames() -> Iterator[Frame]:
+            for t_ns, image in zip(clip.times_ns.tolist(), clip.frames, strict=True):
+                yield Frame(t_ns, image, white=255.0)
+
+        # the clip is on the sensor already, whatever camera the configuration is of
+        config = replace(self.config, sensor=None)
+        return resimulator(frames, config, "linear", clip.size, threads=self.threads)(seed)
+
+    def scaled(self, on: float, off: float) -> Pixel:
+        """Return it with its thresholds times these factors."""
+        pixel = self.config.pixel
+        levels = replace(
+            pixel.thresholds, on=pixel.thresholds.on * on, off=pixel.thresholds.off * off
+        )
+        config = replace(self.config, pixel=replace(pixel, thresholds=levels))
+        return replace(self, config=config)

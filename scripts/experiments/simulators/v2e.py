@@ -1,0 +1,65 @@
+"""v2e, the tool itself, from a folder with its sources: the defaults of its command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from adv2e.errors import DataError
+from adv2e.events import Events, make_events, sort_events
+from experiments.simulators.clip import Clip
+
+DEFAULTS = {
+    "pos_thres": 0.2, "neg_thres": 0.2, "sigma_thres": 0.03, "cutoff_hz": 300.0,
+    "leak_rate_hz": 0.01, "shot_noise_rate_hz": 0.001, "refractory_period_s": 0.0005,
+}  # fmt: skip
+"""Of its command line; those of its class differ."""
+
+
+@dataclass(frozen=True)
+class V2e:
+    """v2e.
+
+    Attributes
+    ----------
+    folder : Path
+        Holds ``v2ecore/``.
+    arguments : dict
+        Of its ``EventEmulator``.
+    parts : int
+        Even steps of an interval.
+
+    Raises
+    ------
+    DataError
+        The folder does not hold its sources.
+    """
+
+    folder: Path
+    arguments: dict[str, float] = field(default_factory=lambda: dict(DEFAULTS))
+    parts: int = 10
+    name: str = "v2e"
+    nature: str = "the tool itself, from its sources"
+
+    def __post_init__(self) -> None:
+        if not (self.folder / "v2ecore" / "emulator.py").is_file():
+            raise DataError(
+                f"{self.folder}: no v2ecore/emulator.py in it; give a clone of"
+                " github.com/SensorsINI/v2e"
+            )
+
+    def events(self, clip: Clip, seed: int) -> Events:
+        """Return the events of a clip."""
+        from benchmarks.tools.v2e import columns, simulator  # noqa: PLC0415 - it needs PyTorch
+
+        light, rate = clip.even(self.parts)
+        # seed 0 means no seed there
+        options = {"folder": self.folder, "arguments": {**self.arguments, "seed": seed + 1}}
+        t, x, y, p = columns(simulator({**options, "threads": None})(light, float(rate)))
+        return sort_events(make_events(t + int(clip.times_ns[0]) // 1000, x, y, p))
+
+    def scaled(self, on: float, off: float) -> V2e:
+        """Return it with its thresholds times these factors."""
+        held = self.arguments
+        levels = {"pos_thres": held["pos_thres"] * on, "neg_thres": held["neg_thres"] * off}
+        return replace(self, arguments={**held, **levels})
