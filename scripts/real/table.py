@@ -72,7 +72,7 @@ def marks(events: Events, windows: Windows, size: tuple[int, int]) -> dict[str, 
 
 def markdown(judged: Mapping[str, Judged], others: Mapping[str, Floor]) -> str:
     """Return the table of configurations, and of the marks to go by."""
-    names = ["configuration", "events", "ON share", *COLUMNS.values(), "still"]
+    names = ["simulator", "events", "ON share", *COLUMNS.values(), "still"]
     rows = [[label, *_cells(one)] for label, one in judged.items()]
     rows += [[label, "", "", *cells(one, COLUMNS), ""] for label, one in others.items()]
     return table(names, rows)

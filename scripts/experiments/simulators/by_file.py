@@ -53,5 +53,11 @@ class ByFile:
             )
         return events
 
-    def scaled(self, on: float, off: float) -> None:
-        """Return None: it cannot be simulated anew."""
+    @property
+    def levels(self) -> None:
+        """None: it cannot be simulated anew."""
+        return None
+
+    def with_levels(self, on: float, off: float) -> ByFile:
+        """Return it as it is."""
+        return self

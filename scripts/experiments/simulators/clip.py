@@ -84,13 +84,21 @@ class Simulator(Protocol):
     nature : str
         Whether it is the tool itself, its equations, its parameters in the pixel of adv2e, or
         events that it wrote.
+    levels : (float, float), optional
+        Its thresholds of ON and OFF, in its own unit; None where it cannot be simulated anew.
     """
 
-    name: str
-    nature: str
+    @property
+    def name(self) -> str: ...  # noqa: D102 - above
+
+    @property
+    def nature(self) -> str: ...  # noqa: D102
+
+    @property
+    def levels(self) -> tuple[float, float] | None: ...  # noqa: D102
 
     def events(self, clip: Clip, seed: int) -> Events:
         """Return sorted events on the clock of the clip [us]; the same for the same seed."""
 
-    def scaled(self, on: float, off: float) -> Simulator | None:
-        """Return it with its thresholds times these factors; None where that cannot be."""
+    def with_levels(self, on: float, off: float) -> Simulator:
+        """Return it with other thresholds."""

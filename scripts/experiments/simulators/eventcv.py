@@ -65,8 +65,12 @@ class EventCV:
         t, x, y, p = columns(run(coded, float(rate)))
         return sort_events(make_events(t + int(clip.times_ns[0]) // 1000, x, y, p))
 
-    def scaled(self, on: float, off: float) -> EventCV:
-        """Return it with its thresholds times these factors."""
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Its thresholds of ON and OFF [ln]."""
         held = {**THRESHOLDS, **self.arguments}
-        levels = {"pos_thres": held["pos_thres"] * on, "neg_thres": held["neg_thres"] * off}
-        return replace(self, arguments={**self.arguments, **levels})
+        return held["pos_thres"], held["neg_thres"]
+
+    def with_levels(self, on: float, off: float) -> EventCV:
+        """Return it with other thresholds [ln]."""
+        return replace(self, arguments={**self.arguments, "pos_thres": on, "neg_thres": off})

@@ -19,7 +19,7 @@ from experiments.simulators.pixel import OF_A_TOOL, OWN, Pixel
 from experiments.simulators.v2e import V2e
 from experiments.simulators.voltmeter import Voltmeter
 
-NAMES = "ideal,adv2e,paper,v2e,vid2e,dvs-voltmeter,eventcv"
+NAMES = "ideal,adv2e,paper,v2e,vid2e,dvs-voltmeter,eventcv,eventcv-quiet"
 _OF_TOOLS = ("v2e", "vid2e")
 """Configurations with another tool's parameters."""
 
@@ -98,7 +98,7 @@ def simulator_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @click.option(
         "--simulators", "names", default=NAMES, show_default=True,
-        help="Also eventcv-quiet (without noise), other shipped names, YAML files.",
+        help="Also other shipped names and YAML files.",
     )  # fmt: skip
     @click.option(
         "--events", "files", type=NameAndFile(), multiple=True, metavar="NAME=FILE",

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from adv2e.comparison.resimulation import resimulator
 from adv2e.config import Config
+from adv2e.effects.pixel.thresholds import FLOOR
 from adv2e.events import Events
 from adv2e.sources import Frame
 from experiments.simulators.clip import Clip
@@ -44,11 +45,19 @@ class Pixel:
         config = replace(self.config, sensor=None)
         return resimulator(frames, config, "linear", clip.size, threads=self.threads)(seed)
 
-    def scaled(self, on: float, off: float) -> Pixel:
-        """Return it with its thresholds times these factors."""
-        pixel = self.config.pixel
-        levels = replace(
-            pixel.thresholds, on=pixel.thresholds.on * on, off=pixel.thresholds.off * off
-        )
-        config = replace(self.config, pixel=replace(pixel, thresholds=levels))
-        return replace(self, config=config)
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Its thresholds of ON and OFF [ln]."""
+        return self.config.pixel.thresholds.on, self.config.pixel.thresholds.off
+
+    def with_levels(self, on: float, off: float) -> Pixel:
+        """Return it with other thresholds [ln], the smallest that the pixel has at least."""
+        levels = self.config.pixel.thresholds
+        thresholds = replace(levels, on=max(on, FLOOR), off=max(off, FLOOR))
+        pixel = replace(self.config.pixel, thresholds=thresholds)
+        return replace(self, config=replace(self.config, pixel=pixel))
+
+    def from_random_references(self) -> Pixel:
+        """Return it with pixels that begin anywhere between their thresholds."""
+        pixel = replace(self.config.pixel, initial_reference="random")
+        return replace(self, config=replace(self.config, pixel=pixel))

@@ -58,8 +58,11 @@ class V2e:
         t, x, y, p = columns(simulator({**options, "threads": None})(light, float(rate)))
         return sort_events(make_events(t + int(clip.times_ns[0]) // 1000, x, y, p))
 
-    def scaled(self, on: float, off: float) -> V2e:
-        """Return it with its thresholds times these factors."""
-        held = self.arguments
-        levels = {"pos_thres": held["pos_thres"] * on, "neg_thres": held["neg_thres"] * off}
-        return replace(self, arguments={**held, **levels})
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Its thresholds of ON and OFF [ln]."""
+        return self.arguments["pos_thres"], self.arguments["neg_thres"]
+
+    def with_levels(self, on: float, off: float) -> V2e:
+        """Return it with other thresholds [ln]."""
+        return replace(self, arguments={**self.arguments, "pos_thres": on, "neg_thres": off})

@@ -149,6 +149,6 @@ class Voltmeter:
             found.append((at, now, on))
         return found
 
-    def scaled(self, on: float, off: float) -> Voltmeter:
-        """Return it with its thresholds times these factors."""
-        return replace(self, levels=(self.levels[0] * on, self.levels[1] * off))
+    def with_levels(self, on: float, off: float) -> Voltmeter:
+        """Return it with other thresholds; 1 as published."""
+        return replace(self, levels=(on, off))

@@ -61,7 +61,7 @@ def test_a_table_has_a_row_for_each_configuration_and_the_two_marks(recording):
     assert result.stdout.startswith("Configurations named after a tool are that tool's parameters")
     (heading, (names, rule, *rows)) = next(iter(tables(result.stdout).items()))
     assert heading == "waves: thresholds as shipped"
-    assert names[:4] == ["configuration", "events", "ON share", "shared window"]
+    assert names[:4] == ["simulator", "events", "ON share", "shared window"]
     assert rule == ["---", *["---:"] * (len(names) - 1)]
     labels = [row[0] for row in rows]
     assert labels == ["adv2e", "ideal †", "half split (Poisson)", "no events at all"]
