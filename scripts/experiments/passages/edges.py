@@ -1,0 +1,140 @@
+r"""The scene: straight edges between two grey levels, which move and stop suddenly.
+
+The picture consists of bands of rows.  In each band one edge moves to the right,
+
+.. math:: p(t) = p_0 + v \min(t, t_{stop}), \qquad
+          I(x, t) = a + (b - a)\,\tfrac12 \left(1 + \tanh\frac{p(t) - x}{w}\right)
+
+from light a [DN] before it to light b behind it: an ON edge where b is brighter.  Each line of a
+band starts a part of a pixel further, so that pixels meet their edge at all phases of the frames.
+The edge passes a pixel when p(t) = x: half of the change of its light is done then.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.passages.measures import Passages
+from experiments.simulators.clip import Clip
+
+Values = NDArray[np.float64]
+
+PAIRS = ((4.0, 12.0), (12.0, 36.0), (36.0, 108.0), (80.0, 240.0))
+"""Dark and bright side of the edges [DN]: a change by 1.10 ln everywhere."""
+
+START_PX = -6.0
+"""Where edges are at first, outside of the picture [px]."""
+
+HALF_WIDTH_PX = 0.7
+"""w: from 10 to 90 % of the change is 1.5 px [px]."""
+
+CLEAR_PX = 3.0
+"""An edge this far from a pixel has passed it wholly, or not begun to [px]."""
+
+LAST_PX = 15.0
+"""Pixels this near before the place of the stop are those that may go on firing [px]."""
+
+_GOLDEN = 0.6180339887498949
+
+
+class Band(NamedTuple):
+    """Rows with the same edge: both levels [DN], and the polarity of its events (1 ON, 0 OFF)."""
+
+    dark: float
+    bright: float
+    polarity: int
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The scene.
+
+    Attributes
+    ----------
+    pairs : sequence of (float, float)
+        Dark and bright light [DN]; each makes an ON and an OFF edge.
+    lines : int
+        Rows of a band.
+    columns : int
+        More than the edges go through.
+    speed : float
+        [px/s]
+    stop_s, end_s : float
+        When edges stop, and the end [s].
+    """
+
+    pairs: tuple[tuple[float, float], ...] = PAIRS
+    lines: int = 8
+    columns: int = 50
+    speed: float = 500.0
+    stop_s: float = 0.1013
+    end_s: float = 0.26
+
+    @cached_property
+    def bands(self) -> list[Band]:
+        """An ON and an OFF edge of each pair."""
+        return [Band(*pair, polarity) for pair in self.pairs for polarity in (1, 0)]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows."""
+        return self.columns, self.lines * len(self.bands)
+
+    def band_of(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the bands of rows."""
+        return rows // self.lines
+
+    def place(self, rows: NDArray[np.int64], times: Values) -> Values:
+        """Return where the edges are [px] in rows at times [s], broadcast."""
+        start = START_PX + np.mod(rows * _GOLDEN, 1.0)
+        return start + self.speed * np.minimum(times, self.stop_s)
+
+    def passage(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Values:
+        """Return when the edge would pass pixels [s] if it did not stop."""
+        return (columns - self.place(rows, np.zeros(()))) / self.speed
+
+    def light(self, rows: NDArray[np.int64], columns: NDArray[np.int64], times: Values) -> Values:
+        """Return the light [DN] of pixels at times [s]; the three are broadcast."""
+        ahead, behind = np.array(
+            [(one.dark, one.bright)[:: 1 if one.polarity else -1] for one in self.bands]
+        )[self.band_of(rows)].transpose(-1, *range(rows.ndim))
+        share = 0.5 + 0.5 * np.tanh((self.place(rows, times) - columns) / HALF_WIDTH_PX)
+        return np.asarray(ahead + (behind - ahead) * share)
+
+    def pixels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return rows and columns of all pixels, row after row."""
+        rows, columns = np.indices(self.size[::-1])
+        return rows.ravel(), columns.ravel()
+
+    def near(self) -> NDArray[np.bool_]:
+        """Return which of the pixels an edge comes near to."""
+        rows, columns = self.pixels()
+        return columns <= self.place(rows, np.full((), self.stop_s)) + CLEAR_PX
+
+    def clip(self, rate: float) -> Clip:
+        """Return frames at a rate [Hz], each the light of one instant."""
+        times_ns = np.arange(int(self.end_s * rate + 1e-6) + 1) * 10**9 // round(rate)
+        rows, columns = self.pixels()
+        light = self.light(rows, columns, 1e-9 * times_ns[:, None])
+        return Clip(light.reshape(-1, *self.size[::-1]).astype(np.float32), times_ns)
+
+    def passages(self) -> Passages:
+        """Return when edges passed, and which pixels they came near to last."""
+        rows, columns = self.pixels()
+        shape = self.size[::-1]
+        at, stop = self.passage(rows, columns), self.place(rows, np.full((), self.stop_s))
+        whole = columns <= stop - CLEAR_PX
+        return Passages(
+            time_us=np.where(whole, 1e6 * at, np.nan).reshape(shape),
+            last=(self.near() & (columns > stop - LAST_PX)).reshape(shape),
+            band=self.band_of(rows).reshape(shape),
+            polarity=tuple(one.polarity for one in self.bands),
+            lead_us=1e6 * CLEAR_PX / self.speed,
+            stop_us=1e6 * self.stop_s,
+            end_us=1e6 * self.end_s,
+        )
