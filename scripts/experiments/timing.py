@@ -107,7 +107,9 @@ def camera_part(
     camera = Camera(edges, rate)
     truths = [camera.events(seed) for seed in range(seeds)]
     tell("camera: truth done")
-    every = [*simulators, *told(["adv2e"], camera.told())]
+    every = [*simulators]
+    for sets, how in ((camera.told(), "told"), ([*camera.told(), *FLOW], "told, flow")):
+        every += told(["adv2e"], sets, how)
     about = (
         f"Frames of {rate:g} a second. Simulators know nothing of this camera; told: all of its"
         " pixel."

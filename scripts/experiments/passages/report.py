@@ -102,7 +102,7 @@ class Part:
     def tables(self) -> str:
         """Return all tables."""
         parts = [f"## {self.title}", self.about]
-        for number in (1, 3):
+        for number in self._told():
             parts += [
                 f"Latency of event {number} after the passage [ms]: median (10 to 90 %).",
                 self._by_edge(lambda row, band, number=number: _spread(row, band, number)),
@@ -126,6 +126,12 @@ class Part:
             self._by_pair(_stopped),
         ]  # fmt: skip
         return "\n\n".join(parts)
+
+    def _told(self) -> list[int]:
+        """Return the first event, and the last of the next two that the truth has at all edges."""
+        edges = range(len(self.bands))
+        others = [k for k in (3, 2) if all(self.truth.has(b, k) >= FEWEST for b in edges)]
+        return [1, *others[:1]]
 
     def _by_edge(self, cell: Callable[[Row, int], str]) -> str:
         head = [
@@ -267,5 +273,6 @@ def _after(axis: Any, part: Part, rows: Sequence[Row]) -> None:
             axis.bar(x, np.mean(counts), 0.17, color=shades[k], label=name if not place else None)
             axis.plot([x] * len(counts), counts, ".", color="black", ms=2.5)
     axis.set_title(f"{part.title}: events of a line after the stop", fontsize=9)
-    axis.legend(fontsize=7)
+    axis.set_ylim(top=1.25 * axis.get_ylim()[1])  # room for the legend
+    axis.legend(fontsize=7, ncols=len(part.pairs), loc="upper center")
     axis.axhline(0.0, color="grey", lw=0.6)

@@ -215,7 +215,12 @@ def test_the_command_writes_tables_numbers_and_the_picture(tmp_path, monkeypatch
     assert done.exit_code == 0, done.output
     numbers = json.loads(path.with_suffix(".json").read_text("utf-8"))
     assert list(numbers) == ["circuit, 240 frames/s", "camera, 240 frames/s"]
-    assert list(numbers["camera, 240 frames/s"]) == ["truth", "ideal", "adv2e, told"]
+    assert list(numbers["camera, 240 frames/s"]) == [
+        "truth",
+        "ideal",
+        "adv2e, told",
+        "adv2e, told, flow",
+    ]
     assert Path(path.with_suffix(".png")).stat().st_size > 10_000
 
 
