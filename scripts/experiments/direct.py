@@ -29,7 +29,7 @@ import numpy as np
 from real.model import SCORE, Bench, Judged
 from real.recording import Real, halves, read
 from real.table import COLUMNS, definitions, markdown, marks, preamble
-from writing import output_option, table, write_report
+from writing import output_option, write_report
 
 from adv2e.comparison.distances import MEASURES, distances
 from adv2e.comparison.floor import Floor
@@ -40,7 +40,7 @@ from adv2e.sources.times.instants import seconds
 from experiments import side_by_side
 from experiments.recordings import Measured
 from experiments.simulators.clip import Simulator
-from experiments.simulators.named import simulator_options
+from experiments.simulators.named import natures, simulator_options
 from experiments.simulators.pixel import Pixel
 
 
@@ -78,14 +78,14 @@ def main(
     output: Path | None,
 ) -> None:
     """Compare the events of simulators with those of real recordings."""
-    natures = [[one.name, one.nature] for one in simulators]
-    parts = [preamble(), table(["simulator", "what it is"], natures).replace("---:", "---")]
-    numbers: dict[str, Any] = {"simulators": dict(natures)}
+    parts = [preamble(), natures(simulators)]
+    numbers: dict[str, Any] = {"simulators": {one.name: one.nature for one in simulators}}
     for path in recordings:
         measured = Measured(read(path))
         for problem in measured.real.problems:
             _say(f"{path}: {problem}")
-        trials = [Trial(measured, simulators, measured.real.windows, "thresholds as shipped")]
+        shipped = {one.name: one for one in simulators}
+        trials = [Trial(measured, shipped, measured.real.windows, "thresholds as shipped")]
         if matching:
             trials.append(with_matched_totals(measured, simulators))
         for trial in trials:
@@ -130,23 +130,12 @@ class Row:
 def with_matched_totals(measured: Measured, simulators: Sequence[Simulator]) -> Trial:
     """Return the trial of simulators whose totals match on the first half, on the second."""
     first, second = halves(measured.real.windows)
-    found: dict[str, Simulator] = {}
-    for one in simulators:
-        simulator, miss = measured.matched(one, first)
-        label = one.name
-        if simulator.levels is not None:
-            on, off = simulator.levels
-            label += f", ON {on:.3f} OFF {off:.3f}"
-        label += " (!)" if miss > TOLERANCE else ""
-        _say(f"{measured.real.name}: {label}: totals miss by {miss:.1%}")
-        found[label] = simulator
+    found = measured.all_matched(simulators, first)
     about = (
         "Thresholds, each in the unit of its simulator, are such that the totals of ON and of OFF"
         f" events match from {_span(first)}; (!): they do not, to {TOLERANCE:.0%}."
     )
-    return Trial(
-        measured, list(found.values()), second, "totals matched before", about, list(found)
-    )
+    return Trial(measured, found, second, "totals matched before", about)
 
 
 def _span(windows: Windows) -> str:
@@ -159,26 +148,22 @@ class Trial:
     Parameters
     ----------
     measured : Measured
-    simulators : sequence of Simulator
+    simulators : mapping of str to Simulator
+        By label.
     windows : Windows
     title, about : str
-    labels : sequence of str, optional
-        Default: the simulators' names.
     """
 
     def __init__(
         self,
         measured: Measured,
-        simulators: Sequence[Simulator],
+        simulators: Mapping[str, Simulator],
         windows: Windows,
         title: str,
         about: str = "",
-        labels: Sequence[str] | None = None,
     ) -> None:
         self.measured, self.windows, self.title, self.about = measured, windows, title, about
-        self.simulators = dict(
-            zip(labels or [one.name for one in simulators], simulators, strict=True)
-        )
+        self.simulators = simulators
         self.heading = f"{measured.real.name}: {title}"
 
     @property

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import click
 import numpy as np
 from real.model import BEYOND_US, totals
 from real.recording import Real
 
 from adv2e.comparison.windows import Windows
-from adv2e.diagnosis.fitting.nuisances import match_totals
+from adv2e.diagnosis.fitting.nuisances import TOLERANCE, match_totals
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events, Window, cut
 from experiments.simulators.clip import Clip, Simulator
@@ -75,3 +76,18 @@ class Measured:
         within = min(levels) / WIDEST, max(levels) * WIDEST
         found, miss = match_totals(counts, levels, goal, within=within)
         return simulator.with_levels(*found), miss
+
+    def all_matched(
+        self, simulators: Sequence[Simulator], windows: Windows
+    ) -> dict[str, Simulator]:
+        """Return them so, by what tables call them: with thresholds, marked where they miss."""
+        found = {}
+        for one in simulators:
+            simulator, miss = self.matched(one, windows)
+            label = one.name
+            if simulator.levels is not None:
+                label += ", ON {:.3f} OFF {:.3f}".format(*simulator.levels)
+            label += " (!)" if miss > TOLERANCE else ""
+            click.echo(f"{self.real.name}: {label}: totals miss by {miss:.1%}", err=True)
+            found[label] = simulator
+        return found

@@ -1,1 +1,1 @@
-"""Parts of ``scripts/real/compare.py`` and ``scripts/real/diagnose.py``."""
+"""Real recordings: read, simulated, searched for effects; and what measurements say of pixels."""

@@ -50,7 +50,10 @@ def test_a_script_tells_how_to_use_it(helps, script):
     assert helps[script].lower().startswith("usage: ")
 
 
-def test_the_table_names_every_script_and_no_other():
-    text = (ROOT / "scripts" / "README.md").read_text("utf-8")
-    named = re.findall(r"^\| `(\S+\.py)", text, flags=re.MULTILINE)
-    assert [f"scripts/{name}" for name in sorted(named)] == SCRIPTS
+def test_the_tables_name_every_script_once_and_no_other():
+    named = []
+    for path in (ROOT / "scripts").rglob("README.md"):
+        folder = path.parent.relative_to(ROOT).as_posix()
+        found = re.findall(r"^\| `(\S+\.py)", path.read_text("utf-8"), flags=re.MULTILINE)
+        named += [f"{folder}/{name}" for name in found]
+    assert sorted(named) == SCRIPTS

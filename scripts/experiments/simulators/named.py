@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
-from writing import one_line_errors
+from writing import one_line_errors, table, threads_option
 
 from adv2e.config import load_config
 from adv2e.errors import ConfigError
@@ -76,6 +76,12 @@ _OTHERS: dict[str, Callable[[], Simulator]] = {
 }
 
 
+def natures(simulators: Sequence[Simulator]) -> str:
+    """Return what each is, as a table."""
+    rows = [[one.name, one.nature] for one in simulators]
+    return table(["simulator", "what it is"], rows).replace("---:", "---")
+
+
 class NameAndFile(click.ParamType):
     """``NAME=FILE``."""
 
@@ -112,7 +118,7 @@ def simulator_options(command: Callable[..., None]) -> Callable[..., None]:
         "--set", "sets", multiple=True, metavar="KEY=VALUE",
         help="For all configurations of adv2e. Repeatable.",
     )  # fmt: skip
-    @click.option("--threads", type=click.IntRange(min=1), help="[default: all cores]")
+    @threads_option
     @wraps(command)
     def made(
         names: str, files: tuple[tuple[str, Path], ...], v2e_sources: Path | None,

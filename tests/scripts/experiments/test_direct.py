@@ -67,7 +67,9 @@ def run(*arguments):
 
 
 def trial(measured, *simulators):
-    return direct.Trial(measured, simulators, measured.real.windows, "as shipped")
+    return direct.Trial(
+        measured, {one.name: one for one in simulators}, measured.real.windows, "as shipped"
+    )
 
 
 def test_a_table_has_a_row_for_each_simulator_and_the_two_marks(recording):

@@ -1,14 +1,17 @@
 #!/usr/bin/env python
-"""How near configurations are to real cameras, by several measures together.
+"""Frozen networks: whether pretrained ones see in simulated events what they see in measured.
 
-DATA holds recordings with frames (folders in the DAVIS240C layout, or with ``events.npz``), WEIGHTS
-those of :mod:`networks.firenet`.  The frames go in at their own times; what comes out is judged on
-the second half of the frame intervals.  Nothing is fitted to that half.  Prints a Markdown table a
-recording, and with ``--match-totals`` a second one that takes out the difference in thresholds::
+FireNet and FireNet+ reconstruct images from the measured events and from those that simulators make
+of the recording's frames.  All is judged on the second half of the frame intervals, beside the
+distance of the events, rates of still pixels and totals.  Nothing is fitted to that half.  One
+Markdown table a recording, and with ``--match-totals`` a second one that takes out the difference
+in thresholds::
 
-    python scripts/real/judge.py real weights --match-totals -o judged.md
+    python scripts/experiments/frozen.py weights cradle slider_depth --match-totals -o frozen.md
 
-Needs PyTorch, and about a minute a recording.
+WEIGHTS is a folder with ``firenet.pth`` and ``firenet_plus.pth``: the files ``model.pth`` in
+``pretrained/FireNet`` and ``pretrained/FireNet+`` of github.com/ercanburak/EVREAL.  RECORDING: see
+``direct.py``.  Needs PyTorch, and about a minute a recording.
 
 FireNet, FireNet+
     Mean structural similarity (SSIM, 1 for equal images) of what the frozen network reconstructs
@@ -22,10 +25,11 @@ still
 ON share, events
     Of all events, and their number over the measured one.
 
-Beside them stand two floors: the same between two seeds, and between a half of the measured events
-and all of them.
+Beside them stand floors: the same between two seeds, between a half of the measured events and all
+of them, and between the measured events and themselves with times that jitter by `JITTER_MS`.  The
+last tells what this experiment cannot see: times.
 
-A configuration is *behind* ideal in a measure where it is farther from the measured value than
+A simulator is *behind* ideal in a measure where it is farther from the measured value than
 ``ideal`` in the same table by more than the margin of `MARGINS`.  Similarity and distance are as
 they are; rates and events are judged by how far their logarithm is off, with `LEAST` events added
 to counts of still pixels, so that no event at all has a logarithm; the ON share by its difference.
@@ -47,23 +51,23 @@ import cv2
 import numpy as np
 from networks.firenet import NETWORKS, Images, Network
 from numpy.typing import NDArray
-from writing import one_line_errors, output_option, table, threads_option, write_report
-
-from adv2e.comparison.floor import half_split
-from adv2e.comparison.windows import Windows
-from adv2e.config import Config, load_config
-from adv2e.errors import DataError
-from adv2e.events import Events, Window, cut, empty_events
-from real.compare import Case, with_totals
 from real.measures import likeness, similarity
 from real.model import SCORE, Bench
-from real.recording import Real, halves, read
+from real.recording import halves, read
+from writing import output_option, table, write_report
 
-CONFIGS = "ideal,adv2e,paper,v2e,vid2e,davis240c,davis346"
-RECORDINGS = "davis346-emlb-cradle,davis240c-slider-depth-chunk,davis346-esl-cups"
+from adv2e.comparison.distances import distances
+from adv2e.comparison.floor import half_split
+from adv2e.comparison.windows import Windows
+from adv2e.errors import DataError
+from adv2e.events import Events, cut, empty_events, sort_events
+from experiments.recordings import Measured
+from experiments.simulators.clip import Simulator
+from experiments.simulators.named import natures, simulator_options
+
 REFERENCE = "ideal"
-SILENCE = 1000
-"""A stretch without one event was not recorded where, at the mean rate, it would have so many."""
+JITTER_MS = 2.0
+"""Standard deviation of the times of the third floor [ms]."""
 DARK_DN = 10.0
 """Still pixels are told of below and above this grey value [DN of 255]."""
 LEAST = 3.0
@@ -77,33 +81,6 @@ MARGINS = {
 """By how much a measure must be worse than the reference's to count."""
 
 
-def silences(events: Events) -> list[Window]:
-    """Return the stretches in which a camera recorded nothing [us], both ends excluded."""
-    t = events["t"]
-    gaps = np.diff(t)
-    at = np.flatnonzero(gaps * float(len(t)) >= SILENCE * float(t[-1] - t[0]))
-    return [(int(t[i]), int(t[i + 1])) for i in at]
-
-
-class Masked(Bench):
-    """A bench whose simulations lack what the camera did not record either."""
-
-    def made(
-        self, config: Config, windows: Windows, seeds: Sequence[int], *, in_full: bool = False
-    ) -> list[Events]:
-        """Return the events in the windows outside silences, a seed each."""
-        streams = super().made(config, windows, seeds, in_full=in_full)
-        return [without(one, silences(self.real.events)) for one in streams]
-
-
-def without(events: Events, stretches: Sequence[Window]) -> Events:
-    """Return the events that are in none of the stretches."""
-    kept = np.ones(len(events), np.bool_)
-    for start, stop in stretches:
-        kept &= (events["t"] <= start) | (events["t"] >= stop)
-    return events[kept]
-
-
 @dataclass(frozen=True)
 class Still:
     """The still pixels of a recording, by name of the part of the picture, and time recorded."""
@@ -112,14 +89,13 @@ class Still:
     duration_s: float
 
     @classmethod
-    def of(cls, real: Real, windows: Windows) -> Still:
+    def of(cls, measured: Measured, windows: Windows) -> Still:
         """Return those of a recording; parts without still pixels are left out."""
-        grey = np.mean([np.asarray(one.image, np.float64) for one in real.source.frames()], axis=0)
-        dark = grey < DARK_DN
-        parts = {"dark": real.still & dark, "bright": real.still & ~dark}
+        still, dark = measured.real.still, measured.clip.frames.mean(axis=0) < DARK_DN
+        parts = {"dark": still & dark, "bright": still & ~dark}
         silent = sum(
             max(0, min(stop, windows.stop) - max(start, windows.start))
-            for start, stop in silences(real.events)
+            for start, stop in measured.silences
         )
         used = {name: mask for name, mask in parts.items() if mask.any()}
         return cls(used, windows.duration_s - 1e-6 * silent)
@@ -140,7 +116,7 @@ class Still:
 
 @dataclass(frozen=True)
 class Row:
-    """One configuration, or the measured events, by name of the measure.
+    """One simulator, or the measured events, by name of the measure.
 
     Attributes
     ----------
@@ -178,16 +154,15 @@ class Judge:
 
     Parameters
     ----------
-    real : Real
+    measured : Measured
     networks : sequence of Network
-    threads : int, optional
     """
 
-    def __init__(self, real: Real, networks: Sequence[Network], threads: int | None) -> None:
-        self.bench, self.real, self.networks = Masked(real, threads), real, networks
-        self.first, self.test = halves(real.windows)
-        self.still = Still.of(real, self.test)
-        self.events = cut(real.events, self.test.start, self.test.stop)
+    def __init__(self, measured: Measured, networks: Sequence[Network]) -> None:
+        self.measured, self.real, self.networks = measured, measured.real, networks
+        self.first, self.test = halves(self.real.windows)
+        self.still = Still.of(measured, self.test)
+        self.events = cut(self.real.events, self.test.start, self.test.stop)
         self.images = self.reconstructed(self.events)
 
     def reconstructed(self, events: Events) -> dict[str, Images]:
@@ -195,18 +170,17 @@ class Judge:
         parts = [cut(events, *window) for window in self.test.used]
         return {one.name: one.images(parts, self.real.size) for one in self.networks}
 
-    def config(self, case: Case, seeds: int) -> Row:
-        """Return how near a configuration is, means over seeds."""
-        chosen = range(case.config.seed, case.config.seed + seeds)
-        streams = self.bench.made(case.config, self.test, chosen, in_full=True)
-        judged = self.bench.against(streams, self.test)
+    def simulated(self, simulator: Simulator, label: str, seeds: int) -> Row:
+        """Return how near a simulator is, means over seeds."""
+        streams = self.measured.made(simulator, self.test, range(seeds))
+        judged = Bench(self.real, None).against(streams, self.test)
         images = [self.reconstructed(one) for one in streams]
         values = _means([self._of_stream(*one) for one in zip(streams, images, strict=True)])
         values["distance"] = judged.values[SCORE]
         floors = {name: alike(images[0][name], images[-1][name]) for name in self.images}
-        return Row(case.label, values, {**floors, "distance": judged.floor[SCORE]}, images[0])
+        return Row(label, values, {**floors, "distance": judged.floor[SCORE]}, images[0])
 
-    def measured(self) -> Row:
+    def of_the_camera(self) -> Row:
         """Return the measured events as a row."""
         return Row("measured", self._of_stream(self.events, self.images), {}, self.images)
 
@@ -218,6 +192,18 @@ class Judge:
         values: dict[str, float | None] = self._alike(images)
         values["distance"] = half_split(self.events, self.test, *self.real.size)[SCORE]
         return Row("half of the measured events", values, {}, images)
+
+    def jittered(self) -> Row:
+        """Return the measured events with times that jitter, against themselves."""
+        events = self.events.copy()
+        apart = np.random.default_rng(0).normal(0.0, 1e3 * JITTER_MS, len(events))
+        last = self.test.stop - 1
+        events["t"] = np.clip(np.rint(events["t"] + apart), self.test.start, last)
+        events = sort_events(events)
+        images = self.reconstructed(events)
+        found = distances(self.events, events, self.test, *self.real.size).values[SCORE]
+        values = {**self._alike(images), "distance": found}
+        return Row(f"measured, times jittered by {JITTER_MS:g} ms", values, {}, images)
 
     def nothing(self) -> Row:
         """Return what no events at all come to."""
@@ -233,11 +219,8 @@ class Judge:
             Not more than the frames mirrored: the weights are not read as they are meant.
         """
         stops = [stop for _, stop in self.test.used]
-        frames = [
-            np.asarray(frame.image, np.float64)
-            for frame, t_us in zip(self.real.source.frames(), self.real.times_us, strict=True)
-            if t_us in stops
-        ]
+        times = self.real.times_us[self.real.used]
+        frames = self.measured.clip.frames[np.isin(times, stops)]
         for name, images in self.images.items():
             pairs = list(zip(images, frames, strict=True))
             like = float(np.mean([likeness(*pair) for pair in pairs]))
@@ -290,13 +273,8 @@ def _means(found: Sequence[dict[str, float | None]]) -> dict[str, float | None]:
 
 
 @click.command()
-@click.argument("data", type=click.Path(path_type=Path))
 @click.argument("weights", type=click.Path(path_type=Path))
-@click.option("--recordings", default=RECORDINGS, show_default=True, help="Folders in DATA.")
-@click.option("--configs", default=CONFIGS, show_default=True, help="Shipped names or YAML files.")
-@click.option(
-    "--set", "sets", multiple=True, metavar="KEY=VALUE", help="For all configurations; repeatable."
-)
+@click.argument("recordings", metavar="RECORDING...", nargs=-1, required=True)
 @click.option(
     "--seeds",
     type=click.IntRange(min=2),
@@ -314,59 +292,56 @@ def _means(found: Sequence[dict[str, float | None]]) -> dict[str, float | None]:
     "--pictures",
     type=click.Path(file_okay=False, path_type=Path),
     metavar="FOLDER",
-    help="Write the last images: a row a network; measured, half of it, configurations in order.",
+    help="Write the last images: a row a network; measured, half of it, simulators in order.",
 )
-@threads_option
+@simulator_options
 @output_option
-@one_line_errors()
 def main(
-    data: Path,
     weights: Path,
-    recordings: str,
-    configs: str,
-    sets: tuple[str, ...],
+    recordings: tuple[str, ...],
+    simulators: list[Simulator],
     seeds: int,
     matching: bool,
     pictures: Path | None,
-    threads: int | None,
     output: Path | None,
 ) -> None:
-    """Judge configurations by frozen networks, distance, and still pixels together."""
+    """Judge simulators by frozen networks, distance, and still pixels together."""
     networks = [Network(name, weights) for name in NETWORKS]
-    cases = [Case(Path(name).stem, load_config([name], sets)) for name in configs.split(",")]
-    parts, numbers = [], {}
-    for name in recordings.split(","):
-        judge = Judge(read(str(data / name)), networks, threads)
+    parts, numbers = [natures(simulators)], {}
+    for path in recordings:
+        judge = Judge(Measured(read(path)), networks)
         like = ", ".join(judge.loaded())
-        tables = {"as shipped": cases}
+        tables = {"thresholds as shipped": {one.name: one for one in simulators}}
         if matching:
-            tables["totals matched"] = [with_totals(judge.bench, one, judge.first) for one in cases]
+            tables["totals matched before"] = judge.measured.all_matched(simulators, judge.first)
         for title, each in tables.items():
-            rows = [judge.config(one, seeds) for one in each]
+            heading = f"{judge.real.name}: {title}"
+            rows = [judge.simulated(one, label, seeds) for label, one in each.items()]
             text, found = section(judge, rows)
             about = f"Images of the measured events correlate with the frames: {like}."
-            parts.append(f"## {name}: {title}\n\n{about}\n\n{text}")
-            numbers[f"{name}: {title}"] = found
-            click.echo(f"{name}: {title} done", err=True)
+            parts.append(f"## {heading}\n\n{about}\n\n{text}")
+            numbers[heading] = found
+            click.echo(f"{heading} done", err=True)
             if pictures is not None:
                 pictures.mkdir(parents=True, exist_ok=True)
-                path = pictures / f"{name}-{title.replace(' ', '-')}.png"
-                cv2.imwrite(str(path), picture([judge.measured(), judge.half, *rows]))
+                name = heading.replace(":", "").replace(" ", "-")
+                image = picture([judge.of_the_camera(), judge.half, *rows])
+                cv2.imwrite(str(pictures / f"{name}.png"), image)
     write_report("\n\n".join(parts), output, numbers)
 
 
 def section(judge: Judge, rows: Sequence[Row]) -> tuple[str, dict[str, Any]]:
     """Return the table of rows and of what to go by, and its numbers."""
-    measured = judge.measured()
+    measured = judge.of_the_camera()
     reference = next((one for one in rows if one.label.split(",")[0] == REFERENCE), None)
     lines, numbers = [], {}
-    for row in [*rows, measured, judge.half, judge.nothing()]:
+    for row in [*rows, measured, judge.half, judge.jittered(), judge.nothing()]:
         behind = ""
         if reference is not None and row in rows and row is not reference:
             behind = ", ".join(judge.behind(row, reference, measured)) or "none"
         lines.append([row.label, *cells(row), behind])
         numbers[row.label] = {**row.values, "floors": row.floors, "behind": behind}
-    head = ["configuration", "events", "ON share", *NETWORKS, "distance"]
+    head = ["simulator", "events", "ON share", *NETWORKS, "distance"]
     head += [f"still, {name}, ON / OFF [Hz]" for name in ("dark", "bright")]
     return table([*head, f"behind {REFERENCE} in"], lines), numbers
 

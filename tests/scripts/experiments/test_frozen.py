@@ -1,4 +1,4 @@
-"""What the judge of configurations measures, with a network of a few lines in place of FireNet."""
+"""What the experiment with frozen networks measures, with a few lines in place of FireNet."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from experiments import frozen
+from experiments.recordings import Measured
+from experiments.simulators.pixel import Pixel
 from networks.firenet import NETWORKS, Network, firenet
-from real import judge
-from real.compare import Case
 from real.measures import likeness, similarity
 from real.recording import read
 from written_recordings import write_recording
@@ -43,7 +44,7 @@ CAMERA = load_config(["ideal"], ["pixel.thresholds.on=0.3", "pixel.thresholds.of
 @pytest.fixture
 def recording(tmp_path):
     frames = moving_edge_beside_a_wall()
-    return read(str(write_recording(tmp_path / "edge", TIMES, frames, events_of(CAMERA))))
+    return Measured(read(str(write_recording(tmp_path / "edge", TIMES, frames, events_of(CAMERA)))))
 
 
 class Counts:
@@ -77,24 +78,15 @@ def test_likeness_is_blind_to_gain():
     assert likeness(-np.log(frame + 5), frame) == pytest.approx(-1)
 
 
-def test_what_a_camera_did_not_record_is_taken_off_the_simulation():
-    t = np.concatenate([np.arange(2000), 5000 + np.arange(2000), [7500]])
-    measured = make_events(t=t, x=0 * t, y=0 * t, p=0 * t)
-    gaps = judge.silences(measured)
-    assert gaps == [(1999, 5000)]  # 500 us hold no thousand events
-    made = make_events(t=[500, 1999, 2000, 4999, 5000], x=[0] * 5, y=[0] * 5, p=[1] * 5)
-    assert judge.without(made, gaps)["t"].tolist() == [500, 1999, 5000]
-
-
 def test_the_camera_itself_is_judged_near_and_others_behind_it(recording):
-    one = judge.Judge(recording, [Counts()], 1)
-    itself = one.config(Case("camera", CAMERA), 2)
+    one = frozen.Judge(recording, [Counts()])
+    itself = one.simulated(Pixel("camera", "", CAMERA, 1), "camera", 2)
     assert itself.values["FireNet"] == pytest.approx(1)
     assert itself.values["events"] == 1
     assert itself.values["distance"] == pytest.approx(0, abs=1e-6)
     noise = ["pixel.shot_noise.rate_hz=100", "pixel.thresholds.on=0.6"]
-    noisy = one.config(Case("noisy", load_config(CAMERA, noise)), 2)
-    measured = one.measured()
+    noisy = one.simulated(Pixel("noisy", "", load_config(CAMERA, noise), 1), "noisy", 2)
+    measured = one.of_the_camera()
     behind = one.behind(noisy, itself, measured)
     assert {"FireNet", "distance", "ON share", "dark ON", "bright OFF"} <= set(behind)
     assert one.behind(itself, noisy, measured) == []
@@ -102,7 +94,7 @@ def test_the_camera_itself_is_judged_near_and_others_behind_it(recording):
 
 
 def test_still_pixels_are_told_of_by_their_light(recording):
-    one = judge.Judge(recording, [Counts()], 1)
+    one = frozen.Judge(recording, [Counts()])
     assert set(one.still.parts) == {"dark", "bright"}
     assert one.still.parts["dark"][:, 18:].any()
     assert not one.still.parts["dark"][:, :18].any()
@@ -116,23 +108,25 @@ def test_still_pixels_are_told_of_by_their_light(recording):
 
 
 def test_few_events_of_still_pixels_count_little():
-    measured = judge.Row("measured", {"dark ON": 0.0}, {}, {})
-    few = judge.Row("few", {"dark ON": 0.02}, {}, {})
+    measured = frozen.Row("measured", {"dark ON": 0.0}, {}, {})
+    few = frozen.Row("few", {"dark ON": 0.02}, {}, {})
     assert few.error(measured, "dark ON", 10.0) < 0.2 < few.error(measured, "dark ON", 1e4)
 
 
 def test_a_table_has_a_row_for_each_configuration_and_what_to_go_by(recording):
-    one = judge.Judge(recording, [Counts()], 1)
-    rows = [one.config(Case(name, load_config([name])), 2) for name in ("ideal", "v2e")]
-    text, numbers = judge.section(one, rows)
+    one = frozen.Judge(recording, [Counts()])
+    configs = {name: load_config([name]) for name in ("ideal", "v2e")}
+    rows = [one.simulated(Pixel(name, "", of, 1), name, 2) for name, of in configs.items()]
+    text, numbers = frozen.section(one, rows)
     lines = [line.split(" | ") for line in text.splitlines()]
     labels = [line[0].strip("| ") for line in lines[2:]]
     assert labels == [
-        "ideal", "v2e", "measured", "half of the measured events", "no events at all",
+        "ideal", "v2e", "measured", "half of the measured events",
+        "measured, times jittered by 2 ms", "no events at all",
     ]  # fmt: skip
     assert {len(line) for line in lines} == {9}
     assert numbers["v2e"]["behind"]
-    assert judge.picture([one.measured(), *rows])[:HEIGHT].shape == (HEIGHT, 3 * WIDTH)
+    assert frozen.picture([one.of_the_camera(), *rows])[:HEIGHT].shape == (HEIGHT, 3 * WIDTH)
 
 
 def test_images_that_do_not_resemble_the_frames_are_an_error(recording):
@@ -142,12 +136,12 @@ def test_images_that_do_not_resemble_the_frames_are_an_error(recording):
             return frames.astype(np.float32) / 255
 
     with pytest.raises(DataError, match="are these its weights"):
-        list(judge.Judge(recording, [Mirrored()], 1).loaded())
+        list(frozen.Judge(recording, [Mirrored()]).loaded())
 
 
 def test_without_pytorch_one_line_says_so(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "torch", None)
-    result = CliRunner().invoke(judge.main, [str(tmp_path), str(tmp_path)])
+    result = CliRunner().invoke(frozen.main, [str(tmp_path), str(tmp_path)])
     assert result.exit_code == 1
     assert "adv2e[experiments]" in result.stderr
     assert len(result.stderr.splitlines()) == 1
@@ -208,8 +202,15 @@ def test_firenet_sees_no_gain_of_the_events(tmp_path):
 
 
 def test_floors_are_between_seeds(recording):
-    one = judge.Judge(recording, [Counts()], 1)
+    one = frozen.Judge(recording, [Counts()])
     pixel = replace(CAMERA.pixel, initial_reference="random")
-    random = one.config(Case("random", replace(CAMERA, pixel=pixel)), 2)
+    random = one.simulated(Pixel("random", "", replace(CAMERA, pixel=pixel), 1), "random", 2)
     assert random.floors["distance"] > 0
     assert random.floors["FireNet"] < 1
+
+
+def test_jittered_times_are_far_as_events_and_near_as_counts(recording):
+    one = frozen.Judge(recording, [Counts()])
+    jittered = one.jittered()
+    assert 0.1 < jittered.values["distance"] < 1.5
+    assert jittered.values["FireNet"] > one.nothing().values["FireNet"]
