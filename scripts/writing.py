@@ -31,6 +31,11 @@ def one_line_errors() -> Iterator[None]:
         raise click.ClickException(f"{error.filename}: {error.strerror}") from None
 
 
+def as_written(text: str | None) -> str:
+    """Return a text for help whose lines click leaves as they are."""
+    return "\n\n".join(f"\b\n{part}" for part in (text or "").strip().split("\n\n"))
+
+
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a table in Markdown; all columns but the first are numbers."""
     ruler = ["---", *(["---:"] * (len(head) - 1))]

@@ -1,0 +1,429 @@
+#!/usr/bin/env python
+"""Images from events, by networks that are trained on the events of simulators.
+
+::
+
+    python scripts/experiments/reconstruction.py train runs/adv2e --gopro GOPRO_Large_all
+    python scripts/experiments/reconstruction.py test DAVIS240C runs/adv2e -o results.md
+    python scripts/experiments/reconstruction.py small runs cups -o small.md
+    python scripts/experiments/reconstruction.py report runs -o small.md
+
+``train``
+    E2VID or FireNet (:mod:`networks.e2vid`, :mod:`networks.firenet`) from scratch, on events that
+    one simulator makes of GOPRO_Large_all (240 frames a second, by way of
+    seungjunnah.github.io/Datasets/gopro.html), or of textures that move
+    (:mod:`experiments.textures`).  Light is linear throughout.  Called again, it goes on.
+``test``
+    The images that trained networks make of measured events, against the frames.  DATA is a folder
+    with the seven DAVIS240C sequences, folders or zips as they are published
+    (rpg.ifi.uzh.ch/davis_data.html), of which the cuts of EVREAL are used; or any one recording
+    with frames, which is used as a whole.
+``small``
+    A training for each simulator and seed on moving textures, each on one thread, tested on one
+    measured recording: what two cores can do.  ``report`` makes its tables again.
+
+The loss is the mean absolute difference plus 1 less the mean structural similarity (SSIM); with
+``--lpips`` LPIPS alone, as E2VID has it, by weights in a folder (:mod:`networks.lpips`).  E2VID's
+second term, consistency over time along known flow, is left out.
+
+Measures are means over all images: MSE and SSIM of images as they are made (clipped to black and
+white), the same after both histograms are equalised, which takes out gain and offset, and LPIPS.
+A picture of one grey, the mean of each frame, stands beside them: who is not better has learnt
+nothing.  Published networks are added by ``--weights`` (:mod:`networks.firenet`).
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import click
+import cv2
+import numpy as np
+from networks import torch_module
+from networks.e2vid import e2vid
+from networks.firenet import firenet
+from networks.image_loss import structural_loss
+from networks.lpips import Lpips
+from writing import as_written, one_line_errors, output_option, table, write_report
+
+from adv2e.errors import DataError
+from experiments import seeds as of_seeds
+from experiments import textures
+from experiments.image_tests import MEASURES, made_of, measures_of, parts, picture, references
+from experiments.seeds import anew, simulators_option
+from experiments.sequences import Batches, Pair, gopro_clips, gopro_folders
+from experiments.simulators.clip import Clip, Simulator
+from experiments.training import CHECKPOINT, Training, Update, written
+
+BUILD = {"e2vid": e2vid, "firenet": firenet}
+LOSS = "L1 + 1 - SSIM"
+SMALL = "ideal,adv2e,v2e,vid2e"
+LENGTH, EVERY = 11, 8
+"""Windows of a run of ``small``, and frames of a window."""
+
+
+def update_of(batches: Batches, truncate: int, device: str, lpips: Lpips | None = None) -> Update:
+    """Return one step of a training: a run of windows, the gradient cut after each `truncate`."""
+    torch = torch_module()
+
+    def loss_of(image: Any, wanted: Any) -> Any:
+        return structural_loss(image, wanted) if lpips is None else lpips(image, wanted).mean()
+
+    def update(net: Any, optimiser: Any, rng: np.random.Generator) -> float:
+        grids, images = (torch.from_numpy(one).to(device) for one in batches.draw(rng))
+        state, total = None, 0.0
+        for begin in range(0, batches.length, truncate):
+            optimiser.zero_grad()
+            losses = []
+            for k in range(begin, min(begin + truncate, batches.length)):
+                image, state = net(grids[k], state)
+                losses.append(loss_of(image, images[k]))
+            loss = torch.stack(losses).mean()
+            loss.backward()
+            optimiser.step()
+            state = detached(state)
+            total += float(loss.detach()) * len(losses)
+        return total / batches.length
+
+    return update
+
+
+def detached(state: Any) -> Any:
+    """Return a state, nested as it is, through which no gradient flows back."""
+    if isinstance(state, (list, tuple)):
+        return [detached(one) for one in state]
+    return state.detach()
+
+
+def trained(run: Path) -> Any:
+    """Return the network of a training.
+
+    Raises
+    ------
+    DataError
+        The folder holds no checkpoint of one of these networks.
+    """
+    path = run / CHECKPOINT
+    if not path.is_file():
+        raise DataError(f"{path}: not there; give a folder that train or small made")
+    state = torch_module().load(path, map_location="cpu", weights_only=True)
+    network = json.loads(state["rest"])["settings"].get("network")
+    if network not in BUILD:
+        raise DataError(f"{path}: network: {network!r} is none of {', '.join(BUILD)}")
+    net = BUILD[network]()
+    net.load_state_dict(state["net"])
+    return net.eval()
+
+
+@dataclass(frozen=True)
+class Small:
+    """One training of ``small``."""
+
+    simulator: Simulator
+    seed: int
+    output: Path
+    recording: Path
+    network: str
+    steps: int
+    rate: float
+    clips: int
+    side: int
+    features: Path | None
+
+    @property
+    def folder(self) -> Path:
+        """Where it is kept."""
+        return self.output / f"{self.simulator.name}-seed{self.seed}"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides its numbers."""
+        return {
+            **self._training, "steps": self.steps, "recording": self.recording.resolve().name,
+            "LPIPS": self.features is not None,
+        }  # fmt: skip
+
+    @property
+    def _training(self) -> dict[str, Any]:
+        return {
+            "simulator": self.simulator.name, "nature": self.simulator.nature, "seed": self.seed,
+            "network": self.network, "rate": self.rate, "batch": 2, "length": LENGTH,
+            "clips": self.clips, "side": self.side, "loss": LOSS,
+        }  # fmt: skip
+
+    def run(self) -> dict[str, Any]:
+        """Train and test."""
+        side = (self.side, self.side)
+        first = 1000 * self.seed
+        clips = (
+            textures.moving(k, EVERY * LENGTH + 1, side) for k in range(first, first + self.clips)
+        )
+        pairs = [Pair.simulated(clip, self.simulator, self.seed, EVERY) for clip in clips]
+        step = update_of(Batches(pairs, 2, LENGTH, side), LENGTH, "cpu")
+        training = Training(BUILD[self.network], step, self._training)
+        net, curve = training.run(self.folder, self.steps)
+        lpips = None if self.features is None else Lpips(self.features)
+        (part,) = parts(self.recording)
+        images = made_of(net, part)
+        cv2.imwrite(str(self.folder / "last.png"), picture(part, [images]))
+        return {
+            "measures": measures_of(images, part.frames, lpips),
+            "loss": float(np.mean(curve.losses[-50:])),
+            "seconds a step": curve.seconds / self.steps,
+            "events": sum(len(pair.events) for pair in pairs),
+        }
+
+
+_lpips_option = click.option(
+    "--lpips", "features", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
+    help="Weights of LPIPS.",
+)  # fmt: skip
+_weights_option = click.option(
+    "--weights", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
+    help="Weights of the published FireNet and FireNet+, which then stand beside.",
+)  # fmt: skip
+
+
+class _Size(click.ParamType):
+    name = "WxH"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value
+        width, _, height = str(value).partition("x")
+        if not (width.isdecimal() and height.isdecimal()):
+            self.fail(f"{value!r}: must be WxH, such as 240x180", param, ctx)
+        return int(width), int(height)
+
+
+def _counted(name: str, default: int, text: str | None = None) -> Any:
+    return click.option(
+        name, type=click.IntRange(min=1), default=default, show_default=True, help=text
+    )
+
+
+def _rate(default: float) -> Any:
+    return click.option(
+        "--rate", type=click.FloatRange(min=0, min_open=True), default=default, show_default=True,
+        help="Of Adam.",
+    )  # fmt: skip
+
+
+@click.group(help=as_written(__doc__))
+def main() -> None:
+    pass
+
+
+@main.command()
+@click.argument("output", type=click.Path(file_okay=False, path_type=Path))
+@click.option(
+    "--gopro", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="FOLDER",
+    help="GOPRO_Large_all.",
+)  # fmt: skip
+@click.option("--textures", "clips", type=click.IntRange(min=1), help="So many clips of textures.")
+@click.option("--network", type=click.Choice(list(BUILD)), default="e2vid", show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@_counted("--steps", 300_000)
+@_rate(1e-4)
+@_counted("--batch", 2, "Runs at a time.")
+@_counted("--length", 40, "Windows of a run.")
+@_counted("--truncate", 40, "Windows that a gradient spans; a step of Adam each.")
+@click.option("--crop", type=_Size(), default="128x128", show_default=True)
+@click.option("--size", type=_Size(), default="240x180", show_default=True, help="Of the sensor.")
+@_counted("--every", EVERY, "Frames from an image to the next.")
+@_counted("--frames", 481, "Of a piece of a sequence.")
+@_counted("--checkpoint", 500, "Steps between checkpoints.")
+@click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True)
+@_lpips_option
+@simulators_option("adv2e")
+@one_line_errors()
+def train(
+    output: Path, gopro: Path | None, clips: int | None, network: str, seed: int, steps: int,
+    rate: float, batch: int, length: int, truncate: int, crop: tuple[int, int],
+    size: tuple[int, int], every: int, frames: int, checkpoint: int, device: str,
+    features: Path | None, names: str, sets: tuple[str, ...], v2e_sources: Path | None,
+) -> None:  # fmt: skip
+    """Train a network on the events of one simulator in the folder OUTPUT; called again, go on."""
+    if (gopro is None) == (clips is None):
+        raise click.UsageError("say --gopro FOLDER or --textures N, and not both")
+    simulators = anew(names, sets, v2e_sources)
+    if len(simulators) != 1:
+        raise click.UsageError(f"--simulators {names}: train takes one")
+    (simulator,) = simulators
+    source = _gopro(gopro, size, frames) if gopro else _textures(clips or 0, seed, size, frames)
+    settings = {
+        "network": network, "simulator": simulator.name, "nature": simulator.nature,
+        "set": list(sets), "data": "GOPRO" if gopro else "textures", "seed": seed, "rate": rate,
+        "batch": batch, "length": length, "truncate": truncate, "crop": list(crop),
+        "size": list(size), "every": every, "frames": frames,
+        "loss": LOSS if features is None else "LPIPS",
+    }  # fmt: skip
+    pairs = list(_kept(source, simulator, output / "sequences", settings))
+    lpips = None if features is None else Lpips(features)
+    step = update_of(Batches(pairs, batch, length, crop), truncate, device, lpips)
+    settings["sequences"] = len(pairs)
+    Training(BUILD[network], step, settings, checkpoint, device=device).run(output, steps)
+
+
+def _gopro(
+    folder: Path, size: tuple[int, int], frames: int
+) -> Iterator[tuple[str, Callable[[], Iterator[Clip]]]]:
+    for sequence in gopro_folders(folder):
+        yield sequence.name, partial(gopro_clips, sequence, size, frames)
+
+
+def _textures(
+    count: int, seed: int, size: tuple[int, int], frames: int
+) -> Iterator[tuple[str, Callable[[], Iterator[Clip]]]]:
+    for number in range(1000 * seed, 1000 * seed + count):
+        yield f"texture-{number:06d}", lambda k=number: iter([textures.moving(k, frames, size)])
+
+
+def _kept(
+    source: Iterator[tuple[str, Callable[[], Iterator[Clip]]]],
+    simulator: Simulator,
+    folder: Path,
+    settings: dict[str, Any],
+) -> Iterator[Pair]:
+    """Yield events and images of all clips, which are simulated where they were not before."""
+    folder.mkdir(parents=True, exist_ok=True)
+    told = folder / "settings.json"
+    about = {
+        name: settings[name]
+        for name in ("simulator", "nature", "set", "data", "seed", "size", "every", "frames")
+    }
+    if told.exists() and (held := json.loads(told.read_text("utf-8"))) != about:
+        raise DataError(f"{told}: events were made with {held}, not {about}; take another folder")
+    written(told, lambda path: path.write_text(json.dumps(about) + "\n", "utf-8"))
+    for name, clips in source:
+        whole = folder / f"{name}.done"
+        if not whole.exists():
+            count = 0
+            for count, clip in enumerate(clips(), 1):
+                pair = Pair.simulated(clip, simulator, settings["seed"], settings["every"])
+                written(folder / f"{name}-{count:03d}.npz", pair.save)
+            whole.touch()
+            click.echo(f"{name}: {count} pieces simulated", err=True)
+        for path in sorted(folder.glob(f"{name}-*.npz")):
+            yield Pair.load(path)
+
+
+@main.command()
+@click.argument("data", type=click.Path(exists=True, path_type=Path))
+@click.argument("runs", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path))
+@_lpips_option
+@_weights_option
+@click.option(
+    "--pictures", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
+    help="Write the last frame of each part, and beside it what each run makes of it.",
+)  # fmt: skip
+@output_option
+@one_line_errors()
+def test(
+    data: Path, runs: tuple[Path, ...], features: Path | None, weights: Path | None,
+    pictures: Path | None, output: Path | None,
+) -> None:  # fmt: skip
+    """Test the networks that were trained in the folders RUNS on the measured events in DATA."""
+    lpips = None if features is None else Lpips(features)
+    nets = {str(run): trained(run) for run in runs}
+    found: dict[str, Any] = {}
+    for part in parts(data):
+        images = {run: made_of(net, part) for run, net in nets.items()}
+        found[part.name] = {
+            run: measures_of(made, part.frames, lpips) for run, made in images.items()
+        } | references(part, weights, lpips)
+        click.echo(f"{part.name}: {len(part.spans)} images done", err=True)
+        if pictures is not None:
+            pictures.mkdir(parents=True, exist_ok=True)
+            path = pictures / f"{part.name}.png"
+            cv2.imwrite(str(path), picture(part, list(images.values())))
+    write_report(_tables(found), output, found)
+
+
+def _tables(found: dict[str, dict[str, dict[str, float]]]) -> str:
+    """Return a table a recording."""
+    texts = []
+    for part, each in found.items():
+        names = list(next(iter(each.values())))
+        lines = [[run, *(f"{values[k]:.4f}" for k in names)] for run, values in each.items()]
+        texts.append(f"## {part}\n\n{table(['network', *names], lines)}")
+    return "\n\n".join(texts)
+
+
+@main.command()
+@click.argument("output", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER")
+@click.argument("recording", type=click.Path(exists=True, path_type=Path))
+@click.option("--network", type=click.Choice(list(BUILD)), default="firenet", show_default=True)
+@_counted("--seeds", 5)
+@_counted("--steps", 800)
+@_rate(1e-3)
+@_counted("--clips", 40, "Of each seed, 0.37 s each.")
+@_counted("--side", 64, "Of the clips [pixels].")
+@_counted("--jobs", 1, "Trainings at a time, on one thread each.")
+@_lpips_option
+@_weights_option
+@simulators_option(SMALL)
+@click.option(
+    "-o", "--report", "to", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE.md",
+    help="Write the report here too; numbers beside it.",
+)  # fmt: skip
+@one_line_errors()
+def small(
+    output: Path, recording: Path, network: str, seeds: int, steps: int, rate: float, clips: int,
+    side: int, jobs: int, features: Path | None, weights: Path | None, names: str,
+    sets: tuple[str, ...], v2e_sources: Path | None, to: Path | None,
+) -> None:  # fmt: skip
+    """Train for each simulator and seed in FOLDER, test on a RECORDING; called again, go on."""
+    lpips = None if features is None else Lpips(features)
+    (part,) = parts(recording)
+    beside = json.dumps(references(part, weights, lpips), indent=1) + "\n"
+    output.mkdir(parents=True, exist_ok=True)
+    written(output / "references.json", lambda path: path.write_text(beside, "utf-8"))
+    trainings = [
+        Small(simulator, seed, output, recording, network, steps, rate, clips, side, features)
+        for seed in range(seeds)
+        for simulator in anew(names, sets, v2e_sources)
+    ]
+    of_seeds.all_done(trainings, jobs)
+    _report(output, to)
+
+
+@main.command()
+@click.argument(
+    "folder", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="FOLDER"
+)
+@output_option
+@one_line_errors()
+def report(folder: Path, output: Path | None) -> None:
+    """Tell what came of the trainings of small in FOLDER, seed by seed, and what it carries."""
+    _report(folder, output)
+
+
+def _report(folder: Path, output: Path | None) -> None:
+    found = of_seeds.measured(folder)
+    path = folder / "references.json"
+    beside = json.loads(path.read_text("utf-8")) if path.exists() else {}
+    one = found[0]["settings"]
+    seconds = np.mean([each["seconds a step"] for each in found])
+    about = (
+        f"{one['network']}, {one['steps']} steps of {seconds:.2f} s on one thread, {one['clips']}"
+        f" clips of {one['side']}x{one['side']} pixels a seed; tested on {one['recording']}."
+    )
+    names = list(found[0]["measures"])
+    lines = [[run, *(f"{values[k]:.4f}" for k in names)] for run, values in beside.items()]
+    texts = [about, of_seeds.report(found, MEASURES), table(["beside", *names], lines)]
+    write_report("\n\n".join(texts), output, {"trainings": found, "beside": beside})
+
+
+if __name__ == "__main__":
+    main()
