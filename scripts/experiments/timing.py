@@ -19,11 +19,13 @@ Truths, which share no code with adv2e (both are in ``tests/``):
 
 Simulators see frames alone.  Those named ``..., told`` are adv2e's pixel with numbers of the truth.
 
-Measured events need frames from which passages can be timed: ``--real FOLDER`` takes a recording
-with ``exposures.txt`` (name, start and end [s] of each exposure), such as the Newton's cradle
-of E-MLB (github.com/KugaMaxx/cuke-emlb, data/demo/samples/demo-01.aedat4) as a DAVIS240C folder.
+Measured events: ``--real FOLDER`` takes a recording with frames and ``exposures.txt`` (name, start
+and end [s] of each exposure), such as the Newton's cradle of E-MLB (github.com/KugaMaxx/cuke-emlb,
+data/demo/samples/demo-01.aedat4) as a DAVIS240C folder, and ``--sweep`` where an edge blurs one.
+Beside its events stand those of rendered edges of the same speed and light.
 
-    python scripts/experiments/timing.py [--quick] [--real FOLDER] [-o FILE.md]
+    python scripts/experiments/timing.py [--quick] [-o FILE.md]
+    python scripts/experiments/timing.py --real cradle --sweep 2,16:45,153:159,ON -o FILE.md
 """
 
 from __future__ import annotations
@@ -45,9 +47,9 @@ from real.recording import read
 from writing import load_pyplot, one_line_errors, output_option, write_report
 
 from adv2e.events import Events
-from experiments.passages import exposures
 from experiments.passages.edges import PAIRS, Edges
 from experiments.passages.report import TRUTH, Part, draw, row_of
+from experiments.passages.sweeps import Sweep, SweepType, exposures_of, report
 from experiments.passages.truth import AS_THE_CIRCUIT, Camera, Dense
 from experiments.simulators.clip import Clip, Simulator
 from experiments.simulators.named import named, simulator_options
@@ -145,6 +147,10 @@ def write_frames(edges: Edges, rate: float, folder: Path) -> None:
     metavar="FOLDER", help="A recording with frames and exposures.txt.",
 )  # fmt: skip
 @click.option(
+    "--sweep", "sweeps", type=SweepType(), multiple=True, metavar="FRAME,X0:X1,Y0:Y1,ON|OFF",
+    help="Where an edge of a dark thing blurs a frame before a bright wall. Repeatable.",
+)  # fmt: skip
+@click.option(
     "--frames", "folder", type=click.Path(exists=False, path_type=Path), metavar="FOLDER",
     help="Only write the rendered frames, of the first rate, for tools that --events brings in.",
 )  # fmt: skip
@@ -153,7 +159,8 @@ def write_frames(edges: Edges, rate: float, folder: Path) -> None:
 @one_line_errors()
 def main(
     quick: bool, rates: str, camera_rate: float, seeds: int, lines: int,
-    recording: Path | None, folder: Path | None, simulators: list[Simulator], output: Path | None,
+    recording: Path | None, sweeps: tuple[Sweep, ...], folder: Path | None,
+    simulators: list[Simulator], output: Path | None,
 ) -> None:  # fmt: skip
     edges = Edges(lines=lines)
     each = [float(rate) for rate in rates.split(",")]
@@ -164,8 +171,11 @@ def main(
         return
     measured = None
     if recording is not None:
+        if not sweeps:
+            raise click.UsageError("--real needs a --sweep, the edges to look at")
         real = read(str(recording))
-        measured = exposures.report(real, exposures.exposures_of(recording, len(real.times_us)))
+        exposed = exposures_of(recording, len(real.times_us))
+        measured = report(real, exposed, sweeps, [*simulators, *named(["davis346"])])
     if output is not None:
         load_pyplot()  # before all the work
     tell = partial(click.echo, err=True)

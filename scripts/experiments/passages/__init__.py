@@ -4,7 +4,7 @@
 edges          the scene: edges between grey levels, exact light at any time
 truth          its events by a dense solution of the circuit, and by a camera by brute force
 measures       latencies after the passage, events after the stop, distances of distributions
-exposures      passage times in a real recording, from the mixed light of its exposures
+sweeps         edges in a real recording, timed by the exposures that they blur
 report         tables and the picture
 =============  ====================================================================================
 """

@@ -30,9 +30,6 @@ PAIRS = ((4.0, 12.0), (12.0, 36.0), (36.0, 108.0), (80.0, 240.0))
 START_PX = -6.0
 """Where edges are at first, outside of the picture [px]."""
 
-HALF_WIDTH_PX = 0.7
-"""w: from 10 to 90 % of the change is 1.5 px [px]."""
-
 CLEAR_PX = 3.0
 """An edge this far from a pixel has passed it wholly, or not begun to [px]."""
 
@@ -66,6 +63,8 @@ class Edges:
         [px/s]
     stop_s, end_s : float
         When edges stop, and the end [s].
+    half_width : float
+        w: 10 to 90 % of the change is 2.2 of it [px].
     """
 
     pairs: tuple[tuple[float, float], ...] = PAIRS
@@ -74,6 +73,7 @@ class Edges:
     speed: float = 500.0
     stop_s: float = 0.1013
     end_s: float = 0.26
+    half_width: float = 0.7
 
     @cached_property
     def bands(self) -> list[Band]:
@@ -103,7 +103,7 @@ class Edges:
         ahead, behind = np.array(
             [(one.dark, one.bright)[:: 1 if one.polarity else -1] for one in self.bands]
         )[self.band_of(rows)].transpose(-1, *range(rows.ndim))
-        share = 0.5 + 0.5 * np.tanh((self.place(rows, times) - columns) / HALF_WIDTH_PX)
+        share = 0.5 + 0.5 * np.tanh((self.place(rows, times) - columns) / self.half_width)
         return np.asarray(ahead + (behind - ahead) * share)
 
     def pixels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -236,7 +236,7 @@ def draw(parts: Sequence[Part], path: Path) -> None:
     for axis in axes[:-1, 0]:
         axis.set_ylabel("since the passage [ms]", fontsize=8)
     axes[-1, 0].set_ylabel("events after the stop", fontsize=8)
-    axes[0, 0].legend(fontsize=7, loc="upper left")
+    axes[0, 0].legend(fontsize=7, loc="upper left", bbox_to_anchor=(0.1, 1.0))  # right of the bars
     for axis in axes.ravel():
         axis.tick_params(labelsize=8)
     save_figure(figure, path)

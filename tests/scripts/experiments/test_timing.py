@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from experiments import timing
-from experiments.passages import exposures, measures, truth
-from experiments.passages.edges import CLEAR_PX, HALF_WIDTH_PX, Edges
+from experiments.passages import measures, sweeps, truth
+from experiments.passages.edges import Edges
 from experiments.passages.measures import Passages, after_stop, apart, latencies
 from experiments.passages.report import row_of
 from experiments.simulators.named import named
@@ -177,27 +177,84 @@ def test_the_floor_is_between_different_seeds_of_the_truth():
     assert part.distances(row, [0], 1) == pytest.approx([70.0])
 
 
-def test_exposures_tell_the_passage_of_one_sharp_edge():
-    assert CLEAR_PX > 3 * HALF_WIDTH_PX
-    errors = exposures.errors_at_best(20_000.0, 40_000.0)
-    assert len(errors) > 50
-    assert abs(np.median(errors)) < 200
-    assert np.percentile(np.abs(errors), 90) < 2000
+WALL, BEHIND = 45.0, 4.0
+
+
+def blurred(polarity, level):
+    """Return three frames, exposures of 20 ms, of a dark thing that goes over or off a wall."""
+    edges = Edges(pairs=((BEHIND, WALL),), lines=4, columns=60, speed=1300.0, stop_s=1.0)
+    rows, columns = edges.pixels()
+    exposures = np.array([[-0.06, -0.04], [0.012, 0.032], [0.06, 0.08]])
+    frames = []
+    for start, end in exposures:
+        times = np.linspace(start, end, 801)[:, None]
+        light = edges.light(rows, columns, times).mean(axis=0).reshape(edges.size[::-1])
+        frames.append(light[:4] if polarity else light[4:])
+    # the wall is the median: what most frames show
+    other = np.full_like(frames[1], WALL)
+    stack = np.array([other, frames[1], other])
+    return (
+        stack + level * np.random.default_rng(2).standard_normal(stack.shape),
+        1e6 * exposures,
+        edges,
+    )
+
+
+@pytest.mark.parametrize("polarity", [1, 0])
+def test_a_blurred_exposure_tells_passages(polarity):
+    frames, exposures, edges = blurred(polarity, 1.0)
+    sweep = sweeps.Sweep(1, (5, 45), (0, 3), polarity)
+    found = sweeps.timed(frames, exposures, sweep, BEHIND)
+    rows = np.arange(4) + (0 if polarity else 4)
+    true = 1e6 * edges.passage(rows[:, None], np.arange(60)[None, :])
+    known = np.isfinite(found.passages.time_us)
+    assert known.sum() > 60
+    assert np.abs(found.passages.time_us - true)[known].max() < 400
+    assert sweeps.straight(found.passages.time_us)[1] == pytest.approx(1e6 / 1300.0, rel=0.1)
+    assert found.wall == pytest.approx(WALL, abs=1.0)
+    with pytest.raises(DataError, match="not within 3 frames of 60x4"):
+        sweeps.timed(frames, exposures, sweep._replace(frame=3), BEHIND)
+    with pytest.raises(DataError, match="no row has"):
+        sweeps.timed(frames, exposures, sweep._replace(columns=(50, 59)), BEHIND)
+
+
+def test_a_passage_ends_with_the_next_edge():
+    passages = passages_of([[20_000.0, 21_000.0, 22_000.0]], lead_us=3000.0)
+    rows = [(16_000, 0, 1), (19_000, 0, 1), (20_000, 0, 1), (23_000, 0, 0), (24_000, 0, 1),
+            (19_500, 1, 0), (20_000, 1, 1), (25_500, 1, 1), (21_000, 2, 1)]  # fmt: skip
+    t, x, p = np.array(rows).T
+    events = sort_events(make_events(t, x, np.zeros(len(t)), p))
+    sweep = sweeps.Sweep(0, (0, 2), (0, 0), 1)
+    found, speed = sweeps.passed_by(events, sweep, passages)
+    assert found.of.tolist() == [-1000, 0, -1000, 4500, -1000]
+    assert sweeps.since_first(found).tolist() == [1000, 5500]
+    assert sweeps.since_first(found, 1).tolist() == [5500]
+    assert speed == pytest.approx(1000.0)
+
+
+def test_a_sweep_is_written_as_it_is_read():
+    text = "2,16:45,153:159,OFF"
+    sweep = sweeps.SweepType().convert(text, None, None)
+    assert sweep == (2, (16, 45), (153, 159), 0)
+    assert str(sweep) == text
+    done = CliRunner().invoke(timing.main, ["--sweep", "2,16:45,OFF"])
+    assert done.exit_code == 2
+    assert "must be FRAME,X0:X1,Y0:Y1,ON or OFF" in done.output
 
 
 def test_exposures_must_be_those_of_the_frames(tmp_path):
     with pytest.raises(DataError, match="no such file"):
-        exposures.exposures_of(tmp_path, 2)
+        sweeps.exposures_of(tmp_path, 2)
     path = tmp_path / "exposures.txt"
     path.write_text("# name start end\na.png 0.5 0.52\n\nb.png 0.54 0.56\n")
-    assert exposures.exposures_of(tmp_path, 2) == pytest.approx(
+    assert sweeps.exposures_of(tmp_path, 2) == pytest.approx(
         1e6 * np.array([[0.5, 0.52], [0.54, 0.56]])
     )
     with pytest.raises(DataError, match="must be 3 lines"):
-        exposures.exposures_of(tmp_path, 3)
+        sweeps.exposures_of(tmp_path, 3)
     path.write_text("a.png 0.5\nb.png 0.54\n")
     with pytest.raises(DataError, match=r"start and end \[s\]"):
-        exposures.exposures_of(tmp_path, 2)
+        sweeps.exposures_of(tmp_path, 2)
 
 
 def test_the_command_writes_tables_numbers_and_the_picture(tmp_path, monkeypatch):
