@@ -7,7 +7,7 @@ how its distance is defined: it is given in each of the ways it can be read, bes
 Each comes with its floor.  One Markdown table a recording::
 
     python scripts/experiments/direct.py slider_depth.zip cradle -o direct.md
-    python scripts/experiments/direct.py urban --events v2ce=v2ce.npz --match-totals --page pages
+    python scripts/experiments/direct.py urban --events v2ce=v2ce.npz@start --match-totals
 
 RECORDING is a folder or zip in the layout of the DAVIS240C data set (urban.zip, slider_depth.zip
 and others, "Text (zip)" at rpg.ifi.uzh.ch/davis_data.html), or a folder with images.txt and

@@ -12,7 +12,7 @@ from writing import one_line_errors, table, threads_option
 
 from adv2e.config import load_config
 from adv2e.errors import ConfigError
-from experiments.simulators.by_file import ByFile
+from experiments.simulators.by_file import FIRST_FRAME, ByFile
 from experiments.simulators.clip import Simulator
 from experiments.simulators.eventcv import QUIET, EventCV
 from experiments.simulators.pixel import OF_A_TOOL, OWN, Pixel
@@ -26,7 +26,7 @@ _OF_TOOLS = ("v2e", "vid2e")
 
 def named(
     names: Sequence[str],
-    files: Sequence[tuple[str, Path]] = (),
+    files: Sequence[ByFile] = (),
     *,
     sets: Sequence[str] = (),
     v2e_sources: Path | None = None,
@@ -38,8 +38,7 @@ def named(
     ----------
     names : sequence of str
         ``dvs-voltmeter``, ``eventcv``, ``eventcv-quiet``, or what :func:`adv2e.load_config` takes.
-    files : sequence of (str, Path)
-        Names and files of events.
+    files : sequence of ByFile
     sets : sequence of str
         ``KEY=VALUE`` for all configurations of adv2e.
     v2e_sources : Path, optional
@@ -53,7 +52,7 @@ def named(
     MissingExtraError
         A tool is not installed.
     """
-    asked = [Path(name).stem for name in names] + [name for name, _ in files]
+    asked = [Path(name).stem for name in names] + [one.name for one in files]
     for name in asked:
         if asked.count(name) > 1:
             raise ConfigError(f"{name}: is asked for twice; give each simulator a name of its own")
@@ -66,7 +65,7 @@ def named(
         nature = OF_A_TOOL if name in _OF_TOOLS else OWN
         return Pixel(Path(name).stem, nature, load_config([name], sets), threads)
 
-    return [*map(one, names), *(ByFile(name, path) for name, path in files)]
+    return [*map(one, names), *files]
 
 
 _OTHERS: dict[str, Callable[[], Simulator]] = {
@@ -82,21 +81,29 @@ def natures(simulators: Sequence[Simulator]) -> str:
     return table(["simulator", "what it is"], rows).replace("---:", "---")
 
 
-class NameAndFile(click.ParamType):
-    """``NAME=FILE``."""
+class EventsOf(click.ParamType):
+    """``NAME=FILE``, ``NAME=FILE@SECONDS`` or ``NAME=FILE@start``."""
 
     name = "NAME=FILE"
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, Path]:
-        """Return both."""
-        if isinstance(value, tuple):
+    ) -> ByFile:
+        """Return the simulator."""
+        if isinstance(value, ByFile):
             return value
         name, _, path = str(value).partition("=")
         if not name or not path:
-            self.fail(f"{value!r}: must be NAME=FILE, such as v2ce=events.h5", param, ctx)
-        return name, Path(path)
+            self.fail(f"{value!r}: must be NAME=FILE, such as v2ce=events.npz", param, ctx)
+        file, at, clock = path.rpartition("@")
+        if not at:
+            return ByFile(name, Path(path))
+        if clock == FIRST_FRAME:
+            return ByFile(name, Path(file), None)
+        try:
+            return ByFile(name, Path(file), float(clock))
+        except ValueError:  # a name with @ in it
+            return ByFile(name, Path(path))
 
 
 def simulator_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -107,8 +114,9 @@ def simulator_options(command: Callable[..., None]) -> Callable[..., None]:
         help="Also other shipped names and YAML files.",
     )  # fmt: skip
     @click.option(
-        "--events", "files", type=NameAndFile(), multiple=True, metavar="NAME=FILE",
-        help="Events that another simulator wrote, on the recording's clock. Repeatable.",
+        "--events", "files", type=EventsOf(), multiple=True, metavar="NAME=FILE",
+        help="Events that another simulator wrote, on the recording's clock; with @start after"
+        " FILE they begin with the first frame, @SECONDS adds so many. Repeatable.",
     )  # fmt: skip
     @click.option(
         "--v2e-sources", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
@@ -121,7 +129,7 @@ def simulator_options(command: Callable[..., None]) -> Callable[..., None]:
     @threads_option
     @wraps(command)
     def made(
-        names: str, files: tuple[tuple[str, Path], ...], v2e_sources: Path | None,
+        names: str, files: tuple[ByFile, ...], v2e_sources: Path | None,
         sets: tuple[str, ...], threads: int | None, **rest: Any,
     ) -> None:  # fmt: skip
         with one_line_errors():

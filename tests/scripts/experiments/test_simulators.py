@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from experiments.simulators.by_file import ByFile
 from experiments.simulators.clip import Clip
-from experiments.simulators.named import NAMES, NameAndFile, named
+from experiments.simulators.named import NAMES, EventsOf, named
 from experiments.simulators.v2e import V2e
 from experiments.simulators.voltmeter import (
     CONSTANTS,
@@ -86,11 +86,16 @@ def test_unknown_names_and_names_that_stand_twice_are_refused():
     with pytest.raises(ConfigError, match="nonsense"):
         named(["ideal", "nonsense"])
     with pytest.raises(ConfigError, match="ideal: is asked for twice"):
-        named(["ideal"], [("ideal", Path("events.h5"))])
+        named(["ideal"], [ByFile("ideal", Path("events.h5"))])
 
 
-def test_names_with_files():
-    assert NameAndFile().convert("v2ce=a=b.h5", None, None) == ("v2ce", Path("a=b.h5"))
+@pytest.mark.parametrize(
+    ("text", "path", "added"),
+    [("a.h5", "a.h5", 0.0), ("a.h5@start", "a.h5", None), ("a@b=c.h5", "a@b=c.h5", 0.0),
+     ("a.h5@-0.5", "a.h5", -0.5)],
+)  # fmt: skip
+def test_names_with_files(text, path, added):
+    assert EventsOf().convert(f"v2ce={text}", None, None) == ByFile("v2ce", Path(path), added)
 
 
 # ------------------------------------------------------------------------------------------ clips
@@ -196,8 +201,20 @@ def test_events_by_file_are_read_and_cannot_be_made_with_other_thresholds(writte
 def test_events_of_another_size_or_clock_are_refused(written):
     with pytest.raises(DataError, match=r"made.h5: events of 20x12 pixels, but frames of 8x8"):
         ByFile("other", written).events(Clip(np.zeros((2, 8, 8), np.uint8), TIMES_NS[:2]), 0)
-    with pytest.raises(DataError, match="on the clock of the recording"):
+    with pytest.raises(DataError, match=r"other=\S+made.h5@start is for times that begin"):
         ByFile("other", written).events(Clip(CLIP.frames, TIMES_NS - START_NS), 0)
+
+
+def test_events_as_v2ce_writes_them_are_put_on_the_clock_of_the_recording(tmp_path):
+    """One structured array of times from 0, and no size."""
+    fields = [("timestamp", "i8"), ("x", "i2"), ("y", "i2"), ("polarity", "i1")]
+    stream = np.array([(k * 1000, k % WIDTH, k % 9, 2 * (k % 2) - 1) for k in range(90)], fields)
+    np.savez(tmp_path / "v2ce.npz", event_stream=stream)
+    events = ByFile("v2ce", tmp_path / "v2ce.npz", None).events(CLIP, 0)
+    assert events["t"].tolist() == [7_000_000 + 1000 * k for k in range(90)]
+    assert events["p"].tolist() == [0, 1] * 45
+    later = ByFile("v2ce", tmp_path / "v2ce.npz", 7.01).events(CLIP, 0)
+    assert later["t"][0] == 7_010_000
 
 
 def test_v2e_without_its_sources_is_refused(tmp_path):
