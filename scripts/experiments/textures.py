@@ -9,6 +9,7 @@ grows and tilts, each as the sum of two slow waves.
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
@@ -29,6 +30,8 @@ SPEEDS = 15.0, 150.0
 SCALES = 0.7, 1.6
 """Pixels of the photograph to one of the clip, drawn in the same way."""
 HZ = 240
+View = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Rows and columns of a picture, a pixel each."""
 
 
 @lru_cache(maxsize=len(NAMES))
@@ -66,25 +69,41 @@ def moving(seed: int, frames: int, size: tuple[int, int], hz: float = HZ) -> Cli
     """
     rng = np.random.default_rng([seed, 41])
     light = photograph(NAMES[rng.integers(len(NAMES))])
+    made = [seen(light, view) for view in views(rng, light.shape, frames, size, hz)]
+    return Clip(np.stack(made), times_ns(frames, hz))
+
+
+def times_ns(frames: int, hz: float) -> NDArray[np.int64]:
+    """Return the times of frames at a rate [ns]."""
+    return np.rint(1e9 * np.arange(frames) / hz).astype(np.int64)
+
+
+def seen(light: NDArray[np.float32], view: View, order: int = 3) -> NDArray[np.float32]:
+    """Return what a view shows of a picture, by a spline of an order; mirrored beyond its edges."""
+    made = np.empty(view[0].shape, np.float32)
+    spline = _late("scipy.ndimage").map_coordinates
+    spline(light, view, made, order=order, mode="mirror", prefilter=False)
+    return made
+
+
+def views(
+    rng: np.random.Generator, shape: tuple[int, ...], frames: int, size: tuple[int, int], hz: float
+) -> Iterator[View]:
+    """Yield the rows and columns of a picture of a shape that the pixels see, frame by frame."""
     speed, scale = (np.exp(rng.uniform(*np.log(span))) for span in (SPEEDS, SCALES))
     times = np.arange(frames) / hz
     # waves of 0.4 to 2 s; the amplitude that gives the speed
     waves = rng.uniform(0.4, 2.0, (6, 2)), rng.uniform(0, 2 * np.pi, (6, 2))
     pace = 2 * np.pi / waves[0]
-    ways = np.sin(pace * times[:, None, None] + waves[1]).transpose(1, 2, 0)
+    ways = np.sin(pace * times[:, None, None] + waves[1])
     reach = np.array([speed, speed, 0.5, 0.15, 0.05, 0.05])[:, None] / pace / 2
-    shift_x, shift_y, turn, grow, tilt_x, tilt_y = (reach[..., None] * ways).sum(1)
-    centre = rng.uniform(0.25, 0.75, 2) * light.shape
+    centre = rng.uniform(0.25, 0.75, 2) * shape
     columns, rows = size
     x = (np.arange(columns) - (columns - 1) / 2)[None]
     y = (np.arange(rows) - (rows - 1) / 2)[:, None]
-    spline = _late("scipy.ndimage").map_coordinates
-    made = np.empty((frames, rows, columns), np.float32)
-    for k in range(frames):
-        away = 1 + (tilt_x[k] * x + tilt_y[k] * y) / max(size)
-        factor = scale * np.exp(grow[k]) / away
-        cos, sin = np.cos(turn[k]), np.sin(turn[k])
-        at_x = centre[1] + factor * (cos * x - sin * y) + scale * shift_x[k]
-        at_y = centre[0] + factor * (sin * x + cos * y) + scale * shift_y[k]
-        spline(light, (at_y, at_x), made[k], order=3, mode="mirror", prefilter=False)
-    return Clip(made, np.rint(1e9 * times).astype(np.int64))
+    for shift_x, shift_y, turn, grow, tilt_x, tilt_y in (reach * ways).sum(2):
+        away = 1 + (tilt_x * x + tilt_y * y) / max(size)
+        factor = scale * np.exp(grow) / away
+        at_x = centre[1] + factor * (np.cos(turn) * x - np.sin(turn) * y) + scale * shift_x
+        at_y = centre[0] + factor * (np.sin(turn) * x + np.cos(turn) * y) + scale * shift_y
+        yield at_y, at_x

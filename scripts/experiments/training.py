@@ -80,6 +80,8 @@ class Training:
         The measure to go by: the larger the better.
     device : str
         ``cpu`` or ``cuda``.
+    slowing : callable, optional
+        Returns the share of the rate that a step has, from its number.
     """
 
     build: Callable[[], Any]
@@ -89,6 +91,7 @@ class Training:
     check: Callable[[Any], dict[str, float]] | None = None
     best_by: str | None = None
     device: str = "cpu"
+    slowing: Callable[[int], float] | None = None
 
     def run(self, folder: Path, steps: int) -> tuple[Any, Curve]:
         """Train up to a number of steps, from where the folder is; return network and curve.
@@ -110,6 +113,9 @@ class Training:
         curve = self._resume(folder / CHECKPOINT, net, optimiser, rng)
         while len(curve.losses) < steps:
             net.train()
+            if self.slowing is not None:
+                share = self.slowing(len(curve.losses))
+                optimiser.param_groups[0]["lr"] = self.settings["rate"] * share
             start = time.perf_counter()
             loss = self.update(net, optimiser, rng)
             curve.seconds += time.perf_counter() - start
