@@ -94,8 +94,7 @@ class Dense:
             axis=1, return_index=True, return_inverse=True,
         )[1:]  # fmt: skip
         of = rows[courses], columns[courses]
-        times = passage[courses] + np.minimum(KNOTS_S[:, None], left[courses])
-        light = edges.light(*of, times)
+        light = edges.light(*of, passage[courses] + KNOTS_S[:, None])
         solve = of_the_tests("reference.dense_signal").solve_signal
         paths = solve(light, KNOTS_S, self._circuit(LEVEL, LEVEL))
         return [paths[k] for k in which.ravel()]
