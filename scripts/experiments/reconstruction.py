@@ -154,8 +154,8 @@ class Small:
     @property
     def _training(self) -> dict[str, Any]:
         return {
-            "simulator": self.simulator.name, "nature": self.simulator.nature, "seed": self.seed,
-            "network": self.network, "rate": self.rate, "batch": 2, "length": LENGTH,
+            **of_seeds.about(self.simulator), "seed": self.seed, "network": self.network,
+            "rate": self.rate, "batch": 2, "length": LENGTH,
             "clips": self.clips, "side": self.side, "loss": LOSS,
         }  # fmt: skip
 
@@ -262,9 +262,8 @@ def train(
     (simulator,) = simulators
     source = _gopro(gopro, size, frames) if gopro else _textures(clips or 0, seed, size, frames)
     settings = {
-        "network": network, "simulator": simulator.name, "nature": simulator.nature,
-        "set": list(sets), "data": "GOPRO" if gopro else "textures", "seed": seed, "rate": rate,
-        "batch": batch, "length": length, "truncate": truncate, "crop": list(crop),
+        **of_seeds.about(simulator), "network": network,
+        "data": "GOPRO" if gopro else "textures", "seed": seed, "rate": rate, "batch": batch, "length": length, "truncate": truncate, "crop": list(crop),
         "size": list(size), "every": every, "frames": frames,
         "loss": LOSS if features is None else "LPIPS",
     }  # fmt: skip
@@ -300,7 +299,7 @@ def _kept(
     told = folder / "settings.json"
     about = {
         name: settings[name]
-        for name in ("simulator", "nature", "set", "data", "seed", "size", "every", "frames")
+        for name in ("simulator", "nature", "digest", "data", "seed", "size", "every", "frames")
     }
     if told.exists() and (held := json.loads(told.read_text("utf-8"))) != about:
         raise DataError(f"{told}: events were made with {held}, not {about}; take another folder")

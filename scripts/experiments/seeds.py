@@ -8,6 +8,7 @@ What it cannot see: it is about other seeds with the same test data, not about o
 
 from __future__ import annotations
 
+import hashlib
 import json
 import multiprocessing
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,7 +21,7 @@ import click
 import cv2
 import numpy as np
 from networks import torch_module
-from writing import table
+from writing import load_pyplot, table
 
 from adv2e.errors import DataError
 from experiments.simulators.clip import Simulator
@@ -63,8 +64,16 @@ def done(job: Job) -> dict[str, Any]:
     return held
 
 
+def about(simulator: Simulator) -> dict[str, str]:
+    """Return what a training keeps of its simulator: name, nature, and a digest of all it is."""
+    digest = hashlib.sha256(repr(simulator).encode()).hexdigest()[:16]
+    return {"simulator": simulator.name, "nature": simulator.nature, "digest": digest}
+
+
 def all_done(jobs: Sequence[Job], processes: int) -> None:
     """Train and test all, so many at a time, each in a process of its own."""
+    torch_module()  # what is missing is told at once, and by this process
+    load_pyplot()
     if processes == 1:
         for number, job in enumerate(jobs, 1):
             done(job)
@@ -98,7 +107,7 @@ def measured(folder: Path) -> list[dict[str, Any]]:
     for one in found[1:]:
         for name in found[0]["settings"]:
             a, b = (each["settings"].get(name) for each in (found[0], one))
-            if name not in ("simulator", "nature", "seed") and a != b:
+            if name not in ("simulator", "nature", "digest", "seed") and a != b:
                 raise DataError(
                     f"{folder}: trainings with {name} {a!r} and {b!r}: not to be compared"
                 )

@@ -269,7 +269,7 @@ class Small:
     @property
     def _training(self) -> dict[str, Any]:
         return {
-            "simulator": self.simulator.name, "nature": self.simulator.nature, "seed": self.seed,
+            **of_seeds.about(self.simulator), "seed": self.seed,
             "network": "unet", "rate": self.rate, "batch": 4, "clips": self.clips,
             "side": self.side, "tested on": self.about, "pictures tested": len(self.tested),
         }  # fmt: skip

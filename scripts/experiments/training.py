@@ -99,7 +99,8 @@ class Training:
         Raises
         ------
         DataError
-            The folder holds a training with other settings, or the loss is not finite any more.
+            The folder holds a training with other settings or of more steps, or the loss is not
+            finite any more.
         MissingExtraError
             PyTorch or Matplotlib is not installed.
         """
@@ -111,6 +112,11 @@ class Training:
         optimiser = torch.optim.Adam(net.parameters(), lr=self.settings["rate"])
         rng = np.random.default_rng(self.settings["seed"])
         curve = self._resume(folder / CHECKPOINT, net, optimiser, rng)
+        if len(curve.losses) > steps:
+            raise DataError(
+                f"{folder / CHECKPOINT}: holds {len(curve.losses)} steps, more than {steps};"
+                " take another folder"
+            )
         while len(curve.losses) < steps:
             net.train()
             if self.slowing is not None:

@@ -92,6 +92,16 @@ def test_other_settings_are_done_anew_and_not_mixed(tmp_path):
         seeds.measured(tmp_path)
 
 
+def test_a_simulator_is_known_by_all_it_is():
+    plain, again, set_other = (
+        seeds.about(seeds.anew("ideal", sets, None)[0])
+        for sets in ((), (), ("pixel.thresholds.on=0.3",))
+    )
+    assert plain == again
+    assert plain["simulator"] == set_other["simulator"] == "ideal"
+    assert plain["digest"] != set_other["digest"]
+
+
 def test_an_empty_folder_is_one_line(tmp_path):
     with pytest.raises(DataError, match="small makes them"):
         seeds.measured(tmp_path)

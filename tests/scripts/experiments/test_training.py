@@ -108,6 +108,12 @@ def test_other_settings_need_another_folder(tmp_path):
         training(rate=0.02).run(tmp_path, 4)
 
 
+def test_a_longer_training_is_not_taken_for_a_shorter_one(tmp_path):
+    training().run(tmp_path, 4)
+    with pytest.raises(DataError, match="holds 4 steps, more than 2;"):
+        training().run(tmp_path, 2)
+
+
 def test_another_file_is_no_checkpoint(tmp_path):
     (tmp_path / CHECKPOINT).write_bytes(b"nothing")
     with pytest.raises(DataError, match="no checkpoint of a training"):
