@@ -263,9 +263,9 @@ def train(
     source = _gopro(gopro, size, frames) if gopro else _textures(clips or 0, seed, size, frames)
     settings = {
         **of_seeds.about(simulator), "network": network,
-        "data": "GOPRO" if gopro else "textures", "seed": seed, "rate": rate, "batch": batch, "length": length, "truncate": truncate, "crop": list(crop),
-        "size": list(size), "every": every, "frames": frames,
-        "loss": LOSS if features is None else "LPIPS",
+        "data": "GOPRO" if gopro else "textures", "seed": seed, "rate": rate, "batch": batch,
+        "length": length, "truncate": truncate, "crop": list(crop), "size": list(size),
+        "every": every, "frames": frames, "loss": LOSS if features is None else "LPIPS",
     }  # fmt: skip
     pairs = list(_kept(source, simulator, output / "sequences", settings))
     lpips = None if features is None else Lpips(features)
