@@ -29,7 +29,7 @@ import numpy as np
 from real.model import SCORE, Bench, Judged
 from real.recording import Real, halves, read
 from real.table import COLUMNS, definitions, markdown, marks, preamble
-from writing import output_option, write_report
+from writing import as_written, output_option, write_report
 
 from adv2e.comparison.distances import MEASURES, distances
 from adv2e.comparison.floor import Floor
@@ -38,28 +38,13 @@ from adv2e.diagnosis.fitting.nuisances import TOLERANCE
 from adv2e.events import Events
 from adv2e.sources.times.instants import seconds
 from experiments import side_by_side
-from experiments.recordings import Measured
+from experiments.recordings import Measured, trial_options
 from experiments.simulators.clip import Simulator
 from experiments.simulators.named import natures, simulator_options
 from experiments.simulators.pixel import Pixel
 
 
-@click.command()
-@click.argument("recordings", metavar="RECORDING...", nargs=-1, required=True)
-@click.option(
-    "--seeds",
-    type=click.IntRange(min=2),
-    default=2,
-    show_default=True,
-    help="Simulations of each; values are their means, floors the means over their pairs.",
-)
-@click.option(
-    "--match-totals",
-    "matching",
-    is_flag=True,
-    help="Add a table: thresholds set so that the totals of the first half of the intervals match,"
-    " distances on the second.",
-)
+@click.command(help=as_written(__doc__))
 @click.option(
     "--page",
     "pages",
@@ -67,6 +52,7 @@ from experiments.simulators.pixel import Pixel
     metavar="FOLDER",
     help="Write a page a table there: measured and simulated events frame by frame.",
 )
+@trial_options
 @simulator_options
 @output_option
 def main(
@@ -77,7 +63,6 @@ def main(
     pages: Path | None,
     output: Path | None,
 ) -> None:
-    """Compare the events of simulators with those of real recordings."""
     parts = [preamble(), natures(simulators)]
     numbers: dict[str, Any] = {"simulators": {one.name: one.nature for one in simulators}}
     for path in recordings:

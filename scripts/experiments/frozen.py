@@ -54,14 +54,14 @@ from numpy.typing import NDArray
 from real.measures import likeness, similarity
 from real.model import SCORE, Bench
 from real.recording import halves, read
-from writing import output_option, table, write_report
+from writing import as_written, output_option, table, write_report
 
 from adv2e.comparison.distances import distances
 from adv2e.comparison.floor import half_split
 from adv2e.comparison.windows import Windows
 from adv2e.errors import DataError
 from adv2e.events import Events, cut, empty_events, sort_events
-from experiments.recordings import Measured
+from experiments.recordings import Measured, trial_options
 from experiments.simulators.clip import Simulator
 from experiments.simulators.named import natures, simulator_options
 
@@ -272,28 +272,15 @@ def _means(found: Sequence[dict[str, float | None]]) -> dict[str, float | None]:
     return means
 
 
-@click.command()
+@click.command(help=as_written(__doc__))
 @click.argument("weights", type=click.Path(path_type=Path))
-@click.argument("recordings", metavar="RECORDING...", nargs=-1, required=True)
-@click.option(
-    "--seeds",
-    type=click.IntRange(min=2),
-    default=2,
-    show_default=True,
-    help="Simulations of each; values are their means.",
-)
-@click.option(
-    "--match-totals",
-    "matching",
-    is_flag=True,
-    help="Add a table: thresholds set so that the totals of the first half of the intervals match.",
-)
 @click.option(
     "--pictures",
     type=click.Path(file_okay=False, path_type=Path),
     metavar="FOLDER",
     help="Write the last images: a row a network; measured, half of it, simulators in order.",
 )
+@trial_options
 @simulator_options
 @output_option
 def main(
@@ -305,7 +292,6 @@ def main(
     pictures: Path | None,
     output: Path | None,
 ) -> None:
-    """Judge simulators by frozen networks, distance, and still pixels together."""
     networks = [Network(name, weights) for name in NETWORKS]
     parts, numbers = [natures(simulators)], {}
     for path in recordings:

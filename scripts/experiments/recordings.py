@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,6 +21,24 @@ SILENCE = 1000
 """A stretch without one event was not recorded where, at the mean rate, it would have so many."""
 WIDEST = 25.0
 """Thresholds are sought from 1/25 to 25 times those of the simulator."""
+
+
+def trial_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add recordings, and how simulators are tried on them."""
+    for one in (
+        click.option(
+            "--match-totals", "matching", is_flag=True,
+            help="Add a table: thresholds set so that the totals of the first half of the frame"
+            " intervals match, judged on the second.",
+        ),
+        click.option(
+            "--seeds", type=click.IntRange(min=2), default=2, show_default=True,
+            help="Simulations of each; values are their means, floors the means over their pairs.",
+        ),
+        click.argument("recordings", metavar="RECORDING...", nargs=-1, required=True),
+    ):  # fmt: skip
+        command = one(command)
+    return command
 
 
 @dataclass(frozen=True)

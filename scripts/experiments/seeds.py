@@ -25,7 +25,7 @@ from writing import load_pyplot, table
 
 from adv2e.errors import DataError
 from experiments.simulators.clip import Simulator
-from experiments.simulators.named import named
+from experiments.simulators.named import named, sets_option, sources_option
 from experiments.training import written
 
 MEASURED = "measures.json"
@@ -184,18 +184,7 @@ def simulators_option(default: str) -> Any:
     """Return the options that choose simulators which make events of new clips."""
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
-        for one in (
-            click.option(
-                "--v2e-sources", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
-                help="A clone of github.com/SensorsINI/v2e: v2e is the tool itself then.",
-            ),
-            click.option(
-                "--set", "sets", multiple=True, metavar="KEY=VALUE",
-                help="For all configurations of adv2e. Repeatable.",
-            ),
-            click.option("--simulators", "names", default=default, show_default=True),
-        ):  # fmt: skip
-            command = one(command)
-        return command
+        names = click.option("--simulators", "names", default=default, show_default=True)
+        return names(sets_option(sources_option(command)))
 
     return add

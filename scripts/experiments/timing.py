@@ -30,7 +30,6 @@ Beside its events stand those of rendered edges of the same speed and light.
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -44,7 +43,7 @@ import click
 import cv2
 import numpy as np
 from real.recording import read
-from writing import load_pyplot, one_line_errors, output_option, write_report
+from writing import as_written, load_pyplot, one_line_errors, output_option, write_report
 
 from adv2e.events import Events
 from experiments.passages.edges import PAIRS, Edges
@@ -131,8 +130,7 @@ def write_frames(edges: Edges, rate: float, folder: Path) -> None:
     (folder / "images.txt").write_text("".join(lines), "ascii")
 
 
-# paragraphs that click must not fill
-@click.command(help=re.sub(r"\n\n(?=- |    )", "\n\n\b\n", __doc__))
+@click.command(help=as_written(__doc__))
 @click.option("--quick", is_flag=True, help="Two levels of light, few lines, one frame rate.")
 @click.option("--rates", default="240,960", show_default=True, help="Frames a second, rendered.")
 @click.option(

@@ -106,6 +106,16 @@ class EventsOf(click.ParamType):
             return ByFile(name, Path(path))
 
 
+sources_option = click.option(
+    "--v2e-sources", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
+    help="A clone of github.com/SensorsINI/v2e: v2e is the tool itself then. Needs PyTorch.",
+)  # fmt: skip
+sets_option = click.option(
+    "--set", "sets", multiple=True, metavar="KEY=VALUE",
+    help="For all configurations of adv2e. Repeatable.",
+)  # fmt: skip
+
+
 def simulator_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add options that choose simulators; the command is given them as `simulators`."""
 
@@ -118,14 +128,8 @@ def simulator_options(command: Callable[..., None]) -> Callable[..., None]:
         help="Events that another simulator wrote, on the recording's clock; with @start after"
         " FILE they begin with the first frame, @SECONDS adds so many. Repeatable.",
     )  # fmt: skip
-    @click.option(
-        "--v2e-sources", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
-        help="A clone of github.com/SensorsINI/v2e: v2e is the tool itself then. Needs PyTorch.",
-    )  # fmt: skip
-    @click.option(
-        "--set", "sets", multiple=True, metavar="KEY=VALUE",
-        help="For all configurations of adv2e. Repeatable.",
-    )  # fmt: skip
+    @sources_option
+    @sets_option
     @threads_option
     @wraps(command)
     def made(
