@@ -33,7 +33,7 @@ def tool(monkeypatch):
     def load(name):
         monkeypatch.delitem(sys.modules, f"benchmarks.tools.{name}", raising=False)
         found = importlib.import_module(f"benchmarks.tools.{name}")
-        monkeypatch.delitem(sys.modules, f"benchmarks.tools.{name}")
+        del sys.modules[f"benchmarks.tools.{name}"]  # not by monkeypatch, which would bring it back
         return found
 
     return load
