@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 torch = pytest.importorskip("torch", reason="PyTorch (extra torch) is too large to install for all")
 onnxruntime = pytest.importorskip("onnxruntime", reason="is of the extra torch")
+pytest.importorskip("onnxscript", reason="is of the extra torch")
 
 
 def run(*words):

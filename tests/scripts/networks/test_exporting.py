@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch", reason="PyTorch (extra torch) is too large to install for all")
-pytest.importorskip("onnxruntime", reason="is of the extra torch")
+pytest.importorskip("onnxscript", reason="is of the extra torch")
 
 from networks import exporting  # noqa: E402
 
