@@ -85,3 +85,14 @@ def pipeline(monkeypatch):
     module.convert_reading = convert
     monkeypatch.setitem(sys.modules, "adv2e.conversion.pipeline", module)
     return module
+
+
+@pytest.fixture
+def one_torch_thread():
+    """Draw and add up as PyTorch does on one thread, from the same state of chance."""
+    torch = pytest.importorskip("torch")
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    torch.manual_seed(0)
+    yield
+    torch.set_num_threads(before)

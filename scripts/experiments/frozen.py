@@ -193,6 +193,7 @@ class Judge:
         values["distance"] = half_split(self.events, self.test, *self.real.size)[SCORE]
         return Row("half of the measured events", values, {}, images)
 
+    @cached_property
     def jittered(self) -> Row:
         """Return the measured events with times that jitter, against themselves."""
         events = self.events.copy()
@@ -205,6 +206,7 @@ class Judge:
         values = {**self._alike(images), "distance": found}
         return Row(f"measured, times jittered by {JITTER_MS:g} ms", values, {}, images)
 
+    @cached_property
     def nothing(self) -> Row:
         """Return what no events at all come to."""
         images = self.reconstructed(empty_events())
@@ -321,7 +323,7 @@ def section(judge: Judge, rows: Sequence[Row]) -> tuple[str, dict[str, Any]]:
     measured = judge.of_the_camera()
     reference = next((one for one in rows if one.label.split(",")[0] == REFERENCE), None)
     lines, numbers = [], {}
-    for row in [*rows, measured, judge.half, judge.jittered(), judge.nothing()]:
+    for row in [*rows, measured, judge.half, judge.jittered, judge.nothing]:
         behind = ""
         if reference is not None and row in rows and row is not reference:
             behind = ", ".join(judge.behind(row, reference, measured)) or "none"

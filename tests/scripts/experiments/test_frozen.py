@@ -90,7 +90,7 @@ def test_the_camera_itself_is_judged_near_and_others_behind_it(recording):
     behind = one.behind(noisy, itself, measured)
     assert {"FireNet", "distance", "ON share", "dark ON", "bright OFF"} <= set(behind)
     assert one.behind(itself, noisy, measured) == []
-    assert one.nothing().values["FireNet"] < one.half.values["FireNet"] < 1
+    assert one.nothing.values["FireNet"] < one.half.values["FireNet"] < 1
 
 
 def test_still_pixels_are_told_of_by_their_light(recording):
@@ -211,6 +211,6 @@ def test_floors_are_between_seeds(recording):
 
 def test_jittered_times_are_far_as_events_and_near_as_counts(recording):
     one = frozen.Judge(recording, [Counts()])
-    jittered = one.jittered()
+    jittered = one.jittered
     assert 0.1 < jittered.values["distance"] < 1.5
-    assert jittered.values["FireNet"] > one.nothing().values["FireNet"]
+    assert jittered.values["FireNet"] > one.nothing.values["FireNet"]

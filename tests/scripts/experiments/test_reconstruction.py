@@ -29,13 +29,7 @@ from networks.firenet import firenet  # noqa: E402
 SIZE = WIDTH, HEIGHT = 24, 16
 
 
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    torch.manual_seed(0)
-    yield
-    torch.set_num_threads(before)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 def call(*words):

@@ -15,12 +15,7 @@ pytest.importorskip("matplotlib", reason="curves are drawn by Matplotlib (extra 
 SETTINGS = {"seed": 3, "rate": 0.01, "of": ["a", 1]}
 
 
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 def build():

@@ -19,13 +19,7 @@ from adv2e.events import make_events
 torch = pytest.importorskip("torch", reason="PyTorch (extra experiments) is too large for all")
 
 
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    torch.manual_seed(0)
-    yield
-    torch.set_num_threads(before)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 @pytest.mark.parametrize(("build", "count"), [(firenet, OF_FIRENET), (e2vid, PARAMETERS)])

@@ -13,13 +13,7 @@ from adv2e.errors import MissingExtraError
 torch = pytest.importorskip("torch", reason="PyTorch (extra experiments) is too large for all")
 
 
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    torch.manual_seed(0)
-    yield
-    torch.set_num_threads(before)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 def count(net):
