@@ -12,7 +12,7 @@
     E2VID or FireNet (:mod:`networks.e2vid`, :mod:`networks.firenet`) from scratch, on events that
     one simulator makes of GOPRO_Large_all (240 frames a second, by way of
     seungjunnah.github.io/Datasets/gopro.html), or of textures that move
-    (:mod:`experiments.textures`).  Light is linear throughout.  Called again, it goes on.
+    (:mod:`experiments.images.textures`).  Light is linear throughout.  Called again, it goes on.
 ``test``
     The images that trained networks make of measured events, against the frames.  DATA is a folder
     with the seven DAVIS240C sequences, folders or zips as they are published
@@ -36,9 +36,6 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -47,140 +44,26 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 import cv2
 import numpy as np
-from networks import torch_module
-from networks.e2vid import e2vid
-from networks.firenet import firenet
-from networks.image_loss import structural_loss
 from networks.lpips import Lpips
 from writing import as_written, one_line_errors, output_option, table, write_report
 
-from adv2e.errors import DataError
-from experiments import seeds as of_seeds
-from experiments import textures
-from experiments.image_tests import MEASURES, made_of, measures_of, parts, picture, references
-from experiments.seeds import anew, simulators_option
-from experiments.sequences import Batches, Pair, gopro_clips, gopro_folders
-from experiments.simulators.clip import Clip, Simulator
-from experiments.training import CHECKPOINT, Training, Update, written
-
-BUILD = {"e2vid": e2vid, "firenet": firenet}
-LOSS = "L1 + 1 - SSIM"
-SMALL = "ideal,adv2e,v2e,vid2e"
-LENGTH, EVERY = 11, 8
-"""Windows of a run of ``small``, and frames of a window."""
-
-
-def update_of(batches: Batches, truncate: int, device: str, lpips: Lpips | None = None) -> Update:
-    """Return one step of a training: a run of windows, the gradient cut after each `truncate`."""
-    torch = torch_module()
-
-    def loss_of(image: Any, wanted: Any) -> Any:
-        return structural_loss(image, wanted) if lpips is None else lpips(image, wanted).mean()
-
-    def update(net: Any, optimiser: Any, rng: np.random.Generator) -> float:
-        grids, images = (torch.from_numpy(one).to(device) for one in batches.draw(rng))
-        state, total = None, 0.0
-        for begin in range(0, batches.length, truncate):
-            optimiser.zero_grad()
-            losses = []
-            for k in range(begin, min(begin + truncate, batches.length)):
-                image, state = net(grids[k], state)
-                losses.append(loss_of(image, images[k]))
-            loss = torch.stack(losses).mean()
-            loss.backward()
-            optimiser.step()
-            state = detached(state)
-            total += float(loss.detach()) * len(losses)
-        return total / batches.length
-
-    return update
-
-
-def detached(state: Any) -> Any:
-    """Return a state, nested as it is, through which no gradient flows back."""
-    if isinstance(state, (list, tuple)):
-        return [detached(one) for one in state]
-    return state.detach()
-
-
-def trained(run: Path) -> Any:
-    """Return the network of a training.
-
-    Raises
-    ------
-    DataError
-        The folder holds no checkpoint of one of these networks.
-    """
-    path = run / CHECKPOINT
-    if not path.is_file():
-        raise DataError(f"{path}: not there; give a folder that train or small made")
-    state = torch_module().load(path, map_location="cpu", weights_only=True)
-    network = json.loads(state["rest"])["settings"].get("network")
-    if network not in BUILD:
-        raise DataError(f"{path}: network: {network!r} is none of {', '.join(BUILD)}")
-    net = BUILD[network]()
-    net.load_state_dict(state["net"])
-    return net.eval()
-
-
-@dataclass(frozen=True)
-class Small:
-    """One training of ``small``."""
-
-    simulator: Simulator
-    seed: int
-    output: Path
-    recording: Path
-    network: str
-    steps: int
-    rate: float
-    clips: int
-    side: int
-    features: Path | None
-
-    @property
-    def folder(self) -> Path:
-        """Where it is kept."""
-        return self.output / f"{self.simulator.name}-seed{self.seed}"
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """All that decides its numbers."""
-        return {
-            **self._training, "steps": self.steps, "recording": self.recording.resolve().name,
-            "LPIPS": self.features is not None,
-        }  # fmt: skip
-
-    @property
-    def _training(self) -> dict[str, Any]:
-        return {
-            **of_seeds.about(self.simulator), "seed": self.seed, "network": self.network,
-            "rate": self.rate, "batch": 2, "length": LENGTH,
-            "clips": self.clips, "side": self.side, "loss": LOSS,
-        }  # fmt: skip
-
-    def run(self) -> dict[str, Any]:
-        """Train and test."""
-        side = (self.side, self.side)
-        first = 1000 * self.seed
-        clips = (
-            textures.moving(k, EVERY * LENGTH + 1, side) for k in range(first, first + self.clips)
-        )
-        pairs = [Pair.simulated(clip, self.simulator, self.seed, EVERY) for clip in clips]
-        step = update_of(Batches(pairs, 2, LENGTH, side), LENGTH, "cpu")
-        training = Training(BUILD[self.network], step, self._training)
-        net, curve = training.run(self.folder, self.steps)
-        lpips = None if self.features is None else Lpips(self.features)
-        (part,) = parts(self.recording)
-        images = made_of(net, part)
-        cv2.imwrite(str(self.folder / "last.png"), picture(part, [images]))
-        return {
-            "measures": measures_of(images, part.frames, lpips),
-            "loss": float(np.mean(curve.losses[-50:])),
-            "seconds a step": curve.seconds / self.steps,
-            "events": sum(len(pair.events) for pair in pairs),
-        }
-
+from experiments.images.clips import gopro_sequences, kept, moving_textures
+from experiments.images.scores import MEASURES, made_of, measures_of, parts, picture, references
+from experiments.images.sequences import Batches
+from experiments.images.small import EVERY, Small
+from experiments.images.training import BUILD, LOSS, trained, update_of
+from experiments.trainings import seeds as of_seeds
+from experiments.trainings.jobs import all_done, all_measured, identity
+from experiments.trainings.options import (
+    SMALL,
+    anew,
+    counted,
+    rate_option,
+    report_command,
+    report_option,
+    simulators_option,
+)
+from experiments.trainings.training import Training, written
 
 _lpips_option = click.option(
     "--lpips", "features", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
@@ -206,19 +89,6 @@ class _Size(click.ParamType):
         return int(width), int(height)
 
 
-def _counted(name: str, default: int, text: str | None = None) -> Any:
-    return click.option(
-        name, type=click.IntRange(min=1), default=default, show_default=True, help=text
-    )
-
-
-def _rate(default: float) -> Any:
-    return click.option(
-        "--rate", type=click.FloatRange(min=0, min_open=True), default=default, show_default=True,
-        help="Of Adam.",
-    )  # fmt: skip
-
-
 @click.group(help=as_written(__doc__))
 def main() -> None:
     pass
@@ -233,16 +103,16 @@ def main() -> None:
 @click.option("--textures", "clips", type=click.IntRange(min=1), help="So many clips of textures.")
 @click.option("--network", type=click.Choice(list(BUILD)), default="e2vid", show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@_counted("--steps", 300_000)
-@_rate(1e-4)
-@_counted("--batch", 2, "Runs at a time.")
-@_counted("--length", 40, "Windows of a run.")
-@_counted("--truncate", 40, "Windows that a gradient spans; a step of Adam each.")
+@counted("--steps", 300_000)
+@rate_option(1e-4)
+@counted("--batch", 2, "Runs at a time.")
+@counted("--length", 40, "Windows of a run.")
+@counted("--truncate", 40, "Windows that a gradient spans; a step of Adam each.")
 @click.option("--crop", type=_Size(), default="128x128", show_default=True)
 @click.option("--size", type=_Size(), default="240x180", show_default=True, help="Of the sensor.")
-@_counted("--every", EVERY, "Frames from an image to the next.")
-@_counted("--frames", 481, "Of a piece of a sequence.")
-@_counted("--checkpoint", 500, "Steps between checkpoints.")
+@counted("--every", EVERY, "Frames from an image to the next.")
+@counted("--frames", 481, "Of a piece of a sequence.")
+@counted("--checkpoint", 500, "Steps between checkpoints.")
 @click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True)
 @_lpips_option
 @simulators_option("adv2e")
@@ -260,61 +130,21 @@ def train(
     if len(simulators) != 1:
         raise click.UsageError(f"--simulators {names}: train takes one")
     (simulator,) = simulators
-    source = _gopro(gopro, size, frames) if gopro else _textures(clips or 0, seed, size, frames)
+    sequences = (
+        gopro_sequences(gopro, size, frames) if gopro
+        else moving_textures(clips or 0, seed, size, frames)
+    )  # fmt: skip
     settings = {
-        **of_seeds.about(simulator), "network": network,
+        **identity(simulator), "network": network,
         "data": "GOPRO" if gopro else "textures", "seed": seed, "rate": rate, "batch": batch,
         "length": length, "truncate": truncate, "crop": list(crop), "size": list(size),
         "every": every, "frames": frames, "loss": LOSS if features is None else "LPIPS",
     }  # fmt: skip
-    pairs = list(_kept(source, simulator, output / "sequences", settings))
+    pairs = list(kept(sequences, simulator, output / "sequences", settings))
     lpips = None if features is None else Lpips(features)
     step = update_of(Batches(pairs, batch, length, crop), truncate, device, lpips)
     settings["sequences"] = len(pairs)
     Training(BUILD[network], step, settings, checkpoint, device=device).run(output, steps)
-
-
-def _gopro(
-    folder: Path, size: tuple[int, int], frames: int
-) -> Iterator[tuple[str, Callable[[], Iterator[Clip]]]]:
-    for sequence in gopro_folders(folder):
-        yield sequence.name, partial(gopro_clips, sequence, size, frames)
-
-
-def _textures(
-    count: int, seed: int, size: tuple[int, int], frames: int
-) -> Iterator[tuple[str, Callable[[], Iterator[Clip]]]]:
-    for number in range(1000 * seed, 1000 * seed + count):
-        yield f"texture-{number:06d}", lambda k=number: iter([textures.moving(k, frames, size)])
-
-
-def _kept(
-    source: Iterator[tuple[str, Callable[[], Iterator[Clip]]]],
-    simulator: Simulator,
-    folder: Path,
-    settings: dict[str, Any],
-) -> Iterator[Pair]:
-    """Yield events and images of all clips, which are simulated where they were not before."""
-    folder.mkdir(parents=True, exist_ok=True)
-    told = folder / "settings.json"
-    about = {
-        name: settings[name]
-        for name in ("simulator", "nature", "digest", "data", "seed", "size", "every", "frames")
-    }
-    if told.exists() and (held := json.loads(told.read_text("utf-8"))) != about:
-        raise DataError(f"{told}: events were made with {held}, not {about}; take another folder")
-    written(told, lambda path: path.write_text(json.dumps(about) + "\n", "utf-8"))
-    for name, clips in source:
-        whole = folder / f"{name}.done"
-        if not whole.exists():
-            count = 0
-            for count, clip in enumerate(clips(), 1):
-                pair = Pair.simulated(clip, simulator, settings["seed"], settings["every"])
-                written(folder / f"{name}-{count:03d}.npz", pair.save)
-            whole.touch()
-            click.echo(f"{name}: {count} pieces simulated", err=True)
-        for path in sorted(folder.glob(f"{name}-*.npz")):
-            yield Pair.load(path)
 
 
 @main.command()
@@ -363,19 +193,16 @@ def _tables(found: dict[str, dict[str, dict[str, float]]]) -> str:
 @click.argument("output", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER")
 @click.argument("recording", type=click.Path(exists=True, path_type=Path))
 @click.option("--network", type=click.Choice(list(BUILD)), default="firenet", show_default=True)
-@_counted("--seeds", 5)
-@_counted("--steps", 800)
-@_rate(1e-3)
-@_counted("--clips", 40, "Of each seed, 0.37 s each.")
-@_counted("--side", 64, "Of the clips [pixels].")
-@_counted("--jobs", 1, "Trainings at a time, on one thread each.")
+@counted("--seeds", 5)
+@counted("--steps", 800)
+@rate_option(1e-3)
+@counted("--clips", 40, "Of each seed, 0.37 s each.")
+@counted("--side", 64, "Of the clips [pixels].")
+@counted("--jobs", 1, "Trainings at a time, on one thread each.")
 @_lpips_option
 @_weights_option
 @simulators_option(SMALL)
-@click.option(
-    "-o", "--report", "to", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE.md",
-    help="Write the report here too; numbers beside it.",
-)  # fmt: skip
+@report_option
 @one_line_errors()
 def small(
     output: Path, recording: Path, network: str, seeds: int, steps: int, rate: float, clips: int,
@@ -393,23 +220,12 @@ def small(
         for seed in range(seeds)
         for simulator in anew(names, sets, v2e_sources)
     ]
-    of_seeds.all_done(trainings, jobs)
+    all_done(trainings, jobs)
     _report(output, to)
 
 
-@main.command()
-@click.argument(
-    "folder", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="FOLDER"
-)
-@output_option
-@one_line_errors()
-def report(folder: Path, output: Path | None) -> None:
-    """Tell what came of the trainings of small in FOLDER, seed by seed, and what it carries."""
-    _report(folder, output)
-
-
 def _report(folder: Path, output: Path | None) -> None:
-    found = of_seeds.measured(folder)
+    found = all_measured(folder)
     path = folder / "references.json"
     beside = json.loads(path.read_text("utf-8")) if path.exists() else {}
     one = found[0]["settings"]
@@ -423,6 +239,8 @@ def _report(folder: Path, output: Path | None) -> None:
     texts = [about, of_seeds.report(found, MEASURES), table(["beside", *names], lines)]
     write_report("\n\n".join(texts), output, {"trainings": found, "beside": beside})
 
+
+main.add_command(report_command(_report))
 
 if __name__ == "__main__":
     main()

@@ -9,11 +9,10 @@ from functools import cached_property
 import click
 import numpy as np
 from real.model import BEYOND_US, totals
-from real.recording import Real
+from real.recording import Real, decoder_of
 
 from adv2e.comparison.windows import Windows
 from adv2e.diagnosis.fitting.nuisances import TOLERANCE, match_totals
-from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events, Window, cut
 from experiments.simulators.clip import Clip, Simulator
 
@@ -51,7 +50,7 @@ class Measured:
     def clip(self) -> Clip:
         """Its frames, in linear light."""
         source = self.real.source
-        decoder = LightDecoder(source.encoding, source.full_scale, source.dtype, source.colour)
+        decoder = decoder_of(source)
         plain = source.dtype == np.uint8 and not source.colour and source.encoding == "linear"
         frames = list(self.real.frames())
         light = [one.image if plain else decoder.decode(one.image) for one in frames]

@@ -126,9 +126,14 @@ def read(folder: str) -> Real:
     )
 
 
+def decoder_of(source: Source) -> LightDecoder:
+    """Return what makes light of the frames of a source, as ``encoding: auto`` has it."""
+    return LightDecoder(source.encoding, source.full_scale, source.dtype, source.colour)
+
+
 def _light(source: Source, times_us: NDArray[np.int64], windows: Windows) -> Iterator[NDArray[Any]]:
     """Yield the light [DN] of the frames inside the windows."""
-    decoder = LightDecoder(source.encoding, source.full_scale, source.dtype, source.colour)
+    decoder = decoder_of(source)
     for frame, t_us in zip(source.frames(), times_us, strict=True):
         if windows.start <= t_us <= windows.stop:
             yield decoder.decode(frame.image)

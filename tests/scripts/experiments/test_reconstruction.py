@@ -20,8 +20,10 @@ torch = pytest.importorskip("torch", reason="PyTorch (extra experiments) is too 
 pytest.importorskip("skimage", reason="textures are of scikit-image (extra experiments)")
 pytest.importorskip("matplotlib", reason="curves are drawn by Matplotlib (extra experiments)")
 
-from experiments import image_tests, reconstruction, textures  # noqa: E402
-from experiments.sequences import Batches, Pair, gopro_folders  # noqa: E402
+from experiments import reconstruction  # noqa: E402
+from experiments.images import scores, textures, training  # noqa: E402
+from experiments.images.clips import gopro_folders  # noqa: E402
+from experiments.images.sequences import Batches, Pair  # noqa: E402
 from experiments.simulators.clip import Clip  # noqa: E402
 from experiments.simulators.named import named  # noqa: E402
 from networks.firenet import firenet  # noqa: E402
@@ -110,7 +112,7 @@ def test_too_short_a_sequence_is_one_line():
 def test_firenet_learns(tmp_path):
     batches = Batches([pair_of(7, 33, (16, 16))], 1, 4, (16, 16))
     net, rng = firenet(), np.random.default_rng(0)
-    step = reconstruction.update_of(batches, 4, "cpu")
+    step = training.update_of(batches, 4, "cpu")
     optimiser = torch.optim.Adam(net.parameters(), lr=3e-3)
     losses = [step(net, optimiser, rng) for _ in range(60)]
     assert np.mean(losses[-10:]) < 0.75 * np.mean(losses[:5])
@@ -129,13 +131,13 @@ def test_a_gradient_spans_as_many_windows_as_it_is_told():
     for truncate, steps in ((4, 1), (3, 2), (1, 4)):
         net = firenet()
         optimiser = Counted(net.parameters(), lr=1e-3)
-        reconstruction.update_of(batches, truncate, "cpu")(net, optimiser, np.random.default_rng(0))
+        training.update_of(batches, truncate, "cpu")(net, optimiser, np.random.default_rng(0))
         assert optimiser.steps == steps
 
 
 def test_a_state_that_is_detached_has_its_values():
     held = torch.ones(2, requires_grad=True)
-    inner = reconstruction.detached([(held * 2, held), held * 3])
+    inner = training.detached([(held * 2, held), held * 3])
     assert inner[0][0].tolist() == [2, 2]
     assert not any(one.requires_grad for one in (inner[0][0], inner[0][1], inner[1]))
 
@@ -151,21 +153,21 @@ def recording(tmp_path_factory):
 
 def test_measures_are_those_of_their_definitions():
     frames = np.random.default_rng(0).random((2, 20, 30)).astype(np.float32)
-    same = image_tests.measures_of(frames, frames, None)
+    same = scores.measures_of(frames, frames, None)
     assert same["MSE"] == same["equalised MSE"] == 0
     assert same["SSIM"] == same["equalised SSIM"] == pytest.approx(1)
-    darker = image_tests.measures_of(0.5 * frames, frames, None)
+    darker = scores.measures_of(0.5 * frames, frames, None)
     assert darker["MSE"] == pytest.approx(np.mean((0.5 * frames) ** 2), rel=1e-6)
     assert darker["equalised MSE"] < 0.001
 
 
 def test_sequences_of_davis240c_are_cut(recording):
-    (whole,) = image_tests.parts(recording)
+    (whole,) = scores.parts(recording)
     assert len(whole.spans) == 4
     assert whole.frames.shape == (4, HEIGHT, WIDTH)
-    (cut_one,) = image_tests.parts(recording.parent)
+    (cut_one,) = scores.parts(recording.parent)
     assert (cut_one.name, len(cut_one.spans)) == ("slider_depth", 4)
-    assert image_tests.CUTS["slider_depth"] == (1.0, 2.5)
+    assert scores.CUTS["slider_depth"] == (1.0, 2.5)
     # events begin after the first frame, so that it begins no interval
     first = cv2.imread(str(recording / "images" / "frame_00000002.png"), cv2.IMREAD_GRAYSCALE)
     np.testing.assert_allclose(whole.frames[0], first / 255, atol=1e-6)
@@ -176,7 +178,7 @@ def test_a_sequence_without_its_cut_is_one_line(tmp_path):
     events = np.concatenate(list(simulate(frames, 20, "ideal", threads=1)))
     write_recording(tmp_path / "boxes_6dof", np.arange(5) / 20, frames, events)
     with pytest.raises(DataError, match="no frame interval with events within"):
-        list(image_tests.parts(tmp_path))
+        list(scores.parts(tmp_path))
 
 
 TINY = ("--frames", 25, "--length", 2, "--batch", 1, "--size", "24x16", "--crop", "16x16")
@@ -198,7 +200,7 @@ def test_a_network_is_trained_and_tested(tmp_path, recording):
     found = json.loads(out.with_suffix(".json").read_text())["slider_depth"]
     assert set(found) == {str(run), "one grey"}
     assert found["one grey"]["MSE"] == pytest.approx(
-        np.mean([frame.var() for frame in next(image_tests.parts(recording)).frames]), rel=1e-3
+        np.mean([frame.var() for frame in next(scores.parts(recording)).frames]), rel=1e-3
     )
     assert cv2.imread(str(tmp_path / "pictures" / "slider_depth.png")).shape == (16, 48, 3)
 

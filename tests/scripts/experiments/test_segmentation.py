@@ -20,7 +20,9 @@ torch = pytest.importorskip("torch", reason="PyTorch (extra experiments) is too 
 pytest.importorskip("skimage", reason="scipy and scikit-image are of the extra experiments")
 pytest.importorskip("matplotlib", reason="curves are drawn by Matplotlib (extra experiments)")
 
-from experiments import labelled, segmentation, shapes  # noqa: E402
+from experiments import segmentation  # noqa: E402
+from experiments.labels import labelled, shapes, training  # noqa: E402
+from experiments.labels import scores as label_scores  # noqa: E402
 from experiments.simulators.named import named  # noqa: E402
 from networks.unet import unet  # noqa: E402
 from real.recording import read  # noqa: E402
@@ -75,7 +77,7 @@ def test_a_picture_and_its_labels_are_changed_alike(changed):
     picture = np.repeat(label[None].astype(np.float32), 6, 0)
     kinds = set()
     for _ in range(20):
-        made, said = segmentation.augmented((picture, label), rng, changed)
+        made, said = training.augmented((picture, label), rng, changed)
         known = said != labelled.IGNORED
         assert np.array_equal(made[3][known], said[known])
         assert not made[:, ~known].any()
@@ -90,7 +92,7 @@ def test_scores_are_those_of_a_loop_over_pixels():
     labels[labels == 3] = labelled.IGNORED
     pictures = rng.normal(size=(5, 4, 8, 8)).astype(np.float32)
     samples = list(zip(pictures, labels, strict=True))
-    counts = segmentation.confusion(lambda x: x, samples, 4, "cpu")
+    counts = label_scores.confusion(lambda x: x, samples, 4, "cpu")
     wanted = np.zeros((4, 4), int)
     for picture, label in samples:
         for y in range(8):
@@ -98,27 +100,27 @@ def test_scores_are_those_of_a_loop_over_pixels():
                 if label[y, x] != labelled.IGNORED:
                     wanted[label[y, x], np.argmax(picture[:, y, x])] += 1
     assert np.array_equal(counts, wanted)
-    scores = segmentation.scores_of(counts)
+    scores = label_scores.scores_of(counts)
     shares = [
         wanted[k, k] / (wanted[k].sum() + wanted[:, k].sum() - wanted[k, k]) for k in range(4)
     ]
     assert scores["mIoU"] == pytest.approx(np.mean(shares))
     assert scores["accuracy"] == pytest.approx(np.trace(wanted) / wanted.sum())
-    assert segmentation.scores_of(np.diag([3, 0])) == {"accuracy": 1, "mIoU": 0.5}
+    assert label_scores.scores_of(np.diag([3, 0])) == {"accuracy": 1, "mIoU": 0.5}
 
 
 def test_pixels_of_no_class_teach_nothing():
     scores = torch.randn(1, 3, 4, 4, requires_grad=True)
     labels = torch.full((1, 4, 4), labelled.IGNORED, dtype=torch.uint8)
     labels[0, 1, 2] = 1
-    segmentation.loss_of(scores, labels).backward()
+    training.loss_of(scores, labels).backward()
     assert (scores.grad.abs().sum(1)[0] > 0).sum() == 1
 
 
 def test_the_small_net_learns(simulator):
     samples = labelled.rendered([2, 5], simulator, SIZE, 3)
     net, rng = unet(2), np.random.default_rng(0)
-    step = segmentation.update_of(samples, 2, "cpu", False)
+    step = training.update_of(samples, 2, "cpu", False)
     optimiser = torch.optim.Adam(net.parameters(), lr=2e-3)
     losses = [step(net, optimiser, rng) for _ in range(60)]
     assert np.mean(losses[-10:]) < 0.6 * np.mean(losses[:5])
@@ -126,7 +128,7 @@ def test_the_small_net_learns(simulator):
 
 def test_last_and_best_are_both_told():
     checks = [{"step": k, "accuracy": a, "mIoU": m} for k, a, m in ((1, 0.5, 0.4), (2, 0.6, 0.3))]
-    assert segmentation.last_and_best(checks) == {
+    assert label_scores.last_and_best(checks) == {
         "last accuracy": 0.6, "last mIoU": 0.3, "best accuracy": 0.5, "best mIoU": 0.4,
     }  # fmt: skip
 
@@ -270,7 +272,7 @@ def test_small_trains_each_once_and_reports(tmp_path):
     assert first.stdout == again.stdout == call("report", tmp_path / "runs").stdout
     assert "16 pictures: rendered shapes by dvs-voltmeter" in first.stdout
     numbers = json.loads((tmp_path / "small.json").read_text())["trainings"]
-    assert all(set(one["measures"]) == set(segmentation.MEASURES) for one in numbers)
+    assert all(set(one["measures"]) == set(label_scores.MEASURES) for one in numbers)
 
 
 def test_small_is_tested_on_a_recording(tmp_path):

@@ -39,9 +39,9 @@ from adv2e.errors import DataError
 from adv2e.events import Events, cut, make_events, sort_events
 from adv2e.export.ev_segnet import DDD17, DDD17_ROWS
 from adv2e.representations.event_images import event_image
-from experiments import shapes
+from experiments.labels import shapes
 from experiments.simulators.clip import Clip, Simulator
-from experiments.training import written
+from experiments.trainings.training import written
 
 IGNORED = 255
 WINDOW_US = 50_000

@@ -1,8 +1,8 @@
 """Clips of dark shapes on a bright wall that moves, with the class of every pixel.
 
 Like ``shapes_6dof`` of DAVIS240C: polygons and ellipses, nothing else.  They are drawn once, four
-times as fine, and moved as :mod:`experiments.textures` moves photographs, so that the light is
-exact at any rate.
+times as fine, and moved as :mod:`experiments.images.textures` moves photographs, so that the light
+is exact at any rate.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.images.textures import HZ, seen, times_ns, views
 from experiments.simulators.clip import Clip
-from experiments.textures import HZ, seen, times_ns, views
 
 CLASSES = "wall", "shape"
 _SIDE, _FINE = 384, 4

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from networks.firenet import BINS, grid_of
 from numpy.typing import NDArray
 
-from adv2e.config.model import Sensor
-from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events, cut
-from adv2e.light.sensor import fitting_of
-from adv2e.sources import open_source
 from experiments.simulators.clip import Clip, Simulator
 
 Array = NDArray[np.float32]
@@ -118,39 +112,3 @@ class Batches:
                 image = pair.images[first + k + 1, y : y + rows, x : x + columns]
                 images[k, one, 0] = image[turned]
         return grids, images
-
-
-def gopro_folders(folder: Path) -> list[Path]:
-    """Return the sequences of ``GOPRO_Large_all`` that are for training.
-
-    Raises
-    ------
-    DataError
-        There is none.
-    """
-    inside = folder / "train"
-    place = inside if inside.is_dir() else folder
-    found = sorted(one for one in place.iterdir() if one.is_dir() and one.name.startswith("GOPR"))
-    if not found:
-        raise DataError(f"{folder}: no GOPR... in it or in its train/; give GOPRO_Large_all")
-    return found
-
-
-def gopro_clips(folder: Path, size: tuple[int, int], frames: int) -> Iterator[Clip]:
-    """Yield pieces of a sequence of GOPRO, of so many frames each, on a sensor of a size.
-
-    A rest of less than a piece is left out.
-    """
-    source = open_source(folder)
-    decoder = LightDecoder(source.encoding, source.full_scale, source.dtype, source.colour)
-    sensor = Sensor(width=size[0], height=size[1], fit="crop")
-    fitting = fitting_of(source.width, source.height, sensor, str(folder))
-
-    def light(image: NDArray[Any], label: str) -> Array:
-        seen = decoder.decode(image)
-        return seen if fitting is None else fitting.light(seen, label)
-
-    coming = ((one.t_ns, light(one.image, one.label)) for one in source.frames())
-    while len(piece := list(islice(coming, frames))) == frames:
-        times, images = zip(*piece, strict=True)
-        yield Clip(np.stack(images), np.array(times, np.int64))

@@ -1,0 +1,83 @@
+"""One of the small trainings of networks that make images, with its test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from networks.lpips import Lpips
+
+from experiments.images import textures
+from experiments.images.scores import made_of, measures_of, parts, picture
+from experiments.images.sequences import Batches, Pair
+from experiments.images.training import BUILD, LOSS, update_of
+from experiments.simulators.clip import Simulator
+from experiments.trainings.jobs import identity
+from experiments.trainings.training import Training
+
+LENGTH = 11
+"""Windows of a run."""
+EVERY = 8
+"""Frames of a window."""
+
+
+@dataclass(frozen=True)
+class Small:
+    """One training on moving textures, and its test on a recording."""
+
+    simulator: Simulator
+    seed: int
+    output: Path
+    recording: Path
+    network: str
+    steps: int
+    rate: float
+    clips: int
+    side: int
+    features: Path | None
+
+    @property
+    def folder(self) -> Path:
+        """Where it is kept."""
+        return self.output / f"{self.simulator.name}-seed{self.seed}"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides its numbers."""
+        return {
+            **self._training, "steps": self.steps, "recording": self.recording.resolve().name,
+            "LPIPS": self.features is not None,
+        }  # fmt: skip
+
+    @property
+    def _training(self) -> dict[str, Any]:
+        return {
+            **identity(self.simulator), "seed": self.seed, "network": self.network,
+            "rate": self.rate, "batch": 2, "length": LENGTH,
+            "clips": self.clips, "side": self.side, "loss": LOSS,
+        }  # fmt: skip
+
+    def run(self) -> dict[str, Any]:
+        """Train and test."""
+        side = (self.side, self.side)
+        first = 1000 * self.seed
+        clips = (
+            textures.moving(k, EVERY * LENGTH + 1, side) for k in range(first, first + self.clips)
+        )
+        pairs = [Pair.simulated(clip, self.simulator, self.seed, EVERY) for clip in clips]
+        step = update_of(Batches(pairs, 2, LENGTH, side), LENGTH, "cpu")
+        training = Training(BUILD[self.network], step, self._training)
+        net, curve = training.run(self.folder, self.steps)
+        lpips = None if self.features is None else Lpips(self.features)
+        (part,) = parts(self.recording)
+        images = made_of(net, part)
+        cv2.imwrite(str(self.folder / "last.png"), picture(part, [images]))
+        return {
+            "measures": measures_of(images, part.frames, lpips),
+            "loss": float(np.mean(curve.losses[-50:])),
+            "seconds a step": curve.seconds / self.steps,
+            "events": sum(len(pair.events) for pair in pairs),
+        }

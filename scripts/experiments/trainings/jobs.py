@@ -1,0 +1,102 @@
+"""Trainings of several configurations and seeds: each is done once, several at a time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, Protocol
+
+import click
+import cv2
+from networks import torch_module
+from writing import load_pyplot
+
+from adv2e.errors import DataError
+from experiments.simulators.clip import Simulator
+from experiments.trainings.training import written
+
+MEASURED = "measures.json"
+
+
+class Job(Protocol):
+    """One training with its test."""
+
+    @property
+    def folder(self) -> Path:
+        """Where it is kept."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides its numbers, with ``simulator`` and ``seed``."""
+
+    def run(self) -> dict[str, Any]:
+        """Train and test; return ``measures`` by name, and what else is to be kept."""
+
+
+def done(job: Job) -> dict[str, Any]:
+    """Return what came of a training, which is read where it was kept; on one thread."""
+    path = job.folder / MEASURED
+    if path.exists():
+        held = json.loads(path.read_text("utf-8"))
+        if held["settings"] == job.settings:
+            return held
+    torch_module().set_num_threads(1)
+    cv2.setNumThreads(1)
+    held = {"settings": job.settings, **job.run()}
+    raw = json.dumps(held, indent=1) + "\n"
+    written(path, lambda place: place.write_text(raw, "utf-8"))
+    return held
+
+
+def identity(simulator: Simulator) -> dict[str, str]:
+    """Return what a training keeps of its simulator: name, nature, and a digest of all it is."""
+    digest = hashlib.sha256(repr(simulator).encode()).hexdigest()[:16]
+    return {"simulator": simulator.name, "nature": simulator.nature, "digest": digest}
+
+
+def all_done(jobs: Sequence[Job], processes: int) -> None:
+    """Train and test all, so many at a time, each in a process of its own."""
+    torch_module()  # what is missing is told at once, and by this process
+    load_pyplot()
+    if processes == 1:
+        for number, job in enumerate(jobs, 1):
+            done(job)
+            click.echo(f"{job.folder.name} done, {number} of {len(jobs)}", err=True)
+        return
+    # forked processes would share the locks of PyTorch's threads
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        coming = {pool.submit(done, job): job for job in jobs}
+        try:
+            for number, one in enumerate(as_completed(coming), 1):
+                one.result()
+                click.echo(f"{coming[one].folder.name} done, {number} of {len(jobs)}", err=True)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def all_measured(folder: Path) -> list[dict[str, Any]]:
+    """Return what came of all trainings in a folder, by configuration and seed.
+
+    Raises
+    ------
+    DataError
+        There is none, or they differ in more than simulator and seed.
+    """
+    paths = folder.glob(f"*/{MEASURED}")
+    found = [json.loads(path.read_text("utf-8")) for path in paths]
+    if not found:
+        raise DataError(f"{folder}: no */{MEASURED} in it; small makes them")
+    for one in found[1:]:
+        for name in found[0]["settings"]:
+            a, b = (each["settings"].get(name) for each in (found[0], one))
+            if name not in ("simulator", "nature", "digest", "seed") and a != b:
+                raise DataError(
+                    f"{folder}: trainings with {name} {a!r} and {b!r}: not to be compared"
+                )
+    return sorted(found, key=lambda one: (one["settings"]["simulator"], one["settings"]["seed"]))

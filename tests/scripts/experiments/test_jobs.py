@@ -1,0 +1,65 @@
+"""Trainings that are not done twice, nor mixed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import pytest
+from experiments.trainings import jobs, seeds
+from experiments.trainings.options import anew
+
+from adv2e.errors import DataError
+
+pytest.importorskip("torch", reason="PyTorch (extra experiments) is too large for all")
+
+
+@dataclass(frozen=True)
+class Noted:
+    """A training that only counts how often it was done."""
+
+    folder: object
+    seed: int
+    steps: int = 3
+
+    @property
+    def settings(self):
+        return {"simulator": "a", "nature": "none", "seed": self.seed, "steps": self.steps}
+
+    def run(self):
+        self.folder.mkdir(exist_ok=True)
+        count = self.folder / "count"
+        count.write_text("x" + (count.read_text() if count.exists() else ""))
+        return {"measures": {"MSE": 0.1 * self.seed}}
+
+
+def test_what_was_done_is_not_done_again(tmp_path):
+    trainings = [Noted(tmp_path / f"a-seed{k}", k) for k in range(3)]
+    jobs.all_done(trainings[:2], 1)
+    jobs.all_done(trainings, 1)
+    assert [(job.folder / "count").read_text() for job in trainings] == ["x"] * 3
+    found = jobs.all_measured(tmp_path)
+    assert seeds.values_of(found, "MSE") == {"a": [0.0, 0.1, 0.2]}
+
+
+def test_other_settings_are_done_anew_and_not_mixed(tmp_path):
+    jobs.all_done([Noted(tmp_path / "a-seed0", 0), Noted(tmp_path / "a-seed1", 1)], 1)
+    jobs.all_done([Noted(tmp_path / "a-seed1", 1, steps=4)], 1)
+    assert json.loads((tmp_path / "a-seed1" / jobs.MEASURED).read_text())["settings"]["steps"] == 4
+    with pytest.raises(DataError, match="trainings with steps"):
+        jobs.all_measured(tmp_path)
+
+
+def test_a_simulator_is_known_by_all_it_is():
+    plain, again, set_other = (
+        jobs.identity(anew("ideal", sets, None)[0])
+        for sets in ((), (), ("pixel.thresholds.on=0.3",))
+    )
+    assert plain == again
+    assert plain["simulator"] == set_other["simulator"] == "ideal"
+    assert plain["digest"] != set_other["digest"]
+
+
+def test_an_empty_folder_is_one_line(tmp_path):
+    with pytest.raises(DataError, match="small makes them"):
+        jobs.all_measured(tmp_path)
