@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from experiments import frozen
+from experiments import frozen, judge
 from experiments.recordings import Measured
 from experiments.simulators.pixel import Pixel
 from networks.firenet import NETWORKS, Network, firenet
@@ -79,7 +79,7 @@ def test_likeness_is_blind_to_gain():
 
 
 def test_the_camera_itself_is_judged_near_and_others_behind_it(recording):
-    one = frozen.Judge(recording, [Counts()])
+    one = judge.Judge(recording, [Counts()])
     itself = one.simulated(Pixel("camera", "", CAMERA, 1), "camera", 2)
     assert itself.values["FireNet"] == pytest.approx(1)
     assert itself.values["events"] == 1
@@ -94,7 +94,7 @@ def test_the_camera_itself_is_judged_near_and_others_behind_it(recording):
 
 
 def test_still_pixels_are_told_of_by_their_light(recording):
-    one = frozen.Judge(recording, [Counts()])
+    one = judge.Judge(recording, [Counts()])
     assert set(one.still.parts) == {"dark", "bright"}
     assert one.still.parts["dark"][:, 18:].any()
     assert not one.still.parts["dark"][:, :18].any()
@@ -108,13 +108,13 @@ def test_still_pixels_are_told_of_by_their_light(recording):
 
 
 def test_few_events_of_still_pixels_count_little():
-    measured = frozen.Row("measured", {"dark ON": 0.0}, {}, {})
-    few = frozen.Row("few", {"dark ON": 0.02}, {}, {})
+    measured = judge.Row("measured", {"dark ON": 0.0}, {}, {})
+    few = judge.Row("few", {"dark ON": 0.02}, {}, {})
     assert few.error(measured, "dark ON", 10.0) < 0.2 < few.error(measured, "dark ON", 1e4)
 
 
 def test_a_table_has_a_row_for_each_configuration_and_what_to_go_by(recording):
-    one = frozen.Judge(recording, [Counts()])
+    one = judge.Judge(recording, [Counts()])
     configs = {name: load_config([name]) for name in ("ideal", "v2e")}
     rows = [one.simulated(Pixel(name, "", of, 1), name, 2) for name, of in configs.items()]
     text, numbers = frozen.section(one, rows)
@@ -136,7 +136,7 @@ def test_images_that_do_not_resemble_the_frames_are_an_error(recording):
             return frames.astype(np.float32) / 255
 
     with pytest.raises(DataError, match="are these its weights"):
-        list(frozen.Judge(recording, [Mirrored()]).loaded())
+        list(judge.Judge(recording, [Mirrored()]).loaded())
 
 
 def test_without_pytorch_one_line_says_so(monkeypatch, tmp_path):
@@ -202,7 +202,7 @@ def test_firenet_sees_no_gain_of_the_events(tmp_path):
 
 
 def test_floors_are_between_seeds(recording):
-    one = frozen.Judge(recording, [Counts()])
+    one = judge.Judge(recording, [Counts()])
     pixel = replace(CAMERA.pixel, initial_reference="random")
     random = one.simulated(Pixel("random", "", replace(CAMERA, pixel=pixel), 1), "random", 2)
     assert random.floors["distance"] > 0
@@ -210,7 +210,7 @@ def test_floors_are_between_seeds(recording):
 
 
 def test_jittered_times_are_far_as_events_and_near_as_counts(recording):
-    one = frozen.Judge(recording, [Counts()])
+    one = judge.Judge(recording, [Counts()])
     jittered = one.jittered
     assert 0.1 < jittered.values["distance"] < 1.5
     assert jittered.values["FireNet"] > one.nothing.values["FireNet"]
