@@ -34,7 +34,6 @@ nothing.  Published networks are added by ``--weights`` (:mod:`networks.firenet`
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -53,7 +52,13 @@ from experiments.images.sequences import Batches
 from experiments.images.small import EVERY, Small
 from experiments.images.training import BUILD, LOSS, trained, update_of
 from experiments.trainings import seeds as of_seeds
-from experiments.trainings.jobs import all_done, all_measured, identity
+from experiments.trainings.jobs import (
+    all_done,
+    all_measured,
+    identity,
+    keep_references,
+    kept_references,
+)
 from experiments.trainings.options import (
     SMALL,
     anew,
@@ -63,7 +68,7 @@ from experiments.trainings.options import (
     report_option,
     simulators_option,
 )
-from experiments.trainings.training import Training, written
+from experiments.trainings.training import Training
 
 _lpips_option = click.option(
     "--lpips", "features", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
@@ -194,7 +199,7 @@ def _tables(found: dict[str, dict[str, dict[str, float]]]) -> str:
 @click.argument("recording", type=click.Path(exists=True, path_type=Path))
 @click.option("--network", type=click.Choice(list(BUILD)), default="firenet", show_default=True)
 @counted("--seeds", 5)
-@counted("--steps", 800)
+@counted("--steps", 400)
 @rate_option(1e-3)
 @counted("--clips", 40, "Of each seed, 0.37 s each.")
 @counted("--side", 64, "Of the clips [pixels].")
@@ -212,9 +217,7 @@ def small(
     """Train for each simulator and seed in FOLDER, test on a RECORDING; called again, go on."""
     lpips = None if features is None else Lpips(features)
     (part,) = parts(recording)
-    beside = json.dumps(references(part, weights, lpips), indent=1) + "\n"
-    output.mkdir(parents=True, exist_ok=True)
-    written(output / "references.json", lambda path: path.write_text(beside, "utf-8"))
+    keep_references(output, references(part, weights, lpips))
     trainings = [
         Small(simulator, seed, output, recording, network, steps, rate, clips, side, features)
         for seed in range(seeds)
@@ -226,18 +229,15 @@ def small(
 
 def _report(folder: Path, output: Path | None) -> None:
     found = all_measured(folder)
-    path = folder / "references.json"
-    beside = json.loads(path.read_text("utf-8")) if path.exists() else {}
+    kept = kept_references(folder)
     one = found[0]["settings"]
-    seconds = np.mean([each["seconds a step"] for each in found])
+    seconds = np.median([each["seconds a step"] for each in found])
     about = (
         f"{one['network']}, {one['steps']} steps of {seconds:.2f} s on one thread, {one['clips']}"
         f" clips of {one['side']}x{one['side']} pixels a seed; tested on {one['recording']}."
     )
-    names = list(found[0]["measures"])
-    lines = [[run, *(f"{values[k]:.4f}" for k in names)] for run, values in beside.items()]
-    texts = [about, of_seeds.report(found, MEASURES), table(["beside", *names], lines)]
-    write_report("\n\n".join(texts), output, {"trainings": found, "beside": beside})
+    text = f"{about}\n\n{of_seeds.report(found, MEASURES, kept)}"
+    write_report(text, output, {"trainings": found, "beside": kept})
 
 
 main.add_command(report_command(_report))

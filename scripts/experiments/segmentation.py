@@ -46,11 +46,11 @@ from writing import as_written, one_line_errors, output_option, table, write_rep
 
 from adv2e.errors import DataError
 from experiments.labels.labelled import CLASSES, Folder, from_ess, of_shapes, rendered
-from experiments.labels.scores import MEASURES, confusion, last_and_best, scores_of
+from experiments.labels.scores import MEASURES, confusion, last_and_best, of_one_class, scores_of
 from experiments.labels.small import WINDOWS, Small
 from experiments.labels.training import update_of
 from experiments.trainings import seeds as of_seeds
-from experiments.trainings.jobs import all_done, all_measured
+from experiments.trainings.jobs import all_done, all_measured, keep_references, kept_references
 from experiments.trainings.options import (
     SMALL,
     anew,
@@ -145,7 +145,7 @@ def train(
 @click.option("--test-simulator", "tester", default=TESTED, show_default=True)
 @counted("--test-clips", 20, "Of the test on rendered shapes.")
 @counted("--seeds", 5)
-@counted("--steps", 400)
+@counted("--steps", 1600)
 @rate_option(1e-3)
 @counted("--clips", 40, "Of each seed, 0.4 s each.")
 @counted("--side", 64, "Of the clips, a multiple of 8 [pixels].")
@@ -179,6 +179,7 @@ def small(
         for seed in range(seeds)
         for simulator in simulators
     ]
+    keep_references(output, {"one class for all pixels": of_one_class(samples, 2)})
     all_done(trainings, jobs)
     _report(output, to)
 
@@ -186,13 +187,15 @@ def small(
 def _report(folder: Path, output: Path | None) -> None:
     found = all_measured(folder)
     one = found[0]["settings"]
-    seconds = np.mean([each["seconds a step"] for each in found])
+    seconds = np.median([each["seconds a step"] for each in found])
     about = (
         f"U-Net, {one['steps']} steps of {seconds:.2f} s on one thread, {one['clips']} clips of"
         f" {one['side']}x{one['side']} pixels a seed; tested on {one['pictures tested']} pictures:"
         f" {one['tested on']}. The best test of each training is chosen by the test data itself."
     )
-    write_report(f"{about}\n\n{of_seeds.report(found, MEASURES)}", output, {"trainings": found})
+    kept = kept_references(folder)
+    text = f"{about}\n\n{of_seeds.report(found, MEASURES, kept)}"
+    write_report(text, output, {"trainings": found, "beside": kept})
 
 
 main.add_command(report_command(_report))

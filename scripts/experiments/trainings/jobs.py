@@ -19,7 +19,9 @@ from adv2e.errors import DataError
 from experiments.simulators.clip import Simulator
 from experiments.trainings.training import written
 
-MEASURED = "measures.json"
+MEASURED, REFERENCES = "measures.json", "references.json"
+References = dict[str, dict[str, float]]
+"""Measures, by name of what is measured and of the measure."""
 
 
 class Job(Protocol):
@@ -100,3 +102,16 @@ def all_measured(folder: Path) -> list[dict[str, Any]]:
                     f"{folder}: trainings with {name} {a!r} and {b!r}: not to be compared"
                 )
     return sorted(found, key=lambda one: (one["settings"]["simulator"], one["settings"]["seed"]))
+
+
+def keep_references(folder: Path, found: References) -> None:
+    """Write measures that stand beside those of the trainings in a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    raw = json.dumps(found, indent=1) + "\n"
+    written(folder / REFERENCES, lambda path: path.write_text(raw, "utf-8"))
+
+
+def kept_references(folder: Path) -> References:
+    """Return the measures that were written there; none where they were not."""
+    path = folder / REFERENCES
+    return json.loads(path.read_text("utf-8")) if path.exists() else {}

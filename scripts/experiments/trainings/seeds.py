@@ -59,10 +59,15 @@ def sentence(name: str, values: Values, larger_is_better: bool) -> str:
     return f"{name}: {said}. The other pairs ({rest}) are not parted by their seeds."
 
 
-def report(found: Sequence[Mapping[str, Any]], measures: Mapping[str, bool]) -> str:
+def report(
+    found: Sequence[Mapping[str, Any]],
+    measures: Mapping[str, bool],
+    beside: Mapping[str, Mapping[str, float]],
+) -> str:
     """Return the table of all measures and what their spread carries, in Markdown.
 
     `measures` tells of each whether larger is better; those that were not taken are left out.
+    `beside` holds measures of what was not trained, which get a table of their own.
     """
     taken = {name: larger for name, larger in measures.items() if name in found[0]["measures"]}
     rows, said = [], []
@@ -77,4 +82,9 @@ def report(found: Sequence[Mapping[str, Any]], measures: Mapping[str, bool]) -> 
     about = [f"- {name}: {nature}" for name, nature in natures.items()]
     head = ["configuration", "measure", "mean", "deviation", "each seed"]
     about_level = f"At {LEVEL:.0%} over all pairs of a measure, by the exact test of all deals:"
-    return "\n".join([table(head, rows), "", about_level, "", *said, "", *about])
+    lines = [table(head, rows), "", about_level, "", *said, "", *about]
+    if beside:
+        names = list(next(iter(beside.values())))
+        cells = [[label, *(f"{each[k]:.4f}" for k in names)] for label, each in beside.items()]
+        lines += ["", table(["beside", *names], cells)]
+    return "\n".join(lines)

@@ -51,7 +51,9 @@ def test_a_report_has_each_seed_and_only_what_was_measured():
         {"settings": {"simulator": "a", "nature": "none", "seed": k}, "measures": {"MSE": 0.1 * k}}
         for k in range(3)
     ]
-    text = seeds.report(found, {"MSE": False, "LPIPS": False})
+    text = seeds.report(found, {"MSE": False, "LPIPS": False}, {"grey": {"MSE": 0.25}})
     assert "| a | MSE | 0.1000 | 0.1000 | 0.0000 0.1000 0.2000 |" in text
     assert "LPIPS" not in text
     assert "- a: none" in text
+    assert text.endswith("| beside | MSE |\n| --- | ---: |\n| grey | 0.2500 |")
+    assert "beside" not in seeds.report(found, {"MSE": False}, {})

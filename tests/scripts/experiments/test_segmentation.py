@@ -109,6 +109,18 @@ def test_scores_are_those_of_a_loop_over_pixels():
     assert label_scores.scores_of(np.diag([3, 0])) == {"accuracy": 1, "mIoU": 0.5}
 
 
+def test_one_class_for_all_pixels_is_scored_as_a_network_that_says_it():
+    labels = np.full((2, 4, 4), labelled.IGNORED, np.uint8)
+    labels[0], labels[1, 0] = 1, (0, 0, 1, 2)
+    samples = [(np.zeros((3, 4, 4), np.float32), label) for label in labels]
+    says_one = np.zeros((1, 3, 4, 4), np.float32)
+    says_one[0, 1] = 1
+    counts = label_scores.confusion(lambda _: torch.from_numpy(says_one), samples, 3, "cpu")
+    found = label_scores.of_one_class(samples, 3)
+    assert found == label_scores.scores_of(counts)
+    assert found["accuracy"] == 17 / 20
+
+
 def test_pixels_of_no_class_teach_nothing():
     scores = torch.randn(1, 3, 4, 4, requires_grad=True)
     labels = torch.full((1, 4, 4), labelled.IGNORED, dtype=torch.uint8)
@@ -271,6 +283,7 @@ def test_small_trains_each_once_and_reports(tmp_path):
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").glob("*/*")} == files
     assert first.stdout == again.stdout == call("report", tmp_path / "runs").stdout
     assert "16 pictures: rendered shapes by dvs-voltmeter" in first.stdout
+    assert "| one class for all pixels | 0." in first.stdout
     numbers = json.loads((tmp_path / "small.json").read_text())["trainings"]
     assert all(set(one["measures"]) == set(label_scores.MEASURES) for one in numbers)
 
