@@ -12,13 +12,15 @@ float32.  Rows and columns are free, but must be multiples of ``multiple`` in th
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+import pickle
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
-from adv2e.errors import MissingExtraError
+from adv2e.errors import DataError, MissingExtraError
 
 
 def output_options(body: Callable[..., None]) -> Callable[..., None]:
@@ -56,3 +58,22 @@ def torch_module() -> Any:
         return importlib.import_module("torch")
     except ImportError as error:
         raise MissingExtraError("a network of PyTorch", "experiments") from error
+
+
+_DAMAGED = pickle.UnpicklingError, EOFError, LookupError, RuntimeError, TypeError, ValueError
+
+
+@contextmanager
+def damage_told(complaint: str) -> Iterator[None]:
+    """Turn what PyTorch raises for files that it did not write, or not so, into one line.
+
+    Raises
+    ------
+    DataError
+        `complaint`, and in brackets the reason.
+    """
+    try:
+        yield
+    except _DAMAGED as error:
+        reason = str(error).strip().partition("\n")[0]
+        raise DataError(f"{complaint} ({reason})") from error

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.representations.voxel_grid import own_window, signed_grid, z_scored
-from networks import torch_module
+from networks import damage_told, torch_module
 
 Images = NDArray[np.float32]
 """(windows, rows, columns), 0 black and 1 white."""
@@ -205,10 +205,11 @@ def _weights(path: Path) -> Any:
     before = sys.modules.get("parse_config")
     sys.modules["parse_config"] = stub
     try:
-        with torch.serialization.safe_globals([stub.ConfigParser, pathlib.PosixPath]):
+        with (
+            damage_told(f"{path}: no checkpoint of PyTorch"),
+            torch.serialization.safe_globals([stub.ConfigParser, pathlib.PosixPath]),
+        ):
             return torch.load(path, map_location="cpu", weights_only=True)["state_dict"]
-    except (KeyError, RuntimeError, EOFError) as error:
-        raise DataError(f"{path}: no checkpoint of PyTorch: {error}") from None
     finally:
         if before is None:
             del sys.modules["parse_config"]

@@ -15,12 +15,11 @@ References
 
 from __future__ import annotations
 
-import pickle
 from pathlib import Path
 from typing import Any
 
 from adv2e.errors import DataError
-from networks import torch_module
+from networks import damage_told, torch_module
 
 BACKBONE, LINEAR = "alexnet-owt-7be5be79.pth", "alex.pth"
 LAYERS = {0: (3, 64, 11, 4, 2), 3: (64, 192, 5, 1, 2), 6: (192, 384, 3, 1, 1),
@@ -85,11 +84,8 @@ class Lpips:
 
 
 def _read(torch: Any, path: Path) -> Any:
-    try:
+    with damage_told(f"{path}: no weights of PyTorch"):
         return torch.load(path, map_location="cpu", weights_only=True)
-    except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError) as error:
-        reason = str(error).strip().partition("\n")[0]
-        raise DataError(f"{path}: no weights of PyTorch: {reason}") from None
 
 
 def _of(path: Path, state: Any, key: str, shape: tuple[int, ...]) -> Any:

@@ -24,7 +24,6 @@ from __future__ import annotations
 import datetime
 import hashlib
 import io
-import pickle
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -34,6 +33,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from adv2e.errors import DataError
+from networks import damage_told
 from networks.exporting import Network
 from networks.sampling import sample
 
@@ -168,12 +168,11 @@ def load(checkpoint: Path, mean: float | None) -> Network:
 
 def _unpickled(checkpoint: Path, raw: bytes) -> Any:
     """Return what a checkpoint holds; nothing in it is run."""
-    try:
-        with torch.serialization.safe_globals([datetime.datetime]):  # it tells when it was made
-            return torch.load(io.BytesIO(raw), map_location="cpu", weights_only=True)
-    except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError, KeyError) as error:
-        reason = str(error).strip().partition("\n")[0]
-        raise DataError(f"{checkpoint}: is no checkpoint of PyTorch ({reason})") from error
+    with (
+        damage_told(f"{checkpoint}: is no checkpoint of PyTorch"),
+        torch.serialization.safe_globals([datetime.datetime]),  # it tells when it was made
+    ):
+        return torch.load(io.BytesIO(raw), map_location="cpu", weights_only=True)
 
 
 def _check(where: str, found: Mapping[str, object], wanted: Mapping[str, Tensor]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from networks.lpips import Lpips
 
 from adv2e.errors import DataError
 from experiments.images.sequences import Batches
-from experiments.trainings.training import CHECKPOINT, Update
+from experiments.trainings.training import CHECKPOINT, Update, checkpoint
 
 BUILD = {"e2vid": e2vid, "firenet": firenet}
 LOSS = "L1 + 1 - SSIM"
@@ -65,8 +64,8 @@ def trained(run: Path) -> Any:
     path = run / CHECKPOINT
     if not path.is_file():
         raise DataError(f"{path}: not there; give a folder that train or small made")
-    state = torch_module().load(path, map_location="cpu", weights_only=True)
-    network = json.loads(state["rest"])["settings"].get("network")
+    state, rest = checkpoint(path)
+    network = rest["settings"].get("network")
     if network not in BUILD:
         raise DataError(f"{path}: network: {network!r} is none of {', '.join(BUILD)}")
     net = BUILD[network]()

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import json
 import math
-import pickle
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -26,7 +25,7 @@ from typing import Any
 
 import click
 import numpy as np
-from networks import torch_module
+from networks import damage_told, torch_module
 from writing import load_pyplot, save_figure
 
 from adv2e.errors import DataError
@@ -58,6 +57,13 @@ class Curve:
     def best(self, name: str) -> dict[str, float]:
         """Return the check in which a measure was largest, the first of equals."""
         return max(self.checks, key=lambda one: one[name])
+
+    def summary(self) -> dict[str, float]:
+        """Return the loss of the last 50 steps, and how long one took."""
+        return {
+            "loss": float(np.mean(self.losses[-50:])),
+            "seconds a step": self.seconds / len(self.losses),
+        }
 
 
 @dataclass(frozen=True)
@@ -179,12 +185,7 @@ class Training:
         torch = torch_module()
         if not path.exists():
             return Curve()
-        try:
-            state = torch.load(path, map_location="cpu", weights_only=True)
-            rest = json.loads(state["rest"])
-        except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError, ValueError) as error:
-            reason = str(error).strip().partition("\n")[0]
-            raise DataError(f"{path}: no checkpoint of a training: {reason}") from None
+        state, rest = checkpoint(path)
         settings = json.loads(json.dumps(dict(self.settings)))
         for name in sorted({*settings, *rest["settings"]}):
             old, new = rest["settings"].get(name), settings.get(name)
@@ -197,6 +198,19 @@ class Training:
             torch.cuda.set_rng_state_all(state["cuda"])
         rng.bit_generator.state = rest["numpy"]
         return Curve(**rest["curve"])
+
+
+def checkpoint(path: Path) -> tuple[Any, dict[str, Any]]:
+    """Return the states that a checkpoint holds, and what else: settings, chance, curve.
+
+    Raises
+    ------
+    DataError
+        It is none.
+    """
+    with damage_told(f"{path}: no checkpoint of a training"):
+        state = torch_module().load(path, map_location="cpu", weights_only=True)
+        return state, json.loads(state["rest"])
 
 
 def written(path: Path, write: Callable[[Path], object]) -> None:

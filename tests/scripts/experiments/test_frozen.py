@@ -189,6 +189,15 @@ def test_weights_of_another_net_are_an_error(tmp_path):
         Network("FireNet+", tmp_path)
 
 
+@pytest.mark.parametrize("raw", [b"something else", b"", b"\x80\x02]q\x00."])
+def test_a_file_without_weights_is_an_error(raw, tmp_path):
+    checkpoint(tmp_path, "FireNet", of_chance())
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(raw)
+    with pytest.raises(DataError, match=r"no checkpoint of PyTorch \("):
+        Network("FireNet", tmp_path)
+
+
 def test_firenet_sees_no_gain_of_the_events(tmp_path):
     state = of_chance()
     for name in NETWORKS:

@@ -268,6 +268,16 @@ def test_a_folder_without_a_training_is_one_line(tmp_path, recording):
     ]
 
 
+@pytest.mark.parametrize("raw", [b"something else", b"", b"PK\x03\x04", b"\x80\x02]q\x00."])
+def test_a_file_that_is_no_checkpoint_is_one_line(raw, tmp_path, recording):
+    path = tmp_path / "checkpoint.pt"
+    path.write_bytes(raw)
+    done = CliRunner().invoke(reconstruction.main, ["test", str(recording), str(tmp_path)])
+    assert done.exit_code == 1
+    (line,) = done.output.splitlines()
+    assert line.startswith(f"Error: {path}: no checkpoint of a training (")
+
+
 def test_events_of_other_settings_need_another_folder(tmp_path):
     words = ("train", tmp_path, "--textures", 1, "--network", "firenet", *TINY, "--steps", 1)
     call(*words)
