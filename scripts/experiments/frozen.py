@@ -11,7 +11,7 @@ in thresholds::
 
 WEIGHTS is a folder with ``firenet.pth`` and ``firenet_plus.pth``: the files ``model.pth`` in
 ``pretrained/FireNet`` and ``pretrained/FireNet+`` of github.com/ercanburak/EVREAL.  RECORDING: see
-``direct.py``.  Needs PyTorch, and about a minute a recording.
+``direct.py``.  Needs PyTorch, and some minutes a recording.
 
 FireNet, FireNet+
     Mean structural similarity (SSIM, 1 for equal images) of what the frozen network reconstructs
