@@ -51,6 +51,7 @@ from experiments.images.scores import MEASURES, made_of, measures_of, parts, pic
 from experiments.images.sequences import Batches
 from experiments.images.small import EVERY, Small
 from experiments.images.training import BUILD, LOSS, trained, update_of
+from experiments.trainings import options
 from experiments.trainings import seeds as of_seeds
 from experiments.trainings.jobs import (
     all_done,
@@ -58,15 +59,6 @@ from experiments.trainings.jobs import (
     identity,
     keep_references,
     kept_references,
-)
-from experiments.trainings.options import (
-    SMALL,
-    anew,
-    counted,
-    rate_option,
-    report_command,
-    report_option,
-    simulators_option,
 )
 from experiments.trainings.training import Training
 
@@ -108,19 +100,19 @@ def main() -> None:
 @click.option("--textures", "clips", type=click.IntRange(min=1), help="So many clips of textures.")
 @click.option("--network", type=click.Choice(list(BUILD)), default="e2vid", show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@counted("--steps", 300_000)
-@rate_option(1e-4)
-@counted("--batch", 2, "Runs at a time.")
-@counted("--length", 40, "Windows of a run.")
-@counted("--truncate", 40, "Windows that a gradient spans; a step of Adam each.")
+@options.counted("--steps", 300_000)
+@options.rate_option(1e-4)
+@options.counted("--batch", 2, "Runs at a time.")
+@options.counted("--length", 40, "Windows of a run.")
+@options.counted("--truncate", 40, "Windows that a gradient spans; a step of Adam each.")
 @click.option("--crop", type=_Size(), default="128x128", show_default=True)
 @click.option("--size", type=_Size(), default="240x180", show_default=True, help="Of the sensor.")
-@counted("--every", EVERY, "Frames from an image to the next.")
-@counted("--frames", 481, "Of a piece of a sequence.")
-@counted("--checkpoint", 500, "Steps between checkpoints.")
+@options.counted("--every", EVERY, "Frames from an image to the next.")
+@options.counted("--frames", 481, "Of a piece of a sequence.")
+@options.counted("--checkpoint", 500, "Steps between checkpoints.")
 @click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True)
 @_lpips_option
-@simulators_option("adv2e")
+@options.simulators_option("adv2e")
 @one_line_errors()
 def train(
     output: Path, gopro: Path | None, clips: int | None, network: str, seed: int, steps: int,
@@ -131,7 +123,7 @@ def train(
     """Train a network on the events of one simulator in the folder OUTPUT; called again, go on."""
     if (gopro is None) == (clips is None):
         raise click.UsageError("say --gopro FOLDER or --textures N, and not both")
-    simulators = anew(names, sets, v2e_sources)
+    simulators = options.anew(names, sets, v2e_sources)
     if len(simulators) != 1:
         raise click.UsageError(f"--simulators {names}: train takes one")
     (simulator,) = simulators
@@ -198,16 +190,16 @@ def _tables(found: dict[str, dict[str, dict[str, float]]]) -> str:
 @click.argument("output", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER")
 @click.argument("recording", type=click.Path(exists=True, path_type=Path))
 @click.option("--network", type=click.Choice(list(BUILD)), default="firenet", show_default=True)
-@counted("--seeds", 5)
-@counted("--steps", 400)
-@rate_option(1e-3)
-@counted("--clips", 40, "Of each seed, 0.37 s each.")
-@counted("--side", 64, "Of the clips [pixels].")
-@counted("--jobs", 1, "Trainings at a time, on one thread each.")
+@options.counted("--seeds", 5)
+@options.counted("--steps", 400)
+@options.rate_option(1e-3)
+@options.counted("--clips", 40, "Of each seed, 0.37 s each.")
+@options.counted("--side", 64, "Of the clips [pixels].")
+@options.counted("--jobs", 1, "Trainings at a time, on one thread each.")
 @_lpips_option
 @_weights_option
-@simulators_option(SMALL)
-@report_option
+@options.simulators_option(options.SMALL)
+@options.report_option
 @one_line_errors()
 def small(
     output: Path, recording: Path, network: str, seeds: int, steps: int, rate: float, clips: int,
@@ -219,11 +211,11 @@ def small(
     (part,) = parts(recording)
     keep_references(output, references(part, weights, lpips))
     trainings = [
-        Small(simulator, seed, output, recording, network, steps, rate, clips, side, features)
+        Small(simulator, seed, recording, network, steps, rate, clips, side, features)
         for seed in range(seeds)
-        for simulator in anew(names, sets, v2e_sources)
+        for simulator in options.anew(names, sets, v2e_sources)
     ]
-    all_done(trainings, jobs)
+    all_done(trainings, output, jobs)
     _report(output, to)
 
 
@@ -240,7 +232,7 @@ def _report(folder: Path, output: Path | None) -> None:
     write_report(text, output, {"trainings": found, "beside": kept})
 
 
-main.add_command(report_command(_report))
+main.add_command(options.report_command(_report))
 
 if __name__ == "__main__":
     main()

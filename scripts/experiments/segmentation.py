@@ -49,17 +49,9 @@ from experiments.labels.labelled import CLASSES, Folder, from_ess, of_shapes, re
 from experiments.labels.scores import MEASURES, confusion, last_and_best, of_one_class, scores_of
 from experiments.labels.small import WINDOWS, Small
 from experiments.labels.training import update_of
+from experiments.trainings import options
 from experiments.trainings import seeds as of_seeds
 from experiments.trainings.jobs import all_done, all_measured, keep_references, kept_references
-from experiments.trainings.options import (
-    SMALL,
-    anew,
-    counted,
-    rate_option,
-    report_command,
-    report_option,
-    simulators_option,
-)
 from experiments.trainings.training import Training
 
 TESTED = "dvs-voltmeter"
@@ -76,14 +68,14 @@ def main() -> None:
 @click.argument("ess", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.argument("output", type=click.Path(file_okay=False, path_type=Path))
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@simulators_option("")
+@options.simulators_option("")
 @one_line_errors()
 def prepare(
     ess: Path, output: Path, seed: int, names: str, sets: tuple[str, ...],
     v2e_sources: Path | None,
 ) -> None:  # fmt: skip
     """Write DDD17 as Ev-SegNet has it: measured events, or those of one simulator."""
-    simulators = anew(names, sets, v2e_sources)
+    simulators = options.anew(names, sets, v2e_sources)
     if len(simulators) > 1:
         raise click.UsageError(f"--simulators {names}: prepare takes one, or none for measured")
     counts = from_ess(ess, output, simulators[0] if simulators else None, seed)
@@ -98,9 +90,9 @@ def prepare(
     help="Data set whose split test is used.  [default: DATA]",
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@counted("--epochs", 500)
-@counted("--batch", 8, least=2)
-@rate_option(1e-3, "Of Adam, at first; it falls to nothing.")
+@options.counted("--epochs", 500)
+@options.counted("--batch", 8, least=2)
+@options.rate_option(1e-3, "Of Adam, at first; it falls to nothing.")
 @click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True)
 @output_option
 @one_line_errors()
@@ -143,15 +135,15 @@ def train(
     help="shapes_6dof, or another recording of dark shapes on a bright wall.",
 )  # fmt: skip
 @click.option("--test-simulator", "tester", default=TESTED, show_default=True)
-@counted("--test-clips", 20, "Of the test on rendered shapes.")
-@counted("--seeds", 5)
-@counted("--steps", 1600)
-@rate_option(1e-3)
-@counted("--clips", 40, "Of each seed, 0.4 s each.")
-@counted("--side", 64, "Of the clips, a multiple of 8 [pixels].")
-@counted("--jobs", 1, "Trainings at a time, on one thread each.")
-@simulators_option(SMALL)
-@report_option
+@options.counted("--test-clips", 20, "Of the test on rendered shapes.")
+@options.counted("--seeds", 5)
+@options.counted("--steps", 1600)
+@options.rate_option(1e-3)
+@options.counted("--clips", 40, "Of each seed, 0.4 s each.")
+@options.counted("--side", 64, "Of the clips, a multiple of 8 [pixels].")
+@options.counted("--jobs", 1, "Trainings at a time, on one thread each.")
+@options.simulators_option(options.SMALL)
+@options.report_option
 @one_line_errors()
 def small(
     output: Path, measured: Path | None, tester: str, test_clips: int, seeds: int, steps: int,
@@ -161,11 +153,13 @@ def small(
     """Train for each simulator and seed in FOLDER, and test; called again, go on."""
     if side % 8:
         raise click.UsageError(f"--side {side}: must be a multiple of 8")
-    simulators = anew(names, sets, v2e_sources)
-    if measured is None and tester in [one.name for one in simulators]:
-        raise click.UsageError(f"--test-simulator {tester}: is one of those that are trained on")
+    simulators = options.anew(names, sets, v2e_sources)
     if measured is None:
-        (other,) = anew(tester, (), v2e_sources)
+        if tester in [one.name for one in simulators]:
+            raise click.UsageError(
+                f"--test-simulator {tester}: is one of those that are trained on"
+            )
+        (other,) = options.anew(tester, (), v2e_sources)
         # seeds that no training has
         samples = rendered(range(10**6, 10**6 + test_clips), other, (side, side), WINDOWS)
         about = f"rendered shapes by {other.name} ({other.nature})"
@@ -175,12 +169,12 @@ def small(
     if not samples:
         raise DataError(f"{measured}: no frame with 50 ms of events before it")
     trainings = [
-        Small(simulator, seed, output, tuple(samples), about, steps, rate, clips, side)
+        Small(simulator, seed, tuple(samples), about, steps, rate, clips, side)
         for seed in range(seeds)
         for simulator in simulators
     ]
     keep_references(output, {"one class for all pixels": of_one_class(samples, 2)})
-    all_done(trainings, jobs)
+    all_done(trainings, output, jobs)
     _report(output, to)
 
 
@@ -198,7 +192,7 @@ def _report(folder: Path, output: Path | None) -> None:
     write_report(text, output, {"trainings": found, "beside": kept})
 
 
-main.add_command(report_command(_report))
+main.add_command(options.report_command(_report))
 
 if __name__ == "__main__":
     main()

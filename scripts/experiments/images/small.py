@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 from networks.lpips import Lpips
 
 from experiments.images import textures
@@ -30,7 +29,6 @@ class Small:
 
     simulator: Simulator
     seed: int
-    output: Path
     recording: Path
     network: str
     steps: int
@@ -38,11 +36,6 @@ class Small:
     clips: int
     side: int
     features: Path | None
-
-    @property
-    def folder(self) -> Path:
-        """Where it is kept."""
-        return self.output / f"{self.simulator.name}-seed{self.seed}"
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -60,8 +53,8 @@ class Small:
             "clips": self.clips, "side": self.side, "loss": LOSS,
         }  # fmt: skip
 
-    def run(self) -> dict[str, Any]:
-        """Train and test."""
+    def run(self, folder: Path) -> dict[str, Any]:
+        """Train in a folder, and test."""
         side = (self.side, self.side)
         first = 1000 * self.seed
         clips = (
@@ -70,14 +63,13 @@ class Small:
         pairs = [Pair.simulated(clip, self.simulator, self.seed, EVERY) for clip in clips]
         step = update_of(Batches(pairs, 2, LENGTH, side), LENGTH, "cpu")
         training = Training(BUILD[self.network], step, self._training)
-        net, curve = training.run(self.folder, self.steps)
+        net, curve = training.run(folder, self.steps)
         lpips = None if self.features is None else Lpips(self.features)
         (part,) = parts(self.recording)
         images = made_of(net, part)
-        cv2.imwrite(str(self.folder / "last.png"), picture(part, [images]))
+        cv2.imwrite(str(folder / "last.png"), picture(part, [images]))
         return {
             "measures": measures_of(images, part.frames, lpips),
-            "loss": float(np.mean(curve.losses[-50:])),
-            "seconds a step": curve.seconds / self.steps,
+            **curve.summary(),
             "events": sum(len(pair.events) for pair in pairs),
         }

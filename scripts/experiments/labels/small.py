@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 from networks.unet import unet
 
 from experiments.labels.labelled import Sample, rendered
@@ -29,18 +28,12 @@ class Small:
 
     simulator: Simulator
     seed: int
-    output: Path
     tested: tuple[Sample, ...]
     tested_on: str
     steps: int
     rate: float
     clips: int
     side: int
-
-    @property
-    def folder(self) -> Path:
-        """Where it is kept."""
-        return self.output / f"{self.simulator.name}-seed{self.seed}"
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -55,8 +48,8 @@ class Small:
             "side": self.side, "tested on": self.tested_on, "pictures tested": len(self.tested),
         }  # fmt: skip
 
-    def run(self) -> dict[str, Any]:
-        """Train and test."""
+    def run(self, folder: Path) -> dict[str, Any]:
+        """Train in a folder, and test."""
         first = 1000 * self.seed
         samples = rendered(
             range(first, first + self.clips), self.simulator, (self.side, self.side), WINDOWS
@@ -69,10 +62,9 @@ class Small:
             lambda: unet(2), update_of(samples, 4, "cpu", False), self._training, EPOCH, check,
             "mIoU",
         )  # fmt: skip
-        net, curve = made.run(self.folder, self.steps)
-        cv2.imwrite(str(self.folder / "last.png"), picture(net, self.tested[-1]))
+        net, curve = made.run(folder, self.steps)
+        cv2.imwrite(str(folder / "last.png"), picture(net, self.tested[-1]))
         return {
             "measures": last_and_best(curve.checks),
-            "loss": float(np.mean(curve.losses[-50:])),
-            "seconds a step": curve.seconds / self.steps,
+            **curve.summary(),
         }

@@ -28,27 +28,23 @@ class Job(Protocol):
     """One training with its test."""
 
     @property
-    def folder(self) -> Path:
-        """Where it is kept."""
-
-    @property
     def settings(self) -> dict[str, Any]:
         """All that decides its numbers, with ``simulator`` and ``seed``."""
 
-    def run(self) -> dict[str, Any]:
-        """Train and test; return ``measures`` by name, and what else is to be kept."""
+    def run(self, folder: Path) -> dict[str, Any]:
+        """Train in a folder, and test; return ``measures`` by name, and what else is to be kept."""
 
 
-def done(job: Job) -> dict[str, Any]:
+def done(job: Job, folder: Path) -> dict[str, Any]:
     """Return what came of a training, which is read where it was kept; on one thread."""
-    path = job.folder / MEASURED
+    path = folder / MEASURED
     if path.exists():
         held = json.loads(path.read_text("utf-8"))
         if held["settings"] == job.settings:
             return held
     torch_module().set_num_threads(1)
     cv2.setNumThreads(1)
-    held = {"settings": job.settings, **job.run()}
+    held = {"settings": job.settings, **job.run(folder)}
     raw = json.dumps(held, indent=1) + "\n"
     written(path, lambda place: place.write_text(raw, "utf-8"))
     return held
@@ -60,23 +56,28 @@ def identity(simulator: Simulator) -> dict[str, str]:
     return {"simulator": simulator.name, "nature": simulator.nature, "digest": digest}
 
 
-def all_done(jobs: Sequence[Job], processes: int) -> None:
-    """Train and test all, so many at a time, each in a process of its own."""
+def all_done(jobs: Sequence[Job], output: Path, processes: int) -> None:
+    """Train and test all, so many at a time, each in a process and in a folder of its own."""
     torch_module()  # what is missing is told at once, and by this process
     load_pyplot()
+    settings = [job.settings for job in jobs]
+    folders = [output / f"{one['simulator']}-seed{one['seed']}" for one in settings]
     if processes == 1:
-        for number, job in enumerate(jobs, 1):
-            done(job)
-            click.echo(f"{job.folder.name} done, {number} of {len(jobs)}", err=True)
+        for number, (job, folder) in enumerate(zip(jobs, folders, strict=True), 1):
+            done(job, folder)
+            click.echo(f"{folder.name} done, {number} of {len(jobs)}", err=True)
         return
     # forked processes would share the locks of PyTorch's threads
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes, mp_context=context) as pool:
-        coming = {pool.submit(done, job): job for job in jobs}
+        coming = {
+            pool.submit(done, job, folder): folder.name
+            for job, folder in zip(jobs, folders, strict=True)
+        }
         try:
             for number, one in enumerate(as_completed(coming), 1):
                 one.result()
-                click.echo(f"{coming[one].folder.name} done, {number} of {len(jobs)}", err=True)
+                click.echo(f"{coming[one]} done, {number} of {len(jobs)}", err=True)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -18,7 +18,6 @@ pytest.importorskip("torch", reason="PyTorch (extra experiments) is too large fo
 class Noted:
     """A training that only counts how often it was done."""
 
-    folder: object
     seed: int
     steps: int = 3
 
@@ -26,25 +25,25 @@ class Noted:
     def settings(self):
         return {"simulator": "a", "nature": "none", "seed": self.seed, "steps": self.steps}
 
-    def run(self):
-        self.folder.mkdir(exist_ok=True)
-        count = self.folder / "count"
+    def run(self, folder):
+        folder.mkdir(exist_ok=True)
+        count = folder / "count"
         count.write_text("x" + (count.read_text() if count.exists() else ""))
         return {"measures": {"MSE": 0.1 * self.seed}}
 
 
 def test_what_was_done_is_not_done_again(tmp_path):
-    trainings = [Noted(tmp_path / f"a-seed{k}", k) for k in range(3)]
-    jobs.all_done(trainings[:2], 1)
-    jobs.all_done(trainings, 1)
-    assert [(job.folder / "count").read_text() for job in trainings] == ["x"] * 3
+    trainings = [Noted(k) for k in range(3)]
+    jobs.all_done(trainings[:2], tmp_path, 1)
+    jobs.all_done(trainings, tmp_path, 1)
+    assert [(tmp_path / f"a-seed{k}" / "count").read_text() for k in range(3)] == ["x"] * 3
     found = jobs.all_measured(tmp_path)
     assert seeds.values_of(found, "MSE") == {"a": [0.0, 0.1, 0.2]}
 
 
 def test_other_settings_are_done_anew_and_not_mixed(tmp_path):
-    jobs.all_done([Noted(tmp_path / "a-seed0", 0), Noted(tmp_path / "a-seed1", 1)], 1)
-    jobs.all_done([Noted(tmp_path / "a-seed1", 1, steps=4)], 1)
+    jobs.all_done([Noted(0), Noted(1)], tmp_path, 1)
+    jobs.all_done([Noted(1, steps=4)], tmp_path, 1)
     assert json.loads((tmp_path / "a-seed1" / jobs.MEASURED).read_text())["settings"]["steps"] == 4
     with pytest.raises(DataError, match="trainings with steps"):
         jobs.all_measured(tmp_path)
