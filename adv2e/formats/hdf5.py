@@ -27,9 +27,13 @@ from adv2e.errors import DataError
 from adv2e.files.expansion import check_expansion
 from adv2e.formats.event_file import MOST_COLUMNS, Facts
 from adv2e.process.machine import machine_complaint
+from adv2e.sources.tracks import Track, counted
 
 PART = 1 << 20
 """Events read at once."""
+
+SIDES = "left", "right"
+"""What layouts with several cameras call them."""
 
 _LINKS = 16
 """Soft links on the way to one name, as in the library itself."""
@@ -100,6 +104,33 @@ def find(file: h5py.File, name: str) -> h5py.Group | h5py.Dataset | None:
 def is_dataset(file: h5py.File, name: str) -> bool:
     """Tell whether the name is that of a dataset; DataError as :func:`find`."""
     return isinstance(find(file, name), h5py.Dataset)
+
+
+def sides(file: h5py.File, pattern: str) -> list[str]:
+    """Return which cameras of a pair, left and right, have the dataset of a name with a ``*``."""
+    return [side for side in SIDES if is_dataset(file, pattern.replace("*", side))]
+
+
+def choose(file: h5py.File, facts: Facts, events: str, frames: str = "") -> tuple[str, str]:
+    """Return of which camera, left or right, the events and the frames are to be read.
+
+    Parameters
+    ----------
+    events, frames : str
+        Names of datasets whose length is their number, with ``*`` for the camera.
+    """
+
+    def tracks(pattern: str, what: str) -> list[Track]:
+        names = [pattern.replace("*", side) for side in sides(file, pattern)] if pattern else []
+        counts = [math.prod(dataset(file, name).shape[:1]) for name in names]
+        return [
+            Track(name.removesuffix("/t"), counted(count, what), is_empty=not count)
+            for name, count in zip(names, counts, strict=True)
+        ]
+
+    event, frame = facts.choose(tracks(events, "events"), tracks(frames, "frames"))
+    side = sides(file, events)[event or 0]
+    return side, side if frame is None else sides(file, frames)[frame]
 
 
 def dataset(file: h5py.File, name: str) -> h5py.Dataset:

@@ -120,7 +120,7 @@ def _layout_of(path: Path, layouts: list[Format]) -> Format:
 
     with hdf5.opened(path) as file:
         for found in layouts:
-            if all(hdf5.is_dataset(file, name) for name in found.datasets):
+            if all(hdf5.sides(file, name) for name in found.datasets):
                 return found
     known = "; or ".join(f"{f.name} (datasets {', '.join(f.datasets)})" for f in layouts)
     raise DataError(f"{path}: unknown HDF5 layout, must be {known}")

@@ -1,4 +1,4 @@
-"""HDF5 in the layout of the data set M3ED, of its left camera.
+"""HDF5 in the layout of the data set M3ED, of its left camera or the right one.
 
 ================================= ==============================================================
 /prophesee/left/x, y              uint16, column and row
@@ -7,6 +7,8 @@
 /prophesee/left/ms_map_idx        uint64, for each millisecond the first event at it or after
 /prophesee/left/calib/resolution  columns and rows of the sensor
 ================================= ==============================================================
+
+The right camera is ``prophesee/right``.
 
 References
 ----------
@@ -30,8 +32,10 @@ from adv2e.formats.sink import Request
 from adv2e.ticks import US, to_ticks
 
 _CAMERA = "prophesee/left"
-_COLUMNS = (f"{_CAMERA}/t", f"{_CAMERA}/x", f"{_CAMERA}/y", f"{_CAMERA}/p")
-_RESOLUTION = f"{_CAMERA}/calib/resolution"
+
+
+def _columns(camera: str) -> tuple[str, str, str, str]:
+    return f"{camera}/t", f"{camera}/x", f"{camera}/y", f"{camera}/p"
 
 
 def open_m3ed(path: Path, facts: Facts) -> EventFile:
@@ -44,16 +48,18 @@ def open_m3ed(path: Path, facts: Facts) -> EventFile:
     """
     with hdf5.opened(path) as file:
         hdf5.describe(file, facts)
-        hdf5.columns(file, _COLUMNS)
-        if hdf5.is_dataset(file, _RESOLUTION):
-            size = hdf5.read_all(hdf5.dataset(file, _RESOLUTION), f"{path}: {_RESOLUTION}")
+        camera = f"prophesee/{hdf5.choose(file, facts, 'prophesee/*/t')[0]}"
+        names, resolution = _columns(camera), f"{camera}/calib/resolution"
+        hdf5.columns(file, names)
+        if hdf5.is_dataset(file, resolution):
+            size = hdf5.read_all(hdf5.dataset(file, resolution), f"{path}: {resolution}")
             if size.shape == (2,) and size.dtype.kind in "iu":
                 width, height = size.tolist()
                 facts.state(described_geometry({"width": width, "height": height}), "resolution")
 
     def parts() -> Iterator[Columns]:
-        for t, x, y, p in hdf5.parts(path, _COLUMNS, facts):
-            yield to_ticks(t, US, US, f"{path}: {_COLUMNS[0]}"), x, y, hdf5.signs(p)
+        for t, x, y, p in hdf5.parts(path, names, facts):
+            yield to_ticks(t, US, US, f"{path}: {names[0]}"), x, y, hdf5.signs(p)
 
     return EventFile("m3ed", facts, parts)
 
@@ -69,7 +75,7 @@ class M3edWriter(Hdf5Writer):
 
     def columns(self) -> list[Column]:
         """Return the columns of the events."""
-        t, x, y, p = _COLUMNS
+        t, x, y, p = _columns(_CAMERA)
         return [
             Column(t, np.int64, lambda events: events["t"]),
             Column(x, np.uint16, lambda events: events["x"]),
@@ -88,4 +94,6 @@ class M3edWriter(Hdf5Writer):
 
     def complete(self) -> None:
         """Write the size of the sensor."""
-        self.file[_RESOLUTION] = np.array([self.request.width, self.request.height], np.int64)
+        self.file[f"{_CAMERA}/calib/resolution"] = np.array(
+            [self.request.width, self.request.height], np.int64
+        )

@@ -1,4 +1,4 @@
-"""HDF5 in the layout of the data set MVSEC, of its left DAVIS.
+"""HDF5 in the layout of the data set MVSEC, of its left DAVIS or the right one.
 
 ================================= ==============================================================
 /davis/left/events                float64 (events, 4): column, row, time [s], polarity -1/+1
@@ -7,7 +7,8 @@
 /davis/left/image_raw_event_inds  int64 (frames), the last event before each
 ================================= ==============================================================
 
-Times of the data set are dates.  The size of the sensor is that of the frames.
+The right camera is ``davis/right``.  Times of the data set are dates.  The size of the sensor is
+that of the frames.
 
 References
 ----------
@@ -23,18 +24,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import Events
+from adv2e.formats import hdf5
 from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.hdf5_writer import Column, Hdf5Writer
 from adv2e.formats.tables import Table, open_table
 from adv2e.ticks import S
 
 _CAMERA = "davis/left"
-_TABLE = Table(f"{_CAMERA}/events", "xytp", f"{_CAMERA}/image_raw", f"{_CAMERA}/image_raw_ts")
+
+
+def _table(side: str, side_of_frames: str) -> Table:
+    images = f"davis/{side_of_frames}/image_raw"
+    return Table(f"davis/{side}/events", "xytp", images, f"{images}_ts")
+
+
+_TABLE = _table("left", "left")
 
 
 def open_mvsec(path: Path, facts: Facts) -> EventFile:
     """Open a file of this layout; errors as :func:`adv2e.formats.tables.open_table`."""
-    return open_table(path, facts, "mvsec", _TABLE, S, S)
+    with hdf5.opened(path) as file:
+        table = _table(*hdf5.choose(file, facts, "davis/*/events", "davis/*/image_raw"))
+    return open_table(path, facts, "mvsec", table, S, S)
 
 
 class MvsecWriter(Hdf5Writer):

@@ -32,7 +32,7 @@ class Format:
     magic : bytes
         How such a file begins, if always so.
     datasets : tuple of str
-        Of a layout of HDF5: the datasets by which it is known.
+        Of a layout of HDF5: the datasets by which it is known; ``*`` is left or right.
     file : str
         Of a folder: the file in it by which it is known.
     frames : str
@@ -124,7 +124,7 @@ FORMATS = (
         suffixes=_HDF5,
         reader="mvsec:open_mvsec",
         writer="mvsec:MvsecWriter",
-        datasets=("davis/left/events",),
+        datasets=("davis/*/events",),
         frames="rw",
         is_camera=True,
     ),
@@ -134,7 +134,7 @@ FORMATS = (
         suffixes=_HDF5,
         reader="m3ed:open_m3ed",
         writer="m3ed:M3edWriter",
-        datasets=("prophesee/left/t", "prophesee/left/x", "prophesee/left/y", "prophesee/left/p"),
+        datasets=("prophesee/*/t", "prophesee/*/x", "prophesee/*/y", "prophesee/*/p"),
         first_us=0,
         last_us=(1 << 40) - 1,
     ),

@@ -49,6 +49,11 @@ class Track:
         return [*same, False].index(False)
 
 
+def counted(count: int, what: str) -> str:
+    """Return a number of things for people; `what` is their plural, that ends with an s."""
+    return f"{count:,} {what if count != 1 else what[:-1]}"
+
+
 def choose(
     wanted: str | None, events: Sequence[Track], frames: Sequence[Track], path: str | Path
 ) -> tuple[int | None, int | None, list[str]]:
@@ -76,17 +81,17 @@ def choose(
         No track is called so.
     """
     asked, asked_frames = _asked(wanted, events, frames, path)
-    beside = [frames[k] for k in asked_frames[:1] if not asked]
-    event = _best(events, asked or range(len(events)), beside)
-    pool = asked_frames
-    if not pool:
-        camera = [] if event is None else [events[event]]
-        pool = [k for k, each in enumerate(frames) if _belongs(each, camera, events)]
-    frame = _best(frames, pool, [] if event is None else [events[event]])
+    pool = asked or _nearest(events, [frames[k] for k in asked_frames])
+    event = _best(events, pool)
+    camera = [] if event is None else [events[event]]
+    pool_of_frames = asked_frames or [
+        k for k, each in enumerate(frames) if _belongs(each, camera, events)
+    ]
+    frame = _best(frames, _nearest(frames, camera, pool_of_frames))
     told = []
-    if event is not None and len(events) > 1 and len(asked) != 1:
+    if event is not None and len(pool if wanted else events) > 1:
         told.append(_told("streams of events", events, event, numbered=True))
-    if frame is not None and len(asked_frames) != 1 and len(pool if wanted else frames) > 1:
+    if frame is not None and len(pool_of_frames if wanted else frames) > 1:
         told.append(_told("tracks of frames", frames, frame, numbered=not events))
     return event, frame, told
 
@@ -121,11 +126,18 @@ def _belongs(frame: Track, camera: list[Track], events: Sequence[Track]) -> bool
     return all(frame.shared(each) == nearest for each in camera)
 
 
-def _best(tracks: Sequence[Track], pool: Sequence[int], beside: list[Track]) -> int | None:
-    def rank(place: int) -> tuple[bool, int, bool, int]:
-        track = tracks[place]
-        near = sum(map(track.shared, beside))
-        return track.is_empty, -near, not track.is_usual, place
+def _nearest(
+    tracks: Sequence[Track], beside: Sequence[Track], pool: Sequence[int] | None = None
+) -> list[int]:
+    """Return which of a pool are of the camera of others, by the most parts that are the same."""
+    pool = range(len(tracks)) if pool is None else pool
+    near = {k: sum(map(tracks[k].shared, beside)) for k in pool}
+    return [k for k in pool if near[k] == max(near.values())]
+
+
+def _best(tracks: Sequence[Track], pool: Sequence[int]) -> int | None:
+    def rank(place: int) -> tuple[bool, bool, int]:
+        return tracks[place].is_empty, not tracks[place].is_usual, place
 
     return min(pool, key=rank, default=None)
 

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from adv2e.errors import OutputError
+from adv2e.errors import DataError, OutputError
 from adv2e.events import make_events, sort_events
 from adv2e.formats.hdf5_writer import CHUNK
 from adv2e.formats.lookup import layouts
@@ -214,6 +214,34 @@ def test_mvsec_as_its_readers_have_it(tmp_path):
         assert np.array_equal(camera["image_raw_ts"], [t_ns / 1e9 for t_ns, _ in frames])
         assert camera["image_raw_event_inds"].dtype == np.int64
         assert camera["image_raw_event_inds"][:].tolist() == [0, 0, 2, 3]
+
+
+@pytest.mark.parametrize("layout", ["mvsec", "m3ed"])
+def test_of_two_cameras_the_user_chooses(tmp_path, layout):
+    events = many(9)
+    names = "davis" if layout == "mvsec" else "prophesee"
+    frames = [(7000, grey(1))] if layout == "mvsec" else []
+    write(tmp_path / "a.h5", layout, [*frames, events])
+    write(tmp_path / "b.h5", layout, [*frames, events[:3]])
+    with h5py.File(tmp_path / "a.h5", "a") as left, h5py.File(tmp_path / "b.h5") as right:
+        del left.attrs["adv2e"]
+        right.copy(f"{names}/left", left[names], "right")
+
+    unasked = read_events(tmp_path / "a.h5")
+    assert len(unasked.events) == len(events)
+    assert "is taken, --track chooses another" in unasked.problems[0]
+    for track in ("1", "right", f"{names}/right"):
+        chosen = read_events(tmp_path / "a.h5", track=track)
+        assert np.array_equal(chosen.events, events[:3])
+        assert not any("taken" in problem for problem in chosen.problems)
+        assert (chosen.frame_times_ns is None) == (layout == "m3ed")
+    with pytest.raises(DataError, match=rf"--track 2: it holds no such track, but 0 {names}/left"):
+        read_events(tmp_path / "a.h5", track=2)
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        del file[f"{names}/left"]
+    alone = read_events(tmp_path / "a.h5")
+    assert len(alone.events) == 3
+    assert not any("taken" in problem for problem in alone.problems)
 
 
 def test_m3ed_as_its_readers_have_it(tmp_path):

@@ -24,7 +24,9 @@ References
 
 from __future__ import annotations
 
+import copy
 import struct
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -65,7 +67,10 @@ class Table:
         self._data, self._label = data, label
         if data[4:8] != identifier:
             raise DataError(f"{label}: holds no {identifier.decode()}: damaged")
-        self._at = self._number("<I", 0)
+        self._enter(self._number("<I", 0))
+
+    def _enter(self, at: int) -> None:
+        self._at = at
         self._fields = self._at - self._number("<i", self._at)
         self._size = self._number("<H", self._fields)
 
@@ -99,6 +104,15 @@ class Table:
         if place + 4 + count * np.dtype(dtype).itemsize > len(self._data):
             raise DataError(f"{self._label}: cut short: states {count:,} elements")
         return np.frombuffer(self._data, dtype, count, place + 4)
+
+    def tables(self, field: int) -> Iterator[Table]:
+        """Yield the tables of a vector of them."""
+        place = self._place(field)
+        place += self._number("<I", place) if place else 0
+        for at, offset in enumerate(self.array(field, "<u4").tolist(), 1):
+            table = copy.copy(self)
+            table._enter(place + 4 * at + offset)
+            yield table
 
 
 def unpacked(data: bytes, compression: int, label: str) -> bytes:

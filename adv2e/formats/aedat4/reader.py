@@ -1,12 +1,14 @@
 """Events and frames of AEDAT4 files; what they are made of: :mod:`adv2e.formats.aedat4.packets`.
 
-Of several cameras in one file the first is taken.  A recording that was interrupted states no data
-table; its last packet may be cut, which is told and left out.
+A stream is called as its camera and its output: of several, DV takes the output ``events`` and so
+does this.  A recording that was interrupted states no data table; its last packet may be cut, which
+is told and left out.
 """
 
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -21,6 +23,7 @@ from adv2e.errors import DataError
 from adv2e.formats.aedat4.packets import EVENT, MAGIC, NONE, Table, unpacked
 from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
 from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.tracks import Track, counted
 from adv2e.ticks import US, check_time, check_us
 
 _MOST_HEADER = 1 << 24  # bytes
@@ -38,6 +41,7 @@ class _Stream:
     number: int
     holds: str
     source: str
+    output: str
     size: tuple[int, int] | None
     description: str
 
@@ -64,9 +68,7 @@ def open_aedat4(path: Path, facts: Facts) -> EventFile:
         Its packets are compressed, and the package for it is not installed.
     """
     head = _head(path)
-    events = _first(head.streams, _EVENTS, facts)
-    beside = [s for s in head.streams if events is None or s.source == events.source]
-    frames = _first(beside or head.streams, _FRAME, facts)
+    events, frames = _chosen(path, head, facts)
     first = events or frames
     if first is None:
         kinds = ", ".join(stream.holds for stream in head.streams) or "nothing"
@@ -105,13 +107,40 @@ def _columns(held: list[np.ndarray[tuple[int], np.dtype[np.void]]]) -> Columns:
     return t, x, y, (p != 0).astype(np.uint8)
 
 
-def _first(streams: list[_Stream], holds: str, facts: Facts) -> _Stream | None:
-    """Return the first stream that holds such; others are told."""
-    found = [stream for stream in streams if stream.holds == holds]
-    if len(found) > 1:
-        names = ", ".join(f"{stream.number} ({stream.source})" for stream in found)
-        facts.problems.append(f"{len(found)} streams of {holds}: {names}: the first is taken")
-    return found[0] if found else None
+def _chosen(path: Path, head: _Head, facts: Facts) -> tuple[_Stream | None, _Stream | None]:
+    """Return the streams of events and of frames that are read."""
+    events, frames = ([s for s in head.streams if s.holds == kind] for kind in (_EVENTS, _FRAME))
+    counts = _counts(path, head) if max(len(events), len(frames)) > 1 else Counter()
+
+    def track(stream: _Stream, what: str) -> Track:
+        count = counts[stream.number]
+        return Track(
+            "/".join(filter(None, (stream.source, stream.output))) or what,
+            counted(count, what) if counts else "",
+            is_usual=stream.output == what,
+            is_empty=bool(counts) and not count,
+        )
+
+    event, frame = facts.choose(
+        [track(stream, "events") for stream in events],
+        [track(stream, "frames") for stream in frames],
+    )
+    return None if event is None else events[event], None if frame is None else frames[frame]
+
+
+def _counts(path: Path, head: _Head) -> Counter[int]:
+    """Return how much each stream holds by the data table; nothing where that is not to be had."""
+    counts: Counter[int] = Counter()
+    label = f"{path}: its data table"
+    try:
+        with path.open("rb") as file:
+            file.seek(head.end)
+            data = unpacked(file.read(), head.compression, label)
+        for packet in Table(data, b"FTAB", label).tables(0):
+            counts[packet.number(1, "<i")] += packet.number(2, "<q")
+    except DataError:
+        return Counter()
+    return counts
 
 
 def _head(path: Path) -> _Head:
@@ -153,6 +182,7 @@ def _streams(path: Path, text: bytes) -> Iterator[_Stream]:
                 int(node.get("name", "")),
                 attributes.get("typeIdentifier", ""),
                 attributes.get("source", ""),
+                attributes.get("originalOutputName", ""),
                 described_geometry(dict(sides)),
                 attributes.get("adv2e", ""),
             )

@@ -5,7 +5,7 @@ What messages are read: :mod:`adv2e.formats.bag.messages`.  The container is rea
 frames that of their header, both on the clock of ROS.
 
 Of several topics with events, the first is taken, those named right last; of several with images,
-one of the same camera, ``image_raw`` first.  What was left is told.
+one of the same camera, ``image_raw`` first; unless the user names one.
 
 References
 ----------
@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise, takewhile
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,7 @@ from adv2e.formats.bag.messages import (
 from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.tracks import Track, counted
 from adv2e.ticks import check_time, check_us
 
 _EVENTS = {EVENT_ARRAY: read_event_array, EVENT_PACKET: read_event_packet}
@@ -60,8 +61,7 @@ def open_bag(path: Path, facts: Facts) -> EventFile:
     MissingExtraError
         The package ``rosbags`` is not installed.
     """
-    bag = _Bag(path)
-    facts.problems += bag.told
+    bag = _Bag(path, facts)
     facts.stated_unit = "us"
     if bag.settings:
         facts.describe(bag.settings, f"{path}: adv2e", "the file")
@@ -121,12 +121,11 @@ class _Topic:
     connections: list[Any]
     count: int
 
-    def rank(self, beside: str) -> tuple[Any, ...]:
-        """Return what sorts topics that hold the same, best first, `beside` another one."""
-        both = zip(self.name.split("/"), beside.split("/"), strict=False)
-        shared = len(list(takewhile(lambda pair: pair[0] == pair[1], both)))
-        is_other = self.holds == COMPRESSED or not self.name.endswith(("/image_raw", "/events"))
-        return not self.count, -shared, is_other, "right" in self.name, self.name
+    @property
+    def track(self) -> Track:
+        """What it is among others."""
+        is_usual = self.holds != COMPRESSED and self.name.endswith(("/image_raw", "/events"))
+        return Track(self.name, counted(self.count, "messages"), is_usual, not self.count)
 
 
 def _topics(connections: list[Any]) -> list[_Topic]:
@@ -145,15 +144,13 @@ class _Bag:
     is_ros1 : bool
     settings : str
         What this program wrote inside, if it did.
-    told : list of str
-        Which topics were taken of several.
     events_count : int
         Messages of events.
     images : _Topic or None
         The topic of the frames.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, facts: Facts) -> None:
         self._path, self._reader = path, None
         self.is_ros1 = path.suffix.lower() == ".bag"
         with _reading(path):
@@ -161,9 +158,11 @@ class _Bag:
             topics = _topics(self._reader.connections)
             about = None if self.is_ros1 else self._reader.storage.metadata
             self.settings = str((getattr(about, "custom", None) or {}).get("adv2e", ""))
-        self.told: list[str] = []
-        self._events = self._chosen("events", [t for t in topics if t.holds in _EVENTS])
-        self.images = self._chosen("images", [t for t in topics if t.holds in _IMAGES])
+        topics.sort(key=lambda topic: ("right" in topic.name, topic.name))
+        events, images = ([t for t in topics if t.holds in kind] for kind in (_EVENTS, _IMAGES))
+        event, image = facts.choose([t.track for t in events], [t.track for t in images])
+        self._events = None if event is None else events[event]
+        self.images = None if image is None else images[image]
         if self._events is None and self.images is None:
             known = ", ".join(f"{t.name} ({t.holds})" for t in topics) or "nothing"
             raise DataError(
@@ -180,15 +179,6 @@ class _Bag:
             with suppress(Exception):
                 self._running = iter(())
                 self._reader.close()
-
-    def _chosen(self, what: str, topics: list[_Topic]) -> _Topic | None:
-        """Return one of several topics, and note what is to be told."""
-        beside = self._events.name if what == "images" and self._events is not None else ""
-        topics.sort(key=lambda topic: topic.rank(beside))
-        if len(topics) > 1:
-            left = ", ".join(topic.name for topic in topics[1:])
-            self.told.append(f"{what} are those of {topics[0].name}, not of {left}")
-        return topics[0] if topics else None
 
     def _messages(self, topic: _Topic, start: int | None = None) -> Iterator[tuple[int, bytes]]:
         """Yield when each message of a topic was recorded [ns], and what it holds."""

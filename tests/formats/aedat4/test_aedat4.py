@@ -1,3 +1,4 @@
+import itertools
 import struct
 import sys
 import tempfile
@@ -181,10 +182,93 @@ def test_a_file_of_frames_alone_has_no_events(tmp_path):
     assert recording.frame_times_ns.tolist() == [t_ns for t_ns, _ in FRAMES]
 
 
+STEREO = (
+    "4 streams of events: 0 L/denoised (1 event), 1 L/events (2 events), 2 R/denoised (3 events),"
+    " 3 R/events (4 events)"
+)
+
+
+def stereo(path):
+    """Two cameras of the library; each has two streams of events, and one of frames."""
+    library = pytest.importorskip("dv_processing")
+    streams = ("denoised", "events")
+    configs = []
+    for camera in "LR":
+        config = library.io.MonoCameraWriter.Config(camera)
+        for stream in streams:
+            config.addEventStream((346, 260), stream)
+        config.addFrameStream((346, 260))
+        configs.append(config)
+    writer = library.io.StereoCameraWriter(str(path), *configs)
+    for number, (side, stream) in enumerate(itertools.product(("left", "right"), streams), 1):
+        store = library.EventStore()
+        for t, x, y, p in CORNERS[:number].tolist():
+            store.push_back(t, x, y, bool(p))
+        getattr(writer, side).writeEvents(store, stream)
+    for side in ("right", "left"):
+        frame = library.Frame(EPOCH_US + (side == "right"), GREY)
+        getattr(writer, side).writeFrame(frame)
+    del writer
+    return path
+
+
+@pytest.mark.parametrize(
+    ("track", "count", "is_right"),
+    [
+        (None, 2, False),
+        ("0", 1, False),
+        (3, 4, True),
+        ("R", 4, True),
+        ("R/denoised", 3, True),
+        ("L/denoised", 1, False),
+        ("denoised", 1, False),
+        ("R/frames", 4, True),
+    ],
+)
+def test_of_several_streams_that_called_events_or_the_one_named(tmp_path, track, count, is_right):
+    recording = read_events(stereo(tmp_path / "a.aedat4"), track=track)
+
+    assert len(recording.events) == count
+    assert recording.frame_times_ns.tolist() == [(EPOCH_US + is_right) * 1000]
+    told = [problem for problem in recording.problems if problem.startswith(STEREO)]
+    assert len(told) == (track in (None, "R", "denoised", "R/frames"))
+
+
+def test_streams_of_a_recording_that_was_interrupted_have_names_without_counts(tmp_path):
+    path = stereo(tmp_path / "a.aedat4")
+    path.write_bytes(interrupted(path))
+    names = "0 L/denoised, 1 L/events, 2 R/denoised, 3 R/events, L/frames, R/frames"
+    assert len(read_events(path).events) == 2
+    with pytest.raises(DataError, match=f"--track 4: it holds no such track, but {names}$"):
+        read_events(path, track=4)
+
+
+def test_the_command_line_names_streams(adv2e, tmp_path):
+    path = stereo(tmp_path / "a.aedat4")
+    made = adv2e("convert", path, "-o", tmp_path / "b.csv", "--from", "events")
+    assert (made.status, STEREO in made.err) == (0, True)
+    for _ in range(2):
+        made = adv2e(
+            "convert", path, "-o", tmp_path / "b.csv", "--overwrite", "--stream", "R/denoised",
+            "--from", "events",
+        )  # fmt: skip
+        assert (made.status, "taken" in made.err) == (0, False)
+        assert len((tmp_path / "b.csv").read_text().splitlines()) == 4
+    wrong = adv2e("info", path, "--track", "4")
+    assert (wrong.status, wrong.err.count("\n"), STEREO.partition(": ")[2] in wrong.err) == (
+        1,
+        1,
+        True,
+    )
+
+
 def interrupted(path):
     """A recording whose end was never written: no data table is stated."""
     data = bytearray(path.read_bytes())
-    at = data.index(b"IOHE") + 24
+    header = 14 + 4
+    root = header + struct.unpack_from("<I", data, header)[0]
+    fields = root - struct.unpack_from("<i", data, root)[0]
+    at = root + struct.unpack_from("<H", data, fields + 4 + 2 * 1)[0]
     (end,) = struct.unpack_from("<q", data, at)
     struct.pack_into("<q", data, at, -1)
     return data[:end]
@@ -224,7 +308,10 @@ def test_a_packet_that_fills_the_memory(tmp_path):
     frame = pytest.importorskip("lz4.frame")
     path = write(tmp_path / "a.aedat4", CORNERS[:0], ())
     data = bytearray(path.read_bytes())
-    at = data.index(b"IOHE") + 24
+    header = 14 + 4
+    root = header + struct.unpack_from("<I", data, header)[0]
+    fields = root - struct.unpack_from("<i", data, root)[0]
+    at = root + struct.unpack_from("<H", data, fields + 4 + 2 * 1)[0]
     (end,) = struct.unpack_from("<q", data, at)
     bomb = frame.compress(bytes(100 << 20))
     struct.pack_into("<q", data, at, end + 8 + len(bomb))

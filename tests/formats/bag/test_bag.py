@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from adv2e.errors import DataError, MissingExtraError, OutputError
 from adv2e.events import make_events, sort_events
 from adv2e.formats.bag.messages import EVENT_ARRAY, EVENT_ARRAY_TEXT, EVENT_TEXT
+from adv2e.formats.frames import open_frames
 from adv2e.formats.reading import open_events, read_events
 from adv2e.formats.writing import open_sink
 
@@ -325,10 +326,47 @@ def test_of_several_topics_those_of_one_camera_are_taken(tmp_path):
     assert np.array_equal(recording.events, CORNERS)
     assert [np.array_equal(frame.image, GREY) for frame in recording.frames()] == [True]
     assert recording.problems[:2] == [
-        "events are those of /davis/left/events, not of /davis/right/events",
-        "images are those of /davis/left/image_raw, not of /davis/left/depth_map,"
-        " /davis/right/image_raw, /davis/right/depth_map",
+        "2 streams of events: 0 /davis/left/events (1 message), 1 /davis/right/events (1 message):"
+        " 0 /davis/left/events is taken, --track chooses another",
+        "4 tracks of frames: /davis/left/depth_map (1 message), /davis/left/image_raw (1 message),"
+        " /davis/right/depth_map (1 message), /davis/right/image_raw (1 message):"
+        " /davis/left/image_raw is taken, --track chooses another",
     ]
+
+
+@pytest.mark.parametrize("name", ["o.bag", "o"])
+@pytest.mark.parametrize("track", [1, "right", "/davis/right/events", "/davis/right/image_raw"])
+def test_the_topic_that_the_user_names_is_taken(tmp_path, name, track):
+    with Bag(tmp_path / name) as bag:
+        for side in ("right", "left"):
+            bag.events(f"/davis/{side}/events", CORNERS if side == "right" else CORNERS[:2])
+            bag.image(f"/davis/{side}/image_raw", 7, "mono8", GREY if side == "right" else 0 * GREY)
+
+    recording = read_events(tmp_path / name, track=track)
+
+    assert np.array_equal(recording.events, CORNERS)
+    assert [np.array_equal(frame.image, GREY) for frame in recording.frames()] == [True]
+    assert not any("taken" in problem for problem in recording.problems)
+    with pytest.raises(
+        DataError, match=r"--track /dvs/events: it holds no such track, but 0 /davis"
+    ):
+        read_events(tmp_path / name, track="/dvs/events")
+
+
+def test_of_topics_of_images_alone_the_user_chooses(tmp_path):
+    with Bag(tmp_path / "o.bag") as bag:
+        for side in ("left", "right"):
+            for stamp in (7, 8):
+                bag.image(f"/{side}/image_raw", stamp, "mono8", GREY * (side == "right"))
+    first, second = (open_frames(tmp_path / "o.bag", track=track) for track in (None, "1"))
+
+    assert not any(frame.image.any() for frame in first.frames())
+    assert all(np.array_equal(frame.image, GREY) for frame in second.frames())
+    assert first.doubts == [
+        "2 tracks of frames: 0 /left/image_raw (2 messages), 1 /right/image_raw (2 messages):"
+        " 0 /left/image_raw is taken, --track chooses another"
+    ]
+    assert second.doubts == []
 
 
 def test_compressed_images_and_stamps_that_go_back(tmp_path):
