@@ -59,14 +59,16 @@ def open_dat(path: Path, facts: Facts) -> EventFile:
     with path.open("rb") as file:
         file.seek(header.size)
         kind = tuple(file.read(2))
-    if len(kind) < 2 or kind[0] not in _TYPES or kind[1] != _SIZE:
-        held = f"type {kind[0]} of {kind[1]} bytes" if len(kind) == 2 else "nothing"
+    if not kind:
+        facts.problems.append("ends with its header")
+    elif len(kind) < 2 or kind[0] not in _TYPES or kind[1] != _SIZE:
+        held = f"type {kind[0]} of {kind[1]} bytes" if len(kind) == 2 else "cut short"
         raise DataError(
             f"{path}: events, at byte {header.size}: {held}, must be type {_TYPE} (contrast"
             f" detection) of {_SIZE} bytes"
         )
     header.tell(facts, (header.whole("width"), header.whole("height")))
-    begin = header.whole("t0") or 0
+    begin = header.t0
 
     def parts() -> Iterator[Columns]:
         counter = Counter(32)

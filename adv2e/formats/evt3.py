@@ -29,7 +29,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -50,22 +50,24 @@ _BLOCK = 1 << 18  # words, or events to be written
 _NOWHERE = -(1 << 40)
 
 
-def evt3_of(header: Header, facts: Facts) -> EventFile:
+def evt3_of(header: Header, facts: Facts, options: Mapping[str, str]) -> EventFile:
     """Return the events of a file whose header was read."""
-    begin = header.whole("t0") or 0
+    begin = header.t0
 
     def parts() -> Iterator[Columns]:
-        decoder = _Decoder()
-        for words in blocks(header.path, header.size, "<u2", _BLOCK, facts):
+        decoder = Evt3Decoder()
+        for words in blocks(header.path, header.size, decoder.word, _BLOCK, facts):
             t, x, y, p = decoder.events_of(words)
             yield t + begin, x, y, p
-        facts.problems += decoder.kinds.problems()
+        facts.problems += decoder.problems()
 
     return EventFile("evt3", facts, parts)
 
 
-class _Decoder:
+class Evt3Decoder:
     """Decodes block after block, and holds what the words before said."""
+
+    word, bits = "<u2", 24
 
     def __init__(self) -> None:
         self.kinds = Kinds(*_KINDS)
@@ -73,6 +75,10 @@ class _Decoder:
         self._high = self._t = self._row = -1
         self._base = _NOWHERE  # of the next vector, and ...
         self._polarity = 0
+
+    def problems(self) -> list[str]:
+        """Return what is to be told of all words until now."""
+        return self.kinds.problems()
 
     def events_of(self, words: NDArray[np.uint16]) -> Columns:
         """Return the events of some words."""

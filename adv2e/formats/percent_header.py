@@ -13,6 +13,7 @@ from pathlib import Path
 from adv2e.errors import DataError
 from adv2e.formats.event_file import Facts, described_geometry
 from adv2e.formats.sink import Request, to_line
+from adv2e.ticks import US, check_time
 
 _LONGEST = 1 << 20  # bytes of a header
 _LINE = re.compile(rb"%[ \r\n]")
@@ -47,11 +48,18 @@ class Header:
         value = self.values.get(key)
         if value is None:
             return None
-        if not re.fullmatch(r"[0-9]{1,15}", value):
+        if not re.fullmatch(r"[0-9]{1,18}", value):
             raise DataError(
                 f"{self.path}: header: {key!r} must be a whole number, not {value[:40]!r}"
             )
         return int(value)
+
+    @property
+    def t0(self) -> int:
+        """Time [us] that faery took off all times and states; DataError if it cannot be."""
+        t0_us = self.whole("t0") or 0
+        check_time(t0_us * US, f"{self.path}: header: 't0'")
+        return t0_us
 
     def tell(self, facts: Facts, geometry: tuple[int | None, int | None]) -> None:
         """Tell what the header says of the file, width and height among it."""

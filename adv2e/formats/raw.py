@@ -6,16 +6,16 @@ from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.formats.event_file import EventFile, Facts
-from adv2e.formats.evt2 import evt2_of
+from adv2e.formats.evt2 import evt2_of, evt21_of
 from adv2e.formats.evt3 import evt3_of
 from adv2e.formats.percent_header import Header, read_header
 
-_READ = {"EVT2": evt2_of, "EVT3": evt3_of}
+_READ = {"EVT2": evt2_of, "EVT21": evt21_of, "EVT3": evt3_of}
 _VERSIONS = {"2.0": "EVT2", "2.1": "EVT21", "3.0": "EVT3", "4.0": "EVT4"}
 
 
 def open_raw(path: Path, facts: Facts) -> EventFile:
-    """Open a file in EVT 2.0 or EVT 3.0.
+    """Open a file in EVT 2.0, EVT 2.1 or EVT 3.0.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def open_raw(path: Path, facts: Facts) -> EventFile:
     if encoding not in _READ:
         raise DataError(
             f"{path}: events in {encoding or 'an encoding that its header does not state'};"
-            f" {' and '.join(_READ)} are read, as '% evt 3.0' or '% format EVT3;...' in its header"
+            f" {', '.join(_READ)} are read, as '% evt 3.0' or '% format EVT3;...' in its header"
             " states them; Metavision converts others: metavision_file_to_hdf5,"
             " metavision_file_to_csv"
         )
@@ -41,7 +41,7 @@ def open_raw(path: Path, facts: Facts) -> EventFile:
             _size(options.get("height") or geometry[2]),
         ),
     )
-    return _READ[encoding](header, facts)
+    return _READ[encoding](header, facts, options)
 
 
 def _encoding(header: Header) -> tuple[str, dict[str, str]]:

@@ -298,6 +298,13 @@ FORMATS = (
         last_us=(1 << 34) - 1,
     ),
     Format(
+        name="evt21",
+        what="EVT 2.1 of Prophesee's cameras",
+        suffixes=(".raw",),
+        reader="raw:open_raw",
+        is_camera=True,
+    ),
+    Format(
         name="dat",
         what="DAT of Prophesee's cameras",
         suffixes=(".dat",),

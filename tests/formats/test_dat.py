@@ -41,7 +41,7 @@ def test_times_begin_again(tmp_path):
         (b"", b"\0\x08", "does not begin as DAT of Prophesee's cameras does"),
         (HEADER, b"\x28\x08", "type 40 of 8 bytes, must be type 12"),
         (HEADER, b"\x0c\x10", "type 12 of 16 bytes, must be type 12"),
-        (HEADER, b"\x0c", f"at byte {len(HEADER)}: nothing, must be type 12"),
+        (HEADER, b"\x0c", f"at byte {len(HEADER)}: cut short, must be type 12"),
         (HEADER + b"% Width many\n", b"\x0c\x08", "'width' must be a whole number, not 'many'"),
     ],
 )
@@ -51,6 +51,16 @@ def test_others_are_refused(tmp_path, header, kind, said):
 
     assert str(raised.value).startswith(f"{tmp_path / 'a.dat'}: ")
     assert said in str(raised.value)
+
+
+def test_nothing_behind_the_header_is_no_events(adv2e, tmp_path):
+    (tmp_path / "a.dat").write_bytes(HEADER)
+    recording = read_events(tmp_path / "a.dat")
+    assert recording.events.size == 0
+    assert recording.problems == ["ends with its header", "no events"]
+    made = adv2e("convert", tmp_path / "a.dat", "-o", tmp_path / "b.csv")
+    assert (made.status, "ends with its header" in made.err) == (0, True)
+    assert adv2e("info", tmp_path / "a.dat").status == 0
 
 
 def test_times_of_faery_begin_where_its_header_says(tmp_path):
