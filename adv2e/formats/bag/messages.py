@@ -1,13 +1,18 @@
 """Messages of ROS, as ROS 1 packs them and as ROS 2 does (CDR), with arrays in place of objects.
 
 ============================== ====================================================================
-dvs_msgs/EventArray            header, height, width, events: x, y, time, polarity
-event_camera_msgs/EventPacket  header, height, width, sequence number, time, encoding, bytes; of the
-                               encodings ``mono`` is read: words of 64 bits, from the top polarity
-                               1, y 15, x 16, nanoseconds since the stamp of the header 32
+dvs_msgs/EventArray            header, height, width, events: x, y, time, polarity; the same of
+                               prophesee_event_msgs
+event_camera_msgs/EventPacket  header, height, width, sequence number, time, encoding, bytes; called
+                               event_array_msgs/EventArray before
 sensor_msgs/Image              header, height, width, encoding, byte order, bytes a row, bytes
 sensor_msgs/CompressedImage    header, format, bytes of PNG or JPEG
 ============================== ====================================================================
+
+Encodings of packets are ``mono`` (words of 64 bits, from the top polarity 1, y 15, x 16,
+nanoseconds since the stamp of the header 32), ``evt3``, ``evt2`` and ``evt21``, which are what the
+camera sent, cut anywhere, and ``trigger``, which holds no events.  What a camera sent has times of
+its own clock.  They are shifted, all alike, so that the first event is at the stamp of its packet.
 
 ROS 1 packs numbers without gaps.  CDR aligns each to its own size, so that of 16 bytes an event
 takes, two lie between those of its neighbours; strings end with a zero.
@@ -29,12 +34,15 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.events import Events
+from adv2e.formats.event_file import Columns
+from adv2e.formats.evt2 import Evt2Decoder, Evt21Decoder
+from adv2e.formats.evt3 import Evt3Decoder
 from adv2e.sources.frame import Pixels
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.times.instants import NS_PER_S
 
 EVENT_ARRAY = "dvs_msgs/msg/EventArray"
-EVENT_PACKET = "event_camera_msgs/msg/EventPacket"
+_DECODERS: dict[str, Any] = {"evt3": Evt3Decoder, "evt2": Evt2Decoder, "evt21": Evt21Decoder}
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 
 EVENT_TEXT = "uint16 x\nuint16 y\ntime ts\nbool polarity\n"
@@ -66,7 +74,7 @@ class EventMessage:
     """Events of one message: its sensor, and columns with the time [us]."""
 
     size: tuple[int, int]
-    columns: tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
+    columns: Columns
 
 
 class _Cursor:
@@ -143,26 +151,89 @@ def read_event_array(data: bytes, is_cdr: bool, label: str) -> EventMessage:
     return EventMessage((width, height), (t, x, y, (events["p"] != 0).astype(np.uint8)))
 
 
-def read_event_packet(data: bytes, is_cdr: bool, label: str) -> EventMessage:
-    """Return what an event_camera_msgs/EventPacket holds; DataError if that cannot be read."""
-    cursor = _Cursor(data, is_cdr, label)
-    stamp_ns = cursor.stamp_ns()
-    height, width = cursor.number("I"), cursor.number("I")
-    cursor.number("Q")  # sequence number
-    cursor.number("Q")  # time on the clock of the sensor; that of the header is on ROS's
-    encoding = cursor.string()
-    is_big = bool(cursor.number("B"))
-    content = cursor.bytes(cursor.number("I"))
-    if encoding != "mono" or len(content) % 8:
-        raise DataError(
-            f"{label}: events in the encoding {encoding!r}, of which only 'mono' can be read;"
-            " event_camera_tools of ROS converts bags to dvs_msgs/EventArray"
-        )
-    words = np.frombuffer(content, ">u8" if is_big else "<u8").astype(np.uint64)
+class PacketReader:
+    """Reads the packets of a topic, one after another.
+
+    Parameters
+    ----------
+    problems : list of str
+        Is added what is to be told.
+    """
+
+    def __init__(self, problems: list[str]) -> None:
+        self._problems = problems
+        self._decoder: Any = None
+        self._shift_us: int | None = None
+        self._number: int | None = None
+
+    def __call__(self, data: bytes, is_cdr: bool, label: str) -> EventMessage:
+        """Return what an event_camera_msgs/EventPacket holds; DataError if that cannot be read."""
+        cursor = _Cursor(data, is_cdr, label)
+        stamp_ns = cursor.stamp_ns()
+        height, width = cursor.number("I"), cursor.number("I")
+        number = cursor.number("Q")
+        cursor.number("Q")  # time on the clock of the sensor; that of the header is on ROS's
+        encoding = cursor.string()
+        name, *options = encoding.lower().split(";")
+        is_big = bool(cursor.number("B"))
+        content = cursor.bytes(cursor.number("I"))
+        if name == "trigger":
+            content, name = b"", "mono"
+        if name != "mono" and name not in _DECODERS:
+            raise DataError(
+                f"{label}: events in the encoding {encoding!r}; mono, {', '.join(_DECODERS)} are"
+                " read, and event_camera_tools of ROS converts bags to dvs_msgs/EventArray"
+            )
+        word = np.dtype((">u8" if is_big else "<u8") if name == "mono" else _DECODERS[name].word)
+        if len(content) % word.itemsize:
+            raise DataError(
+                f"{label}: {len(content):,} bytes of {name} are no whole words of {word.itemsize}:"
+                " damaged"
+            )
+        words = np.frombuffer(content, word)
+        if name == "mono":
+            return EventMessage((width, height), _of_mono(words.astype(np.uint64), stamp_ns))
+        if self._decoder is None:
+            order = next((o.partition("=")[2] for o in options if o.startswith("endianness=")), "")
+            self._decoder = _DECODERS[name](*([order] if name == "evt21" else []))
+        columns = self._decoder.events_of(words)
+        lost = 0 if self._number is None else number - self._number - 1
+        self._number = number
+        return EventMessage((width, height), self._on_ros(columns, stamp_ns // 1000, lost, label))
+
+    def _on_ros(self, columns: Columns, stamp_us: int, lost: int, label: str) -> Columns:
+        """Return events with times on the clock of ROS."""
+        t, x, y, p = columns
+        if not t.size:
+            return columns
+        first = int(t[0])
+        if self._shift_us is None:
+            self._shift_us = stamp_us - first
+            self._tell(
+                f"times are those of the camera's clock, shifted by {self._shift_us / 1e6:.6f} s:"
+                " the first event is at the stamp of its packet"
+            )
+        elif lost > 0:  # and with them, perhaps, turns of the clock
+            turn = 1 << self._decoder.bits
+            self._shift_us += round((stamp_us - first - self._shift_us) / turn) * turn
+            self._tell(f"{label}: {lost:,} packets before it are missing")
+        return t + self._shift_us, x, y, p
+
+    def end(self) -> None:
+        """Tell what is to be told of all packets."""
+        for text in self._decoder.problems() if self._decoder is not None else ():
+            self._tell(text)
+
+    def _tell(self, text: str) -> None:
+        if text not in self._problems:  # packets may be read more than once
+            self._problems.append(text)
+
+
+def _of_mono(words: NDArray[np.uint64], stamp_ns: int) -> Columns:
     t = (stamp_ns + (words & np.uint64(0xFFFFFFFF)).astype(np.int64) + 500) // 1000
     x = (words >> np.uint64(32) & np.uint64(0xFFFF)).astype(np.uint16)
     y = (words >> np.uint64(48) & np.uint64(0x7FFF)).astype(np.uint16)
-    return EventMessage((width, height), (t, x, y, (words >> np.uint64(63)).astype(np.uint8)))
+    return t, x, y, (words >> np.uint64(63)).astype(np.uint8)
 
 
 def read_image(data: bytes, is_cdr: bool, label: str) -> Pixels:

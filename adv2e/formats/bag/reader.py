@@ -16,7 +16,7 @@ References
 from __future__ import annotations
 
 import bz2
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -31,12 +31,11 @@ from adv2e.files.expansion import check_expansion, expand
 from adv2e.formats.bag.messages import (
     COMPRESSED,
     EVENT_ARRAY,
-    EVENT_PACKET,
     IMAGE,
     EventMessage,
+    PacketReader,
     read_compressed,
     read_event_array,
-    read_event_packet,
     read_image,
     read_stamp,
 )
@@ -46,7 +45,8 @@ from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.tracks import Track, counted
 from adv2e.ticks import check_time, check_us
 
-_EVENTS = {EVENT_ARRAY: read_event_array, EVENT_PACKET: read_event_packet}
+_PACKETS = "event_camera_msgs/msg/EventPacket", "event_array_msgs/msg/EventArray"
+_EVENTS = EVENT_ARRAY, "prophesee_event_msgs/msg/EventArray", *_PACKETS
 _IMAGES = {IMAGE: read_image, COMPRESSED: read_compressed}
 _GATHERED = 1 << 20  # events yielded at once, or some more
 
@@ -151,14 +151,14 @@ class _Bag:
     """
 
     def __init__(self, path: Path, facts: Facts) -> None:
-        self._path, self._reader = path, None
+        self._path, self._reader, self._problems = path, None, facts.problems
         self.is_ros1 = path.suffix.lower() == ".bag"
         with _reading(path):
             self._reader = _opened(path, self.is_ros1)
             topics = _topics(self._reader.connections)
             about = None if self.is_ros1 else self._reader.storage.metadata
             self.settings = str((getattr(about, "custom", None) or {}).get("adv2e", ""))
-        topics.sort(key=lambda topic: ("right" in topic.name, topic.name))
+        topics.sort(key=lambda t: ("trigger" in t.name, "right" in t.name, t.name))
         events, images = ([t for t in topics if t.holds in kind] for kind in (_EVENTS, _IMAGES))
         event, image = facts.choose([t.track for t in events], [t.track for t in images])
         self._events = None if event is None else events[event]
@@ -166,8 +166,7 @@ class _Bag:
         if self._events is None and self.images is None:
             known = ", ".join(f"{t.name} ({t.holds})" for t in topics) or "nothing"
             raise DataError(
-                f"{path}: holds neither events ({EVENT_ARRAY}, {EVENT_PACKET}) nor images, but"
-                f" {known}"
+                f"{path}: holds neither events ({', '.join(_EVENTS)}) nor images, but {known}"
             )
         self.events_count = self._events.count if self._events is not None else 0
         self._times: list[int] = []  # when the images were recorded [ns]
@@ -191,12 +190,15 @@ class _Bag:
         """Yield the messages of events."""
         if self._events is None:
             return
-        read = _EVENTS[self._events.holds]
+        packets = PacketReader(self._problems) if self._events.holds in _PACKETS else None
+        read: Callable[[bytes, bool, str], EventMessage] = packets or read_event_array
         for number, (_, data) in enumerate(self._messages(self._events)):
             label = f"{self._path}: {self._events.name} message {number}"
             message = read(data, not self.is_ros1, label)
             check_us(message.columns[0], label)
             yield message
+        if packets is not None:
+            packets.end()
 
     def stamps(self) -> Iterator[tuple[int, str]]:
         """Yield the times in the headers of the images [ns], and what they are called."""

@@ -191,7 +191,13 @@ class Bag:
         for text, name in (
             (EVENT_TEXT.replace("time ", time), "dvs_msgs/msg/Event"),
             (EVENT_ARRAY_TEXT, EVENT_ARRAY),
+            (EVENT_TEXT.replace("time ", time), "prophesee_event_msgs/msg/Event"),
+            (
+                EVENT_ARRAY_TEXT.replace("dvs_msgs", "prophesee_event_msgs"),
+                "prophesee_event_msgs/msg/EventArray",
+            ),
             (PACKET, "event_camera_msgs/msg/EventPacket"),
+            (PACKET, "event_array_msgs/msg/EventArray"),
         ):
             self.types.register(get_types_from_msg(text, name))
         if self.is_ros1:
@@ -225,15 +231,23 @@ class Bag:
         pack = self.types.serialize_ros1 if self.is_ros1 else self.types.serialize_cdr
         self.writer.write(self.topics[topic], recorded or t_ns, pack(message, kind))
 
-    def events(self, topic, events):
+    def packet(self, topic, t_us, encoding, data, kind="event_camera_msgs/msg/EventPacket", **more):
+        values = {"height": 260, "width": 346, "seq": 0, "time_base": 0, "is_bigendian": False}
+        self.write(
+            topic, kind, t_us * 1000, encoding=encoding, events=np.frombuffer(data, np.uint8),
+            **(values | more),
+        )  # fmt: skip
+
+    def events(self, topic, events, package="dvs_msgs"):
         made = [
             self.make(
-                "dvs_msgs/msg/Event", x=x, y=y, polarity=bool(p),
+                f"{package}/msg/Event", x=x, y=y, polarity=bool(p),
                 ts=self.header(t * 1000).stamp,
             )
             for t, x, y, p in events.tolist()
         ]  # fmt: skip
-        self.write(topic, EVENT_ARRAY, EPOCH_US * 1000, height=260, width=346, events=made)
+        kind = f"{package}/msg/EventArray"
+        self.write(topic, kind, EPOCH_US * 1000, height=260, width=346, events=made)
 
     def image(self, topic, t_ns, encoding, array, **options):
         data = np.frombuffer(array.tobytes(), np.uint8)
@@ -295,16 +309,107 @@ def test_event_packets_of_mono(tmp_path, name, is_big):
     assert np.array_equal(read_events(tmp_path / name).events, events)
 
 
+@pytest.mark.parametrize("name", ["o.bag", "o"])
+def test_arrays_of_prophesee(tmp_path, name):
+    with Bag(tmp_path / name) as bag:
+        bag.events("/prophesee/camera/cd_events_buffer", many(9), "prophesee_event_msgs")
+
+    recording = read_events(tmp_path / name)
+
+    assert np.array_equal(recording.events, many(9))
+    assert (recording.width, recording.height, recording.problems) == (346, 260, [])
+
+
+def sent(events, encoding):
+    """What a camera sends of events, word for word."""
+    words = []
+    for t, x, y, p in events.tolist():
+        if encoding == "evt3":
+            words += [(0x8 << 12 | t >> 12 & 0xFFF, 2), (0x6 << 12 | t & 0xFFF, 2)]
+            words += [(y, 2), (0x2 << 12 | p << 11 | x, 2)]
+            words += [(0xA << 12 | 1, 2)]  # a trigger
+        elif encoding == "evt2":
+            words += [(0x8 << 28 | t >> 6 & 0xFFFFFFF, 4)]
+            words += [(p << 28 | (t & 63) << 22 | x << 11 | y, 4)]
+        else:
+            words += [(0x8 << 60 | (t >> 6 & 0xFFFFFFF) << 32, 8)]
+            place = p << 60 | (t & 63) << 54 | (x & ~31) << 43 | y << 32
+            words += [(place | 1 << (x & 31), 8)]
+    return [word.to_bytes(size, "little") for word, size in words]
+
+
+KINDS_OF_PACKETS = ["event_camera_msgs/msg/EventPacket", "event_array_msgs/msg/EventArray"]
+
+
+@pytest.mark.parametrize("name", ["o.bag", "o"])
+@pytest.mark.parametrize("kind", KINDS_OF_PACKETS)
+@pytest.mark.parametrize("encoding", ["evt3", "evt2", "evt21", "evt3;height=260;width=346"])
+def test_packets_of_what_the_camera_sent_are_laid_on_the_clock_of_ros(
+    tmp_path, name, kind, encoding
+):
+    """Packets are cut anywhere; the clock of the camera begins again, and drifts."""
+    events = many(60)
+    events["t"] += 5_000_000 * (np.arange(60) // 20)
+    clock = events.copy()
+    clock["t"] += 2**34 - 7_000_000 - events["t"][0]  # begins again in all encodings
+    words = sent(clock, encoding.partition(";")[0])
+    per_event = len(words) // 60
+    with Bag(tmp_path / name) as bag:
+        for k, cut in enumerate(range(0, 60, 20)):
+            begin = max(0, cut * per_event - (k > 0))
+            data = b"".join(words[begin : (cut + 20) * per_event - 1 if cut < 40 else None])
+            bag.packet("/camera/events", int(events["t"][cut]) + 3 * k, encoding, data, kind, seq=k)
+            bag.packet("/camera/triggers", EPOCH_US, "trigger", b"x", kind, seq=k)
+
+    recording = read_events(tmp_path / name)
+
+    assert np.array_equal(recording.events, events)
+    assert (recording.width, recording.height) == (346, 260)
+    shift = (
+        int(events["t"][0]) - int(clock["t"][0]) % (2**24 if "evt3" in encoding else 2**34)
+    ) / 1e6
+    assert recording.problems[1:] == [
+        f"times are those of the camera's clock, shifted by {shift:.6f} s: the first event is at"
+        " the stamp of its packet"
+    ]
+
+
+def test_turns_of_the_clock_in_packets_that_are_missing(tmp_path):
+    events = many(40)
+    events["t"][20:] += 40_000_000  # more than two turns of 2^24 us
+    words = sent(events, "evt3")
+    with Bag(tmp_path / "o.bag") as bag:
+        for seq, cut in ((0, 0), (900, 20)):
+            data = b"".join(words[cut * 5 : (cut + 20) * 5])
+            bag.packet("/events", int(events["t"][cut]) + seq, "evt3", data, seq=seq)
+
+    recording = read_events(tmp_path / "o.bag")
+
+    assert np.array_equal(recording.events, events)
+    assert any("message 1: 899 packets before it are missing" in p for p in recording.problems)
+
+
+def test_the_user_may_name_a_topic_without_events(tmp_path):
+    with Bag(tmp_path / "o.bag") as bag:
+        bag.packet("/camera/events", EPOCH_US, "evt3", b"".join(sent(many(3), "evt3")))
+        bag.packet("/camera/triggers", EPOCH_US, "trigger", b"x")
+
+    assert read_events(tmp_path / "o.bag", track="triggers").problems == ["no events"]
+
+
 def test_other_encodings_are_named(tmp_path):
     with Bag(tmp_path / "o.bag") as bag:
-        bag.write(
-            "/camera/events", "event_camera_msgs/msg/EventPacket", 0, height=260, width=346, seq=0,
-            time_base=0, encoding="evt3", is_bigendian=False, events=np.zeros(4, np.uint8),
-        )  # fmt: skip
+        bag.packet("/camera/events", 1, "libcaer_cmp", bytes(4))
         bag.image("/camera/image", 0, "bayer_rggb8", GREY)
-
-    with pytest.raises(DataError, match=r"/camera/events message 0: events in the encoding 'evt3'"):
+    with pytest.raises(
+        DataError,
+        match=r"/camera/events message 0: events in the encoding 'libcaer_cmp'; mono, evt3",
+    ):
         read_events(tmp_path / "o.bag")
+    with Bag(tmp_path / "q.bag") as bag:
+        bag.packet("/camera/events", 1, "evt3", bytes(3))
+    with pytest.raises(DataError, match=r"3 bytes of evt3 are no whole words of 2: damaged"):
+        read_events(tmp_path / "q.bag")
 
     with Bag(tmp_path / "p.bag") as bag:
         bag.events("/camera/events", CORNERS)
