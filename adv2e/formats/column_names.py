@@ -7,7 +7,7 @@ time       t_s, t_ms, t_us, t_ns   as they say
            t, ts, time(stamp)(s)   told from the times: :mod:`adv2e.formats.units`
 column     x, xs                   from the left
 row        y, ys                   from the top
-polarity   p, ps, pol(arity)       ON above 0
+polarity   p, ps, pol(arity), on   ON above 0
 ========== ======================= =================================================
 """
 
@@ -21,7 +21,7 @@ _NAMES = {
     "time": ("t_us", "t_ns", "t_ms", "t_s", "t", "ts", "time", "times", "timestamp", "timestamps"),
     "x": ("x", "xs"),
     "y": ("y", "ys"),
-    "polarity": ("p", "ps", "pol", "polarity"),
+    "polarity": ("p", "ps", "pol", "polarity", "on"),
 }
 
 

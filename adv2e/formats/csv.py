@@ -12,8 +12,9 @@ cause     with causes: see adv2e.causes
 
 pandas and faery take this with their defaults.  Read are the columns that
 :mod:`adv2e.formats.column_names` names, in any order and among others, between commas, semicolons
-or tabs.  A file without a heading is refused: some programs write ``t, x, y, p``, Metavision
-``x, y, p, t``.
+or tabs.  faery's heading names the size, too: ``t,x@640,y@480,on``.  A line ``%geometry:640,480``
+is of Metavision, which writes ``x, y, p, t`` without a heading; both have times in microseconds.
+Any other file without a heading is refused.
 
 References
 ----------
@@ -38,7 +39,7 @@ from adv2e.causes import has_causes
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.formats.column_names import find_columns, stated_unit
-from adv2e.formats.event_file import EventFile, Facts
+from adv2e.formats.event_file import EventFile, Facts, described_geometry
 from adv2e.formats.sink import Request, Writer
 from adv2e.formats.text.reader import Form, events_of_lines
 
@@ -66,6 +67,10 @@ def open_csv(path: Path, facts: Facts) -> EventFile:
         begin = file.read(_MOST_HEADING)
     names, skipped, lines = _heading(path, begin)
     found = find_columns(names, str(path))
+    size = re.search(rb"%geometry:(\d{1,5}),(\d{1,5})\s|x@(\d{1,5})\W+y@(\d{1,5})", begin[:skipped])
+    if size is not None:
+        width, height = (int(side) for side in size.groups() if side is not None)
+        facts.state(described_geometry({"width": width, "height": height}), "its heading")
     # of what was written here, the description beside it tells: t is in us
     facts.stated_unit = "us" if facts.description and found[0] == "t" else None
     facts.time_unit = facts.time_unit or stated_unit(found[0])
@@ -75,8 +80,8 @@ def open_csv(path: Path, facts: Facts) -> EventFile:
         tuple(names.index(name) for name in found),
         _cleaned,
     )
-    size, head = path.stat().st_size, (skipped, lines)
-    opened = events_of_lines(lambda: path.open("rb"), size, str(path), facts, head, form)
+    total, head = path.stat().st_size, (skipped, lines)
+    opened = events_of_lines(lambda: path.open("rb"), total, str(path), facts, head, form)
     return replace(opened, layout="csv")
 
 
@@ -84,15 +89,24 @@ def _heading(path: Path, begin: bytes) -> tuple[list[str], int, int]:
     """Return the names of the columns, and the bytes and lines before the first event."""
     at = 3 if begin.startswith(b"\xef\xbb\xbf") else 0
     lines = 0
+    of_metavision = False
     while at < len(begin):
         end = begin.find(b"\n", at) + 1 or len(begin)
         text = begin[at:end].decode("utf-8", "replace").strip()
-        at, lines = end, lines + 1
         names = [name.strip("\"'").lower() for name in _BETWEEN.split(text.lstrip("# "))]
         if len(names) >= 4 and not any(map(_is_number, names)):
-            return names, at, lines
-        if text and not text.startswith("#"):
+            in_us = of_metavision or any("@" in name for name in names)
+            names = [name.partition("@")[0] for name in names]
+            return ["t_us" if in_us and n == "t" else n for n in names], end, lines + 1
+        if of_metavision and (not text or _is_number(names[0])):
+            return ["x", "y", "p", "t_us"], at, lines
+        of_metavision |= text.startswith("%geometry:")
+        if text and not text.startswith(("#", "%")):
             break
+        at, lines = end, lines + 1
+    else:
+        if of_metavision:
+            return ["x", "y", "p", "t_us"], at, lines
     raise DataError(
         f"{path}: must begin with a line that names the columns, such as t,x,y,p (t in"
         " microseconds; t_s,x,y,p in seconds); files of Metavision need x,y,p,t_us"

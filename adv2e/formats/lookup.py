@@ -66,11 +66,15 @@ def check_frames(found: Format) -> None:
 
 
 def may_hold_events(path: Path) -> bool:
-    """Tell, by its name alone, whether a file or folder may be an event file."""
+    """Tell, by its name, whether a file or folder may be an event file; a .npy is looked into."""
     readable = (found for found in FORMATS if found.reader)
     if path.is_dir():
         return any(found.file and (path / found.file).is_file() for found in readable)
     suffix = path.suffix.lower()
+    if suffix == ".npy":
+        from adv2e.formats.npz import is_array_of_events  # noqa: PLC0415 - needs NumPy
+
+        return is_array_of_events(path)
     return bool(suffix) and any(suffix in found.suffixes for found in readable)
 
 

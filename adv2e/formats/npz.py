@@ -1,4 +1,4 @@
-"""Events in NumPy archives: one structured array, or an array for each column.
+"""Events of NumPy: in archives one structured array, or an array for each column; or one array.
 
 The columns are called as in :mod:`adv2e.formats.column_names`.  ``width`` and ``height`` tell the
 geometry [pixels], ``adv2e`` (JSON) what wrote the file.  What is written here:
@@ -77,8 +77,54 @@ def open_npz(path: Path, facts: Facts) -> EventFile:
         }
         facts.state(described_geometry(sizes), "the file")
         table, names, count = _table(path, headers)
-        first = next(_parts(archive, table, names, count), None)
-    time = names[0]
+    first = next(_parts_of(path, table, names, count), None)
+    return _file("npz", facts, names, count, lambda: _parts_of(path, table, names, count), first)
+
+
+def open_npy(path: Path, facts: Facts) -> EventFile:
+    """Open a structured array of events; errors as :func:`open_npz`."""
+
+    def rows() -> Iterator[tuple[NDArray[Any], ...]]:
+        with path.open("rb") as file:
+            read_header(file, path.stat().st_size, str(path))
+            yield from _rows({"": (file, header.dtype)}, "", names, count, str(path))
+
+    header = _header(path)
+    if header.dtype.names is None:
+        raise DataError(
+            f"{path}: numbers of shape {header.shape} without names, which may be frames; events"
+            " need the named fields t, x, y and p"
+        )
+    names = find_columns(header.dtype.names, str(path))
+    if len(header.shape) != 1:
+        raise DataError(f"{path}: events must be in one dimension, not of shape {header.shape}")
+    count = header.shape[0]
+    return _file("npy", facts, names, count, rows, next(rows(), None))
+
+
+def is_array_of_events(path: Path) -> bool:
+    """Tell whether a ``.npy`` holds named fields, as stacks of frames do not."""
+    try:
+        return path.is_file() and _header(path).dtype.names is not None
+    except (OSError, DataError):  # for others to tell
+        return False
+
+
+def _header(path: Path) -> Header:
+    with path.open("rb") as file:
+        return read_header(file, path.stat().st_size, str(path))
+
+
+def _file(
+    layout: str,
+    facts: Facts,
+    names: tuple[str, ...],
+    count: int,
+    rows: Callable[[], Iterator[tuple[NDArray[Any], ...]]],
+    first: tuple[NDArray[Any], ...] | None,
+) -> EventFile:
+    """Return the events of `rows`, of which `first` tell the unit of the times."""
+    path, time = facts.path, names[0]
     facts.time_unit, facts.stated_unit = facts.time_unit or stated_unit(time), None
     t, x, y = (np.empty(0, np.int64),) * 3 if first is None else first[:3]
     if t.dtype.kind not in "iuf":
@@ -88,15 +134,12 @@ def open_npz(path: Path, facts: Facts) -> EventFile:
 
     def parts() -> Iterator[Columns]:
         done = 0
-        with _archive(path) as archive:
-            for t, *others in _parts(archive, table, names, count):
-                ticks = to_ticks(t, unit.ns, US, f"{path}: {time}")
-                x, y, p = others
-                yield ticks, x, y, p
-                done += t.size
-                facts.progress(done, count)
+        for t, x, y, p in rows():
+            yield to_ticks(t, unit.ns, US, f"{path}: {time}"), x, y, p
+            done += t.size
+            facts.progress(done, count)
 
-    return EventFile("npz", facts, parts)
+    return EventFile(layout, facts, parts)
 
 
 def _archive(path: Path) -> Any:
@@ -131,24 +174,34 @@ def _table(path: Path, headers: Mapping[str, Header]) -> tuple[str, tuple[str, .
     return table, names, next(iter(shapes))[0]
 
 
-def _parts(
-    archive: zipfile.ZipFile, table: str, names: tuple[str, ...], count: int
+def _parts_of(
+    path: Path, table: str, names: tuple[str, ...], count: int
 ) -> Iterator[tuple[NDArray[Any], ...]]:
-    """Yield the columns, times as they are and the others as whole numbers."""
-    with ExitStack() as stack:
+    """Yield the columns, as :func:`_rows`."""
+    with _archive(path) as archive, ExitStack() as stack:
         streams = {}
         for name in [table] if table else names:
             file = stack.enter_context(open_member(archive, f"{name}.npy"))
             size = archive.getinfo(f"{name}.npy").file_size
             streams[name] = file, read_header(file, size, f"{archive.filename}: {name}").dtype
-        for begin in range(0, count, _PART):
-            held = {
-                name: _take(file, dtype, min(_PART, count - begin), f"{archive.filename}: {name}")
-                for name, (file, dtype) in streams.items()
-            }
-            t, *others = (held[table][name] if table else held[name] for name in names)
-            label = str(archive.filename)
-            yield t, *(_whole(label, *pair) for pair in zip(names[1:], others, strict=True))
+        yield from _rows(streams, table or None, names, count, str(path))
+
+
+def _rows(
+    streams: Mapping[str, tuple[IO[bytes], np.dtype[Any]]],
+    table: str | None,
+    names: tuple[str, ...],
+    count: int,
+    label: str,
+) -> Iterator[tuple[NDArray[Any], ...]]:
+    """Yield the columns, times as they are and the others as whole numbers."""
+    for begin in range(0, count, _PART):
+        held = {
+            name: _take(file, dtype, min(_PART, count - begin), f"{label}: {name}".rstrip(": "))
+            for name, (file, dtype) in streams.items()
+        }
+        t, *others = (held[name] if table is None else held[table][name] for name in names)
+        yield t, *(_whole(label, *pair) for pair in zip(names[1:], others, strict=True))
 
 
 def _take(file: IO[bytes], dtype: np.dtype[Any], count: int, label: str) -> NDArray[Any]:

@@ -276,6 +276,13 @@ FORMATS = (
         causes="npz:causes_of",
     ),
     Format(
+        name="npy",
+        what="a NumPy array of events",
+        suffixes=(".npy",),
+        reader="npz:open_npy",
+        magic=b"\x93NUMPY",
+    ),
+    Format(
         name="evt3",
         what="EVT 3.0 of Prophesee's cameras",
         suffixes=(".raw",),
@@ -315,6 +322,13 @@ FORMATS = (
         most=(1 << 14, 1 << 14),
         first_us=0,
         last_us=(1 << 32) - 1,
+    ),
+    Format(
+        name="nmnist",
+        what="N-MNIST and N-Caltech101",
+        suffixes=(".bin",),
+        reader="nmnist:open_nmnist",
+        is_camera=True,
     ),
     Format(
         name="aedat2",

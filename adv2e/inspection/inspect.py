@@ -97,7 +97,7 @@ def _has_only_frames(path: Path) -> bool:
 
         files = Members(path)
         return bool(files.enter(LIST) or images_in(files)) and not files.enter(EVENTS)
-    return path.suffix.lower() in OPENERS
+    return path.suffix.lower() in OPENERS and not may_hold_events(path)
 
 
 def _of_recording(recording: Recording) -> dict[str, Any]:

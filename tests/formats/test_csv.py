@@ -93,7 +93,7 @@ def test_the_unit_that_the_user_says(read):
         ("", "must begin with a line that names the columns"),
         ("0.1,1,1,1\n", "must begin with a line that names the columns"),
         ("3,2,1,1000\n4,5,0,2000\n", "files of Metavision need x,y,p,t_us"),
-        ("t,x,y,q\n", r"no column for polarity \(p, ps, pol, polarity\); it has t, x, y, q"),
+        ("t,x,y,q\n", r"no column for polarity \(p, ps, pol, polarity, on\); it has t, x, y, q"),
         ("t,x,y,p\n1,2,3,1\n1,2,,1\n", "line 3: must be the 4 numbers that the heading names"),
         ("t,x,y,p\n1,2,3,1\n1,2,3,1,5\n", r"line 3: .* got '1,2,3,1,5'"),
         ("t_us,x,y,p\n1,2,3,yes\n", r"a\.csv line 2"),
@@ -103,6 +103,47 @@ def test_the_unit_that_the_user_says(read):
 def test_what_is_wrong_is_named(read, text, message):
     with pytest.raises(DataError, match=message):
         read(text)
+
+
+@pytest.mark.parametrize("end", ["", "\n"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "%geometry:640,480\n3,2,1,1000\n4,5,0,2000",
+        "%geometry:640,480\r\n3,2,1,1000\r\n4,5,0,2000",
+        "%geometry:640,480\nx,y,p,t\n3,2,1,1000\n4,5,0,2000",
+        "t,x@640,y@480,on\r\n1000,3,2,1\r\n2000,4,5,0",
+        "t;x@640;y@480;on\n1000;3;2;1\n2000;4;5;0",
+    ],
+)
+def test_forms_of_metavision_and_faery_state_columns_and_size(read, text, end):
+    recording = read(text + end)
+    assert rows(recording) == [(1000, 3, 2, 1), (2000, 4, 5, 0)]
+    assert (recording.width, recording.height) == (640, 480)
+    assert recording.problems == []
+
+
+def test_a_file_of_metavision_without_events(read):
+    assert read("%geometry:640,480\n").problems == ["no events"]
+    with pytest.raises(DataError, match="must begin with a line that names the columns"):
+        read("%geometry:640,480\nsome text\n")
+
+
+def test_faery_writes_what_is_read(tmp_path):
+    faery = pytest.importorskip("faery")
+    events = np.zeros(300, faery.EVENTS_DTYPE)
+    events["t"] = 1468941032229165 + np.arange(300) * 7
+    events["x"], events["y"], events["on"] = (
+        np.arange(300),
+        np.arange(300) % 200,
+        np.arange(300) % 2,
+    )
+    faery.events_stream_from_array(events, (640, 480)).to_file(tmp_path / "a.csv")
+
+    recording = read_events(tmp_path / "a.csv")
+
+    assert recording.events.tolist() == [tuple(event) for event in events.tolist()]
+    assert (recording.width, recording.height, recording.problems) == (640, 480, [])
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,9 @@ from damage import damages, read_or_refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adv2e.errors import DataError
 from adv2e.events import make_events
+from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink, write_events
 
 CORNERS = make_events(
@@ -55,3 +57,65 @@ def test_damaged_archives(good, data):
         path = Path(folder, "a.npz")
         path.write_bytes(data.draw(damages(good)))
         read_or_refused(path, 5)
+
+
+# arrays of events alone, as libraries save them
+
+DTYPES = {
+    "metavision": [("x", "<u2"), ("y", "<u2"), ("p", "<i2"), ("t", "<i8")],
+    "dv": [("timestamp", "<i8"), ("x", "<i2"), ("y", "<i2"), ("polarity", "i1")],
+    "tonic": [("x", "<i2"), ("y", "<i2"), ("t", "<i8"), ("p", "?")],
+    "aedat": [("t", "<u8"), ("x", "<u2"), ("y", "<u2"), ("on", "?")],
+    "faery": [("t", "<u8"), ("x", "<u2"), ("y", "<u2"), (("p", "on"), "?")],
+    "big": [("t_us", ">i8"), ("x", ">u2"), ("y", ">u2"), ("p", "u1"), ("more", "<f8")],
+}
+KNOWN = ("t", "timestamp", "t_us"), ("x",), ("y",), ("p", "polarity", "on")
+
+
+@pytest.mark.parametrize("dtype", DTYPES.values(), ids=DTYPES)
+def test_an_array_of_named_fields_is_events(tmp_path, adv2e, dtype):
+    draw = np.random.default_rng(0)
+    t, xy, p = np.cumsum(draw.integers(0, 900, 500)), draw.integers(0, 90, (2, 500)), np.arange(500)
+    events = make_events(t, *xy, p % 2)
+    array = np.zeros(500, dtype)
+    for names, column in zip(KNOWN, ("t", "x", "y", "p"), strict=True):
+        (name,) = [name for name in array.dtype.names if name in names]
+        array[name] = events[column]
+    np.save(tmp_path / "a.npy", array)
+
+    recording = read_events(tmp_path / "a.npy", time_unit="us")
+
+    assert np.array_equal(recording.events, events)
+    assert recording.layout == "npy"
+    for _ in range(2):
+        made = adv2e(
+            "convert",
+            tmp_path / "a.npy",
+            "-o",
+            tmp_path / "b.csv",
+            "--overwrite",
+            "--time-unit",
+            "us",
+        )
+        assert (made.status, "nothing was simulated" in made.out) == (0, True)
+    assert adv2e("info", tmp_path / "a.npy").status == 0
+    part = adv2e("convert", tmp_path / "a.npy", "-o", tmp_path / "c.csv", "--from", "frames")
+    assert (part.status, "holds events and no frames" in part.err) == (1, True)
+
+
+def test_arrays_of_fields_that_are_no_events(tmp_path):
+    for array, why in (
+        (np.zeros(3, [("t", "i8"), ("x", "i2"), ("y", "i2")]), "no column for polarity"),
+        (np.zeros((3, 2), [(n, "i8") for n in "txyp"]), r"one dimension, not of shape \(3, 2\)"),
+        (np.zeros(3, [(n, "U2") for n in "txyp"]), "x must hold numbers, not <U2"),
+        (np.zeros(3, [("x", "i2"), ("y", "i2"), ("p", "i2"), ("t", "U2")]), "t must hold numbers"),
+    ):
+        np.save(tmp_path / "a.npy", array)
+        with pytest.raises(DataError, match=rf"a\.npy: .*{why}"):
+            read_events(tmp_path / "a.npy")
+    np.save(tmp_path / "a.npy", np.zeros(9, [(n, "i8") for n in "txyp"]))
+    (tmp_path / "a.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:-5])
+    with pytest.raises(DataError, match=r"a\.npy: "):
+        read_events(tmp_path / "a.npy")
+    np.save(tmp_path / "a.npy", np.zeros(0, [(n, "i8") for n in "txyp"]))
+    assert read_events(tmp_path / "a.npy").events.size == 0
