@@ -155,10 +155,11 @@ def _header(path: Path) -> tuple[list[str], int]:
         raise DataError(f"{path}: does not begin with '#!AER-DAT2.0', as AEDAT-2.0 does")
     if version[1] != b"2.0":
         name = version[1].decode("ascii")
-        what = ", which is called .aedat4: rename it" if name.startswith("4") else ""
-        raise DataError(
-            f"{path}: AEDAT-{name}{what or '; AEDAT-2.0 is read, which jAER writes, and AEDAT4'}"
-        )
+        what = {
+            "4": ", which is called .aedat4: rename it",
+            "3": ", which is not read; iniVation's DV converts it to AEDAT4, which is",
+        }.get(name[0], "; AEDAT-2.0 is read, which jAER writes, and AEDAT4")
+        raise DataError(f"{path}: AEDAT-{name}{what}")
     lines, at = [], 0
     while data.startswith(b"#", at):
         end = data.find(b"\n", at)

@@ -35,14 +35,12 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.formats.event_file import Columns
-from adv2e.formats.evt2 import Evt2Decoder, Evt21Decoder
-from adv2e.formats.evt3 import Evt3Decoder
+from adv2e.formats.evt import DECODERS
 from adv2e.sources.frame import Pixels
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.times.instants import NS_PER_S
 
 EVENT_ARRAY = "dvs_msgs/msg/EventArray"
-_DECODERS: dict[str, Any] = {"evt3": Evt3Decoder, "evt2": Evt2Decoder, "evt21": Evt21Decoder}
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 
 EVENT_TEXT = "uint16 x\nuint16 y\ntime ts\nbool polarity\n"
@@ -174,28 +172,29 @@ class PacketReader:
         number = cursor.number("Q")
         cursor.number("Q")  # time on the clock of the sensor; that of the header is on ROS's
         encoding = cursor.string()
-        name, *options = encoding.lower().split(";")
+        name, *options = encoding.upper().split(";")
         is_big = bool(cursor.number("B"))
         content = cursor.bytes(cursor.number("I"))
-        if name == "trigger":
-            content, name = b"", "mono"
-        if name != "mono" and name not in _DECODERS:
+        if name == "TRIGGER":
+            content, name = b"", "MONO"
+        if name != "MONO" and name not in DECODERS:
+            known = ", ".join(DECODERS).lower()
             raise DataError(
-                f"{label}: events in the encoding {encoding!r}; mono, {', '.join(_DECODERS)} are"
-                " read, and event_camera_tools of ROS converts bags to dvs_msgs/EventArray"
+                f"{label}: events in the encoding {encoding!r}; mono, {known} are read, and"
+                " event_camera_tools of ROS converts bags to dvs_msgs/EventArray"
             )
-        word = np.dtype((">u8" if is_big else "<u8") if name == "mono" else _DECODERS[name].word)
+        word = np.dtype((">u8" if is_big else "<u8") if name == "MONO" else DECODERS[name].word)
         if len(content) % word.itemsize:
             raise DataError(
-                f"{label}: {len(content):,} bytes of {name} are no whole words of {word.itemsize}:"
-                " damaged"
+                f"{label}: damaged: {len(content):,} bytes of {encoding} are no whole words of"
+                f" {word.itemsize}"
             )
         words = np.frombuffer(content, word)
-        if name == "mono":
+        if name == "MONO":
             return EventMessage((width, height), _of_mono(words.astype(np.uint64), stamp_ns))
         if self._decoder is None:
-            order = next((o.partition("=")[2] for o in options if o.startswith("endianness=")), "")
-            self._decoder = _DECODERS[name](*([order] if name == "evt21" else []))
+            stated = (option.lower().partition("endianness=")[2] for option in options)
+            self._decoder = DECODERS[name](next(filter(None, stated), ""))
         columns = self._decoder.events_of(words)
         lost = 0 if self._number is None else number - self._number - 1
         self._number = number
