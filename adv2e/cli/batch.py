@@ -68,6 +68,7 @@ _LARGE_SOURCE = 100_000_000
 @click.option("--fps", metavar="F", callback=options.rate, help="Take all frames at F a second.")
 @click.option("--size", type=options.SIZE, metavar="WxH", help="Size of the sensor.")
 @options.rotate_option()
+@options.track_option("every sequence")
 @click.option("--with-frames", is_flag=True, help="Store the frames, too, in HDF5.")
 @click.option("--causes", is_flag=True, help="Store what made each event, too.")
 @click.option(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 )
 @options.time_unit_option
 @options.rotate_option(" of MEASURED, and of --frames,")
+@options.track_option("MEASURED")
 @options.config_options
 @options.threads_option
 @options.progress_option
@@ -56,6 +57,7 @@ def command(
     frames_path: str | None,
     time_unit: str | None,
     rotate180: bool,
+    track: str | None,
     config: Callable[[], Config],
     threads: int | None,
     progress: bool,
@@ -84,7 +86,8 @@ def command(
 
     declared = config()
     with reading_told(measured, progress) as told:
-        ours = read_events(measured, time_unit=time_unit, progress=told, rotate180=rotate180)
+        given: dict[str, Any] = {"time_unit": time_unit, "rotate180": rotate180, "track": track}
+        ours = read_events(measured, progress=told, **given)
     with reading_told(simulated, progress) as told:
         theirs = read_events(simulated, time_unit=time_unit, progress=told)
     source = open_frames(frames_path, rotate180=rotate180) if frames_path else None

@@ -162,13 +162,13 @@ def command(
     if motion is None and (extent_px is not None or duration_s is not None):
         raise click.UsageError("--extent and --duration are of the path that --motion makes")
     part: dict[str, Any] = {"start_s": start, "stop_s": stop, "t0": t0, "crop": crop}
-    if _takes_events(source, choice):
+    if _takes_events(source, choice, given["track"]):
         from adv2e.conversion.transfer import convert_events
 
         del written["preview"]
         if output is None:
             raise click.UsageError("-o OUT is missing: say what to write the events to")
-        part |= {name: given[name] for name in ("time_unit", "rotate180")}
+        part |= {name: given[name] for name in ("time_unit", "rotate180", "track")}
         summary = convert_events(
             source, output, size=size, threads=threads, log=log, **part, **written
         )
@@ -225,7 +225,7 @@ _OF_SIMULATION = (
 """Options that say how frames are simulated."""
 
 
-def _takes_events(source: str, choice: str | None) -> bool:
+def _takes_events(source: str, choice: str | None, track: str | None) -> bool:
     """Tell whether events are to be written and nothing simulated.
 
     Raises
@@ -238,7 +238,7 @@ def _takes_events(source: str, choice: str | None) -> bool:
     from adv2e.errors import DataError
     from adv2e.formats.frames import takes_events
 
-    if not takes_events(Path(source), choice):
+    if not takes_events(Path(source), choice, track):
         return False
     context = click.get_current_context()
     for parameter in context.command.params:

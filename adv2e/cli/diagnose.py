@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 )
 @options.time_unit_option
 @options.rotate_option()
+@options.track_option("RECORDING")
 def command(
     recording: str,
     config: Callable[[Size | None], Config],
@@ -59,6 +60,7 @@ def command(
     size: Size | None,
     time_unit: str | None,
     rotate180: bool,
+    track: str | None,
     threads: int | None,
     progress: bool,
     log: Log,
@@ -108,6 +110,7 @@ def command(
         fit_thresholds=fit_thresholds,
         time_unit=time_unit,
         rotate180=rotate180,
+        track=track,
         overwrite=overwrite,
         threads=threads,
         progress=progress,

@@ -105,6 +105,7 @@ _OPTIONS = {
     help="Share that is for validation: of the recordings, or of the images if there is one.",
 )
 @options.time_unit_option
+@options.track_option("each of EVENTS")
 @click.option(
     "--size",
     type=options.SIZE,
@@ -122,6 +123,7 @@ def command(
     count: int | None,
     at: str | None,
     time_unit: str | None,
+    track: str | None,
     size: Size | None,
     threads: int | None,
     log: Log,
@@ -143,8 +145,8 @@ def command(
     from adv2e.export import export as exports
 
     assert output is not None
-    how: dict[str, Any] = {"overwrite": overwrite, "time_unit": time_unit, "size": size}
-    how["doubt"] = log
+    how: dict[str, Any] = {"overwrite": overwrite, "doubt": log}
+    how |= {"time_unit": time_unit, "size": size, "track": track}
     paths = [Path(path) for path in events]
     if to == "voxel":
         from adv2e.export.voxels import VoxelSettings

@@ -248,8 +248,8 @@ def source_options(body: Body) -> Body:
     """Add what says how to read an input with frames.
 
     The command gets ``given``, these by the names that :func:`adv2e.sources.open_source` has for
-    them: fps, as it was written, timestamps, time_unit, allow_damaged, bayer, pixel_format and
-    rotate180.
+    them: fps, as it was written, timestamps, time_unit, allow_damaged, bayer, pixel_format,
+    rotate180 and track.
     """
 
     @click.option(
@@ -281,6 +281,7 @@ def source_options(body: Body) -> Body:
         help="Raw video comes through standard input (INPUT is -), in frames of the --size given.",
     )
     @rotate_option()
+    @track_option()
     @functools.wraps(body)
     def with_given(*args: Any, **kw: Any) -> Any:
         names = (
@@ -291,6 +292,7 @@ def source_options(body: Body) -> Body:
             "bayer",
             "pixel_format",
             "rotate180",
+            "track",
         )
         return body(*args, given={name: kw.pop(name) for name in names}, **kw)
 
@@ -304,6 +306,20 @@ def rotate_option(what: str = "") -> Callable[[Body], Body]:
         is_flag=True,
         help=f"Turn frames and events{what} by 180 degrees, first of all: the camera was mounted"
         " upside down, as for DDD17 and DDD20.",
+    )
+
+
+def track_option(what: str = "INPUT") -> Callable[[Body], Body]:
+    """Return what adds --track, one of several in `what`; the command gets ``track``, or None."""
+    return click.option(
+        "--track",
+        "--stream",
+        "--topic",
+        "track",
+        metavar="N|NAME",
+        callback=_not_empty,
+        help=f"Which one to read of several video tracks, streams or topics in {what}: its number"
+        " from 0, or its name.  [default: the usual one of them, and a line that tells all]",
     )
 
 
@@ -333,9 +349,7 @@ def output_options(body: Body) -> Body:
 def _not_empty(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """Refuse an empty name: a variable of a shell that is not set would mean the default."""
     if value == "":
-        raise click.BadParameter(
-            "is empty: name what to write, or leave the option out", ctx, param
-        )
+        raise click.BadParameter("is empty: give a name, or leave the option out", ctx, param)
     return value
 
 

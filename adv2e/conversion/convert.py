@@ -35,6 +35,7 @@ def convert(
     bayer: str | None = None,
     pixel_format: str | None = None,
     rotate180: bool = False,
+    track: str | int | None = None,
     format: str | None = None,
     layout: str | None = None,
     with_frames: bool = False,
@@ -82,6 +83,9 @@ def convert(
         Raw video of pixels of this kind comes through standard input; `size` is that of its frames.
     rotate180 : bool
         Turn frames and events by half a turn, before even that.
+    track : str or int, optional
+        Which one to read of several video tracks, streams or topics: its number from 0, or its
+        name.
     format, layout : str, optional
         Format of the output where its suffix does not say it, and layout of HDF5.
     with_frames : bool
@@ -144,7 +148,7 @@ def convert(
 
     if fps is not None and timestamps is not None:
         raise UsageError("fps and timestamps both give the times of the frames: keep one")
-    if takes_events(Path(source), take):
+    if takes_events(Path(source), take, track):
         simulated = {
             **{"config": config, "fps": fps, "timestamps": timestamps, "preview": preview},
             **{"bayer": bayer, "pixel_format": pixel_format, "motion": motion},
@@ -159,6 +163,7 @@ def convert(
             size=wanted,
             crop=part,
             rotate180=rotate180,
+            track=track,
             time_unit=time_unit,
             start_s=start_s,
             stop_s=stop_s,
@@ -189,6 +194,7 @@ def convert(
         pixel_format=pixel_format,
         frame_size=wanted,
         rotate180=rotate180,
+        track=track,
         along=None if motion is None else SensorPath(motion, extent_px, duration_s),
         threads=threads,
     )

@@ -38,7 +38,7 @@ AHEAD_BYTES, AHEAD_FRAMES = 16 << 20, 256
 
 READING = (
     *("fps", "timestamps", "time_unit", "start_s", "stop_s", "t0", "allow_damaged", "bayer"),
-    "rotate180",
+    *("rotate180", "track"),
 )
 """Arguments of a conversion that a :class:`Reading` takes as they are."""
 
@@ -113,7 +113,7 @@ class Reading:
     Parameters
     ----------
     path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged, crop, bayer,
-    pixel_format, frame_size, rotate180, along
+    pixel_format, frame_size, rotate180, along, track
         See :func:`adv2e.sources.open_source`.
     threads : int, optional
         Threads that the whole conversion may compute with; default: all cores.
@@ -136,6 +136,7 @@ class Reading:
         frame_size: Size | None = None,
         rotate180: bool = False,
         along: SensorPath | None = None,
+        track: str | int | None = None,
         threads: int | None = None,
     ) -> None:
         self.path = path
@@ -144,7 +145,7 @@ class Reading:
             "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
             "time_unit": time_unit, "allow_damaged": allow_damaged, "crop": crop,
             "bayer": bayer, "pixel_format": pixel_format, "frame_size": frame_size,
-            "rotate180": rotate180, "along": along,
+            "rotate180": rotate180, "along": along, "track": track,
         }  # fmt: skip
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()

@@ -94,6 +94,7 @@ def convert_events(
     crop: Rectangle | None = None,
     time_unit: str | None = None,
     rotate180: bool = False,
+    track: str | int | None = None,
     start_s: float | None = None,
     stop_s: float | None = None,
     t0: str = "auto",
@@ -124,6 +125,8 @@ def convert_events(
         Unit of the times in the file.
     rotate180 : bool
         Turn events and frames by half a turn, before they are cut.
+    track : str or int, optional
+        Which one to read of several streams: its number from 0, or its name.
     start_s, stop_s : float, optional
         First and last time wanted, from the first event [s]; both inclusive.
     t0 : {'auto', 'keep', 'zero'}
@@ -148,7 +151,7 @@ def convert_events(
     if with_frames:
         check_frames(chosen)
     keeps_all_bits = chosen.is_davis240c
-    file = open_events(path, time_unit=time_unit, size=size, rotate180=rotate180)
+    file = open_events(path, time_unit=time_unit, size=size, rotate180=rotate180, track=track)
     facts = file.facts
     if causes and file.causes is None:
         raise DataError(

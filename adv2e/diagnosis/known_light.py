@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,7 @@ def read_known_light(
     sensor: Sensor | None = None,
     *,
     rotate180: bool = False,
+    track: str | int | None = None,
 ) -> Evidence:
     """Read events and the light that they were made under.
 
@@ -63,7 +65,8 @@ def read_known_light(
         after it; there are too few.
     """
     size = None if sensor is None else (sensor.width, sensor.height)
-    recording = assemble(open_events(events, time_unit=time_unit, size=size, rotate180=rotate180))
+    given: dict[str, Any] = {"time_unit": time_unit, "rotate180": rotate180, "track": track}
+    recording = assemble(open_events(events, size=size, **given))
     width, height = recording.width, recording.height
     check_beside(width, height, sensor, recording.path)
     stimulus, part = read_stimulus(light, Size(width, height))

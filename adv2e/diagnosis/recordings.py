@@ -31,6 +31,7 @@ def diagnose(
     fit_thresholds: bool = False,
     time_unit: str | None = None,
     rotate180: bool = False,
+    track: str | int | None = None,
     overwrite: bool = False,
     threads: int | None = None,
     progress: bool = False,
@@ -59,6 +60,8 @@ def diagnose(
         Unit of the times in lists.
     rotate180 : bool
         Turn frames and events by half a turn, as for a camera that was mounted upside down.
+    track : str or int, optional
+        Which one to read of several streams: its number from 0, or its name.
     overwrite : bool
         Replace the folder of an earlier report.
     threads : int, optional
@@ -97,6 +100,7 @@ def diagnose(
         fit_thresholds=fit_thresholds,
         time_unit=time_unit,
         rotate180=rotate180,
+        track=track,
         overwrite=overwrite,
         threads=threads,
         progress=progress,
@@ -116,6 +120,7 @@ def diagnose_file(
     fit_thresholds: bool,
     time_unit: str | None,
     rotate180: bool,
+    track: str | int | None,
     overwrite: bool,
     threads: int | None,
     progress: bool,
@@ -135,9 +140,9 @@ def diagnose_file(
     with _stages(progress) as tell:
         given = time_unit, declared.sensor
         evidence = (
-            read_evidence(recording, *given, rotate180=rotate180)
+            read_evidence(recording, *given, rotate180=rotate180, track=track)
             if light is None
-            else read_known_light(recording, light, *given, rotate180=rotate180)
+            else read_known_light(recording, light, *given, rotate180=rotate180, track=track)
         )
         found = diagnose_evidence(
             evidence,

@@ -169,6 +169,7 @@ def _exported(
     *,
     time_unit: str | None = None,
     size: tuple[int, int] | None = None,
+    track: str | int | None = None,
     overwrite: bool = False,
     doubt: Callable[[str], None] = lambda text: None,
 ) -> Exported:
@@ -186,7 +187,7 @@ def _exported(
         What the items are, for people.
     write : callable
         Fills the folder.
-    time_unit, size
+    time_unit, size, track
         See :func:`adv2e.formats.reading.open_events`.
     overwrite : bool
         Replace, at the end, an export that exists.
@@ -194,7 +195,7 @@ def _exported(
         Takes lines for people that ask for a look.
     """
     began = time.perf_counter()
-    sequences = open_sequences(paths, time_unit, size)
+    sequences = open_sequences(paths, time_unit=time_unit, size=size, track=track)
     told: dict[str, Any] = {"sequences": [], "doubts": []}
     with Staging(overwrite, paths) as staging, writing(output):
         folder = staging.folder(Path(output), _foreign)

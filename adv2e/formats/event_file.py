@@ -8,7 +8,7 @@ What reads a format is a function ``open_...(path, facts)``.  It reads the head 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from adv2e.sources.frame import Light, Pixels, Shot
 from adv2e.sources.frame import rotated180 as turned_pixels
 from adv2e.sources.stored import recorded_light
 from adv2e.sources.times.units import Unit
+from adv2e.sources.tracks import Track, choose
 
 MOST_COLUMNS = 1 << 16
 """Columns and rows that coordinates of events can name."""
@@ -49,11 +50,15 @@ class Facts:
         Is told how far the reading is.
     rotate180 : bool
         What is read will be turned by half a turn, as the user says; see :func:`rotated180`.
+    track : str, optional
+        Which of several streams the user wants: its number or its name.
 
     Attributes
     ----------
     progress : callable
         For the reader to tell.
+    has_chosen : bool
+        The reader looked for the stream that the user wants.
     problems : list of str
         What is doubtful and what was done about it.
     description : dict
@@ -75,8 +80,11 @@ class Facts:
         progress: Progress | None = None,
         *,
         rotate180: bool = False,
+        track: str | None = None,
     ) -> None:
         self.path = path
+        self.track = track
+        self.has_chosen = False
         self.rotate180 = rotate180
         self.progress = progress or (lambda done, total: None)
         self.problems: list[str] = []
@@ -113,6 +121,15 @@ class Facts:
         """Take what a file beside it says, as :meth:`describe`."""
         text = file.read_text("utf-8", errors="replace")
         self.describe(text, str(file), file.name)
+
+    def choose(
+        self, events: Sequence[Track], frames: Sequence[Track] = ()
+    ) -> tuple[int | None, int | None]:
+        """Return which of several streams are read, as :func:`adv2e.sources.tracks.choose`."""
+        event, frame, told = choose(self.track, events, frames, self.path)
+        self.has_chosen = True
+        self.problems += told
+        return event, frame
 
     def state(self, geometry: tuple[int, int] | None, by: str) -> None:
         """Take (width, height) [pixels] that something states, unless something before it did."""

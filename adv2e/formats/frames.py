@@ -37,7 +37,9 @@ def open_frames(path: str | Path, **given: Any) -> Source:
     turn = given.get("rotate180", False)
     if turn and selection.bayer is not None:
         raise DataError(f"{path}: --bayer is not known of frames that --rotate180 turns: give one")
-    file = open_events(path, time_unit=given.get("time_unit"), rotate180=turn)
+    file = open_events(
+        path, time_unit=given.get("time_unit"), rotate180=turn, track=given.get("track")
+    )
     if file.shots is None:
         raise DataError(f"{path}: holds events and no frames")
     return _source(file, times, selection)
@@ -61,7 +63,7 @@ def _source(file: EventFile, given: GivenTimes, selection: Selection) -> Source:
     )
 
 
-def takes_events(path: Path, choice: str | None = None) -> bool:
+def takes_events(path: Path, choice: str | None = None, track: str | int | None = None) -> bool:
     """Tell whether it is the events of an input that are converted, and not its frames.
 
     Recordings of cameras are simulated from their frames, where they have any; other event files
@@ -72,6 +74,8 @@ def takes_events(path: Path, choice: str | None = None) -> bool:
     path : Path
     choice : {'frames', 'events'}, optional
         What the user wants.
+    track : str or int, optional
+        Which of several streams the user wants.
 
     Raises
     ------
@@ -86,6 +90,6 @@ def takes_events(path: Path, choice: str | None = None) -> bool:
     if found.is_davis240c:
         files = Members(path)
         if files.enter(EVENTS):
-            return open_events(path).shots is None
+            return open_events(path, track=track).shots is None
         return not path.is_dir() and [Path(name).suffix for name in files.archived()] == [".txt"]
-    return not found.is_camera or open_events(path).shots is None
+    return not found.is_camera or open_events(path, track=track).shots is None

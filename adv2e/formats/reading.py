@@ -21,6 +21,7 @@ from adv2e.formats.recording import Recording
 from adv2e.geometry import MOST_PIXELS
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.frame import Shot
+from adv2e.sources.tracks import Track
 
 __all__ = ["Recording", "open_events", "read_events"]
 
@@ -34,12 +35,13 @@ def open_events(
     progress: Progress | None = None,
     size: tuple[int, int] | None = None,
     rotate180: bool = False,
+    track: str | int | None = None,
 ) -> EventFile:
     """Open an event file, or a folder in the DAVIS240C layout; its events are not read yet.
 
     Parameters
     ----------
-    path, time_unit, progress, rotate180
+    path, time_unit, progress, rotate180, track
         See :func:`read_events`.
     size : (int, int), optional
         Width and height [pixels] that hold whatever the file states.
@@ -50,7 +52,8 @@ def open_events(
         As :func:`read_events`.
     """
     path = Path(path)
-    facts = Facts(path, time_unit, progress, rotate180=rotate180)
+    wanted = None if track is None else str(track)
+    facts = Facts(path, time_unit, progress, rotate180=rotate180, track=wanted)
     facts.state(size, "--size")
     with _reading(path):
         check_ends(path)
@@ -61,6 +64,8 @@ def open_events(
         if not found.holds_settings and beside.is_file():
             facts.describe_from(beside)
         file: EventFile = found.load(found.reader)(path, facts)
+        if not facts.has_chosen:
+            facts.choose([Track("events")])
         inside = found.load(found.causes)(path) if found.causes else None
     file = _named(replace(file, causes=inside or found_beside(path)))
     return rotated180(file) if rotate180 else file
@@ -72,6 +77,7 @@ def read_events(
     time_unit: str | None = None,
     progress: Progress | None = None,
     rotate180: bool = False,
+    track: str | int | None = None,
 ) -> Recording:
     r"""Read an event file, or a folder in the DAVIS240C layout.
 
@@ -85,6 +91,8 @@ def read_events(
         Is called now and then with two numbers: how much was read, and of how much.
     rotate180 : bool
         Turn events and frames by half a turn, as for a camera that was mounted upside down.
+    track : str or int, optional
+        Which one to read of several streams: its number from 0, or its name.
 
     Returns
     -------
@@ -111,7 +119,9 @@ def read_events(
     >>> recording.width, recording.height, recording.frame_times_ns is None
     (4, 3, True)
     """
-    file = open_events(path, time_unit=time_unit, progress=progress, rotate180=rotate180)
+    file = open_events(
+        path, time_unit=time_unit, progress=progress, rotate180=rotate180, track=track
+    )
     recording = assemble(file)
     _check_size(recording)
     return recording

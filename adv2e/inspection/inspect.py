@@ -35,6 +35,7 @@ def inspect(
     pixel_format: str | None = None,
     frame_size: Size | None = None,
     rotate180: bool = False,
+    track: str | int | None = None,
     progress: Callable[[int, int | None], None] | None = None,
 ) -> dict[str, Any]:
     """Return what a recording, an event file or an input with frames holds, ready for JSON.
@@ -51,7 +52,7 @@ def inspect(
         Damage of a video becomes one of the problems.
     bayer, pixel_format, frame_size
         See :func:`adv2e.sources.open_source`.
-    rotate180 : bool
+    rotate180, track
         See :func:`adv2e.read_events`.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much, where that is
@@ -80,10 +81,11 @@ def inspect(
             pixel_format=pixel_format,
             frame_size=frame_size,
             rotate180=rotate180,
+            track=track,
         )
         return _of_source(source, progress or (lambda done, total: None))
     return _of_recording(
-        read_events(path, time_unit=time_unit, progress=progress, rotate180=rotate180)
+        read_events(path, time_unit=time_unit, progress=progress, rotate180=rotate180, track=track)
     )
 
 

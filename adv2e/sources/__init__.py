@@ -53,6 +53,7 @@ def open_source(
     frame_size: Size | None = None,
     rotate180: bool = False,
     along: SensorPath | None = None,
+    track: str | int | None = None,
 ) -> Source:
     """Open an input with frames.
 
@@ -88,6 +89,8 @@ def open_source(
         Turn each frame by half a turn, before even that.
     along : SensorPath, optional
         The input is one picture, before which the sensor moves so.
+    track : str or int, optional
+        Which one to read of several tracks: its number from 0, or its name.
 
     Returns
     -------
@@ -103,7 +106,8 @@ def open_source(
     """
     listed = Path(timestamps) if timestamps is not None else None
     given = GivenTimes(fps, listed, time_unit)
-    selection = Selection(start_s, stop_s, t0, allow_damaged, crop, bayer, rotate180)
+    wanted = None if track is None else str(track)
+    selection = Selection(start_s, stop_s, t0, allow_damaged, crop, bayer, rotate180, wanted)
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")
     if pixel_format is not None and (str(path) != STDIN or frame_size is None):

@@ -33,6 +33,7 @@ from adv2e.sources.frame import (
 )
 from adv2e.sources.paths import SensorPath
 from adv2e.sources.times.instants import seconds
+from adv2e.sources.tracks import Track, choose
 from adv2e.sources.wanted import Selection
 from adv2e.ticks import check_time
 
@@ -73,11 +74,17 @@ class Source(ABC):
         Optional packages that decode it.
     along : SensorPath or None
         Path of a sensor that moves before one picture.
+    has_tracks : bool
+        It may hold several tracks, and chooses among them itself.
     waits : bool
         Reading waits for others, and for ever if they please: it belongs in the main thread.
     """
 
+    has_tracks = False
+
     def __init__(self, path: Path, kind: str, selection: Selection, has_clock: bool) -> None:
+        if not self.has_tracks:
+            choose(selection.track, [], [Track("frames")], path)
         self.path = str(path)
         self.kind = kind
         self.selection = selection

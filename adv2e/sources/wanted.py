@@ -84,6 +84,8 @@ class Selection:
         Frames are mosaics of this pattern, and wanted in colour.
     rotate180 : bool
         Frames are wanted turned by half a turn, before they are cut.
+    track : str, optional
+        Which of several tracks is wanted: its number or its name.
 
     Raises
     ------
@@ -98,6 +100,7 @@ class Selection:
     crop: Rectangle | None = None
     bayer: str | None = None
     rotate180: bool = False
+    track: str | None = None
 
     def __post_init__(self) -> None:
         for name, value in (("--start", self.start_s), ("--stop", self.stop_s)):

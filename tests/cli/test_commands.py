@@ -83,7 +83,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
             "p.gif",
             "--allow-damaged",
         ),
-        *("--causes", "--motion", "pan", "--extent", "9"),
+        *("--causes", "--motion", "pan", "--extent", "9", "--stream", "1"),
     )
     assert outcome.status == 0
     ((reading, output, options),) = pipeline.calls
@@ -102,6 +102,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "frame_size": (8, 6),
         "rotate180": True,
         "along": SensorPath("pan", 9.0),
+        "track": "1",
     }
     log = options.pop("log")
     assert options == {

@@ -276,9 +276,9 @@ def made_up(monkeypatch, tmp_path):
     """Stand in for reading and diagnosing; returns the calls, and what there was to tell."""
     calls = []
 
-    def read(path, time_unit, sensor, rotate180):
+    def read(path, time_unit, sensor, rotate180, track):
         assert sensor is None or (sensor.width, sensor.height) == (346, 260)
-        return (path, "turned") if rotate180 else path
+        return (path, "turned", track) if rotate180 else path
 
     def write(found, folder, *, overwrite):
         calls.append(folder)
@@ -303,11 +303,11 @@ def test_options_arrive(adv2e, made_up, tmp_path):
     outcome = adv2e(
         "diagnose", "a.zip", "-c", "davis346", "-c", "mine.yaml", "--threads", 3, "--seed", 4,
         "--without", "flicker", "--without", "leak", "--set", "pixel.refractory.period_us=7",
-        "--rotate180",
+        "--rotate180", "--topic", "/dvs/events",
     )  # fmt: skip
     assert outcome.status == 0
     call, folder = made_up
-    assert (call["recording"], call["threads"]) == (("a.zip", "turned"), 3)
+    assert (call["recording"], call["threads"]) == (("a.zip", "turned", "/dvs/events"), 3)
     assert call["without"] == ("flicker", "leak")
     assert call["declared_name"] == "davis346, mine.yaml, pixel.refractory.period_us=7"
     assert call["config"].pixel.leak is None

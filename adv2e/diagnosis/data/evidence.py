@@ -186,8 +186,9 @@ def read_evidence(
     sensor: Sensor | None = None,
     *,
     rotate180: bool = False,
+    track: str | int | None = None,
 ) -> Evidence:
-    """Read a recording that holds frames and events; its unit as :func:`read_events` has it.
+    """Read a recording that holds frames and events; all but `sensor` as :func:`read_events`.
 
     Raises
     ------
@@ -196,7 +197,7 @@ def read_evidence(
         frames, fewer than three, or too few events; frames and events do not overlap in time;
         frames are out of order, not all alike, or of another size than the events.
     """
-    recording = read_events(path, time_unit=time_unit, rotate180=rotate180)
+    recording = read_events(path, time_unit=time_unit, rotate180=rotate180, track=track)
     check_beside(recording.width, recording.height, sensor, recording.path)
     if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
         raise DataError(f"{path}: holds no frames, from which the events could be simulated")
