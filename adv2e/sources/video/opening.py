@@ -22,6 +22,7 @@ import av.logging
 from av.stream import Disposition
 
 from adv2e.errors import DataError
+from adv2e.sources.tracks import Track, choose
 
 FORMATS = (
     *("mov", "avi", "matroska", "mpegts", "mpeg", "flv", "asf", "ogg", "gif", "apng", "dv", "ivf"),
@@ -47,9 +48,8 @@ class Video:
         Its bytes.
     container, stream : Any
         Container of PyAV, and the stream of it that is the film.
-    tracks : list of str
-        Its video tracks in a few words each, from number 0 on; one of them is `track`.
-    track : int
+    told : list of str
+        What is to be told of its tracks, where there are several.
     said : list of str
         Errors that FFmpeg told of when it was opened.
     """
@@ -58,8 +58,7 @@ class Video:
     size: int
     container: Any
     stream: Any
-    tracks: list[str]
-    track: int
+    told: list[str]
     said: list[str]
 
     @property
@@ -76,7 +75,7 @@ def opened(path: str, track: str | None = None) -> Iterator[Video]:
     ----------
     path : str
     track : str, optional
-        Number of the wanted track among those of video, from 0, or its title or language; default:
+        Number of the wanted track among those of video, from 0, or its language or title; default:
         the one that players take, which is flagged as default.
 
     Raises
@@ -97,10 +96,8 @@ def opened(path: str, track: str | None = None) -> Iterator[Video]:
         with overheard() as said:
             container = _container(file, path)
         try:
-            number, stream, tracks = _chosen(container, track, path)
-            yield Video(
-                path, size, container, stream, tracks, number, [text for _, _, text in said]
-            )
+            stream, told = _chosen(container, track, path)
+            yield Video(path, size, container, stream, told, [text for _, _, text in said])
         finally:
             container.close()
 
@@ -127,8 +124,8 @@ def _refused(*_: Any) -> NoReturn:
     raise OSError("no further files are opened")
 
 
-def _chosen(container: Any, track: str | None, name: str) -> tuple[int, Any, list[str]]:
-    """Return number and stream of the wanted video track, and all such tracks in a few words.
+def _chosen(container: Any, wanted: str | None, name: str) -> tuple[Any, list[str]]:
+    """Return the wanted video track, and what is to be told of it.
 
     Pictures that are attached, such as covers, are no tracks.
     """
@@ -139,29 +136,15 @@ def _chosen(container: Any, track: str | None, name: str) -> tuple[int, Any, lis
     ]
     if not films:
         raise DataError(f"{name}: not a video that can be read, or damaged: no film in it")
-    tracks = [_words(number, each) for number, each in enumerate(films)]
-    if track is None:
-        best = container.streams.best("video")
-        number = films.index(best) if best in films else 0
-        return number, films[number], tracks
-    if track.isdecimal() and track.isascii() and len(track) < 10:
-        found = [int(track)] if int(track) < len(films) else []
-    else:
-        found = [n for n, each in enumerate(films) if track.lower() in _names(each)]
-    if len(found) != 1:
-        number_of = "several tracks" if found else "no track"
-        raise DataError(f"{name}: {number_of} {track!r}; its video tracks: {', '.join(tracks)}")
-    return found[0], films[found[0]], tracks
-
-
-def _names(stream: Any) -> list[str]:
-    named = (stream.metadata.get("title"), stream.language, stream.metadata.get("name"))
-    return [str(each).lower() for each in named if each and each != "und"]
-
-
-def _words(number: int, stream: Any) -> str:
-    size = f"{stream.codec_context.width}x{stream.codec_context.height}"
-    return " ".join([str(number), f"({size}", *map(repr, _names(stream))]) + ")"
+    usual = container.streams.best("video")
+    tracks = []
+    for each in films:
+        language = each.language if each.language != "und" else None
+        named = filter(None, (language, each.metadata.get("title")))
+        about = f"{each.codec_context.width}x{each.codec_context.height}"
+        tracks.append(Track("/".join(named) or "video", about, is_usual=each is usual))
+    _, number, told = choose(wanted, [], tracks, name)
+    return films[number or 0], told
 
 
 class _Listening:

@@ -44,6 +44,8 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> VideoSou
 class VideoSource(Source):
     """A video file; DataError if it is damaged, is no video, or holds no frame."""
 
+    has_tracks = True
+
     def __init__(self, path: Path, given: GivenTimes, selection: Selection) -> None:
         super().__init__(path, "video", selection, has_clock=given.timestamps is not None)
         self.packages = ("av",)
@@ -52,7 +54,7 @@ class VideoSource(Source):
                 f"{path}: --bayer {selection.bayer} is for images, TIFF and .npy; a video has"
                 " colours already"
             )
-        with opened(self.path) as video:
+        with opened(self.path, selection.track) as video:
             _check_alpha(video)
             self._listing = list_pictures(video)
             self._examine(video)
@@ -70,11 +72,7 @@ class VideoSource(Source):
             raise DataError(f"{self.path}: no frame in it can be decoded: not a video, or damaged")
         odd = oddly_shown(first)
         self.doubts += [f"{self.path}: {each}" for each in (*listing.faults, odd) if each]
-        if len(video.tracks) > 1:
-            self.notes.append(
-                f"{self.path}: video track {video.tracks[video.track]} of {len(video.tracks)} is"
-                f" taken: {', '.join(video.tracks)}"
-            )
+        self.notes += [f"{self.path}: {each}" for each in video.told]
         aspect = video.stream.sample_aspect_ratio
         if aspect and aspect != 1:
             self.notes.append(
@@ -120,7 +118,7 @@ class VideoSource(Source):
         if listed == self._listing.count:
             return
         # pictures that cannot stand alone at the start are in the file and never shown
-        with opened(self.path) as video:
+        with opened(self.path, self.selection.track) as video:
             count = sum(1 for _ in self._decoded(video))
         if listed != count:
             raise DataError(f"{self.path}: {listed} times given for {count} frames")
@@ -171,7 +169,7 @@ class VideoSource(Source):
         clock, given, converter = _Clock(self._listing), self._given, Converter()
         count, guessed, first = 0, 0, self._listing.origin
         latest_ns: int | None = None
-        with opened(self.path) as video:
+        with opened(self.path, self.selection.track) as video:
             tick = video.stream.time_base * NS_PER_S
             for number, frame in enumerate(self._decoded(video)):
                 if number == 0 and frame.pts is not None:

@@ -12,7 +12,6 @@ from video_files import pictures, written
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
-from adv2e.sources.video.opening import opened
 
 SMALL, LARGE = (32, 24), (64, 48)
 
@@ -45,19 +44,21 @@ def test_the_default_track_is_taken_and_told(tmp_path, suffix, default):
     assert (source.width, source.height) == (SMALL, LARGE)[default]
     assert len(list(source.frames())) == 6
     (told,) = source.notes
-    assert f"video track {default} (" in told
-    assert "0 (32x24), 1 (64x48)" in told
+    assert "2 tracks of frames: 0 video (32x24), 1 video (64x48)" in told
+    assert f"{default} video is taken, --track chooses another" in told
 
 
 def test_a_track_is_chosen_by_number_or_title(tmp_path):
-    path = str(two_tracks(tmp_path / "clip.mkv", 1, ("Left eye", "Right")))
-    for track, size in (("0", SMALL), ("1", LARGE), ("left EYE", SMALL), ("right", LARGE)):
-        with opened(path, track) as video:
-            assert (video.stream.width, video.stream.height) == size
-    for track in ("2", "-1", "middle", "\u0664", ""):
-        said = r"no track .*its video tracks: 0 .*, 1 "
-        with pytest.raises(DataError, match=said), opened(path, track):
-            pass
+    path = two_tracks(tmp_path / "clip.mkv", 1, ("Left eye", "Right"))
+    for track, size in (("0", SMALL), (0, SMALL), ("1", LARGE), ("Left eye", SMALL)):
+        source = open_source(path, track=track)
+        assert (source.width, source.height, source.notes) == (*size, [])
+        assert [frame.image.shape[:2] for frame in source.frames()] == [size[::-1]] * 6
+    for track in ("2", "-1", "middle", "\u0664"):
+        with pytest.raises(DataError, match=r"no such track, but 0 Left eye \(32x24\), 1 Right"):
+            open_source(path, track=track)
+    with pytest.raises(DataError, match="no such track"):
+        open_source(written(tmp_path / "one.mp4", "mpeg4", 25), track="1")
 
 
 def test_a_cover_is_not_the_film(tmp_path):
