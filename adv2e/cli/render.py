@@ -127,9 +127,7 @@ def command(
     Times are counted from its first event or frame. The suffix of OUT chooses what is made:
 
     \b
-      .mp4    a film for browsers and slides. With the extra 'video' (PyAV) it is H.264 and plays
-              everywhere. Without, it is VP9, plays in Chrome, Edge, Firefox and VLC, and takes
-              twenty times as long to write.
+      .mp4    a film (H.264) for browsers, slides and everything else
       .webm   a film (VP8) for Chrome, Edge, Firefox, VLC, and Safari from 14.1 on
       .gif    a film for everything that shows pictures, at most 50 pictures a second
       .avi    a film without any loss (HuffYUV) for VLC, mpv and ffmpeg, but for no browser

@@ -11,12 +11,12 @@ from adv2e.errors import UsageError
 from adv2e.rendering.layout import Cell, compose, default_scale, sheet
 from adv2e.rendering.output import NotWritten
 from adv2e.rendering.styles import Style
-from adv2e.rendering.video import CODES, VideoFile
+from adv2e.rendering.video import CODERS, VideoFile
 
 if TYPE_CHECKING:
     from adv2e.rendering.gif import GifWriter
 
-SUFFIXES = (*CODES, ".gif", ".png")
+SUFFIXES = (*CODERS, ".gif", ".png")
 """The kinds of file there are."""
 
 

@@ -18,7 +18,8 @@ __all__ = ["Frame", "Source", "open_source"]
 
 VIDEO_SUFFIXES = (
     *(".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts"),
-    *(".wmv", ".flv", ".3gp", ".ogv", ".gif", ".y4m"),
+    *(".wmv", ".flv", ".3gp", ".ogv", ".gif", ".apng", ".y4m"),
+    *(".h264", ".264", ".hevc", ".h265", ".265"),
 )
 """Files that are opened as video."""
 
@@ -150,6 +151,8 @@ def _opener(path: Path) -> str:
     if suffix in OPENERS:
         return OPENERS[suffix]
     if suffix in _PICTURES:
+        if suffix in (".png", ".webp") and (kind := _animated(path)):
+            return kind
         raise DataError(
             f"{path}: a single picture makes no events: --motion saccade moves a sensor before it;"
             " give the folder if it is one of many frames"
@@ -159,6 +162,25 @@ def _opener(path: Path) -> str:
         f"{path}: frames cannot be read from {suffix or 'a file without suffix'}; give a folder of"
         f" images, a recording of a data set, or a file ({known})"
     )
+
+
+def _animated(path: Path) -> str:
+    """Return the module that reads an animated picture; nothing for one that stands still.
+
+    Raises
+    ------
+    DataError
+        It is an animated WebP.
+    """
+    from adv2e.sources.images.headers import read_header  # noqa: PLC0415  (needs OpenCV)
+
+    if read_header(path.read_bytes()).pictures < 2:
+        return ""
+    if path.suffix.lower() == ".webp":
+        raise DataError(
+            f"{path}: animated WebP is not read; make an animated PNG or a video of it, or pictures"
+        )
+    return OPENERS[".apng"]
 
 
 def _kind_of_folder(path: Path) -> str:

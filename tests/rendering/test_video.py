@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -16,21 +14,16 @@ import numpy as np
 import pytest
 
 from adv2e.errors import OutputError
-from adv2e.rendering import video
 from adv2e.rendering.video import VideoFile
 from adv2e.sources.images.opencv import quiet
 
-CODERS = {".mp4": "vp9", ".webm": "vp8", ".avi": "huffyuv", "H.264": "h264"}
+CODERS = {".mp4": "h264", ".webm": "vp8", ".avi": "huffyuv"}
 
 
 @pytest.fixture(params=list(CODERS))
-def coder(request, monkeypatch):
+def coder(request):
     """Choose a coder; return the suffix of its films and its name."""
-    h264 = request.param == "H.264"
-    if h264 and not video.writes_h264():
-        pytest.skip("needs PyAV, the extra 'video'")
-    monkeypatch.setattr(video, "writes_h264", lambda: h264)
-    return ".mp4" if h264 else request.param, CODERS[request.param]
+    return request.param, CODERS[request.param]
 
 
 def read_film(path):
@@ -74,7 +67,7 @@ def test_the_coder_is_one_that_browsers_know(tmp_path, coder):
     suffix, name = coder
     path = tmp_path / f"film{suffix}"
     write(path, [noise(48, 64, k) for k in range(3)])
-    marks = {"vp9": b"vp09", "vp8": b"V_VP8", "huffyuv": b"HFYU", "h264": b"avc1"}
+    marks = {"vp8": b"V_VP8", "huffyuv": b"HFYU", "h264": b"avc1"}
     assert marks[name] in path.read_bytes()
     if shutil.which("ffprobe"):
         shown = ("-show_entries", "stream=codec_name,pix_fmt", "-of", "json")
@@ -114,12 +107,6 @@ def test_nothing_is_printed(tmp_path, coder, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_what_others_print_meanwhile_is_shown(capfd):
-    with video._unprinted():
-        os.write(2, b"OpenCV: FFMPEG: tag\nmine\n")
-    assert capfd.readouterr().err == "mine\n"
-
-
 def test_a_video_that_cannot_be_written(tmp_path, coder, capfd):
     with pytest.raises(OutputError, match="cannot be written there"):
         write(tmp_path / "absent" / f"film{coder[0]}", [noise(16, 16)])
@@ -145,15 +132,6 @@ def test_a_video_that_came_out_short(tmp_path, coder):
         path.write_bytes(damage(path.read_bytes()))  # as on a full disk
         with pytest.raises(OutputError, match="holds 0 of 3 pictures"):
             film.finish()
-
-
-def test_without_pyav_there_is_no_h264(monkeypatch):
-    installed = importlib.util.find_spec("av") is not None
-    assert installed or not video.writes_h264()
-    video.writes_h264.cache_clear()
-    monkeypatch.setitem(__import__("sys").modules, "av", None)
-    assert not video.writes_h264()
-    video.writes_h264.cache_clear()
 
 
 def test_opencv_stays_quiet_until_the_last_has_left():

@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from adv2e.formats.reading import read_events
 from adv2e.rendering.gif import GifWriter, palette
 from adv2e.rendering.styles import Style
 from adv2e.sources import open_source
-from adv2e.sources.video.opening import openable
 
 NAMES = [
     "2024-05-01T12:30:00",
@@ -186,16 +184,3 @@ def test_messages_are_one_line_in_any_locale(tmp_path, environment):
     for line in lines:
         assert line.startswith("adv2e: error: ")
         assert line.endswith(": no such file or folder") or "patterns are not read" in line
-
-
-def test_a_link_stands_in_only_within_the_context_and_for_nobody_else(tmp_path):
-    path = tmp_path / "clip%d.mp4"
-    path.write_bytes(b"x")
-    with openable(path) as name:
-        assert name != str(path)
-        assert path.samefile(name)
-        assert name.endswith("video.mp4")
-        if os.name == "posix":
-            assert Path(name).parent.stat().st_mode & 0o777 == 0o700
-    assert not Path(name).parent.exists()
-    assert path.read_bytes() == b"x"

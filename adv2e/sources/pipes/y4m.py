@@ -18,7 +18,7 @@ from adv2e.sources.pipes.layout import Layout, check_size, pixels_of, white_of
 from adv2e.sources.pipes.stream import NAME, Stream
 from adv2e.sources.times.rates import FrameRate, parse_rate
 from adv2e.sources.video.colours import UNSTATED, encoding_of
-from adv2e.sources.video.ycbcr import bgr_of
+from adv2e.sources.video.ycbcr import rgb_of_planes
 
 MAGIC = b"YUV4MPEG2 "
 LONGEST_LINE = 1024
@@ -70,7 +70,7 @@ class _Picture:
         if len(planes) == 1:
             image = (codes[0] - np.float32(16 << self.bits - 8)) / np.float32(219 << self.bits - 8)
         else:
-            image = bgr_of(codes, UNSTATED, self.bits, full=self.full)[..., ::-1]
+            image = rgb_of_planes(codes, UNSTATED, self.bits, full=self.full)
         whole = np.rint(np.clip(image, 0, 1) * ((1 << self.bits) - 1)).astype(kind)
         return pixels_of(np.ascontiguousarray(whole), self.bits, label)
 

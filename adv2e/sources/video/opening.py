@@ -1,37 +1,187 @@
-"""Videos under any name that a file system allows."""
+"""Video files, opened so that no other file is read, and the track of them that is the film.
+
+FFmpeg takes texts for what they name: scripts that join files, playlists, patterns of numbered
+images, addresses.  Here it reads bytes of a file that is open already, and knows formats alone that
+hold their pictures themselves.
+"""
 
 from __future__ import annotations
 
-import re
-import tempfile
+import io
+import logging
+import os
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NoReturn
 
-_UNFIT = re.compile("[%\ud800-\udfff]")
-"""What FFmpeg takes for the number in a pattern, and what has no place in UTF-8."""
+import av
+import av.logging
+from av.stream import Disposition
+
+from adv2e.errors import DataError
+from adv2e.sources.tracks import Track, choose
+
+FORMATS = (
+    *("mov", "avi", "matroska", "mpegts", "mpeg", "flv", "asf", "ogg", "gif", "apng", "dv", "ivf"),
+    *("yuv4mpegpipe", "h264", "hevc", "m4v", "mpegvideo"),
+)
+"""Demultiplexers of FFmpeg that are used: none of them opens further files."""
+
+_NO_FILM = Disposition.attached_pic | Disposition.timed_thumbnails
+_FIRST_BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
+"""Kinds of box with which an MP4 or MOV file can begin."""
+_BUFFER_BYTES = 1 << 18
+
+
+@dataclass(frozen=True)
+class Video:
+    """An open video file.
+
+    Attributes
+    ----------
+    path : str
+        Its name, for messages.
+    size : int
+        Its bytes.
+    container, stream : Any
+        Container of PyAV, and the stream of it that is the film.
+    told : list of str
+        What is to be told of its tracks, where there are several.
+    said : list of str
+        Errors that FFmpeg told of when it was opened.
+    """
+
+    path: str
+    size: int
+    container: Any
+    stream: Any
+    told: list[str]
+    said: list[str]
+
+    @property
+    def format(self) -> str:
+        """Name of the first of the formats that its demultiplexer reads."""
+        return str(self.container.format.name).partition(",")[0]
 
 
 @contextmanager
-def openable(path: str | Path) -> Iterator[str]:
-    """Within the context, a name under which OpenCV opens a file and nothing else.
+def opened(path: str, track: str | None = None) -> Iterator[Video]:
+    """Open a video within the context, and choose a track of it.
 
-    It is absolute: FFmpeg takes what stands before a colon for a protocol.  A name that is no UTF-8
-    or could be a pattern gives way to that of a link in a private folder, gone with the context.
+    Parameters
+    ----------
+    path : str
+    track : str, optional
+        Number of the wanted track among those of video, from 0, or its language or title; default:
+        the one that players take, which is flagged as default.
+
+    Raises
+    ------
+    DataError
+        It is no video, damaged beyond reading, or has no such track.
     """
-    whole = Path(path).absolute()
-    if not _UNFIT.search(str(whole)):
-        yield str(whole)
-        return
-    with tempfile.TemporaryDirectory(dir=_plain_folder()) as folder:
-        link = Path(folder) / f"video{whole.suffix if whole.suffix.isascii() else ''}"
+    try:
+        file = io.FileIO(path)
+    except OSError as error:
+        raise DataError(f"{path}: {error.strerror}") from error
+    with file:
+        size = os.fstat(file.fileno()).st_size
+        if not size:
+            raise DataError(f"{path}: an empty file")
+        # the suffix may help to tell formats apart; the rest of a name could be an address
+        file.name = f"video{Path(path).suffix}" if Path(path).suffix.isascii() else "video"
+        with overheard() as said:
+            container = _container(file, path)
         try:
-            link.symlink_to(whole)
-        except OSError:  # not everybody may make links on Windows, where names are UTF-8
-            link = whole
-        yield str(link)
+            stream, told = _chosen(container, track, path)
+            yield Video(path, size, container, stream, told, [text for _, _, text in said])
+        finally:
+            container.close()
 
 
-def _plain_folder() -> str:
-    usual = tempfile.gettempdir()
-    return "/tmp" if _UNFIT.search(usual) else usual
+def _container(file: io.FileIO, name: str) -> Any:
+    try:
+        return av.open(
+            file,
+            "r",
+            options={"format_whitelist": ",".join(FORMATS), "protocol_whitelist": "none"},
+            metadata_errors="replace",
+            buffer_size=_BUFFER_BYTES,
+            io_open=_refused,
+        )
+    except (av.error.FFmpegError, OSError, ValueError) as error:
+        why = "not a video that can be read, or damaged"
+        file.seek(4)
+        if file.read(4) in _FIRST_BOXES:
+            why = "cut short, damaged or never finished: its index ('moov') cannot be read"
+        raise DataError(f"{name}: {why}") from error
+
+
+def _refused(*_: Any) -> NoReturn:
+    raise OSError("no further files are opened")
+
+
+def _chosen(container: Any, wanted: str | None, name: str) -> tuple[Any, list[str]]:
+    """Return the wanted video track, and what is to be told of it.
+
+    Pictures that are attached, such as covers, are no tracks.
+    """
+    films = [
+        each
+        for each in container.streams.video
+        if each.codec_context is not None and not each.disposition & _NO_FILM
+    ]
+    if not films:
+        raise DataError(f"{name}: not a video that can be read, or damaged: no film in it")
+    usual = container.streams.best("video")
+    tracks = []
+    for each in films:
+        language = each.language if each.language != "und" else None
+        named = filter(None, (language, each.metadata.get("title")))
+        about = f"{each.codec_context.width}x{each.codec_context.height}"
+        tracks.append(Track("/".join(named) or "video", about, is_usual=each is usual))
+    _, number, told = choose(wanted, [], tracks, name)
+    return films[number or 0], told
+
+
+class _Listening:
+    """Turns FFmpeg's log on for all threads at once: the last to leave turns it off."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._before: tuple[int | None, bool] = None, True
+
+    def enter(self) -> None:
+        with self._lock:
+            self._inside += 1
+            if self._inside == 1:
+                self._before = av.logging.get_level(), av.logging.get_skip_repeated()
+                av.logging.set_skip_repeated(False)
+                av.logging.set_level(av.logging.ERROR)
+
+    def leave(self) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                av.logging.set_level(self._before[0])
+                av.logging.set_skip_repeated(self._before[1])
+
+
+_LISTENING = _Listening()
+# what threads of others say meanwhile is not printed
+logging.getLogger("libav").addHandler(logging.NullHandler())
+
+
+@contextmanager
+def overheard() -> Iterator[list[tuple[int, str, str]]]:
+    """Give errors that FFmpeg tells in no other way: level, part and text, of this thread alone."""
+    _LISTENING.enter()
+    try:
+        with av.logging.Capture() as said:
+            yield said
+    finally:
+        _LISTENING.leave()

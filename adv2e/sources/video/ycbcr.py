@@ -22,19 +22,19 @@ SHARES = {
 """Shares of red and blue in luma by the code of the matrix; not stated is BT.601, as in FFmpeg."""
 
 
-def bgr_of(
+def rgb_of_planes(
     planes: Sequence[NDArray[np.float32]], matrix: int, bits: int, *, full: bool
 ) -> NDArray[np.float32]:
-    """Return blue, green and red, 0 to 1 but for codes beyond, of codes of so many bits."""
+    """Return red, green and blue, 0 to 1 but for codes beyond, of codes of so many bits."""
     top = (1 << bits) - 1
     luma, chroma = 1 / top, 1 / top
     black = 0
     if not full:
         black, luma, chroma = 16 << bits - 8, 1 / (219 << bits - 8), 1 / (224 << bits - 8)
     whole = [planes[0], *(_spread(plane, planes[0].shape) for plane in planes[1:3])]
-    to_bgr = _to_bgr(matrix) * [luma, chroma, chroma]
-    offset = to_bgr @ np.array([black, 1 << bits - 1, 1 << bits - 1])
-    turned = np.column_stack([to_bgr, -offset]).astype(np.float32)
+    to_rgb = _to_rgb(matrix) * [luma, chroma, chroma]
+    offset = to_rgb @ np.array([black, 1 << bits - 1, 1 << bits - 1])
+    turned = np.column_stack([to_rgb, -offset]).astype(np.float32)
     return np.asarray(cv2.transform(cv2.merge(whole), turned))
 
 
@@ -45,11 +45,11 @@ def _spread(plane: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.fl
     return plane[: shape[0], : shape[1]]
 
 
-def _to_bgr(matrix: int) -> NDArray[np.float64]:
-    """Return blue, green and red of luma 0..1 and two chromas of -0.5..0.5."""
+def _to_rgb(matrix: int) -> NDArray[np.float64]:
+    """Return red, green and blue of luma 0..1 and two chromas of -0.5..0.5."""
     red, blue = SHARES[matrix]
     green = 1 - red - blue
     to_red, to_blue = 2 * (1 - red), 2 * (1 - blue)
     return np.array(
-        [[1, to_blue, 0], [1, -blue * to_blue / green, -red * to_red / green], [1, 0, to_red]]
+        [[1, 0, to_red], [1, -blue * to_blue / green, -red * to_red / green], [1, to_blue, 0]]
     )

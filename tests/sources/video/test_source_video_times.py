@@ -10,7 +10,6 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
-from adv2e.sources.video.colours import Colours
 
 pytest.importorskip("av", reason="PyAV writes what OpenCV does not")
 from video_files import COUNT, written
@@ -51,21 +50,9 @@ def test_every_frame_is_at_its_time(tmp_path, name, codec, reordered, rate):
     clock_ns = 10**6 if name.endswith("flv") else 20_000 if name.endswith("ts") else 1
     assert len(times) == COUNT == source.count
     assert np.abs(np.subtract(times, at_rate(rate))).max() <= clock_ns
-    told = [doubt for doubt in source.doubts if "frames: taken at" not in doubt]
-    assert told == []
-    assert bool(source.doubts) == name.endswith("mpg")
-
-
-@pytest.mark.parametrize(("name", "codec", "reordered"), FILES)
-def test_every_frame_is_at_its_time_when_pyav_decodes(
-    tmp_path, monkeypatch, name, codec, reordered
-):
-    path = written(tmp_path / name, codec, Fraction(25), reordered=reordered)
-    expected = times_of(path)
-    choice = "for a test", Colours()
-    monkeypatch.setattr("adv2e.sources.video.source.choose", lambda *_: choice)
-    assert times_of(path) == expected
-    assert len(expected) == COUNT
+    scarce = name.endswith("mpg") and codec == "libx264"  # FFmpeg writes a time for the first alone
+    assert all("1 of its 36 frames: taken at" in doubt for doubt in source.doubts)
+    assert len(source.doubts) == scarce
 
 
 @pytest.mark.parametrize("name", ["clip.avi", "clip.mpg", "clip.mp4", "clip.mkv", "clip.wmv"])

@@ -1,0 +1,145 @@
+"""Decoded pictures of PyAV as images: all their bits, in the colours that they state, upright.
+
+Codes of 8 bits are converted by FFmpeg.  Deeper ones are converted here, as that conversion is off
+by several codes of 10 bits: with matrix and range of the pictures, to whole numbers of 16 bits.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import cv2
+import numpy as np
+from av.video.reformatter import VideoReformatter
+from numpy.typing import NDArray
+
+from adv2e.errors import DataError
+from adv2e.sources.frame import Pixels
+from adv2e.sources.video.ycbcr import SHARES, rgb_of_planes
+
+_FULL = 2
+_TURNS: dict[tuple[int, ...], int] = {
+    (0, 1, -1, 0): cv2.ROTATE_90_CLOCKWISE,
+    (-1, 0, 0, -1): cv2.ROTATE_180,
+    (0, -1, 1, 0): cv2.ROTATE_90_COUNTERCLOCKWISE,
+}
+"""Signs of a, b, c, d of a display matrix: x' = a x + c y, y' = b x + d y, y counted down."""
+
+
+class Converter:
+    """Makes images of pictures; one for each pass, as it keeps the tables of the conversion."""
+
+    def __init__(self) -> None:
+        self._scaler = VideoReformatter()
+
+    def pixels(self, frame: Any, label: str) -> Pixels:
+        """Return a picture as grey or RGB of uint8 or uint16, white 255 or 65535.
+
+        Raises
+        ------
+        DataError
+            Its pixels are of a kind that cannot be converted.
+        """
+        try:
+            image = self.codes(frame)
+        except (ValueError, OSError) as error:
+            raise DataError(f"{label}: {error}") from error
+        turn = _TURNS.get(_signs(frame))
+        if turn is not None:
+            image = np.asarray(cv2.rotate(image, turn))
+        if image.ndim == 2 or image.shape[2] == 3:
+            return Pixels(image)
+        white, alpha = np.iinfo(image.dtype).max, image[..., 3]
+        there = None if alpha.min() == white else alpha.astype(np.float32) / np.float32(white)
+        return Pixels(np.ascontiguousarray(image[..., :3]), there)
+
+    def codes(self, frame: Any) -> NDArray[Any]:
+        """Return the codes of a picture as (rows, columns, 3) RGB, or (rows, columns).
+
+        Where pixels can be transparent, how much of each is there is a fourth number.
+
+        Raises
+        ------
+        ValueError
+            Its pixels cannot be converted.
+        """
+        kind = frame.format
+        parts, matrix = kind.components, int(frame.colorspace)
+        bits, alpha = parts[0].bits, parts[-1].is_alpha
+        rgb = kind.is_rgb or len(parts) - alpha < 3
+        if not rgb and matrix not in SHARES:
+            raise ValueError(f"colours by the matrix {frame.colorspace} cannot be read")
+        if bits > 16 or kind.name.startswith(("xyz", "bayer", "grayf", "gbrpf", "rgbf")):
+            raise ValueError(f"pixels of {kind.name} cannot be read")
+        if bits > 8:
+            return _deep(frame, bits, matrix, rgb=rgb)
+        name = "rgba" if alpha else "rgb24"
+        if len(parts) == 1 and not kind.has_palette:
+            name = "gray"
+        whole = self._scaler.reformat(frame, format=name, interpolation="BICUBIC", threads=1)
+        return np.asarray(whole.to_ndarray())
+
+
+def oddly_shown(frame: Any) -> str:
+    """Return how a picture is to be shown that is not done here, or ""."""
+    a, b, c, d = _matrix(frame)
+    if a * d - b * c < 0:
+        return "it is to be shown mirrored, which is not done; re-encode it upright"
+    if (a or d) and (b or c):
+        return "it is to be shown tilted, which is not done; re-encode it upright"
+    return ""
+
+
+def _matrix(frame: Any) -> tuple[int, ...]:
+    """Return a, b, c, d of the display matrix of a picture [1/65536]."""
+    found = frame.side_data.get("DISPLAYMATRIX")
+    if found is None:
+        return 65536, 0, 0, 65536
+    a, b, _, c, d, *_ = struct.unpack("=9i", bytes(found))
+    return a, b, c, d
+
+
+def _signs(frame: Any) -> tuple[int, ...]:
+    return tuple((each > 0) - (each < 0) for each in _matrix(frame))
+
+
+def _deep(frame: Any, bits: int, matrix: int, *, rgb: bool) -> NDArray[np.uint16]:
+    planes = _planes(frame)
+    top = (1 << bits) - 1
+    if len(planes) == 1:
+        return _rounded(planes[0] * np.float32(1 / top))
+    there = planes[3:]
+    if rgb:
+        image = cv2.merge([planes[2], planes[0], planes[1], *there])
+        return _rounded(image * np.float32(1 / top))
+    image = rgb_of_planes(planes, matrix, bits, full=int(frame.color_range) == _FULL)
+    return _rounded(np.dstack([image, *(plane / top for plane in there)]))
+
+
+def _rounded(image: NDArray[Any]) -> NDArray[np.uint16]:
+    return np.asarray(np.rint(np.clip(image, 0, 1) * 65535), np.uint16)
+
+
+def _planes(frame: Any) -> list[NDArray[np.float32]]:
+    """Return the planes: luma and two chromas, or green, blue and red, and alpha; or grey."""
+    parts = frame.format.components
+    # shared by interleaved samples, or not in the lowest bits: laid out anew, the same samples
+    if len(frame.planes) < len(parts) or frame.format.name.startswith(("p0", "p2", "p4")):
+        frame = frame.reformat(format=_planar(frame, parts[0].bits))
+    sample = np.dtype(">u2" if frame.format.is_big_endian else "<u2")
+    planes = []
+    for plane in frame.planes[: len(frame.format.components)]:
+        rows = np.frombuffer(plane, sample).reshape(plane.height, -1)
+        planes.append(rows[:, : plane.width].astype(np.float32))
+    return planes
+
+
+def _planar(frame: Any, bits: int) -> str:
+    alpha = "a" if frame.format.components[-1].is_alpha else ""
+    if frame.format.is_rgb or len(frame.format.components) < 3:
+        return f"gbr{alpha}p16le"
+    luma, chroma = frame.format.components[:2]
+    kind = {(False, False): 444, (True, False): 422, (True, True): 420, (False, True): 440}
+    halved = luma.width > chroma.width, luma.height > chroma.height
+    return f"yuv{alpha}{kind[halved]}p{bits}le"
