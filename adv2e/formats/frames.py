@@ -51,7 +51,7 @@ def _source(file: EventFile, given: GivenTimes, selection: Selection) -> Source:
     if given:
         pictures = [Picture(shot.label, None, shot.load) for shot in times.shots]
         times = timed(given, pictures, path, str(path))
-    return ListedSource(
+    source = ListedSource(
         path,
         file.layout,
         times,
@@ -59,6 +59,8 @@ def _source(file: EventFile, given: GivenTimes, selection: Selection) -> Source:
         has_clock=given.fps is None,
         light=file.facts.light,
     )
+    source.inputs += file.inputs
+    return source
 
 
 def takes_events(path: Path, choice: str | None = None) -> bool:

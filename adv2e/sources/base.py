@@ -44,6 +44,8 @@ class Source(ABC):
     ----------
     path : str
         What was opened.
+    inputs : list of str or Path
+        Files that are read, and the folder they are in: where nothing may be written.
     kind : str
         ``video``, ``images``, ``npy``, or the data set that it is of, such as ``davis240c``.
     width, height : int
@@ -79,6 +81,7 @@ class Source(ABC):
 
     def __init__(self, path: Path, kind: str, selection: Selection, has_clock: bool) -> None:
         self.path = str(path)
+        self.inputs: list[str | Path] = [path]
         self.kind = kind
         self.selection = selection
         self.has_clock = has_clock

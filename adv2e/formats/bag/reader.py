@@ -61,6 +61,7 @@ def open_bag(path: Path, facts: Facts) -> EventFile:
         The package ``rosbags`` is not installed.
     """
     bag = _Bag(path)
+    facts.inputs += (file for kind in ("*.yaml", "*.db3*", "*.mcap*") for file in path.glob(kind))
     facts.problems += bag.told
     facts.stated_unit = "us"
     if bag.settings:
