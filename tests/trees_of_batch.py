@@ -41,6 +41,14 @@ def davis240c(root):
     (root / "images.txt").write_text("".join(lines))
 
 
+def pictures(folder, count=3, *, times=False):
+    folder.mkdir(parents=True, exist_ok=True)
+    for k in range(count):
+        cv2.imwrite(str(folder / f"{k}.png"), picture(k))
+    if times:
+        (folder / "timestamps.txt").write_text("".join(f"{k / 10}\n" for k in range(count)))
+
+
 def stack(path):
     path.parent.mkdir(parents=True, exist_ok=True)
     np.save(path, np.stack([picture(k) for k in range(3)]))

@@ -98,11 +98,14 @@ class Outcome:
         What went wrong, by the name of the sequence.
     events : int
         Made, not those that were kept.
+    passed : int
+        Files and folders that were passed over, of all shards.
     """
 
     tasks: list[Task]
     failed: dict[str, str]
     events: int
+    passed: int = 0
 
     @property
     def made(self) -> int:
@@ -158,7 +161,10 @@ class Batch:
         self._wanted = settings.wanted(dest)
         if split > 1:
             check_divisible(active_hooks(settings.family.config))
-        self._sequences = find_sequences(source, layout, leave_out=dest, by_name=digest is not None)
+        by_name, fps = digest is not None, settings.options.get("fps")
+        found = find_sequences(source, layout, leave_out=dest, by_name=by_name, fps=fps)
+        self._sequences, self.passed = found.sequences, found.told()
+        self._passed = sum(map(len, found.passed.values()))
         self._states = {one.name: state_of(one.source) for one in self._sequences}
         if shard is not None:
             mine = shard_of(self._states, *shard)
@@ -285,7 +291,7 @@ class Batch:
                     parts_folder(self._dest, name).rmdir()
             if self._wanted.export is not None and self._wanted.export.kind == "e2vid":
                 write_lists(self._dest, read_records(self._dest).values())
-        return Outcome(tasks, failed, events)
+        return Outcome(tasks, failed, events, self._passed)
 
 
 def _check_apart(wanted: Wanted, sequences: Sequence[Found]) -> None:
@@ -364,6 +370,7 @@ def table(outcome: Outcome) -> list[str]:
     lines = [
         f"{count} sequences: {outcome.made} made ({outcome.events:,} events), {outcome.kept} kept,"
         f" {len(outcome.failed)} failed"
+        + (f", {outcome.passed:,} passed over" if outcome.passed else "")
     ]
     width = max((len(shown(name)) for name in outcome.failed), default=0)
     return lines + [

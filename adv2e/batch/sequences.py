@@ -7,9 +7,13 @@ layout          what counts
 ``gopro``       folders of GOPRO_Large and GOPRO_Large_all; of one with several kinds, ``sharp``
 ``ddd17``       HDF5 of DDD17 and DDD20
 ``davis240c``   recordings of DAVIS240C: folders and zips with ``images.txt``
-``auto``        all of these, and what else holds frames and their times: folders with a list of
-                them, AEDAT4, bags of ROS, AEDAT-2
+``images``      folders of two pictures or more with a list of their times, or any with ``fps``
+``auto``        all of these, and what else holds frames and their times: AEDAT4, bags of ROS,
+                AEDAT-2, stacks in ``.npy``, TIFFs of several pages
 ==============  =================================================================================
+
+Pictures that lie beside other sequences are no frames.  What looks like frames or events and is no
+sequence is passed over, and told with the reason.
 
 The name of a sequence is its path below the folder, without its suffix, unless two would be called
 the same.  Hidden files and folders do not count, and links to folders are not followed, so that
@@ -26,13 +30,20 @@ from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
 from adv2e.formats.lookup import format_of, may_hold_events
-from adv2e.sources import VIDEO_SUFFIXES
+from adv2e.sources import VIDEO_SUFFIXES, open_source
 from adv2e.sources.gopro import find_sequence
-from adv2e.sources.images.source import found_list, natural_key
+from adv2e.sources.images.opencv import IMAGE_SUFFIXES
+from adv2e.sources.images.order import natural_key
+from adv2e.sources.images.source import LISTS, found_list
+from adv2e.sources.images.tiff_pages import Pages
+from adv2e.sources.times.rates import Rate
 
-LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "videos")
+LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")
 
 _DDD = ("ddd", "ddd20")
+_PAGES = (".tif", ".tiff")
+_TEXTS = (".txt", ".csv")
+"""Of events, perhaps, and of much else."""
 _RECORDINGS = {"ddd17": (".h5", ".hdf5"), "davis240c": (".zip",)}
 
 
@@ -55,10 +66,31 @@ class Sequence:
     layout: str
 
 
+@dataclass(frozen=True)
+class Found:
+    """Sequences in natural order of their names; what was passed over, by the reason."""
+
+    sequences: list[Sequence]
+    passed: dict[str, list[Path]]
+
+    def told(self) -> list[str]:
+        """Return what was passed over, a line for each reason."""
+        lines = []
+        for why, paths in self.passed.items():
+            more = f" and {len(paths) - 1:,} more" if len(paths) > 1 else ""
+            lines.append(f"passed over: {paths[0]}{more}: {why}")
+        return lines
+
+
 def find_sequences(
-    root: Path, layout: str = "auto", *, leave_out: Path | None = None, by_name: bool = False
-) -> list[Sequence]:
-    """Return the sequences below a folder, in natural order of their names; or that of a file.
+    root: Path,
+    layout: str = "auto",
+    *,
+    leave_out: Path | None = None,
+    by_name: bool = False,
+    fps: Rate | None = None,
+) -> Found:
+    """Return the sequences below a folder; or that of a file.
 
     Parameters
     ----------
@@ -70,6 +102,8 @@ def find_sequences(
         Folder in which nothing is looked for: that of the results.
     by_name : bool
         Files cannot be read: recordings are told by the layout and their suffix.
+    fps : float, Fraction or str, optional
+        All frames are at this rate: sequences need no times of their own.
 
     Raises
     ------
@@ -79,16 +113,24 @@ def find_sequences(
     if not root.exists():
         raise DataError(f"{root}: no such file or folder")
     avoided = None if leave_out is None else leave_out.resolve()
-    trusted = layout if by_name else ""
-    walked = _walk(root, avoided, trusted)
-    found = [(path, kind) for path, kind in walked if layout in ("auto", kind)]
-    if not found:
-        raise DataError(f"{root}: {_nothing(layout)}")
+    walk = _Walk(avoided, by_name, layout if by_name else "", fps)
+    seen = list(walk.below(root))
+    if (root, "images") in seen and len(seen) > 1:
+        seen.remove((root, "images"))
+        walk.passed.setdefault("pictures beside sequences", []).append(root)
+    found = [(path, kind) for path, kind in seen if layout in ("auto", kind)]
+    passed = walk.passed if layout in ("auto", "images") else {}
+    for path, kind in seen:
+        if layout not in ("auto", kind):
+            passed.setdefault(f"--layout {kind} takes that", []).append(path)
     names = _names(root, [path for path, _ in found])
     sequences = [
         Sequence(name, path, kind) for name, (path, kind) in zip(names, found, strict=True)
     ]
-    return sorted(sequences, key=lambda one: natural_key(one.name))
+    result = Found(sorted(sequences, key=lambda one: natural_key(one.name)), passed)
+    if not sequences:
+        raise DataError("; ".join([f"{root}: {_nothing(layout)}", *result.told()]))
+    return result
 
 
 def _nothing(layout: str) -> str:
@@ -97,33 +139,110 @@ def _nothing(layout: str) -> str:
     return f"holds no sequence of the layout {layout}"
 
 
-def _walk(root: Path, avoided: Path | None, trusted: str) -> Iterator[tuple[Path, str]]:
-    """Yield each sequence with its layout; nothing is looked for inside of one."""
+class _Walk:
+    """A walk through folders, which finds sequences and notes what it passes over."""
 
-    def fail(error: OSError) -> None:
-        raise DataError(f"{error.filename}: {error.strerror}") from error
+    def __init__(self, avoided: Path | None, by_name: bool, trusted: str, fps: Rate | None) -> None:
+        self._avoided, self._by_name, self._trusted, self._fps = avoided, by_name, trusted, fps
+        self.passed: dict[str, list[Path]] = {}
 
-    if root.is_file():
-        if kind := _kind_of_file(root, trusted):
-            yield root, kind
-        return
-    for place, folders, files in os.walk(root, onerror=fail):
-        here = Path(place)
-        if kind := _kind_of_folder(here):
-            folders.clear()
-            yield here, kind
-            continue
-        folders[:] = sorted(
-            one
-            for one in folders
-            if not one.startswith(".") and (avoided is None or (here / one).resolve() != avoided)
-        )
-        for file in sorted(files):
-            path = here / file
-            if file.startswith(".") or not path.is_file():
+    def below(self, root: Path) -> Iterator[tuple[Path, str]]:
+        """Yield each sequence with its layout; in recordings, nothing is looked for."""
+
+        def fail(error: OSError) -> None:
+            raise DataError(f"{error.filename}: {error.strerror}") from error
+
+        if root.is_file():
+            yield from self._in_files([root])
+            return
+        for place, folders, names in os.walk(root, onerror=fail):
+            here = Path(place)
+            if kind := _kind_of_folder(here):
+                folders.clear()
+                yield here, kind
                 continue
-            if kind := _kind_of_file(path, trusted):
-                yield path, kind
+            folders[:] = sorted(
+                one
+                for one in folders
+                if not one.startswith(".")
+                and (self._avoided is None or (here / one).resolve() != self._avoided)
+            )
+            shown = sorted(name for name in names if not name.startswith("."))
+            images = [name for name in shown if _suffix(name) in IMAGE_SUFFIXES]
+            pages = [name for name in images if _suffix(name) in _PAGES]
+            if pages and self._is_stack(here / pages[0]):
+                images = [name for name in images if name not in pages]
+            rest = [here / name for name in shown if name not in set(images)]
+            beside = list(self._in_files([file for file in rest if file.is_file()]))
+            yield from beside
+            if why := self._against(here, len(images), is_beside=bool(beside)):
+                self.passed.setdefault(why, []).append(here)
+            elif images:
+                if found_list(here):  # would be that of folders in it, too
+                    folders.clear()
+                yield here, "images"
+
+    def _against(self, folder: Path, images: int, *, is_beside: bool) -> str:
+        """Return why a folder of so many images is no sequence; "" if it is, or has none."""
+        if images == 0:
+            return ""
+        if is_beside:
+            return "pictures beside sequences"
+        if images == 1:
+            return "a single picture"
+        if self._fps is None and not found_list(folder):
+            return f"pictures without times: give --fps F, or put one of {', '.join(LISTS)} there"
+        return ""
+
+    def _in_files(self, files: list[Path]) -> Iterator[tuple[Path, str]]:
+        for file in files:
+            kind, why = self._kind_of_file(file)
+            if kind:
+                yield file, kind
+            elif why:
+                self.passed.setdefault(why.removeprefix(f"{file}: "), []).append(file)
+
+    def _kind_of_file(self, path: Path) -> tuple[str, str]:
+        """Return the layout of a file, or why it has none: "" of one that nobody would take."""
+        suffix = path.suffix.lower()
+        if suffix in VIDEO_SUFFIXES:
+            return "videos", ""
+        if suffix in _RECORDINGS.get(self._trusted, ()):
+            return self._trusted, ""
+        if suffix in (".npy", *_PAGES) and not self._by_name:
+            if path.stem.endswith("_ts"):  # times of a stack
+                return "", ""
+            try:
+                open_source(path, fps=self._fps)
+            except DataError as error:
+                return "", str(error)
+            return "auto", ""
+        if not may_hold_events(path) or self._by_name:
+            return "", ""
+        try:
+            found = format_of(path)
+        except DataError as error:
+            return "", str(error)
+        if found.name in _DDD:
+            return "ddd17", ""
+        if found.is_davis240c:
+            return "davis240c", ""
+        if found.is_camera and "r" in found.frames:
+            return "auto", ""
+        return "", "" if suffix in _TEXTS else "events, which are not simulated"
+
+    def _is_stack(self, path: Path) -> bool:
+        """Tell whether a TIFF has several pages."""
+        if self._by_name:
+            return False
+        try:
+            return len(Pages(path)) > 1
+        except DataError:
+            return False
+
+
+def _suffix(name: str) -> str:
+    return Path(name).suffix.lower()
 
 
 def _kind_of_folder(path: Path) -> str:
@@ -131,29 +250,8 @@ def _kind_of_folder(path: Path) -> str:
         return "davis240c"
     if find_sequence(path):
         return "gopro"
-    if found_list(path):
-        return "auto"
     is_bag = may_hold_events(path) and "r" in format_of(path).frames
     return "auto" if is_bag else ""
-
-
-def _kind_of_file(path: Path, trusted: str) -> str:
-    suffix = path.suffix.lower()
-    if suffix in VIDEO_SUFFIXES:
-        return "videos"
-    if suffix in _RECORDINGS.get(trusted, ()):
-        return trusted
-    if not may_hold_events(path):
-        return ""
-    try:
-        found = format_of(path)
-    except DataError:
-        return ""  # named as a recording, and none: as any other file that lies about
-    if found.name in _DDD:
-        return "ddd17"
-    if found.is_davis240c:
-        return "davis240c"
-    return "auto" if found.is_camera and "r" in found.frames else ""
 
 
 def _names(root: Path, paths: list[Path]) -> list[str]:

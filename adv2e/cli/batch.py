@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from adv2e.geometry import Size
 
 # adv2e.batch.sequences.LAYOUTS, without the time that importing it takes
-LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "videos")
+LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")
 # adv2e.batch.exports.KINDS, likewise
 EXPORTS = ("e2vid", "voxel", "ev-segnet")
 
@@ -202,6 +202,8 @@ def command(
             for task in tasks:
                 log(f"{shown(task.sequence.name)}: {task.why or 'kept'}", 0 if task.why else 1)
             click.echo(reasons(tasks))
+            for line in work.passed:
+                log(shown(line))
             if coming := work.forecast(tasks, jobs, threads):
                 click.echo(coming.text())
             return
@@ -219,6 +221,8 @@ def command(
         click.echo(lines[0])
     for line in lines[1:]:
         click.echo(line, err=True)
+    for line in work.passed:
+        log(shown(line))
     if outcome.failed:
         raise click.exceptions.Exit(1)
 

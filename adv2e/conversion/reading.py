@@ -173,10 +173,9 @@ class Reading:
 
     @property
     def inputs(self) -> tuple[str | Path, ...]:
-        """What is read: the source, and the list of times if there is one."""
-        timestamps = self.given["timestamps"]
-        source = () if self.path == STDIN else (self.path,)
-        return source if timestamps is None else (*source, timestamps)
+        """What is read: the files of the source, and the list of times if there is one."""
+        source = () if self.path == STDIN else self.source.inputs
+        return *source, *filter(None, [self.given["timestamps"]])
 
     def stills(self, decoding: Decoding) -> Iterator[Still]:
         """Return the frames, as `decoding` says; raises what goes wrong with them."""

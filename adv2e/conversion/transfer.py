@@ -162,7 +162,7 @@ def convert_events(
         part = _part(path, found, first_us, selection, crop)
         width, height = part.crop[2:]
         frames = file.shots is not None and (with_frames or keeps_all_bits)
-        with Staging(overwrite, (path,)) as staging, ExitStack() as stack:
+        with Staging(overwrite, file.inputs) as staging, ExitStack() as stack:
             sink = stack.enter_context(
                 open_sink(
                     output,

@@ -197,7 +197,8 @@ def _exported(
     began = time.perf_counter()
     sequences = open_sequences(paths, time_unit=time_unit, size=size, track=track)
     told: dict[str, Any] = {"sequences": [], "doubts": []}
-    with Staging(overwrite, paths) as staging, writing(output):
+    read = [one for sequence in sequences for one in sequence.file.inputs]
+    with Staging(overwrite, read) as staging, writing(output):
         folder = staging.folder(Path(output), _foreign)
         staging.prepare()
         folder.mkdir()

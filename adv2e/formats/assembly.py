@@ -107,6 +107,7 @@ def assemble(file: EventFile) -> Recording:
         metadata=facts.description,
         problems=facts.problems,
         images=lambda: (shot.load() for shot in shots or ()),
+        inputs=file.inputs,
     )
 
 

@@ -55,6 +55,8 @@ class Facts:
 
     Attributes
     ----------
+    inputs : list of str or Path
+        Files that are read beside `path`, and within it if it is a folder.
     progress : callable
         For the reader to tell.
     has_chosen : bool
@@ -85,6 +87,7 @@ class Facts:
         self.path = path
         self.track = track
         self.has_chosen = False
+        self.inputs: list[str | Path] = []
         self.rotate180 = rotate180
         self.progress = progress or (lambda done, total: None)
         self.problems: list[str] = []
@@ -119,6 +122,7 @@ class Facts:
 
     def describe_from(self, file: Path) -> None:
         """Take what a file beside it says, as :meth:`describe`."""
+        self.inputs.append(file)
         text = file.read_text("utf-8", errors="replace")
         self.describe(text, str(file), file.name)
 
@@ -222,6 +226,12 @@ class EventFile:
     parts: Callable[[], Iterator[Columns]]
     shots: Callable[[], Iterator[Shot]] | None = None
     causes: Callable[[], Column] | None = None
+
+    @property
+    def inputs(self) -> list[str | Path]:
+        """All files that are read, and the folder they are in: where nothing may be written."""
+        shots = self.shots() if self.shots is not None and self.facts.path.is_dir() else ()
+        return [self.facts.path, *self.facts.inputs, *(shot.label for shot in shots)]
 
 
 def rotated180(file: EventFile) -> EventFile:

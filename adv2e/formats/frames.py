@@ -53,7 +53,7 @@ def _source(file: EventFile, given: GivenTimes, selection: Selection) -> Source:
     if given:
         pictures = [Picture(shot.label, None, shot.load) for shot in times.shots]
         times = timed(given, pictures, path, str(path))
-    return ListedSource(
+    source = ListedSource(
         path,
         file.layout,
         times,
@@ -61,6 +61,8 @@ def _source(file: EventFile, given: GivenTimes, selection: Selection) -> Source:
         has_clock=given.fps is None,
         light=file.facts.light,
     )
+    source.inputs += file.inputs
+    return source
 
 
 def takes_events(path: Path, choice: str | None = None, track: str | int | None = None) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from adv2e.errors import DataError
 from adv2e.files.regular import check_ends
 from adv2e.formats.assembly import assemble
+from adv2e.formats.causes import beside as beside_of_causes
 from adv2e.formats.causes import found_beside
 from adv2e.formats.event_file import Columns, EventFile, Facts, Progress, rotated180
 from adv2e.formats.lookup import format_of
@@ -66,6 +67,7 @@ def open_events(
         file: EventFile = found.load(found.reader)(path, facts)
         if not facts.has_chosen:
             facts.choose([Track("events")])
+        facts.inputs.append(beside_of_causes(path))
         inside = found.load(found.causes)(path) if found.causes else None
     file = _named(replace(file, causes=inside or found_beside(path)))
     return rotated180(file) if rotate180 else file

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,8 @@ class Recording:
         What is doubtful in the file and what was done about it, a line each.
     images : callable
         Returns an iterator over the images of the frames.
+    inputs : list of str or Path
+        Files that were read, and are read again for the images.
     """
 
     path: str
@@ -47,6 +50,7 @@ class Recording:
     metadata: dict[str, Any] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
     images: Callable[[], Iterator[Image | Pixels]] = field(default=lambda: iter(()), repr=False)
+    inputs: list[str | Path] = field(default_factory=list, repr=False)
 
     @property
     def light(self) -> Light:

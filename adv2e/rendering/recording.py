@@ -67,7 +67,7 @@ def render_recording(
     OutputError, UsageError
         See :func:`open_preview`.
     """
-    check_distinct(path, [recording.path])
+    check_distinct(path, recording.inputs)
     begin_us, until_us = _span_us(recording)
     lasts = f"{recording.path}: lasts {(until_us - begin_us) * 1e-6:.3f} s"
     frames = frames and recording.frame_times_ns is not None and recording.frame_times_ns.size > 0

@@ -45,6 +45,8 @@ class Source(ABC):
     ----------
     path : str
         What was opened.
+    inputs : list of str or Path
+        Files that are read, and the folder they are in: where nothing may be written.
     kind : str
         ``video``, ``images``, ``npy``, or the data set that it is of, such as ``davis240c``.
     width, height : int
@@ -86,6 +88,7 @@ class Source(ABC):
         if not self.has_tracks:
             choose(selection.track, [], [Track("frames")], path)
         self.path = str(path)
+        self.inputs: list[str | Path] = [path]
         self.kind = kind
         self.selection = selection
         self.has_clock = has_clock

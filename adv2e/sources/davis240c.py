@@ -54,7 +54,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     light, ours = None, files.has(DESCRIPTION)
     if ours:
         light = read_light(files.read(DESCRIPTION), files.label(DESCRIPTION))
-    return listed_source(
+    source = listed_source(
         files,
         Listing("davis240c", LIST),
         given,
@@ -62,3 +62,5 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         stated="s" if ours else None,
         light=light or Light("linear", RECORDED),
     )
+    source.inputs += map(files.label, (EVENTS, DESCRIPTION))
+    return source

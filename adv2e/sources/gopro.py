@@ -70,7 +70,8 @@ class Sequence:
 def find_sequence(path: Path) -> Sequence | None:
     """Return the sequence that a folder is, or whose frames it holds; None: it is of no such.
 
-    The name and the folders above or below tell, and all images must be numbered as theirs are.
+    Its name and those of its images tell.  They are all frames of the camera, unless a folder above
+    or below is of a kind of ``GOPRO_Large``; below a folder of that name without kinds, it is open.
     """
     whole = path.absolute()
     inside = _SEQUENCE.fullmatch(whole.parent.name)
@@ -78,12 +79,15 @@ def find_sequence(path: Path) -> Sequence | None:
     found: Sequence | None = None
     if inside and whole.name in _KINDS:
         found = Sequence(path, whole.name, int(inside[1]))
-    elif named and whole.parent.parent.name == "GOPRO_Large_all":
-        found = Sequence(path, "all", 1)
     elif named:
-        kinds = (kind for kind in _KINDS if (path / kind).is_dir())
-        if (kind := next(kinds, None)) and not image_files(path):
+        kind = next((kind for kind in _KINDS if (path / kind).is_dir()), "")
+        above = next((place.name for place in whole.parents if place.name in _KINDS), "")
+        if kind and not image_files(path):
             found = Sequence(path / kind, kind, int(named[1]))
+        elif above:
+            found = Sequence(path, above, int(named[1]))
+        elif not kind and not any(place.name == "GOPRO_Large" for place in whole.parents):
+            found = Sequence(path, "all", 1)
     if found is None or found.window == 0 or found_list(found.folder):
         return None
     files = image_files(found.folder)
@@ -106,6 +110,13 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         times.notes.append(
             f"{sequence.folder}: no frames between {files[first].name} and"
             f" {files[first + 1].name}{more}; the times leave room for them"
+        )
+    known = any(place.name == "GOPRO_Large_all" for place in path.absolute().parents)
+    if sequence.kind == "all" and not known and not given:
+        others = FrameRate(Fraction(_HZ, int(path.absolute().name[9:11]) or 1)).hz
+        times.doubts.append(
+            f"{path}: its names are of GOPRO_Large_all: {_HZ} frames a second; --fps {others} if"
+            " they are of GOPRO_Large"
         )
     if sequence.blurred and not given:
         exposure_us = round(1e6 * sequence.window / _HZ)

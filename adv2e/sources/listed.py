@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from adv2e.errors import DataError
@@ -27,11 +27,15 @@ class Picture:
 
 @dataclass(frozen=True)
 class Timed:
-    """Frames with their times, and what is doubtful and what else is to be told of these."""
+    """Frames with their times, what is doubtful and what else is to be told of these.
+
+    `found` is the list that lies beside them, whether its times are taken or others.
+    """
 
     shots: list[Shot]
     doubts: list[str]
     notes: list[str]
+    found: str | None = None
 
 
 def timed(
@@ -41,6 +45,7 @@ def timed(
     found: str | None,
     read_found: Callable[[str], FrameList] | None = None,
     missing: str = "",
+    order: Sequence[str] = (),
 ) -> Timed:
     """Return the pictures at the times that the user gave, else at those found beside them.
 
@@ -56,6 +61,8 @@ def timed(
         Reads what is called so; not needed where the user gave times.
     missing : str
         What was looked for.
+    order : sequence of str
+        What is doubtful of the order of the pictures, where it is not the list that has it.
 
     Raises
     ------
@@ -65,15 +72,16 @@ def timed(
     if (rate := given.rate) is not None:
         shots = [Shot(rate.time_ns(n), p.label, p.load) for n, p in enumerate(pictures)]
         doubt = numbering_doubt([picture.path or "" for picture in pictures], rate)
-        result = Timed(shots, [f"{path}: {doubt}"] if doubt else [], [])
+        result = Timed(shots, [f"{path}: {line}" for line in (*order, doubt) if line], [])
     elif given.timestamps is not None:
         label = str(given.timestamps)
         listed = read_list(given.timestamps, time_unit=given.time_unit)
-        result = _listed(listed, label, pictures, path)
+        result = _listed(listed, label, pictures, path, order)
         if len(result.shots) != len(pictures):
             raise _other_number(label, len(result.shots), len(pictures), path)
     elif found is not None and read_found is not None:
-        return _listed(read_found(found), found, pictures, path)
+        result = _listed(read_found(found), found, pictures, path, order)
+        return replace(result, found=found)
     else:
         raise DataError(
             f"{path}: no times of its frames are known: give --fps F or --timestamps FILE, or put"
@@ -81,23 +89,27 @@ def timed(
         )
     if found is not None:
         result.notes.append(f"{given} replaces the times in {found}")
-    return result
+    return replace(result, found=found)
 
 
-def _listed(found: FrameList, label: str, pictures: Sequence[Picture], path: Path) -> Timed:
+def _listed(
+    found: FrameList, label: str, pictures: Sequence[Picture], path: Path, order: Sequence[str]
+) -> Timed:
     """Return the pictures that a list of times names, or all in order if it names none."""
+    doubts, notes = found.told(label)
     stamps, paths = found.stamps, [p.path for p in pictures if p.path is not None]
     if stamps[0].name is not None and paths:
         places = match(stamps, paths, label, f" in {path}")
     elif len(stamps) == len(pictures):
         places = list(range(len(pictures)))
+        doubts += [f"{path}: {line}" for line in order]
     else:
         raise _other_number(label, len(stamps), len(pictures), path)
     shots = [
         Shot(stamp.t_ns, pictures[at].label, pictures[at].load)
         for stamp, at in zip(stamps, places, strict=True)
     ]
-    return Timed(shots, *found.told(label))
+    return Timed(shots, doubts, notes)
 
 
 def _other_number(label: str, times: int, frames: int, path: Path) -> DataError:
@@ -127,6 +139,8 @@ class ListedSource(Source):
     ) -> None:
         super().__init__(path, kind, selection, has_clock)
         shots = self._shots = timed.shots
+        # of an archive or a stack, they are names of no file
+        self.inputs += [*filter(None, [timed.found]), *(shot.label for shot in shots)]
         if (pattern := selection.bayer) is not None:
             shots = self._shots = [in_colour(shot, pattern) for shot in shots]
             light = light_of(pattern)

@@ -90,9 +90,8 @@ def read_light(text: bytes, label: str) -> Light | None:
     return light_stored(description, label)
 
 
-def light_beside(folder: Path) -> Light | None:
-    """Return what the description in a folder says of the frames there; None without one."""
-    file = folder / DESCRIPTION
+def light_beside(file: Path) -> Light | None:
+    """Return what a description says of the frames beside it; None if there is no such file."""
     if not file.is_file():
         return None
     try:

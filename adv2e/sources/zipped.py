@@ -13,7 +13,8 @@ from adv2e.files.zips import Members
 from adv2e.sources import davis240c
 from adv2e.sources.frame import Pixels
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
-from adv2e.sources.images.source import LISTS, natural_key
+from adv2e.sources.images.order import in_order
+from adv2e.sources.images.source import LISTS
 from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.listings import find_listing, open_listing
 from adv2e.sources.stored import LIST
@@ -22,7 +23,7 @@ from adv2e.sources.wanted import GivenTimes, Selection
 
 
 def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
-    """Return the frames of a zip, in natural order of their names where no list has them.
+    """Return the frames of a zip, in the order of their names where no list has them.
 
     Raises
     ------
@@ -38,7 +39,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         if listing := find_listing(files.below(top)):
             return open_listing(files.below(top), listing, given, selection)
     files = files.below("")
-    images = images_in(files)
+    images, told = in_order(images_in(files))
     if not images:
         known = " ".join(suffix.lstrip(".") for suffix in IMAGE_SUFFIXES)
         raise DataError(f"{path}: no {LIST} in it, and no images ({known})")
@@ -57,15 +58,15 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         return parse_list(text, label, time_unit=given.time_unit)
 
     missing = f"one of {', '.join(LISTS)} in it"
-    times = timed(given, pictures, path, label, read, missing)
+    times = timed(given, pictures, path, label, read, missing, told)
     if left_out := len(pictures) - len(times.shots):
         times.notes.append(f"{left_out} images are not in {label} and are left out")
     return ListedSource(path, "images", times, selection, has_clock=given.fps is None)
 
 
 def images_in(files: Members) -> list[str]:
-    """Return the images of a zip, in natural order of their names; hidden files left out."""
-    return sorted(filter(_is_image, files.archived()), key=natural_key)
+    """Return the images of a zip, in no order; hidden files left out."""
+    return list(filter(_is_image, files.archived()))
 
 
 def _is_image(name: str) -> bool:

@@ -176,3 +176,18 @@ def test_folders_that_would_lie_in_each_other_are_refused(batch, tmp_path):
     assert done.status == 1
     assert "a/b: its folder would lie in that of a" in done.err
     assert not dest.exists()
+
+
+def test_folders_of_pictures_are_converted_and_what_is_passed_over_is_told(batch, tmp_path):
+    source, dest = tmp_path / "from", tmp_path / "to"
+    trees.pictures(source / "walk")
+    clip(source / "a.avi")
+    for options, made, passed in (([], "1 made", ", 1 passed over"), (["--fps", 10], "2 made", "")):
+        shown = batch(source, dest, *options, "--dry-run")
+        done = batch(source, dest, *options)
+        assert made in done.out
+        assert done.out.rstrip().endswith(f"0 failed{passed}")
+        for outcome in (shown, done):
+            assert ("walk: pictures without times" in outcome.err) is bool(passed)
+    assert sorted(made_in(dest)) == ["a.h5", "walk.h5"]
+    assert read_events(dest / "walk.h5").frame_times_ns is None

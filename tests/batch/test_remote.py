@@ -196,7 +196,7 @@ def test_recordings_are_told_by_the_layout_where_they_cannot_be_read(tmp_path):
         (tmp_path / name).write_bytes(bytes(10))
 
     def names(layout):
-        return [one.name for one in find_sequences(tmp_path, layout, by_name=True)]
+        return [one.name for one in find_sequences(tmp_path, layout, by_name=True).sequences]
 
     assert names("ddd17") == ["a"]
     assert names("davis240c") == ["b"]

@@ -2,6 +2,8 @@
 
 import os
 
+import cv2
+import numpy as np
 import pytest
 import trees_of_batch as trees
 
@@ -27,7 +29,7 @@ def tree(tmp_path):
 
 
 def names(root, layout="auto", **options):
-    return [one.name for one in find_sequences(root, layout, **options)]
+    return [one.name for one in find_sequences(root, layout, **options).sequences]
 
 
 def test_layouts_are_those_of_the_command():
@@ -55,7 +57,7 @@ def test_each_layout_takes_its_own(tree):
 
 
 def test_of_gopro_the_folder_of_the_sequence_is_taken_once(tree):
-    found = find_sequences(tree, "gopro")
+    found = find_sequences(tree, "gopro").sequences
     assert [one.source for one in found] == [tree / "GOPRO_Large/train/GOPR0384_11_00"]
 
 
@@ -100,3 +102,64 @@ def test_a_recording_that_is_none_is_left_out(tmp_path):
     (tmp_path / "b.aedat4").write_bytes(b"no such thing")
     assert names(tmp_path) == ["a"]
     assert module.LAYOUTS[0] == "auto"
+
+
+def test_folders_of_pictures_count_where_their_times_are_known(tmp_path):
+    trees.pictures(tmp_path / "walk")
+    trees.pictures(tmp_path / "timed", times=True)
+    trees.pictures(tmp_path / "walk" / "masks")
+    assert names(tmp_path) == ["timed"]
+    assert names(tmp_path, fps=10) == ["timed", "walk", "walk/masks"]
+    assert names(tmp_path, "images", fps=10) == ["timed", "walk", "walk/masks"]
+    assert names(tmp_path / "walk" / "masks", fps=10) == ["masks"]
+    assert {one.layout for one in find_sequences(tmp_path, fps=10).sequences} == {"images"}
+
+
+def test_stacks_count_where_their_times_are_known(tmp_path):
+    trees.stack(tmp_path / "a.npy")
+    trees.stack(tmp_path / "b.npy")
+    np.save(tmp_path / "b_ts.npy", np.arange(3) * 0.1)
+    cv2.imwritemulti(str(tmp_path / "c.tif"), [np.full((24, 32), k, np.uint8) for k in range(3)])
+    assert names(tmp_path) == ["b"]
+    assert names(tmp_path, fps=10) == ["a", "b", "c"]
+
+
+def test_what_is_passed_over_is_listed_with_the_reason(tmp_path):
+    trees.clip(tmp_path / "a.avi")
+    trees.pictures(tmp_path)
+    trees.pictures(tmp_path / "walk")
+    trees.pictures(tmp_path / "run")
+    trees.pictures(tmp_path / "single", count=1)
+    trees.stack(tmp_path / "s.npy")
+    np.save(tmp_path / "labels.npy", np.zeros(5))
+    (tmp_path / "b.aedat4").write_bytes(b"no such thing")
+    (tmp_path / "readme.txt").write_text("nothing\n")
+    found = find_sequences(tmp_path)
+    assert [one.name for one in found.sequences] == ["a"]
+    reasons = {path.name: why for why, paths in found.passed.items() for path in paths}
+    assert set(reasons) == {
+        *("walk", "run", "single", "s.npy", "labels.npy", "b.aedat4", tmp_path.name)
+    }
+    assert "give --fps" in reasons["walk"]
+    assert "give --fps" in reasons["s.npy"]
+    assert reasons[tmp_path.name] == "pictures beside sequences"
+    assert reasons["single"] == "a single picture"
+    assert "array of shape (5,)" in reasons["labels.npy"]
+    assert any("run and 1 more: pictures without times" in line for line in found.told())
+
+
+def test_a_list_of_something_else_does_not_make_a_folder_a_sequence(tmp_path):
+    trees.clip(tmp_path / "a.avi")
+    (tmp_path / "info.txt").write_text("of this data set\n")
+    assert names(tmp_path) == ["a"]
+
+
+def test_what_another_layout_would_take_is_told(tree):
+    told = find_sequences(tree, "gopro").told()
+    assert any("4 more: --layout videos takes that" in line for line in told)
+
+
+def test_where_nothing_counts_what_was_passed_over_is_told(tmp_path):
+    trees.pictures(tmp_path / "walk")
+    with pytest.raises(DataError, match=r"passed over: .*walk: pictures without times: give --fps"):
+        names(tmp_path)

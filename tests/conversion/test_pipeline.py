@@ -235,7 +235,7 @@ def test_an_input_is_never_written_over(adv2e, folder, tmp_path):
     ):
         outcome = adv2e(*arguments, "--overwrite")
         assert outcome.status in (1, 2), arguments
-        assert "is the input, which would be lost" in outcome.err or "a film ends in" in outcome.err
+        assert "is read and would be lost" in outcome.err or "a film ends in" in outcome.err
     outcome = adv2e("convert", folder, "--fps", 100, "-o", folder.parent, "--overwrite")
     assert outcome.status == 1
     assert "holds the input" in outcome.err
@@ -285,6 +285,28 @@ def test_nothing_that_is_read_beside_the_input_is_written_over(adv2e, folder, tm
             assert outcome.status == 1
             assert "would be lost; choose another name" in outcome.err
         assert read.read_bytes() == before, (command, read)
+
+
+def test_lists_and_texts_are_read_again_where_the_output_is_replaced(adv2e, folder, tmp_path):
+    text, stamps = tmp_path / "ev.txt", tmp_path / "stamps.txt"
+    text.write_text("0.1 1 2 1\n0.2 3 4 0\n")
+    stamps.write_text("0\n.01\n.02\n.03\n.04\n")
+    for command in (
+        ("convert", text, "-o", tmp_path / "a.h5"),
+        ("render", text, "-o", tmp_path / "a.png"),
+        ("convert", folder, "--timestamps", stamps, "-o", tmp_path / "b.h5"),
+        ("export", text, "-o", tmp_path / "c", "--to", "voxel", "--count", "1"),
+    ):
+        for _ in range(2):
+            assert adv2e(*command, "--overwrite", "-q") == (0, "", "")
+
+
+def test_what_lies_beside_events_is_not_written_over(adv2e, folder, tmp_path):
+    events, causes = tmp_path / "a.txt", tmp_path / "a.txt.causes.txt"
+    assert adv2e("convert", folder, "-o", events, "--causes").status == 0
+    for read in (causes, tmp_path / "a.txt.json"):
+        outcome = adv2e("convert", events, "-o", read, "--format", "txt", "--overwrite")
+        assert "is read and would be lost" in outcome.err
 
 
 def test_what_lies_beside_the_input_and_is_not_read_may_be_written_over(adv2e, folder):

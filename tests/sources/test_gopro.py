@@ -100,11 +100,25 @@ def test_given_times_win_and_a_note_says_so(large, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("path", "window"),
+    [
+        ("gopro/train/GOPR0372_07_00", 1),
+        ("GOPR0372_07_00", 1),
+        ("gopro/train/sharp/GOPR0372_07_00", 7),
+        ("GOPRO_Large/blur/train/GOPR0372_07_00", 7),
+    ],
+)
+def test_a_sequence_is_known_whatever_stands_above(tmp_path, path, window):
+    source = open_source(write(tmp_path / path, [323, 324, 325]))
+    assert [frame.t_ns for frame in source.frames()] == times_ns([323, 324, 325], window)
+    assert ("--fps 240/7 if" in "".join(source.doubts)) is (window == 1)
+
+
+@pytest.mark.parametrize(
     "path",
     [
         "GOPRO_Large_all/train/scene_07_00",
-        "elsewhere/train/GOPR0372_07_00",
-        "GOPR0372_07_00/GOPR0372_07_00",
+        "GOPRO_Large/train/GOPR0372_07_00",
         "GOPRO_Large/train/GOPR0372_07_00/depth",
         "GOPRO_Large/train/GOPR0372_00_00/sharp",
         "GOPRO_Large/train/GOPR0372_7_00/sharp",

@@ -141,12 +141,22 @@ def test_a_table_of_another_kind_is_left_alone(tmp_path, write_images, picture):
         assert (source.kind, source.count) == ("images", 2)
 
 
-@pytest.mark.parametrize("name", ["rgb.txt", "mav0/cam0/data.csv", "left_images.txt"])
-def test_lists_are_not_written_over(tmp_path, name):
-    for make in (tum, euroc, fpv):
-        make(tmp_path)
-    with pytest.raises(OutputError, match="would be lost"):
-        check_distinct(tmp_path / name, [tmp_path])
+@pytest.mark.parametrize(
+    ("make", "name", "image"),
+    [
+        (tum, "rgb.txt", f"rgb/{TUM[1]}.png"),
+        (euroc, "mav0/cam0/data.csv", f"mav0/cam0/data/{EUROC[1]}.png"),
+        (fpv, "left_images.txt", "img/image_0_1.png"),
+    ],
+)
+def test_what_is_read_is_not_written_over_and_all_else_may_be(tmp_path, make, name, image):
+    inputs = open_source(make(tmp_path)).inputs
+    for read in (name, image):
+        with pytest.raises(OutputError, match=r"is read and would be lost"):
+            check_distinct(tmp_path / read, inputs)
+    for other in ("groundtruth.txt", "preview.png", "depth.txt"):
+        (tmp_path / other).touch()
+        check_distinct(tmp_path / other, inputs)
 
 
 PIECES = st.sampled_from(

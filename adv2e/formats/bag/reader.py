@@ -62,6 +62,7 @@ def open_bag(path: Path, facts: Facts) -> EventFile:
         The package ``rosbags`` is not installed.
     """
     bag = _Bag(path, facts)
+    facts.inputs += (file for kind in ("*.yaml", "*.db3*", "*.mcap*") for file in path.glob(kind))
     facts.stated_unit = "us"
     if bag.settings:
         facts.describe(bag.settings, f"{path}: adv2e", "the file")

@@ -56,6 +56,7 @@ def open_davis240c(path: Path, facts: Facts) -> EventFile:
         facts.describe(text, files.label(DESCRIPTION), DESCRIPTION)
     elif not path.is_dir() and (beside := path.with_name(path.name + ".json")).is_file():
         facts.describe_from(beside)  # a zip for rpg_e2vid holds nothing but events
+    facts.inputs += map(files.label, (name, LIST, DESCRIPTION))
     listed = _listed(files, stated=facts.stated_unit)
     if listed is not None and len(listed.stamps) > 1:
         facts.note_frames(listed.unit, whole=listed.whole)

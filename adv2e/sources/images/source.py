@@ -1,15 +1,15 @@
-"""Folders of still images, in natural order of their names, with times from beside them."""
+"""Folders of still images, in the order of their names, with times from beside them."""
 
 from __future__ import annotations
 
-import re
 from functools import partial
 from pathlib import Path
 
 from adv2e.errors import DataError
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
+from adv2e.sources.images.order import in_order, natural_key
 from adv2e.sources.listed import ListedSource, Picture, timed
-from adv2e.sources.stored import light_beside
+from adv2e.sources.stored import DESCRIPTION, LIST, light_beside
 from adv2e.sources.times.lists import FrameList, read_list
 from adv2e.sources.wanted import GivenTimes, Selection
 
@@ -33,9 +33,9 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     Event-Camera Dataset), ``timestamps.txt`` (one time a line, of vid2e), ``info.txt`` (``path
     t_us``, of DVS-Voltmeter), in the folder or beside it.
     """
-    pictures = [
-        Picture(str(f), str(f.absolute()), partial(read_image, f)) for f in image_files(path)
-    ]
+    names, told = in_order(_image_names(path))
+    files = [path / name for name in names]
+    pictures = [Picture(str(f), str(f.absolute()), partial(read_image, f)) for f in files]
     if not pictures:
         raise _no_images(path)
     if len(pictures) == 1:
@@ -43,7 +43,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     found = found_list(path)
     label = None if found is None else str(found)
     missing = f"one of {', '.join(LISTS)} there"
-    times = timed(given, pictures, path, label, partial(_read, given), missing)
+    times = timed(given, pictures, path, label, partial(_read, given), missing, told)
     if left_out := len(pictures) - len(times.shots):
         times.notes.append(f"{left_out} images are not in {found} and are left out")
     if unread := _unread(path):
@@ -51,8 +51,12 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
             f"{path}: images that are not read are left out: {len(unread)}, such as {unread[0]}"
         )
     # the folder may be that of the frames of a recording of ours
-    light = light_beside(found.parent) if found is not None and found.name == "images.txt" else None
-    return ListedSource(path, "images", times, selection, has_clock=given.fps is None, light=light)
+    ours = found.with_name(DESCRIPTION) if found is not None and found.name == LIST else None
+    light = None if ours is None else light_beside(ours)
+    has_clock = given.fps is None
+    source = ListedSource(path, "images", times, selection, has_clock=has_clock, light=light)
+    source.inputs += filter(None, [ours])
+    return source
 
 
 def _read(given: GivenTimes, name: str) -> FrameList:
@@ -60,19 +64,16 @@ def _read(given: GivenTimes, name: str) -> FrameList:
 
 
 def image_files(folder: Path) -> list[Path]:
-    """Return the images in a folder, in natural order of their names; hidden files left out."""
+    """Return the images in a folder, in the order of their names; hidden files left out."""
+    return [folder / name for name in in_order(_image_names(folder))[0]]
+
+
+def _image_names(folder: Path) -> list[str]:
     try:
         entries = [entry for entry in folder.iterdir() if not entry.name.startswith(".")]
     except OSError as error:
         raise DataError(f"{folder}: {error.strerror}") from error
-    images = [e for e in entries if e.suffix.lower() in IMAGE_SUFFIXES and e.is_file()]
-    return sorted(images, key=lambda entry: natural_key(entry.name))
-
-
-def natural_key(name: str) -> tuple[list[tuple[bool, int, str]], str]:
-    """Return a key that sorts names with their numbers as numbers: frame2 before frame10."""
-    parts = re.split(r"([0-9]+)", name)
-    return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts], name
+    return [e.name for e in entries if e.suffix.lower() in IMAGE_SUFFIXES and e.is_file()]
 
 
 def found_list(folder: Path) -> Path | None:

@@ -51,9 +51,6 @@ def gap_doubts(times_ns: Sequence[int], label: str) -> list[str]:
 def numbering_doubt(paths: Sequence[str], rate: FrameRate) -> str:
     """Return what is to be told of frames at a rate given whose numbers have gaps, or ""."""
     names = [PurePath(path).name for path in paths]
-    for before, after in pairwise(names):
-        if before != after and PurePath(before).stem == PurePath(after).stem:
-            return f"{before} and {after} differ in their endings alone, and are two frames"
     numbers = _numbers(names)
     steps = [after - before for before, after in pairwise(numbers)]
     if not steps or median(steps) >= _NO_NUMBERS:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from unicodedata import normalize
 
 from adv2e.errors import DataError
 from adv2e.sources.times.instants import Stamp
@@ -26,8 +27,10 @@ def member_of(name: str, has: Callable[[str], bool]) -> str | None:
             del parts[-1:]
         elif part not in ("", "."):
             parts.append(part)
-    ends = ("/".join(parts[begin:]) for begin in range(len(parts)))
-    return next(filter(has, ends), None)
+    ends = ["/".join(parts[begin:]) for begin in range(len(parts))]
+    # systems differ in how they store letters with accents
+    forms = (normalize(form, end) for form in ("NFC", "NFD") for end in ends)
+    return next(filter(has, (*ends, *forms)), None)
 
 
 def members_of(

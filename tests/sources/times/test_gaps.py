@@ -94,10 +94,6 @@ def test_gaps_between_numbers_that_rise_by_more_than_one():
     assert "missing between 6 and 12" in told
 
 
-def test_one_picture_in_two_formats_is_told():
-    assert doubt("1.jpg", "1.png", "2.jpg", "2.png").startswith("1.jpg and 1.png differ in their")
-
-
 @pytest.mark.parametrize(
     "names",
     [
