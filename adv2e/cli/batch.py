@@ -115,8 +115,7 @@ _LARGE_SOURCE = 100_000_000
 @click.option("--dry-run", is_flag=True, help="Show what would be done, and write nothing.")
 @click.option("--overwrite", is_flag=True, help="Make all anew, and replace files of others.")
 @options.threads_option
-@options.verbosity_options
-@options.progress_option
+@options.reporting_options
 def command(
     source: str,
     dest: str,

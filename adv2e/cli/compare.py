@@ -46,8 +46,7 @@ if TYPE_CHECKING:
 @options.rotate_option(" of MEASURED, and of --frames,")
 @options.config_options
 @options.threads_option
-@options.progress_option
-@options.verbosity_options
+@options.reporting_options
 def command(
     measured: str,
     simulated: str,
