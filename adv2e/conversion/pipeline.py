@@ -260,7 +260,8 @@ def convert_reading(
             del events  # or they would stay while the next ones are made
     # at the end: an error is to be the only line
     taken = light_text(recording.light, recording.full_scale, config.frames)
-    log(f"frames are {taken}")
+    is_guess = config.frames.encoding == "auto" and recording.light.is_guess
+    (doubt if is_guess else log)(f"frames are {taken}")
     crop = recording.selection.crop
     if crop is not None or fitting is not None:
         part = f" at x {crop.x}, y {crop.y} of the input's" if crop is not None else ""
