@@ -182,7 +182,7 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
     decoder = decoder_for(config.frames, image.dtype, colour, auto=light.encoding)
     if config.frames.encoding == "auto" and light.is_guess:
         taken = light_text(light, decoder.full_scale, config.frames)
-        warnings.warn(f"frames are {taken}", stacklevel=3)
+        warnings.warn(f"frames are {taken}", stacklevel=4)  # of who loops over adv2e.simulate
     return decoder
 
 
