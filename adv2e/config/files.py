@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import re
+from itertools import takewhile
 from pathlib import Path
 
 from adv2e.config.yaml12 import Origin, Value, parse
@@ -25,6 +27,15 @@ def shipped() -> list[str]:
     return sorted(path.stem for path in shipped_folder().glob("*.yaml"))
 
 
+def title(name: str) -> str:
+    """Return what a shipped configuration says of itself first, in one sentence."""
+    text = (shipped_folder() / f"{name}.yaml").read_text("utf-8")
+    comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
+    told = re.sub(r"\s*\([^)]*\)", "", " ".join(line.lstrip("# ") for line in comment))
+    # a sentence, without the authors that follow a colon
+    return re.split(r"\.\s|:\s(?=[A-Z]\.)", told, maxsplit=1)[0]
+
+
 def find(name: str | Path) -> Path:
     """Return the path of the configuration `name`: a file, or the name of a shipped one.
 
@@ -44,7 +55,7 @@ def find(name: str | Path) -> Path:
         known = path.suffix in (".yaml", ".yml") and path.stem in shipped()
         hint = f" (the shipped one: -c {path.stem})" if known else ""
         raise ConfigError(f"{name}: no such file{hint}")
-    near = difflib.get_close_matches(path.name, shipped(), n=1)
+    near = difflib.get_close_matches(path.name.lower(), shipped(), n=1)
     hint = f", did you mean '{near[0]}'?" if near else ""
     raise ConfigError(
         f"{name}: no such file or shipped configuration{hint} (shipped: {', '.join(shipped())})"
