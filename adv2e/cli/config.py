@@ -45,6 +45,8 @@ def group() -> None:
       adv2e config check mine.yaml
       adv2e convert clip.mp4 -c mine.yaml
 
+    'adv2e config template davis346' begins one for 'adv2e diagnose'.
+
     A configuration is a YAML file. Keys that it leaves out keep their defaults. The value null
     switches an effect off. 'adv2e config' alone is 'adv2e config show'.
 
@@ -68,6 +70,19 @@ def list_shipped() -> None:
 
     for name in shipped():
         click.echo(f"{name:<16} {title(name)}")
+
+
+@group.command()
+@click.argument("name", metavar="CAMERA", shell_complete=completion.configurations)
+def template(name: str) -> None:
+    """Print a declared.yaml for 'adv2e diagnose', to write into it what is known of a camera.
+
+    It holds what the maker of CAMERA, a shipped configuration, states for each one that he sells.
+    All else depends on biases, light and the single chip, and is commented out.
+    """
+    from adv2e.config.files import template as template_of
+
+    click.echo(template_of(name), nl=False)
 
 
 @group.command()

@@ -261,6 +261,19 @@ def test_config_show_and_check_take_files_with_and_without_an_option(adv2e, tmp_
     assert adv2e("config", "check") == (2, "", adv2e("config", "check").err)
 
 
+def test_the_template_holds_the_sensor_and_all_else_as_comments(adv2e, tmp_path):
+    outcome = adv2e("config", "template", "davis346")
+    path = tmp_path / "declared.yaml"
+    path.write_text(outcome.out)
+    assert load_config(path) == load_config([], ["sensor={width: 346, height: 260, fit: crop}"])
+    head, _, rest = outcome.out.partition("# pixel:\n")
+    path.write_text(f"{head}pixel:\n" + re.sub("(?m)^# ", "", rest))
+    assert load_config(path).pixel == load_config("davis346").pixel
+    refused = adv2e("config", "template", "v2e")
+    assert refused.status == 1
+    assert "must be davis240c or davis346" in refused.err
+
+
 @pytest.mark.parametrize("name", ["DAVIS346", "Davis346", "davis364"])
 def test_a_shipped_name_that_is_nearly_right_is_told_the_nearest(adv2e, name):
     outcome = adv2e("config", "show", name)
