@@ -28,6 +28,10 @@ LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "videos")
 # adv2e.batch.exports.KINDS, likewise
 EXPORTS = ("e2vid", "voxel", "ev-segnet")
 
+_UNKNOWN = (
+    "how much comes and how long it takes is not known: a tenth of the work tells nothing of it"
+)
+
 _LARGE_SOURCE = 100_000_000
 """Bytes of source from which on it is worth to look how much will come out."""
 
@@ -200,8 +204,9 @@ def command(
             for task in tasks:
                 log(f"{shown(task.sequence.name)}: {task.why or 'kept'}", 0 if task.why else 1)
             click.echo(reasons(tasks))
-            if coming := work.forecast(tasks, jobs, threads):
-                click.echo(coming.text())
+            if any(task.why for task in tasks):
+                coming = work.forecast(tasks, jobs, threads)
+                click.echo(coming.text() if coming else _UNKNOWN)
             return
         told = _Told(log, progress, stack, lambda tasks: work.forecast(tasks, jobs, threads))
         outcome = work.run(
