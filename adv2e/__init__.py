@@ -19,7 +19,7 @@ Examples
 --------
 >>> import numpy as np
 >>> import adv2e
->>> frames = [np.full((180, 240), dn, np.uint8) for dn in (20, 40, 80, 160)]
+>>> frames = [np.full((180, 240), light, np.float32) for light in (0.1, 0.2, 0.4, 0.8)]
 >>> events = np.concatenate(list(adv2e.simulate(frames, 100)))  # 100 frames a second
 >>> events.dtype == adv2e.EVENT_DTYPE
 True
@@ -76,8 +76,13 @@ def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module 'adv2e' has no attribute {name!r}")
     from importlib import import_module  # noqa: PLC0415
+    from inspect import isfunction  # noqa: PLC0415
 
-    return getattr(import_module(_HOMES[name]), name)
+    from adv2e.in_python import reworded  # noqa: PLC0415
+
+    found = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = found = reworded(found) if isfunction(found) else found
+    return found
 
 
 def __dir__() -> list[str]:

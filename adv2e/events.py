@@ -7,6 +7,7 @@ that the order of a file does not depend on how the work was divided.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from typing import Any
 
 import numpy as np
@@ -65,18 +66,7 @@ def checked_events(
     DataError
         The array has other fields, or an event lies outside the sensor; the text names the first.
     """
-    events = np.asarray(events)
-    held = events.dtype.names or ()
-    if events.ndim != 1 or not {"t", "x", "y", "p"} <= set(held):
-        raise DataError(
-            f"events: must be a structured array, (n,), with the fields t, x, y, p, got"
-            f" {events.dtype} {events.shape}"
-        )
-    for name in ("t", "x", "y"):
-        if events[name].dtype.kind not in "iu":
-            raise DataError(
-                f"events: {name} must be whole numbers, t in microseconds, got {events[name].dtype}"
-            )
+    events = with_fields(events)
     for name, most in (("x", width), ("y", height)):
         outside = np.flatnonzero((events[name] < 0) | (events[name] >= most))
         if outside.size:
@@ -93,6 +83,23 @@ def checked_events(
     return events if is_sorted(events) else sort_events(events)
 
 
+def with_fields(made: Any) -> Events:
+    """Return events that somebody made as a structured array; DataError if it has other fields."""
+    events: Events = np.asarray(made)
+    held = events.dtype.names or ()
+    if events.ndim != 1 or not {"t", "x", "y", "p"} <= set(held):
+        raise DataError(
+            f"events: must be a structured array, (n,), with the fields t, x, y, p, got"
+            f" {events.dtype} {events.shape}"
+        )
+    for name in ("t", "x", "y"):
+        if events[name].dtype.kind not in "iu":
+            raise DataError(
+                f"events: {name} must be whole numbers, t in microseconds, got {events[name].dtype}"
+            )
+    return events
+
+
 def pixels_of(events: Events, columns: int) -> NDArray[np.int64]:
     """Return the pixel of each event, counted along rows of so many columns, (events,)."""
     pixels: NDArray[np.int64] = events["y"].astype(np.int64) * columns + events["x"]
@@ -101,8 +108,9 @@ def pixels_of(events: Events, columns: int) -> NDArray[np.int64]:
 
 def cut(events: Events, start: int, stop: int) -> Events:
     """Return the part of the sorted `events` with start <= t < stop [us], as a view."""
-    first, last = np.searchsorted(events["t"], (start, stop))
-    return events[first:last]
+    times = events["t"]
+    # of a field, np.searchsorted copies all times first
+    return events[bisect_left(times, start) : bisect_left(times, stop)]
 
 
 def sort_events(events: Events) -> Events:

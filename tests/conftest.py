@@ -40,7 +40,7 @@ def _no_test_hangs() -> Iterator[None]:
 @pytest.fixture(autouse=True, scope="session")
 def _solvers_are_compiled() -> None:
     """Compile both solvers, if need be: tests look at all that a command says, and at its time."""
-    frames = np.zeros((3, 4, 5), np.uint8)
+    frames = np.zeros((3, 4, 5), np.float32)
     for form in ("exact", "paper"):
         config = load_config([], [f"pixel.low_pass.update={form}"])
         for _ in simulate(frames, [0.0, 0.1, 0.2], config, threads=1):

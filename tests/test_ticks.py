@@ -107,6 +107,6 @@ def test_a_rate_that_leads_out_of_64_bits(tmp_path):
 
 @pytest.mark.parametrize("start", [1e13, -1e13, 1e300])
 def test_simulate(start):
-    frames = [np.zeros((2, 2), np.uint8)] * 3
+    frames = [np.zeros((2, 2), np.float32)] * 3
     with pytest.raises(DataError, match=r"^frame 0: a time of"):
         list(simulate(frames, [start, start + 0.01, start + 0.02]))

@@ -59,6 +59,12 @@ class Program(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command that `args` begin with; a mistyped one is told the nearest."""
         name = args[0]
+        if name == "help":  # as of git and others
+            args = [*args[1:], "--help"] if len(args) > 1 else ["--help"]
+            if len(args) == 1:
+                click.echo(ctx.get_help())
+                ctx.exit()
+            name = args[0]
         if name not in COMMANDS and not name.startswith("-") and not ctx.resilient_parsing:
             near = difflib.get_close_matches(name, COMMANDS, n=1)
             meant = near[0] if near else f"adv2e convert {name}" if Path(name).exists() else ""

@@ -28,6 +28,10 @@ LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")
 # adv2e.batch.exports.KINDS, likewise
 EXPORTS = ("e2vid", "voxel", "ev-segnet")
 
+_UNKNOWN = (
+    "how much comes and how long it takes is not known: a tenth of the work tells nothing of it"
+)
+
 _LARGE_SOURCE = 100_000_000
 """Bytes of source from which on it is worth to look how much will come out."""
 
@@ -116,8 +120,7 @@ _LARGE_SOURCE = 100_000_000
 @click.option("--dry-run", is_flag=True, help="Show what would be done, and write nothing.")
 @click.option("--overwrite", is_flag=True, help="Make all anew, and replace files of others.")
 @options.threads_option
-@options.verbosity_options
-@options.progress_option
+@options.reporting_options
 def command(
     source: str,
     dest: str,
@@ -204,8 +207,9 @@ def command(
             click.echo(reasons(tasks))
             for line in work.passed:
                 log(shown(line))
-            if coming := work.forecast(tasks, jobs, threads):
-                click.echo(coming.text())
+            if any(task.why for task in tasks):
+                coming = work.forecast(tasks, jobs, threads)
+                click.echo(coming.text() if coming else _UNKNOWN)
             return
         told = _Told(log, progress, stack, lambda tasks: work.forecast(tasks, jobs, threads))
         outcome = work.run(

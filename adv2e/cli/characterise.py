@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     help="Standard error of every row, relative.  [default: from the table]",
 )
 @options.output_options
-@options.verbosity_options
+@options.reporting_options
 def command(
     table: str,
     config_files: tuple[str, ...],
@@ -59,6 +59,7 @@ def command(
     output: str | None,
     overwrite: bool,
     log: Log,
+    progress: bool,
     **settings: Any,
 ) -> None:
     """Name the effect that measured latencies or noise rates ask for.

@@ -11,11 +11,54 @@ from click.core import ParameterSource
 
 from adv2e.errors import UsageError
 
+_GROUPS = {
+    "Input": (
+        *("fps", "timestamps", "time_unit", "track", "start", "stop", "start_s", "stop_s", "crop"),
+        *("rotate180", "bayer", "pixel_format", "allow_damaged", "choice", "crop_events"),
+        *("frames_path", "layout_of_source", "light"),
+    ),
+    "Sensor and pixel": (
+        *("config_files", "sets", "seed", "effect_files", "size", "motion", "extent_px"),
+        *("duration_s", "fit_thresholds", "without"),
+    ),
+    "Output": (
+        *("output", "overwrite", "format", "layout", "t0", "with_frames", "preview", "causes"),
+        "as_json",
+    ),
+    "Running": ("threads", "jobs", "shard", "scheduler", "split", "dry_run", "progress", "quiet"),
+}
+"""Options by what they are about, where a command has many; the others stand before or after."""
+
+_LAST, _MANY = ("verbose", "help"), 14
+
 
 class Command(click.Command):
-    """A command whose extra arguments become a hint: an output without -o, or further inputs."""
+    """A command whose extra arguments become a hint: an output without -o, or further inputs.
+
+    Its help shows many options in groups.
+    """
 
     allow_extra_args = True
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, those of a group together."""
+        records = {
+            "help" if "--help" in item.opts else item.name: record
+            for item in self.get_params(ctx)
+            if isinstance(item, click.Option)
+            if (record := item.get_help_record(ctx)) is not None
+        }
+        if len(records) < _MANY:
+            super().format_options(ctx, formatter)
+            return
+        grouped = {name for names in _GROUPS.values() for name in names} | {*_LAST}
+        others = tuple(str(name) for name in records if name not in grouped)
+        groups = {"Options": others, **_GROUPS}
+        groups["Running"] = (*_GROUPS["Running"], *_LAST)
+        for title, names in groups.items():
+            if rows := [records[name] for name in names if name in records]:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments; raise UsageError, with what to type instead, if some are left."""

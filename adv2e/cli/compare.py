@@ -47,8 +47,7 @@ if TYPE_CHECKING:
 @options.track_option("MEASURED")
 @options.config_options
 @options.threads_option
-@options.progress_option
-@options.verbosity_options
+@options.reporting_options
 def command(
     measured: str,
     simulated: str,

@@ -40,9 +40,12 @@ def group() -> None:
 
     \b
     Examples:
-      adv2e config show -c v2e --set pixel.leak=null > mine.yaml
+      adv2e config list
+      adv2e config show v2e --set pixel.leak=null > mine.yaml
       adv2e config check mine.yaml
       adv2e convert clip.mp4 -c mine.yaml
+
+    'adv2e config template davis346' begins one for 'adv2e diagnose'.
 
     A configuration is a YAML file. Keys that it leaves out keep their defaults. The value null
     switches an effect off. 'adv2e config' alone is 'adv2e config show'.
@@ -53,18 +56,50 @@ def group() -> None:
     """
 
 
+def _files_argument(body: options.Body) -> options.Body:
+    """Add FILE..., which is the same as -c FILE; the command gets ``files``, a tuple."""
+    return click.argument(
+        "files", metavar="[FILE]...", nargs=-1, shell_complete=completion.configurations
+    )(body)
+
+
+@group.command("list")
+def list_shipped() -> None:
+    """List the shipped configurations, which -c takes by name."""
+    from adv2e.config.files import shipped, title
+
+    for name in shipped():
+        click.echo(f"{name:<16} {title(name)}")
+
+
 @group.command()
+@click.argument("name", metavar="CAMERA", shell_complete=completion.configurations)
+def template(name: str) -> None:
+    """Print a declared.yaml for 'adv2e diagnose', to write into it what is known of a camera.
+
+    It holds what the maker of CAMERA, a shipped configuration, states for each one that he sells.
+    All else depends on biases, light and the single chip, and is commented out.
+    """
+    from adv2e.config.files import template as template_of
+
+    click.echo(template_of(name), nl=False)
+
+
+@group.command()
+@_files_argument
 @options.config_parts
 def show(
+    files: tuple[str, ...],
     config_files: tuple[str, ...],
     sets: tuple[str, ...],
     seed: int | None,
     effect_files: tuple[str, ...],
 ) -> None:
-    """Print the configuration that -c and --set make, each key explained."""
+    """Print the configuration that FILE (or -c) and --set make, each key explained."""
     from adv2e.config import load_family
 
-    family = load_family(config_files, sets, seed, options.own_effects(effect_files))
+    files = (*files, *config_files)
+    family = load_family(files, sets, seed, options.own_effects(effect_files))
     _print(family, "resolved configuration")
 
 
@@ -77,14 +112,23 @@ def defaults() -> None:
 
 
 @group.command()
-@click.argument("file", metavar="FILE", shell_complete=completion.configurations)
-@options.effect_option
-def check(file: str, effect_files: tuple[str, ...]) -> None:
-    """Check a configuration file. The exit status is 0 if it is right, 1 if not."""
+@_files_argument
+@options.config_parts
+def check(
+    files: tuple[str, ...],
+    config_files: tuple[str, ...],
+    sets: tuple[str, ...],
+    seed: int | None,
+    effect_files: tuple[str, ...],
+) -> None:
+    """Check what FILE (or -c) and --set make. The exit status is 0 if it is right, 1 if not."""
     from adv2e.config import load_family
 
-    load_family([file], effects=options.own_effects(effect_files))
-    click.echo(f"{file}: ok")
+    files = (*files, *config_files)
+    if not files and not sets:
+        raise click.UsageError("FILE is missing: name a configuration to check")
+    load_family(files, sets, seed, options.own_effects(effect_files))
+    click.echo(f"{', '.join(files) or 'defaults'}: ok")
 
 
 def _print(family: Family, what: str) -> None:

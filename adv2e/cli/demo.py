@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 @click.option("--overwrite", is_flag=True, help="Replace what an earlier demo left in it.")
 @options.config_options
 @options.threads_option
-@options.progress_option
-@options.verbosity_options
+@options.reporting_options
 def command(
     output: Path,
     overwrite: bool,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from adv2e.cli.options import Log
     from adv2e.config import Config
-    from adv2e.geometry import Size
+    from adv2e.geometry import Rectangle, Size
 
 
 @click.command("diagnose", cls=Command)
@@ -49,6 +49,13 @@ if TYPE_CHECKING:
 @options.time_unit_option
 @options.rotate_option()
 @options.track_option("RECORDING")
+@click.option(
+    "--start", type=options.SECONDS, metavar="S", help="Look at it from S seconds after its start."
+)
+@click.option(
+    "--stop", type=options.SECONDS, metavar="S", help="Look at it until S seconds after its start."
+)
+@options.crop_option("Look at a part of the sensor only: first column, first row, columns, rows.")
 def command(
     recording: str,
     config: Callable[[Size | None], Config],
@@ -61,16 +68,20 @@ def command(
     time_unit: str | None,
     rotate180: bool,
     track: str | None,
+    start: float | None,
+    stop: float | None,
+    crop: Rectangle | None,
     threads: int | None,
     progress: bool,
     log: Log,
 ) -> None:
     """Find what a recording holds that its simulation lacks.
 
-    RECORDING holds frames and events on one clock: a DAVIS240C folder or zip, or HDF5. The
-    configuration (-c) says what is known of the camera. The events are simulated from the frames;
-    where the recording differs from all simulations by more than chance, the effect that the
-    declared model lacks is looked for, fitted, and judged on data that it was not fitted to.
+    RECORDING holds frames and events on one clock: a DAVIS240C folder or zip, AEDAT4, AEDAT-2, a
+    ROS bag, HDF5 of DDD17, DDD20 or MVSEC, or HDF5 that adv2e wrote with frames. The configuration
+    (-c) says what is known of the camera. The events are simulated from the frames; where the
+    recording differs from all simulations by more than chance, the effect that the declared model
+    lacks is looked for, fitted, and judged on data that it was not fitted to.
 
     With --light, RECORDING holds events alone, in any format that adv2e reads, of a light that is
     known: an LED that leaps, a lamp with a photodiode. TABLE is delimited text: time_s on the clock
@@ -83,6 +94,7 @@ def command(
 
     \b
     Examples:
+      adv2e config template davis346 > declared.yaml
       adv2e diagnose recording.zip -c declared.yaml -o diagnosis
       adv2e diagnose recording.zip -c davis346 --without flicker
       adv2e diagnose led.raw --light stimulus.csv -c declared.yaml --fit-thresholds
@@ -94,6 +106,7 @@ def command(
     from adv2e.files.names import shown
     from adv2e.reports.summary import summary_text
 
+    options.check_part(start, stop)
     declared = config(size)
     options_given = click.get_current_context().params
     given = options_given["config_files"], options_given["sets"]
@@ -111,9 +124,11 @@ def command(
         time_unit=time_unit,
         rotate180=rotate180,
         track=track,
+        part=(start, stop, crop),
         overwrite=overwrite,
         threads=threads,
         progress=progress,
+        say=log,
         log=lambda text: log(text, 1),
     )
     for line in summary_text(found).splitlines():

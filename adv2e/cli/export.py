@@ -113,7 +113,7 @@ _OPTIONS = {
     help="Size of the sensor, where the files do not state it.",
 )
 @options.threads_option
-@options.verbosity_options
+@options.reporting_options
 def command(
     events: tuple[str, ...],
     output: str | None,

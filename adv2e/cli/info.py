@@ -20,8 +20,7 @@ from adv2e.geometry import Size
 @click.option(
     "--size", type=options.SIZE, metavar="WxH", help="Size of the frames of raw video (FILE is -)."
 )
-@options.progress_option
-@options.verbosity_options
+@options.reporting_options
 def command(
     file: Path,
     as_json: bool,

@@ -364,13 +364,21 @@ def threads_option(body: Body) -> Body:
     )(body)
 
 
-def verbosity_options(body: Body) -> Body:
-    """Add -q and -v; the command gets ``log``."""
+def reporting_options(body: Body) -> Body:
+    """Add -q, -v and --progress; the command gets ``log`` and ``progress``, off by default with -q.
+
+    While it runs, it is told that functions are compiled.
+    """
 
     def remember(ctx: click.Context, param: click.Parameter, count: int) -> int:
         ctx.meta[VERBOSITY] = count
         return count
 
+    @click.option(
+        "--progress/--no-progress",
+        default=None,
+        help="Show a progress bar.  [default: on a terminal]",
+    )
     @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
     @click.option(
         "-v",
@@ -381,36 +389,18 @@ def verbosity_options(body: Body) -> Body:
         help="Print more. -vv also prints tracebacks.",
     )
     @functools.wraps(body)
-    def with_log(*args: Any, quiet: bool, verbose: int, **kw: Any) -> Any:
-        return body(*args, log=Log(-1 if quiet else verbose), **kw)
-
-    return with_log  # type: ignore[return-value]
-
-
-def progress_option(body: Body) -> Body:
-    """Add --progress/--no-progress; the command gets ``progress``.
-
-    Where `log` is among the command's arguments and -q was given, the default is no progress.
-    """
-
-    @click.option(
-        "--progress/--no-progress",
-        default=None,
-        help="Show a progress bar.  [default: on a terminal]",
-    )
-    @functools.wraps(body)
-    def with_progress(*args: Any, progress: bool | None, **kw: Any) -> Any:
+    def reporting(*args: Any, progress: bool | None, quiet: bool, verbose: int, **kw: Any) -> Any:
+        log = Log(-1 if quiet else verbose)
         if progress is None:
-            quiet = isinstance(kw.get("log"), Log) and kw["log"].level < 0
             progress = not quiet and sys.stderr is not None and sys.stderr.isatty()
-        with compilation_told(kw.get("log"), progress):
-            return body(*args, progress=progress, **kw)
+        with compilation_told(log, progress):
+            return body(*args, log=log, progress=progress, **kw)
 
-    return with_progress  # type: ignore[return-value]
+    return reporting  # type: ignore[return-value]
 
 
 def run_options(body: Body) -> Body:
     """Add those of any work: the command gets output, overwrite, threads, progress and log."""
-    for decorator in (progress_option, verbosity_options, threads_option, output_options):
+    for decorator in (reporting_options, threads_option, output_options):
         body = decorator(body)
     return body

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 @click.command("render", cls=Command)
 @click.argument("events", metavar="EVENTS", shell_complete=completion.files)
 @options.output_options
-@options.progress_option
-@options.verbosity_options
+@options.reporting_options
 @click.option(
     "--style",
     type=click.Choice(["white", "black", "grey", "surface"]),

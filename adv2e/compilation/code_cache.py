@@ -5,7 +5,9 @@ user's own and nobody else may write to it.  Damaged code may do anything: a man
 digest of every file, and what differs from it is removed before anything is loaded.
 
 Numba numbers the files of a function, so two processes that write at once could take the code of
-one signature for that of another.  Whoever reads or writes holds :meth:`CodeCache.lock`.
+one signature for that of another.  Whoever writes holds :meth:`CodeCache.lock`; it is not held
+while a function is compiled, so nobody waits for long.  Whoever reads needs none: files are
+replaced whole, and a number keeps its signature.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ import time
 import weakref
 from contextlib import suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from adv2e.files.locks import lock_file, unlock_file
 from adv2e.files.workspace import is_ours
@@ -52,6 +54,7 @@ class CodeCache:
         self.folder: Path | None = None
         self.why_not = ""
         self._file: BinaryIO | None = None
+        self._noted: dict[str, tuple[int, int]] = {}
         for base in _bases():
             wrong = self._open(base / "adv2e", base / "adv2e" / name)
             if not wrong:
@@ -81,29 +84,49 @@ class CodeCache:
         except OSError as error:
             return f"{base}: {error.strerror or error}"
         try:
-            _remove_unknown(folder)
+            self._remove_unknown(folder)
         finally:
             unlock_file(self._file)
         return ""
 
     def lock(self) -> None:
-        """Wait until no other process reads or writes here."""
+        """Wait until no other process writes here."""
         if self._file is not None:
             lock_file(self._file, wait=True)
 
     def unlock(self) -> None:
-        """Let others read and write."""
+        """Let others write."""
         if self._file is not None:
             unlock_file(self._file)
 
     def note_files(self) -> None:
-        """Write the manifest of all that is there, under the lock."""
+        """Add to the manifest what came or changed since this process looked, under the lock."""
         if self.folder is None:
             return
         with suppress(OSError):  # what is not listed is compiled again
+            listed = _listed(self.folder)
+            there = _code(self.folder)
+            digests = {name: listed[name] for name in there if name in listed}
+            for name, path in there.items():
+                if self._is_new(name, path):
+                    digests[name] = _digest(path)
             part = self.folder / f"{_MANIFEST}.part"
-            part.write_text(json.dumps(_digests(self.folder), indent=0), encoding="utf-8")
+            part.write_text(json.dumps(digests, indent=0), encoding="utf-8")
             part.replace(self.folder / _MANIFEST)
+
+    def _is_new(self, name: str, path: Path) -> bool:
+        """Tell whether a file is not as it was when this process looked last, which is now."""
+        status = path.stat()
+        before, self._noted[name] = self._noted.get(name), (status.st_mtime_ns, status.st_ino)
+        return before != self._noted[name]
+
+    def _remove_unknown(self, folder: Path) -> None:
+        """Remove every file of code that is not as the manifest says."""
+        listed = _listed(folder)
+        for name, path in _code(folder).items():
+            self._is_new(name, path)
+            if listed.get(name) != _digest(path):
+                path.unlink()
 
 
 def _bases() -> list[Path]:
@@ -116,23 +139,22 @@ def _bases() -> list[Path]:
     return [*map(Path, filter(None, told)), cache]
 
 
-def _digests(folder: Path) -> dict[str, str]:
-    """Return the digest of each file of code, by its name below `folder`."""
-    return {
-        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.glob("*/*"))
-    }
+def _code(folder: Path) -> dict[str, Path]:
+    """Return each file of code, by its name below `folder`."""
+    return {path.relative_to(folder).as_posix(): path for path in sorted(folder.glob("*/*"))}
 
 
-def _remove_unknown(folder: Path) -> None:
-    """Remove every file of code that is not as the manifest says."""
-    listed: object = None
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _listed(folder: Path) -> dict[str, Any]:
+    """Return the manifest: the digest of each file of code."""
     with suppress(OSError, ValueError):
         listed = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
-    known = listed if isinstance(listed, dict) else {}
-    for name, digest in _digests(folder).items():
-        if known.get(name) != digest:
-            (folder / name).unlink()
+        if isinstance(listed, dict):
+            return listed
+    return {}
 
 
 def _note_use(folder: Path) -> None:

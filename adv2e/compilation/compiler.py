@@ -54,7 +54,7 @@ def know_type(of: type[Any]) -> None:
 
 
 def listen(cache: CodeCache, watcher: Callable[[Callable[..., Any]], None]) -> None:
-    """Hold the lock of `cache` while Numba holds its own; tell of what is about to be compiled.
+    """Hold the lock of `cache` while Numba writes to it; tell of what is about to be compiled.
 
     Parameters
     ----------
@@ -68,30 +68,32 @@ def listen(cache: CodeCache, watcher: Callable[[Callable[..., Any]], None]) -> N
 
 
 class _Listener(_event.Listener):  # type: ignore[misc]
-    """Numba tells before it takes its lock, and after it has given it back."""
+    """Numba tells before it takes its lock, around compiling, and after it has given the lock back.
+
+    It writes the code of a function between the last two.  In its lock, other functions may be
+    compiled and written, which those that are being compiled call.
+    """
 
     def __init__(self, cache: CodeCache, watcher: Callable[[Callable[..., Any]], None]) -> None:
         self._cache, self._watcher = cache, watcher
         self._lock = threading.RLock()
-        self._depth, self._has_compiled = 0, False
+        self._depth = self._writes_at = 0
 
     def on_start(self, event: Any) -> None:
         if event.kind == "numba:compile":
-            self._has_compiled = True
             self._watcher(event.data["dispatcher"].py_func)
             return
         self._lock.acquire()
         self._depth += 1
-        if self._depth == 1:
-            self._cache.lock()
 
     def on_end(self, event: Any) -> None:
         if event.kind == "numba:compile":
+            self._cache.lock()
+            self._writes_at = self._depth
             return
-        self._depth -= 1
-        if self._depth == 0:
-            if self._has_compiled:
-                self._cache.note_files()
-                self._has_compiled = False
+        if self._writes_at == self._depth:
+            self._writes_at = 0
+            self._cache.note_files()
             self._cache.unlock()
+        self._depth -= 1
         self._lock.release()

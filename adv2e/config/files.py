@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import re
+from itertools import takewhile
 from pathlib import Path
 
 from adv2e.config.yaml12 import Origin, Value, parse
@@ -25,6 +27,46 @@ def shipped() -> list[str]:
     return sorted(path.stem for path in shipped_folder().glob("*.yaml"))
 
 
+def title(name: str) -> str:
+    """Return what a shipped configuration says of itself first, in one sentence."""
+    text = (shipped_folder() / f"{name}.yaml").read_text("utf-8")
+    comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
+    told = re.sub(r"\s*\([^)]*\)", "", " ".join(line.lstrip("# ") for line in comment))
+    # a sentence, without the authors that follow a colon
+    return re.split(r"\.\s|:\s(?=[A-Z]\.)", told, maxsplit=1)[0]
+
+
+_TEMPLATE = """\
+# What is known of a camera, for 'adv2e diagnose RECORDING -c declared.yaml'.  Every key that is
+# written here counts as known: if the data need another value, that is the finding.  The maker
+# knows the sensor alone.  The rest is commented out, as {name} has it: thresholds, bandwidth and
+# noise depend on biases, light and the single chip.  Take the '#' away from keys, and the sections
+# that they are in, where you have measured your own.
+
+"""
+
+
+def template(name: str) -> str:
+    """Return the text of a shipped configuration of which but the sensor is commented out.
+
+    Raises
+    ------
+    ConfigError
+        No configuration of that name is shipped, or it has no sensor.
+    """
+    texts = {one: find(one).read_text("utf-8").splitlines() for one in shipped()}
+    cameras = [one for one, text in texts.items() if "sensor:" in text]
+    if name not in cameras:
+        raise ConfigError(f"{name}: no camera that is shipped, must be {' or '.join(cameras)}")
+    written, is_known = [_TEMPLATE.format(name=name)], False
+    for line in texts[name]:
+        if line and not line[0].isspace() and not line.startswith("#"):
+            is_known = line == "sensor:"
+        keep = is_known or not line or line.startswith("#")
+        written.append(f"{line}\n" if keep else f"# {line}\n")
+    return "".join(written)
+
+
 def find(name: str | Path) -> Path:
     """Return the path of the configuration `name`: a file, or the name of a shipped one.
 
@@ -44,7 +86,7 @@ def find(name: str | Path) -> Path:
         known = path.suffix in (".yaml", ".yml") and path.stem in shipped()
         hint = f" (the shipped one: -c {path.stem})" if known else ""
         raise ConfigError(f"{name}: no such file{hint}")
-    near = difflib.get_close_matches(path.name, shipped(), n=1)
+    near = difflib.get_close_matches(path.name.lower(), shipped(), n=1)
     hint = f", did you mean '{near[0]}'?" if near else ""
     raise ConfigError(
         f"{name}: no such file or shipped configuration{hint} (shipped: {', '.join(shipped())})"

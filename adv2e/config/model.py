@@ -45,7 +45,8 @@ class Frames(Section):
         "auto",
         unit="-",
         meaning="auto | linear | srgb | bt709 | pq | hlg | gamma:<g> (light = value^g); auto: what"
-        " a video states, else srgb for it and 8-bit colour images, linear for everything else",
+        " a video states, else srgb for it and all 8-bit pictures; linear for cameras' recordings,"
+        " mosaics, 16 bits and floats",
     )
     full_scale: float | None = parameter(
         None,

@@ -14,6 +14,7 @@ from adv2e.conversion.transfer import convert_events
 from adv2e.errors import UsageError
 from adv2e.formats.frames import takes_events
 from adv2e.geometry import parse_rectangle, parse_size
+from adv2e.in_python import in_python
 from adv2e.sources.paths import SensorPath
 from adv2e.sources.times.rates import Rate
 
@@ -131,7 +132,8 @@ def convert(
     >>> folder = tempfile.TemporaryDirectory()
     >>> clip = os.path.join(folder.name, "clip.npy")
     >>> np.save(clip, np.repeat(np.array([20, 40, 80, 160], np.uint8), 32 * 24).reshape(4, 24, 32))
-    >>> done = convert(clip, os.path.join(folder.name, "clip.h5"), "davis346", fps=100)
+    >>> config = ["davis346", {"frames": {"encoding": "srgb"}}]
+    >>> done = convert(clip, os.path.join(folder.name, "clip.h5"), config, fps=100)
     >>> (done.width, done.height, done.frames, done.events > 0)
     (346, 260, 4, True)
     >>> folder.cleanup()
@@ -144,7 +146,7 @@ def convert(
         raise UsageError(f"size, crop: {error}") from None
 
     def doubt(text: str) -> None:
-        warnings.warn(text, stacklevel=4)
+        warnings.warn(in_python(text), stacklevel=5)  # of who calls adv2e.convert
 
     if fps is not None and timestamps is not None:
         raise UsageError("fps and timestamps both give the times of the frames: keep one")
@@ -178,7 +180,7 @@ def convert(
             log=notes.append,
             doubt=doubt,
         )
-        return replace(summary, notes=tuple(notes))
+        return replace(summary, notes=tuple(map(in_python, notes)))
     ready = load_config(config, size=None if part and pixel_format else wanted)
     reading = Reading(
         str(source),
@@ -214,4 +216,4 @@ def convert(
             log=notes.append,
             doubt=doubt,
         )
-    return replace(summary, notes=tuple(notes))
+    return replace(summary, notes=tuple(map(in_python, notes)))

@@ -6,6 +6,7 @@ to an event: from rest, each would first have to gather a threshold, which short
 
 from __future__ import annotations
 
+import math
 import tempfile
 import warnings
 from collections.abc import Sequence
@@ -56,6 +57,8 @@ class Estimate:
     events, bytes, seconds : float
     frames, seen : int
         Frames of the source, and how many of them were looked at.
+    spent : float
+        Time that looking took, but for compiling [s].
     """
 
     events: float
@@ -63,6 +66,7 @@ class Estimate:
     seconds: float
     frames: int
     seen: int
+    spent: float = 0.0
 
 
 def may_be_much(source: Source) -> bool:
@@ -106,9 +110,13 @@ def estimate(
     config: Written | Sequence[Written] | None = None,
     *,
     threads: int | None = None,
+    share: float = math.inf,
     **options: Any,
 ) -> Estimate | None:
-    """Return about how much a conversion will make and take; None where frames are not counted.
+    """Return about how much a conversion will make and take; None where nobody can tell.
+
+    That is where frames are not counted, or so small a `share` of them may be looked at that it
+    tells nothing.
 
     Parameters
     ----------
@@ -118,6 +126,8 @@ def estimate(
     config : Config, or what :func:`adv2e.load_config` takes, optional
     threads : int, optional
         Threads that the conversion will have.
+    share : float
+        Of the frames, that may be converted for it; some are converted several times.
     **options
         Further arguments of :func:`adv2e.convert`, but for those of the output.
 
@@ -141,6 +151,14 @@ def estimate(
     times_s = _times_s(opened)
     half = int(_PART_PIXELS / 2 / (opened.width * opened.height))
     half = max(1, min(max(half, _FEWEST // 2), _MOST // 2, (len(times_s) - 1) // 2))
+    count = _PARTS
+    if share < (2 + half * (2 * count + 1)) / intervals:
+        room = share * intervals - 2
+        half = int(room / (2 * count + 1))
+        if half < _FEWEST // 2:
+            count, half = 1, int(room / 3)
+        if half < _FEWEST // 2:
+            return None
     last = max(0, len(times_s) - 1 - 2 * half)
 
     with tempfile.TemporaryDirectory(prefix="adv2e-estimate-") as folder:
@@ -160,9 +178,9 @@ def estimate(
                 made = convert(source, target, config, overwrite=True, threads=threads, **wanted)
             return _Part(made.frames - 1, made.events, state_of(target).bytes, made.seconds)
 
-        part(0, 2 * half)  # compiles, and reads what is not in memory
+        part(0, 2)  # compiles, and reads what is not in memory
         short, whole = part(0, half), part(0, 2 * half)
-        others = [part(k * last // (_PARTS - 1), 2 * half) for k in range(1, _PARTS) if last]
+        others = [part(k * last // (count - 1), 2 * half) for k in range(1, count) if last]
     parts = [whole, *others]
     seen = sum(one.intervals for one in parts)
     fixed_bytes = min(_at_none(short, short.bytes, whole, whole.bytes), float(short.bytes))
@@ -174,6 +192,7 @@ def estimate(
         fixed_s + intervals * (whole.seconds - fixed_s) / whole.intervals,
         opened.count,
         seen + len(parts),
+        short.seconds + sum(one.seconds for one in parts),
     )
 
 

@@ -217,7 +217,9 @@ def convert_reading(
                 format=format,
                 layout=layout,
                 metadata={
-                    **_metadata(config, recording, decoder, white if with_frames else None),
+                    **_metadata(
+                        config, recording, decoder, fitting, white if with_frames else None
+                    ),
                     **({"causes": CAUSES} if causes else {}),
                 },
                 with_frames=with_frames,
@@ -260,7 +262,8 @@ def convert_reading(
             del events  # or they would stay while the next ones are made
     # at the end: an error is to be the only line
     taken = light_text(recording.light, recording.full_scale, config.frames)
-    log(f"frames are {taken}")
+    is_guess = config.frames.encoding == "auto" and recording.light.is_guess
+    (doubt if is_guess else log)(f"frames are {taken}")
     crop = recording.selection.crop
     if crop is not None or fitting is not None:
         part = f" at x {crop.x}, y {crop.y} of the input's" if crop is not None else ""
@@ -314,7 +317,11 @@ def _doubt_of_white(recording: Source, largest: float | None, config: Config) ->
 
 
 def _metadata(
-    config: Config, recording: Source, decoder: LightDecoder, white: float | None
+    config: Config,
+    recording: Source,
+    decoder: LightDecoder,
+    fitting: Fitting | None,
+    white: float | None,
 ) -> dict[str, Any]:
     """Return what makes the file again, apart from the input itself, and what it holds.
 
@@ -334,7 +341,10 @@ def _metadata(
         "source": {
             "name": shown(Path(recording.path).name),
             "kind": recording.kind,
+            "size": list(recording.whole),
+            **({"rotate180": True} if recording.selection.rotate180 else {}),
             **({"crop": list(crop)} if crop is not None else {}),
+            **({"sensor": fitting.placement()} if fitting is not None else {}),
             "encoding": decoder.encoding,
             "full_scale": decoder.full_scale,
             "light": light_text(recording.light, recording.full_scale, config.frames),

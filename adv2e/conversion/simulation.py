@@ -18,17 +18,17 @@ from adv2e.config import Config, Written, load_config
 from adv2e.config.active_effects import active_hooks
 from adv2e.effects.composition import additions_of, begin, check_causes, map_events, overrides
 from adv2e.effects.frames.brightness import bounded, check_floats
-from adv2e.effects.frames.encoding import LightDecoder, encoding_of_images
+from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.effects.reorder_buffer import InOrder, count_before
 from adv2e.errors import DataError
 from adv2e.events import Events, empty_events
-from adv2e.light.decoding import decoder_for, kernel_table
+from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.intervals import Intervals
 from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray, Share
 from adv2e.pixel.steps import PRECISE, Coarseness
-from adv2e.sources.frame import check_values
+from adv2e.sources.frame import check_values, light_of_images
 from adv2e.sources.times.instants import NS_PER_S
 from adv2e.sources.times.rates import FrameRate, parse_rate
 from adv2e.ticks import check_time
@@ -51,9 +51,9 @@ def simulate(
     Parameters
     ----------
     frames : iterable of (rows, columns) or (rows, columns, 3) arrays
-        uint8, uint16, float32 or float64; colour as RGB.  `frames.encoding: auto` means linear
-        here, except for 8-bit colour, which is taken as sRGB.  With a `sensor` in the configuration
-        they are brought to its size, which is that of the events.
+        uint8, uint16, float32 or float64; colour as RGB.  `frames.encoding: auto` means sRGB for 8
+        bits and linear for others.  With a `sensor` in the configuration they are brought to its
+        size, which is that of the events.
     times : iterable of float, or float
         Time of each frame [s], increasing; or so many frames a second, the first at 0.
     config : Config, or what :func:`adv2e.load_config` takes, optional
@@ -82,13 +82,15 @@ def simulate(
     Warns
     -----
     UserWarning
-        The second frame comes so late that the times are hardly in seconds.
+        The second frame comes so late that the times are hardly in seconds.  `frames.encoding` is
+        auto, and the frames are grey of 8 bits or of 16 bits, so that what they stand for is a
+        guess.
 
     Examples
     --------
     >>> import numpy as np
     >>> from adv2e import simulate
-    >>> frames = [np.full((4, 6), dn, np.uint8) for dn in (20, 40, 80, 160)]
+    >>> frames = [np.full((4, 6, 3), dn, np.uint8) for dn in (50, 80, 130, 200)]
     >>> events = np.concatenate(list(simulate(frames, 100)))  # 100 frames a second
     >>> times = [0.0, 0.01, 0.02, 0.03]  # seconds
     >>> sum(map(len, simulate(frames, times, "adv2e"))) == len(events) > 0
@@ -176,8 +178,12 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
         raise DataError(
             f"frame 0: shape {image.shape}, must be (rows, columns) or (rows, columns, 3)"
         )
-    auto = encoding_of_images(image.dtype, colour)
-    return decoder_for(config.frames, image.dtype, colour, auto=auto)
+    light = light_of_images(image.dtype, colour=colour, name="arrays")
+    decoder = decoder_for(config.frames, image.dtype, colour, auto=light.encoding)
+    if config.frames.encoding == "auto" and light.is_guess:
+        taken = light_text(light, decoder.full_scale, config.frames)
+        warnings.warn(f"frames are {taken}", stacklevel=4)  # of who loops over adv2e.simulate
+    return decoder
 
 
 def events_from_light(

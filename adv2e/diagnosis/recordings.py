@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,11 +13,12 @@ from tqdm import tqdm
 from adv2e.config import Config, Written, files_among, load_config, names_of, written_keys
 from adv2e.config.user_effects import user_effects
 from adv2e.diagnosis.configurations import without_user_effects
-from adv2e.diagnosis.data.evidence import read_evidence
+from adv2e.diagnosis.data.evidence import part_of, read_evidence
 from adv2e.diagnosis.diagnose import diagnose as diagnose_evidence
 from adv2e.diagnosis.fitting.library import names
 from adv2e.diagnosis.known_light import read_known_light
 from adv2e.errors import UsageError
+from adv2e.geometry import Rectangle, parse_rectangle
 from adv2e.reports.files import check_folder, write_reports
 from adv2e.reports.result import Diagnosis
 
@@ -32,6 +34,9 @@ def diagnose(
     time_unit: str | None = None,
     rotate180: bool = False,
     track: str | int | None = None,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    crop: str | tuple[int, int, int, int] | None = None,
     overwrite: bool = False,
     threads: int | None = None,
     progress: bool = False,
@@ -62,6 +67,10 @@ def diagnose(
         Turn frames and events by half a turn, as for a camera that was mounted upside down.
     track : str or int, optional
         Which one to read of several streams: its number from 0, or its name.
+    start_s, stop_s : float, optional
+        Part to look at [s after the first frame].
+    crop : (int, int, int, int) or str, optional
+        First column, first row, columns and rows of the part of the sensor to look at.
     overwrite : bool
         Replace the folder of an earlier report.
     threads : int, optional
@@ -88,6 +97,10 @@ def diagnose(
     ('explained', ['refractory'])
     >>> dead_time = load_config(found.model).pixel.refractory.period_us
     """
+    try:
+        part = None if crop is None else parse_rectangle(crop)
+    except ValueError as error:
+        raise UsageError(f"crop: {error}") from None
     return diagnose_file(
         recording,
         load_config(declared),
@@ -101,6 +114,7 @@ def diagnose(
         time_unit=time_unit,
         rotate180=rotate180,
         track=track,
+        part=(start_s, stop_s, part),
         overwrite=overwrite,
         threads=threads,
         progress=progress,
@@ -121,15 +135,19 @@ def diagnose_file(
     time_unit: str | None,
     rotate180: bool,
     track: str | int | None,
+    part: tuple[float | None, float | None, Rectangle | None],
     overwrite: bool,
     threads: int | None,
     progress: bool,
+    say: Callable[[str], None] | None = None,
     log: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
     """Do what :func:`diagnose` does, with a configuration that was loaded.
 
     `name` and `written` are what it was made from and the keys that somebody wrote; `also_read` are
-    files that must not be written over; `log` takes lines for people.
+    files that must not be written over; `part` is what of the recording is looked at
+    (:func:`adv2e.diagnosis.data.evidence.part_of`); `log` takes lines for people, and `say` those
+    that tell now and then how far it is, where no bar does.
     """
     check_names(without, names(declared))
     _check_own_names(declared)
@@ -137,13 +155,14 @@ def diagnose_file(
     if output is not None:
         inputs = [recording, *([] if light is None else [light]), *also_read]
         check_folder(output, overwrite=overwrite, inputs=inputs)
-    with _stages(progress) as tell:
+    with _stages(progress, say) as tell:
         given = time_unit, declared.sensor
         evidence = (
             read_evidence(recording, *given, rotate180=rotate180, track=track)
             if light is None
             else read_known_light(recording, light, *given, rotate180=rotate180, track=track)
         )
+        evidence = part_of(evidence, *part)
         found = diagnose_evidence(
             evidence,
             declared,
@@ -160,16 +179,41 @@ def diagnose_file(
     return found
 
 
+SAY_EVERY_S = 30.0
+USUAL = 1300
+"""Simulations of a diagnosis that finds its effect at once; others take up to nine times as many
+(the README of this package)."""
+
+
+def how_far(stage: str, simulations: int, seconds: float) -> str:
+    """Return what a diagnosis does, and an estimate of the time that it will still take."""
+    text = f"{stage}: {simulations:,} simulations in {seconds:.0f} s"
+    if not simulations:
+        return text
+    if simulations >= USUAL:
+        return f"{text}; it takes longer where no single effect explains all"
+    left_s = seconds * (USUAL / simulations - 1)
+    return f"{text}; about {max(10, round(left_s, -1)):.0f} s more where one effect explains all"
+
+
 @contextmanager
-def _stages(shown: bool) -> Iterator[Callable[[str, int], None]]:
-    """Show a stage and the number of simulations done; how many there will be, nobody knows."""
+def _stages(shown: bool, say: Callable[[str], None] | None) -> Iterator[Callable[[str, int], None]]:
+    """Show a stage and the number of simulations done; how many there will be, nobody knows.
+
+    Without a bar, `say` is told the same now and then.
+    """
+    began = said = time.monotonic()
     layout = "{desc}: {n_fmt} simulations in {elapsed}"
     last = "reading the recording"
     with tqdm(desc=last, bar_format=layout, leave=False, disable=not shown) as bar:
 
         def tell(stage: str, simulations: int) -> None:
-            nonlocal last
+            nonlocal last, said
             bar.update(simulations - bar.n)
+            now = time.monotonic()
+            if say is not None and not shown and now - said >= SAY_EVERY_S:
+                said = now
+                say(how_far(stage, simulations, now - began))
             if stage != last:
                 bar.set_description_str(stage)
                 last = stage

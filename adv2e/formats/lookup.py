@@ -130,6 +130,8 @@ def _layout_of(path: Path, layouts: list[Format]) -> Format:
     raise DataError(f"{path}: unknown HDF5 layout, must be {known}")
 
 
+_PICTURES_OF_EVENTS = (".mp4", ".webm", ".gif", ".avi", ".mkv", ".mov", ".png", ".jpg", ".jpeg")
+
 _STANDARD_OUTPUT = Format(name="txt", what="text", suffixes=(), writer="text.writer:StandardOutput")
 
 
@@ -138,6 +140,11 @@ def _of_suffix(path: Path) -> Format:
     for found in FORMATS:
         if found.writer and suffix in found.suffixes:
             return found
+    if suffix in _PICTURES_OF_EVENTS:
+        raise UsageError(
+            f"{path}: would be a picture or film of events, and a file of events is to be written:"
+            f" add --preview {path}, or make one later with 'adv2e render EVENTS -o {path}'"
+        )
     known = dict.fromkeys(s for f in FORMATS if f.writer for s in f.suffixes if s)
     raise UsageError(
         f"{path}: unknown suffix '{suffix}', must be one of {', '.join(known)},"

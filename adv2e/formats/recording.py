@@ -62,6 +62,25 @@ class Recording:
         """What ``frames.encoding: auto`` means for the frames."""
         return self.light.encoding
 
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return the events as arrays of their own, by name: t, x, y and p.
+
+        Each is contiguous and signed, t int64, x, y and p int16, so that ``torch.from_numpy`` takes
+        it, and p - 1 or 2 p - 1 do not wrap.
+
+        Examples
+        --------
+        >>> from adv2e.events import make_events
+        >>> from adv2e.formats.recording import Recording
+        >>> events = make_events(t=[5, 9], x=[3, 0], y=[2, 1], p=[1, 0])
+        >>> (2 * Recording("r", "array", 4, 3, events).columns()["p"] - 1).tolist()
+        [1, -1]
+        """
+        kinds = {"t": np.int64, "x": np.int16, "y": np.int16, "p": np.int16}
+        most = max(self.width, self.height) > np.iinfo(np.int16).max
+        kinds |= {"x": np.int32, "y": np.int32} if most else {}
+        return {name: self.events[name].astype(kind) for name, kind in kinds.items()}
+
     def frames(self) -> Iterator[Frame]:
         """Yield the frames one by one, as often as asked.
 

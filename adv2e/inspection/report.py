@@ -68,6 +68,21 @@ def _origin(metadata: dict[str, Any]) -> Iterator[tuple[str, str]]:
     source = metadata.get("source")
     if isinstance(source, dict) and "name" in source:
         yield "made from", str(source["name"])
+        if "size" in source:
+            yield "made of", _placement(source)
+
+
+def _placement(source: dict[str, Any]) -> str:
+    """Return how the frames came to the sensor: turned, cut out, fitted."""
+    parts = ["frames of {}x{}".format(*source["size"])]
+    if source.get("rotate180"):
+        parts.append("turned by 180 degrees")
+    if "crop" in source:
+        x, y, width, height = source["crop"]
+        parts.append(f"of which {width}x{height} at x {x}, y {y} are taken")
+    if "sensor" in source:
+        parts.append(source["sensor"]["text"])
+    return ", ".join(parts)
 
 
 def _span(first_ns: int, last_ns: int) -> str:

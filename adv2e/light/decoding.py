@@ -52,8 +52,6 @@ def light_text(light: Light, white: float, frames: Frames | None = None) -> str:
     frames = frames or Frames()
     if frames.encoding != "auto":
         why = ["as frames.encoding says"]
-    elif "frames.encoding" in light.encoding_reason:
-        why = [light.encoding_reason]
     else:
         why = [light.encoding_reason, "frames.encoding changes it"]
     if frames.full_scale is not None:

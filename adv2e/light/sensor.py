@@ -171,6 +171,17 @@ class Fitting:
             seen[part] = self._columns.means(self._rows.means(single, 0, part), 1)
         return seen
 
+    def placement(self) -> dict[str, Any]:
+        """Return where a point of the frame lies on the sensor, of that in the middle of its path.
+
+        Of a point at (column, row) of the frame, from its upper left corner, it is
+        ``scale * (column, row) - scale * origin`` on the sensor.
+        """
+        pairs = zip(self.frames, self.size, self._scales, strict=True)
+        origin = [float((count - size / scale) / 2) for count, size, scale in pairs]
+        scale = [float(one) for one in self._scales]
+        return {"fit": self._fit, "scale": scale, "origin": origin, "text": self.text()}
+
     def text(self) -> str:
         """Return what is done, to follow the size that the frames have, after a comma."""
         if self._fit == "stretch":

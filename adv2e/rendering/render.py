@@ -89,7 +89,7 @@ def render(
     >>> import os, tempfile
     >>> import numpy as np
     >>> from adv2e import render, simulate
-    >>> frames = [np.full((24, 32), dn, np.uint8) for dn in (20, 40, 80, 160)]
+    >>> frames = [np.full((24, 32), light, np.float32) for light in (0.1, 0.2, 0.4, 0.8)]
     >>> events = np.concatenate(list(simulate(frames, 100)))
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     render(events, os.path.join(folder, "events.png"), size=(32, 24), count=2)

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.events import Events, Window, checked_events, cut, pixels_of
+from adv2e.events import Events, Window, checked_events, cut, is_sorted, pixels_of, with_fields
+from adv2e.formats.recording import Recording
 
 Grid = NDArray[np.float64]
 """(bins, rows, columns)."""
@@ -34,18 +35,22 @@ def signs(events: Events) -> NDArray[np.float64]:
 
 
 def voxel_grid(
-    events: Events, bins: int, size: tuple[int, int], window: Window | None = None
+    events: Events | Recording,
+    bins: int,
+    size: tuple[int, int] | None = None,
+    window: Window | None = None,
 ) -> Grid:
     """Return the signed grid of events: ON counts +1, OFF -1, shared by the two nearest bins.
 
     Parameters
     ----------
-    events : (n,) array of EVENT_DTYPE
-        In any order.  Events outside the window are left out.
+    events : Recording, or (n,) array of EVENT_DTYPE sorted by time
+        Events outside the window are left out.  Those in it are found by bisection, so that many
+        windows of a long recording cost no more than their own events.
     bins : int
         Number of bins; with 1 all events weigh the same.
-    size : (int, int)
-        Width and height of the sensor [pixels].
+    size : (int, int), optional
+        Width and height of the sensor [pixels]; default: those of the recording.
     window : (int, int), optional
         Times of the middles of the first and of the last bin [us], which belong to the window.
         Default: times of the first and the last event, as E2VID has it.
@@ -57,7 +62,8 @@ def voxel_grid(
     Raises
     ------
     DataError
-        There is no bin, the window ends before it begins, or an event lies outside the sensor.
+        There is no bin, the window ends before it begins, an event lies outside the sensor, or
+        events are not in the order of time; an array has no size.
 
     Examples
     --------
@@ -69,14 +75,40 @@ def voxel_grid(
            [0. , 0.5, 0. ],
            [0. , 0. , 0. ]])
     """
-    width, height = size
-    events = checked_events(events, width, height)
-    first, last = own_window(events) if window is None else window
+    if isinstance(events, Recording):
+        size = size or (events.width, events.height)
+        events = events.events
+    if size is None:
+        raise DataError("voxel grid: size is missing, (width, height) of the sensor [pixels]")
     if bins < 1:
         raise DataError(f"voxel grid: {bins} bins, at least 1 is needed")
+    if window is None:
+        events = checked_events(events, *size)
+        window = own_window(events)
+        return signed_grid(events, bins, size, window)
+    first, last = window
     if last < first:
         raise DataError(f"voxel grid: the window ends at {last} us, before it begins at {first} us")
-    return signed_grid(cut(events, first, last + 1), bins, size, (first, last))
+    events = with_fields(events)
+    _check_order(events)
+    inside = cut(events, first, last + 1)
+    if not is_sorted(inside):
+        raise DataError(_UNSORTED)
+    return signed_grid(checked_events(inside, *size), bins, size, window)
+
+
+_UNSORTED = (
+    "voxel grid: events must be sorted by time to find a window:"
+    " events[np.argsort(events['t'], kind='stable')]"
+)
+_SAMPLE = 256
+
+
+def _check_order(events: Events) -> None:
+    """Refuse an array whose events, some of which are looked at, are not in the order of time."""
+    some = events[:: max(1, len(events) // _SAMPLE)]
+    if len(events) and not (is_sorted(some) and some["t"][-1] <= events["t"][-1]):
+        raise DataError(_UNSORTED)
 
 
 def signed_grid(events: Events, bins: int, size: tuple[int, int], window: Window) -> Grid:

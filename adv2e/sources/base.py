@@ -20,6 +20,7 @@ import numpy as np
 from adv2e.effects.frames.brightness import doubt_of_white
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
+from adv2e.geometry import Size
 from adv2e.sources.frame import (
     OVER_BLACK,
     Frame,
@@ -60,6 +61,8 @@ class Source(ABC):
         file states, and good for showing progress.
     has_clock : bool
         Times are on a clock of the source's own, not counted from its first frame.
+    whole : Size
+        Size of the frames before they are cut.
     light : Light
         What the numbers of the frames stand for; `encoding` and `full_scale` are those of it.
     largest : float or None
@@ -112,10 +115,11 @@ class Source(ABC):
             usual = full_scale_of(image.dtype)
         except DataError as error:
             raise DataError(f"{label}: {error}") from error
-        self._height, self._width = self.height, self.width = image.shape[:2]
+        self.height, self.width = image.shape[:2]
+        self.whole = Size(self.width, self.height)
         crop = self.selection.crop
         if crop is not None:
-            if not crop.is_inside(self.width, self.height):
+            if not crop.is_inside(*self.whole):
                 raise DataError(
                     f"{label}: --crop {crop} is not inside its {self.width}x{self.height} pixels"
                 )
@@ -215,8 +219,9 @@ class Source(ABC):
     def _load(self, shot: Shot) -> Pixels:
         pixels, label = shot.load(), shot.label
         image = pixels.image
-        first = _description(self._width, self._height, self.dtype, self.colour)
-        this = _description(image.shape[1], image.shape[0], image.dtype, image.ndim == 3)
+        first = _description(self.whole, self.dtype, self.colour)
+        size = Size(image.shape[1], image.shape[0])
+        this = _description(size, image.dtype, image.ndim == 3)
         if this != first:
             raise DataError(f"{label}: {this}, but the first frame is {first}")
         pixels = self._wanted(pixels)
@@ -239,5 +244,5 @@ class Source(ABC):
         return replace(pixels, image=pixels.image[part].copy(), alpha=alpha)
 
 
-def _description(width: int, height: int, dtype: np.dtype[Any], colour: bool) -> str:
-    return f"{dtype.name} {'colour' if colour else 'grey'} of {width}x{height}"
+def _description(size: Size, dtype: np.dtype[Any], colour: bool) -> str:
+    return f"{dtype.name} {'colour' if colour else 'grey'} of {size}"

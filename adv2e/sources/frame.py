@@ -65,12 +65,15 @@ class Light:
         Number that means white, whatever the files of the frames say of it.
     full_scale_reason : str
         Empty where the reason is the same, or the data type says it.
+    is_guess : bool
+        Such numbers stand for other light nearly as often.
     """
 
     encoding: str
     encoding_reason: str
     full_scale: float | None = None
     full_scale_reason: str = ""
+    is_guess: bool = False
 
 
 @dataclass(frozen=True)
@@ -139,13 +142,17 @@ def as_pixels(loaded: Image | Pixels) -> Pixels:
     return loaded if isinstance(loaded, Pixels) else Pixels(loaded)
 
 
-def light_of_images(dtype: np.dtype[Any], *, colour: bool) -> Light:
-    """Return what the numbers of images stand for that do not say so."""
+def light_of_images(dtype: np.dtype[Any], *, colour: bool, name: str = "images") -> Light:
+    """Return what the numbers of images, or of arrays (`name`), stand for that do not say so.
+
+    8-bit pictures are sRGB, nearly always in colour; grey ones may be a camera's own numbers, and
+    16-bit ones are written by cameras and by photo editors alike.
+    """
     depth = "floating-point" if dtype.kind == "f" else f"{8 * dtype.itemsize}-bit"
-    reason = f"{depth} {'colour' if colour else 'grey'} images"
-    if dtype == np.uint8 and not colour:
-        reason += "; frames.encoding=srgb if they are ordinary pictures"
-    return Light(encoding_of_images(dtype, colour), reason)
+    colours = "colour" if colour else "grey"
+    is_guess = dtype.kind != "f" and not (colour and dtype == np.uint8)
+    encoding = encoding_of_images(dtype)
+    return Light(encoding, f"{depth} {colours} {name}", is_guess=is_guess)
 
 
 def check_values(image: Image, label: str) -> None:

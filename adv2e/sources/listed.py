@@ -87,9 +87,13 @@ def timed(
             f"{path}: no times of its frames are known: give --fps F or --timestamps FILE, or put"
             f" {missing}"
         )
-    if found is not None:
+    if found is not None and not _is_same(given.timestamps, found):
         result.notes.append(f"{given} replaces the times in {found}")
     return replace(result, found=found)
+
+
+def _is_same(file: Path | None, other: str) -> bool:
+    return file is not None and Path(other).exists() and file.samefile(other)
 
 
 def _listed(

@@ -20,15 +20,13 @@ from numpy.typing import NDArray
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
 from adv2e.files.npy import Header, read_array, read_header
-from adv2e.sources.frame import Light, Pixels
+from adv2e.sources.frame import Pixels
 from adv2e.sources.listed import ListedSource, Picture, Timed, timed
 from adv2e.sources.times.instants import Stamp
 from adv2e.sources.times.lists import FrameList, read_list
 from adv2e.sources.times.units import frame_unit
 from adv2e.sources.wanted import GivenTimes, Selection
 from adv2e.ticks import NS, to_ticks
-
-_LIGHT = Light("linear", "a .npy stack")
 
 
 def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:
@@ -47,7 +45,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     if not pictures:
         raise DataError(f"{path}: no frames in it; at least two are needed")
     times = timed_beside(path, given, pictures)
-    return ListedSource(path, "npy", times, selection, has_clock=given.fps is None, light=_LIGHT)
+    return ListedSource(path, "npy", times, selection, has_clock=given.fps is None)
 
 
 def timed_beside(path: Path, given: GivenTimes, pictures: Sequence[Picture]) -> Timed:

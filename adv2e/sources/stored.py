@@ -18,7 +18,7 @@ from adv2e.sources.frame import RECORDED, Light
 EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
 """Files of a recording: its events, its frames and their times, and how it was made."""
 
-_REASON = f"as {DESCRIPTION} says"
+_REASON = "as adv2e stored them"
 
 MOST_BYTES = 16 << 20
 """Longest description that is read; one with effects of one's own holds their text."""

@@ -30,7 +30,7 @@ def test_the_forecast_is_the_total_on_average(tmp_path, monkeypatch):
     monkeypatch.setattr(
         module,
         "estimate",
-        lambda source, *_, **__: Estimate(made[int(source)], 4 * made[int(source)], 1.0, 9, 9),
+        lambda source, *_, **__: Estimate(made[int(source)], 4 * made[int(source)], 1.0, 9, 9, 0.0),
     )
 
     class Job:
@@ -55,7 +55,7 @@ def test_the_forecast_is_the_total_on_average(tmp_path, monkeypatch):
 def test_a_dry_run_tells_what_is_coming(batch, tmp_path):
     root, dest = tmp_path / "from", tmp_path / "to"
     for k in range(9):
-        clip(root / f"{k}.avi", count=10 + k, start=k)
+        clip(root / f"{k}.avi", count=120 + 12 * k, start=k)
     (root / "bad.avi").write_bytes(b"no video")
     told = batch(root, dest, "--dry-run").out.splitlines()
     assert told[0] == "10 new"
@@ -64,7 +64,7 @@ def test_a_dry_run_tells_what_is_coming(batch, tmp_path):
         told[1],
     )
     assert found, told[1]
-    assert int(found[3]) >= 5
+    assert int(found[3]) >= 1
     assert not dest.exists()
     assert batch(root, dest).status == 1
     made = sum(record.get("events", 0) for record in last_of(dest).values())
@@ -73,8 +73,40 @@ def test_a_dry_run_tells_what_is_coming(batch, tmp_path):
     assert float(found[2]) * 1e6 == pytest.approx(size, rel=0.25)
 
 
-def test_a_batch_tells_of_very_much_before_it_begins(batch, tmp_path, monkeypatch):
+def test_of_few_short_clips_it_is_said_that_nothing_is_known(batch, tmp_path):
     clip(tmp_path / "from" / "a.avi", count=10)
+    told = batch(tmp_path / "from", tmp_path / "to", "--dry-run").out.splitlines()
+    assert told[0] == "1 new"
+    assert "is not known" in told[1]
+    assert batch(tmp_path / "from", tmp_path / "to").status == 0
+    told = batch(tmp_path / "from", tmp_path / "to", "--dry-run").out
+    assert "not known" not in told  # nothing is to be done
+
+
+def test_looking_stops_at_a_tenth_of_what_it_tells(tmp_path, monkeypatch):
+    tasks, calls = tasks_of(tmp_path, [100] * 40), []
+
+    def estimated(source, *_, share, **__):
+        calls.append(share)
+        return Estimate(1.0, 1.0, 1.0, 9, 9, 2.5)
+
+    monkeypatch.setattr(module, "config_of", lambda job: None)
+    monkeypatch.setattr(module, "estimate", estimated)
+
+    class Job:
+        threads, output, options, source = 1, "", {}, ""
+
+        def __init__(self, task):
+            pass
+
+    found = module.forecast(tasks, tmp_path, Job, 1)
+    assert found.seconds == pytest.approx(40)
+    assert len(calls) == 2  # 2.5 s is less than a tenth of 40 s, 5 s is not
+    assert calls == [pytest.approx(0.1 * 40 / 6)] * 2
+
+
+def test_a_batch_tells_of_very_much_before_it_begins(batch, tmp_path, monkeypatch):
+    clip(tmp_path / "from" / "a.avi", count=120)
     assert "about" not in batch(tmp_path / "from", tmp_path / "to").err
     monkeypatch.setattr("adv2e.cli.batch._LARGE_SOURCE", 1)
     monkeypatch.setattr("adv2e.conversion.estimate.MUCH", 1)

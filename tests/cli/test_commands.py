@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
 import adv2e as package
@@ -242,6 +243,80 @@ def test_config_takes_distributions_and_others_say_who_draws(adv2e, tmp_path):
 def test_config_help_names_what_is_shipped(adv2e):
     out = adv2e("config", "--help").out
     assert all(re.search(rf"\b{name}\b", out) for name in shipped())
+
+
+def test_config_list_tells_what_is_shipped_a_line_each(adv2e):
+    lines = adv2e("config", "list").out.splitlines()
+    assert [line.split()[0] for line in lines] == shipped()
+    assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_config_show_and_check_take_files_with_and_without_an_option(adv2e, tmp_path):
+    path = tmp_path / "c.yaml"
+    path.write_text("seed: 3\n")
+    shown = adv2e("config", "show", "-c", "davis346", "-c", path)
+    assert shown.status == 0
+    assert adv2e("config", "show", "davis346", path) == shown
+    assert adv2e("config", "check", "-c", path) == (0, f"{path}: ok\n", "")
+    assert adv2e("config", "check", path, "--set", "seed=x").status == 2
+    assert adv2e("config", "check") == (2, "", adv2e("config", "check").err)
+
+
+def test_the_template_holds_the_sensor_and_all_else_as_comments(adv2e, tmp_path):
+    outcome = adv2e("config", "template", "davis346")
+    path = tmp_path / "declared.yaml"
+    path.write_text(outcome.out)
+    assert load_config(path) == load_config([], ["sensor={width: 346, height: 260, fit: crop}"])
+    head, _, rest = outcome.out.partition("# pixel:\n")
+    path.write_text(f"{head}pixel:\n" + re.sub("(?m)^# ", "", rest))
+    assert load_config(path).pixel == load_config("davis346").pixel
+    refused = adv2e("config", "template", "v2e")
+    assert refused.status == 1
+    assert "must be davis240c or davis346" in refused.err
+
+
+@pytest.mark.parametrize("name", ["DAVIS346", "Davis346", "davis364"])
+def test_a_shipped_name_that_is_nearly_right_is_told_the_nearest(adv2e, name):
+    outcome = adv2e("config", "show", name)
+    assert outcome.status == 1
+    assert "did you mean 'davis346'?" in outcome.err
+
+
+def test_help_is_a_command_too(adv2e):
+    assert adv2e("help") == adv2e("--help")
+    assert adv2e("help", "convert") == adv2e("convert", "--help")
+    assert adv2e("help", "config", "show") == adv2e("config", "show", "--help")
+    assert adv2e("help", "convrt").status == 2
+
+
+def test_many_options_stand_in_groups_and_each_once(adv2e):
+    command = main.get_command(click.Context(main), "convert")
+    out = adv2e("convert", "--help").out
+    titles = re.findall(r"^(\w[\w ]+):$", out, re.MULTILINE)
+    assert titles == ["Input", "Sensor and pixel", "Output", "Running"]
+    for option in (one for one in command.params if isinstance(one, click.Option)):
+        assert len(re.findall(rf"^  (?:-\w, )?{option.opts[-1]}\b", out, re.MULTILINE)) == 1
+    assert "-h, --help" in out
+
+
+@pytest.mark.parametrize("name", [*(one for one in COMMANDS if one not in ("config", "effects"))])
+def test_every_command_that_works_can_be_quiet_and_show_its_progress(name):
+    names = {item.name for item in main.get_command(click.Context(main), name).params}
+    if name != "protocol":
+        assert names >= {"quiet", "verbose", "progress"}
+
+
+def test_a_film_or_a_folder_of_videos_is_told_the_command_that_is_meant(adv2e, tmp_path):
+    np.save(tmp_path / "c.npy", np.full((3, 4, 5), 0.5, np.float32))
+    outcome = adv2e("convert", tmp_path / "c.npy", "--fps", 9, "-o", tmp_path / "e.mp4")
+    assert outcome.status == 2
+    assert "--preview" in outcome.err
+    assert "adv2e render" in outcome.err
+    (tmp_path / "videos").mkdir()
+    (tmp_path / "videos" / "a.mp4").touch()
+    outcome = adv2e("convert", tmp_path / "videos")
+    assert outcome.status == 1
+    assert f"'adv2e batch {tmp_path / 'videos'} DEST'" in outcome.err
 
 
 def test_a_mistyped_config_command_is_of_usage(adv2e):

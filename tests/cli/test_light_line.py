@@ -54,7 +54,7 @@ SOURCES = {
     "grey images": (
         write_images,
         FRAMES.astype(np.uint8),
-        "linear, white 255 (8-bit grey images; frames.encoding=srgb if they are ordinary pictures)",
+        "srgb, white 255 (8-bit grey images; frames.encoding changes it)",
     ),
     "deep images": (
         write_images,
@@ -69,7 +69,7 @@ SOURCES = {
     "stack": (
         write_stack,
         FRAMES.astype(np.uint8),
-        "linear, white 255 (a .npy stack; frames.encoding changes it)",
+        "srgb, white 255 (8-bit grey images; frames.encoding changes it)",
     ),
 }
 
@@ -104,6 +104,6 @@ def test_what_the_configuration_says_is_told_as_such(adv2e, tmp_path):
 def test_our_own_recordings_say_it_too(adv2e, tmp_path):
     source = write_video(tmp_path / "in", COLOUR.astype(np.uint8))
     adv2e("convert", source, "-o", tmp_path / "rec.zip")
-    line = "srgb, white 255 (as adv2e.json says; frames.encoding changes it)"
+    line = "srgb, white 255 (as adv2e stored them; frames.encoding changes it)"
     assert line in adv2e("info", tmp_path / "rec.zip").out
     assert line in adv2e("convert", tmp_path / "rec.zip", "-o", tmp_path / "b.h5").err

@@ -244,3 +244,31 @@ def test_frames_of_one_size_in_a_simulation():
     for frames in (GREY, COLOUR):
         events = simulated(frames, "sensor={width: 8, height: 6}")
         assert (events["x"].max(), events["y"].max()) == (7, 5)
+
+
+@pytest.mark.parametrize("fit", ["crop", "pad", "stretch"])
+@pytest.mark.parametrize("cut", [(), ("--crop", "8,4,40,36"), ("--rotate180",)])
+def test_files_say_where_a_point_of_the_frames_lies_on_the_sensor(adv2e, tmp_path, fit, cut):
+    frames = np.zeros((3, 48, 64), np.float32)
+    frames[:, 20:28, 24:32] = 1  # its middle is column 28, row 24
+    np.save(tmp_path / "clip.npy", frames)
+    words = ["convert", tmp_path / "clip.npy", "--fps", 100, "--size", "20x16", *cut]
+    words += ["--set", f"sensor.fit={fit}", "--with-frames", "-o", tmp_path / "a.h5"]
+    assert adv2e(*words).status == 0
+    recording = read_events(tmp_path / "a.h5")
+    source = recording.metadata["source"]
+    assert source["size"] == [64, 48]
+    point = np.array([28.0, 24.0])
+    if source.get("rotate180"):
+        point = np.array(source["size"]) - point
+    point -= source.get("crop", [0, 0])[:2]
+    expected = np.array(source["sensor"]["scale"]) * (point - source["sensor"]["origin"])
+    image = next(recording.frames()).image.astype(float)
+    rows, columns = np.indices(image.shape) + 0.5
+    found = np.array([(columns * image).sum(), (rows * image).sum()]) / image.sum()
+    np.testing.assert_allclose(found, expected, atol=0.1)  # stored with 8 bits
+    (made_of,) = [
+        line for line in adv2e("info", tmp_path / "a.h5").out.splitlines() if "made of" in line
+    ]
+    assert "frames of 64x48" in made_of
+    assert source["sensor"]["text"] in made_of

@@ -150,7 +150,33 @@ with open(sys.argv[1], "ab", buffering=0) as file:
 """
 
 
-def test_compiling_waits_for_another_process_that_does(start, tmp_path):
+COMPILES_FOR_LONG = """
+import time
+from adv2e import compiled
+from adv2e.outer import outer
+
+def wait(function):
+    print("compiling", flush=True)
+    time.sleep(100)
+
+with compiled.watched(wait):
+    outer(2.5)
+"""
+
+
+def test_nobody_waits_for_a_process_that_compiles(start):
+    said(start(1))
+    compiling = start(code=COMPILES_FOR_LONG)
+    assert compiling.stdout.readline() == "compiling\n"
+    assert said(start(1)) == ["20", "1"]  # what is there is loaded
+    assert said(start(1.5)) == ["25.0", "0"]  # and what is not is compiled, and kept
+    assert compiling.poll() is None
+    compiling.kill()
+    compiling.communicate()
+    assert said(start(1, 1.5)) == ["20", "25.0", "2"]
+
+
+def test_writing_waits_for_another_process_that_does(start, tmp_path):
     said(start(1))
     (folder,) = tmp_path.glob("cache/adv2e/kernels-*")
     holder = start(folder / "lock", code=HELD)

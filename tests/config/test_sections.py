@@ -64,7 +64,7 @@ def test_whole_numbers_compile_nothing_anew(form):
         ),
         sampling=Sampling(L=1, K=2),
     )
-    frames, times = np.full((3, 4, 5), 9, np.uint8), [0.0, 0.1, 0.2]
+    frames, times = np.full((3, 4, 5), 0.04, np.float32), [0.0, 0.1, 0.2]
     usual = load_config([], [f"pixel.low_pass.update={form}"])
     list(simulate(frames, times, usual, threads=1))
     seen = []

@@ -13,7 +13,7 @@ from adv2e.errors import OutputError, UsageError
 @pytest.fixture
 def clip(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    np.save("clip.npy", np.stack([picture(k) for k in range(5)]))
+    np.save("clip.npy", np.stack([np.dstack([picture(k)] * 3) for k in range(5)]))
     return "clip.npy"
 
 
@@ -29,7 +29,9 @@ def test_it_does_what_the_command_does(clip, adv2e, tmp_path):
     assert (tmp_path / "a.txt.json").read_bytes() == (tmp_path / "b.txt.json").read_bytes()
     assert done.events == len(package.read_events("a.txt").events) > 100
     assert (done.frames, done.output) == (4, str(tmp_path / "b.txt"))
-    assert any(note.startswith("frames are linear, white 255") for note in done.notes)
+    assert any(
+        note.startswith("frames are srgb, white 255 (8-bit colour images;") for note in done.notes
+    )
 
 
 def test_the_default_output_is_that_of_the_command(clip):
@@ -51,6 +53,19 @@ def test_a_doubt_is_a_warning_and_no_note(clip, tmp_path):
         done = adv2e.convert(clip, "a.txt", timestamps="times.txt")
     assert told[0].filename == __file__
     assert all("frames are " in note or "times " in note for note in done.notes)
+
+
+@pytest.mark.parametrize(("dtype", "light"), [(np.uint8, "srgb"), (np.uint16, "linear")])
+def test_a_guess_of_the_light_is_a_warning_unless_it_is_stated(tmp_path, dtype, light):
+    scale = np.iinfo(dtype).max // 255
+    np.save(tmp_path / "a.npy", np.stack([scale * picture(k).astype(dtype) for k in range(5)]))
+    with pytest.warns(UserWarning, match=f"are {light}, .*bit grey .*frames.encoding") as told:
+        adv2e.convert(tmp_path / "a.npy", tmp_path / "a.txt", fps=100)
+    assert [one.filename for one in told] == [__file__]
+    stated = {"frames": {"encoding": light}}
+    done = adv2e.convert(tmp_path / "a.npy", tmp_path / "b.txt", stated, fps=100)
+    assert (tmp_path / "a.txt").read_bytes() == (tmp_path / "b.txt").read_bytes()
+    assert any(note.startswith(f"frames are {light}") for note in done.notes)
 
 
 def test_what_cannot_be(clip):

@@ -47,6 +47,16 @@ def test_the_estimate_is_near_what_is_made(tmp_path, monkeypatch, make, part, na
     assert found.seconds > 0
 
 
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_a_share_of_the_frames_is_enough_or_nothing_is_told(tmp_path, share):
+    source = video(tmp_path / "in.avi", 120)
+    found = estimate(source, "a.h5", "adv2e", threads=1, share=share)
+    made = convert(source, tmp_path / "a.h5", "adv2e", threads=1)
+    assert found.seen <= share * 120
+    assert found.events == pytest.approx(made.events, rel=0.5)
+    assert estimate(source, "a.h5", "adv2e", threads=1, share=0.05) is None
+
+
 @pytest.mark.parametrize("count", [2, 3, 5])
 def test_of_few_frames_all_are_seen(tmp_path, count):
     source = folder(tmp_path / "in", count)

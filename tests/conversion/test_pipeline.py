@@ -488,7 +488,7 @@ def test_late_times_stay_exact_to_the_microsecond(adv2e, tmp_path, begin_s, name
     (tmp_path / "times.txt").write_text("".join(lines))
     outcome = adv2e(
         "convert", tmp_path / "stack.npy", "--timestamps", tmp_path / "times.txt",
-        "-o", tmp_path / name,
+        "--set", "frames.encoding=linear", "-o", tmp_path / name,
     )  # fmt: skip
     assert outcome.status == 0, outcome.err
 
@@ -505,7 +505,9 @@ def test_grey_frames_make_the_events_of_their_light(adv2e, tmp_path, L, interpol
     """However the grey values are decoded: ahead of the pixel, or by the kernel."""
     frames = [picture(k, (48, 64)) for k in range(4)]
     np.save(tmp_path / "stack.npy", np.stack(frames))
-    sets = [f"sampling.L={L}", f"sampling.interpolation={interpolation}"]
+    sets = [
+        "frames.encoding=linear", f"sampling.L={L}", f"sampling.interpolation={interpolation}",
+    ]  # fmt: skip
     options = [text for one in sets for text in ("--set", one)]
     outcome = adv2e(
         "convert", tmp_path / "stack.npy", "--fps", "10", "-o", tmp_path / "a.txt", *options

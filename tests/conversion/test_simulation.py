@@ -15,14 +15,21 @@ from adv2e.errors import ConfigError, DataError
 from adv2e.events import is_sorted, sort_events
 from adv2e.light import intervals
 
+LINEAR, SRGB = (Frames(encoding=name) for name in ("linear", "srgb"))
 
-def frames(count=7, shape=(20, 30), dtype=np.uint8):
+
+def numbers(dtype, count=7, shape=(20, 30)):
     y, x = np.mgrid[: shape[0], : shape[1]]
     scale = 1 if dtype == np.uint8 else 257
     return [
         ((120 + 100 * np.sin(0.4 * (x - 2 * k)) * np.cos(0.3 * y)) * scale).astype(dtype)
         for k in range(count)
     ]
+
+
+def frames(count=7, shape=(20, 30)):
+    """Return light of 0..1, of as many levels as 8 bits have."""
+    return [one / np.float32(255) for one in numbers(np.uint8, count, shape)]
 
 
 def times(count=7, start=0.0):
@@ -65,22 +72,35 @@ def test_epoch_times_shift_events_exactly():
 
 
 def test_sixteen_bit_and_float_are_not_cut_to_eight():
-    config = Config(pixel=quiet())
-    deep = run(frames(dtype=np.uint16), times(), config)
-    light = [f.astype(np.float64) / 65535 for f in frames(dtype=np.uint16)]
+    config = Config(pixel=quiet(), frames=LINEAR)
+    deep = run(numbers(np.uint16), times(), config)
+    light = [f.astype(np.float64) / 65535 for f in numbers(np.uint16)]
     assert np.abs(deep["t"] - run(light, times(), config)["t"]).max() <= 1
-    shallow = [(f // 257).astype(np.uint8) for f in frames(dtype=np.uint16)]
+    shallow = [(f // 257).astype(np.uint8) for f in numbers(np.uint16)]
     assert run(shallow, times(), config).tobytes() != deep.tobytes()
 
 
-def test_colour_is_srgb_and_grey_is_linear_unless_told():
-    colour = [np.repeat(f[:, :, None], 3, axis=2) for f in frames()]
+def test_8_bits_are_srgb_unless_told():
+    grey = numbers(np.uint8)
+    colour = [np.repeat(f[:, :, None], 3, axis=2) for f in grey]
     by_default = Config(pixel=quiet())
-    told = Config(pixel=quiet(), frames=Frames(encoding="srgb"))
-    assert run(colour, times(), by_default).tobytes() == run(colour, times(), told).tobytes()
-    assert run(frames(), times(), by_default).tobytes() != run(frames(), times(), told).tobytes()
+    srgb, linear = (Config(pixel=quiet(), frames=one) for one in (SRGB, LINEAR))
+    assert run(colour, times(), by_default).tobytes() == run(colour, times(), srgb).tobytes()
+    with pytest.warns(UserWarning, match="8-bit grey arrays"):
+        guessed = run(grey, times(), by_default)
+    assert guessed.tobytes() == run(grey, times(), srgb).tobytes()
+    assert guessed.tobytes() != run(grey, times(), linear).tobytes()
     # luma is weighed in light: equal channels give what the grey picture gives, but for rounding
-    assert len(run(colour, times(), told)) == len(run(frames(), times(), told))
+    assert len(run(colour, times(), srgb)) == len(guessed)
+
+
+@pytest.mark.parametrize("channels", [(), (3,)])
+def test_16_bits_are_linear_unless_told(channels):
+    deep = [np.broadcast_to(f.T, (*channels, *f.T.shape)).T for f in numbers(np.uint16)]
+    with pytest.warns(UserWarning, match=f"16-bit {'colour' if channels else 'grey'} arrays"):
+        guessed = run(deep, times(), Config(pixel=quiet()))
+    stated = [run(deep, times(), Config(pixel=quiet(), frames=one)) for one in (LINEAR, SRGB)]
+    assert [one.tobytes() == guessed.tobytes() for one in stated] == [True, False]
 
 
 @pytest.mark.parametrize(
@@ -148,7 +168,7 @@ from adv2e import simulate
 def peak(count):
     stream = (np.full((200, 300), 100 + k % 2, np.uint8) for k in range(count))
     tracemalloc.start()
-    for _ in simulate(stream, 30, threads=1):
+    for _ in simulate(stream, 30, {"frames": {"encoding": "linear"}}, threads=1):
         pass
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

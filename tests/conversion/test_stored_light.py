@@ -42,7 +42,7 @@ def made(tmp_path, write_video, write_images):
     def make(name):
         if name == "colour video":
             return write_video("a.avi", list(moving(255, np.uint8, colour=True))), ()
-        if name == "grey video":  # sRGB, though grey pictures of 8 bits are linear
+        if name == "grey video":
             return write_video("a.avi", list(moving(255, np.uint8))), ()
         if name == "16 bit images":
             return write_images(list(moving(65535, np.uint16))), ("--fps", "25")

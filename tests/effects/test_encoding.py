@@ -170,16 +170,10 @@ def test_unknown_encodings_are_refused(encoding):
 
 
 @pytest.mark.parametrize(
-    ("dtype", "colour", "encoding"),
-    [
-        (np.uint8, True, "srgb"),
-        (np.uint8, False, "linear"),
-        (np.uint16, True, "linear"),
-        (np.float32, True, "linear"),
-    ],
+    ("dtype", "encoding"), [(np.uint8, "srgb"), (np.uint16, "linear"), (np.float32, "linear")]
 )
-def test_meaning_of_auto_for_images(dtype, colour, encoding):
-    assert encoding_of_images(dtype, colour) == encoding
+def test_meaning_of_auto_for_images(dtype, encoding):
+    assert encoding_of_images(dtype) == encoding
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])

@@ -42,6 +42,7 @@ CASES = {
 }
 ROWS, COLUMNS, COUNT = 9, 14, 40
 TIMES = [3.0 + 0.002 * k for k in range(COUNT)]
+LIGHT = "frames.encoding=linear"
 
 
 def frames():
@@ -51,7 +52,7 @@ def frames():
 
 
 def events(*sets, L=1, threads=1):
-    config = load_config([], [f"sampling.L={L}", "pixel.shot_noise.rate_hz=20", *sets])
+    config = load_config([], [LIGHT, f"sampling.L={L}", "pixel.shot_noise.rate_hz=20", *sets])
     chunks = list(simulate(frames(), TIMES, config, threads=threads))
     return np.concatenate(chunks)
 
@@ -107,7 +108,7 @@ def test_neutral_hooks_change_nothing_and_are_not_called():
     class Nothing(Hooks):
         pass
 
-    config = load_config()
+    config = load_config([], [LIGHT])
     plain = np.concatenate(list(simulate(frames(), TIMES, config)))
     found = np.concatenate(list(simulate(frames(), TIMES, config, effects=[Nothing()])))
     assert found.tobytes() == plain.tobytes()
@@ -117,7 +118,7 @@ def test_neutral_hooks_change_nothing_and_are_not_called():
 def test_converting_a_file_gives_what_simulating_its_frames_does(adv2e, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("clip.npy", np.stack(list(frames())))
-    sets = ["sampling.L=1", *(case[0] for case in CASES.values())]
+    sets = [LIGHT, "sampling.L=1", *(case[0] for case in CASES.values())]
     options = [part for text in sets for part in ("--set", text)]
     outcome = adv2e("convert", "clip.npy", "--fps", "500", "-q", "-o", "out.txt", *options)
     assert outcome == (0, "", "")
@@ -137,7 +138,7 @@ def test_frequency_of_flicker_is_that_of_the_rate():
             (110 + 90 * np.sin(0.5 * (x - 0.1 * k)) * np.cos(0.4 * y)).astype(np.uint8)
             for k in range(t.size)
         )
-        config = load_config([], ["sampling.L=1", *sets])
+        config = load_config([], [LIGHT, "sampling.L=1", *sets])
         events = np.concatenate(list(simulate(moving, t, config)))
         seconds = 1e-6 * events["t"][events["p"] == 1]
         hz = np.arange(50.0, 240.0, 0.5)

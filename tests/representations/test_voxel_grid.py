@@ -6,6 +6,7 @@ from scipy import ndimage
 
 from adv2e.errors import DataError
 from adv2e.events import empty_events, make_events
+from adv2e.formats.recording import Recording
 from adv2e.representations.voxel_grid import (
     own_window,
     robust,
@@ -50,6 +51,46 @@ def test_first_and_last_event_fill_first_and_last_bin():
     assert grid[0, 3, 1] == 1
     assert grid[4, 4, 2] == -1
     assert np.abs(grid).sum() == 2
+
+
+def test_windows_of_a_recording_are_those_of_its_events(events):
+    recording = Recording("r", "array", WIDTH, HEIGHT, events)
+    for first in range(0, 100_000, 9_000):
+        window = first, first + 8_999
+        inside = events[(events["t"] >= first) & (events["t"] <= window[1])]
+        expected = slow_grid(inside, window, 3)
+        np.testing.assert_allclose(
+            voxel_grid(recording, 3, window=window), expected, rtol=0, atol=1e-12
+        )
+
+
+@pytest.mark.parametrize("where", ["everywhere", "at the end", "inside"])
+def test_a_window_of_events_out_of_order_is_refused(events, where):
+    swapped = events.copy()
+    if where == "everywhere":
+        swapped = swapped[np.random.default_rng(1).permutation(len(swapped))]
+    elif where == "at the end":
+        swapped[-1]["t"] = 0
+    else:
+        middle = len(swapped) // 2
+        swapped["t"][middle] = swapped["t"][middle + 1] + 1
+    with pytest.raises(DataError, match="sorted by time"):
+        voxel_grid(swapped, 3, SIZE, (0, 100_000))
+
+
+def test_an_array_needs_a_size(events):
+    with pytest.raises(DataError, match="size is missing"):
+        voxel_grid(events, 3)
+
+
+def test_columns_can_be_taken_by_networks(events):
+    columns = Recording("r", "array", WIDTH, HEIGHT, events).columns()
+    for name, column in columns.items():
+        assert column.flags.c_contiguous
+        assert column.dtype.kind == "i"
+        np.testing.assert_array_equal(column, events[name])
+    large = Recording("r", "array", 40_000, 2, events).columns()
+    assert (large["x"].dtype, large["y"].dtype) == (np.int32, np.int32)
 
 
 def test_events_of_a_single_time_fall_into_the_first_bin():

@@ -19,6 +19,7 @@ from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.formats.reading import read_events
+from adv2e.geometry import Rectangle
 from adv2e.light.decoding import decoder_for
 from adv2e.light.sensor import check_beside
 from adv2e.reports.result import Masked
@@ -252,6 +253,47 @@ def read_evidence(
     if not text:
         return whole
     return replace(whole.during(first, last), masked=[*masked, Masked(text, 0.0)])
+
+
+def part_of(
+    evidence: Evidence,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    crop: Rectangle | None = None,
+) -> Evidence:
+    """Return a part of a recording: time since its first frame [s], and a part of its sensor.
+
+    Raises
+    ------
+    DataError
+        The part is not on the sensor, or holds fewer than three frames or too few events.
+    """
+    part, name = evidence, evidence.name
+    if crop is not None:
+        if not crop.is_inside(part.width, part.height):
+            raise DataError(
+                f"{name}: --crop {crop} does not lie on the sensor of {part.width}x{part.height}"
+                " pixels"
+            )
+        columns = slice(crop.x, crop.x + crop.width)
+        part = part.cut(slice(crop.y, crop.y + crop.height), columns)
+    if start_s is not None or stop_s is not None:
+        since_s = np.round(part.times_s - part.times_s[0], 9)
+        first = int(np.searchsorted(since_s, start_s or 0.0))
+        last = len(since_s) - 1
+        if stop_s is not None:
+            last = int(np.searchsorted(since_s, stop_s, "right")) - 1
+        if last - first < 2:
+            raise DataError(
+                f"{name}: --start and --stop leave {max(0, last - first + 1)} of its"
+                f" {len(since_s)} frames, which last {since_s[-1]:.6g} s; at least 3 are needed"
+            )
+        part = part.during(first, last)
+    if part is evidence:
+        return evidence
+    check_events(len(part.stream), name, "in the part that is asked for")
+    lost = 1.0 - len(part.stream) / len(evidence.stream)
+    return replace(part, masked=[*part.masked, Masked("all but the part asked for", lost)])
 
 
 def _check_alike(path: str | Path, frames: list[NDArray[Any]]) -> None:

@@ -89,9 +89,9 @@ def full_scale_of(dtype: DTypeLike) -> float:
     return _FULL_SCALES[name]
 
 
-def encoding_of_images(dtype: DTypeLike, colour: bool) -> str:
-    """Return what ``encoding: auto`` means for still images and arrays: 8-bit colour is sRGB."""
-    return "srgb" if colour and np.dtype(dtype) == np.uint8 else "linear"
+def encoding_of_images(dtype: DTypeLike) -> str:
+    """Return what ``encoding: auto`` means for still images and arrays: 8 bits are sRGB."""
+    return "srgb" if np.dtype(dtype) == np.uint8 else "linear"
 
 
 def decode_values(values: NDArray[Any], encoding: str, full_scale: float) -> NDArray[Any]:

@@ -91,11 +91,23 @@ def _unread(folder: Path) -> list[str]:
     return sorted((name for name in names if not name.startswith(".")), key=natural_key)
 
 
+def _is_video(path: Path) -> bool:
+    from adv2e.sources import VIDEO_SUFFIXES  # noqa: PLC0415 - it names this module
+
+    return path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()
+
+
 def _no_images(folder: Path) -> DataError:
     below = [entry for entry in sorted(folder.iterdir()) if entry.is_dir() and image_files(entry)]
     if below:
         return DataError(f"{folder}: no images in it; there are some in {below[0]}")
     if unread := _unread(folder):
         return DataError(f"{folder}: {unread[0]} is not read; convert its images, to PNG or TIFF")
+    videos = sorted(entry.name for entry in folder.iterdir() if _is_video(entry))
+    if videos:
+        return DataError(
+            f"{folder}: no images in it, but videos, such as {videos[0]}: give one, or convert all"
+            f" with 'adv2e batch {folder} DEST'"
+        )
     known = " ".join(suffix.lstrip(".") for suffix in IMAGE_SUFFIXES)
     return DataError(f"{folder}: no images in it ({known})")

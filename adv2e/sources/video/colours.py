@@ -38,7 +38,7 @@ def encoding_of(transfer: int) -> tuple[str, str]:
     A transfer that cannot be decoded gives what `LightDecoder` refuses by name.
     """
     if not is_stated(transfer):
-        return "srgb", "the video does not say"
+        return "srgb", "usual for video that states no curve"
     name = _NAMES.get(transfer, f"number {transfer}")
     if transfer not in _ENCODINGS:
         return UNKNOWN + name, f"the video states {name}, which is not known here"

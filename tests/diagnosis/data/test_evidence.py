@@ -10,8 +10,10 @@ import pytest
 
 from adv2e.config import load_config
 from adv2e.config.model import Sensor
-from adv2e.diagnosis.data.evidence import LEAST_EVENTS, read_evidence
+from adv2e.diagnosis.data.evidence import LEAST_EVENTS, part_of, read_evidence
+from adv2e.diagnosis.recordings import how_far
 from adv2e.errors import DataError
+from adv2e.geometry import Rectangle
 
 WIDTH, HEIGHT = 12, 8
 
@@ -70,6 +72,49 @@ def test_frames_and_events_are_on_one_clock(record):
     (masked,) = evidence.masked
     assert masked.share == pytest.approx(1 - len(stream) / 9000)
     assert masked.share == pytest.approx(0.7, abs=0.03)
+
+
+def test_a_part_holds_its_frames_and_events_and_what_pixels_saw_before(record):
+    whole = read_evidence(record(times=5.0 + 0.01 * np.arange(10), span=(5.0, 5.09), events=9000))
+    part = part_of(whole, 0.03, 0.07, Rectangle(2, 1, 8, 6))
+    assert part.times_s == pytest.approx(5.0 + 0.01 * np.arange(3, 8))
+    assert (part.width, part.height) == (8, 6)
+    assert [frame.shape for frame in part.frames] == [(6, 8)] * 5
+    assert (part.stream.t.min() >= 5_030_000) and (part.stream.t.max() < 5_070_000)
+    x, y = whole.stream.pixel % WIDTH, whole.stream.pixel // WIDTH
+    inside = (x >= 2) & (x < 10) & (y >= 1) & (y < 7)
+    inside &= (whole.stream.t >= 5_030_000) & (whole.stream.t < 5_070_000)
+    assert len(part.stream) == np.count_nonzero(inside)
+    assert 0 < len(part.run_in.times_s) <= 3
+    assert part.masked[-1].share == pytest.approx(1 - inside.mean())
+    assert part_of(whole) is whole
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--start", "0.08"), "leave 2 of its 10 frames, which last 0.09 s; at least 3"),
+        (("--stop", "0.001"), "leave 1 of its 10 frames"),
+        (("--start", "9"), "leave 0 of its 10 frames"),
+        (("--crop", "0,0,13,8"), "--crop 0,0,13,8 does not lie on the sensor of 12x8 pixels"),
+        (("--crop", "0,0,2,2"), "in the part that is asked for; at least 1000"),
+    ],
+)
+def test_a_part_that_cannot_be_is_refused(adv2e, record, words, said):
+    folder = record()
+    outcome = adv2e("diagnose", folder, "-o", folder.parent / "found", *words)
+    assert (outcome.status, outcome.err.count("\n")) == (1, 1)
+    assert said in outcome.err
+    assert adv2e("diagnose", folder, "--start", "2", "--stop", "1").status == 2
+
+
+def test_how_far_a_diagnosis_is_tells_its_stage_and_an_estimate():
+    told = how_far("searching", 650, 60.0)
+    assert (
+        told == "searching: 650 simulations in 60 s; about 60 s more where one effect explains all"
+    )
+    assert "takes longer" in how_far("searching", 5000, 600.0)
+    assert how_far("reading", 0, 31.0) == "reading: 0 simulations in 31 s"
 
 
 def test_nothing_is_masked_between_the_frames(record):

@@ -54,7 +54,7 @@ def test_lossless_grey_comes_back_as_stored(write_video, picture, dtype, encodin
     assert all(np.array_equal(f.image, image) for f, image in zip(frames, stored, strict=True))
     assert (source.dtype, source.colour, source.encoding) == (dtype, False, encoding)
     assert source.full_scale == np.iinfo(dtype).max
-    depth = "16-bit grey video" if dtype == np.uint16 else "the video does not say"
+    depth = "16-bit grey video" if dtype == np.uint16 else "usual for video that states no curve"
     assert (source.light.encoding_reason, source.notes) == (depth, [])
 
 

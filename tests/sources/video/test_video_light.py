@@ -33,7 +33,7 @@ def test_light_is_what_the_video_states(tmp_path, transfer):
     path = write(tmp_path / "clip.mp4", [60, 90, 120], tags=(2, transfer, 2))
     source = open_source(path)
     assert source.encoding == ENCODINGS[transfer]
-    assert ("does not say" in source.light.encoding_reason) == (transfer == 2)
+    assert ("states no curve" in source.light.encoding_reason) == (transfer == 2)
 
 
 @pytest.mark.parametrize(("transfer", "factor"), [(18, 1 / 0.26496), (16, 1 / 0.098338)])

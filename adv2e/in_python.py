@@ -1,0 +1,69 @@
+"""Public functions as Python users meet them: what they tell names arguments, not options.
+
+Errors and doubts are worded for the command line, below which most of them arise.  The names in
+``adv2e.__all__`` lead to functions that reword them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from functools import wraps
+from inspect import isgeneratorfunction
+from typing import Any, TypeVar
+
+from adv2e.errors import Adv2eError
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_OTHER_NAMES = {
+    **{"start": "start_s", "stop": "stop_s", "from": "take", "set": "config", "at": "at_s"},
+    **{"extent": "extent_px", "duration": "duration_s", "effect": "effects"},
+}
+_FLAGS = ("overwrite", "allow_damaged", "rotate180", "with_frames", "causes", "crop_events")
+# a command that is quoted stays as it is typed in a shell
+_OPTION = re.compile(r"'adv2e [^']*'|(?<![\w-])--([a-z][a-z0-9-]*)(?: ([A-Z]+\b|zero\b|\d+\b))?")
+
+
+def in_python(text: str) -> str:
+    """Return what is said of options as said of arguments: ``--fps F`` becomes ``fps=F``."""
+
+    def argument(found: re.Match[str]) -> str:
+        if found[1] is None:
+            return found[0]
+        name = found[1].replace("-", "_")
+        name = _OTHER_NAMES.get(name, name)
+        value = "True" if name in _FLAGS else found[2]
+        if value is None:
+            return name
+        return f"{name}={value!r}" if value.islower() else f"{name}={value}"
+
+    return _OPTION.sub(argument, text)
+
+
+def reworded(function: Function) -> Function:
+    """Return a function whose errors, and problems of what it returns, name arguments."""
+
+    @wraps(function)
+    def call(*arguments: Any, **named: Any) -> Any:
+        try:
+            found = function(*arguments, **named)
+        except Adv2eError as error:
+            error.args = (in_python(str(error)),)
+            raise
+        problems = getattr(found, "problems", None)
+        if isinstance(problems, list):
+            problems[:] = map(in_python, problems)
+        return found
+
+    @wraps(function)
+    def generate(*arguments: Any, **named: Any) -> Iterator[Any]:
+        try:
+            yield from function(*arguments, **named)
+        except Adv2eError as error:
+            error.args = (in_python(str(error)),)
+            raise
+
+    made: Any = generate if isgeneratorfunction(function) else call
+    made.__module__ = "adv2e"  # where pickle finds it
+    return made  # type: ignore[no-any-return]
