@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 )
 @options.time_unit_option
 @options.rotate_option(" of MEASURED, and of --frames,")
+@options.events_options
 @options.config_options
 @options.threads_option
 @options.progress_option
@@ -56,6 +57,7 @@ def command(
     frames_path: str | None,
     time_unit: str | None,
     rotate180: bool,
+    reading: dict[str, Any],
     config: Callable[[], Config],
     threads: int | None,
     progress: bool,
@@ -83,10 +85,11 @@ def command(
     from adv2e.formats.reading import read_events
 
     declared = config()
+    reading["time_unit"] = time_unit
     with reading_told(measured, progress) as told:
-        ours = read_events(measured, time_unit=time_unit, progress=told, rotate180=rotate180)
+        ours = read_events(measured, progress=told, rotate180=rotate180, **reading)
     with reading_told(simulated, progress) as told:
-        theirs = read_events(simulated, time_unit=time_unit, progress=told)
+        theirs = read_events(simulated, progress=told, **reading)
     source = open_frames(frames_path, rotate180=rotate180) if frames_path else None
     for doubt in source.doubts if source else []:
         log(doubt)

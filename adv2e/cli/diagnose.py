@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 )
 @options.time_unit_option
 @options.rotate_option()
+@options.events_options
 def command(
     recording: str,
     config: Callable[[Size | None], Config],
@@ -59,6 +60,7 @@ def command(
     size: Size | None,
     time_unit: str | None,
     rotate180: bool,
+    reading: dict[str, Any],
     threads: int | None,
     progress: bool,
     log: Log,
@@ -106,8 +108,7 @@ def command(
         output=folder,
         without=without,
         fit_thresholds=fit_thresholds,
-        time_unit=time_unit,
-        rotate180=rotate180,
+        reading={**reading, "time_unit": time_unit, "rotate180": rotate180},
         overwrite=overwrite,
         threads=threads,
         progress=progress,

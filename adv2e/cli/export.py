@@ -111,6 +111,7 @@ _OPTIONS = {
     metavar="WxH",
     help="Size of the sensor, where the files do not state it.",
 )
+@options.events_options
 @options.threads_option
 @options.verbosity_options
 def command(
@@ -123,6 +124,7 @@ def command(
     at: str | None,
     time_unit: str | None,
     size: Size | None,
+    reading: dict[str, Any],
     threads: int | None,
     log: Log,
     **given: Any,
@@ -143,8 +145,7 @@ def command(
     from adv2e.export import export as exports
 
     assert output is not None
-    how: dict[str, Any] = {"overwrite": overwrite, "time_unit": time_unit, "size": size}
-    how["doubt"] = log
+    how = {**reading, "time_unit": time_unit, "size": size, "overwrite": overwrite, "doubt": log}
     paths = [Path(path) for path in events]
     if to == "voxel":
         from adv2e.export.voxels import VoxelSettings

@@ -99,6 +99,7 @@ if TYPE_CHECKING:
 )
 @options.time_unit_option
 @options.rotate_option()
+@options.events_options
 def command(
     events: str,
     output: str | None,
@@ -111,6 +112,7 @@ def command(
     progress: bool,
     time_unit: str | None,
     rotate180: bool,
+    reading: dict[str, Any],
     **shown: Any,
 ) -> None:
     """Make pictures and films of events.
@@ -142,8 +144,9 @@ def command(
 
     about = {name: shown[name] for name in ("fps", "speed", "at_s")}
     chosen = chosen_style(output, style, on_color, off_color, window_ms=window, **about)
+    reading |= {"time_unit": time_unit, "rotate180": rotate180}
     with reading_told(events, progress) as told:
-        recording = read_events(events, time_unit=time_unit, progress=told, rotate180=rotate180)
+        recording = read_events(events, progress=told, **reading)
     for problem in recording.problems:
         log(f"{events}: {problem}")
     if frames and recording.frame_times_ns is None:

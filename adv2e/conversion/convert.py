@@ -35,6 +35,8 @@ def convert(
     bayer: str | None = None,
     pixel_format: str | None = None,
     rotate180: bool = False,
+    set_back: str | None = None,
+    crop_events: bool = False,
     format: str | None = None,
     layout: str | None = None,
     with_frames: bool = False,
@@ -82,6 +84,8 @@ def convert(
         Raw video of pixels of this kind comes through standard input; `size` is that of its frames.
     rotate180 : bool
         Turn frames and events by half a turn, before even that.
+    set_back, crop_events
+        Of events: see :func:`adv2e.read_events`.
     format, layout : str, optional
         Format of the output where its suffix does not say it, and layout of HDF5.
     with_frames : bool
@@ -159,6 +163,8 @@ def convert(
             size=wanted,
             crop=part,
             rotate180=rotate180,
+            set_back=set_back,
+            crop_events=crop_events,
             time_unit=time_unit,
             start_s=start_s,
             stop_s=stop_s,
@@ -174,6 +180,8 @@ def convert(
             doubt=doubt,
         )
         return replace(summary, notes=tuple(notes))
+    if set_back or crop_events:
+        raise UsageError(f"{source}: set_back and crop_events are for events, not for frames")
     ready = load_config(config, size=None if part and pixel_format else wanted)
     reading = Reading(
         str(source),

@@ -27,12 +27,11 @@ from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
 from adv2e.formats import compression
-from adv2e.formats.assembly import inside
+from adv2e.formats.assembly import events_in_order, inside
 from adv2e.formats.event_file import EventFile, Progress
 from adv2e.formats.lookup import check_frames, to_write
 from adv2e.formats.reading import open_events
 from adv2e.formats.sink import Sink
-from adv2e.formats.streaming import events_in_order
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of, picture_white
@@ -94,6 +93,8 @@ def convert_events(
     crop: Rectangle | None = None,
     time_unit: str | None = None,
     rotate180: bool = False,
+    set_back: str | None = None,
+    crop_events: bool = False,
     start_s: float | None = None,
     stop_s: float | None = None,
     t0: str = "auto",
@@ -124,6 +125,8 @@ def convert_events(
         Unit of the times in the file.
     rotate180 : bool
         Turn events and frames by half a turn, before they are cut.
+    set_back, crop_events
+        See :func:`adv2e.read_events`.
     start_s, stop_s : float, optional
         First and last time wanted, from the first event [s]; both inclusive.
     t0 : {'auto', 'keep', 'zero'}
@@ -148,7 +151,14 @@ def convert_events(
     if with_frames:
         check_frames(chosen)
     keeps_all_bits = chosen.is_davis240c
-    file = open_events(path, time_unit=time_unit, size=size, rotate180=rotate180)
+    file = open_events(
+        path,
+        time_unit=time_unit,
+        size=size,
+        rotate180=rotate180,
+        set_back=set_back,
+        crop_events=crop_events,
+    )
     facts = file.facts
     if causes and file.causes is None:
         raise DataError(

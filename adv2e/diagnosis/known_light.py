@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,17 +45,12 @@ _REST = -1
 
 
 def read_known_light(
-    events: str | Path,
-    light: str | Path,
-    time_unit: str | None = None,
-    sensor: Sensor | None = None,
-    *,
-    rotate180: bool = False,
+    events: str | Path, light: str | Path, sensor: Sensor | None = None, **reading: Any
 ) -> Evidence:
     """Read events and the light that they were made under.
 
-    Events as :func:`adv2e.formats.reading.read_events` reads them; the `sensor` says of how many
-    pixels they are, where the file does not.
+    Events as :func:`adv2e.formats.reading.read_events` reads them, `reading` as it takes it; the
+    `sensor` says of how many pixels they are, where the file does not.
 
     Raises
     ------
@@ -63,7 +59,7 @@ def read_known_light(
         after it; there are too few.
     """
     size = None if sensor is None else (sensor.width, sensor.height)
-    recording = assemble(open_events(events, time_unit=time_unit, size=size, rotate180=rotate180))
+    recording = assemble(open_events(events, size=size, **reading))
     width, height = recording.width, recording.height
     check_beside(width, height, sensor, recording.path)
     stimulus, part = read_stimulus(light, Size(width, height))

@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
@@ -31,6 +32,8 @@ def diagnose(
     fit_thresholds: bool = False,
     time_unit: str | None = None,
     rotate180: bool = False,
+    set_back: str | None = None,
+    crop_events: bool = False,
     overwrite: bool = False,
     threads: int | None = None,
     progress: bool = False,
@@ -59,6 +62,8 @@ def diagnose(
         Unit of the times in lists.
     rotate180 : bool
         Turn frames and events by half a turn, as for a camera that was mounted upside down.
+    set_back, crop_events
+        See :func:`adv2e.read_events`.
     overwrite : bool
         Replace the folder of an earlier report.
     threads : int, optional
@@ -95,8 +100,12 @@ def diagnose(
         output=output,
         without=without,
         fit_thresholds=fit_thresholds,
-        time_unit=time_unit,
-        rotate180=rotate180,
+        reading={
+            "time_unit": time_unit,
+            "rotate180": rotate180,
+            "set_back": set_back,
+            "crop_events": crop_events,
+        },
         overwrite=overwrite,
         threads=threads,
         progress=progress,
@@ -114,8 +123,7 @@ def diagnose_file(
     output: str | Path | None,
     without: Sequence[str],
     fit_thresholds: bool,
-    time_unit: str | None,
-    rotate180: bool,
+    reading: dict[str, Any],
     overwrite: bool,
     threads: int | None,
     progress: bool,
@@ -124,7 +132,8 @@ def diagnose_file(
     """Do what :func:`diagnose` does, with a configuration that was loaded.
 
     `name` and `written` are what it was made from and the keys that somebody wrote; `also_read` are
-    files that must not be written over; `log` takes lines for people.
+    files that must not be written over; `reading` is for :func:`adv2e.read_events`; `log` takes
+    lines for people.
     """
     check_names(without, names(declared))
     _check_own_names(declared)
@@ -133,11 +142,10 @@ def diagnose_file(
         inputs = [recording, *([] if light is None else [light]), *also_read]
         check_folder(output, overwrite=overwrite, inputs=inputs)
     with _stages(progress) as tell:
-        given = time_unit, declared.sensor
         evidence = (
-            read_evidence(recording, *given, rotate180=rotate180)
+            read_evidence(recording, declared.sensor, **reading)
             if light is None
-            else read_known_light(recording, light, *given, rotate180=rotate180)
+            else read_known_light(recording, light, declared.sensor, **reading)
         )
         found = diagnose_evidence(
             evidence,

@@ -7,6 +7,7 @@ from collections.abc import Sequence as Many
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from adv2e.errors import DataError, UsageError
 from adv2e.formats.event_file import EventFile
@@ -29,12 +30,13 @@ class Sequence:
         return [(shot.t_ns + 500) // 1000 for shot in self.file.shots()]
 
 
-def open_sequences(
-    paths: Many[str | Path], time_unit: str | None, size: tuple[int, int] | None
-) -> list[Sequence]:
-    """Open recordings; each is called as its file, or as its folder and its file."""
+def open_sequences(paths: Many[str | Path], **reading: Any) -> list[Sequence]:
+    """Open recordings; each is called as its file, or as its folder and its file.
+
+    `reading` as :func:`adv2e.formats.reading.open_events` takes it.
+    """
     return [
-        Sequence(name, open_events(path, time_unit=time_unit, size=size))
+        Sequence(name, open_events(path, **reading))
         for name, path in zip(_names([Path(path) for path in paths]), paths, strict=True)
     ]
 
