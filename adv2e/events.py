@@ -1,8 +1,9 @@
 """Events: the one record type, its order, and what must hold of it.
 
 An event is ``(t, x, y, p)``: time in integer microseconds, column, row (origin top left) and
-polarity, 1 for ON and 0 for OFF.  A stream is sorted by time; ties are ordered by (y, x, p), so
-that the order of a file does not depend on how the work was divided.
+polarity, 1 for ON and 0 for OFF.  A stream is sorted by time.  Events of one time that were read
+keep the order of the file; of those that are made here, pixels come by row and column, so that the
+order does not depend on how the work was divided, and those of one pixel as they happened.
 """
 
 from __future__ import annotations
@@ -23,8 +24,6 @@ Events = NDArray[Any]
 
 Window = tuple[int, int]
 """Start and stop [us], half open."""
-
-_PART = 1 << 20  # events looked at together
 
 
 def empty_events(count: int = 0) -> Events:
@@ -80,7 +79,7 @@ def checked_events(
         for name in dtype.names or ():
             ours[name] = events[name] > 0 if name == "p" else events[name]
         events = ours
-    return events if is_sorted(events) else sort_events(events)
+    return by_time(events)
 
 
 def with_fields(made: Any) -> Events:
@@ -114,10 +113,8 @@ def cut(events: Events, start: int, stop: int) -> Events:
 
 
 def sort_events(events: Events) -> Events:
-    """Return the events sorted by time, ties by (y, x, p), and then by cause if they know it."""
-    held = events.dtype.names or ()
-    order = np.lexsort([events[name] for name in ("cause", "p", "x", "y", "t") if name in held])
-    return events[order]
+    """Return the events sorted by time, ties by row and column, those of a pixel as they were."""
+    return events[np.lexsort([events[name] for name in ("x", "y", "t")])]
 
 
 def is_sorted(events: Events) -> bool:
@@ -125,30 +122,20 @@ def is_sorted(events: Events) -> bool:
     return bool(np.all(events["t"][1:] >= events["t"][:-1]))
 
 
-def disorder(events: Events) -> tuple[int, int, int]:
-    """Return the number of steps back in time, of ties out of order, and of repeated events."""
-    back = untidy = repeated = 0
-    for begin in range(0, events.size - 1, _PART):
-        part = events[begin : begin + _PART + 1]
-        step = np.diff(part["t"])
-        back += int(np.count_nonzero(step < 0))
-        tied = np.flatnonzero(step == 0)
-        former, latter = (_rank(part[place]) for place in (tied, tied + 1))
-        untidy += int(np.count_nonzero(latter < former))
-        repeated += int(np.count_nonzero(latter == former))
-    return back, untidy, repeated
+def by_time(events: Events) -> Events:
+    """Return the events sorted by time, those of one time as they were."""
+    return events if is_sorted(events) else events[np.argsort(events["t"], kind="stable")]
 
 
-def _rank(events: Events) -> NDArray[np.int64]:
-    """Return numbers that are in the order of (y, x, p)."""
-    y, x, p = (events[name].astype(np.int64) for name in "yxp")
-    return (y << 17) | (x << 1) | p
-
-
-def sort_ties(events: Events) -> None:
-    """Sort events that share a time, in place; times are in order already."""
+def repeated(events: Events) -> int:
+    """Return how many events, sorted by time, repeat another one."""
     t = events["t"]
     tied = np.zeros(events.size, np.bool_)
     np.equal(t[1:], t[:-1], out=tied[1:])
     tied[:-1] |= tied[1:]
-    events[tied] = sort_events(events[tied])
+    y, x, p = (events[name][tied].astype(np.int64) for name in "yxp")
+    t, place = t[tied], (y << 17) | (x << 1) | p
+    if np.any((t[1:] == t[:-1]) & (place[1:] < place[:-1])):
+        order = np.lexsort([place, t])
+        t, place = t[order], place[order]
+    return int(np.count_nonzero((t[1:] == t[:-1]) & (place[1:] == place[:-1])))

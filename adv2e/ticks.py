@@ -42,13 +42,12 @@ def to_ticks(times: NDArray[Any], unit_ns: int, tick_ns: int, label: str) -> NDA
     DataError
         No numbers, NaN, infinite, or more than 146 years before or after zero.
     """
-    if times.dtype.kind not in "iuf":
-        raise DataError(f"{label} must hold numbers, not {times.dtype}")
-    if times.size:
-        for extreme in (times.min(), times.max()):  # NaN, if there is one, is both
-            if not np.isfinite(extreme):
-                raise DataError(f"{label} holds NaN or infinite times")
-            check_time(extreme.item() * unit_ns, label)
+    check_numbers(times, unit_ns, label)
+    return in_ticks(times, unit_ns, tick_ns)
+
+
+def in_ticks(times: NDArray[Any], unit_ns: int, tick_ns: int) -> NDArray[np.int64]:
+    """Return what :func:`to_ticks` does of times that were checked."""
     if unit_ns < tick_ns:
         ticks = tick_ns // unit_ns
         if times.dtype.kind == "f":
@@ -61,6 +60,17 @@ def to_ticks(times: NDArray[Any], unit_ns: int, tick_ns: int, label: str) -> NDA
     whole = np.floor(wide)
     # the fraction is exact in float64, while t * ticks would round a second time
     return whole.astype(np.int64) * ticks + np.rint((wide - whole) * ticks).astype(np.int64)
+
+
+def check_numbers(times: NDArray[Any], unit_ns: int, label: str) -> None:
+    """Raise DataError, which begins with `label`, for what :func:`to_ticks` does not take."""
+    if times.dtype.kind not in "iuf":
+        raise DataError(f"{label} must hold numbers, not {times.dtype}")
+    if times.size:
+        for extreme in (times.min(), times.max()):  # NaN, if there is one, is both
+            if not np.isfinite(extreme):
+                raise DataError(f"{label} holds NaN or infinite times")
+            check_time(extreme.item() * unit_ns, label)
 
 
 def check_time(t_ns: float, label: str) -> None:

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 @options.time_unit_option
 @options.rotate_option(" of MEASURED, and of --frames,")
 @options.track_option("MEASURED")
+@options.events_options
 @options.config_options
 @options.threads_option
 @options.reporting_options
@@ -57,6 +58,7 @@ def command(
     time_unit: str | None,
     rotate180: bool,
     track: str | None,
+    reading: dict[str, Any],
     config: Callable[[], Config],
     threads: int | None,
     progress: bool,
@@ -84,11 +86,12 @@ def command(
     from adv2e.formats.reading import read_events
 
     declared = config()
+    reading["time_unit"] = time_unit
     with reading_told(measured, progress) as told:
-        given: dict[str, Any] = {"time_unit": time_unit, "rotate180": rotate180, "track": track}
+        given = {**reading, "rotate180": rotate180, "track": track}
         ours = read_events(measured, progress=told, **given)
     with reading_told(simulated, progress) as told:
-        theirs = read_events(simulated, time_unit=time_unit, progress=told)
+        theirs = read_events(simulated, progress=told, **reading)
     source = open_frames(frames_path, rotate180=rotate180) if frames_path else None
     for doubt in source.doubts if source else []:
         log(doubt)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 @options.run_options
 @options.config_options
 @options.source_options
+@options.events_options
 @click.option("--start", type=SECONDS, metavar="S", help="Begin S seconds after the first frame.")
 @click.option("--stop", type=SECONDS, metavar="S", help="Stop S seconds after the first frame.")
 @options.crop_option(
@@ -114,6 +115,7 @@ def command(
     threads: int | None,
     log: Log,
     given: dict[str, Any],
+    reading: dict[str, Any],
     start: float | None,
     stop: float | None,
     crop: Rectangle | None,
@@ -168,13 +170,20 @@ def command(
         del written["preview"]
         if output is None:
             raise click.UsageError("-o OUT is missing: say what to write the events to")
-        part |= {name: given[name] for name in ("time_unit", "rotate180", "track")}
+        part |= {name: given[name] for name in ("time_unit", "rotate180", "track")} | reading
         summary = convert_events(
             source, output, size=size, threads=threads, log=log, **part, **written
         )
         if log.level >= 0:
             click.echo(summary.text(), err=output == "-")
         return
+    if any(reading.values()):
+        from adv2e.errors import DataError
+
+        raise DataError(
+            f"{source}: its frames are simulated: --set-back and --crop-events are for events,"
+            " leave them out"
+        )
     from adv2e.compiled import import_ahead
 
     import_ahead()
@@ -184,17 +193,17 @@ def command(
         from adv2e.sources.paths import SensorPath
 
         part["along"] = SensorPath(motion, extent_px, duration_s)
-    reading = Reading(source, **given, **part, frame_size=size, threads=threads)
-    with reading:  # it reads while all else that is needed is imported
+    opened = Reading(source, **given, **part, frame_size=size, threads=threads)
+    with opened:  # it reads while all else that is needed is imported
         from adv2e.conversion.pipeline import convert_reading
 
         gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
         chosen = config(None if crop and given["pixel_format"] else size)
-        if output != "-" and reading.is_open:
+        if output != "-" and opened.is_open:
             wanted = {**given, **part, **written, "threads": threads}
-            _tell_of_much(reading.source, chosen, Path(output or "events.h5"), wanted, log)
+            _tell_of_much(opened.source, chosen, Path(output or "events.h5"), wanted, log)
         summary = convert_reading(
-            reading,
+            opened,
             output,
             config=chosen,
             also_read=options.files_given(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     "--stop", type=options.SECONDS, metavar="S", help="Look at it until S seconds after its start."
 )
 @options.crop_option("Look at a part of the sensor only: first column, first row, columns, rows.")
+@options.events_options
 def command(
     recording: str,
     config: Callable[[Size | None], Config],
@@ -71,6 +72,7 @@ def command(
     start: float | None,
     stop: float | None,
     crop: Rectangle | None,
+    reading: dict[str, Any],
     threads: int | None,
     progress: bool,
     log: Log,
@@ -121,9 +123,7 @@ def command(
         output=folder,
         without=without,
         fit_thresholds=fit_thresholds,
-        time_unit=time_unit,
-        rotate180=rotate180,
-        track=track,
+        reading={**reading, "time_unit": time_unit, "rotate180": rotate180, "track": track},
         part=(start, stop, crop),
         overwrite=overwrite,
         threads=threads,

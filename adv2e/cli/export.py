@@ -112,6 +112,7 @@ _OPTIONS = {
     metavar="WxH",
     help="Size of the sensor, where the files do not state it.",
 )
+@options.events_options
 @options.threads_option
 @options.reporting_options
 def command(
@@ -125,6 +126,7 @@ def command(
     time_unit: str | None,
     track: str | None,
     size: Size | None,
+    reading: dict[str, Any],
     threads: int | None,
     log: Log,
     **given: Any,
@@ -145,8 +147,8 @@ def command(
     from adv2e.export import export as exports
 
     assert output is not None
-    how: dict[str, Any] = {"overwrite": overwrite, "doubt": log}
-    how |= {"time_unit": time_unit, "size": size, "track": track}
+    how = {**reading, "time_unit": time_unit, "size": size, "track": track}
+    how |= {"overwrite": overwrite, "doubt": log}
     paths = [Path(path) for path in events]
     if to == "voxel":
         from adv2e.export.voxels import VoxelSettings

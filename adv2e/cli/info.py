@@ -18,6 +18,11 @@ from adv2e.geometry import Size
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, always with the same keys.")
 @options.source_options
 @click.option(
+    "--set-back",
+    type=click.Choice(options.SET_BACK),
+    help="Where times of events go back by more than 0.1 s: see 'adv2e convert'.",
+)
+@click.option(
     "--size", type=options.SIZE, metavar="WxH", help="Size of the frames of raw video (FILE is -)."
 )
 @options.reporting_options
@@ -25,6 +30,7 @@ def command(
     file: Path,
     as_json: bool,
     given: dict[str, Any],
+    set_back: str | None,
     size: Size | None,
     progress: bool,
     log: options.Log,
@@ -45,7 +51,7 @@ def command(
 
     log(f"reading {file}", 1)
     with reading_told(file, progress) as told:
-        report = inspect(file, **given, frame_size=size, progress=told)
+        report = inspect(file, **given, set_back=set_back, frame_size=size, progress=told)
     if as_json:
         import json
 

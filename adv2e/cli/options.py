@@ -299,6 +299,35 @@ def source_options(body: Body) -> Body:
     return with_given  # type: ignore[return-value]
 
 
+# adv2e.formats.clock.SET_BACK, without the time that importing it takes
+SET_BACK = ("continue", "sort")
+
+
+def events_options(body: Body) -> Body:
+    """Add what says which events are taken; the command gets ``reading``, a dict.
+
+    It holds these by the names that :func:`adv2e.read_events` has for them.
+    """
+
+    @click.option(
+        "--set-back",
+        type=click.Choice(SET_BACK),
+        help="Where times of events go back by more than 0.1 s. continue: from the time before, as"
+        " where a clock was reset. sort: by time.  [default: an error]",
+    )
+    @click.option(
+        "--crop-events",
+        is_flag=True,
+        help="Leave out events outside the sensor, however many.  [default: more than 1 % are an"
+        " error]",
+    )
+    @functools.wraps(body)
+    def with_reading(*args: Any, set_back: str | None, crop_events: bool, **kw: Any) -> Any:
+        return body(*args, reading={"set_back": set_back, "crop_events": crop_events}, **kw)
+
+    return with_reading  # type: ignore[return-value]
+
+
 def rotate_option(what: str = "") -> Callable[[Body], Body]:
     """Return what adds --rotate180, which turns `what`; the command gets ``rotate180``, a bool."""
     return click.option(

@@ -99,6 +99,7 @@ if TYPE_CHECKING:
 @options.time_unit_option
 @options.rotate_option()
 @options.track_option("EVENTS")
+@options.events_options
 def command(
     events: str,
     output: str | None,
@@ -112,6 +113,7 @@ def command(
     time_unit: str | None,
     rotate180: bool,
     track: str | None,
+    reading: dict[str, Any],
     **shown: Any,
 ) -> None:
     """Make pictures and films of events.
@@ -141,9 +143,9 @@ def command(
 
     about = {name: shown[name] for name in ("fps", "speed", "at_s")}
     chosen = chosen_style(output, style, on_color, off_color, window_ms=window, **about)
+    reading |= {"time_unit": time_unit, "rotate180": rotate180, "track": track}
     with reading_told(events, progress) as told:
-        given: dict[str, Any] = {"time_unit": time_unit, "rotate180": rotate180, "track": track}
-        recording = read_events(events, progress=told, **given)
+        recording = read_events(events, progress=told, **reading)
     for problem in recording.problems:
         log(f"{events}: {problem}")
     if frames and recording.frame_times_ns is None:

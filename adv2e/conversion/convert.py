@@ -37,6 +37,8 @@ def convert(
     pixel_format: str | None = None,
     rotate180: bool = False,
     track: str | int | None = None,
+    set_back: str | None = None,
+    crop_events: bool = False,
     format: str | None = None,
     layout: str | None = None,
     with_frames: bool = False,
@@ -87,6 +89,8 @@ def convert(
     track : str or int, optional
         Which one to read of several video tracks, streams or topics: its number from 0, or its
         name.
+    set_back, crop_events
+        Of events: see :func:`adv2e.read_events`.
     format, layout : str, optional
         Format of the output where its suffix does not say it, and layout of HDF5.
     with_frames : bool
@@ -166,6 +170,8 @@ def convert(
             crop=part,
             rotate180=rotate180,
             track=track,
+            set_back=set_back,
+            crop_events=crop_events,
             time_unit=time_unit,
             start_s=start_s,
             stop_s=stop_s,
@@ -181,6 +187,8 @@ def convert(
             doubt=doubt,
         )
         return replace(summary, notes=tuple(map(in_python, notes)))
+    if set_back or crop_events:
+        raise UsageError(f"{source}: set_back and crop_events are for events, not for frames")
     ready = load_config(config, size=None if part and pixel_format else wanted)
     reading = Reading(
         str(source),

@@ -27,12 +27,11 @@ from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
 from adv2e.formats import compression
-from adv2e.formats.assembly import inside
+from adv2e.formats.assembly import events_in_order, inside
 from adv2e.formats.event_file import EventFile, Progress
 from adv2e.formats.lookup import check_frames, to_write
 from adv2e.formats.reading import open_events
 from adv2e.formats.sink import Sink
-from adv2e.formats.streaming import events_in_order
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of, picture_white
@@ -95,6 +94,8 @@ def convert_events(
     time_unit: str | None = None,
     rotate180: bool = False,
     track: str | int | None = None,
+    set_back: str | None = None,
+    crop_events: bool = False,
     start_s: float | None = None,
     stop_s: float | None = None,
     t0: str = "auto",
@@ -127,6 +128,8 @@ def convert_events(
         Turn events and frames by half a turn, before they are cut.
     track : str or int, optional
         Which one to read of several streams: its number from 0, or its name.
+    set_back, crop_events
+        See :func:`adv2e.read_events`.
     start_s, stop_s : float, optional
         First and last time wanted, from the first event [s]; both inclusive.
     t0 : {'auto', 'keep', 'zero'}
@@ -151,7 +154,15 @@ def convert_events(
     if with_frames:
         check_frames(chosen)
     keeps_all_bits = chosen.is_davis240c
-    file = open_events(path, time_unit=time_unit, size=size, rotate180=rotate180, track=track)
+    file = open_events(
+        path,
+        time_unit=time_unit,
+        size=size,
+        rotate180=rotate180,
+        track=track,
+        set_back=set_back,
+        crop_events=crop_events,
+    )
     facts = file.facts
     if causes and file.causes is None:
         raise DataError(

@@ -45,18 +45,12 @@ _REST = -1
 
 
 def read_known_light(
-    events: str | Path,
-    light: str | Path,
-    time_unit: str | None = None,
-    sensor: Sensor | None = None,
-    *,
-    rotate180: bool = False,
-    track: str | int | None = None,
+    events: str | Path, light: str | Path, sensor: Sensor | None = None, **reading: Any
 ) -> Evidence:
     """Read events and the light that they were made under.
 
-    Events as :func:`adv2e.formats.reading.read_events` reads them; the `sensor` says of how many
-    pixels they are, where the file does not.
+    Events as :func:`adv2e.formats.reading.read_events` reads them, `reading` as it takes it; the
+    `sensor` says of how many pixels they are, where the file does not.
 
     Raises
     ------
@@ -65,8 +59,7 @@ def read_known_light(
         after it; there are too few.
     """
     size = None if sensor is None else (sensor.width, sensor.height)
-    given: dict[str, Any] = {"time_unit": time_unit, "rotate180": rotate180, "track": track}
-    recording = assemble(open_events(events, size=size, **given))
+    recording = assemble(open_events(events, size=size, **reading))
     width, height = recording.width, recording.height
     check_beside(width, height, sensor, recording.path)
     stimulus, part = read_stimulus(light, Size(width, height))

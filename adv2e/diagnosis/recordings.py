@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
@@ -37,6 +38,8 @@ def diagnose(
     start_s: float | None = None,
     stop_s: float | None = None,
     crop: str | tuple[int, int, int, int] | None = None,
+    set_back: str | None = None,
+    crop_events: bool = False,
     overwrite: bool = False,
     threads: int | None = None,
     progress: bool = False,
@@ -71,6 +74,8 @@ def diagnose(
         Part to look at [s after the first frame].
     crop : (int, int, int, int) or str, optional
         First column, first row, columns and rows of the part of the sensor to look at.
+    set_back, crop_events
+        See :func:`adv2e.read_events`.
     overwrite : bool
         Replace the folder of an earlier report.
     threads : int, optional
@@ -111,10 +116,14 @@ def diagnose(
         output=output,
         without=without,
         fit_thresholds=fit_thresholds,
-        time_unit=time_unit,
-        rotate180=rotate180,
-        track=track,
         part=(start_s, stop_s, part),
+        reading={
+            "time_unit": time_unit,
+            "rotate180": rotate180,
+            "track": track,
+            "set_back": set_back,
+            "crop_events": crop_events,
+        },
         overwrite=overwrite,
         threads=threads,
         progress=progress,
@@ -132,10 +141,8 @@ def diagnose_file(
     output: str | Path | None,
     without: Sequence[str],
     fit_thresholds: bool,
-    time_unit: str | None,
-    rotate180: bool,
-    track: str | int | None,
     part: tuple[float | None, float | None, Rectangle | None],
+    reading: dict[str, Any],
     overwrite: bool,
     threads: int | None,
     progress: bool,
@@ -145,9 +152,9 @@ def diagnose_file(
     """Do what :func:`diagnose` does, with a configuration that was loaded.
 
     `name` and `written` are what it was made from and the keys that somebody wrote; `also_read` are
-    files that must not be written over; `part` is what of the recording is looked at
-    (:func:`adv2e.diagnosis.data.evidence.part_of`); `log` takes lines for people, and `say` those
-    that tell now and then how far it is, where no bar does.
+    files that must not be written over; `reading` is for :func:`adv2e.read_events`, and `part` what
+    of the recording is looked at (:func:`adv2e.diagnosis.data.evidence.part_of`); `log` takes lines
+    for people, and `say` those that tell now and then how far it is, where no bar does.
     """
     check_names(without, names(declared))
     _check_own_names(declared)
@@ -156,11 +163,10 @@ def diagnose_file(
         inputs = [recording, *([] if light is None else [light]), *also_read]
         check_folder(output, overwrite=overwrite, inputs=inputs)
     with _stages(progress, say) as tell:
-        given = time_unit, declared.sensor
         evidence = (
-            read_evidence(recording, *given, rotate180=rotate180, track=track)
+            read_evidence(recording, declared.sensor, **reading)
             if light is None
-            else read_known_light(recording, light, *given, rotate180=rotate180, track=track)
+            else read_known_light(recording, light, declared.sensor, **reading)
         )
         evidence = part_of(evidence, *part)
         found = diagnose_evidence(

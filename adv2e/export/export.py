@@ -16,7 +16,7 @@ from adv2e.export.sequence import Sequence, open_sequences
 from adv2e.export.windows import Slice, before_images, between_images, by_count, by_time
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging, writing
-from adv2e.formats.streaming import events_in_order
+from adv2e.formats.assembly import events_in_order
 
 DESCRIPTION = "export.json"
 """Says how an export was made."""
@@ -167,11 +167,9 @@ def _exported(
     what: str,
     write: Write,
     *,
-    time_unit: str | None = None,
-    size: tuple[int, int] | None = None,
-    track: str | int | None = None,
     overwrite: bool = False,
     doubt: Callable[[str], None] = lambda text: None,
+    **reading: Any,
 ) -> Exported:
     """Let `write` fill a folder, which comes into place when all is there.
 
@@ -187,15 +185,15 @@ def _exported(
         What the items are, for people.
     write : callable
         Fills the folder.
-    time_unit, size, track
-        See :func:`adv2e.formats.reading.open_events`.
     overwrite : bool
         Replace, at the end, an export that exists.
     doubt : callable
         Takes lines for people that ask for a look.
+    **reading
+        See :func:`adv2e.formats.reading.open_events`.
     """
     began = time.perf_counter()
-    sequences = open_sequences(paths, time_unit=time_unit, size=size, track=track)
+    sequences = open_sequences(paths, **reading)
     told: dict[str, Any] = {"sequences": [], "doubts": []}
     read = [one for sequence in sequences for one in sequence.file.inputs]
     with Staging(overwrite, read) as staging, writing(output):

@@ -30,10 +30,13 @@ class Sequence:
         return [(shot.t_ns + 500) // 1000 for shot in self.file.shots()]
 
 
-def open_sequences(paths: Many[str | Path], **how: Any) -> list[Sequence]:
-    """Open recordings as :func:`open_events`; each is called as its file, or folder and file."""
+def open_sequences(paths: Many[str | Path], **reading: Any) -> list[Sequence]:
+    """Open recordings; each is called as its file, or as its folder and its file.
+
+    `reading` as :func:`adv2e.formats.reading.open_events` takes it.
+    """
     return [
-        Sequence(name, open_events(path, **how))
+        Sequence(name, open_events(path, **reading))
         for name, path in zip(_names([Path(path) for path in paths]), paths, strict=True)
     ]
 

@@ -48,9 +48,10 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.events import Events
+from adv2e.formats.clock import CONTINUE, Clock
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.sink import Request, Writer, to_line
-from adv2e.formats.words import Counter, Numbers, blocks
+from adv2e.formats.words import Numbers, blocks
 from adv2e.sources.frame import Pixels, Shot
 
 _CHIPS = {
@@ -115,7 +116,7 @@ def open_aedat2(path: Path, facts: Facts) -> EventFile:
     else:
         old = known in _OLD
         size = facts.geometry
-    frames = [] if old else _frames(path, begin, size)
+    frames = [] if old else _frames(path, begin, size, facts)
     if frames and "color" in chip.lower():
         facts.problems.append("frames hold a mosaic of colours, taken as grey")
     whole = [frame for frame in frames if frame.is_whole]
@@ -129,9 +130,9 @@ def open_aedat2(path: Path, facts: Facts) -> EventFile:
     ]
 
     def parts() -> Iterator[Columns]:
-        counter = Counter(32)
+        clock = Clock(facts, bits=32)
         for pairs in blocks(path, begin, _PAIR, _BLOCK, facts):
-            t = counter(pairs[:, 1])
+            t = clock.ticks(pairs[:, 1], str(path))
             address = pairs[:, 0].astype(np.uint32)
             if old:
                 is_event = address & 0x8000 == 0
@@ -142,6 +143,7 @@ def open_aedat2(path: Path, facts: Facts) -> EventFile:
                 t, address = t[is_event], address[is_event].astype(np.int32)
                 x, y, p = address >> 12 & 0x3FF, address >> 22, address >> 11 & 1
             yield t, size[0] - 1 - x, size[1] - 1 - y, p
+        clock.tell()
 
     return EventFile("aedat2", facts, parts, (lambda: iter(shots)) if shots else None)
 
@@ -212,7 +214,7 @@ def _samples(address: NDArray[np.uint32]) -> tuple[Numbers, NDArray[np.bool_]]:
     return at, kind[at] == 1
 
 
-def _frames(path: Path, begin: int, size: tuple[int, int]) -> list[_Frame]:
+def _frames(path: Path, begin: int, size: tuple[int, int], facts: Facts) -> list[_Frame]:
     """Return the frames of a recording.
 
     All are read from the same corner on.  It is that at which the fewest pixels were reset and not
@@ -220,10 +222,11 @@ def _frames(path: Path, begin: int, size: tuple[int, int]) -> list[_Frame]:
     """
     corners = [x << 12 | y << 22 for x in (0, size[0] - 1) for y in (0, size[1] - 1)]
     found: list[list[NDArray[np.int64]]] = [[] for _ in corners]
-    counter, past = Counter(32), 0
+    # of frames alone, times go on; events beside them need to be asked for
+    clock, past = Clock(facts, bits=32, set_back=CONTINUE), 0
     total = np.zeros((3, 1), np.int64)  # samples after the reset, signals, and time of both
     for pairs in blocks(path, begin, _PAIR, _BLOCK):
-        address, t = pairs[:, 0].astype(np.uint32), counter(pairs[:, 1])
+        address, t = pairs[:, 0].astype(np.uint32), clock.ticks(pairs[:, 1], str(path))
         at, is_signal = _samples(address)
         if at.size:
             sums = total + np.cumsum([~is_signal, is_signal, t[at]], axis=1, dtype=np.int64)
@@ -238,6 +241,7 @@ def _frames(path: Path, begin: int, size: tuple[int, int]) -> list[_Frame]:
     marks = [np.concatenate(rows, axis=1) for rows in found if rows]
     if not marks:
         return []
+    clock.tell()
     first = min(marks, key=lambda rows: float(np.mean(rows[1] - rows[2])))
     bounds = np.concatenate([first, [[past], *total]], axis=1)
     place, resets, signals, t = np.diff(bounds, axis=1)

@@ -1,58 +1,90 @@
-"""From columns as a file holds them to a sorted event array, with a list of what was wrong."""
+"""From columns as a file holds them to events in the order of time, with a list of what was wrong.
+
+All that the events of a file tell together is known once all were read: how large the sensor is,
+whether they are in order, whether the columns are what they are taken for.  Where they need not
+all be kept (:func:`events_in_order`) the file is therefore read twice.  Events of one time keep the
+order of the file.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.causes import CAUSED_DTYPE
 from adv2e.errors import DataError
-from adv2e.events import (
-    EVENT_DTYPE,
-    Events,
-    disorder,
-    sort_events,
-    sort_ties,
-)
+from adv2e.events import EVENT_DTYPE, Events, by_time, repeated
 from adv2e.formats.causes import check_numbers
-from adv2e.formats.event_file import Column, Columns, EventFile, Facts
+from adv2e.formats.clock import Clock
+from adv2e.formats.column_names import FEW
+from adv2e.formats.event_file import MOST_COLUMNS, Column, Columns, EventFile
 from adv2e.formats.recording import Recording
 from adv2e.sources.times.instants import seconds
 from adv2e.sources.times.units import SETTLED
+from adv2e.ticks import check_us
 
-_LARGEST = np.iinfo(np.uint16).max
-
+_STRAY = 1000
+"""One event of so many may have a polarity that is none."""
+_MOST_OUTSIDE = 0.01
+"""Share of the events that may lie outside the sensor: stray ones."""
 _FEW = 100
 """So few events may well lie in a small part of the recording."""
 _APART = 300
 """Events and frames that differ in length by this factor are in doubt."""
 
 
-class Check:
-    """Makes event arrays of columns, part by part, and counts what does not fit."""
+class Survey:
+    """Takes note of all events of a file, part by part.
 
-    def __init__(self) -> None:
-        self._unstorable = 0
-        self._values: set[int] = set()
-        self._odd_polarities = 0
+    Attributes
+    ----------
+    count : int
+        Events until now.
+    first_us : int or None
+        Time of the first one in the file [us].
+    steps_back : int
+        How often an event is earlier than that before it in the file.
+    """
 
-    def events_of(self, columns: Columns, causes: Column | None = None) -> Events:
-        """Return the events of a part in their order, without those that no sensor can have."""
+    def __init__(self, file: EventFile) -> None:
+        self._file, self._facts = file, file.facts
+        self.count = self.steps_back = self._largest_back_us = 0
+        self.first_us: int | None = None
+        self._unstorable = self._outside = self._odd = 0
+        self._needed = (0, 0)
+        self._signs: set[int] = set()
+        self._whole = True
+        self._columns = {name: _Column() for name in "txyp"}
+
+    def note(self, columns: Columns) -> None:
+        """Take note of a part, its times in microseconds."""
         t, x, y, p = columns
+        if not t.size:
+            return
+        self.count += t.size
+        self.first_us = int(t[0]) if self.first_us is None else self.first_us
+        step = np.diff(t, prepend=self._columns["t"].last if self._columns["t"].size else t[0])
+        back = step < 0
+        if back.any():
+            self.steps_back += int(np.count_nonzero(back))
+            self._largest_back_us = max(self._largest_back_us, -int(step.min()))
+        if self._whole and self._file.unit_ns > 1000:
+            self._whole = not np.any(t % (self._file.unit_ns // 1000))
+        for name, column in zip("txyp", columns, strict=True):
+            self._columns[name].note(column)
         self._note_polarities(p)
-        fits = (x >= 0) & (x <= _LARGEST) & (y >= 0) & (y <= _LARGEST)
-        count = int(np.count_nonzero(fits))
-        if count < fits.size:
-            self._unstorable += fits.size - count
-            t, x, y, p = t[fits], x[fits], y[fits], p[fits]
-            causes = None if causes is None else causes[fits]
-        part = np.empty(count, EVENT_DTYPE if causes is None else CAUSED_DTYPE)
-        part["t"], part["x"], part["y"], part["p"] = t, x, y, p > 0
-        if causes is not None:
-            part["cause"] = causes
-        return part
+        fits = storable(x, y)
+        if fits is not None:
+            self._unstorable += fits.size - int(np.count_nonzero(fits))
+            x, y = x[fits], y[fits]
+        if x.size:
+            right, down = int(x.max()) + 1, int(y.max()) + 1
+            self._needed = max(self._needed[0], right), max(self._needed[1], down)
+            stated = self._facts.geometry
+            if stated is not None and (right > stated[0] or down > stated[1]):
+                self._outside += int(np.count_nonzero((x >= stated[0]) | (y >= stated[1])))
 
     def _note_polarities(self, p: Column) -> None:
         usual = 0
@@ -60,40 +92,189 @@ class Check:
             found = int(np.count_nonzero(p == value))
             usual += found
             if found:
-                self._values.add(value)
-        self._odd_polarities += p.size - usual
+                self._signs.add(value)
+        self._odd += p.size - usual
 
-    def problems(self) -> list[str]:
-        """Return what is to be told of all parts until now."""
-        told = []
+    def settle(self) -> tuple[int, int]:
+        """Return width and height of the sensor, and tell what is doubtful of all events.
+
+        Raises
+        ------
+        DataError
+            The columns are not what they were taken for; or more than a few events lie outside the
+            sensor, and nobody asked for the others.
+        """
+        self._check_columns()
         if self._unstorable:
-            told.append(
-                f"{self._unstorable} events with a coordinate below 0 or above 65535: left out"
-            )
-        if self._odd_polarities:
-            told.append(
-                f"{self._odd_polarities} events with a polarity other than -1, 0 and 1:"
+            self._tell_outside(self._unstorable, "with a coordinate below 0 or above 65535")
+        if self._odd:
+            self._facts.tell(
+                f"{self._odd} events with a polarity other than -1, 0 and 1:"
                 " taken as ON above 0, else OFF"
             )
-        if {-1, 0} <= self._values:
-            told.append("polarities -1 and 0 both occur: both taken as OFF")
-        return told
+        if {-1, 0} <= self._signs:
+            self._facts.tell("polarities -1 and 0 both occur: both taken as OFF")
+        size = self._size()
+        if self._outside and size == self._facts.geometry:
+            where = f"outside {size[0]}x{size[1]}, which {self._facts.stated_by} states"
+            self._tell_outside(self._outside, where)
+        return size
+
+    def tell_order(self) -> None:
+        """Tell of events out of order, which were sorted."""
+        if self.steps_back:
+            self._facts.tell(
+                f"events are not in the order of time ({self.steps_back} steps back, the largest"
+                f" {_length(self._largest_back_us)}): sorted"
+            )
+
+    def _check_columns(self) -> None:
+        facts, (t, *others) = self._facts, self._columns.values()
+        wrong = ""
+        if self._odd > max(1, self.count // _STRAY):
+            wrong = f"{self._odd} of {self.count} polarities are other than -1, 0 and 1"
+        elif (
+            self.count >= FEW
+            and self.steps_back > self.count // 4
+            and self._whole
+            and t.least >= 0
+            and t.most * 1000 < MOST_COLUMNS * self._file.unit_ns
+            and any(column.rises for column in others[:2])
+        ):
+            wrong = f"times go back {self.steps_back} times, and another column never does"
+        if wrong:
+            held = "; ".join(f"{name} {c.text}" for name, c in self._columns.items() if name != "t")
+            raise DataError(
+                f"{facts.path}: {wrong}: are the columns {' '.join(self._file.order or 'txyp')}?"
+                f" {held}"
+            )
+
+    def _tell_outside(self, count: int, where: str) -> None:
+        told = f"{count} events {where}"
+        if not self._facts.crop_events and count > _MOST_OUTSIDE * self.count:
+            hint, (width, height) = "", self._needed
+            stated = self._facts.geometry
+            if stated and width <= stated[1] and height <= stated[0]:
+                hint = f" (a sensor of {stated[1]}x{stated[0]} holds them: --size)"
+            elif stated:
+                hint = f" (they need {width}x{height})"
+            raise DataError(
+                f"{self._facts.path}: {told}, of {self.count}{hint}: --crop-events leaves them out"
+            )
+        self._facts.tell(f"{told}: left out")
+
+    def _size(self) -> tuple[int, int]:
+        facts, needed = self._facts, self._needed
+        stated, by = facts.geometry, facts.stated_by
+        if needed == (0, 0):
+            facts.tell("no events")
+            return stated or (0, 0)
+        size = f"{needed[0]}x{needed[1]}"
+        if stated is None:
+            facts.tell(f"no geometry stated: {size} from the largest coordinates")
+            return needed
+        wider = max(stated[0], needed[0]), max(stated[1], needed[1])
+        if wider == stated or wider[0] > stated[0] + 1 or wider[1] > stated[1] + 1:
+            return stated
+        # a known fault of writers: the largest coordinate in place of the size
+        facts.tell(
+            f"{by} states {stated[0]}x{stated[1]}, one less than the largest coordinates need:"
+            f" {wider[0]}x{wider[1]} taken"
+        )
+        return wider
+
+
+class _Column:
+    """Range of a column, and whether it ever falls."""
+
+    def __init__(self) -> None:
+        self.size = 0
+        self.first = self.last = self.least = self.most = 0
+        self.falls = False
+
+    def note(self, column: Column) -> None:
+        if not self.size:
+            self.first = self.last = self.least = self.most = int(column[0])
+        self.least = min(self.least, int(column.min()))
+        self.most = max(self.most, int(column.max()))
+        if not self.falls:
+            self.falls = bool(column[0] < self.last or np.any(column[1:] < column[:-1]))
+        self.size += column.size
+        self.last = int(column[-1])
+
+    @property
+    def rises(self) -> bool:
+        return not self.falls and self.last > self.first
+
+    @property
+    def text(self) -> str:
+        return f"is {self.least} to {self.most}" + (" and never falls" if self.rises else "")
+
+
+def storable(x: Column, y: Column) -> NDArray[np.bool_] | None:
+    """Return which coordinates a sensor can have; None: all."""
+    fits = (x >= 0) & (x < MOST_COLUMNS) & (y >= 0) & (y < MOST_COLUMNS)
+    return None if fits.all() else fits
+
+
+def events_of_file(file: EventFile, survey: Survey | None = None) -> Iterator[Events]:
+    """Yield the events part by part in the order of the file, with their causes if it has them.
+
+    Those that no sensor can have are left out.
+
+    Parameters
+    ----------
+    file : EventFile
+    survey : Survey, optional
+        Takes note of all events.
+
+    Raises
+    ------
+    DataError
+        They cannot be read; their times go back (:mod:`adv2e.formats.clock`).
+    """
+    path, done = file.facts.path, 0
+    clock = Clock(file.facts, file.unit_ns, bits=file.bits)
+    causes = None if file.causes is None else file.causes()
+    if causes is not None:
+        check_numbers(causes, f"{path}: causes")
+    label = f"{path}: {file.times}"
+    for raw, *others in file.parts():
+        x, y, p = others
+        t = clock.ticks(raw, label)
+        if file.offset_us:
+            t += file.offset_us
+            check_us(t, label)
+        if survey is not None:
+            survey.note((t, x, y, p))
+        part = np.empty(t.size, EVENT_DTYPE if causes is None else CAUSED_DTYPE)
+        if causes is not None:
+            if done + t.size > causes.size:
+                raise DataError(f"{path}: fewer causes than events: {causes.size}")
+            part["cause"] = causes[done : done + t.size]
+        fits = storable(x, y)
+        if fits is not None:
+            part = part[fits]
+            t, x, y, p = t[fits], x[fits], y[fits], p[fits]
+        part["t"], part["x"], part["y"], part["p"] = t, x, y, p > 0
+        done += raw.size
+        yield part
+    if causes is not None and done != causes.size:
+        raise DataError(f"{path}: {causes.size} causes for {done} events")
+    clock.tell()
 
 
 def assemble(file: EventFile) -> Recording:
     """Return all that a file holds, its events sorted and inside its geometry."""
-    facts, check = file.facts, Check()
-    parts = list(events_of_file(file, check))
-    dtype = EVENT_DTYPE if file.causes is None else CAUSED_DTYPE
-    events = np.concatenate([np.empty(0, dtype), *parts])
-    del parts
-    facts.problems += check.problems()
-    size = settled_size(needed_size(events), facts)
-    found = events.size
-    events = inside(events, size)
-    if events.size < found:
-        facts.problems.append(left_out(found - events.size, size, facts.stated_by))
-    events = _in_order(events, facts)
+    facts, survey = file.facts, Survey(file)
+    parts = list(events_of_file(file, survey))
+    size = survey.settle()
+    events = _all_in_order(file, parts, size)
+    survey.tell_order()
+    if events.size and events["t"][0] < 0:
+        facts.tell(f"times begin below zero, at {events['t'][0] / 1e6:.6f} s")
+    if count := repeated(events):
+        facts.tell(f"{count} events repeat another one exactly: kept")
     shots = list(file.shots()) if file.shots is not None else None
     times = None if shots is None else np.array([shot.t_ns for shot in shots], np.int64)
     facts.problems += _disagreement(events, times)
@@ -111,49 +292,40 @@ def assemble(file: EventFile) -> Recording:
     )
 
 
-def events_of_file(file: EventFile, check: Check) -> Iterator[Events]:
-    """Yield the events part by part, with their causes if the file has them."""
-    if file.causes is None:
-        yield from map(check.events_of, file.parts())
-        return
-    causes, done = file.causes(), 0
-    check_numbers(causes, f"{file.facts.path}: causes")
-    for columns in file.parts():
-        size = columns[0].size
-        if done + size > causes.size:
-            raise DataError(f"{file.facts.path}: fewer causes than events: {causes.size}")
-        yield check.events_of(columns, causes[done : done + size])
-        done += size
-    if done != causes.size:
-        raise DataError(f"{file.facts.path}: {causes.size} causes for {done} events")
+def events_in_order(file: EventFile) -> tuple[tuple[int, int], int, Generator[Events, None, None]]:
+    """Return the size of the sensor, the time of the first event [us], and all events in order.
 
+    The events come part by part, those on the sensor.  What is doubtful is added to the problems of
+    the file.  Only events out of order are all kept in memory, to be sorted.
 
-def settled_size(needed: tuple[int, int] | None, facts: Facts) -> tuple[int, int]:
-    """Return width and height of the sensor, and note what is doubtful of them.
-
-    Parameters
-    ----------
-    needed : (int, int) or None
-        What the largest coordinates need; None: there are no events.
-    facts : Facts
+    Raises
+    ------
+    DataError
+        There are no events, and no size is stated; or the file cannot be read.
     """
-    stated, by = facts.geometry, facts.stated_by
-    if needed is None:
-        facts.problems.append("no events")
-        return stated or (0, 0)
-    size = f"{needed[0]}x{needed[1]}"
-    if stated is None:
-        facts.problems.append(f"no geometry stated: {size} from the largest coordinates")
-        return needed
-    wider = max(stated[0], needed[0]), max(stated[1], needed[1])
-    if wider == stated or wider[0] > stated[0] + 1 or wider[1] > stated[1] + 1:
-        return stated
-    # a known fault of writers: the largest coordinate in place of the size
-    facts.problems.append(
-        f"{by} states {stated[0]}x{stated[1]}, one less than the largest coordinates need:"
-        f" {wider[0]}x{wider[1]} taken"
-    )
-    return wider
+    survey = Survey(file)
+    for _ in events_of_file(file, survey):
+        pass
+    size = survey.settle()
+    if size == (0, 0):
+        raise DataError(
+            f"{file.facts.path}: no events, and no size of the sensor: state it with --size"
+        )
+    if survey.steps_back:
+        events = _all_in_order(file, list(events_of_file(file)), size)
+        survey.tell_order()
+        first_us = int(events["t"][0]) if events.size else 0
+        return size, first_us, (part for part in [events] if part.size)
+    fitting = (inside(events, size) for events in events_of_file(file))
+    return size, survey.first_us or 0, (events for events in fitting if events.size)
+
+
+def _all_in_order(file: EventFile, parts: list[Events], size: tuple[int, int]) -> Events:
+    """Return the events of all parts that lie on the sensor, by time."""
+    dtype = EVENT_DTYPE if file.causes is None else CAUSED_DTYPE
+    events = np.concatenate([np.empty(0, dtype), *parts])
+    parts.clear()
+    return by_time(inside(events, size))
 
 
 def inside(events: Events, size: tuple[int, int]) -> Events:
@@ -162,30 +334,12 @@ def inside(events: Events, size: tuple[int, int]) -> Events:
     return events if fits.all() else events[fits]
 
 
-def left_out(count: int, size: tuple[int, int], by: str) -> str:
-    """Return what is told of so many events outside the sensor."""
-    return f"{count} events outside {size[0]}x{size[1]}, which {by} states: left out"
-
-
-def needed_size(events: Events) -> tuple[int, int] | None:
-    """Return width and height that the largest coordinates need."""
-    return (int(events["x"].max()) + 1, int(events["y"].max()) + 1) if events.size else None
-
-
-def _in_order(events: Events, facts: Facts) -> Events:
-    back, untidy, repeated = disorder(events)
-    if back:
-        facts.problems.append(f"events are not in the order of time ({back} steps back): sorted")
-        events = sort_events(events)
-    elif untidy:
-        sort_ties(events)
-    if back or untidy:
-        repeated = disorder(events)[2]
-    if events.size and events["t"][0] < 0:
-        facts.problems.append(f"times begin below zero, at {events['t'][0] / 1e6:.6f} s")
-    if repeated:
-        facts.problems.append(f"{repeated} events repeat another one exactly: kept")
-    return events
+def _length(time_us: int) -> str:
+    """Return a length of time in the unit that suits it."""
+    for unit, size in (("s", 1e6), ("ms", 1e3)):
+        if time_us >= size:
+            return f"{time_us / size:.7g} {unit}"
+    return f"{time_us} us"
 
 
 def _disagreement(events: Events, times_ns: NDArray[np.int64] | None) -> list[str]:

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from adv2e.causes import has_causes
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.formats.column_names import find_columns, stated_unit
+from adv2e.formats.column_names import find_columns, geometry_in, stated_unit
 from adv2e.formats.event_file import EventFile, Facts, described_geometry
 from adv2e.formats.sink import Request, Writer
 from adv2e.formats.text.reader import Form, events_of_lines
@@ -66,6 +66,8 @@ def open_csv(path: Path, facts: Facts) -> EventFile:
     with path.open("rb") as file:
         begin = file.read(_MOST_HEADING)
     names, skipped, lines = _heading(path, begin)
+    comments = begin[:skipped].decode("utf-8", "replace")
+    facts.state(geometry_in("".join(re.findall("^#.*\n", comments, re.M)))[1], "a comment")
     found = find_columns(names, str(path))
     size = re.search(rb"%geometry:(\d{1,5}),(\d{1,5})\s|x@(\d{1,5})\W+y@(\d{1,5})", begin[:skipped])
     if size is not None:

@@ -34,7 +34,7 @@ from adv2e.events import Events
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.percent_header import header_of, read_header
 from adv2e.formats.sink import Request, Writer
-from adv2e.formats.words import Counter, blocks
+from adv2e.formats.words import blocks
 
 _TYPE, _SIZE = 12, 8
 _TYPES = (0, _TYPE)
@@ -71,13 +71,16 @@ def open_dat(path: Path, facts: Facts) -> EventFile:
     begin = header.t0
 
     def parts() -> Iterator[Columns]:
-        counter = Counter(32)
         for words in blocks(path, header.size + 2, "(2,)<u4", _BLOCK, facts):
             where = words[:, 1]
-            t = counter(words[:, 0]) + begin
-            yield t, where & 0x3FFF, where >> 14 & 0x3FFF, (where >> 28 > 0).astype(np.uint8)
+            yield (
+                words[:, 0],
+                where & 0x3FFF,
+                where >> 14 & 0x3FFF,
+                (where >> 28 > 0).astype(np.uint8),
+            )
 
-    return EventFile("dat", facts, parts)
+    return EventFile("dat", facts, parts, offset_us=begin, bits=32)
 
 
 class DatWriter(Writer):

@@ -50,6 +50,7 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.formats import hdf5
+from adv2e.formats.clock import CONTINUE, Clock
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.tables import Table, open_table
 from adv2e.sources.frame import Pixels, Shot
@@ -62,8 +63,6 @@ _FRAME_HEAD = 36
 _WRAP = 1 << 31
 _WRAPS = range(1 << 21)
 """More wraps are beyond 142 years."""
-_BACK_US = 1_000_000
-"""Times that go back so far were set back, even if nothing says so [us]."""
 _ROWS = 64
 """Rows read at once, of which each may be a frame."""
 _SIZE = (346, 260)
@@ -125,7 +124,7 @@ def _events(path: Path, facts: Facts) -> Iterator[Columns]:
     """Yield the events, and tell what was wrong with them."""
     waiting: list[tuple[NDArray[np.int64], NDArray[np.uint32]]] = []
     held = left_out = 0
-    clock = _Clock()
+    clock = _Clock(facts)
     for packet in _packets(path, facts):
         if packet.kind == _SPECIAL:
             clock.note(packet)
@@ -141,11 +140,8 @@ def _events(path: Path, facts: Facts) -> Iterator[Columns]:
     if waiting:
         yield _columns(waiting)
     if left_out:
-        facts.problems.append(f"{left_out} events are marked as invalid: left out")
-    if clock.restarts:
-        facts.problems.append(
-            f"times were set back {clock.restarts} times: they go on from those before"
-        )
+        facts.tell(f"{left_out} events are marked as invalid: left out")
+    clock.tell()
 
 
 def _columns(waiting: list[tuple[NDArray[np.int64], NDArray[np.uint32]]]) -> Columns:
@@ -157,7 +153,7 @@ def _columns(waiting: list[tuple[NDArray[np.int64], NDArray[np.uint32]]]) -> Col
 
 
 def _frames(path: Path, facts: Facts) -> Generator[Shot, None, None]:
-    clock = _Clock()
+    clock = _Clock(facts)
     for packet in _packets(path, facts):
         if packet.kind == _SPECIAL:
             clock.note(packet)
@@ -235,33 +231,18 @@ def _words(packet: _Packet, place: int) -> NDArray[Any]:
     return np.ascontiguousarray(words)
 
 
-class _Clock:
-    """Puts times of packets on one axis, over wraps and where they were set back."""
+class _Clock(Clock):
+    """The clock of packets, which goes on where it was set back, even if nothing says so."""
 
-    def __init__(self) -> None:
-        self.offset = 0
-        self.restarts = 0
-        self._last: int | None = None
-        self._announced = False
+    def __init__(self, facts: Facts) -> None:
+        super().__init__(facts, bits=31, set_back=CONTINUE)
 
     def note(self, packet: _Packet) -> None:
         """Take note of special events."""
         kinds = _words(packet, 0).view("<u4") >> 1 & 0x7F
-        self._announced |= bool(np.any(kinds <= 1))
+        self.announced |= bool(np.any(kinds <= 1))
 
     def times(self, packet: _Packet) -> NDArray[np.int64]:
         """Return the times of the items of a packet, none of them empty [us]."""
-        times = _words(packet, 1).astype(np.int64) + packet.wraps * _WRAP + self.offset
-        last = self._last
-        if last is not None:
-            back = last - int(times[0])
-            if back > _WRAP // 2:  # a wrap that the head does not count
-                self.offset += _WRAP
-                times += _WRAP
-            elif back > _BACK_US or (back > 0 and self._announced):
-                self.restarts += 1
-                times += last - self.offset
-                self.offset = last
-        self._announced = False
-        self._last = int(times[-1])
-        return times
+        times = _words(packet, 1).astype(np.int64) + packet.wraps * _WRAP
+        return self.ticks(times, f"{self._facts.path}: dvs/data row {packet.row}")

@@ -23,8 +23,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -32,10 +32,10 @@ import numpy as np
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.formats import hdf5
-from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
+from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.hdf5_writer import CHUNK, FILTERS, Column, Hdf5Writer, Milliseconds
 from adv2e.formats.sink import Request
-from adv2e.ticks import US, check_us, to_ticks
+from adv2e.ticks import US
 
 COLUMNS = ("events/t", "events/x", "events/y", "events/p")
 
@@ -53,29 +53,25 @@ def open_dsec(path: Path, facts: Facts) -> EventFile:
     """
     with hdf5.opened(path) as file:
         hdf5.describe(file, facts)
-        sizes = {
-            name: hdf5.number(file, f"events/{name}")
-            for name in ("width", "height")
-            if hdf5.find(file, f"events/{name}") is not None
-        }
-        facts.state(described_geometry(sizes), "events/width, height")
         offset = hdf5.number(file, "t_offset") if hdf5.find(file, "t_offset") is not None else 0
         columns = hdf5.columns(file, COLUMNS)
         unit_ns = US
         if hdf5.find(file, "ms_to_idx") is None:
             t, x, y = (column[: hdf5.PART] for column in columns[:3])
             whole = t.dtype.kind != "f"
+            facts.time_unit = facts.time_unit or hdf5.unit_of(columns[0])
             unit_ns = facts.unit_of_events(t, x, y, facts.geometry, whole=whole).ns
-
-    def parts() -> Iterator[Columns]:
-        for t, x, y, p in hdf5.parts(path, COLUMNS, facts):
-            ticks = to_ticks(t, unit_ns, US, f"{path}: events/t") + offset
-            check_us(ticks, f"{path}: events/t with t_offset")
-            yield ticks, x, y, hdf5.signs(p)
 
     if abs(offset) > 1 << 53:
         raise DataError(f"{path}: t_offset of {offset} us is beyond 146 years")
-    return EventFile("dsec", facts, parts)
+    return EventFile(
+        "dsec",
+        facts,
+        partial(hdf5.parts, path, COLUMNS, facts),
+        unit_ns=unit_ns,
+        offset_us=offset,
+        times="events/t",
+    )
 
 
 class DsecWriter(Hdf5Writer):

@@ -8,7 +8,7 @@ What reads a format is a function ``open_...(path, facts)``.  It reads the head 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,12 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
+from adv2e.formats.clock import unwrapped
+from adv2e.formats.column_names import named_geometry
 from adv2e.formats.units import event_unit
 from adv2e.sources.frame import Light, Pixels, Shot
 from adv2e.sources.frame import rotated180 as turned_pixels
 from adv2e.sources.stored import recorded_light
 from adv2e.sources.times.units import Unit
 from adv2e.sources.tracks import Track, choose
+from adv2e.ticks import US
 
 MOST_COLUMNS = 1 << 16
 """Columns and rows that coordinates of events can name."""
@@ -31,7 +34,7 @@ MOST_COLUMNS = 1 << 16
 Column = NDArray[Any]
 
 Columns = tuple[Column, Column, Column, Column]
-"""Time [us], column, row, and polarity (ON above 0; 0/1 and -1/+1 are both usual), of integers."""
+"""Time, column, row, and polarity (ON above 0; 0/1 and -1/+1 are both usual), of integers."""
 
 Progress = Callable[[int, int], None]
 """Is told how much of a file was read, and of how much: bytes, or events."""
@@ -52,6 +55,10 @@ class Facts:
         What is read will be turned by half a turn, as the user says; see :func:`rotated180`.
     track : str, optional
         Which of several streams the user wants: its number or its name.
+    set_back : {'continue', 'sort'}, optional
+        What to do where times go back; see :mod:`adv2e.formats.clock`.
+    crop_events : bool
+        Leave out events outside the sensor, however many.
 
     Attributes
     ----------
@@ -83,12 +90,16 @@ class Facts:
         *,
         rotate180: bool = False,
         track: str | None = None,
+        set_back: str | None = None,
+        crop_events: bool = False,
     ) -> None:
         self.path = path
         self.track = track
         self.has_chosen = False
         self.inputs: list[str | Path] = []
         self.rotate180 = rotate180
+        self.set_back = set_back
+        self.crop_events = crop_events
         self.progress = progress or (lambda done, total: None)
         self.problems: list[str] = []
         self.description: dict[str, Any] = {}
@@ -98,6 +109,11 @@ class Facts:
         self.stated_unit: str | None = None
         self._frames: tuple[Unit, bool] | None = None
         self._events: tuple[Unit, bool] = Unit("s"), False
+
+    def tell(self, problem: str) -> None:
+        """Add a problem, unless it was told already: files are read twice."""
+        if problem not in self.problems:
+            self.problems.append(problem)
 
     def describe(self, text: str, label: str, name: str) -> None:
         """Take what the file says of itself; if that is broken, note a problem.
@@ -115,8 +131,8 @@ class Facts:
             description = None
         if isinstance(description, dict):
             self.description = description
-            self.stated_unit = "s" if description else None
-            self.state(described_geometry(description), name)
+            self.stated_unit = "s" if "adv2e" in description else None
+            self.state_by_names(description, name)
         else:
             self.problems.append(f"{label}: not a JSON mapping, ignored")
 
@@ -139,6 +155,11 @@ class Facts:
         """Take (width, height) [pixels] that something states, unless something before it did."""
         if self.geometry is None:
             self.geometry, self.stated_by = geometry, by
+
+    def state_by_names(self, values: Mapping[str, Any], by: str) -> None:
+        """Take the size of the sensor from whatever among named values states one."""
+        name, geometry = named_geometry(values)
+        self.state(geometry, f"{by}: {name}" if name else by)
 
     @property
     def light(self) -> Light:
@@ -174,14 +195,14 @@ class Facts:
             frames = self._frames
             alike = frames is None or frames[1] == whole
             unit = event_unit(
-                t,
+                unwrapped(t),
                 max(1, size[0] * size[1]),
                 whole=whole,
                 given=self.time_unit if alike or whole else None,
                 beside=frames[0] if frames is not None and alike else None,
             )
         if t.size and unit.doubt:
-            self.problems.append(unit.doubt)
+            self.tell(unit.doubt)
         self._events = unit, whole
         return unit
 
@@ -219,6 +240,14 @@ class EventFile:
         none.
     causes : callable, optional
         Returns the number of the cause of each event, in the order of the file; None: it has none.
+    unit_ns, offset_us : int
+        Unit of the times in the parts [ns], and what is to be added to them [us].
+    bits : int
+        Of the clock, where the format says it; 0: it does not.
+    times : str
+        What the times are called in the file, for messages.
+    order : str
+        That of the columns, where the file does not name them.
     """
 
     layout: str
@@ -226,6 +255,11 @@ class EventFile:
     parts: Callable[[], Iterator[Columns]]
     shots: Callable[[], Iterator[Shot]] | None = None
     causes: Callable[[], Column] | None = None
+    unit_ns: int = US
+    offset_us: int = 0
+    bits: int = 0
+    times: str = "times"
+    order: str = ""
 
     @property
     def inputs(self) -> list[str | Path]:
@@ -266,11 +300,6 @@ def _turned(load: Callable[[], Pixels]) -> Pixels:
     return turned_pixels(load())
 
 
-def described_geometry(description: dict[str, Any]) -> tuple[int, int] | None:
+def described_geometry(description: Mapping[str, Any]) -> tuple[int, int] | None:
     """Return (width, height) [pixels] that a description holds, or None."""
-    width, height = description.get("width"), description.get("height")
-    if not (isinstance(width, int) and isinstance(height, int)):
-        return None
-    return (
-        (width, height) if min(width, height) > 0 and max(width, height) <= MOST_COLUMNS else None
-    )
+    return named_geometry(description)[1]

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.files.expansion import check_expansion
-from adv2e.formats.event_file import MOST_COLUMNS, Facts
+from adv2e.formats.column_names import SIZE_NAMES, unit_of_attribute
+from adv2e.formats.event_file import Columns, Facts
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.tracks import Track, counted
 
@@ -34,6 +35,8 @@ PART = 1 << 20
 
 SIDES = "left", "right"
 """What layouts with several cameras call them."""
+_SIDES = 3
+"""Numbers that may state the size of a sensor, the last of polarities."""
 
 _LINKS = 16
 """Soft links on the way to one name, as in the library itself."""
@@ -164,18 +167,36 @@ def number(file: h5py.File, name: str) -> int:
     return int(np.asarray(found[()]).item())
 
 
-def describe(file: h5py.File, facts: Facts) -> None:
-    """Take what a file says of itself, if this program wrote it, and of the size of its sensor."""
+def describe(file: h5py.File, facts: Facts, *groups: str) -> None:
+    """Take what a file says of itself, if this program wrote it, and of the size of its sensor.
+
+    The size may stand in attributes or small datasets, of the root and of the `groups`.
+    """
     if "adv2e" in file.attrs:
         label = f"{facts.path}: attribute adv2e"
         facts.describe(str(file.attrs["adv2e"]), label, "the attribute adv2e")
-    stated = np.atleast_1d(file.attrs.get("sensor_resolution", ()))
-    if stated.size >= 2 and stated.dtype.kind in "iuf" and np.all(stated[:2] > 0):
-        if not np.all(stated[:2] <= MOST_COLUMNS):
-            raise DataError(
-                f"{facts.path}: sensor_resolution is {stated[:2]}, must be rows and columns"
-            )
-        facts.state((int(stated[1]), int(stated[0])), "sensor_resolution")
+    for name in ("", *groups):
+        group = find(file, name)
+        if group is None:
+            continue
+        values: dict[str, Any] = {}
+        for key in SIZE_NAMES:
+            if key in group.attrs:
+                values[key] = group.attrs[key]
+            elif isinstance(group, h5py.Group) and is_dataset(file, f"{name}/{key}"):
+                held = dataset(file, f"{name}/{key}")
+                if held.size <= _SIDES:
+                    values[key] = held[()]
+        facts.state_by_names(values, name)
+
+
+def unit_of(column: h5py.Dataset) -> str | None:
+    """Return the unit that an attribute of a column of times states; None: there is none."""
+    for name in ("units", "unit"):
+        value = column.attrs.get(name)
+        if isinstance(value, (bytes, str)):
+            return unit_of_attribute(value if isinstance(value, str) else value.decode("latin-1"))
+    return None
 
 
 def columns(file: h5py.File, names: tuple[str, ...]) -> list[h5py.Dataset]:
@@ -191,14 +212,14 @@ def columns(file: h5py.File, names: tuple[str, ...]) -> list[h5py.Dataset]:
     return found
 
 
-def parts(path: Path, names: tuple[str, ...], facts: Facts) -> Iterator[list[NDArray[Any]]]:
+def parts(path: Path, names: tuple[str, ...], facts: Facts) -> Iterator[Columns]:
     """Yield what :func:`columns` returns, a part of the events at a time."""
     with opened(path) as file:
         found = columns(file, names)
         for begin in range(0, found[0].size, PART):
-            part = [column[begin : begin + PART] for column in found]
-            yield part
-            facts.progress(begin + part[0].size, found[0].size)
+            t, x, y, p = (column[begin : begin + PART] for column in found)
+            yield t, x, y, signs(p)
+            facts.progress(begin + t.size, found[0].size)
 
 
 def signs(p: NDArray[Any]) -> NDArray[np.int8]:

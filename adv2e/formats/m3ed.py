@@ -18,18 +18,17 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from adv2e.events import Events
 from adv2e.formats import hdf5
-from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
+from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.hdf5_writer import Column, Hdf5Writer, Milliseconds
 from adv2e.formats.sink import Request
-from adv2e.ticks import US, to_ticks
 
 _CAMERA = "prophesee/left"
 
@@ -47,21 +46,11 @@ def open_m3ed(path: Path, facts: Facts) -> EventFile:
         Columns of different lengths or kinds, or times beyond 146 years.
     """
     with hdf5.opened(path) as file:
-        hdf5.describe(file, facts)
         camera = f"prophesee/{hdf5.choose(file, facts, 'prophesee/*/t')[0]}"
-        names, resolution = _columns(camera), f"{camera}/calib/resolution"
+        names = _columns(camera)
+        hdf5.describe(file, facts, camera, f"{camera}/calib")
         hdf5.columns(file, names)
-        if hdf5.is_dataset(file, resolution):
-            size = hdf5.read_all(hdf5.dataset(file, resolution), f"{path}: {resolution}")
-            if size.shape == (2,) and size.dtype.kind in "iu":
-                width, height = size.tolist()
-                facts.state(described_geometry({"width": width, "height": height}), "resolution")
-
-    def parts() -> Iterator[Columns]:
-        for t, x, y, p in hdf5.parts(path, names, facts):
-            yield to_ticks(t, US, US, f"{path}: {names[0]}"), x, y, hdf5.signs(p)
-
-    return EventFile("m3ed", facts, parts)
+    return EventFile("m3ed", facts, partial(hdf5.parts, path, names, facts), times=names[0])
 
 
 class M3edWriter(Hdf5Writer):

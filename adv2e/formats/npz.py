@@ -38,10 +38,9 @@ from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.files.npy import Header, read_array, read_header
 from adv2e.files.zips import open_member, zip_archive
-from adv2e.formats.column_names import find_columns, stated_unit
-from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
+from adv2e.formats.column_names import SIZE_NAMES, find_columns, stated_unit
+from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.sink import Request, Writer, to_json
-from adv2e.ticks import US, to_ticks
 
 _BEYOND = 1 << 31
 _PART = 1 << 20  # events read at once
@@ -67,15 +66,12 @@ def open_npz(path: Path, facts: Facts) -> EventFile:
         headers = _headers(archive)
         held = {
             name: _read(archive, name)
-            for name in ("adv2e", "width", "height")
-            if name in headers and not headers[name].shape
+            for name in ("adv2e", *SIZE_NAMES)
+            if name in headers and headers[name].shape in ((), (2,), (3,))
         }
         if "adv2e" in held:
             facts.describe(str(held["adv2e"]), f"{path}: adv2e", "the file")
-        sizes: dict[str, Any] = {
-            name: held[name].item() for name in ("width", "height") if name in held
-        }
-        facts.state(described_geometry(sizes), "the file")
+        facts.state_by_names(held, "the file")
         table, names, count = _table(path, headers)
     first = next(_parts_of(path, table, names, count), None)
     return _file("npz", facts, names, count, lambda: _parts_of(path, table, names, count), first)
@@ -135,11 +131,11 @@ def _file(
     def parts() -> Iterator[Columns]:
         done = 0
         for t, x, y, p in rows():
-            yield to_ticks(t, unit.ns, US, f"{path}: {time}"), x, y, p
+            yield t, x, y, p
             done += t.size
             facts.progress(done, count)
 
-    return EventFile(layout, facts, parts)
+    return EventFile(layout, facts, parts, unit_ns=unit.ns, times=time)
 
 
 def _archive(path: Path) -> Any:

@@ -11,11 +11,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from adv2e.errors import DataError
+from adv2e.errors import DataError, UsageError
 from adv2e.files.regular import check_ends
 from adv2e.formats.assembly import assemble
 from adv2e.formats.causes import beside as beside_of_causes
 from adv2e.formats.causes import found_beside
+from adv2e.formats.clock import SET_BACK
 from adv2e.formats.event_file import Columns, EventFile, Facts, Progress, rotated180
 from adv2e.formats.lookup import format_of
 from adv2e.formats.recording import Recording
@@ -37,12 +38,14 @@ def open_events(
     size: tuple[int, int] | None = None,
     rotate180: bool = False,
     track: str | int | None = None,
+    set_back: str | None = None,
+    crop_events: bool = False,
 ) -> EventFile:
     """Open an event file, or a folder in the DAVIS240C layout; its events are not read yet.
 
     Parameters
     ----------
-    path, time_unit, progress, rotate180, track
+    path, time_unit, progress, rotate180, track, set_back, crop_events
         See :func:`read_events`.
     size : (int, int), optional
         Width and height [pixels] that hold whatever the file states.
@@ -53,8 +56,17 @@ def open_events(
         As :func:`read_events`.
     """
     path = Path(path)
-    wanted = None if track is None else str(track)
-    facts = Facts(path, time_unit, progress, rotate180=rotate180, track=wanted)
+    if set_back not in (None, *SET_BACK):
+        raise UsageError(f"set_back {set_back!r}: must be one of {', '.join(SET_BACK)}")
+    facts = Facts(
+        path,
+        time_unit,
+        progress,
+        rotate180=rotate180,
+        track=None if track is None else str(track),
+        set_back=set_back,
+        crop_events=crop_events,
+    )
     facts.state(size, "--size")
     with _reading(path):
         check_ends(path)
@@ -78,8 +90,11 @@ def read_events(
     *,
     time_unit: str | None = None,
     progress: Progress | None = None,
+    size: tuple[int, int] | None = None,
     rotate180: bool = False,
     track: str | int | None = None,
+    set_back: str | None = None,
+    crop_events: bool = False,
 ) -> Recording:
     r"""Read an event file, or a folder in the DAVIS240C layout.
 
@@ -91,10 +106,17 @@ def read_events(
         Unit of the times; default: see :mod:`adv2e.formats.units`.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much.
+    size : (int, int), optional
+        Width and height of the sensor [pixels], whatever the file states.
     rotate180 : bool
         Turn events and frames by half a turn, as for a camera that was mounted upside down.
     track : str or int, optional
         Which one to read of several streams: its number from 0, or its name.
+    set_back : {'continue', 'sort'}, optional
+        What to do where times go back by more than 0.1 s: go on from the time before, as where a
+        clock was reset, or sort the events by time.  Default: an error.
+    crop_events : bool
+        Leave out events outside the sensor, however many.  Default: more than 1 % are an error.
 
     Returns
     -------
@@ -122,7 +144,14 @@ def read_events(
     (4, 3, True)
     """
     file = open_events(
-        path, time_unit=time_unit, progress=progress, rotate180=rotate180, track=track
+        path,
+        time_unit=time_unit,
+        progress=progress,
+        size=size,
+        rotate180=rotate180,
+        track=track,
+        set_back=set_back,
+        crop_events=crop_events,
     )
     recording = assemble(file)
     _check_size(recording)
@@ -177,7 +206,7 @@ def _check_size(recording: Recording) -> None:
         far = events[int(np.argmax(np.maximum(events["x"], events["y"])))]
         why = (
             f"the event at {far['t'] / 1e6:.6f} s, x {far['x']}, y {far['y']} needs; if it is"
-            " wrong, state the size, and what lies outside is left out"
+            " wrong, state the size: --size WxH"
         )
     raise DataError(
         f"{recording.path}: a sensor of {width}x{height} pixels, over {MOST_PIXELS:,}, {why}"

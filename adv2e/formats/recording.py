@@ -28,7 +28,8 @@ class Recording:
     width, height : int
         Geometry [pixels]; zero when nothing tells.
     events : array of EVENT_DTYPE
-        Sorted by (t, y, x, p); all inside the geometry.  Of CAUSED_DTYPE where the file has causes.
+        Sorted by time, those of one time as in the file; all inside the geometry.  Of CAUSED_DTYPE
+        where the file has causes.
     frame_times_ns : array of int64 or None
         Times of the frames on the clock of the events [ns]; None without frames.
     metadata : dict

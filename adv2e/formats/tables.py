@@ -77,8 +77,15 @@ def open_table(
                 Shot(t_ns, label, partial(_load, path, table, number))
                 for number, (t_ns, label) in enumerate(zip(times.tolist(), labels, strict=True))
             ]
-    parts = partial(_parts, path, facts, table, unit_ns)
-    return EventFile(layout, facts, parts, (lambda: iter(shots)) if shots else None)
+    return EventFile(
+        layout,
+        facts,
+        partial(_parts, path, facts, table),
+        (lambda: iter(shots)) if shots else None,
+        unit_ns=unit_ns,
+        times=table.events,
+        order=table.order,
+    )
 
 
 def _events(file: h5py.File, table: Table) -> h5py.Dataset:
@@ -92,23 +99,25 @@ def _events(file: h5py.File, table: Table) -> h5py.Dataset:
     return events
 
 
-def _parts(path: Path, facts: Facts, table: Table, unit_ns: int) -> Iterator[Columns]:
+def _parts(path: Path, facts: Facts, table: Table) -> Iterator[Columns]:
     label = f"{path}: {table.events}"
     late = odd = last = 0
     with hdf5.opened(path) as file:
         events = _events(file, table)
+        is_whole = events.dtype.kind != "f"
         for begin in range(0, events.shape[0], hdf5.PART):
             part = events[begin : begin + hdf5.PART]
             column = {name: part[:, place] for place, name in enumerate(table.order)}
-            t = to_ticks(column["t"], unit_ns, US, label)
+            t = column["t"]
             x, y = (_whole(column[name], f"{label}, {name}") for name in "xy")
-            late += int(np.count_nonzero(t >= _COARSE_US))
-            odd += int(np.count_nonzero((t >= _COARSE_US) & (t % 2 == 1)))
-            last = max(last, int(t.max()))
+            if is_whole:
+                late += int(np.count_nonzero(t >= _COARSE_US))
+                odd += int(np.count_nonzero((t >= _COARSE_US) & (t % 2 == 1)))
+                last = max(last, int(t.max()))
             yield t, x, y, hdf5.signs(column["p"])
             facts.progress(begin + t.size, events.shape[0])
     if late >= _FEW and not odd and not facts.description:
-        facts.problems.append(
+        facts.tell(
             f"times were made in single precision: from {_COARSE_US / 1e6:.1f} s on they have"
             f" steps of 2 us and more, at the end of {float(np.spacing(np.float32(last))):g} us"
         )

@@ -36,6 +36,7 @@ def inspect(
     frame_size: Size | None = None,
     rotate180: bool = False,
     track: str | int | None = None,
+    set_back: str | None = None,
     progress: Callable[[int, int | None], None] | None = None,
 ) -> dict[str, Any]:
     """Return what a recording, an event file or an input with frames holds, ready for JSON.
@@ -52,8 +53,8 @@ def inspect(
         Damage of a video becomes one of the problems.
     bayer, pixel_format, frame_size
         See :func:`adv2e.sources.open_source`.
-    rotate180, track
-        See :func:`adv2e.read_events`.
+    rotate180, track, set_back
+        See :func:`adv2e.read_events`.  Events outside the sensor are told, however many.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much, where that is
         known.
@@ -85,7 +86,15 @@ def inspect(
         )
         return _of_source(source, progress or (lambda done, total: None))
     return _of_recording(
-        read_events(path, time_unit=time_unit, progress=progress, rotate180=rotate180, track=track)
+        read_events(
+            path,
+            time_unit=time_unit,
+            progress=progress,
+            rotate180=rotate180,
+            track=track,
+            set_back=set_back,
+            crop_events=True,
+        )
     )
 
 

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from adv2e.events import sort_events
+from adv2e.errors import DataError
 from adv2e.formats.assembly import assemble
 from adv2e.formats.event_file import EventFile, Facts
 
 
-def built(rows, geometry=(10, 10), parts=1):
-    facts = Facts("a.h5")
+def built(rows, geometry=(10, 10), parts=1, **said):
+    facts = Facts("a.h5", **said)
     facts.state(geometry, "the file")
     columns = [part.T for part in np.array_split(np.array(rows, np.int64).reshape(-1, 4), parts)]
     found = assemble(EventFile("monash", facts, lambda: iter(columns)))
@@ -24,30 +24,24 @@ def test_unsorted_events_are_sorted_and_told():
     events, _, problems = built([(5, 1, 1, 1), (3, 1, 1, 1), (4, 1, 1, 1), (2, 1, 1, 1)])
 
     assert [t for t, *_ in events] == [2, 3, 4, 5]
-    assert problems == ["events are not in the order of time (2 steps back): sorted"]
+    assert problems == [
+        "events are not in the order of time (2 steps back, the largest 2 us): sorted"
+    ]
 
 
-def test_ties_are_put_in_order_of_row_column_polarity_silently():
-    rows = [(0, 9, 9, 1), (1, 2, 1, 0), (1, 1, 2, 0), (1, 1, 1, 1), (1, 1, 1, 0), (2, 0, 0, 0)]
+@pytest.mark.parametrize("late", [False, True])
+def test_events_of_one_time_stay_in_the_order_of_the_file(late):
+    rows = [(0, 9, 9, 1), (1, 2, 1, 0), (1, 1, 1, 1), (1, 1, 1, 0), (1, 1, 1, 1), (2, 0, 0, 0)]
+    given = [*rows[1:], rows[0]] if late else rows
 
-    events, _, problems = built(rows)
+    events, _, problems = built(given, parts=2)
 
-    assert events == [rows[0], rows[4], rows[3], rows[1], rows[2], rows[5]]
-    assert problems == []
-
-
-def test_order_agrees_with_a_full_sort():
-    rng = np.random.default_rng(0)
-    rows = np.column_stack(
-        [
-            np.sort(rng.integers(0, 100, 2000)),
-            rng.integers(0, 10, (2000, 2)),
-            rng.integers(0, 2, 2000),
-        ]
+    assert events == rows
+    assert [p for p in problems if "repeat" not in p] == (
+        ["events are not in the order of time (1 steps back, the largest 2 us): sorted"]
+        if late
+        else []
     )
-    events = assemble(EventFile("monash", Facts("a.h5"), lambda: iter([rows.T]))).events
-
-    assert np.array_equal(events, sort_events(events))
 
 
 @pytest.mark.parametrize("shuffled", [False, True])
@@ -61,18 +55,20 @@ def test_duplicates_are_counted_and_kept(shuffled):
 
 
 def test_negative_and_huge_coordinates_are_left_out():
-    rows = [(1, -1, 0, 1), (2, 0, -5, 1), (3, 70_000, 0, 1), (4, 1, 1, 1)]
+    rows = [(1, -1, 0, 1), (2, 0, -5, 1), (3, 70_000, 0, 1)]
+    rest = [(t, 1, 1, 1) for t in range(4, 304)]
 
-    events, _, problems = built(rows)
+    events, _, problems = built(rows + rest)
 
-    assert events == [(4, 1, 1, 1)]
+    assert events == rest
     assert problems == ["3 events with a coordinate below 0 or above 65535: left out"]
 
 
 def test_events_outside_the_geometry_are_left_out():
-    events, size, problems = built([(1, 9, 9, 1), (2, 12, 0, 1), (3, 0, 400, 0)])
+    rest = [(t, 9, 9, 1) for t in range(3, 203)]
+    events, size, problems = built([(1, 12, 0, 1), (2, 0, 400, 0), *rest])
 
-    assert (events, size) == ([(1, 9, 9, 1)], (10, 10))
+    assert (events, size) == (rest, (10, 10))
     assert problems == ["2 events outside 10x10, which the file states: left out"]
 
 
@@ -93,9 +89,10 @@ def test_without_geometry_the_largest_coordinates_tell():
 
 
 def test_odd_polarities_are_counted():
-    events, _, problems = built([(1, 0, 0, 2), (2, 0, 0, -3), (3, 0, 0, 1)])
+    rest = [(t, 0, 0, 1) for t in range(3, 2003)]
+    events, _, problems = built([(1, 0, 0, 2), (2, 0, 0, -3), *rest])
 
-    assert [p for *_, p in events] == [1, 0, 1]
+    assert [p for *_, p in events] == [1, 0, *[1] * 2000]
     assert problems == [
         "2 events with a polarity other than -1, 0 and 1: taken as ON above 0, else OFF"
     ]
@@ -112,3 +109,61 @@ def test_negative_times_are_told():
     _, _, problems = built([(-1_500_000, 0, 0, 1), (2, 0, 0, 1)])
 
     assert problems == ["times begin below zero, at -1.500000 s"]
+
+
+@pytest.mark.parametrize(
+    ("rows", "text"),
+    [
+        ([(1, 12, 0, 1), (2, 0, 0, 1)], r"1 events outside 10x10, .* of 2 \(they need 13x1\)"),
+        ([(1, -1, 0, 1), (2, 0, 0, 1)], "1 events with a coordinate below 0 or above 65535, of 2"),
+        ([(1, 20_000, 30_000, 1)] * 50, "50 events outside 10x10"),
+    ],
+)
+def test_many_events_outside_the_sensor_are_an_error_unless_asked_for(rows, text):
+    with pytest.raises(DataError, match=rf"a\.h5: {text}.*: --crop-events leaves them out"):
+        built(rows)
+
+    events, _, problems = built(rows, crop_events=True)
+    assert all(x < 10 and y < 10 for _, x, y, _ in events)
+    assert any("left out" in problem for problem in problems)
+
+
+def test_a_sensor_that_is_stated_the_other_way_round_is_named():
+    rows = [(t, t % 200, t % 100, 1) for t in range(400)]
+    with pytest.raises(DataError, match="a sensor of 240x180 holds them"):
+        built(rows, geometry=(180, 240))
+    assert built(rows, geometry=(240, 180))[2] == []
+
+
+def columns_of(order, count=2000):
+    """Columns of a made-up recording in some order, which are then taken for t, x, y, p."""
+    draw = np.random.default_rng(0)
+    held = {
+        "t": np.sort(draw.integers(0, 1_000_000, count)),
+        "x": draw.integers(0, 640, count),
+        "y": draw.integers(0, 480, count),
+        "p": draw.integers(0, 2, count),
+    }
+    return np.stack([held[name] for name in order], axis=1).tolist()
+
+
+@pytest.mark.parametrize("order", ["xypt", "xytp", "tpxy", "pxyt", "yxtp"])
+def test_columns_in_another_order_are_an_error(order):
+    with pytest.raises(DataError, match="are the columns t x y p"):
+        built(columns_of(order), geometry=None, parts=3)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [(1, 5, 0, 1), (2, 3, 1, 0)],
+        [(7, 5, 5, 1)] * 50,
+        [(t, 1, t % 2, 1) for t in range(100)],
+        [(7, t // 30, t, 1) for t in range(100)],
+        [(t, t, t, 1) for t in range(100)],
+    ],
+)
+def test_events_that_look_alike_are_no_columns_in_another_order(rows):
+    events, _, problems = built(rows, geometry=None)
+    assert events == rows
+    assert not [problem for problem in problems if "order" in problem or "polarit" in problem]

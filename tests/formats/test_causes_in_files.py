@@ -100,11 +100,11 @@ def test_text_of_the_events_is_that_without_causes(clip, tmp_path):
 @pytest.mark.parametrize("name", ["a.h5", "a.npz", "a.csv", "a.txt"])
 def test_events_of_ones_own_are_written_with_their_causes(count, name, tmp_path):
     events = some(count)
-    write_events(tmp_path / name, events[::-1], (9, 9))
+    given = events[::-1]
+    write_events(tmp_path / name, given, (9, 9))
     found = read_events(tmp_path / name).events
-    order = np.lexsort([events[n] for n in ("cause", "p", "x", "y", "t")])
     assert found.dtype == CAUSED_DTYPE
-    assert np.array_equal(found, events[order])
+    assert np.array_equal(found, given[np.argsort(given["t"], kind="stable")])
 
 
 @pytest.mark.parametrize("name", [found.name for found in FORMATS if found.writer])
@@ -270,7 +270,7 @@ def test_events_that_no_sensor_has_take_their_causes_along(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("0.1 1 1 1\n0.2 -3 1 1\n0.3 2 2 0\n0.25 3 3 0\n")
     (tmp_path / "a.txt.causes.txt").write_text("1\n2\n3\n4\n")
-    assert read_events(path).events["cause"].tolist() == [1, 4, 3]
+    assert read_events(path, crop_events=True).events["cause"].tolist() == [1, 4, 3]
 
 
 def test_they_can_be_drawn(tmp_path):

@@ -181,15 +181,8 @@ class Evidence:
         )
 
 
-def read_evidence(
-    path: str | Path,
-    time_unit: str | None = None,
-    sensor: Sensor | None = None,
-    *,
-    rotate180: bool = False,
-    track: str | int | None = None,
-) -> Evidence:
-    """Read a recording that holds frames and events; all but `sensor` as :func:`read_events`.
+def read_evidence(path: str | Path, sensor: Sensor | None = None, **reading: Any) -> Evidence:
+    """Read a recording that holds frames and events; `reading` as :func:`read_events` takes it.
 
     Raises
     ------
@@ -198,7 +191,7 @@ def read_evidence(
         frames, fewer than three, or too few events; frames and events do not overlap in time;
         frames are out of order, not all alike, or of another size than the events.
     """
-    recording = read_events(path, time_unit=time_unit, rotate180=rotate180, track=track)
+    recording = read_events(path, **reading)
     check_beside(recording.width, recording.height, sensor, recording.path)
     if recording.frame_times_ns is None or len(recording.frame_times_ns) == 0:
         raise DataError(f"{path}: holds no frames, from which the events could be simulated")

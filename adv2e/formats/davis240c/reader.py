@@ -77,7 +77,7 @@ def open_davis240c(path: Path, facts: Facts) -> EventFile:
         Shot(stamp.t_ns, files.label(member), partial(_image, files, member))
         for stamp, member in zip(listed.stamps, names, strict=True)
     ]
-    return EventFile("davis240c", facts, text_file.parts, lambda: iter(shots))
+    return replace(text_file, layout="davis240c", shots=lambda: iter(shots))
 
 
 def _image(files: Members, name: str) -> Pixels:

@@ -7,7 +7,6 @@ names.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from decimal import Decimal
 from functools import partial
 from pathlib import Path
@@ -19,10 +18,10 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.formats import hdf5
-from adv2e.formats.event_file import Columns, EventFile, Facts
+from adv2e.formats.event_file import EventFile, Facts
 from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.times.units import Unit, frame_unit
-from adv2e.ticks import NS, US, to_ticks
+from adv2e.ticks import NS, to_ticks
 
 COLUMNS = ("events/ts", "events/xs", "events/ys", "events/ps")
 
@@ -51,6 +50,7 @@ def open_monash(path: Path, facts: Facts) -> EventFile:
             facts.note_frames(frames.unit(None, facts.stated_unit), whole=frames.whole)
         columns = hdf5.columns(file, COLUMNS)
         whole = columns[0].dtype.kind in "iu"
+        facts.time_unit = facts.time_unit or hdf5.unit_of(columns[0])
         t, x, y = (column[: hdf5.PART] for column in columns[:3])
         unit = facts.unit_of_events(t, x, y, facts.geometry, whole=whole)
         of_frames = frames.unit(facts.unit_of_frames(whole=frames.whole), facts.stated_unit)
@@ -58,15 +58,18 @@ def open_monash(path: Path, facts: Facts) -> EventFile:
             facts.problems.append(f"images: {of_frames.doubt}")
         times = frames.times_ns(of_frames).tolist() if found else []
 
-    def parts() -> Iterator[Columns]:
-        for t, x, y, p in hdf5.parts(path, COLUMNS, facts):
-            yield to_ticks(t, unit.ns, US, f"{path}: events/ts"), x, y, hdf5.signs(p)
-
     shots = [
         Shot(t_ns, f"{path}: {name}", partial(_image, path, name))
         for t_ns, name in zip(times, names, strict=True)
     ]
-    return EventFile("monash", facts, parts, (lambda: iter(shots)) if shots else None)
+    return EventFile(
+        "monash",
+        facts,
+        partial(hdf5.parts, path, COLUMNS, facts),
+        (lambda: iter(shots)) if shots else None,
+        unit_ns=unit.ns,
+        times=COLUMNS[0],
+    )
 
 
 def _pixels(path: Path, image: h5py.Dataset) -> tuple[int, ...]:

@@ -19,16 +19,19 @@ from typing import IO, Any
 import numpy as np
 
 from adv2e.errors import DataError
+from adv2e.formats.column_names import geometry_in, order_of
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.text.lines import parse_lines
 from adv2e.sources.stored import DESCRIPTION, EVENTS
-from adv2e.ticks import LARGEST_NS, US, check_us
+from adv2e.ticks import LARGEST_NS, US, check_time
 
 _BLOCK = 1 << 22  # bytes read at once
 _SAMPLE = 1 << 19  # bytes that tell the unit of the times
 _PIECE = 1 << 18  # bytes parsed at once
+_JUDGED = 4096  # lines that tell the order of the columns
 _DECIMALS = {"s": 6, "ms": 3, "us": 0, "ns": -3}  # that make a microsecond
 
+_COMMENT = re.compile(rb"^[ \t]*#([^\n]*)", re.M)
 _SIZE = re.compile(rb"0{0,9}[1-9][0-9]{0,4}")
 
 
@@ -111,7 +114,29 @@ def lines_of(
         block = next(_blocks(file), b"")
     geometry, skipped, lines = _header(block)
     facts.state(geometry, header)
-    return events_of_lines(opened, size, label, facts, (skipped, lines), Form())
+    comments = b"\n".join(_COMMENT.findall(block[:_SAMPLE])).decode("utf-8", "replace")
+    facts.state(geometry_in(comments)[1], "a comment")
+    form = _form_of(block[skipped:_SAMPLE], facts)
+    return events_of_lines(opened, size, label, facts, (skipped, lines), form)
+
+
+def _form_of(block: bytes, facts: Facts) -> Form:
+    """Return how lines without a heading lie, and tell it if that is not the usual way."""
+    lines = _COMMENT.sub(b"", block[: block.rfind(b"\n") + 1]).splitlines()
+    fields = [line.split() for line in lines if line.strip()][:_JUDGED]
+    try:
+        rows = np.array(fields, np.float64)
+    except ValueError:  # what is wrong with a line is told with its number
+        rows = np.empty(0)
+    order = order_of(rows) if rows.shape == (len(fields), 4) else "txyp"
+    if order == "txyp":
+        return Form()
+    names = " ".join({"t": "time", "p": "polarity"}.get(name, name) for name in order)
+    facts.tell(
+        f"columns are taken as {names}: column {order.index('t') + 1} alone rises, and column"
+        f" {order.index('p') + 1} alone holds but -1, 0 and 1"
+    )
+    return Form(f"'{names}'", order=tuple(order.index(name) for name in "txyp"))
 
 
 def events_of_lines(
@@ -149,26 +174,30 @@ def events_of_lines(
     sample = block[: block.rfind(b"\n", 0, _SAMPLE) + 1 or len(block)]
     (t, x, y, _), *_ = form.parse(sample, 0 if whole else 6, exact=whole)
     unit = facts.unit_of_events(t if whole else t / 1e6, x, y, facts.geometry, whole=whole)
-    decimals = _DECIMALS[unit.name]
+    # whole numbers stay as they are, as what they wrap at is of their unit
+    decimals, unit_ns = (0, unit.ns) if whole else (_DECIMALS[unit.name], US)
 
     def parts() -> Iterator[Columns]:
         begin, before = skipped, lines  # bytes to leave out, lines in earlier blocks
         with opened() as file:
             for read in _blocks(file):
                 block = read[begin:]
-                columns, places, wrong = form.parse(block, decimals, exact=whole and decimals == 0)
+                columns, places, wrong = form.parse(block, decimals, exact=whole)
                 if wrong:
                     raise _malformed(block, f"{label} line {before + wrong}", wrong, form.what)
                 t = columns[0]
-                late = np.flatnonzero(np.abs(t) > LARGEST_NS // US)
+                late = np.flatnonzero(np.abs(t) > LARGEST_NS // unit_ns)
                 if late.size:
-                    check_us(t[late[:1]], f"{label} line {before + places[late[0]]}")
+                    time_ns = int(t[late[0]]) * unit_ns
+                    check_time(time_ns, f"{label} line {before + places[late[0]]}")
                 yield tuple(columns)
                 before += block.count(b"\n")
                 begin = 0
                 facts.progress(file.tell(), size)
 
-    return EventFile("text", facts, parts)
+    order = "".join(name for _, name in sorted(zip(form.order, "txyp", strict=True)))
+    times = label.removeprefix(f"{facts.path}: ")
+    return EventFile("text", facts, parts, unit_ns=unit_ns, times=times, order=order)
 
 
 def _blocks(file: IO[bytes]) -> Iterator[bytes]:
