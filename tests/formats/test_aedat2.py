@@ -114,7 +114,11 @@ def test_without_a_chip_the_smallest_is_taken_and_told(tmp_path, column, row, si
 @pytest.mark.parametrize(
     ("first", "lines", "said"),
     [
-        (b"#!AER-DAT3.1\r\n", [], "AEDAT-3.1, which is not read; iniVation's DV converts it to AEDAT4, which is"),
+        (
+            b"#!AER-DAT3.1\r\n",
+            [],
+            "AEDAT-3.1, which is not read; iniVation's DV converts it to AEDAT4, which is",
+        ),
         (b"#!AER-DAT1.0\r\n", [], "AEDAT-1.0; AEDAT-2.0 is read"),
         (b"#!AER-DAT4.0\r\n", [], "AEDAT-4.0, which is called .aedat4: rename it"),
         (b"# a file\r\n", [], "does not begin with '#!AER-DAT2.0'"),
