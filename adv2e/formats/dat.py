@@ -60,7 +60,7 @@ def open_dat(path: Path, facts: Facts) -> EventFile:
         file.seek(header.size)
         kind = tuple(file.read(2))
     if not kind:
-        facts.problems.append("ends with its header")
+        facts.problems.append("nothing follows its header")
     elif len(kind) < 2 or kind[0] not in _TYPES or kind[1] != _SIZE:
         held = f"type {kind[0]} of {kind[1]} bytes" if len(kind) == 2 else "cut short"
         raise DataError(

@@ -28,7 +28,7 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.formats.words import Counter, blocks
+from adv2e.formats.words import blocks
 
 _LATER, _LATER_US = 240, 1 << 13
 _SIDE = 34  # pixels of N-MNIST
@@ -41,24 +41,25 @@ def open_nmnist(path: Path, facts: Facts) -> EventFile:
     """Open a file of these data sets; DataError if its times show that it is none."""
 
     def parts(told: Facts | None = facts) -> Iterator[Columns]:
-        counter, later = Counter(23), 0
+        later = 0
         for data in blocks(path, 0, "(5,)u1", _BLOCK, told):
             x, y, high, middle, low = data.astype(np.int64).T
             is_later = y == _LATER
             turns = later + np.cumsum(is_later)
             later = int(turns[-1])
-            t = counter((high & 0x7F) << 16 | middle << 8 | low) + turns * _LATER_US
+            t = ((high & 0x7F) << 16 | middle << 8 | low) + turns * _LATER_US
             yield tuple(column[~is_later] for column in (t, x, y, high >> 7))
 
-    size = count = back = 0
+    size = count = back = beyond = 0
     for t, x, y, _ in parts(None):
         count += t.size
         back += int(np.count_nonzero(np.diff(t) < 0))
+        beyond += int(np.count_nonzero(y > _LATER))
         size = max(size, int(np.max([x, y], initial=-1)) + 1)
-    if back > _MOST_BACK * count:
+    if beyond or back > _MOST_BACK * count:
         raise DataError(
-            f"{path}: {back} of {count} times go back: no file of N-MNIST or N-Caltech101, which"
-            " alone are read of this suffix"
+            f"{path}: no file of N-MNIST or N-Caltech101, which alone are read of this suffix: of"
+            f" {count} events {beyond} are in rows from {_LATER} on, and {back} times go back"
         )
     if size <= _SIDE:
         facts.state((_SIDE, _SIDE), "N-MNIST")

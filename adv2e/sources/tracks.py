@@ -147,13 +147,13 @@ def _listed(tracks: Sequence[Track], *, numbered: bool) -> str:
 
 
 def _text(tracks: Sequence[Track], place: int, *, numbered: bool) -> str:
-    number, track = f"{place} " if numbered else "", tracks[place]
+    number, track = f"{place} = " if numbered else "", tracks[place]
     return f"{number}{track.name}" + f" ({track.about})" * bool(track.about)
 
 
 def _told(what: str, tracks: Sequence[Track], taken: int, *, numbered: bool) -> str:
     names = _listed(tracks, numbered=numbered)
-    number = f"{taken} " if numbered else ""
+    number = f"{taken} = " if numbered else ""
     return (
         f"{len(tracks)} {what}: {names}: {number}{tracks[taken].name} is taken, --track chooses"
         " another"

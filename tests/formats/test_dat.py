@@ -57,9 +57,9 @@ def test_nothing_behind_the_header_is_no_events(adv2e, tmp_path):
     (tmp_path / "a.dat").write_bytes(HEADER)
     recording = read_events(tmp_path / "a.dat")
     assert recording.events.size == 0
-    assert recording.problems == ["ends with its header", "no events"]
+    assert recording.problems == ["nothing follows its header", "no events"]
     made = adv2e("convert", tmp_path / "a.dat", "-o", tmp_path / "b.csv")
-    assert (made.status, "ends with its header" in made.err) == (0, True)
+    assert (made.status, "nothing follows its header" in made.err) == (0, True)
     assert adv2e("info", tmp_path / "a.dat").status == 0
 
 

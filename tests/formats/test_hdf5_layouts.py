@@ -235,7 +235,9 @@ def test_of_two_cameras_the_user_chooses(tmp_path, layout):
         assert np.array_equal(chosen.events, events[:3])
         assert not any("taken" in problem for problem in chosen.problems)
         assert (chosen.frame_times_ns is None) == (layout == "m3ed")
-    with pytest.raises(DataError, match=rf"--track 2: it holds no such track, but 0 {names}/left"):
+    with pytest.raises(
+        DataError, match=rf"--track 2: it holds no such track, but 0 = {names}/left"
+    ):
         read_events(tmp_path / "a.h5", track=2)
     with h5py.File(tmp_path / "a.h5", "a") as file:
         del file[f"{names}/left"]

@@ -1,10 +1,11 @@
 """Headers of RAW files: they tell encoding and geometry, and nothing is guessed without them."""
 
+import event_readers
 import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.events import make_events
+from adv2e.events import make_events, sort_events
 from adv2e.formats.reading import read_events
 
 EVT2 = np.array([8 << 28 | 2, 1 << 28 | 5 << 22 | 3 << 11 | 2], "<u4").tobytes()
@@ -150,6 +151,18 @@ def test_evt21_in_both_orders_of_its_words(tmp_path, order, header):
     assert (recording.width, recording.height) == (1280, 720)
     assert np.array_equal(np.sort(recording.events), np.sort(events))
     assert recording.problems == []
+
+
+def test_evt21_is_what_evlib_makes_of_it(tmp_path):
+    draw = np.random.default_rng(1)
+    t, p = np.sort(draw.integers(0, 90_000, 3000)), draw.integers(0, 2, 3000)
+    data = evt21(t, draw.integers(0, 1280, 3000), draw.integers(0, 720, 3000), p, "little")
+    header = b"% evt 2.1\n% format EVT21;height=720;width=1280\n% geometry 1280x720\n% end\n"
+    ours = read(tmp_path / "a.raw", header, data).events
+
+    _, theirs = event_readers.evlib(tmp_path / "a.raw")
+
+    assert np.array_equal(sort_events(ours.copy()), sort_events(theirs))
 
 
 def test_evt21_of_a_recording_that_was_cut(tmp_path):

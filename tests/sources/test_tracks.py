@@ -21,14 +21,17 @@ EVENTS = [
     Track("DAVIS_2/events", "7 events", is_usual=True),
 ]
 FRAMES = [Track("DAVIS_1/frames", "3 frames", is_usual=True), Track("DAVIS_2/frames")]
-LIST = "0 DAVIS_1/denoised (100 events), 1 DAVIS_1/events (400 events), 2 DAVIS_2/events (7 events)"
+LIST = (
+    "0 = DAVIS_1/denoised (100 events), 1 = DAVIS_1/events (400 events), 2 = DAVIS_2/events"
+    " (7 events)"
+)
 
 
 def test_the_usual_stream_is_taken_unasked_and_told():
     event, frame, told = choose(None, EVENTS, FRAMES, "a")
     assert (event, frame) == (1, 0)
     assert told == [
-        f"3 streams of events: {LIST}: 1 DAVIS_1/events is taken, --track chooses another",
+        f"3 streams of events: {LIST}: 1 = DAVIS_1/events is taken, --track chooses another",
         "2 tracks of frames: DAVIS_1/frames (3 frames), DAVIS_2/frames: DAVIS_1/frames is taken,"
         " --track chooses another",
     ]
@@ -59,7 +62,7 @@ def test_nothing_is_told_of_a_choice_that_the_user_made():
 def test_a_name_of_several_leaves_the_choice_among_them_which_is_told():
     event, _, told = choose("events", EVENTS, FRAMES, "a")
     assert event == 1
-    assert told[0].endswith("1 DAVIS_1/events is taken, --track chooses another")
+    assert told[0].endswith("1 = DAVIS_1/events is taken, --track chooses another")
 
 
 def test_a_camera_without_frames_gets_none_of_another():
@@ -85,7 +88,7 @@ def test_what_is_not_there_is_an_error_that_lists_what_is(wanted):
 
 def test_frames_alone_are_counted_themselves():
     assert choose("1", [], FRAMES, "a")[:2] == (None, 1)
-    with pytest.raises(DataError, match=r"it holds no such track, but 0 DAVIS_1/frames"):
+    with pytest.raises(DataError, match=r"it holds no such track, but 0 = DAVIS_1/frames"):
         choose("2", [], FRAMES, "a")
 
 
@@ -97,17 +100,19 @@ def test_files_of_one_stream_take_no_other(tmp_path, name):
     assert open_events(tmp_path / name, track=0).facts.problems == []
     assert len(read_events(tmp_path / name, track="events").events) == 3
     with pytest.raises(
-        DataError, match=rf"{name}: --track 1: it holds no such track, but 0 events"
+        DataError, match=rf"{name}: --track 1: it holds no such track, but 0 = events"
     ):
         read_events(tmp_path / name, track=1)
-    with pytest.raises(DataError, match=r"--track right: it holds no such track, but 0 events"):
+    with pytest.raises(DataError, match=r"--track right: it holds no such track, but 0 = events"):
         convert(tmp_path / name, tmp_path / "b.txt", track="right")
 
 
 def test_pictures_are_one_track(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((2, 3, 4), np.uint8))
     assert open_source(tmp_path / "a.npy", fps=10, track=0).count == 2
-    with pytest.raises(DataError, match=r"a\.npy: --track 1: it holds no such track, but 0 frames"):
+    with pytest.raises(
+        DataError, match=r"a\.npy: --track 1: it holds no such track, but 0 = frames"
+    ):
         open_source(tmp_path / "a.npy", fps=10, track=1)
 
 
@@ -131,7 +136,7 @@ def test_every_command_has_the_option(adv2e, tmp_path, monkeypatch, command, opt
     outcome = adv2e(*command, option, "1")
     assert outcome.status == 1
     assert outcome.err.splitlines()[-1] == (
-        "adv2e: error: a.h5: --track 1: it holds no such track, but 0 events"
+        "adv2e: error: a.h5: --track 1: it holds no such track, but 0 = events"
     )
     assert adv2e(*command, option, "").status == 2
 
@@ -145,4 +150,4 @@ def test_a_batch_has_one_rule_for_all(adv2e, tmp_path):
         (tmp_path / "in" / name / "timestamps.txt").write_text("0.1\n0.2\n")
     outcome = adv2e("batch", tmp_path / "in", tmp_path / "out", "--track", 1)
     assert outcome.status == 1
-    assert outcome.err.count("--track 1: it holds no such track, but 0 frames") >= 2
+    assert outcome.err.count("--track 1: it holds no such track, but 0 = frames") >= 2

@@ -183,8 +183,8 @@ def test_a_file_of_frames_alone_has_no_events(tmp_path):
 
 
 STEREO = (
-    "4 streams of events: 0 L/denoised (1 event), 1 L/events (2 events), 2 R/denoised (3 events),"
-    " 3 R/events (4 events)"
+    "4 streams of events: 0 = L/denoised (1 event), 1 = L/events (2 events), 2 = R/denoised"
+    " (3 events), 3 = R/events (4 events)"
 )
 
 
@@ -237,7 +237,7 @@ def test_of_several_streams_that_called_events_or_the_one_named(tmp_path, track,
 def test_streams_of_a_recording_that_was_interrupted_have_names_without_counts(tmp_path):
     path = stereo(tmp_path / "a.aedat4")
     path.write_bytes(interrupted(path))
-    names = "0 L/denoised, 1 L/events, 2 R/denoised, 3 R/events, L/frames, R/frames"
+    names = "0 = L/denoised, 1 = L/events, 2 = R/denoised, 3 = R/events, L/frames, R/frames"
     assert len(read_events(path).events) == 2
     with pytest.raises(DataError, match=f"--track 4: it holds no such track, but {names}$"):
         read_events(path, track=4)

@@ -431,8 +431,8 @@ def test_of_several_topics_those_of_one_camera_are_taken(tmp_path):
     assert np.array_equal(recording.events, CORNERS)
     assert [np.array_equal(frame.image, GREY) for frame in recording.frames()] == [True]
     assert recording.problems[:2] == [
-        "2 streams of events: 0 /davis/left/events (1 message), 1 /davis/right/events (1 message):"
-        " 0 /davis/left/events is taken, --track chooses another",
+        "2 streams of events: 0 = /davis/left/events (1 message), 1 = /davis/right/events"
+        " (1 message): 0 = /davis/left/events is taken, --track chooses another",
         "4 tracks of frames: /davis/left/depth_map (1 message), /davis/left/image_raw (1 message),"
         " /davis/right/depth_map (1 message), /davis/right/image_raw (1 message):"
         " /davis/left/image_raw is taken, --track chooses another",
@@ -453,7 +453,7 @@ def test_the_topic_that_the_user_names_is_taken(tmp_path, name, track):
     assert [np.array_equal(frame.image, GREY) for frame in recording.frames()] == [True]
     assert not any("taken" in problem for problem in recording.problems)
     with pytest.raises(
-        DataError, match=r"--track /dvs/events: it holds no such track, but 0 /davis"
+        DataError, match=r"--track /dvs/events: it holds no such track, but 0 = /davis"
     ):
         read_events(tmp_path / name, track="/dvs/events")
 
@@ -468,8 +468,8 @@ def test_of_topics_of_images_alone_the_user_chooses(tmp_path):
     assert not any(frame.image.any() for frame in first.frames())
     assert all(np.array_equal(frame.image, GREY) for frame in second.frames())
     assert first.doubts == [
-        "2 tracks of frames: 0 /left/image_raw (2 messages), 1 /right/image_raw (2 messages):"
-        " 0 /left/image_raw is taken, --track chooses another"
+        "2 tracks of frames: 0 = /left/image_raw (2 messages), 1 = /right/image_raw (2 messages):"
+        " 0 = /left/image_raw is taken, --track chooses another"
     ]
     assert second.doubts == []
 
