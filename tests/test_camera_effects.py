@@ -26,7 +26,7 @@ def camera_with(hidden, seed=0):
 def package(camera, added, path, seed=0):
     """Return the package's events for the camera's frames, the effects in `added` declared."""
     path.write_text(yaml.safe_dump(merged(DECLARED, added)), "utf-8")
-    config = load_config([str(path)], seed=seed)
+    config = load_config(path, "frames.encoding=linear", seed=seed)
     frames = list(camera.frames())
     images, stamps = [f.image for f in frames], [f.stamp for f in frames]
     return np.concatenate(list(simulate(images, stamps, config, threads=1)))

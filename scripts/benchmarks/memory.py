@@ -142,7 +142,8 @@ def job_of(case: Case, plan: Plan, scratch: Path) -> Job:
 def converting(clip: Path, fps: float, output: Path, plan: Plan) -> list[str]:
     """Return the arguments of ``adv2e`` that all conversions here have."""
     threads = ["--threads", str(plan.threads)] if plan.threads else []
-    return ["convert", str(clip), "--fps", f"{fps:g}", "-o", str(output), *threads]
+    light = ["--set", "frames.encoding=linear"]
+    return ["convert", str(clip), "--fps", f"{fps:g}", "-o", str(output), *light, *threads]
 
 
 def cases(sizes: Sequence[str], formats: Sequence[str]) -> Iterator[Case]:

@@ -16,8 +16,9 @@ KNEE_DN = 20.0
 SHIPPED_KNEE_DN = 2.72
 
 IDEAL = (
+    "frames.encoding=linear",
     "sampling.L=1",
-    f"pixel.log_response.linear_below={KNEE_DN:g}",  # frames are 8 bits in linear light
+    f"pixel.log_response.linear_below={KNEE_DN:g}",  # frames have 8 bits
     f"pixel.thresholds={{on: {THRESHOLD:g}, off: {THRESHOLD:g}, mismatch: 0}}",
     f"pixel.low_pass={{cutoff_hz: {CUTOFF_HZ:g}, dark_cutoff_hz: 21.8}}",
     "pixel.refractory=null",

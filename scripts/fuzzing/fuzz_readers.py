@@ -64,7 +64,7 @@ def prepare() -> None:
         importlib.import_module(f"adv2e.{name}")
     from adv2e import load_config, simulate  # noqa: PLC0415
 
-    frames = [np.full((4, 5), dn, np.uint8) for dn in (20, 90)]
+    frames = [np.full((4, 5), light, np.float32) for light in (0.1, 0.4)]
     list(simulate(frames, [0.0, 0.1], load_config(["ideal"]), threads=1))
 
 

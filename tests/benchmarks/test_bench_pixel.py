@@ -12,10 +12,11 @@ from adv2e import load_config, simulate
 from adv2e.synthetic import Scene
 
 WIDTH, HEIGHT, FRAMES, FPS = 173, 130, 33, 240.0
-QUIET = ["sampling.L=1", "pixel.thresholds.mismatch=0"] + [
+QUIET = ["frames.encoding=linear", "sampling.L=1", "pixel.thresholds.mismatch=0"] + [
     f"pixel.{name}=null" for name in ("refractory", "leak", "shot_noise")
 ]
 ALL = [
+    "frames.encoding=linear",
     "sampling.L=1",
     "pixel.thresholds.mismatch=0.03",
     "pixel.refractory.period_us=500",

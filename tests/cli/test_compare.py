@@ -127,7 +127,8 @@ def test_frames_from_elsewhere_come_to_the_sensor(adv2e, pair, simulation, tmp_p
     np.save(tmp_path / "frames.npy", np.full((6, 3 * HEIGHT, 2 * WIDTH), 40, np.uint8))
     times = "".join(f"{0.02 * n:.6f}\n" for n in range(6))
     (tmp_path / "frames.timestamps.txt").write_text(times)
-    words = (*pair, "--frames", tmp_path / "frames.npy", "--set")
+    light = ("--set", "frames.encoding=linear")
+    words = (*pair, "--frames", tmp_path / "frames.npy", *light, "--set")
     assert adv2e("compare", *words, "sensor={width: 10, height: 8}").status == 0
     assert simulation[0][0] == [40.0] * 6
     status, _, err = adv2e("compare", *words, "seed=3")

@@ -38,7 +38,7 @@ def offered(adv2e, monkeypatch):
     [
         ("adv2e ", list(COMMANDS)),
         ("adv2e co", ["convert", "compare", "config"]),
-        ("adv2e config ", ["check", "defaults", "show"]),
+        ("adv2e config ", ["check", "defaults", "list", "show", "template"]),
         ("adv2e config -c v2e --eff", ["--effect"]),
         ("adv2e config --se", ["--set", "--seed"]),
         ("adv2e convert clip.mp4 --pro", ["--progress"]),

@@ -52,7 +52,7 @@ def test_makes_clip_events_picture_and_film_and_says_what(adv2e, small, tmp_path
 
     # the sample recording is not what its declared model makes: its pixels are dead for longer
     sample = read_events(folder / "recording.zip")
-    declared = load_config(folder / "declared.yaml", seed=9)
+    declared = load_config(folder / "declared.yaml", "frames.encoding=linear", seed=9)
     frames = [frame.image for frame in sample.frames()]
     times = sample.frame_times_ns * 1e-9
     simulated = np.concatenate(list(simulate(frames, times, declared)))

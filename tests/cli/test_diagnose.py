@@ -3,6 +3,7 @@
 import dataclasses
 import doctest
 import json
+import math
 import re
 import shutil
 from pathlib import Path
@@ -21,6 +22,7 @@ from adv2e.diagnosis.outcome import conclusion
 from adv2e.diagnosis.selection import reference, shortlist
 from adv2e.diagnosis.simulation.progress import Progress
 from adv2e.formats.writing import open_sink
+from adv2e.geometry import Rectangle
 from adv2e.reports import summary
 from adv2e.reports.files import write_reports
 
@@ -42,7 +44,7 @@ def recordings(tmp_path_factory):
     )  # fmt: skip
     camera.record(folder / "dead.zip")
     shutil.copy(folder / "dead.declared.yaml", folder / "none.declared.yaml")
-    config = load_config([folder / "none.declared.yaml"], seed=123_456)
+    config = load_config(folder / "none.declared.yaml", "frames.encoding=linear", seed=123_456)
     frames = list(camera.frames())
     images, stamps = [one.image for one in frames], [one.stamp for one in frames]
     sizes = {"width": SIZE[0], "height": SIZE[1]}
@@ -57,6 +59,7 @@ def recordings(tmp_path_factory):
 @pytest.fixture
 def short(monkeypatch):
     """Simulate less often than a diagnosis that is to be believed."""
+    monkeypatch.setattr(whole, "SAY_EVERY_S", math.inf)  # what is told does not hang on the time
     monkeypatch.setattr(reference, "MANY", 40)
     for module in (reference, shortlist):
         monkeypatch.setattr(module, "SOME", 16)
@@ -276,9 +279,12 @@ def made_up(monkeypatch, tmp_path):
     """Stand in for reading and diagnosing; returns the calls, and what there was to tell."""
     calls = []
 
-    def read(path, time_unit, sensor, rotate180, track):
+    def read(path, sensor, rotate180, track, **_):
         assert sensor is None or (sensor.width, sensor.height) == (346, 260)
         return (path, "turned", track) if rotate180 else path
+
+    def part(recording, *given):
+        return recording if given == (None, None, None) else (recording, given)
 
     def write(found, folder, *, overwrite):
         calls.append(folder)
@@ -291,6 +297,7 @@ def made_up(monkeypatch, tmp_path):
             progress(Progress(*step))
 
     monkeypatch.setattr(whole, "read_evidence", read)
+    monkeypatch.setattr(whole, "part_of", part)
     monkeypatch.setattr(whole, "diagnose_evidence", diagnose)
     monkeypatch.setattr(whole, "write_reports", write)
     monkeypatch.setattr(summary, "summary_text", lambda found: "\n".join(SUMMARY))
@@ -303,11 +310,13 @@ def test_options_arrive(adv2e, made_up, tmp_path):
     outcome = adv2e(
         "diagnose", "a.zip", "-c", "davis346", "-c", "mine.yaml", "--threads", 3, "--seed", 4,
         "--without", "flicker", "--without", "leak", "--set", "pixel.refractory.period_us=7",
-        "--rotate180", "--topic", "/dvs/events",
+        "--rotate180", "--topic", "/dvs/events", "--start", 1, "--crop", "2,3,9,8",
     )  # fmt: skip
     assert outcome.status == 0
     call, folder = made_up
-    assert (call["recording"], call["threads"]) == (("a.zip", "turned", "/dvs/events"), 3)
+    part = (1.0, None, Rectangle(2, 3, 9, 8))
+    read = ("a.zip", "turned", "/dvs/events")
+    assert (call["recording"], call["threads"]) == ((read, part), 3)
     assert call["without"] == ("flicker", "leak")
     assert call["declared_name"] == "davis346, mine.yaml, pixel.refractory.period_us=7"
     assert call["config"].pixel.leak is None

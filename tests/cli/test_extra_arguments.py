@@ -72,7 +72,6 @@ def test_an_output_is_put_behind_its_option(adv2e, pipeline, given, meant):
             "EVENTS",
             'for f in *.h5; do adv2e render "$f" --style grey -o "$f.mp4"; done',
         ),
-        ("config check a b", "FILE", 'for f in a b; do adv2e config check "$f"; done'),
     ],
 )
 def test_several_inputs_are_for_a_loop(adv2e, pipeline, given, argument, loop):
@@ -84,7 +83,7 @@ def test_several_inputs_are_for_a_loop(adv2e, pipeline, given, argument, loop):
     ("given", "usage"),
     [
         ("compare a b c", "'c': adv2e compare [OPTIONS] MEASURED SIMULATED"),
-        ("config show mine.yaml", "'mine.yaml': adv2e config show [OPTIONS]"),
+        ("config list mine.yaml", "'mine.yaml': adv2e config list [OPTIONS]"),
     ],
 )
 def test_what_cannot_be_guessed_shows_the_usage(adv2e, pipeline, given, usage):

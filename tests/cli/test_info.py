@@ -72,7 +72,7 @@ def test_json_has_the_same_keys_for_events_and_for_frames(adv2e, event_file, ima
     assert of_frames["events"] is None
     frames = of_frames["frames"]
     assert (frames["count"], frames["rate_hz"], frames["dtype"]) == (3, 50, "uint8")
-    assert (frames["colour"], frames["encoding"]) == (False, "linear")
+    assert (frames["colour"], frames["encoding"]) == (False, "srgb")
     assert (frames["first_ns"], frames["last_ns"]) == (0, 40_000_000)
 
 

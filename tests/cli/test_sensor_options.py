@@ -17,6 +17,7 @@ from adv2e.light.sensor import fitting_of
 
 GREY = np.random.default_rng(5).integers(0, 256, (4, 18, 32), np.uint8)
 COLOUR = np.random.default_rng(6).integers(0, 256, (4, 18, 32, 3), np.uint8)
+LIGHT = ("--set", "frames.encoding=linear")
 
 
 @pytest.fixture
@@ -26,14 +27,15 @@ def clip(tmp_path):
 
 
 def simulated(frames, *sets):
-    return np.concatenate(list(simulate(frames, 100, load_config([], sets), threads=1)))
+    config = load_config([], [LIGHT[1], *sets])
+    return np.concatenate(list(simulate(frames, 100, config, threads=1)))
 
 
 @pytest.mark.parametrize("level", ["sampling.L=10", "sampling.L=1"])
 def test_events_are_those_of_the_light_on_the_sensor(adv2e, clip, tmp_path, level):
     """With one frame an interval, too: unscaled ones would go to the kernel as they are."""
     output = tmp_path / "a.h5"
-    words = ["--fps", 100, "--size", "8x6", "--set", level]
+    words = ["--fps", 100, "--size", "8x6", *LIGHT, "--set", level]
     outcome = adv2e("convert", clip, "-o", output, *words)
     assert outcome.status == 0
     recording = read_events(output)
@@ -69,7 +71,7 @@ def test_size_leaves_the_fit_that_was_said(adv2e, clip, tmp_path):
 
 
 def test_crop_comes_before_the_sensor(adv2e, clip, tmp_path):
-    words = ["--fps", 100, "--crop", "3,2,12,9", "--size", "4x3"]
+    words = ["--fps", 100, "--crop", "3,2,12,9", "--size", "4x3", *LIGHT]
     said = adv2e("convert", clip, *words, "-o", tmp_path / "a.zip").err
     assert "frames are 12x9 at x 3, y 2 of the input's, scaled to 4x3\n" in said
     part = GREY[:, 2:11, 3:15]
@@ -115,7 +117,8 @@ def test_crop_of_images_with_transparent_pixels(adv2e, tmp_path):
 
 
 def test_crop_alone_leaves_the_numbers_as_they_are(adv2e, clip, tmp_path):
-    outcome = adv2e("convert", clip, "--fps", 100, "--crop", "3,2,12,9", "-o", tmp_path / "a.zip")
+    words = ["--fps", 100, "--crop", "3,2,12,9", *LIGHT]
+    outcome = adv2e("convert", clip, *words, "-o", tmp_path / "a.zip")
     assert outcome.status == 0
     recording = read_events(tmp_path / "a.zip")
     assert recording.events.tobytes() == simulated(GREY[:, 2:11, 3:15]).tobytes()
@@ -219,8 +222,9 @@ def test_what_cannot_be_is_one_line(adv2e, clip, tmp_path, words, status, compla
 
 
 def test_in_python_sizes_are_text_or_numbers(clip, tmp_path):
+    linear = load_config([], LIGHT[1])
     made = [
-        package.convert(clip, tmp_path / f"{n}.h5", fps=100, size=size, crop=crop)
+        package.convert(clip, tmp_path / f"{n}.h5", linear, fps=100, size=size, crop=crop)
         for n, (size, crop) in enumerate([("8x6", "0,0,32,16"), ((8, 6), (0, 0, 32, 16))])
     ]
     assert [(one.width, one.height) for one in made] == [(8, 6)] * 2

@@ -17,7 +17,7 @@ from adv2e.diagnosis.simulation.simulator import Simulator
 WIDTH, HEIGHT, COUNT = 32, 24, 25
 TIMES_S = 0.02 * np.arange(COUNT)
 PULSE = "readout.frame_coupling={amplitude: 0.1, tau_us: 30000, delay_us: 5000, width_us: 4000}"
-CONFIG = load_config(["ideal"], ["sampling.L=1"])
+CONFIG = load_config(["ideal"], ["frames.encoding=linear", "sampling.L=1"])
 
 
 def recording(part):

@@ -349,7 +349,8 @@ def test_where_the_coupling_has_decayed_long_steps_make_the_same_events(monkeypa
         for k in range(6)
     ]
     coupling = f"readout.frame_coupling={{amplitude: 0.25, tau_us: {tau_us}}}"
-    config = load_config(["ideal"], ["sampling.L=10", "pixel.low_pass.cutoff_hz=200", coupling])
+    sets = ["frames.encoding=linear", "sampling.L=10", "pixel.low_pass.cutoff_hz=200", coupling]
+    config = load_config(["ideal"], sets)
 
     def found():
         planned.clear()

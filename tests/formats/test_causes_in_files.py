@@ -17,7 +17,7 @@ from adv2e.formats.registry import FORMATS
 from adv2e.formats.writing import open_sink
 
 SIZE = 12, 9
-NOISY = ["pixel.leak.rate_hz=20", "pixel.shot_noise.rate_hz=40"]
+NOISY = ["frames.encoding=linear", "pixel.leak.rate_hz=20", "pixel.shot_noise.rate_hz=40"]
 OUTPUTS = ["out.h5", "dsec.h5", "out.npz", "out.csv", "out.txt", "out.zip", "out"]
 
 

@@ -90,7 +90,7 @@ def test_the_folder_alone_is_enough(tmp_path, place):
     assert [frame.image.ravel()[0] for frame in frames] == [first, first + 10, first + 20]
     assert (source.kind, source.has_clock, source.doubts) == (kind, True, [])
     coloured = place in ("TUM", "TUM rgb")
-    assert (source.colour, source.encoding) == (coloured, "srgb" if coloured else "linear")
+    assert (source.colour, source.encoding) == (coloured, "srgb")
 
 
 def test_the_second_camera_is_named(tmp_path, adv2e):

@@ -31,7 +31,8 @@ def test_frames_come_back_as_stored(path, picture, shape, dtype, white):
     assert frames[0].image.dtype == source.dtype == np.dtype(dtype).newbyteorder("=")
     assert (source.kind, source.width, source.height) == ("npy", 7, 5)
     assert source.colour is (len(shape) == 4)
-    assert (source.encoding, source.full_scale) == ("linear", white)
+    encoding = "srgb" if dtype == np.uint8 else "linear"
+    assert (source.encoding, source.full_scale) == (encoding, white)
     assert source.path == str(path)
 
 

@@ -127,8 +127,10 @@ def package():
 
 def test_python_does_what_the_command_does(adv2e, tmp_path):
     photo()
-    assert adv2e("convert", "photo.png", "--motion", "saccade", "-o", "a.txt").status == 0
-    package().convert("photo.png", "b.txt", motion="saccade")
+    light = ("--set", "frames.encoding=srgb")
+    assert adv2e("convert", "photo.png", "--motion", "saccade", "-o", "a.txt", *light).status == 0
+    stated = {"frames": {"encoding": "srgb"}}
+    package().convert("photo.png", "b.txt", stated, motion="saccade")
     assert (tmp_path / "a.txt").read_bytes() == (tmp_path / "b.txt").read_bytes()
     assert (tmp_path / "a.txt").stat().st_size > 1000
 

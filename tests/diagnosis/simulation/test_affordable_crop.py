@@ -16,7 +16,7 @@ from adv2e.errors import DataError
 
 WIDTH, HEIGHT = 96, 80
 TIMES = np.arange(6) * 0.01
-CONFIG = load_config(["ideal"])
+CONFIG = load_config(["ideal"], ["frames.encoding=linear"])
 
 
 def recording():

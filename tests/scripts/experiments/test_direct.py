@@ -24,7 +24,8 @@ from adv2e.events import make_events
 WIDTH, HEIGHT, FRAMES = 16, 12, 7
 TIMES = np.arange(FRAMES) * 0.02
 ON, OFF = 0.3, 0.15
-TRUTH = load_config(["ideal"], [f"pixel.thresholds.on={ON}", f"pixel.thresholds.off={OFF}"])
+LIGHT = "frames.encoding=linear"
+TRUTH = load_config(["ideal"], [LIGHT, f"pixel.thresholds.on={ON}", f"pixel.thresholds.off={OFF}"])
 
 
 def moving_waves():
@@ -113,7 +114,7 @@ def test_identical_events_are_at_distance_zero(measured):
 def test_the_floor_is_the_distance_between_seeds_relative_to_the_measured_events(measured):
     simulator = Pixel("adv2e", "", load_config(["adv2e"]), 1)
     row = trial(measured, simulator).judge(simulator, 2)
-    a, b = (events_of(load_config(["adv2e"], seed=seed)) for seed in (0, 1))
+    a, b = (events_of(load_config("adv2e", LIGHT, seed)) for seed in (0, 1))
     windows, events = measured.real.windows, measured.real.events
     assert row.judged.floor == distances(a, b, windows, WIDTH, HEIGHT, whole=events).values
 

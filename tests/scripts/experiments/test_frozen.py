@@ -38,7 +38,10 @@ def events_of(config):
     return np.concatenate(list(simulate(moving_edge_beside_a_wall(), TIMES, config, threads=1)))
 
 
-CAMERA = load_config(["ideal"], ["pixel.thresholds.on=0.3", "pixel.thresholds.off=0.25"])
+CAMERA = load_config(
+    ["ideal"],
+    ["frames.encoding=linear", "pixel.thresholds.on=0.3", "pixel.thresholds.off=0.25"],
+)
 
 
 @pytest.fixture

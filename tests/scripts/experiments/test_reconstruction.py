@@ -29,6 +29,7 @@ from experiments.simulators.named import named  # noqa: E402
 from networks.firenet import firenet  # noqa: E402
 
 SIZE = WIDTH, HEIGHT = 24, 16
+CONFIG = load_config("ideal", "frames.encoding=linear")
 
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
@@ -146,7 +147,7 @@ def test_a_state_that_is_detached_has_its_values():
 def recording(tmp_path_factory):
     frames = np.rint(textures.moving(11, 7, SIZE, 20).frames).astype(np.uint8)
     times = 1.2 + np.arange(7) / 20
-    events = np.concatenate(list(simulate(frames, times, load_config("ideal"), threads=1)))
+    events = np.concatenate(list(simulate(frames, times, CONFIG, threads=1)))
     place = tmp_path_factory.mktemp("data") / "slider_depth"
     return write_recording(place, times, frames, events)
 
@@ -175,7 +176,7 @@ def test_sequences_of_davis240c_are_cut(recording):
 
 def test_a_sequence_without_its_cut_is_one_line(tmp_path):
     frames = np.rint(textures.moving(11, 5, SIZE, 20).frames).astype(np.uint8)
-    events = np.concatenate(list(simulate(frames, 20, "ideal", threads=1)))
+    events = np.concatenate(list(simulate(frames, 20, CONFIG, threads=1)))
     write_recording(tmp_path / "boxes_6dof", np.arange(5) / 20, frames, events)
     with pytest.raises(DataError, match="no frame interval with events within"):
         list(scores.parts(tmp_path))

@@ -291,7 +291,8 @@ def test_small_trains_each_once_and_reports(tmp_path):
 def test_small_is_tested_on_a_recording(tmp_path):
     clip, labels = shapes.moving(2, 49, (44, 30))
     frames = np.rint(clip.frames).astype(np.uint8)
-    events = np.concatenate(list(simulate(frames, 240, load_config("ideal"), threads=1)))
+    config = load_config("ideal", "frames.encoding=linear")
+    events = np.concatenate(list(simulate(frames, 240, config, threads=1)))
     place = write_recording(tmp_path / "shapes_6dof", clip.times_ns[::6] / 1e9, frames[::6], events)
     samples = labelled.of_shapes(read(str(place)), every=2)
     assert len(samples) >= 2

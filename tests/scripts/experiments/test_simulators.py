@@ -69,7 +69,7 @@ def test_larger_thresholds_of_one_polarity_make_fewer_of_its_events(name):
 
 def test_a_configuration_gives_the_events_of_the_package():
     (simulator,) = named(["adv2e"], sets=["pixel.thresholds.on=0.3"], threads=1)
-    config = load_config(["adv2e"], ["pixel.thresholds.on=0.3", "seed=5"])
+    config = load_config(["adv2e"], ["frames.encoding=linear", "pixel.thresholds.on=0.3", "seed=5"])
     expected = list(simulate(CLIP.frames, 1e-9 * TIMES_NS, config, threads=1))
     np.testing.assert_array_equal(simulator.events(CLIP, 5), np.concatenate(expected))
 

@@ -40,6 +40,7 @@ def recording(tmp_path):
     """Waves seen by an ideal pixel with a black level of 20 DN, ON 0.2, OFF 0.15."""
     frames = moving_waves()
     sets = [
+        "frames.encoding=linear",
         "frames.black_level_dn=20",
         "pixel.thresholds.on=0.2",
         "pixel.thresholds.off=0.15",

@@ -35,7 +35,7 @@ def bench_of(folder, sets):
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     phases = 2 * np.pi * (x / 11 + y / 17 - 2.3 * TIMES[:, None, None])
     frames = np.rint(80 + 60 * np.sin(phases)).astype(np.uint8)
-    config = load_config(["ideal"], [*PIXEL, *sets])
+    config = load_config(["ideal"], ["frames.encoding=linear", *PIXEL, *sets])
     events = np.concatenate(list(simulate(frames, TIMES, config, threads=1)))
     return Bench(read(str(write_recording(folder, TIMES, frames, events))), 1)
 

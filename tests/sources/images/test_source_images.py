@@ -41,7 +41,7 @@ def test_frames_in_natural_order_whatever_their_first_number(write_images, pictu
 @pytest.mark.parametrize(
     ("suffix", "dtype", "shape", "encoding", "white"),
     [
-        ("png", np.uint8, (24, 32), "linear", 255),
+        ("png", np.uint8, (24, 32), "srgb", 255),
         ("png", np.uint8, (24, 32, 3), "srgb", 255),
         ("png", np.uint16, (24, 32), "linear", 65535),
         ("png", np.uint16, (24, 32, 3), "linear", 65535),

@@ -79,7 +79,7 @@ def same(images, others):
 @pytest.mark.parametrize(
     ("dtype", "shape", "encoding", "white"),
     [
-        (np.uint8, (6, 8), "linear", 255),
+        (np.uint8, (6, 8), "srgb", 255),
         (np.uint8, (6, 8, 3), "srgb", 255),
         (np.uint16, (6, 8), "linear", 65535),
         (np.uint16, (6, 8, 3), "linear", 65535),
