@@ -11,7 +11,7 @@ from adv2e.config import Written, files_among, load_config
 from adv2e.conversion.pipeline import Summary, convert_reading
 from adv2e.conversion.reading import Reading
 from adv2e.conversion.transfer import convert_events
-from adv2e.errors import UsageError
+from adv2e.errors import Adv2eWarning, UsageError
 from adv2e.formats.frames import takes_events
 from adv2e.geometry import parse_rectangle, parse_size
 from adv2e.sources.paths import SensorPath
@@ -140,7 +140,7 @@ def convert(
         raise UsageError(f"size, crop: {error}") from None
 
     def doubt(text: str) -> None:
-        warnings.warn(text, stacklevel=4)
+        warnings.warn(text, Adv2eWarning, stacklevel=4)
 
     if fps is not None and timestamps is not None:
         raise UsageError("fps and timestamps both give the times of the frames: keep one")
