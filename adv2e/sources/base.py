@@ -26,6 +26,7 @@ from adv2e.sources.frame import (
     Light,
     Pixels,
     Shot,
+    check_pixels,
     check_values,
     light_of_images,
     odd_white,
@@ -103,6 +104,7 @@ class Source(ABC):
         except DataError as error:
             raise DataError(f"{label}: {error}") from error
         self._height, self._width = self.height, self.width = image.shape[:2]
+        check_pixels(self.width, self.height, label)
         crop = self.selection.crop
         if crop is not None:
             if not crop.is_inside(self.width, self.height):
