@@ -12,6 +12,9 @@
 ``MissingExtraError``
     An optional package is needed and absent; the text says which extra to install.
 
+``Adv2eWarning``
+    No error: a warning of ours, as against those of libraries, which the command line leaves out.
+
 Every text is one line that names the file, key or line and says what would be right.
 Programming errors (wrong types from our own code) stay ordinary Python exceptions.
 """
@@ -23,6 +26,10 @@ class Adv2eError(Exception):
     """A mistake that the user can mend; shown as one line, exit status 1."""
 
     exit_status = 1
+
+
+class Adv2eWarning(UserWarning):
+    """Something that the user may look at; the command line shows it as one line."""
 
 
 class ConfigError(Adv2eError):

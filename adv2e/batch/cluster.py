@@ -15,7 +15,6 @@ import atexit
 import hashlib
 import json
 import math
-import multiprocessing
 import queue
 import re
 import threading
@@ -387,8 +386,6 @@ def _workers(count: int) -> Workers:
     """Return the processes of this worker."""
     with _lock:
         if not _processes:
-            # Dask's nanny makes workers daemons, which may have no children and would leave them
-            multiprocessing.current_process().daemon = False
             workers = Workers(count)
             _processes.append(workers)
             # before the process waits for them to end by themselves

@@ -5,6 +5,9 @@ because the machine stopped while it was written, is cut off when the file is op
 Only one process writes a manifest: it holds a lock on it, which the system lets go of however that
 process ends.
 
+The folder may come from elsewhere, and the file with it.  No name in it says what is written or
+removed; a line counts only if all in it has the form that a batch gives it.
+
 Each shard of a batch has a manifest of its own, ``manifest-2-of-8.jsonl``, so that several machines
 never write one file.  What was done is what all of them in a folder say, later lines first.
 """
@@ -16,13 +19,23 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from datetime import datetime, timezone
-from pathlib import Path
+from pathlib import Path, PurePath, PurePosixPath
 from types import TracebackType
 from typing import Any, BinaryIO
 
 from adv2e.errors import DataError, OutputError
 from adv2e.files.locks import lock_file, unlock_file
+from adv2e.files.regular import check_ends
 from adv2e.files.renaming import sync_one
+
+_FORM: dict[str, type] = {
+    **dict.fromkeys(("name", "status", "at", "adv2e", "settings", "output"), str),
+    **dict.fromkeys(("source_sha256", "sha256"), str),
+    **dict.fromkeys(("source", "beside", "export", "remote"), dict),
+    "seed": int,
+}
+_ALWAYS = {"name", "status", "at"}
+_DONE = _FORM.keys() - {"beside", "export", "remote"}
 
 _ANY = "manifest*.jsonl"
 _SHARD = re.compile(r"manifest(?:-[0-9]+-of-([0-9]+))?\.jsonl")
@@ -47,6 +60,7 @@ def read_records(dest: Path) -> dict[str, dict[str, Any]]:
     """
     lines: list[tuple[str, int, dict[str, Any]]] = []
     for path in sorted(dest.glob(_ANY)):
+        check_ends(path)
         with path.open("rb") as file:
             lines += [(one["at"], n, one) for n, one in enumerate(_lines(path, file))]
     return {one["name"]: one for _, _, one in sorted(lines, key=lambda line: line[:2])}
@@ -61,6 +75,7 @@ def check_alone(own: Path) -> None:
         same = _count(path) == _count(own) != ""
         if path == own or same:
             continue
+        check_ends(path, OutputError)
         with path.open("r+b") as file:
             if not lock_file(file, wait=False):
                 raise OutputError(f"{path}: another batch writes here: wait for it, or end it")
@@ -93,6 +108,7 @@ class Manifest:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.is_symlink():
             raise OutputError(f"{path}: is a link, and must be a file: remove it")
+        check_ends(path, OutputError)
         # not buffered: what could not be written would be tried again when it is closed
         self._file = path.open("a+b", buffering=0)
         try:
@@ -166,5 +182,11 @@ def _record(line: bytes) -> dict[str, Any] | None:
         return None
     if not isinstance(record, dict):
         return None
-    told = all(isinstance(record.get(key), str) for key in ("name", "status", "at"))
-    return record if told else None
+    if any(not isinstance(record[key], kind) for key, kind in _FORM.items() if key in record):
+        return None
+    if not (_DONE if record.get("status") == "done" else _ALWAYS) <= record.keys():
+        return None
+    below = PurePosixPath(record["name"])
+    inside = not below.is_absolute() and ".." not in below.parts
+    beside = all(PurePath(name).name == name for name in record.get("beside", ()))
+    return record if inside and beside else None

@@ -180,7 +180,7 @@ def _why_export(
         return "an option of the export changed"
     if not folder.exists():
         return "its export is gone"
-    return "" if digest(folder) == made["sha256"] else "its export changed"
+    return "" if digest(folder) == made.get("sha256") else "its export changed"
 
 
 def outputs_in_the_way(

@@ -3,33 +3,33 @@
 Each process compiles and imports once.  If one ends by itself, its sequence has failed and a new
 process goes on.  A signal to the program ends them all; where the program itself is killed, they
 notice and end.
+
+:func:`start` begins them all.  Not by :mod:`multiprocessing`: what that starts looks for modules in
+the current folder first, which may be anybody's, and runs the script of the caller once more.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import os
+import pickle
 import queue
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import adv2e
 from adv2e.batch.work import Job, do
 from adv2e.files.workspace import remove_abandoned
 from adv2e.process import cleanup
 from adv2e.process.signals import Terminated, stop_on_signals
+from adv2e.process.standard_error import keep_errors_for_ourselves
 
 _LOST_S = 1.0
 _END_S = 10.0
@@ -38,6 +38,56 @@ _END_S = 10.0
 
 class EndedError(Exception):
     """A process ended while it converted."""
+
+
+def start() -> subprocess.Popen[bytes]:
+    """Begin a process of :func:`serve`, which runs no code of the current folder.
+
+    It looks for modules where this one does, but for the current folder, which stands there as an
+    empty name where Python was given a command or runs at a prompt.
+    """
+    home = str(Path(adv2e.__file__).parents[1])
+    path = [place for place in sys.path if place not in ("", ".")]
+    path += [] if home in path else [home]  # last: nothing in it can stand for another module
+    # until the path is set nothing is imported but `sys`, which is no file
+    code = f"import sys; sys.path[:] = {path!a}; from adv2e.batch import processes as p; p.serve()"
+    told = ["-X", f"utf8={sys.flags.utf8_mode}"]  # or it would write names in other bytes
+    told += ["-I"] if sys.flags.isolated else []
+    return subprocess.Popen(
+        [sys.executable, *told, "-c", code, str(os.getpid())],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+
+
+def serve() -> None:
+    """Do the jobs that come through standard input, until it ends; answer each on the output.
+
+    Signals end the process, and so does the end of its parent.
+    """
+    stop_on_signals(silent=True)
+    keep_errors_for_ourselves()
+    jobs, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    with open(os.devnull, "r+b") as nothing:  # noqa: PTH123
+        os.dup2(nothing.fileno(), 0)
+        os.dup2(nothing.fileno(), 1)  # what a library prints is no answer
+    sys.stdout = sys.stderr  # what an effect of the user's prints is for the user
+    threading.Thread(target=_watch, args=(int(sys.argv[1]),), daemon=True).start()
+    try:
+        with suppress(EOFError, BrokenPipeError):
+            while True:
+                pickle.dump(do(pickle.load(jobs)), answers)
+                answers.flush()
+    except KeyboardInterrupt:  # a signal that came while files came into place
+        os._exit(128 + signal.SIGINT)
+    except Terminated as ending:
+        os._exit(ending.exit_status)
+
+
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_LOST_S)
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def run(jobs: Iterable[Job | None], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
@@ -123,21 +173,18 @@ class _Worker:
     """One process, and the next where it ended."""
 
     def __init__(self) -> None:
-        self._pool: ProcessPoolExecutor | None = None
-        self._process = 0
+        self._process: subprocess.Popen[bytes] | None = None
 
     def do(self, job: Job, is_wanted: Callable[[], bool]) -> dict[str, Any]:
+        process = self._process = self._process or start()
         try:
-            if self._pool is None:
-                context = multiprocessing.get_context("spawn")
-                self._pool = ProcessPoolExecutor(1, context, _begin, (os.getpid(),))
-                self._process = self._pool.submit(os.getpid).result()
-            future = self._pool.submit(_do, job)
-            while not wait([future], timeout=_LOST_S).done:
-                if not is_wanted():
-                    self.kill(signal.SIGTERM)
-            return future.result()
-        except BrokenProcessPool:
+            with ThreadPoolExecutor(1) as waiting:
+                future = waiting.submit(_asked, process, job)
+                while not wait([future], timeout=_LOST_S).done:
+                    if not is_wanted():
+                        self.kill(signal.SIGTERM)
+                return future.result()
+        except (OSError, EOFError, pickle.UnpicklingError):
             self.close()
             remove_abandoned(Path(job.output).parent)
             raise EndedError(
@@ -145,48 +192,25 @@ class _Worker:
             ) from None
 
     def close(self) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
-        self._pool, self._process = None, 0
+        """End the process, if it is there."""
+        if self._process is not None:
+            self._process.kill()
+            with suppress(OSError), self._process:  # closes pipes, and waits
+                pass
+        self._process = None
 
     def kill(self, number: int) -> None:
-        if self._process:
-            with suppress(OSError):
-                os.kill(self._process, number)
+        if self._process is not None:
+            self._process.send_signal(number)
 
     def is_there(self) -> bool:
-        if not self._process:
-            return False
-        try:
-            ended, _ = os.waitpid(self._process, os.WNOHANG)
-        except OSError:  # somebody else has seen its end
-            ended = self._process
-        if ended:
-            self._process = 0
-        return not ended
+        return self._process is not None and self._process.poll() is None
 
 
-def _do(job: Job) -> dict[str, Any]:
-    """Return what :func:`do` does, unless a signal came: then end this process.
-
-    A signal that comes while files come into place arrives as an exception, see
-    :mod:`adv2e.process.signals`.  The pool would take it for a result, and the process would stay.
-    """
-    try:
-        return do(job)
-    except KeyboardInterrupt:
-        os._exit(128 + signal.SIGINT)
-    except Terminated as ending:
-        os._exit(ending.exit_status)
-
-
-def _begin(parent: int) -> None:
-    """Make a process of conversions ready: signals end it, and so does the end of its parent."""
-    stop_on_signals()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(_LOST_S)
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    threading.Thread(target=watch, daemon=True).start()
+def _asked(process: subprocess.Popen[bytes], job: Job) -> dict[str, Any]:
+    """Return what a process answers to a job."""
+    assert process.stdin is not None and process.stdout is not None
+    pickle.dump(job, process.stdin)
+    process.stdin.flush()
+    found: dict[str, Any] = pickle.load(process.stdout)
+    return found

@@ -130,7 +130,9 @@ class Scratch(cleanup.Unfinished):
         remove_abandoned(self._base)
         cleanup.add(self)
         self._folder.make()
-        return self._folder.path
+        folder = self._folder.written("0")
+        folder.mkdir()
+        return folder
 
     def __exit__(self, *_: object) -> None:
         self.remove_now()

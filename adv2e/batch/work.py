@@ -14,7 +14,7 @@ from adv2e.batch.transfer import is_url, through
 from adv2e.config import Config, from_dict
 from adv2e.config.active_effects import user_sources
 from adv2e.config.effect_files import load_effects
-from adv2e.errors import Adv2eError
+from adv2e.errors import Adv2eError, Adv2eWarning
 from adv2e.files.states import State, digest_of, digest_of_values
 from adv2e.formats.lookup import to_write
 from adv2e.light.interpolation import network_of
@@ -162,8 +162,13 @@ def _convert(job: Job) -> dict[str, Any]:
         "frames": made.frames,
         "duration_s": made.duration_s,
         "seconds": round(made.seconds + seconds, 3),
-        "notes": [*made.notes, *(str(one.message) for one in doubts)],
+        "notes": [*made.notes, *_told(doubts)],
     }
+
+
+def _told(warned: Iterable[warnings.WarningMessage]) -> Iterator[str]:
+    """Yield what our own warnings say, and not what libraries say of our code."""
+    return (str(one.message) for one in warned if isinstance(one.message, Adv2eWarning))
 
 
 def _whole(job: Job, config: Config) -> tuple[Summary, float]:
@@ -200,7 +205,7 @@ def _merged(job: Job, config: Config, source: str) -> tuple[Summary, float]:
             overwrite=True,
             of_pixels=merged(parts),
             log=notes.append,
-            doubt=warnings.warn,
+            doubt=lambda text: warnings.warn(text, Adv2eWarning, stacklevel=2),
             **given,
         )
     return replace(made, notes=tuple(notes)), sum(one["seconds"] for one in told)

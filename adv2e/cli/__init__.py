@@ -16,7 +16,12 @@ import click
 from click.shell_completion import CompletionItem
 
 from adv2e import __version__
-from adv2e.cli.exit_status import flush_stdout, print_any_character, reporting
+from adv2e.cli.exit_status import (
+    flush_stdout,
+    print_any_character,
+    reporting,
+    warnings_for_people,
+)
 from adv2e.process.memory import collect_seldom, return_large_blocks
 from adv2e.process.signals import stopping_on_signals
 
@@ -108,7 +113,7 @@ class Program(click.Group):
         if len(args) < 2:
             kwargs["prog_name"] = kwargs.get("prog_name") or "adv2e"
         print_any_character()
-        with stopping_on_signals(), _memory_of_a_command():
+        with stopping_on_signals(), warnings_for_people(), _memory_of_a_command():
             try:
                 return super().main(*args, **kwargs)
             except SystemExit as end:

@@ -21,13 +21,14 @@ import os
 import signal
 import sys
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TextIO
+from typing import Any, TextIO
 
 import click
 
-from adv2e.errors import Adv2eError
+from adv2e.errors import Adv2eError, Adv2eWarning
 from adv2e.files.names import shown
 from adv2e.process.machine import machine_complaint
 from adv2e.process.signals import Terminated, last_words
@@ -42,6 +43,26 @@ def complain(text: str) -> None:
     """Write one line to stderr, whatever characters and line breaks `text` holds."""
     with suppress(OSError):  # nobody is left to read it
         click.echo(f"adv2e: {shown(text)}", err=True)
+
+
+@contextmanager
+def warnings_for_people() -> Iterator[None]:
+    """Show warnings of ours as lines, and none of libraries, which are about our code.
+
+    Nothing changes where whoever looks for a fault asked Python for warnings (``-W``).
+    """
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, *where: Any, **more: Any) -> None:
+        if isinstance(message, Adv2eWarning):
+            complain(f"warning: {message}")
+
+    if not sys.warnoptions:
+        warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = usual
 
 
 def _joined(error: BaseException) -> str:

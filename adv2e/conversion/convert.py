@@ -11,7 +11,7 @@ from adv2e.config import Written, files_among, load_config
 from adv2e.conversion.pipeline import Summary, convert_reading
 from adv2e.conversion.reading import Reading
 from adv2e.conversion.transfer import convert_events
-from adv2e.errors import UsageError
+from adv2e.errors import Adv2eWarning, UsageError
 from adv2e.formats.frames import takes_events
 from adv2e.geometry import parse_rectangle, parse_size
 from adv2e.in_python import in_python
@@ -150,7 +150,7 @@ def convert(
         raise UsageError(f"size, crop: {error}") from None
 
     def doubt(text: str) -> None:
-        warnings.warn(in_python(text), stacklevel=5)  # of who calls adv2e.convert
+        warnings.warn(in_python(text), Adv2eWarning, stacklevel=5)  # of who calls adv2e.convert
 
     if fps is not None and timestamps is not None:
         raise UsageError("fps and timestamps both give the times of the frames: keep one")

@@ -21,7 +21,7 @@ from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.effects.reorder_buffer import InOrder, count_before
-from adv2e.errors import DataError
+from adv2e.errors import Adv2eWarning, DataError
 from adv2e.events import Events, empty_events
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.intervals import Intervals
@@ -138,6 +138,7 @@ def _tell_far_apart(apart_s: float) -> None:
         warnings.warn(
             f"the second frame comes {apart_s:g} s after the first: times are in seconds; divide"
             " milliseconds by 1e3, microseconds by 1e6",
+            Adv2eWarning,
             stacklevel=2,
         )
 

@@ -1,7 +1,7 @@
 """Arrays in the ``.npy`` format, of which no more is believed than is there.
 
-NumPy's own reader allocates what the header states before it looks for it, and maps files into
-memory, where one that is cut short meanwhile ends the program.
+NumPy's own reader allocates what the header states before it looks for it, maps files into memory,
+where one that is cut short meanwhile ends the program, and warns of headers of Python 2.
 
 References
 ----------
@@ -10,9 +10,10 @@ References
 
 from __future__ import annotations
 
+import ast
 import math
+import re
 import struct
-import tokenize
 from dataclasses import dataclass
 from typing import IO, Any
 
@@ -22,11 +23,8 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 
-_READERS = {
-    (1, 0): npy.read_array_header_1_0,
-    (2, 0): npy.read_array_header_2_0,
-    (3, 0): npy.read_array_header_2_0,  # differs where names of fields are not ASCII
-}
+_LONGEST = 10_000
+"""Bytes of the longest header that is read, as for NumPy: longer ones take long to parse."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +69,10 @@ def read_header(file: IO[bytes], available: int, label: str) -> Header:
         No such array, one of Python objects, or one of which a part is missing.
     """
     try:
-        shape, fortran, dtype = _READERS[npy.read_magic(file)](file)
-        if dtype.itemsize == 0 or not all(type(n) is int and n >= 0 for n in shape):
-            raise ValueError
+        shape, fortran, dtype = _stated(file)
     except (
         *(ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError),
-        *(SyntaxError, RecursionError, MemoryError, struct.error, tokenize.TokenError),
+        *(SyntaxError, RecursionError, MemoryError, struct.error),
     ) as error:
         raise DataError(f"{label}: not a .npy array that can be read") from error
     header = Header(dtype, shape, fortran, file.tell())
@@ -88,6 +84,27 @@ def read_header(file: IO[bytes], available: int, label: str) -> Header:
             f" of {header.nbytes:,}"
         )
     return header
+
+
+def _stated(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Return shape, order and data type; ValueError and others if they are not stated rightly."""
+    version = npy.read_magic(file)
+    length = struct.Struct({1: "<H", 2: "<I", 3: "<I"}[version[0]])
+    (size,) = length.unpack(file.read(length.size))
+    if version[1] or size > _LONGEST:
+        raise ValueError
+    text = file.read(size).decode("utf-8" if version[0] == 3 else "latin-1")
+    # Python 2 wrote an L behind long numbers
+    stated = ast.literal_eval(re.sub(r"(?<=[0-9])L(?=\s*[,)])", "", text).strip())
+    if set(stated) != {"descr", "fortran_order", "shape"}:
+        raise ValueError
+    shape, fortran = stated["shape"], stated["fortran_order"]
+    dtype = npy.descr_to_dtype(stated["descr"])
+    if dtype.itemsize == 0 or not all(type(n) is int and n >= 0 for n in shape):
+        raise ValueError
+    if type(shape) is not tuple or type(fortran) is not bool:
+        raise ValueError
+    return shape, fortran, dtype
 
 
 def read_array(file: IO[bytes], available: int, label: str) -> NDArray[Any]:

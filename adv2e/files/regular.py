@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO, cast
 
 from adv2e.errors import Adv2eError, DataError
 
@@ -52,6 +53,27 @@ def read_text_bytes(path: Path, kind: type[Adv2eError] = DataError) -> bytes:
     if len(data) > _LONGEST:
         raise kind(f"{path}: does not end within {_LONGEST >> 20} MiB")
     return data
+
+
+def open_regular(path: Path, mode: str) -> BinaryIO | None:
+    """Return a file, opened without buffer; None: the name is that of something else, or a link.
+
+    For files of our own in folders that may come from elsewhere.  A pipe is not waited for.
+
+    Raises
+    ------
+    OSError
+        It cannot be opened.
+    """
+    extra = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    if path.is_symlink() or path.is_dir():
+        return None
+    opened = open(path, mode, 0, opener=lambda name, flags: os.open(name, flags | extra))  # noqa: SIM115
+    file = cast(BinaryIO, opened)
+    if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        return file
+    file.close()
+    return None
 
 
 def _is_open_already(path: Path) -> bool:

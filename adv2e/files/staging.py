@@ -6,8 +6,8 @@ place together or not at all, and what they replace stays until then.
 
 Killed at any instant, a run leaves what was there before or what it made, whole.  Of several
 outputs those after the first may be missing then, but never tell about another file than the one
-beside them; the next run in that folder puts them in place, or back, and removes the rest
-(:mod:`adv2e.files.workspace`).
+beside them.  What they were to replace lies in the hidden folder, which the next run in that folder
+tells of, and else removes (:mod:`adv2e.files.workspace`).
 """
 
 from __future__ import annotations
@@ -23,27 +23,30 @@ from pathlib import Path
 from adv2e.errors import OutputError
 from adv2e.files.distinct import are_one, check_distinct
 from adv2e.files.renaming import exchange, move_to_free, sync, sync_one
-from adv2e.files.workspace import Identity, Workspace, identity_of, remove_abandoned
+from adv2e.files.workspace import Workspace, remove_abandoned
 from adv2e.process import cleanup
+
+Identity = tuple[int, int]
+"""What tells a file or folder from all others, by whatever name: device and inode."""
 
 
 @dataclass(eq=False)
 class _Output:
-    """One file or folder: as the user named it, where it will lie, where it is written.
+    """One file or folder: as the user named it, where it will lie, where it is written, and whose.
 
-    `aside` is where what it replaces may lie meanwhile; `identity` is that of what was written.
+    `identity` is that of what was written.
     """
 
     named: Path
     final: Path
     temporary: Path
-    aside: Path
+    workspace: Workspace
     identity: Identity | None = None
 
     @property
     def is_placed(self) -> bool:
         """Whether what was written has the final name."""
-        return self.identity is not None and identity_of(self.final) == self.identity
+        return self.identity is not None and _identity_of(self.final) == self.identity
 
 
 class Staging(cleanup.Unfinished):
@@ -146,12 +149,11 @@ class Staging(cleanup.Unfinished):
                 raise OutputError(
                     f"{path} and {other.named}: one lies in the other; choose another name"
                 )
-        workspace = self._workspaces.setdefault(final.parent, Workspace(final.parent)).path
+        workspace = self._workspaces.setdefault(final.parent, Workspace(final.parent))
         # OpenCV and others choose the format by the suffix
         name = f"{len(self._outputs)}{re.sub(r'[^A-Za-z0-9._-]', '_', final.suffix)[:20]}"
-        output = _Output(path, final, workspace / f"new{name}", workspace / f"old{name}")
-        self._outputs.append(output)
-        return output.temporary
+        self._outputs.append(_Output(path, final, workspace.written(name), workspace))
+        return self._outputs[-1].temporary
 
     def _check_free(self, path: Path, final: Path) -> None:
         if os.path.lexists(final) and not self._overwrite:
@@ -186,12 +188,11 @@ class Staging(cleanup.Unfinished):
             for at_work in self._outputs:
                 self._check_free(at_work.named, at_work.final)
                 sync(at_work.temporary)
-                at_work.identity = identity_of(at_work.temporary)
-            self._note_placing()
+                at_work.identity = _identity_of(at_work.temporary)
             # the others may tell about the first, and must not tell about the one that it replaces
             for at_work in self._outputs[1:]:
                 if os.path.lexists(at_work.final):
-                    at_work.final.rename(at_work.aside)
+                    at_work.workspace.put_aside(at_work.final)
             for at_work in self._outputs:
                 self._place(at_work, replaces=self._overwrite and at_work is first)
         except BaseException as error:
@@ -203,18 +204,11 @@ class Staging(cleanup.Unfinished):
                     f"{at_work.named}: cannot be written: {error.strerror or error}"
                 ) from error
             raise
-        for folder in self._workspaces:
+        for folder, workspace in self._workspaces.items():
             with suppress(OSError):
                 sync_one(folder)
+            workspace.drop_aside()
         self._end()
-
-    def _note_placing(self) -> None:
-        first = self._outputs[0]
-        assert first.identity is not None
-        for folder, workspace in self._workspaces.items():
-            here = (output for output in self._outputs if output.final.parent == folder)
-            names = ((one.temporary.name, one.aside.name, one.final.name) for one in here)
-            workspace.note_placing((first.final, first.identity), names)
 
     def _place(self, output: _Output, *, replaces: bool) -> None:
         final, temporary = output.final, output.temporary
@@ -225,16 +219,18 @@ class Staging(cleanup.Unfinished):
         elif len(self._outputs) == 1 and not temporary.is_dir():
             temporary.replace(final)
         else:
-            final.rename(output.aside)
-            temporary.rename(final)
+            output.workspace.put_aside(final, linked=True)
+            temporary.replace(final)
 
     def _roll_back(self) -> None:
-        """Take back what came into place; what lies aside is put back when the rest is removed."""
+        """Take back what came into place, and put back what lies aside."""
         if all(output.is_placed for output in self._outputs):
+            for workspace in self._workspaces.values():
+                workspace.drop_aside()
             return
         for output in reversed(self._outputs):
             if output.is_placed:
-                there = identity_of(output.temporary)
+                there = _identity_of(output.temporary)
                 with suppress(OSError):
                     if there is None:
                         output.final.rename(output.temporary)
@@ -242,6 +238,7 @@ class Staging(cleanup.Unfinished):
                         output.final.unlink()  # it has both names
                     else:
                         exchange(output.temporary, output.final)
+            output.workspace.put_back(output.final)
 
     def discard(self) -> None:
         """Remove everything temporary, and the folders made for it."""
@@ -268,6 +265,15 @@ class Staging(cleanup.Unfinished):
             workspace.hide()
         self.discard()
         return not any(workspace.path.exists() for workspace in made)
+
+
+def _identity_of(path: Path) -> Identity | None:
+    """Return the identity of what has a name; None: nothing has it."""
+    try:
+        status = path.lstat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
 
 
 def nearest_there(path: Path) -> Path:

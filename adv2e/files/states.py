@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from adv2e.files.regular import check_ends
+
 _BLOCK = 1 << 20
 
 
@@ -47,10 +49,17 @@ def state_of(path: Path) -> State:
 
 
 def digest_of(path: Path) -> str:
-    """Return the SHA-256 of a file, or of the names and contents of all files below a folder."""
+    """Return the SHA-256 of a file, or of the names and contents of all files below a folder.
+
+    Raises
+    ------
+    DataError
+        One is a pipe, a device or a socket.
+    """
     total = hashlib.sha256()
     for name, file in _files(path):
         own = hashlib.sha256()
+        check_ends(file)
         with file.open("rb") as opened:
             while block := opened.read(_BLOCK):
                 own.update(block)

@@ -4,27 +4,34 @@ A run holds a lock on a file in its folder for as long as it lives; the system l
 however the run ends.  So a folder whose file can be locked is abandoned, and the next run beside it
 removes it.  Where files cannot be locked none looks abandoned, and what a run on another machine
 made is left alone: a file system may not know of locks elsewhere.
+
+Such a folder may also come from elsewhere, in an archive, made by anybody.  So nothing in it says
+what to do: no name is read from it, nothing is moved out of it, and it goes only if it holds
+nothing but what runs write there, with its links and never through them.  Any other stays, and a
+warning names it.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import secrets
 import shutil
-from collections.abc import Iterable
+import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
+from adv2e.errors import Adv2eWarning
 from adv2e.files.locks import lock_file
+from adv2e.files.names import shown
+from adv2e.files.regular import open_regular
 
 _NAME = re.compile(r"\.adv2e\.[0-9a-f]{8}\.part-?")
-_LOCK, _JOURNAL = "lock", "journal.json"
-
-Identity = tuple[int, int]
-"""What tells a file or folder from all others, by whatever name: device and inode."""
+_LOCK, _OLD = "lock", "old"
+_WRITTEN = re.compile(r"lock|new[0-9]+[A-Za-z0-9._-]*", re.ASCII)
+_LONGEST = 1 << 10
+"""Bytes that a lock may hold."""
 
 
 class Workspace:
@@ -45,6 +52,14 @@ class Workspace:
         """Whether it is there."""
         return self._lock is not None
 
+    def written(self, name: str) -> Path:
+        """Return where an output is written, of a name that begins with its number."""
+        return self.path / f"new{name}"
+
+    def aside(self, name: str) -> Path:
+        """Return where what has the final name `name` lies while another takes its place."""
+        return self.path / _OLD / name
+
     def make(self) -> None:
         """Make the folder and lock it."""
         lock = self.path / _LOCK
@@ -57,24 +72,28 @@ class Workspace:
                     _machine() if lock_file(self._lock, wait=True) else b"no locks here"
                 )
 
-    def note_placing(
-        self, first: tuple[Path, Identity], outputs: Iterable[tuple[str, str, str]]
-    ) -> None:
-        """Note that all is written and comes into place from now on.
+    def put_aside(self, final: Path, *, linked: bool = False) -> None:
+        """Move what has a final name beside the folder into it; `linked`: it may keep its name."""
+        aside = self.aside(final.name)
+        aside.parent.mkdir(exist_ok=True)
+        if linked:
+            with suppress(OSError):  # it is a folder, or there are no hard links
+                os.link(final, aside)
+                return
+        final.rename(aside)
 
-        Parameters
-        ----------
-        first : (Path, identity)
-            Final name and identity of the output that comes first.
-        outputs : iterable of (str, str, str)
-            Names of the outputs here: while written, that of what they replace, the final one.
-        """
-        path, identity = first
-        told = {"first": [str(path), *identity], "outputs": list(outputs)}
-        with (self.path / _JOURNAL).open("x", encoding="ascii") as file:
-            json.dump(told, file)
-            file.flush()
-            os.fsync(file.fileno())
+    def put_back(self, final: Path) -> None:
+        """Give what lies aside its final name again, if that is free."""
+        aside = self.aside(final.name)
+        with suppress(OSError):
+            if not os.path.lexists(final):
+                aside.rename(final)
+            elif aside.samefile(final):
+                aside.unlink()
+
+    def drop_aside(self) -> None:
+        """Remove what lies aside: something else has its place."""
+        shutil.rmtree(self.path / _OLD, ignore_errors=True)
 
     def hide(self) -> None:
         """Rename the folder, so that whoever writes into it by its name does not any longer."""
@@ -83,18 +102,18 @@ class Workspace:
         self.path = hidden
 
     def remove(self) -> None:
-        """Remove the folder and all in it, but for what is to be put back and cannot be."""
+        """Remove the folder and all in it, but for what lies aside and could not be put back."""
         if self._lock is not None:
-            _remove(self.path, self._lock)
+            with suppress(OSError):  # it is empty, or not there
+                (self.path / _OLD).rmdir()
+            if not (self.path / _OLD).exists():
+                _remove(self.path, self._lock)
+            self._lock.close()
             self._lock = None
 
 
 def remove_abandoned(folder: Path) -> None:
-    """Remove what dead runs left in a folder.
-
-    If one was killed while its outputs came into place, that is brought to its end where the first
-    of them is in place, else what was there before is put back.
-    """
+    """Remove what dead runs left in a folder; what is not as they leave it is warned of."""
     with suppress(OSError):
         found = [entry for entry in os.scandir(folder) if _NAME.fullmatch(entry.name)]
         for entry in found:
@@ -102,58 +121,60 @@ def remove_abandoned(folder: Path) -> None:
                 if entry.is_dir(follow_symlinks=False) and is_ours(
                     entry.stat(follow_symlinks=False)
                 ):
-                    _remove_if_abandoned(Path(entry.path))
+                    strange = _remove_if_abandoned(Path(entry.path))
+                    if strange:
+                        warnings.warn(
+                            f"{shown(entry.path)}: left alone, as it {strange}",
+                            Adv2eWarning,
+                            stacklevel=2,
+                        )
 
 
-def _remove_if_abandoned(path: Path) -> None:
+def _remove_if_abandoned(path: Path) -> str:
+    """Return why a folder that looks abandoned is left alone, or nothing."""
     file = path / _LOCK
-    if not file.exists():
+    if not os.path.lexists(file):
         path.rmdir()  # if it is empty: the run was killed before it could lock it
-        return
-    with file.open("r+b", buffering=0) as lock:
-        if (
-            _may_be_dead(lock.read())
+        return ""
+    lock = open_regular(file, "r+b")
+    if lock is None:
+        return f"holds a {_LOCK} that is no file: no run made it; remove it if nobody needs it"
+    with lock:
+        if not (
+            _may_be_dead(lock.read(_LONGEST))
             and lock_file(lock, wait=False)
-            and os.path.samestat(os.fstat(lock.fileno()), file.stat())
+            and os.path.samestat(os.fstat(lock.fileno()), file.lstat())
         ):
+            return ""
+        with suppress(OSError):  # nothing lies aside
+            (path / _OLD).rmdir()
+        with os.scandir(path) as entries:
+            strange = next((one.name for one in entries if not _WRITTEN.fullmatch(one.name)), "")
+        if strange == _OLD:
+            return (
+                f"holds, in {_OLD}, what a run was replacing when it was killed: take it from"
+                " there, and remove the folder"
+            )
+        if strange:
+            return f"holds {shown(strange)}, which no run writes: remove it if nobody needs it"
+        try:
             _remove(path, lock)
+        except RecursionError:
+            return "holds too many folders in one another: remove it if nobody needs it"
+    return ""
 
 
 def _remove(path: Path, lock: BinaryIO) -> None:
-    with suppress(OSError), lock:
-        _settle(path)
+    """Remove a folder, its lock last."""
+    with suppress(OSError):
+        for entry in list(os.scandir(path)):
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            elif entry.name != _LOCK:
+                Path(entry.path).unlink()
         shutil.rmtree(path, ignore_errors=True)
         lock.close()
         shutil.rmtree(path, ignore_errors=True)  # Windows removes no open file
-
-
-def _settle(path: Path) -> None:
-    """Finish or undo what is noted as coming into place.
-
-    Raises
-    ------
-    OSError
-        Something could not be put in its place.
-    """
-    try:
-        told = json.loads((path / _JOURNAL).read_text(encoding="ascii"))
-    except (FileNotFoundError, ValueError):  # nothing came into place before the note was whole
-        return
-    first, *identity = told["first"]
-    is_placed = identity_of(Path(first)) == tuple(identity)
-    for new, old, final in told["outputs"]:
-        source, target = path / (new if is_placed else old), path.with_name(final)
-        if os.path.lexists(source) and not os.path.lexists(target):
-            source.rename(target)
-
-
-def identity_of(path: Path) -> Identity | None:
-    """Return the identity of what has a name; None: nothing has it."""
-    try:
-        status = path.lstat()
-    except OSError:
-        return None
-    return status.st_dev, status.st_ino
 
 
 def is_ours(status: os.stat_result) -> bool:

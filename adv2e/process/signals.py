@@ -27,11 +27,11 @@ class Terminated(BaseException):
         self.exit_status = 128 + number
 
 
-def stop_on_signals() -> list[int]:
+def stop_on_signals(*, silent: bool = False) -> list[int]:
     """Let SIGINT, SIGTERM and SIGHUP end the program from now on; return those that do.
 
     Ignored ones stay ignored, and nothing changes where the caller has handlers of its own, or is
-    not the main thread.
+    not the main thread.  `silent`: nothing is said of it, as the program that began this one does.
     """
     if threading.current_thread() is not threading.main_thread():
         return []
@@ -43,7 +43,8 @@ def stop_on_signals() -> list[int]:
         ending = KeyboardInterrupt() if number == signal.SIGINT else Terminated(number)
         if not unfinished.remove_all():
             raise ending
-        _say_at_once(last_words(ending))
+        if not silent:
+            _say_at_once(last_words(ending))
         os._exit(128 + number)
 
     for number in caught:

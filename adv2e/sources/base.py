@@ -27,6 +27,7 @@ from adv2e.sources.frame import (
     Light,
     Pixels,
     Shot,
+    check_pixels,
     check_values,
     light_of_images,
     odd_white,
@@ -117,6 +118,7 @@ class Source(ABC):
             raise DataError(f"{label}: {error}") from error
         self.height, self.width = image.shape[:2]
         self.whole = Size(self.width, self.height)
+        check_pixels(*self.whole, label)
         crop = self.selection.crop
         if crop is not None:
             if not crop.is_inside(*self.whole):

@@ -18,6 +18,19 @@ Image = NDArray[Any]
 """(rows, columns) or (rows, columns, 3) RGB; uint8, uint16, float32 or float64."""
 
 
+LARGEST = 1 << 27
+"""Pixels of the largest frame: 16384x8192, which holds video of 16K and pictures of any camera."""
+
+
+def check_pixels(width: int, height: int, label: str) -> None:
+    """Raise DataError if a frame has more pixels than are read, best before room is made for it."""
+    if width * height > LARGEST:
+        raise DataError(
+            f"{label}: {width}x{height} pixels; frames of more than {LARGEST:,} pixels (16384x8192)"
+            " are not read: make it smaller"
+        )
+
+
 @dataclass(frozen=True)
 class Pixels:
     """An image as its file has it.

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
 from adv2e.files.npy import Header, read_array, read_header
-from adv2e.sources.frame import Pixels
+from adv2e.sources.frame import Pixels, check_pixels
 from adv2e.sources.listed import ListedSource, Picture, Timed, timed
 from adv2e.sources.times.instants import Stamp
 from adv2e.sources.times.lists import FrameList, read_list
@@ -69,6 +69,7 @@ def _open_stack(path: Path) -> _Stack:
             f"{path}: an array of shape {shape}; expected (frames, rows, columns) or (frames, rows,"
             " columns, 3), without alpha"
         )
+    check_pixels(shape[2], shape[1], str(path))
     try:
         full_scale_of(header.dtype)
     except DataError as error:

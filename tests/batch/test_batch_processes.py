@@ -75,13 +75,66 @@ def test_a_process_that_dies_fails_its_sequence_alone(tmp_path, number):
 
 def test_processes_stay_alive_over_many(tmp_path, monkeypatch):
     made = []
-    whole = processes.ProcessPoolExecutor
-    monkeypatch.setattr(processes, "ProcessPoolExecutor", lambda *a: made.append(1) or whole(*a))
+    whole = processes.start
+    monkeypatch.setattr(processes, "start", lambda: made.append(1) or whole())
     jobs = [job(tmp_path, f"s{k}") for k in range(4)]
     found = {one.name: result for one, result in run(jobs, 1)}
     assert sorted(found) == ["s0", "s1", "s2", "s3"]
     assert all(result["events"] > 0 for result in found.values())
     assert len(made) == 1
+
+
+@pytest.mark.parametrize("at_prompt", [False, True])
+def test_no_code_of_the_current_folder_runs(tmp_path, monkeypatch, at_prompt):
+    """Neither as a module of Python's own or of ours, nor as one that Python looks for itself."""
+    one = job(tmp_path, "a")
+    names = "signal struct threading pickle subprocess numpy yaml adv2e sitecustomize usercustomize"
+    for name in names.split():
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'RAN')!r}, 'w')")
+    monkeypatch.chdir(tmp_path)
+    if at_prompt:  # or with `python -c`
+        monkeypatch.setattr(sys, "path", ["", ".", *sys.path])
+    ((_, found),) = run([one], 1)
+    assert "error" not in found
+    assert not (tmp_path / "RAN").exists()
+
+
+def test_a_script_that_calls_for_a_batch_runs_once(tmp_path):
+    clip(tmp_path / "from" / "a.avi")
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from pathlib import Path\n"
+        "from adv2e.batch.run import Batch, Settings\n"
+        "print('runs', flush=True)\n"
+        f"settings = Settings((), {tuple(QUICK[1::2])!r}, (), None, '.h5', {{'format': 'h5'}})\n"
+        "print(Batch(Path('from'), Path('to'), settings).run(jobs=1).made)\n"
+    )
+    told = [sys.executable, str(script)]
+    done = subprocess.run(told, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("runs\n1\n", "")
+
+
+LOUD = """
+import os
+from adv2e.effects.hooks import Hooks
+
+class Loud(Hooks):
+    'Prints, as C code does.'
+    name = "loud"
+    stage = "frames"
+    def light(self, frames):
+        print("text", flush=True)
+        os.write(1, b"text")
+        yield from frames
+"""
+
+
+def test_what_is_printed_in_a_process_is_no_answer(tmp_path, capfd):
+    effect = tmp_path / "loud.py"
+    effect.write_text(LOUD)
+    ((_, found),) = run([job(tmp_path, "a", effects=[effect])], 1)
+    assert found["events"] > 0
+    assert capfd.readouterr() == ("", "text\n")
 
 
 def test_a_source_that_is_gone_is_an_error_of_its_own(tmp_path):

@@ -13,7 +13,11 @@ from adv2e.errors import DataError, OutputError
 
 
 def done(name, **more):
-    return {"name": name, "status": "done", **more}
+    told = dict.fromkeys(("adv2e", "settings", "source_sha256", "sha256"), "")
+    return {
+        **{"name": name, "status": "done", "output": f"{name}.h5", "source": {}, "seed": 0},
+        **{**told, **more},
+    }
 
 
 def plain(records):
@@ -34,7 +38,7 @@ def test_lines_stay_and_the_last_of_a_name_counts(tmp_path):
 
 
 @settings(max_examples=200, deadline=None)
-@given(kept=st.integers(0, 400))
+@given(kept=st.integers(0, 1000))
 def test_a_torn_line_is_cut_off_and_nothing_else(tmp_path_factory, kept):
     path = manifest_path(tmp_path_factory.mktemp("m"), None)
     records = [done(f"s{k}") for k in range(4)]
@@ -130,3 +134,38 @@ def test_what_cannot_be_written_is_cut_off_again(tmp_path, monkeypatch):
         monkeypatch.undo()
         manifest.add(done("c"))
     assert list(read_records(tmp_path)) == ["a", "c"]
+
+
+WRONG = {
+    "without a digest": {"sha256": None},
+    "a seed that is text": {"seed": "0"},
+    "a list beside": {"beside": ["a.json"]},
+    "a list of exports": {"export": []},
+    "a file of another folder": {"beside": {"../a.json": ""}},
+    "a file anywhere": {"beside": {"/etc/passwd": ""}},
+    "a folder": {"beside": {"..": "", ".": ""}},
+    "a sequence of another folder": {"name": "a/../../b"},
+    "a sequence anywhere": {"name": "/home/b"},
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_manifest_from_elsewhere_names_only_what_a_batch_does(tmp_path, what):
+    record = {**done("a"), "at": "2026", **WRONG[what]}
+    line = json.dumps({key: value for key, value in record.items() if value is not None})
+    manifest_path(tmp_path, None).write_text(line + "\n")
+    for read in (read_records, lambda dest: Manifest(manifest_path(dest, None))):
+        with pytest.raises(DataError, match=r"manifest\.jsonl:1: is no line of a manifest"):
+            read(tmp_path)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs pipes")
+@pytest.mark.parametrize("shard", [None, (1, 2)])
+def test_a_pipe_is_no_manifest(tmp_path, shard):
+    path = manifest_path(tmp_path, shard)
+    os.mkfifo(path)
+    for read in (read_records, lambda dest: check_alone(manifest_path(dest, (1, 3)))):
+        with pytest.raises((DataError, OutputError), match="is a pipe, a device or a socket"):
+            read(tmp_path)
+    with pytest.raises(OutputError, match="is a pipe"):
+        Manifest(path)

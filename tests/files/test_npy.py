@@ -67,6 +67,22 @@ def test_headers_that_are_wrong(text, message):
         read(with_header(text, b"\0" * 64))
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{'descr': '|u1', 'fortran_order': False, 'shape': (2L, 3L), }",
+        "{'descr': '|u1', 'fortran_order': False, 'shape': (2L, 3L ), }",
+    ],
+)
+def test_a_header_of_python_2_is_read_without_a_word(text):
+    assert read(with_header(text, bytes(range(6)))).tolist() == [[0, 1, 2], [3, 4, 5]]
+
+
+def test_an_l_within_a_name_stays():
+    array = np.zeros(2, [("a1L", "<i2"), ("L", "<i4")])
+    assert read(stored(array)).dtype == array.dtype
+
+
 def test_a_header_of_thousands_of_signs(tmp_path):
     data = b"\x93NUMPY\x01\x00" + struct.pack("<H", 9000) + b"-" * 9000
     with pytest.raises(DataError, match=r"not a \.npy array"):

@@ -1,8 +1,9 @@
-"""What the headers of PNG, JPEG, WebP, BMP, PGM and PPM say that OpenCV does not tell, or too late.
+"""What the headers of images but TIFF and EXR say that OpenCV does not tell, or too late.
 
 Decoders make room for a picture first and fill it with whatever comes: a JPEG of 600 bytes became
 2.7 GB.  A picture of one colour packs well, so that a small file may hold a large one; up to the
-size of the largest sensors it is let be.
+size of the largest sensors it is let be.  Of any file, a picture beyond
+:data:`adv2e.sources.frame.LARGEST` is not read.
 
 References
 ----------
@@ -20,6 +21,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from adv2e.errors import DataError
+from adv2e.sources.frame import check_pixels
 from adv2e.sources.images.alpha import Alpha
 
 FREE = 1 << 25
@@ -29,6 +31,12 @@ MOST = 100
 
 _GREY, _GREY_ALPHA = 0, 4
 _V3 = 56  # bytes of the first header of BMP that has a mask for alpha
+_OS2 = 12  # bytes of the first header of BMP of all
+_LONGEST = 1 << 16  # bytes of a header of text
+_FLOATS = re.compile(rb"P[Ff]\s+(?P<width>[0-9]{1,10})\s+(?P<height>[0-9]{1,10})\s")
+_RADIANCE = re.compile(
+    rb"#\?R(?s:.*?)\n[-+]Y +(?P<height>[0-9]{1,10}) +[-+]X +(?P<width>[0-9]{1,10})\s"
+)
 _RAW_PNM = re.compile(rb"P[56]" + 3 * rb"(?:\s|#[^\n\r]*[\n\r])+([0-9]{1,10})" + rb"\s")
 
 
@@ -39,7 +47,7 @@ class Header:
     Attributes
     ----------
     width, height : int
-        Zero where they are not stated, or OpenCV looks at them before it makes room.
+        Zero where they are not stated.
     pictures : int
         How many are in the file.
     alpha : Alpha
@@ -71,17 +79,23 @@ def read_header(data: bytes) -> Header:
         if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
             return _webp(data)
         if data[:2] == b"BM":
-            (size,) = struct.unpack_from("<I", data, 14)
-            return Header(alpha=Alpha.STRAIGHT if size >= _V3 else Alpha.NONE)
+            size, width, height = struct.unpack_from(
+                "<Iii" if data[14] > _OS2 else "<IHH", data, 14
+            )
+            alpha = Alpha.STRAIGHT if size >= _V3 else Alpha.NONE
+            return Header(abs(width), abs(height), alpha=alpha)
         if stated := _RAW_PNM.match(data):
             return _pnm(data, stated)
+        if stated := _FLOATS.match(data) or _RADIANCE.match(data[:_LONGEST]):
+            return Header(int(stated["width"]), int(stated["height"]))
     except (struct.error, IndexError):  # cut short: OpenCV will say so
         pass
     return Header()
 
 
 def check_size(width: int, height: int, data: bytes, label: str) -> None:
-    """Raise DataError if the bytes of a file can hold no picture of this size."""
+    """Raise DataError if a picture of this size is not read, or is not in the bytes of its file."""
+    check_pixels(width, height, label)
     if width * height > max(FREE, MOST * len(data)):
         raise DataError(
             f"{label}: states {width}x{height} pixels in {len(data):,} bytes: damaged, or made to"

@@ -23,7 +23,7 @@ import numpy as np
 from adv2e.effects.frames.encoding import full_scale_of, is_light
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.process.standard_error import overhearing
-from adv2e.sources.frame import Image, Pixels
+from adv2e.sources.frame import Image, Pixels, check_pixels
 from adv2e.sources.images import tiff
 from adv2e.sources.images.alpha import Alpha, with_alpha
 from adv2e.sources.images.headers import check_size, read_header
@@ -227,6 +227,10 @@ def _decode_exr(data: bytes, label: str) -> Pixels:
         copy = Path(folder) / "image.exr"  # the package reads only files
         copy.write_bytes(data)
         try:
+            with openexr.File(str(copy), header_only=True) as file:
+                for part in file.parts:
+                    (left, top), (right, bottom) = part.header["dataWindow"]
+                    check_pixels(int(right) - int(left) + 1, int(bottom) - int(top) + 1, label)
             with openexr.File(str(copy)) as file:
                 parts = len(file.parts)
                 channels = {name: channel.pixels for name, channel in file.channels().items()}

@@ -1,5 +1,6 @@
 """Pictures that state a size which their file cannot hold."""
 
+import re
 import struct
 import zlib
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
+from adv2e.sources import frame, open_source
 from adv2e.sources.images import headers
 from adv2e.sources.images.opencv import decode_image
 
@@ -80,11 +82,57 @@ def test_a_large_picture_of_one_colour_is_read():
 
 @pytest.mark.parametrize(
     ("make", "size"),
-    [(png, (30000, 30000)), (jpeg, (30000, 30000)), (tiff, (30000, 30000)), (webp, (16384, 16384))],
+    [(png, (11000, 11000)), (jpeg, (11000, 11000)), (tiff, (11000, 11000)), (webp, (8192, 16384))],
 )
 def test_a_size_that_is_not_there(make, size):
     with pytest.raises(DataError, match=rf"^a\.x: states {size[0]}x{size[1]} pixels in "):
         decode_image(make(*size), "a.x")
+
+
+def bmp(width, height):
+    return b"BM" + bytes(12) + struct.pack("<Iii", 40, width, -height) + bytes(200)
+
+
+def old_bmp(width, height):
+    return b"BM" + bytes(12) + struct.pack("<IHH", 12, width, height) + bytes(200)
+
+
+def hdr(width, height):
+    return f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n".encode() + bytes(200)
+
+
+def pfm(width, height):
+    return f"PF\n{width} {height}\n-1.0\n".encode() + bytes(200)
+
+
+def pgm(width, height):
+    return f"P5 {width} {height} 255\n".encode() + bytes(200)
+
+
+@pytest.mark.parametrize("make", [png, jpeg, tiff, webp, bmp, old_bmp, hdr, pfm, pgm])
+def test_a_picture_beyond_all_measure_is_refused_before_it_is_decoded(monkeypatch, make):
+    monkeypatch.setattr(cv2, "imdecodeWithMetadata", None)
+    most = "frames of more than 134,217,728 pixels (16384x8192) are not read"
+    with pytest.raises(DataError, match=rf"^a\.x: 16384x8193 pixels; {re.escape(most)}"):
+        decode_image(make(16384, 8193), "a.x")
+
+
+def test_a_stack_of_too_large_frames_is_refused_before_it_is_read(tmp_path):
+    header = b"{'descr': '|u1', 'fortran_order': False, 'shape': (2, 8193, 16384), }"
+    with (tmp_path / "a.npy").open("wb") as file:
+        file.write(b"\x93NUMPY\1\0" + struct.pack("<H", 118) + header.ljust(117) + b"\n")
+        file.truncate(128 + 2 * 8193 * 16384)  # which takes no room
+    with pytest.raises(DataError, match=r"a\.npy: 16384x8193 pixels; frames of more than"):
+        open_source(tmp_path / "a.npy", fps=10)
+
+
+@pytest.mark.parametrize("kind", ["png", "jpg", "tif"])
+def test_pictures_of_another_kind_of_source_are_bounded(tmp_path, monkeypatch, kind):
+    monkeypatch.setattr(frame, "LARGEST", 50 * 30 - 1)
+    for number in range(2):
+        (tmp_path / f"{number}.{kind}").write_bytes(KINDS[kind])
+    with pytest.raises(DataError, match=rf"0\.{kind}: 50x30 pixels; frames of more than 1,499"):
+        open_source(tmp_path, fps=10)
 
 
 @pytest.mark.parametrize("kind", KINDS)
