@@ -74,11 +74,16 @@ class Converter:
             raise ValueError(f"pixels of {kind.name} cannot be read")
         if bits > 8:
             return _deep(frame, bits, matrix, rgb=rgb)
-        name = "rgba" if alpha else "rgb24"
-        if len(parts) == 1 and not kind.has_palette:
-            name = "gray"
-        whole = self._scaler.reformat(frame, format=name, interpolation="BICUBIC", threads=1)
-        return np.asarray(whole.to_ndarray())
+        # FFmpeg's conversion to RGB has other roundings for some kinds of pixels
+        name, order = "bgr24", cv2.COLOR_BGR2RGB
+        if alpha:
+            name, order = "bgra", cv2.COLOR_BGRA2RGBA
+        grey = len(parts) == 1 and not kind.has_palette
+        whole = self._scaler.reformat(
+            frame, format="gray" if grey else name, interpolation="BICUBIC", threads=1
+        )
+        image: Any = whole.to_ndarray()
+        return np.asarray(image if grey else cv2.cvtColor(image, order))
 
 
 def oddly_shown(frame: Any) -> str:
