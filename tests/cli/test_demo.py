@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import re
-import sys
 
 import cv2
 import numpy as np
@@ -10,8 +9,6 @@ import pytest
 from adv2e import load_config, simulate
 from adv2e.conversion import demo as module
 from adv2e.formats.reading import read_events
-from adv2e.synthetic import Scene
-from adv2e.synthetic.clips import write_video
 
 
 @pytest.fixture
@@ -73,13 +70,6 @@ def test_makes_clip_events_picture_and_film_and_says_what(adv2e, small, tmp_path
     assert adv2e("demo", "-o", folder, "-q", "--threads", 1, "--overwrite").out == ""
     assert np.array_equal(read_events(folder / "clip.events.h5").events, events)
     assert sorted(path.name for path in folder.iterdir()) == sorted([*FILES, "mine.txt"])
-
-
-def test_the_clip_is_read_without_any_extra(adv2e, tmp_path, monkeypatch):
-    write_video(Scene(), tmp_path / "clip.avi", width=64, height=48, duration_s=0.2)
-    monkeypatch.setitem(sys.modules, "av", None)
-    outcome = adv2e("convert", tmp_path / "clip.avi", "-o", tmp_path / "clip.txt", "--threads", 1)
-    assert outcome.status == 0, outcome.err
 
 
 def test_a_file_in_place_of_the_folder(adv2e, tmp_path):

@@ -62,6 +62,8 @@ class Listing:
         pictures are times of decoding, or missing.
     rate : FrameRate or None
         The constant rate at which all of them are, where there is one.
+    usual_ns : int
+        The usual step from picture to picture [ns].
     tick_ns : int
         Step of the times in the file [ns].
     tiny : int
@@ -79,20 +81,13 @@ class Listing:
     origin: int = 0
     by_number: bool = False
     rate: FrameRate | None = None
+    usual_ns: int = NS_PER_S
     tick_ns: int = 0
     tiny: int = 0
     first: Any = None
     back: tuple[int, int, int] | None = None
     faults: list[str] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
-
-    @property
-    def usual_ns(self) -> int:
-        """The usual step from picture to picture [ns]."""
-        if self.rate is not None:
-            return self.rate.time_ns(1)
-        steps = [after - before for before, after in pairwise(self.shown_ns)]
-        return round(median(steps)) if steps else NS_PER_S
 
 
 def list_pictures(video: Video) -> Listing:
@@ -178,6 +173,11 @@ def _arrange(found: Listing, stamps: list[int | None], video: Video) -> None:
         found.rate = constant_rate(found.shown_ns, stated_hz=hz, tolerance_ns=found.tick_ns)
     if video.format == "yuv4mpegpipe" and not _states_rate(video.path):
         found.shown_ns, found.rate = [], None
+    steps = [after - before for before, after in pairwise(found.shown_ns)]
+    if found.rate is not None:
+        found.usual_ns = found.rate.time_ns(1)
+    elif steps:
+        found.usual_ns = round(median(steps))
     latest = known[0][1] if known else 0
     for number, t_ns in known:
         if latest - t_ns > _REORDERED * found.usual_ns or t_ns - latest > _HALF_WRAP_NS:

@@ -77,8 +77,17 @@ class Converter:
         name = "rgba" if alpha else "rgb24"
         if len(parts) == 1 and not kind.has_palette:
             name = "gray"
+        elif kind.name == "yuv411p":  # its conversion to RGB has other roundings than OpenCV's
+            name = "bgr24"
         whole = self._scaler.reformat(frame, format=name, interpolation="BICUBIC", threads=1)
-        return np.asarray(whole.to_ndarray())
+        if name == "gray":
+            return np.asarray(whole.to_ndarray())
+        plane = whole.planes[0]
+        shape = whole.height, whole.width, 4 if alpha else 3
+        strides = plane.line_size, shape[2], 1
+        # the memory is the picture's own, and goes with it
+        image: Any = np.ndarray(shape, np.uint8, buffer=memoryview(plane), strides=strides)
+        return np.ascontiguousarray(image[..., ::-1] if name == "bgr24" else image)
 
 
 def oddly_shown(frame: Any) -> str:

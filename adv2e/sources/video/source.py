@@ -66,6 +66,7 @@ class VideoSource(Source):
     def _examine(self, video: Video) -> None:
         """Tell what is odd of the file; take geometry and light from the first frame."""
         listing, first = self._listing, self._listing.first
+        listing.first = None  # it holds memory of the decoder
         if listing.faults and not self.selection.allow_damaged:
             raise DataError(f"{self.path}: {listing.faults[0]}; --allow-damaged takes what is left")
         if first is None:
@@ -178,7 +179,7 @@ class VideoSource(Source):
                 count += 1
                 label = f"{self.path}: frame {number}"
                 if frame.is_corrupt and (frame.key_frame or number > guessed):
-                    self._check_damage(f"{label}: it is damaged, and the decoder guessed of it")
+                    self._check_damage(f"{label}: it is damaged: the decoder guessed a part of it")
                 guessed += frame.is_corrupt
                 if self._listed is not None and number >= self._listed:
                     continue  # only counted
