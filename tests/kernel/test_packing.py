@@ -194,3 +194,13 @@ def test_a_call_may_be_as_long_as_the_packing_allows():
     assert on.size == 4
     assert np.allclose((on["t"] - 7) / end_us, share, rtol=1e-5)
     assert np.all(np.diff(events["t"]) >= 0)
+
+
+def test_a_pixel_that_fires_both_ways_within_a_microsecond_does_so_as_it_happened():
+    made = [(5, 34, 1), (5, 34, 0), (5, 34, 1), (5, 3, 0), (6, 34, 1), (6, 34, 0), (6, 2, 1)]
+    keys = np.array([t << (PIXEL_BITS + 1) | i << 1 | p for t, i, p in made], np.int64)
+    part = sorting.Parted(keys, np.zeros(0), keys.size, 1.0)
+    events = np.concatenate(list(sorting.in_order([part], 10, 0, None)))
+    assert [(e["t"], 10 * e["y"] + e["x"], e["p"]) for e in events] == [
+        made[k] for k in (3, 0, 1, 2, 6, 4, 5)
+    ]
