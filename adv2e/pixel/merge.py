@@ -40,6 +40,11 @@ class Parted:
         return self.keys[self.ends[first] : self.ends[last]]
 
 
+def polarity_bits(causes: bool) -> int:
+    """Return how many bits of a packed event, the last ones, say what it is: ON, and the cause."""
+    return 1 + CAUSE_BITS if causes else 1
+
+
 def in_order(
     parted: Sequence[Parted],
     columns: int,
@@ -80,7 +85,7 @@ def _sorted_slices(
         if s == last or ends[s + 1] - ends[borders[-1]] > _SORTED:
             borders.append(s)
 
-    what = 1 + CAUSE_BITS if causes else 1  # bits of polarity and cause, the last ones
+    what = polarity_bits(causes)
 
     def sort(lo: int, hi: int) -> None:
         made = np.concatenate([tile.of(lo, hi) for tile in parted])

@@ -276,7 +276,7 @@ def made_up(monkeypatch, tmp_path):
     """Stand in for reading and diagnosing; returns the calls, and what there was to tell."""
     calls = []
 
-    def read(path, time_unit, sensor, rotate180):
+    def read(path, sensor, *, time_unit, rotate180, set_back, crop_events):
         assert sensor is None or (sensor.width, sensor.height) == (346, 260)
         return (path, "turned") if rotate180 else path
 
