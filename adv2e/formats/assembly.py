@@ -133,6 +133,8 @@ class Survey:
         wrong = ""
         if self._odd > max(1, self.count // _STRAY):
             wrong = f"{self._odd} of {self.count} polarities are other than -1, 0 and 1"
+        elif self._signs == {-1, 0}:
+            wrong = "polarities are -1 (or 255) and 0 alone, so that nothing is ON"
         elif (
             self.count >= FEW
             and self.steps_back > self.count // 4
