@@ -133,6 +133,8 @@ class Survey:
         wrong = ""
         if self._odd > max(1, self.count // _STRAY):
             wrong = f"{self._odd} of {self.count} polarities are other than -1, 0 and 1"
+        elif self._signs == {-1, 0}:
+            wrong = "polarities are -1 (or 255) and 0 alone, so that nothing is ON"
         elif (
             self.count >= FEW
             and self.steps_back > self.count // 4
@@ -155,7 +157,7 @@ class Survey:
             hint, (width, height) = "", self._needed
             stated = self._facts.geometry
             if stated and width <= stated[1] and height <= stated[0]:
-                hint = f" (a sensor of {stated[1]}x{stated[0]} holds them: --size)"
+                hint = f" (a sensor of {stated[1]}x{stated[0]} holds them)"
             elif stated:
                 hint = f" (they need {width}x{height})"
             raise DataError(
@@ -262,6 +264,8 @@ def events_of_file(file: EventFile, survey: Survey | None = None) -> Iterator[Ev
     if causes is not None and done != causes.size:
         raise DataError(f"{path}: {causes.size} causes for {done} events")
     clock.tell()
+    if clock.resets and file.shots is not None:
+        file.facts.tell("frames beside the events go by times of their own: they may lie apart")
 
 
 def assemble(file: EventFile) -> Recording:

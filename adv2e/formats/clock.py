@@ -2,7 +2,8 @@
 
 A clock of few bits begins again.  It is counted on where times fall from the end of its range to
 the beginning: 2^32, with a sign or without, 2^31 and 2^24, in ticks of the file; of floats, in
-microseconds.  The first and last 64th of the range count as such, 67 s of 2^32 us.
+microseconds.  The first and last 64th of the range count as such, 67 s of 2^32 us; a 16th where
+the file has numbers of so few bits.
 
 Other times that go back by more than `MOST_BACK_US` are no packets out of order: the clock was set
 back, or the events are in another order.  That is an error, unless the user, or the file at that
@@ -11,6 +12,7 @@ place, says what to do.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +24,7 @@ from adv2e.ticks import US, check_numbers, in_ticks
 
 if TYPE_CHECKING:
     from adv2e.formats.event_file import Facts
+    from adv2e.sources.frame import Shot
 
 MOST_BACK_US = 100_000
 """Packets out of order, and those of several cameras, are nearer to each other than this [us]."""
@@ -32,8 +35,8 @@ SET_BACK = (CONTINUE, SORT)
 
 _WRAPS = ((1 << 32, 0), (1 << 32, -1 << 31), (1 << 31, 0), (1 << 24, 0))
 """Range and lowest number of clocks."""
-_SHARE = 64
-"""Of the range, this part lies at its ends."""
+_SHARE, _NARROW_SHARE = 64, 16
+"""Of the range, this part lies at its ends; of numbers of 32 bits."""
 
 Times = NDArray[Any]
 
@@ -51,6 +54,7 @@ class _Wraps:
         self.modulus: float = 1 << bits if bits else 0
         self._low: float = 0
         self._slack: float = self.modulus
+        self.share = _SHARE
         self.turns = 0
 
     def __call__(self, before: Times, after: Times) -> Times | None:
@@ -60,7 +64,7 @@ class _Wraps:
         if not self.modulus:
             return None
         down = self._across(before, after, self._slack)
-        up = self._across(after, before, self.modulus / _SHARE)
+        up = self._across(after, before, self.modulus / self.share)
         if not self.turns:  # no wrap yet from which late packets could come back
             up[: int(np.argmax(down)) if down.any() else up.size] = False
         turns: Times = self.turns + np.cumsum(down.astype(np.int64) - up)
@@ -85,7 +89,7 @@ class _Wraps:
         if before.dtype.kind == "f":
             scales += [UNITS["us"] / ns for ns in UNITS.values()]
         for modulus, low in ((m * scale, low * scale) for scale in scales for m, low in _WRAPS):
-            end = modulus / _SHARE
+            end = modulus / self.share
             falls = (before - after > modulus - 2 * end) & (after >= low) & (after < low + end)
             falls &= (before < low + modulus) & (before >= low + modulus - end)
             at = int(np.argmax(falls)) if falls.any() else first
@@ -101,11 +105,17 @@ def unwrapped(times: Times) -> Times:
         return times
     wide: Times = times.astype(np.float64 if times.dtype.kind == "f" else np.int64)
     wraps = _Wraps()
+    wraps.share = _share(times)
     turns = wraps(wide[:-1], wide[1:])
     if turns is None:
         return times
     wide[1:] += turns * wraps.modulus
     return wide
+
+
+def _share(times: Times) -> int:
+    is_narrow = times.dtype.kind in "iu" and times.dtype.itemsize <= 4
+    return _NARROW_SHARE if is_narrow else _SHARE
 
 
 class Clock:
@@ -142,7 +152,9 @@ class Clock:
         self._last: Any = None  # as the file has it
         self._before: Any = None  # the same, counted on
         self._most: Any = None
-        self._count = self._resets = 0
+        self._count = 0
+        self.resets = 0
+        """How often the clock was set back."""
         self._coarse_us = 0.0
         self._wrapped = self._reset = self._step = ""
         self.announced = False
@@ -154,12 +166,16 @@ class Clock:
         return 0 if self._last is None else self._before - self._last
 
     def ticks(self, times: Times, label: str) -> NDArray[np.int64]:
-        """Return the next times in whole microseconds.
+        """Return the next times in whole microseconds; errors as of :meth:`counted`."""
+        return in_ticks(self.counted(times, label), self._unit_ns, US)
+
+    def counted(self, times: Times, label: str) -> Times:
+        """Return the next times, counted on, in the unit of the file.
 
         Raises
         ------
         DataError
-            As :func:`to_ticks`; or they go back, and nothing says what to do.
+            As :func:`adv2e.ticks.to_ticks`; or they go back, and nothing says what to do.
         """
         check_numbers(times, self._unit_ns, label)
         if not times.size:
@@ -168,20 +184,21 @@ class Clock:
         raw = times.astype(np.float64 if is_float else np.int64)
         if self._last is None:
             self._last = self._before = self._most = raw[0]
+            self._wraps.share = _share(times)
         rising = bool(raw[0] >= self._last and np.all(raw[1:] >= raw[:-1]))
         if rising and not raw[-1] - self._last > self._wraps.modulus / 2 > 0:
             counted = raw + self.offset if self.offset else raw
             self._most = max(self._most, counted[-1])
         else:
-            counted = self._counted(raw)
+            counted = self._over_falls(raw)
         self._count += raw.size
         self._last, self._before, self.announced = raw[-1], counted[-1], False
         if is_float and times.dtype.itemsize < 8:
             step = np.spacing(np.abs(times).max())
             self._coarse_us = max(self._coarse_us, float(step) * self._unit_ns / US)
-        return in_ticks(counted, self._unit_ns, US)
+        return counted
 
-    def _counted(self, raw: Times) -> Times:
+    def _over_falls(self, raw: Times) -> Times:
         former = np.concatenate([[self._last], raw[:-1]])
         as_it_is = self._how == SORT and not self._bits
         turns = None if as_it_is else self._wraps(former, raw)
@@ -200,7 +217,7 @@ class Clock:
         resets[0] |= self.announced and step[0] < 0
         if resets.any():
             at = int(np.argmax(resets))
-            self._resets += int(np.count_nonzero(resets))
+            self.resets += int(np.count_nonzero(resets))
             self._reset = self._reset or f"{self._items} {self._count + at}"
             self._step = self._step or self._seconds(-step[at])
             # of a clock that begins anew at zero, the time since then is known
@@ -239,13 +256,27 @@ class Clock:
             )
         if self._reset:
             self._facts.tell(
-                f"the clock was set back{_times(self._resets)} by {self._step} s at {self._reset}:"
+                f"the clock was set back{_times(self.resets)} by {self._step} s at {self._reset}:"
                 " times go on from those before"
             )
         if self._coarse_us > 1:
             self._facts.tell(
                 f"times are of single precision: they have steps of up to {self._coarse_us:.3g} us"
             )
+
+
+def shots_in_order(shots: list[Shot], facts: Facts, disorder: str) -> list[Shot]:
+    """Return frames in the order of time, which goes on where the clock was set back.
+
+    `disorder` is told of frames that lie nearer to each other, and are sorted.
+    """
+    clock = Clock(facts, 1, set_back=CONTINUE, items="frame")
+    times = clock.counted(np.array([shot.t_ns for shot in shots], np.int64), str(facts.path))
+    clock.tell()
+    if np.any(times[1:] < times[:-1]):
+        facts.tell(disorder)
+    found = [replace(shot, t_ns=t) for shot, t in zip(shots, times.tolist(), strict=True)]
+    return sorted(found, key=lambda shot: shot.t_ns)
 
 
 def _times(count: int) -> str:

@@ -52,7 +52,7 @@ def open_dsec(path: Path, facts: Facts) -> EventFile:
         their unit may be another and is told from them.
     """
     with hdf5.opened(path) as file:
-        hdf5.describe(file, facts)
+        hdf5.describe(file, facts, "events")
         offset = hdf5.number(file, "t_offset") if hdf5.find(file, "t_offset") is not None else 0
         columns = hdf5.columns(file, COLUMNS)
         unit_ns = US

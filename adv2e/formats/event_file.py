@@ -159,7 +159,7 @@ class Facts:
     def state_by_names(self, values: Mapping[str, Any], by: str) -> None:
         """Take the size of the sensor from whatever among named values states one."""
         name, geometry = named_geometry(values)
-        self.state(geometry, f"{by}: {name}" if name else by)
+        self.state(geometry, by if name in ("", "width, height") else f"{by}: {name}")
 
     @property
     def light(self) -> Light:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.files.expansion import check_expansion
-from adv2e.formats.column_names import SIZE_NAMES, unit_of_attribute
+from adv2e.formats.column_names import SIZE_NAMES, named_geometry, unit_of_attribute
 from adv2e.formats.event_file import Columns, Facts
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.tracks import Track, counted
@@ -187,7 +187,8 @@ def describe(file: h5py.File, facts: Facts, *groups: str) -> None:
                 held = dataset(file, f"{name}/{key}")
                 if held.size <= _SIDES:
                     values[key] = held[()]
-        facts.state_by_names(values, name)
+        key, geometry = named_geometry(values)
+        facts.state(geometry, f"{name}/{key}".lstrip("/"))
 
 
 def unit_of(column: h5py.Dataset) -> str | None:

@@ -47,6 +47,11 @@ _PART = 1 << 20  # events read at once
 _LEVEL = 1  # of deflate
 _BLOCK = 1 << 20  # bytes deflated at once
 
+_FINE = ("timestamp", "x", "y", "polarity")
+"""Names in BS-ERGB, of which x and y are in 1/32 of a pixel, in 16 bits whose sign was lost."""
+_MOST_PIXELS, _MOST_SHARE = 4096, 0.1
+"""A tenth of the events is not beyond so many columns or rows."""
+
 _CAUSES = "causes"
 
 _WRITTEN = {"t_us": "t", "x": "x", "y": "y", "p": "p"}
@@ -73,8 +78,13 @@ def open_npz(path: Path, facts: Facts) -> EventFile:
             facts.describe(str(held["adv2e"]), f"{path}: adv2e", "the file")
         facts.state_by_names(held, "the file")
         table, names, count = _table(path, headers)
-    first = next(_parts_of(path, table, names, count), None)
-    return _file("npz", facts, names, count, lambda: _parts_of(path, table, names, count), first)
+    rows = partial(_parts_of, path, table, names, count)
+    first = next(rows(), None)
+    if first is not None and _is_fine(headers, names, first[1:3]):
+        facts.tell("coordinates are in 1/32 of a pixel, as in BS-ERGB: rounded to pixels")
+        facts.time_unit = facts.time_unit or "us"
+        return _file("npz", facts, names, count, lambda: map(_rounded, rows()), _rounded(first))
+    return _file("npz", facts, names, count, rows, first)
 
 
 def open_npy(path: Path, facts: Facts) -> EventFile:
@@ -198,6 +208,25 @@ def _rows(
         }
         t, *others = (held[name] if table is None else held[table][name] for name in names)
         yield t, *(_whole(label, *pair) for pair in zip(names[1:], others, strict=True))
+
+
+def _is_fine(
+    headers: Mapping[str, Header], names: tuple[str, ...], where: tuple[NDArray[Any], ...]
+) -> bool:
+    """Tell whether coordinates are in 1/32 of a pixel: 16 bits, and most beyond any sensor."""
+    if names != _FINE or any(headers[name].dtype.itemsize != 2 for name in names[1:3]):
+        return False
+    return any(np.mean(_signed(column) > _MOST_PIXELS) > _MOST_SHARE for column in where)
+
+
+def _signed(column: NDArray[Any]) -> NDArray[Any]:
+    """Return numbers that were stored without their sign, in 16 bits."""
+    return column.astype(np.uint16).view(np.int16)
+
+
+def _rounded(part: tuple[NDArray[Any], ...]) -> tuple[NDArray[Any], ...]:
+    t, x, y, p = part
+    return t, *(np.rint(_signed(column) / 32).astype(np.int64) for column in (x, y)), p
 
 
 def _take(file: IO[bytes], dtype: np.dtype[Any], count: int, label: str) -> NDArray[Any]:

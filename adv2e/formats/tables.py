@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.formats import hdf5
+from adv2e.formats.clock import unwrapped
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.sources.frame import Pixels, Shot
 from adv2e.ticks import NS, US, to_ticks
@@ -65,7 +66,7 @@ def open_table(
         Datasets of other shapes or kinds, or as many frames as there are not times.
     """
     with hdf5.opened(path) as file:
-        hdf5.describe(file, facts)
+        hdf5.describe(file, facts, table.events, table.events.rpartition("/")[0])
         _events(file, table)
         stack = _stack(file, table)
         shots: list[Shot] = []
@@ -153,7 +154,7 @@ def _times(
     stamps = hdf5.read_all(hdf5.dataset(file, table.stamps), label).reshape(-1)
     if stamps.size != count:
         raise DataError(f"{label} holds {stamps.size} times for {count} frames")
-    times = to_ticks(stamps, unit_ns, NS, label)
+    times = to_ticks(unwrapped(stamps), unit_ns, NS, label)
     if stamps.dtype.kind == "f" and stamps.dtype.itemsize < 8:
         step_us = float(np.spacing(stamps.max())) * unit_ns / US
         if step_us > 1:

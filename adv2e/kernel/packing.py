@@ -1,7 +1,8 @@
 """Packed events into order: parted by time tile by tile, then sorted and unpacked slice by slice.
 
 A packed event is one whole number: time since a base [us], pixel, polarity, from the highest bit
-down.  Sorting the numbers sorts the events by (t, y, x, p).
+down.  Sorting the numbers sorts the events by (t, y, x); those of one pixel and time are then put
+as they happened (:mod:`adv2e.pixel.merge`).
 """
 
 from __future__ import annotations

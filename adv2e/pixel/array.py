@@ -30,7 +30,7 @@ from adv2e.kernel.stepped import driver
 from adv2e.kernel.work_queue import STRIP, nothing_claimed
 from adv2e.light.intervals import Part
 from adv2e.pixel.circuit import driver_of, make_circuit
-from adv2e.pixel.merge import Parted, in_order
+from adv2e.pixel.merge import Parted, in_order, polarity_bits
 from adv2e.pixel.state import initial_state
 from adv2e.pixel.steps import PRECISE, Coarseness, Stepping
 
@@ -245,4 +245,5 @@ class PixelArray:
     def _keep_times(self, parted: list[Parted]) -> None:
         times = np.concatenate([tile.times for tile in parted])
         keys = np.concatenate([tile.raw for tile in parted])
-        self.last_times = times[np.argsort(keys, kind="stable")]
+        places = keys >> polarity_bits(self.circuit.causes)
+        self.last_times = times[np.argsort(places, kind="stable")]

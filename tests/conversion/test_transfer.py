@@ -125,7 +125,7 @@ def test_a_part_of_the_sensor(adv2e, tmp_path):
 
 def test_a_size_that_is_given_holds(adv2e, tmp_path):
     (tmp_path / "a.txt").write_text("0.1 3 2 1\n0.2 7 5 0\n0.3 31 0 1\n")
-    told = adv2e("convert", "a.txt", "-o", "b.h5", "--size", "30x20")
+    told = adv2e("convert", "a.txt", "-o", "b.h5", "--size", "30x20", "--crop-events")
     assert "1 events outside 30x20, which --size states: left out" in told.err
     found = adv2e_read(tmp_path / "b.h5")
     assert (found.width, found.height, found.events.size) == (30, 20, 2)
@@ -148,18 +148,23 @@ def test_a_text_without_a_size_takes_that_of_its_coordinates_and_says_so(adv2e, 
 def test_events_out_of_order_are_sorted_and_it_is_told(adv2e, tmp_path):
     (tmp_path / "a.txt").write_text("30 20\n0.2 3 2 1\n0.1 7 5 0\n")
     told = adv2e("convert", "a.txt", "-o", "b.h5")
-    assert "events are not in the order of time (1 steps back): sorted" in told.err
+    assert (
+        "events are not in the order of time (1 steps back, the largest 100 ms): sorted" in told.err
+    )
     assert adv2e_read(tmp_path / "b.h5").events["t"].tolist() == [100_000, 200_000]
 
 
 def test_events_outside_the_sensor_are_left_out_and_it_is_told(adv2e, tmp_path):
     (tmp_path / "a.txt").write_text("30 20\n0.1 3 2 1\n0.2 40 5 0\n0.3 3 2 1\n")
     told = adv2e("convert", "a.txt", "-o", "b.h5")
+    assert (told.status, "--crop-events leaves them out" in told.err) == (1, True)
+    assert not (tmp_path / "b.h5").exists()
+    told = adv2e("convert", "a.txt", "-o", "b.h5", "--crop-events")
     assert "1 events outside 30x20, which the first line states: left out" in told.err
     assert adv2e_read(tmp_path / "b.h5").events["t"].tolist() == [100_000, 300_000]
 
 
-def test_events_of_one_time_are_ordered_across_the_parts_of_reading(tmp_path, monkeypatch):
+def test_events_of_one_time_stay_in_order_across_the_parts_of_reading(tmp_path, monkeypatch):
     from adv2e.formats import hdf5
 
     monkeypatch.setattr(hdf5, "PART", 3)
@@ -171,7 +176,24 @@ def test_events_of_one_time_are_ordered_across_the_parts_of_reading(tmp_path, mo
         file.attrs["sensor_resolution"] = (1, 10)
     adv2e.convert("a.h5", "b.txt")
     rows = (tmp_path / "b.txt").read_text().split()
-    assert rows[1::4] == [str(x) for x in range(10)]
+    assert rows[1::4] == [str(x) for x in reversed(range(10))]
+
+
+@pytest.mark.parametrize("suffix", ["h5", "txt", "csv", "npz", "aedat", "dat", "es", "raw"])
+def test_a_pixel_that_alternates_within_a_time_still_does(suffix, adv2e, tmp_path):
+    (tmp_path / "a.csv").write_text("t_us,x,y,p\n5,7,8,1\n5,3,4,1\n5,3,4,0\n5,3,4,1\n6,3,4,0\n")
+    said = ("--size", "10x10", "--time-unit", "us")
+    assert adv2e("convert", "a.csv", "-o", f"b.{suffix}", *said).status == 0
+    assert adv2e("convert", f"b.{suffix}", "-o", "c.csv", "--size", "10x10").status == 0
+    rows = [tuple(map(int, line.split(","))) for line in Path("c.csv").read_text().split()[1:]]
+    expected = [(5, 7, 8, 1), (5, 3, 4, 1), (5, 3, 4, 0), (5, 3, 4, 1), (6, 3, 4, 0)]
+    assert rows == expected
+
+
+def test_options_of_events_are_refused_where_frames_are_simulated(adv2e, tmp_path):
+    write(tmp_path / "a.zip", events_of(), frames_of())
+    told = adv2e("convert", "a.zip", "-o", "b.h5", "--crop-events")
+    assert (told.status, "its frames are simulated" in told.err) == (1, True)
 
 
 def test_a_recording_with_frames_is_simulated_unless_its_events_are_asked_for(adv2e, tmp_path):
@@ -226,7 +248,7 @@ def test_a_recording_is_no_picture_to_move_before(adv2e, tmp_path):
 
 def test_events_out_of_order_that_all_lie_outside_leave_none(adv2e, tmp_path):
     (tmp_path / "a.txt").write_text("0.2 9 9 1\n0.1 8 8 0\n")
-    told = adv2e("convert", "a.txt", "-o", "b.h5", "--size", "4x3")
+    told = adv2e("convert", "a.txt", "-o", "b.h5", "--size", "4x3", "--crop-events")
     assert told.status == 0, told.err
     assert "2 events outside 4x3, which --size states: left out" in told.err
     assert adv2e_read(tmp_path / "b.h5").events.size == 0

@@ -367,3 +367,12 @@ def test_where_the_coupling_has_decayed_long_steps_make_the_same_events(monkeypa
     )
     assert not agreement.differing
     assert agreement.mean_dt_us < 0.1
+
+
+@pytest.mark.parametrize("cuts", [(), (1,), (2, 3)])
+def test_a_coarse_clock_leaves_the_events_of_a_pixel_in_their_order(cuts):
+    events = make_events([1, 20, 300, 400, 700], [5, 5, 5, 2, 5], [1, 1, 1, 1, 1], [1, 0, 1, 1, 0])
+    found = out_of(TimestampTickHooks(1000.0), events, cuts)
+    assert found["t"].tolist() == [1000] * 5
+    assert found["x"].tolist() == [2, 5, 5, 5, 5]
+    assert found["p"][1:].tolist() == [1, 0, 1, 0]

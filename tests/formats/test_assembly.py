@@ -105,6 +105,11 @@ def test_two_kinds_of_off_are_told():
     assert problems == ["polarities -1 and 0 both occur: both taken as OFF"]
 
 
+def test_two_polarities_of_which_none_is_on_are_refused():
+    with pytest.raises(DataError, match=r"polarities are -1 \(or 255\) and 0 alone"):
+        built([(1, 0, 0, 0), (2, 0, 0, -1)])
+
+
 def test_negative_times_are_told():
     _, _, problems = built([(-1_500_000, 0, 0, 1), (2, 0, 0, 1)])
 

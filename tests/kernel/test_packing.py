@@ -7,6 +7,7 @@ import pytest
 from harness import advance, quiet, start
 
 from adv2e.config.model import LowPass, Thresholds
+from adv2e.effects.pixel.shot_noise import ShotNoise
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE
 from adv2e.kernel import packing as order
@@ -194,3 +195,28 @@ def test_a_call_may_be_as_long_as_the_packing_allows():
     assert on.size == 4
     assert np.allclose((on["t"] - 7) / end_us, share, rtol=1e-5)
     assert np.all(np.diff(events["t"]) >= 0)
+
+
+def test_a_pixel_that_fires_both_ways_within_a_microsecond_does_so_as_it_happened():
+    made = [(5, 34, 1), (5, 34, 0), (5, 34, 1), (5, 3, 0), (6, 34, 1), (6, 34, 0), (6, 2, 1)]
+    keys = np.array([t << (PIXEL_BITS + 1) | i << 1 | p for t, i, p in made], np.int64)
+    part = sorting.Parted(keys, np.zeros(0), keys.size, 1.0)
+    events = np.concatenate(list(sorting.in_order([part], 10, 0, None)))
+    assert [(e["t"], 10 * e["y"] + e["x"], e["p"]) for e in events] == [
+        made[k] for k in (3, 0, 1, 2, 6, 4, 5)
+    ]
+
+
+def test_unrounded_times_of_a_pixel_never_fall():
+    """Much noise and no dead time: some pixels fire both ways within a microsecond."""
+    light = np.random.default_rng(0).integers(0, 256, (6, 20, 30)).astype(np.float32)
+    times_ns = [8_000_000 * k for k in range(6)]
+    pixel = quiet(refractory=None, shot_noise=ShotNoise(rate_hz=20_000.0))
+    array = start(light, times_ns, pixel, exact_times=True)
+    events, exact = advance(array, light, times_ns)
+    pixels = events["y"].astype(np.int64) * 30 + events["x"]
+    order = np.argsort(pixels, kind="stable")
+    same = pixels[order][1:] == pixels[order][:-1]
+    assert np.all(np.diff(exact[order])[same] >= 0)
+    tied = same & (np.diff(events["t"][order]) == 0)
+    assert np.any(events["p"][order][:-1][tied] > events["p"][order][1:][tied])

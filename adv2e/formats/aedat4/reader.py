@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import IO
 from xml.etree import ElementTree
@@ -21,6 +20,7 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.formats.aedat4.packets import EVENT, MAGIC, NONE, Table, unpacked
+from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
 from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.tracks import Track, counted
@@ -78,9 +78,7 @@ def open_aedat4(path: Path, facts: Facts) -> EventFile:
     facts.state(first.size, "the header")
     facts.stated_unit = "us"
     shots = [] if frames is None else list(_shots(path, head, frames.number, facts))
-    if any(a.t_ns > b.t_ns for a, b in pairwise(shots)):
-        facts.problems.append("frames are not in the order of time: sorted")
-        shots.sort(key=lambda shot: shot.t_ns)
+    shots = shots_in_order(shots, facts, "frames are not in the order of time: sorted")
 
     def parts() -> Iterator[Columns]:
         if events is None:

@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +38,7 @@ from adv2e.formats.bag.messages import (
     read_image,
     read_stamp,
 )
+from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.frame import Pixels, Shot
@@ -105,12 +105,9 @@ def _shots(bag: _Bag, facts: Facts) -> Iterator[Shot]:
         Shot(t_ns, label, partial(bag.pixels, number, label))
         for number, (t_ns, label) in enumerate(bag.stamps())
     ]
-    if bag.images is not None and any(a.t_ns > b.t_ns for a, b in pairwise(shots)):
-        text = f"{bag.images.name}: images are not in the order of their stamps: sorted"
-        if text not in facts.problems:
-            facts.problems.append(text)
-        shots.sort(key=lambda shot: shot.t_ns)
-    yield from shots
+    name = bag.images.name if bag.images is not None else ""
+    text = f"{name}: images are not in the order of their stamps: sorted"
+    yield from shots_in_order(shots, facts, text)
 
 
 @dataclass(frozen=True)

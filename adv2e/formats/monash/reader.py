@@ -36,7 +36,7 @@ def open_monash(path: Path, facts: Facts) -> EventFile:
         broken image, or something that is not in the file itself.
     """
     with hdf5.opened(path) as file:
-        hdf5.describe(file, facts)
+        hdf5.describe(file, facts, "events")
         images = hdf5.find(file, "images")
         if isinstance(images, h5py.Dataset):
             raise DataError(f"{path}: images is a dataset, must be a group of images")
