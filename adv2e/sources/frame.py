@@ -35,6 +35,10 @@ class Pixels:
         Number that means white, where the file says it and it is not that of the data type.
     offset : (float, float), optional
         Where on it the sensor looks, from the middle: to the right and down [its pixels].
+    encoding, says : str
+        What its file states of the numbers, if it does, and how; what else is to be told of that.
+    densities : (int, int)
+        Pixels a unit of length, across and down.
     """
 
     image: Image
@@ -42,6 +46,9 @@ class Pixels:
     composed: bool = False
     white: float | None = None
     offset: Offset | None = None
+    encoding: str = ""
+    says: str = ""
+    densities: tuple[int, int] = (1, 1)
 
 
 OVER_BLACK = "transparent pixels are composed over black, in linear light"
@@ -139,12 +146,17 @@ def as_pixels(loaded: Image | Pixels) -> Pixels:
     return loaded if isinstance(loaded, Pixels) else Pixels(loaded)
 
 
-def light_of_images(dtype: np.dtype[Any], *, colour: bool) -> Light:
-    """Return what the numbers of images stand for that do not say so."""
+def light_of_images(pixels: Pixels) -> Light:
+    """Return what the numbers of images stand for: what they state, else what is usual."""
+    if pixels.encoding:
+        return Light(pixels.encoding, pixels.says)
+    dtype, colour = pixels.image.dtype, pixels.image.ndim == 3
     depth = "floating-point" if dtype.kind == "f" else f"{8 * dtype.itemsize}-bit"
     reason = f"{depth} {'colour' if colour else 'grey'} images"
     if dtype == np.uint8 and not colour:
         reason += "; frames.encoding=srgb if they are ordinary pictures"
+    if pixels.says:
+        reason += f"; {pixels.says}"
     return Light(encoding_of_images(dtype, colour), reason)
 
 
