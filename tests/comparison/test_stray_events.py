@@ -138,7 +138,7 @@ def test_an_hour_without_events_is_drawn_if_it_is_asked_for(tmp_path, capsys):
     for options, status in (
         (["--max-pictures", "1000"], 1),
         (["--stop", "1", "--max-pictures", "30"], 0),
-        (["--speed", "900", "--max-pictures", "30", "--overwrite"], 0),
+        (["--speed", "900", "--max-pictures", "31", "--overwrite"], 0),
     ):
         with pytest.raises(SystemExit) as ended:
             main(["render", path, "-o", str(film), *options])
