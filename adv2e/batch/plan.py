@@ -161,7 +161,7 @@ def _why(
     if digest(output) != record["sha256"]:
         return "its file changed"
     for name, was in record.get("beside", {}).items():
-        path = output.with_name(name)
+        path = output.parent / name
         if not path.exists() or digest(path) != was:
             return "a file beside its own changed"
     return ""

@@ -34,7 +34,7 @@ from adv2e.sources import VIDEO_SUFFIXES, open_source
 from adv2e.sources.gopro import find_sequence
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES
 from adv2e.sources.images.order import natural_key
-from adv2e.sources.images.source import LISTS, found_list
+from adv2e.sources.images.source import LISTS, UNREAD, found_list
 from adv2e.sources.images.tiff_pages import Pages
 from adv2e.sources.times.rates import Rate
 
@@ -172,9 +172,11 @@ class _Walk:
             pages = [name for name in images if _suffix(name) in _PAGES]
             if pages and self._is_stack(here / pages[0]):
                 images = [name for name in images if name not in pages]
-            rest = [here / name for name in shown if name not in set(images)]
+            rest = (here / name for name in sorted(set(shown) - set(images)))
             beside = list(self._in_files([file for file in rest if file.is_file()]))
             yield from beside
+            if not beside and not images and any(_suffix(name) in UNREAD for name in shown):
+                self.passed.setdefault("pictures of a kind that is not read", []).append(here)
             if why := self._against(here, len(images), is_beside=bool(beside)):
                 self.passed.setdefault(why, []).append(here)
             elif images:
@@ -256,8 +258,9 @@ def _kind_of_folder(path: Path) -> str:
 
 def _names(root: Path, paths: list[Path]) -> list[str]:
     """Return a name for each, none of them twice, whatever the system holds for the same."""
-    base = root.parent if paths == [root] else root
-    whole = [PurePosixPath(path.relative_to(base).as_posix()) for path in paths]
+    named = root if root.name.strip(".") else root.resolve()  # "." has no name
+    alone = [PurePosixPath(named.name)] if paths == [root] else []
+    whole = alone or [PurePosixPath(path.relative_to(root).as_posix()) for path in paths]
     short = [
         name if path.is_dir() else name.with_suffix("")
         for name, path in zip(whole, paths, strict=True)

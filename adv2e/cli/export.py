@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from adv2e.geometry import Size
 
 _OPTIONS = {
-    "voxel": {"bins", "window_us", "count", "at", "normalise", "polarity", "span"},
+    "voxel": {"bins", "window_us", "count", "at", "normalise", "polarity", "span", "most_empty"},
     "ev-segnet": {"window_us", "split", "rows", "counts"},
     "e2vid": {"valid"},
 }
@@ -44,6 +44,15 @@ _OPTIONS = {
 )
 @click.option(
     "--count", type=options.WholeNumber(1), metavar="N", help="Cut into windows of N events."
+)
+@click.option(
+    "--max-empty",
+    "most_empty",
+    type=options.WholeNumber(1),
+    default=1000,
+    show_default=True,
+    metavar="N",
+    help="Most windows of TIME in a row without an event: one wrong time would make far too many.",
 )
 @click.option("--at", type=click.Choice(["images"]), help="Cut where the images are.")
 @click.option(
@@ -155,6 +164,7 @@ def command(
 
         settings = {name: given[name] for name in ("bins", "normalise", "polarity", "span")}
         cutting = exports.Cutting(window_us, count, at == "images")
+        how["most_empty"] = given["most_empty"]
         done = exports.export_voxels(paths, output, cutting, VoxelSettings(**settings), **how)
     elif to == "ev-segnet":
         from adv2e.export.ev_segnet import SegmentationSettings

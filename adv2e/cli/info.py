@@ -49,6 +49,8 @@ def command(
     """
     from adv2e.inspection.inspect import inspect
 
+    if size is not None and given["pixel_format"] is None:
+        raise click.UsageError("--size is that of raw video, of which --pixel-format says the rest")
     log(f"reading {file}", 1)
     with reading_told(file, progress) as told:
         report = inspect(file, **given, set_back=set_back, frame_size=size, progress=told)

@@ -96,6 +96,14 @@ if TYPE_CHECKING:
     metavar="N",
     help="Draw each pixel N times as wide and high.  [default: panels about 640 pixels wide]",
 )
+@click.option(
+    "--max-pictures",
+    type=options.WholeNumber(min=1),
+    default=36_000,
+    show_default=True,
+    metavar="N",
+    help="Most pictures of a film: one wrong time would make far too many.",
+)
 @options.time_unit_option
 @options.rotate_option()
 @options.track_option("EVENTS")

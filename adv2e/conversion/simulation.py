@@ -28,7 +28,7 @@ from adv2e.light.intervals import Intervals
 from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray, Share
 from adv2e.pixel.steps import PRECISE, Coarseness
-from adv2e.sources.frame import check_values, light_of_images
+from adv2e.sources.frame import Pixels, check_values, light_of_images
 from adv2e.sources.times.instants import NS_PER_S
 from adv2e.sources.times.rates import FrameRate, parse_rate
 from adv2e.ticks import check_time
@@ -179,11 +179,13 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
         raise DataError(
             f"frame 0: shape {image.shape}, must be (rows, columns) or (rows, columns, 3)"
         )
-    light = light_of_images(image.dtype, colour=colour, name="arrays")
+    light = light_of_images(Pixels(image), "arrays")
     decoder = decoder_for(config.frames, image.dtype, colour, auto=light.encoding)
     if config.frames.encoding == "auto" and light.is_guess:
         taken = light_text(light, decoder.full_scale, config.frames)
-        warnings.warn(f"frames are {taken}", stacklevel=4)  # of who loops over adv2e.simulate
+        warnings.warn(
+            f"frames are {taken}", Adv2eWarning, stacklevel=4
+        )  # of who loops over adv2e.simulate
     return decoder
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from adv2e import __version__
 from adv2e.export import e2vid, ev_segnet, voxels
 from adv2e.export.sequence import Sequence, open_sequences
-from adv2e.export.windows import Slice, before_images, between_images, by_count, by_time
+from adv2e.export.windows import MOST_EMPTY, Slice, before_images, between_images, by_count, by_time
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging, writing
 from adv2e.formats.assembly import events_in_order
@@ -65,9 +65,13 @@ def export_voxels(
     output: str | Path,
     cutting: Cutting,
     settings: voxels.VoxelSettings | None = None,
+    *,
+    most_empty: int = MOST_EMPTY,
     **how: Any,
 ) -> Exported:
     """Write the voxel grids of all windows; `how` as in :func:`_exported`.
+
+    `most_empty` windows of time in a row may have no event.
 
     Raises
     ------
@@ -77,7 +81,7 @@ def export_voxels(
     settings = settings or voxels.VoxelSettings()
 
     def one(sequence: Sequence, folder: Path) -> tuple[tuple[int, int], int]:
-        size, slices = _slices(sequence, cutting)
+        size, slices = _slices(sequence, cutting, most_empty)
         return size, voxels.write_voxels(slices, size, folder / sequence.name, settings)
 
     described = {"to": "voxel", "cutting": asdict(cutting), **asdict(settings)}
@@ -219,7 +223,9 @@ def _exported(
     return Exported(str(output), len(sequences), items, what, time.perf_counter() - began)
 
 
-def _slices(sequence: Sequence, cutting: Cutting) -> tuple[tuple[int, int], Iterator[Slice]]:
+def _slices(
+    sequence: Sequence, cutting: Cutting, most_empty: int
+) -> tuple[tuple[int, int], Iterator[Slice]]:
     """Return the size of the sensor and the windows of a recording."""
     size, first_us, parts = events_in_order(sequence.file)
     if cutting.at_images:
@@ -227,7 +233,8 @@ def _slices(sequence: Sequence, cutting: Cutting) -> tuple[tuple[int, int], Iter
     if cutting.count is not None:
         return size, by_count(parts, cutting.count)
     assert cutting.window_us is not None
-    return size, by_time(parts, first_us, cutting.window_us)
+    label = str(sequence.file.facts.path)
+    return size, by_time(parts, first_us, cutting.window_us, label, most_empty)
 
 
 def _foreign(folder: Path) -> str | None:

@@ -8,6 +8,7 @@ from itertools import count, pairwise
 
 import numpy as np
 
+from adv2e.errors import DataError
 from adv2e.events import Events, Window, cut, empty_events
 
 
@@ -28,13 +29,37 @@ class Slice:
     events: Events
 
 
-def by_time(parts: Iterable[Events], first_us: int, length_us: int) -> Iterator[Slice]:
+MOST_EMPTY = 1000
+"""Windows in a row without an event, unless more are asked for."""
+
+
+def by_time(
+    parts: Iterable[Events],
+    first_us: int,
+    length_us: int,
+    label: str = "events",
+    most_empty: int = MOST_EMPTY,
+) -> Iterator[Slice]:
     """Yield windows of one length, [start, start + length), from `first_us` on.
 
     What is left at the end and is shorter than a window is left out.
+
+    Raises
+    ------
+    DataError
+        More than `most_empty` in a row have no event, as a wrong time makes them.
     """
-    starts = count(first_us, length_us)
-    return _between(parts, ((start, start + length_us) for start in starts), to_the_end=False)
+    windows = ((start, start + length_us) for start in count(first_us, length_us))
+    empty = 0
+    for one in _between(parts, windows, to_the_end=False):
+        empty = 0 if one.events.size else empty + 1
+        if empty > most_empty:
+            raise DataError(
+                f"{label}: no event in over {most_empty:,} windows of {length_us / 1000:g} ms, to"
+                f" {one.stop_us * 1e-6:.3f} s: 'adv2e info' tells gaps that a wrong time makes; a"
+                " longer --window makes fewer, --max-empty N allows N"
+            )
+        yield one
 
 
 def by_count(parts: Iterable[Events], number: int) -> Iterator[Slice]:

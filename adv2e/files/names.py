@@ -25,6 +25,12 @@ def shown(name: str | Path) -> str:
     return _UNFIT.sub(_escape, str(name))
 
 
+def beside(path: Path, ending: str) -> Path:
+    """Return what lies beside a file or folder and has its name with an ending, also of ``.``."""
+    whole = path if path.name.strip(".") else path.resolve()
+    return whole.parent / f"{whole.name}{ending}"
+
+
 def _escape(found: re.Match[str]) -> str:
     code = ord(found[0])
     if 0xDC80 <= code <= 0xDCFF:  # a byte that Python could not decode

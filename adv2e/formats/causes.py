@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from adv2e.causes import CAUSES
 from adv2e.errors import DataError
+from adv2e.files.names import beside as beside_of
 
 _DIGITS, _END = ord("0"), ord("\n")
 
@@ -34,7 +35,7 @@ NAMES = ",".join(CAUSES)
 
 def beside(path: Path) -> Path:
     """Return where the causes of the events in `path` are."""
-    return path.with_name(f"{path.name}.causes.txt")
+    return beside_of(path, ".causes.txt")
 
 
 def lines_of(causes: NDArray[np.uint8]) -> bytes:

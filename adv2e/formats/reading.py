@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from adv2e.errors import DataError, UsageError
+from adv2e.files.names import beside
 from adv2e.files.regular import check_ends
 from adv2e.formats.assembly import assemble
 from adv2e.formats.causes import beside as beside_of_causes
@@ -73,9 +74,9 @@ def open_events(
         if not path.exists():
             raise DataError(f"{path}: no such file or folder")
         found = format_of(path)
-        beside = path.with_name(path.name + ".json")
-        if not found.holds_settings and beside.is_file():
-            facts.describe_from(beside)
+        description = beside(path, ".json")
+        if not found.holds_settings and description.is_file():
+            facts.describe_from(description)
         file: EventFile = found.load(found.reader)(path, facts)
         if not facts.has_chosen:
             facts.choose([Track("events")])

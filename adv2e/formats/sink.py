@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from adv2e.causes import without_causes
 from adv2e.errors import OutputError, UsageError
 from adv2e.events import Events
+from adv2e.files.names import beside
 from adv2e.files.staging import Staging, writing
 from adv2e.formats import causes
 from adv2e.formats.registry import Format
@@ -98,8 +99,10 @@ class Sink:
         temporary = writer.stage(request.path, staging)
         self._description: tuple[Path, str] | None = None
         if temporary and not format.holds_settings:
-            beside = request.path.with_name(request.path.name + ".json")
-            self._description = staging.file(beside), to_json(request.description)
+            self._description = (
+                staging.file(beside(request.path, ".json")),
+                to_json(request.description),
+            )
         self._holds_causes = request.causes and format.causes != ""
         self._causes = self._place_of_causes(request, staging, temporary)
         told = replace(request, causes=self._holds_causes)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import full_scale_of
+from adv2e.errors import DataError
 from adv2e.files.names import shown
 from adv2e.files.regular import check_ends
 from adv2e.files.zips import Members
@@ -85,6 +86,12 @@ def inspect(
             track=track,
         )
         return _of_source(source, progress or (lambda done, total: None))
+    of_frames = {
+        "--fps": fps, "--timestamps": timestamps, "--bayer": bayer,
+        "--pixel-format": pixel_format,
+    }  # fmt: skip
+    for option in (name for name, value in of_frames.items() if value is not None):
+        raise DataError(f"{path}: its events are described: leave {option} out")
     return _of_recording(
         read_events(
             path,

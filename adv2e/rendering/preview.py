@@ -11,7 +11,7 @@ from adv2e.files.staging import Staging
 from adv2e.rendering.films import Film, PictureOutput, Sheet, check_suffix
 from adv2e.rendering.output import replacing
 from adv2e.rendering.styles import Style
-from adv2e.rendering.timeline import Caption, Timeline, caption
+from adv2e.rendering.timeline import MOST_PICTURES, Caption, Timeline, caption
 
 SHEET_STEP_US = 1000
 """Instants between which a sheet chooses, at first; later they are further apart."""
@@ -34,6 +34,7 @@ def open_preview(
     frames: bool | None = None,
     caption: Caption = caption,
     staging: Staging | None = None,
+    max_pictures: int = MOST_PICTURES,
 ) -> Iterator[Timeline]:
     """Give the body what takes events and frames, and write them as a film or a sheet.
 
@@ -58,7 +59,7 @@ def open_preview(
         How often a pixel is repeated; by default, panels are made about 640 columns wide.
     overwrite : bool
         Replace a file that exists.
-    instants_us, start_us, frames, caption
+    instants_us, start_us, frames, caption, max_pictures
         See :class:`adv2e.rendering.timeline.Timeline`.
     staging : Staging, optional
         Takes the file together with others; it says whether a file that exists is replaced.
@@ -68,7 +69,7 @@ def open_preview(
     UsageError
         The suffix is none of .mp4, .webm, .avi, .gif, .png; or the film is too fast for a GIF.
     OutputError
-        The file exists or cannot be written; nothing came that could be drawn.
+        The file exists or cannot be written; nothing came that could be drawn, or too much.
     """
     path = Path(path)
     is_sheet = check_suffix(path) == ".png"
@@ -93,6 +94,7 @@ def open_preview(
                 frames=frames,
                 caption=caption,
                 folder=unfinished.parent,
+                max_pictures=max_pictures,
             )
             with closing(timeline):
                 yield timeline

@@ -15,13 +15,10 @@ from adv2e.files.distinct import check_distinct
 from adv2e.light.pictures import drawn_frame
 from adv2e.rendering.preview import open_preview
 from adv2e.rendering.styles import Style
-from adv2e.rendering.timeline import Caption, Timeline, caption, microseconds
+from adv2e.rendering.timeline import MOST_PICTURES, Caption, Timeline, caption, microseconds
 
 if TYPE_CHECKING:
     from adv2e.formats.reading import Recording
-
-MOST_PICTURES = 400_000
-"""Pictures of a film: 3.7 hours of the usual rate."""
 
 _CHUNK = 1 << 18  # events handed on at once where no frames divide them
 
@@ -42,6 +39,7 @@ def render_recording(
     caption: Caption = caption,
     overwrite: bool = False,
     progress: bool = False,
+    max_pictures: int = MOST_PICTURES,
 ) -> None:
     """Write a film (.mp4, .webm, .avi, .gif) or a contact sheet (.png) of `recording`.
 
@@ -59,11 +57,14 @@ def render_recording(
         See :func:`open_preview`.
     progress : bool
         Show a progress bar on stderr.
+    max_pictures : int
+        Most pictures of a film.
 
     Raises
     ------
     DataError
-        The recording holds no events and no frames, or none in the part to show.
+        The recording holds no events and no frames, or none in the part to show; or a film has too
+        many pictures.
     OutputError, UsageError
         See :func:`open_preview`.
     """
@@ -83,10 +84,11 @@ def render_recording(
         instants = [begin_us + round(time * 1e6) for time in sorted(at_s)]
         if instants and instants[-1] > until_us:
             raise DataError(f"{lasts}, the instant {max(at_s):g} s is after the end")
-    elif (until_us - first_us) * 1e-6 * fps / speed > MOST_PICTURES:
+    elif (pictures := (until_us - first_us) * 1e-6 * fps / speed) > max_pictures:
+        number = f"{pictures:,.0f}" if pictures < 1e12 else f"{pictures:.1e}"
         raise DataError(
-            f"{lasts}, of which a film has over {MOST_PICTURES:,} pictures; 'adv2e info' tells gaps"
-            " that a wrong time makes; else choose a part with --start and --stop, or --speed"
+            f"{lasts}, of which a film has {number} pictures: 'adv2e info' tells gaps that a wrong"
+            " time makes; --start, --stop and --speed make it shorter, --max-pictures N allows N"
         )
     with open_preview(
         path,
@@ -102,6 +104,7 @@ def render_recording(
         scale=scale,
         caption=lambda since_us, shown: caption(since_us + first_us - begin_us, shown),
         overwrite=overwrite,
+        max_pictures=max_pictures,
     ) as preview:
         _feed(preview, recording, first_us, until_us, frames, progress)
 

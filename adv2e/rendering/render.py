@@ -15,6 +15,7 @@ from adv2e.formats.reading import Recording, read_events
 from adv2e.rendering.films import check_suffix
 from adv2e.rendering.recording import render_recording
 from adv2e.rendering.styles import Style, parse_colour
+from adv2e.rendering.timeline import MOST_PICTURES
 
 _SHEET_WINDOW_MS = 20.0
 
@@ -38,6 +39,7 @@ def render(
     scale: int | None = None,
     overwrite: bool = False,
     progress: bool = False,
+    max_pictures: int = MOST_PICTURES,
 ) -> None:
     """Draw a film (.mp4, .webm, .avi, .gif) or a sheet of pictures (.png) of events.
 
@@ -74,6 +76,8 @@ def render(
         Replace a file that exists.
     progress : bool
         Show a progress bar on stderr.
+    max_pictures : int
+        Most pictures of a film: a wrong time would make far too many.
 
     Raises
     ------
@@ -120,6 +124,7 @@ def render(
         scale=scale,
         overwrite=overwrite,
         progress=progress,
+        max_pictures=max_pictures,
     )
 
 

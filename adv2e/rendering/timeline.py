@@ -20,10 +20,17 @@ from adv2e.files.backlog import Backlog
 from adv2e.light.pictures import eight_bit
 from adv2e.rendering.films import PictureOutput
 from adv2e.rendering.layout import Cell
+from adv2e.rendering.output import NotWritten
 from adv2e.rendering.styles import Picture, Style, draw
 
 Caption = Callable[[int, int], str]
 """Text of a picture from its time since the start [us] and the number of events it shows."""
+
+MOST_PICTURES = 36_000
+"""Pictures of a film, unless more are asked for: 20 minutes of the usual rate."""
+
+_A_FRAME = 20
+"""Pictures that a film may have for each frame in any case."""
 
 _LONG_AGO, _FAR_OFF = -(1 << 62), 1 << 62
 
@@ -60,6 +67,8 @@ class Timeline:
         What to write above a picture.
     folder : Path, optional
         Where to keep what has to wait on disk.
+    max_pictures : int
+        Most pictures to draw, unless there are enough frames for more.
     """
 
     def __init__(
@@ -74,12 +83,14 @@ class Timeline:
         frames: bool | None = None,
         caption: Caption = caption,
         folder: Path | None = None,
+        max_pictures: int = MOST_PICTURES,
     ) -> None:
         self._output, self._size, self._style = output, size, style
         self._step_us, self._given_us = step_us, instants_us
         self._start_us, self._with_frames, self._caption = start_us, frames, caption
         self._number = 0  # of the instant to draw next
-        self._drawn = 0
+        self._drawn = self._frames_came = 0
+        self._most = max_pictures
         self._first_us: dict[str, int] = {}  # times of the first event and the first frame
         self._last_event_us = self._last_frame_us = _LONG_AGO
         self._told_us = _LONG_AGO  # all events before this have come
@@ -94,6 +105,7 @@ class Timeline:
         Frames come sorted by time.
         """
         t_us = microseconds(t_ns)
+        self._frames_came += 1
         self._first_us.setdefault("frame", t_us)
         if self._with_frames is not False:
             self._with_frames = True
@@ -189,6 +201,11 @@ class Timeline:
         if self._with_frames:
             panels.insert(0, self._frame_at(t_us))
         text = self._caption(t_us - self._start_us, int(events.size))
+        if self._drawn >= max(self._most, _A_FRAME * self._frames_came):
+            raise NotWritten(
+                f"over {self._drawn:,} pictures of {self._frames_came:,} frames, as with a wrong"
+                " time: leave it out, and let 'adv2e render' draw a part"
+            )
         self._output.add(self._number, Cell(tuple(panels), text))
         self._drawn += 1
         self._number += 1

@@ -128,7 +128,16 @@ class Source(ABC):
             self.width, self.height = crop.width, crop.height
         self.dtype = image.dtype
         self.colour = image.ndim == 3
-        light = light or light_of_images(image.dtype, colour=self.colour)
+        across, down = first.densities
+        if across != down:
+            self.notes.append(
+                f"{label}: its pixels are not square, as it states {across} across and {down} down;"
+                " they are taken as square"
+            )
+        self._light_is_stated = light is None
+        light = light or light_of_images(first)
+        if first.encoding not in ("", light.encoding):
+            self.notes.append(f"{label}: states {first.encoding}, and is taken as {light.encoding}")
         self._white_told, self._white_stated = light.full_scale, first.white
         why = light.full_scale_reason
         if light.full_scale is None and first.white is not None:
@@ -230,6 +239,11 @@ class Source(ABC):
         check_values(pixels.image, label)
         if pixels.alpha is not None or pixels.composed:
             self._note(OVER_BLACK)
+        if self._light_is_stated and light_of_images(pixels).encoding != self.encoding:
+            self._note(
+                "not all frames state the same encoding as the first, such as"
+                f" {label}; all are taken as {self.encoding}"
+            )
         if self.largest_read == 0 or self.doubt_of_white(self.largest_read):
             self.largest_read = max(self.largest_read, float(image.max()))
         return pixels

@@ -48,6 +48,10 @@ class Pixels:
         Number that means white, where the file says it and it is not that of the data type.
     offset : (float, float), optional
         Where on it the sensor looks, from the middle: to the right and down [its pixels].
+    encoding, says : str
+        What its file states of the numbers, if it does, and how; what else is to be told of that.
+    densities : (int, int)
+        Pixels a unit of length, across and down.
     """
 
     image: Image
@@ -55,6 +59,9 @@ class Pixels:
     composed: bool = False
     white: float | None = None
     offset: Offset | None = None
+    encoding: str = ""
+    says: str = ""
+    densities: tuple[int, int] = (1, 1)
 
 
 OVER_BLACK = "transparent pixels are composed over black, in linear light"
@@ -155,17 +162,22 @@ def as_pixels(loaded: Image | Pixels) -> Pixels:
     return loaded if isinstance(loaded, Pixels) else Pixels(loaded)
 
 
-def light_of_images(dtype: np.dtype[Any], *, colour: bool, name: str = "images") -> Light:
-    """Return what the numbers of images, or of arrays (`name`), stand for that do not say so.
+def light_of_images(pixels: Pixels, name: str = "images") -> Light:
+    """Return what the numbers of images, or of arrays (`name`), stand for.
 
-    8-bit pictures are sRGB, nearly always in colour; grey ones may be a camera's own numbers, and
-    16-bit ones are written by cameras and by photo editors alike.
+    That is what they state, else what is usual.  8-bit pictures are sRGB, nearly always in colour;
+    grey ones may be a camera's own numbers, and 16-bit ones are written by cameras and by photo
+    editors alike.
     """
+    if pixels.encoding:
+        return Light(pixels.encoding, pixels.says)
+    dtype, colour = pixels.image.dtype, pixels.image.ndim == 3
     depth = "floating-point" if dtype.kind == "f" else f"{8 * dtype.itemsize}-bit"
-    colours = "colour" if colour else "grey"
+    reason = f"{depth} {'colour' if colour else 'grey'} {name}"
+    if pixels.says:
+        reason += f"; {pixels.says}"
     is_guess = dtype.kind != "f" and not (colour and dtype == np.uint8)
-    encoding = encoding_of_images(dtype)
-    return Light(encoding, f"{depth} {colours} {name}", is_guess=is_guess)
+    return Light(encoding_of_images(dtype), reason, is_guess=is_guess)
 
 
 def check_values(image: Image, label: str) -> None:

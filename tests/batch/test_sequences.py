@@ -1,6 +1,7 @@
 """Which files and folders are sequences, and what they are called."""
 
 import os
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -163,3 +164,17 @@ def test_where_nothing_counts_what_was_passed_over_is_told(tmp_path):
     trees.pictures(tmp_path / "walk")
     with pytest.raises(DataError, match=r"passed over: .*walk: pictures without times: give --fps"):
         names(tmp_path)
+
+
+def test_the_current_folder_has_its_name(tmp_path, monkeypatch):
+    trees.pictures(tmp_path / "walk")
+    monkeypatch.chdir(tmp_path / "walk")
+    for here in (Path(), Path("../walk")):
+        assert names(here, fps=10) == ["walk"]
+
+
+def test_pictures_of_kinds_that_are_not_read_are_told(tmp_path):
+    trees.clip(tmp_path / "a.avi")
+    (tmp_path / "phone").mkdir()
+    (tmp_path / "phone" / "1.heic").touch()
+    assert "pictures of a kind that is not read" in find_sequences(tmp_path).passed

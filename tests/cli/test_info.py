@@ -151,3 +151,16 @@ def test_other_commands_tell_the_reading_too(adv2e, event_file, command):
     outcome = adv2e(command, event_file, *more, "--progress")
     assert outcome.status == 0
     assert "sorting and counting: 100%" in outcome.err
+
+
+@pytest.mark.parametrize(
+    "options", [("--fps", "10"), ("--timestamps", "none.txt"), ("--bayer", "RGGB")]
+)
+def test_options_of_frames_are_not_ignored_for_events(adv2e, event_file, options):
+    outcome = adv2e("info", event_file, *options)
+    assert outcome.status == 1
+    assert outcome.err.rstrip().endswith(f"its events are described: leave {options[0]} out")
+
+
+def test_a_size_is_of_raw_video_alone(adv2e, images):
+    assert adv2e("info", images, "--fps", 10, "--size", "8x6").status == 2

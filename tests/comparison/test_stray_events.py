@@ -128,5 +128,34 @@ def test_a_film_of_a_stray_time_is_refused(tmp_path, capsys):
         main(["render", path, "-o", str(tmp_path / "o.mp4")])
     told = capsys.readouterr().err
     assert ended.value.code == 1
-    assert "over 400,000 pictures" in told
+    assert "has 29,999,997 pictures" in told
+    assert "--max-pictures" in told
     assert not (tmp_path / "o.mp4").exists()
+
+
+def test_an_hour_without_events_is_drawn_if_it_is_asked_for(tmp_path, capsys):
+    path, film = write(tmp_path / "a.txt", "0 1 1 1", "0.1 2 2 0", "900 1 1 1"), tmp_path / "o.gif"
+    for options, status in (
+        (["--max-pictures", "1000"], 1),
+        (["--stop", "1", "--max-pictures", "30"], 0),
+        (["--speed", "900", "--max-pictures", "31", "--overwrite"], 0),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(["render", path, "-o", str(film), *options])
+        assert (ended.value.code or 0, film.exists()) == (status, status == 0), options
+        assert ("27,000 pictures" in capsys.readouterr().err) is (status == 1)
+
+
+def test_windows_up_to_a_stray_time_are_refused(tmp_path, capsys):
+    path = write(tmp_path / "a.txt", "0 1 1 1", "0.1 2 2 0", "3600 1 1 1")
+    export = ["export", path, "-o", str(tmp_path / "grids"), "--to", "voxel", "--bins", "1"]
+    with pytest.raises(SystemExit) as ended:
+        main([*export, "--window", "33ms"])
+    told = capsys.readouterr().err
+    assert ended.value.code == 1
+    assert "a.txt: no event in over 1,000 windows of 33 ms" in told
+    assert not (tmp_path / "grids").exists()
+    for more in (["--window", "4s"], ["--window", "1s", "--max-empty", "3600"]):
+        with pytest.raises(SystemExit) as ended:
+            main([*export, *more, "--overwrite"])
+        assert not ended.value.code

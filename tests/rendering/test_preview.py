@@ -145,3 +145,15 @@ def test_wrong_suffix_and_rate_are_found_at_once(tmp_path):
     with pytest.raises(UsageError, match="at most 50"):
         open_preview(tmp_path / "v.gif", 4, 4, fps=60).__enter__()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_of_far_too_many_pictures_for_its_frames_ends(tmp_path):
+    film = tmp_path / "a.gif"
+    events = make_events([0, 2_000_000], [1, 1], [1, 1], [1, 1])
+    with (
+        pytest.raises(OutputError, match=r"a\.gif: over 10 pictures of 0 frames"),
+        open_preview(film, 8, 6, max_pictures=10, frames=False) as preview,
+    ):
+        preview.add_events(events)
+        preview.finish()
+    assert list(tmp_path.iterdir()) == []

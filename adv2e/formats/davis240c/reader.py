@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.errors import DataError
+from adv2e.files.names import beside
 from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.text.reader import lines_of
@@ -54,8 +55,8 @@ def open_davis240c(path: Path, facts: Facts) -> EventFile:
     if files.has(DESCRIPTION):
         text = files.read(DESCRIPTION).decode("utf-8-sig", "replace")
         facts.describe(text, files.label(DESCRIPTION), DESCRIPTION)
-    elif not path.is_dir() and (beside := path.with_name(path.name + ".json")).is_file():
-        facts.describe_from(beside)  # a zip for rpg_e2vid holds nothing but events
+    elif not path.is_dir() and (described := beside(path, ".json")).is_file():
+        facts.describe_from(described)  # a zip for rpg_e2vid holds nothing but events
     facts.inputs += map(files.label, (name, LIST, DESCRIPTION))
     listed = _listed(files, stated=facts.stated_unit)
     if listed is not None and len(listed.stamps) > 1:

@@ -7,7 +7,8 @@ size of the largest sensors it is let be.  Of any file, a picture beyond
 
 References
 ----------
-.. [1] W3C, "Portable Network Graphics (PNG) Specification, third edition".
+.. [1] W3C, "Portable Network Graphics (PNG) Specification, third edition", 4.3 (order of chunks
+   that state the colour space) and 11.3.2.
 .. [2] ITU-T T.81 (JPEG), B.2.2 (frame header).
 .. [3] Google, "WebP Container Specification" and "Specification for WebP Lossless Bitstream".
 .. [4] J. Poskanzer, B. Henderson, "Netpbm format specifications", netpbm.sourceforge.net.
@@ -18,8 +19,9 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from adv2e.effects.frames.encoding import UNKNOWN
 from adv2e.errors import DataError
 from adv2e.sources.frame import check_pixels
 from adv2e.sources.images.alpha import Alpha
@@ -30,6 +32,13 @@ MOST = 100
 """Pixels that one byte may stand for, of a larger one."""
 
 _GREY, _GREY_ALPHA = 0, 4
+_LIGHT = (b"cICP", b"iCCP", b"sRGB", b"gAMA")
+"""Chunks of PNG that say what its numbers stand for, the first that counts first."""
+_TRANSFERS = {
+    **dict.fromkeys((1, 6, 14, 15), "bt709"),
+    **{4: "gamma:2.2", 5: "gamma:2.8", 8: "linear", 13: "srgb", 16: "pq", 18: "hlg"},
+}
+"""Encodings by the transfer of ITU-T H.273 that a cICP chunk states."""
 _V3 = 56  # bytes of the first header of BMP that has a mask for alpha
 _OS2 = 12  # bytes of the first header of BMP of all
 _LONGEST = 1 << 16  # bytes of a header of text
@@ -58,6 +67,10 @@ class Header:
         Number that means white, where it is not that of the data type.
     clear : int, optional
         Grey value of pixels that are not there, in the bits that OpenCV returns.
+    encoding, says : str
+        See :class:`adv2e.sources.frame.Pixels`.
+    densities : (int, int)
+        Pixels a unit of length, across and down; they are square if these are the same.
     """
 
     width: int = 0
@@ -67,6 +80,9 @@ class Header:
     grey: bool = False
     white: float | None = None
     clear: int | None = None
+    encoding: str = ""
+    says: str = ""
+    densities: tuple[int, int] = (1, 1)
 
 
 def read_header(data: bytes) -> Header:
@@ -105,14 +121,41 @@ def check_size(width: int, height: int, data: bytes, label: str) -> None:
 
 def _png(data: bytes) -> Header:
     width, height, depth, colours = struct.unpack_from(">IIBB", data, 16)
-    pictures, clear = 1, None
+    pictures, clear, densities, light = 1, None, (1, 1), {}
     for kind, content in _png_chunks(data):
-        if kind == b"acTL":
+        if kind == b"pHYs":
+            densities = struct.unpack_from(">II", content)
+        elif kind in _LIGHT:
+            light[kind] = content
+        elif kind == b"acTL":
             (pictures,) = struct.unpack_from(">I", content)
         elif kind == b"tRNS" and colours == _GREY:
             (clear,) = struct.unpack_from(">H", content)
             clear *= 255 // ((1 << depth) - 1) if depth < 8 else 1
-    return Header(width, height, max(pictures, 1), grey=colours == _GREY_ALPHA, clear=clear)
+    header = Header(width, height, max(pictures, 1), grey=colours == _GREY_ALPHA, clear=clear)
+    encoding, says = _light_of_png(light)
+    return replace(header, encoding=encoding, says=says, densities=densities)
+
+
+def _light_of_png(chunks: dict[bytes, bytes]) -> tuple[str, str]:
+    """Return the encoding that chunks state, if any, and what is to be told: the first counts."""
+    kind = next((kind for kind in _LIGHT if kind in chunks), b"")
+    if kind == b"cICP":
+        transfer = chunks[kind][1]
+        return _TRANSFERS.get(transfer, f"{UNKNOWN}transfer {transfer} of a cICP chunk"), "cICP"
+    if kind == b"iCCP":
+        name = chunks[kind].partition(b"\0")[0].decode("latin-1")
+        return "", f"its colour profile {name!r} is not read"
+    if kind == b"sRGB":
+        return "srgb", "its chunk sRGB says so"
+    if kind == b"gAMA":
+        gamma = struct.unpack(">I", chunks[kind])[0] / 1e5
+        if abs(gamma - 1 / 2.2) < 0.001:  # as software writes it that means sRGB
+            return "srgb", f"its gAMA is {gamma:g}"
+        if 0.1 <= gamma <= 10:
+            return "linear" if gamma == 1 else f"gamma:{1 / gamma:.6g}", f"its gAMA is {gamma:g}"
+        return "", f"its gAMA of {gamma:g} is ignored"
+    return "", ""
 
 
 def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
@@ -125,14 +168,16 @@ def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _jpeg(data: bytes) -> Header:
-    at = 2
+    at, densities = 2, (1, 1)
     while at >= 0:
         while data[at] == 0xFF:  # any number of them begins a marker
             at += 1
         marker = data[at]
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             height, width = struct.unpack_from(">HH", data, at + 4)
-            return Header(width, height)
+            return Header(width, height, densities=densities)
+        if marker == 0xE0 and data[at + 3 : at + 8] == b"JFIF\0":
+            densities = struct.unpack_from(">HH", data, at + 11)
         alone = marker in (0x00, 0x01) or 0xD0 <= marker <= 0xD9
         at += 1 if alone else 1 + struct.unpack_from(">H", data, at + 1)[0]
         at = data.find(b"\xff", at)

@@ -26,7 +26,7 @@ from adv2e.process.standard_error import overhearing
 from adv2e.sources.frame import Image, Pixels, check_pixels
 from adv2e.sources.images import tiff
 from adv2e.sources.images.alpha import Alpha, with_alpha
-from adv2e.sources.images.headers import check_size, read_header
+from adv2e.sources.images.headers import Header, check_size, read_header
 
 IMAGE_SUFFIXES = (
     *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pfm"),
@@ -118,6 +118,8 @@ def decode_image(data: bytes, label: str) -> Pixels:
     if re.match(rb"P[12347]\s", data):
         kinds = "PBM, PAM and plain PGM and PPM"
         raise DataError(f"{label}: {kinds} are not read; write raw ones, or PNG")
+    if data.startswith(b"GIF8") or data[4:12] == b"ftypavis":
+        raise DataError(f"{label}: is a GIF or AVIF of pictures, whatever its name; write PNG")
     if tiff.is_tiff(data):
         return _decode_tiff(data, label)
     header = read_header(data)
@@ -126,8 +128,15 @@ def decode_image(data: bytes, label: str) -> Pixels:
         raise DataError(
             f"{label}: {header.pictures} pictures in it; give each frame a file of its own"
         )
-    image, orientation = _decoded(data, label)
+    image, orientation, says = _decoded(data, label)
     image = upright(image, orientation)
+    pixels = _pixels(image, header, label)
+    says = header.says or says
+    return replace(pixels, encoding=header.encoding, says=says, densities=header.densities)
+
+
+def _pixels(image: Any, header: Header, label: str) -> Pixels:
+    """Return an image as OpenCV gives it, with what its header says of alpha and white."""
     colours, alpha = rgb_of(image), _fourth(image)
     if header.grey:
         colours = np.ascontiguousarray(colours[..., 0])
@@ -161,7 +170,7 @@ def _decode_tiff(data: bytes, label: str) -> Pixels:
     header = tiff.examine(data, label)
     if header is None:
         raise _unreadable(label)
-    image, _ = _decoded(header.data, label)  # upright
+    image, _, says = _decoded(header.data, label)  # upright
     colours, alpha, white = rgb_of(image), _fourth(image), header.white
     if not is_light(colours.dtype):  # its source refuses it
         return Pixels(colours)
@@ -169,8 +178,8 @@ def _decode_tiff(data: bytes, label: str) -> Pixels:
     if header.inverted:
         colours = np.asarray(most - colours).astype(colours.dtype)
     if alpha is None:
-        return Pixels(colours, white=white)
-    return replace(with_alpha(colours, alpha, header.alpha, most, label), white=white)
+        return Pixels(colours, white=white, says=says)
+    return replace(with_alpha(colours, alpha, header.alpha, most, label), white=white, says=says)
 
 
 _CUT = re.compile(
@@ -179,10 +188,10 @@ _CUT = re.compile(
 """What libjpeg says, and fills the picture with grey.  Foreign bytes between parts do no harm."""
 
 
-def _decoded(data: bytes, label: str) -> tuple[Any, int]:
-    """Return the image, and the orientation that its Exif states."""
+def _decoded(data: bytes, label: str) -> tuple[Any, int, str]:
+    """Return the image, the orientation that its Exif states, and what is to be told of it."""
     image: Any = None
-    orientation = 1
+    orientation, says = 1, ""
     if data and _is_whole(data):
         try:
             with quiet(), overhearing() as said:
@@ -200,7 +209,9 @@ def _decoded(data: bytes, label: str) -> tuple[Any, int]:
     for kind, content in zip(kinds, contents, strict=True):
         if kind == cv2.IMAGE_METADATA_EXIF:
             orientation = tiff.orientation(content.tobytes().removeprefix(b"Exif\0\0"))
-    return image, orientation
+        elif kind == cv2.IMAGE_METADATA_ICCP:
+            says = "its colour profile is not read"
+    return image, orientation, says
 
 
 def _unreadable(label: str) -> DataError:

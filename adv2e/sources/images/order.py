@@ -49,6 +49,8 @@ def in_order(names: Sequence[str]) -> tuple[list[str], list[str]]:
     ordered = sorted(names, key=lambda name: (key(stems[name]), stems[name], name))
     if any(text.endswith(("-", "−")) for _, text in signs):
         told.append(f"numbers with a minus are negative, and come first: {_last(ordered[0])}")
+    elif names and all(stem[:1] in ("-", "−") and stem[1:2].isdecimal() for stem in stems.values()):
+        told.append(f"the - before the numbers is taken as a dash: {_last(ordered[0])} comes first")
     for before, after in pairwise(ordered):
         if key(stems[before]) == key(stems[after]):
             both = f"{_last(before)} and {_last(after)}"

@@ -19,8 +19,23 @@ LISTS = ("images.txt", "timestamps.txt", "info.txt")
 _BESIDE = {"rgb": "rgb.txt", "depth": "depth.txt", "data": "data.csv", "img": "left_images.txt"}
 """Lists beside folders of these names, in data sets: see :mod:`adv2e.sources.listings`."""
 
-_UNREAD = (
-    *(".heic", ".heif", ".avif", ".jxl", ".jp2", ".gif", ".pbm", ".pam", ".tga", ".psd"),
+UNREAD = (
+    *(
+        ".apng",
+        ".mpo",
+        ".jpe",
+        ".jfif",
+        ".heic",
+        ".heif",
+        ".avif",
+        ".jxl",
+        ".jp2",
+        ".gif",
+        ".pbm",
+        ".pam",
+        ".tga",
+        ".psd",
+    ),
     *(".dpx", ".cin", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
 )
 """Still images that are not read: they are not left out without a word."""
@@ -87,7 +102,7 @@ def found_list(folder: Path) -> Path | None:
 
 def _unread(folder: Path) -> list[str]:
     """Return the names of images that are not read."""
-    names = [e.name for e in folder.iterdir() if e.suffix.lower() in _UNREAD]
+    names = [e.name for e in folder.iterdir() if e.suffix.lower() in UNREAD]
     return sorted((name for name in names if not name.startswith(".")), key=natural_key)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 
 import cv2
 import image_bytes as made
@@ -337,3 +338,91 @@ def test_a_doubt_about_white_is_taken_back_where_it_does_not_hold(adv2e, tmp_pat
     assert "whole numbers up to 20," in lines[0]
     assert "whole numbers up to 40000 came: what was said of white does not hold" in lines[-1]
     assert "whole numbers" not in adv2e("info", source, "--fps", "50").out
+
+
+def chunked(folder, *chunks, depth=8, count=3):
+    """Write grey PNGs with chunks of their own."""
+    folder.mkdir(exist_ok=True)
+    for number in range(count):
+        rows = RAMP.astype(np.uint16) * 257 if depth == 16 else RAMP
+        data = made.png(np.roll(rows, number, 1), 0, depth, chunks)
+        (folder / f"{number}.png").write_bytes(data)
+    return folder
+
+
+def gamma(value):
+    return b"gAMA", struct.pack(">I", value)
+
+
+SRGB, PQ = (b"sRGB", b"\0"), (b"cICP", bytes([9, 16, 0, 1]))
+PROFILE = b"iCCP", b"Display P3\0\0" + zlib.compress(bytes(200))
+
+
+@pytest.mark.parametrize(
+    ("chunks", "encoding", "reason"),
+    [
+        ([], "linear", "8-bit grey images"),
+        ([gamma(100_000)], "linear", "its gAMA is 1"),
+        ([gamma(45_455)], "srgb", "its gAMA is 0.45455"),
+        ([gamma(50_000)], "gamma:2", "its gAMA is 0.5"),
+        ([gamma(0)], "linear", "its gAMA of 0 is ignored"),
+        ([(b"gAMA", b"\0")], "linear", "8-bit grey images"),
+        ([gamma(100_000), SRGB], "srgb", "its chunk sRGB says so"),
+        ([gamma(100_000), PROFILE], "linear", "its colour profile 'Display P3' is not read"),
+        ([SRGB, PQ], "pq", "cICP"),
+    ],
+)
+def test_what_a_png_states_of_its_numbers_is_followed_and_told(tmp_path, chunks, encoding, reason):
+    source = open_source(chunked(tmp_path / "png", *chunks), fps=10)
+    assert source.encoding == encoding
+    assert reason in source.light.encoding_reason
+
+
+def test_deep_png_follows_its_chunk_too(tmp_path):
+    source = open_source(chunked(tmp_path / "png", SRGB, depth=16), fps=10)
+    assert (source.encoding, source.full_scale) == ("srgb", 65535)
+
+
+def test_a_transfer_that_is_not_known_is_asked_for(adv2e, tmp_path):
+    folder = chunked(tmp_path / "png", (b"cICP", bytes([1, 99, 0, 1])))
+    convert = ["convert", folder, "--fps", 10, "-o", tmp_path / "a.h5"]
+    outcome = adv2e(*convert)
+    assert outcome.status == 1
+    assert "transfer 99 of a cICP chunk, which is not known; say what they are" in outcome.err
+    assert adv2e(*convert, "--set", "frames.encoding=srgb").status == 0
+
+
+def test_pictures_that_state_another_encoding_than_the_first_are_told(tmp_path):
+    folder = chunked(tmp_path / "png", gamma(100_000))
+    (folder / "2.png").write_bytes(made.png(RAMP, 0, 8, [SRGB]))
+    source = open_source(folder, fps=10)
+    assert len(list(source.frames())) == 3
+    assert any("2.png; all are taken as linear" in note for note in source.notes)
+
+
+def test_pixels_that_are_not_square_are_told(tmp_path):
+    folder = chunked(tmp_path / "png", (b"pHYs", struct.pack(">IIB", 2835, 1417, 1)))
+    assert any(
+        "not square, as it states 2835 across" in n for n in open_source(folder, fps=1).notes
+    )
+    square = chunked(tmp_path / "square", (b"pHYs", struct.pack(">IIB", 2835, 2835, 1)))
+    assert open_source(square, fps=1).notes == []
+    data = bytearray(encoded(".jpg", np.kron(RAMP, np.ones((8, 8), np.uint8))))
+    struct.pack_into(">HH", data, data.index(b"JFIF\0") + 8, 1, 2)
+    for number in range(2):
+        (square / f"{number}.jpg").write_bytes(data)
+    for file in square.glob("*.png"):
+        file.unlink()
+    assert any("1 across and 2 down" in note for note in open_source(square, fps=1).notes)
+
+
+@pytest.mark.parametrize("begin", [b"GIF89a", b"GIF87a", b"\0\0\0\x20ftypavis"])
+def test_films_that_are_named_as_pictures_are_refused(folder, begin):
+    images = folder(("png", encoded(".png", RAMP)), ("png", begin + bytes(100)))
+    with pytest.raises(DataError, match=r"1\.png: is a GIF or AVIF of pictures"):
+        list(open_source(images, fps=10).frames())
+
+
+def test_pictures_that_move_are_left_out_with_a_word(folder):
+    images = folder(("png", encoded(".png", RAMP)), ("png", encoded(".png", RAMP)), ("apng", b""))
+    assert any("such as 2.apng" in note for note in open_source(images, fps=10).notes)

@@ -79,6 +79,7 @@ def test_names_that_are_read_in_one_way_alone(names):
     [
         (["-3.png", "-2.png", "-1.png", "0.png", "1.png", "10.png"], "negative"),
         (["t-10.png", "t-1.png", "t+0.png", "t+1.png"], "negative"),
+        (["-1.png", "-2.png", "-10.png"], "as a dash: -1.png comes first"),
         ([f"{k:02x}.png" for k in range(8, 30)], "hexadecimal"),
         ([f"frame_{k:x}.png" for k in range(8, 30)], "hexadecimal"),
         (["a.jpg", "a.png", "b.png"], "a.jpg and a.png are of one name or number"),
