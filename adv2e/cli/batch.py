@@ -207,7 +207,7 @@ def command(
             click.echo(reasons(tasks))
             for line in work.passed:
                 log(shown(line))
-            if any(task.why for task in tasks):
+            if remote is None and any(task.why and not task.only_export for task in tasks):
                 coming = work.forecast(tasks, jobs, threads)
                 click.echo(coming.text() if coming else _UNKNOWN)
             return

@@ -163,7 +163,8 @@ def _record(sample: Path, declared: Path, overwrite: bool) -> None:
     ]
     with Staging(overwrite) as staging:
         text = staging.file(declared)
-        config = load_config([], ["sampling.L=1", UNDECLARED], _RECORDING_SEED)
+        known = "sampling.L=1", "frames.encoding=linear", UNDECLARED
+        config = load_config([], known, _RECORDING_SEED)
         with open_sink(
             sample,
             width=width,
