@@ -11,7 +11,8 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path, PurePosixPath
+from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import IO
 
 from adv2e.errors import DataError
@@ -55,7 +56,7 @@ def open_member(archive: zipfile.ZipFile, member: str | zipfile.ZipInfo) -> IO[b
 
 def _check_member(info: zipfile.ZipInfo, path: Path) -> None:
     """Refuse a member that would lie outside the folder into which its archive is unpacked."""
-    parts = re.split(r"[/\\]", info.filename)
+    parts = info.filename.replace("\\", "/").split("/")
     wrong = ""
     if ".." in parts:
         wrong = "leads out of the archive by '..'"
@@ -106,15 +107,15 @@ class Members:
         """Return the files whose name matches; if there is one, the others are beside it."""
         if self._archive is None:
             return [file.name for file in self.path.glob(pattern) if file.is_file()]
-        shallow = (
-            place
-            for place in map(PurePosixPath, sorted(self._names))
-            if len(place.parts) <= 2 and place.parts[0] != "__MACOSX"
-        )
-        found = [place for place in shallow if place.match(pattern)]
+        # of many names, no more than the end is looked at
+        found = [
+            (top + slash, name)
+            for top, slash, name in (path.rpartition("/") for path in sorted(self._names))
+            if fnmatchcase(name, pattern) and "/" not in top and top != "__MACOSX"
+        ]
         if len(found) == 1:
-            self._top = "" if len(found[0].parts) == 1 else f"{found[0].parent}/"
-        return [place.name for place in found]
+            self._top = found[0][0]
+        return [name for _, name in found]
 
     def has(self, name: str) -> bool:
         """Tell whether there is a file of that name, with the folders in which it is."""

@@ -42,7 +42,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     if not images:
         known = " ".join(suffix.lstrip(".") for suffix in IMAGE_SUFFIXES)
         raise DataError(f"{path}: no {LIST} in it, and no images ({known})")
-    folders = sorted({str(PurePosixPath(name).parent) for name in images})
+    folders = sorted({name.rpartition("/")[0] or "." for name in images})
     if len(folders) > 1:
         raise DataError(
             f"{path}: images in more than one folder of it, {folders[0]} and {folders[1]}; make a"
@@ -69,8 +69,8 @@ def images_in(files: Members) -> list[str]:
 
 
 def _is_image(name: str) -> bool:
-    file = PurePosixPath(name)
-    return file.suffix.lower() in IMAGE_SUFFIXES and not file.name.startswith(".")
+    file = name.rpartition("/")[2]
+    return file.lower().endswith(IMAGE_SUFFIXES) and not file.startswith(".")
 
 
 def _found_list(folder: PurePosixPath, files: Members) -> str | None:
