@@ -1,20 +1,68 @@
-"""Numba, and what is told to and by it.  Whoever imports this imports Numba."""
+"""Numba, and what is told to and by it.  Whoever imports this imports Numba.
+
+By itself, Numba reads ``.numba_config.yaml`` in the current folder when it is imported, and again
+before each function that it compiles.  That folder may be anybody's, and the file could choose
+another processor, or none, without a word.  So the file has no name here: the settings are those of
+the environment.  Where a program imported Numba before, that is left as it is.
+"""
 
 from __future__ import annotations
 
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
+from pathlib import Path
+from types import CodeType
 from typing import Any
 
-import numba
-from numba.core import event
-from numba.extending import typeof_impl
-
 from adv2e.compilation.code_cache import CodeCache
+from adv2e.errors import Adv2eError
 
-_numba: Any = numba
-_event: Any = event
-_typeof: Any = typeof_impl
+_SETTINGS, _FILE = "numba.core.config", ".numba_config.yaml"
+
+
+class _WithoutFile(SourceFileLoader):
+    """Loads the module of Numba's settings with an empty name for the file: none is found."""
+
+    def get_code(self, fullname: str) -> CodeType | None:
+        code = super().get_code(fullname)
+        if code is None or _FILE not in code.co_consts:  # Numba names it elsewhere
+            if Path(_FILE).exists():
+                raise Adv2eError(f"{_FILE}: would be read by Numba: remove or rename it")
+            return code
+        return code.replace(co_consts=tuple("" if c == _FILE else c for c in code.co_consts))
+
+
+class _Finder(MetaPathFinder):
+    """Finds that module alone."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: object = None
+    ) -> ModuleSpec | None:
+        found = PathFinder.find_spec(fullname, path) if fullname == _SETTINGS else None
+        if found is not None and found.origin is not None:
+            found.loader = _WithoutFile(fullname, found.origin)
+        return found
+
+
+def _import_numba() -> tuple[Any, Any, Any]:
+    finder = _Finder()
+    sys.meta_path.insert(0, finder)
+    try:
+        names = "numba", "numba.core.event", "numba.extending"
+        numba, event, extending = map(import_module, names)
+    finally:
+        sys.meta_path.remove(finder)
+    return numba, event, extending.typeof_impl
+
+
+_numba: Any
+_event: Any
+_typeof: Any
+_numba, _event, _typeof = _import_numba()
 
 
 def make_dispatcher(

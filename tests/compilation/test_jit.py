@@ -140,6 +140,29 @@ def test_whoever_watches_is_told_of_what_is_compiled_and_numba_stays_as_it_was(s
     assert said(start(code=WATCH)) == ["0"]
 
 
+SETTINGS = """
+from pathlib import Path
+from adv2e import compiled
+from adv2e.inner import inner
+from adv2e.outer import outer
+outer(1)
+import numba
+name = Path(".numba_config.yaml")
+name.unlink(missing_ok=True)
+name.write_text("disable_jit: 1\\nopt: 0\\ncpu_name: generic\\n")
+outer(1.5)  # which is compiled
+print(numba.config.DISABLE_JIT, numba.config.OPT._raw_value, numba.config.CPU_NAME)
+"""
+
+
+@pytest.mark.parametrize("before", [False, True])
+def test_a_file_of_settings_in_the_current_folder_is_not_read(start, tmp_path, before):
+    if before:
+        (tmp_path / ".numba_config.yaml").write_text("disable_jit: 1\ncpu_name: generic\n")
+    assert said(start(code=SETTINGS)) == ["0", "3", "None"]
+    assert said(start(code=SETTINGS, NUMBA_OPT="2"))[1] == "2"  # which is the user's own
+
+
 HELD = """
 import sys, time
 from adv2e.files.locks import lock_file
