@@ -21,6 +21,9 @@ Programming errors (wrong types from our own code) stay ordinary Python exceptio
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 
 class Adv2eError(Exception):
     """A mistake that the user can mend; shown as one line, exit status 1."""
@@ -30,6 +33,14 @@ class Adv2eError(Exception):
 
 class Adv2eWarning(UserWarning):
     """Something that the user may look at; the command line shows it as one line."""
+
+
+def is_for_users(warning: Warning | str, filename: str) -> bool:
+    """Tell whether a warning is ours, or about a file of the user's own: not about our code."""
+    places = Path(__file__).parent, Path(sys.prefix), Path(sys.base_prefix)
+    return isinstance(warning, Adv2eWarning) or not any(
+        place in Path(filename).parents for place in places
+    )
 
 
 class ConfigError(Adv2eError):

@@ -14,7 +14,7 @@ from adv2e.batch.transfer import is_url, through
 from adv2e.config import Config, from_dict
 from adv2e.config.active_effects import user_sources
 from adv2e.config.effect_files import load_effects
-from adv2e.errors import Adv2eError, Adv2eWarning
+from adv2e.errors import Adv2eError, Adv2eWarning, is_for_users
 from adv2e.files.states import State, digest_of, digest_of_values
 from adv2e.formats.lookup import to_write
 from adv2e.light.interpolation import network_of
@@ -167,8 +167,8 @@ def _convert(job: Job) -> dict[str, Any]:
 
 
 def _told(warned: Iterable[warnings.WarningMessage]) -> Iterator[str]:
-    """Yield what our own warnings say, and not what libraries say of our code."""
-    return (str(one.message) for one in warned if isinstance(one.message, Adv2eWarning))
+    """Yield what warnings say to users, and not what libraries say of our code."""
+    return (str(one.message) for one in warned if is_for_users(one.message, one.filename))
 
 
 def _whole(job: Job, config: Config) -> tuple[Summary, float]:

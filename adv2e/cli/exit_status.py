@@ -24,11 +24,11 @@ import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, TextIO
+from typing import TextIO
 
 import click
 
-from adv2e.errors import Adv2eError, Adv2eWarning
+from adv2e.errors import Adv2eError, Adv2eWarning, is_for_users
 from adv2e.files.names import shown
 from adv2e.process.machine import machine_complaint
 from adv2e.process.signals import Terminated, last_words
@@ -47,15 +47,23 @@ def complain(text: str) -> None:
 
 @contextmanager
 def warnings_for_people() -> Iterator[None]:
-    """Show warnings of ours as lines, and none of libraries, which are about our code.
+    """Show warnings of ours, and of a user's own effect, as lines; none of what libraries warn us.
 
     Nothing changes where whoever looks for a fault asked Python for warnings (``-W``).
     """
     usual = warnings.showwarning
 
-    def show(message: Warning | str, *where: Any, **more: Any) -> None:
-        if isinstance(message, Adv2eWarning):
-            complain(f"warning: {message}")
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if is_for_users(message, filename):
+            place = "" if isinstance(message, Adv2eWarning) else f"{filename}:{lineno}: "
+            complain(f"warning: {place}{message}")
 
     if not sys.warnoptions:
         warnings.showwarning = show

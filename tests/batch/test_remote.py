@@ -187,7 +187,7 @@ def test_what_a_killed_process_left_is_removed(tmp_path, monkeypatch):
     )
     assert len([*tmp_path.iterdir()]) == 1
     with transfer.Scratch() as folder:
-        assert [*tmp_path.iterdir()] == [folder]
+        assert [*tmp_path.iterdir()] == [folder.parent]
     assert not [*tmp_path.iterdir()]
 
 

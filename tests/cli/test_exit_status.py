@@ -7,14 +7,16 @@ import os
 import signal
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from processes import running_python
 
+from adv2e.cli import exit_status
 from adv2e.cli.exit_status import Terminated
-from adv2e.errors import DataError, MissingExtraError, UsageError
+from adv2e.errors import Adv2eWarning, DataError, MissingExtraError, UsageError
 
 
 def raising(error):
@@ -340,3 +342,19 @@ print(len(os.listdir("/proc/self/task")))
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
     )
     assert done.stdout == "1\n"
+
+
+@pytest.mark.parametrize(
+    ("warning", "filename", "said"),
+    [
+        (Adv2eWarning("two\nlines"), np.__file__, "adv2e: warning: two\\nlines\n"),
+        (UserWarning("of Python 2"), exit_status.__file__, ""),
+        (RuntimeWarning("divided by zero"), np.__file__, ""),
+        (UserWarning("too slow"), "/own/effect.py", "adv2e: warning: /own/effect.py:7: too slow\n"),
+    ],
+)
+def test_warnings_are_ours_or_about_a_file_of_the_user(capsys, warning, filename, said):
+    with warnings.catch_warnings(), exit_status.warnings_for_people():
+        warnings.simplefilter("always")
+        warnings.warn_explicit(warning, None, filename, 7)
+    assert capsys.readouterr() == ("", said)
