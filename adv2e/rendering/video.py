@@ -11,6 +11,7 @@ What was written is gone through again: on a full disk not all writers of FFmpeg
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from fractions import Fraction
@@ -39,6 +40,22 @@ CODERS: dict[str, tuple[str, str, str, dict[str, str]]] = {
     ".avi": ("avi", "huffyuv", "rgb24", {}),
 }
 """By suffix: container, coder, kind of pixels, and options of the coder."""
+
+
+class _File(io.FileIO):
+    """A file that keeps its first error: PyAV prints those that come to it while it has one."""
+
+    error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        """Write all of the bytes, or nothing more after an error."""
+        left = memoryview(data).cast("B")
+        try:
+            while self.error is None and left.nbytes:
+                left = left[super().write(left) :]
+        except OSError as error:
+            self.error = error
+        return len(data)
 
 
 @contextmanager
@@ -77,18 +94,23 @@ class VideoFile:
                 self._open(picture.shape[1], picture.shape[0])
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
             self._container.mux(self._stream.encode(frame))
+            self._check()
         self._count += 1
 
     def _open(self, width: int, height: int) -> None:
         kind, coder, pixels, options = CODERS[self._path.suffix.lower()]
         # FFmpeg takes parts of names for addresses and patterns
-        self._file = self._path.open("wb")
+        self._file = _File(self._path, "wb")
         self._container = av.open(self._file, "w", format=kind)
         self._stream = self._container.add_stream(coder, rate=self._rate, options=options)
         self._stream.width, self._stream.height = width, height
         self._stream.pix_fmt = pixels
         if coder == "libvpx":
             self._stream.bit_rate = _VP8_BITS
+
+    def _check(self) -> None:
+        if self._file.error is not None:
+            raise self._file.error
 
     def finish(self) -> None:
         """Complete the file and check that it holds all pictures."""
@@ -108,6 +130,8 @@ class VideoFile:
                 if container is not None:
                     container.mux(self._stream.encode())
                     container.close()
+                if file.error is not None:
+                    raise file.error
                 self._size = file.seek(0, 2)
 
     def close(self) -> None:
