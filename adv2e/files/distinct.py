@@ -24,7 +24,7 @@ def check_distinct(output: str | Path, inputs: Iterable[str | Path]) -> None:
         `output` is one of them, or a folder that holds one.
     """
     final = Path(output)
-    if not final.exists():
+    if not os.path.lexists(final):
         return
     within = final.resolve() if final.is_dir() else None
     for one in map(Path, inputs):
