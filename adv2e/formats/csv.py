@@ -14,7 +14,7 @@ pandas and faery take this with their defaults.  Read are the columns that
 :mod:`adv2e.formats.column_names` names, in any order and among others, between commas, semicolons
 or tabs.  faery's heading names the size, too: ``t,x@640,y@480,on``.  A line ``%geometry:640,480``
 is of Metavision, which writes ``x, y, p, t`` without a heading; both have times in microseconds.
-Any other file without a heading is refused.
+Any other file of four columns without a heading is read if its columns tell what they are.
 
 References
 ----------
@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from adv2e.causes import has_causes
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.formats.column_names import find_columns, geometry_in, stated_unit
+from adv2e.formats.column_names import find_columns, geometry_in, stated_unit, told_order
 from adv2e.formats.event_file import EventFile, Facts, described_geometry
 from adv2e.formats.sink import Request, Writer
 from adv2e.formats.text.reader import Form, events_of_lines
@@ -61,11 +61,14 @@ def open_csv(path: Path, facts: Facts) -> EventFile:
     Raises
     ------
     DataError
-        There is no heading, or a column is missing; from `parts`: a line that cannot be read.
+        There is no heading, and the columns do not tell what they are; or one is missing.  From
+        `parts`: a line that cannot be read.
     """
     with path.open("rb") as file:
         begin = file.read(_MOST_HEADING)
     names, skipped, lines = _heading(path, begin)
+    if not re.search(rb"[a-zA-Z]", begin[:skipped]):
+        facts.tell(f"no line names the columns: they are taken as {','.join(names)}, as they tell")
     comments = begin[:skipped].decode("utf-8", "replace")
     facts.state(geometry_in("".join(re.findall("^#.*\n", comments, re.M)))[1], "a comment")
     found = find_columns(names, str(path))
@@ -104,6 +107,8 @@ def _heading(path: Path, begin: bytes) -> tuple[list[str], int, int]:
             return ["x", "y", "p", "t_us"], at, lines
         of_metavision |= text.startswith("%geometry:")
         if text and not text.startswith(("#", "%")):
+            if order := told_order(_rows(begin[at:])):
+                return [*order], at, lines
             break
         at, lines = end, lines + 1
     else:
@@ -113,6 +118,16 @@ def _heading(path: Path, begin: bytes) -> tuple[list[str], int, int]:
         f"{path}: must begin with a line that names the columns, such as t,x,y,p (t in"
         " microseconds; t_s,x,y,p in seconds); files of Metavision need x,y,p,t_us"
     )
+
+
+def _rows(begin: bytes) -> NDArray[np.float64]:
+    """Return the numbers of the first lines, if there are four in each; else none."""
+    lines = _cleaned(begin[: begin.rfind(b"\n") + 1]).splitlines()
+    try:
+        rows = np.array([line.split() for line in lines if line.strip()], np.float64)
+    except ValueError:
+        return np.empty((0, 4))
+    return rows if rows.ndim == 2 and rows.shape[1] == 4 else np.empty((0, 4))
 
 
 def causes_of(path: Path) -> Callable[[], NDArray[Any]] | None:

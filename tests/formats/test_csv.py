@@ -182,3 +182,28 @@ def test_many_lines_are_formatted_as_numpy_does(tmp_path):
     lines = (tmp_path / "a.csv").read_text().splitlines()[1:]
 
     assert lines == [f"{t},{x},{y},{p}" for t, x, y, p in events.tolist()]
+
+
+@pytest.mark.parametrize("order", ["xypt", "txyp", "xytp", "ptxy"])
+def test_columns_without_a_heading_that_tell_what_they_are_are_read_and_told(tmp_path, order):
+    rng = np.random.default_rng(3)
+    columns = {
+        "t": np.sort(rng.integers(0, 10**6, 400)),
+        "x": rng.integers(0, 64, 400),
+        "y": rng.integers(0, 48, 400),
+        "p": rng.integers(0, 2, 400),
+    }
+    path = tmp_path / "events.csv"
+    rows = zip(*(columns[name].tolist() for name in order), strict=True)
+    path.write_text("".join(f"{','.join(map(str, row))}\n" for row in rows))
+    recording = read_events(path)
+    for name, column in columns.items():
+        np.testing.assert_array_equal(recording.events[name], column)
+    (told,) = [line for line in recording.problems if "names the columns" in line]
+    assert ",".join(order) in told
+    path.write_text("t,x,y,p\n" + path.read_text() if order == "txyp" else "1,2,3,4\n" * 40)
+    if order == "txyp":
+        assert not [one for one in read_events(path).problems if "names the columns" in one]
+    else:
+        with pytest.raises(DataError, match="must begin with a line that names the columns"):
+            read_events(path)
