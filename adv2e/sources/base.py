@@ -230,11 +230,11 @@ class Source(ABC):
     def _load(self, shot: Shot) -> Pixels:
         pixels, label = shot.load(), shot.label
         image = pixels.image
-        first = _description(self.whole, self.dtype, self.colour)
-        size = Size(image.shape[1], image.shape[0])
-        this = _description(size, image.dtype, image.ndim == 3)
+        first = self.whole, self.dtype, self.colour
+        this = Size(image.shape[1], image.shape[0]), image.dtype, image.ndim == 3
         if this != first:
-            raise DataError(f"{label}: {this}, but the first frame is {first}")
+            told = _description(*this), _description(*first)
+            raise DataError(f"{label}: {told[0]}, but the first frame is {told[1]}")
         pixels = self._wanted(pixels)
         check_values(pixels.image, label)
         if pixels.alpha is not None or pixels.composed:
