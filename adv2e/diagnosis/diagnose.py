@@ -17,7 +17,6 @@ from adv2e.diagnosis.configurations import (
     of_known_light,
     own_of,
 )
-from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.fitting.nuisances import thresholds_of
 from adv2e.diagnosis.outcome.conclusion import conclude
@@ -114,8 +113,8 @@ def diagnose(
             nuisances=nuisances,
             rejected=rejected_of(outcome, kept, search.candidates),
             errors=found.errors,
-            global_p_before=search.probability(search.declared, splits.TEST),
-            global_p_after=search.probability(kept, splits.TEST),
+            global_p_before=search.overall(search.declared),
+            global_p_after=search.overall(kept),
             signatures=signatures_of(reference, search.declared, kept),
             curves=found.curves,
             maps=found.maps,

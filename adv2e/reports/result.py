@@ -193,7 +193,8 @@ class Diagnosis:
     errors : list of ErrorRow
         The first is the one that ``report.json`` gives.
     global_p_before, global_p_after : float
-        Probability of a residual as large if nothing were missing, on held-out data.
+        Probability of a residual as large if nothing were missing, in all data that are compared:
+        below 0.01 something is left.
     signatures : list of Signature
     curves, maps
         The picture of the residual.

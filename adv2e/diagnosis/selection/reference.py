@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 MANY, SOME = 100, 32
 """Simulations of a model that is kept, and of one that is tried."""
+FURTHER = range(1001, 2001)
+"""Seeds of those that tell how often chance makes what none of the many did."""
 
 _OF_SCALES, _OF_MODELS, OF_RECORDINGS, _OF_SHIFTED = 1, 2, 3, 4
 """What simulations stand for, each with draws of its own of what is uncertain in them."""
@@ -170,6 +172,12 @@ class Reference:
             return Ensemble.of(self.scales[view], rows)
 
         return tuple(map(of, range(VIEWS)))
+
+    def further(self, config: Config) -> tuple[Array, ...]:
+        """Return, for each view, further simulations in compressed deviations."""
+        return tuple(
+            one.sample for one in self.ensembles(config, self.sampler.sample(config, FURTHER))
+        )
 
     def tried(self, config: Config, beside: Config | None = None) -> tuple[Ensemble, ...]:
         """Return simulations of a configuration, often enough to judge it; see `ensembles`."""

@@ -42,6 +42,9 @@ LEVEL = 0.01
 PER_LOOK = LEVEL / 2.0
 """The same of each look: at the data for training and validation, and at the test data."""
 
+_BEYOND_CHANCE = 1e-7
+"""Probability, by the tail of a curve, below which nobody need count."""
+
 MOST_EFFECTS = 4
 _MOST_WITH_TWO = 3
 """Effects of a model to which two were added that hold only together: beside two others, they would
@@ -91,8 +94,26 @@ class Search:
         self.declared = reference.state(reference.declared)
 
     def probability(self, state: State, view: int = BOTH) -> float:
-        """Return how often chance makes a residual as large as the recording's."""
-        return state.ensembles[view].probability(self.reference.observed[view])
+        """Return how often chance makes a residual as large as the recording's.
+
+        Where that would decide, and is so rare that it is told by the tail of a curve, further
+        simulations are counted.
+        """
+        observed, ensemble = self.reference.observed[view], state.ensembles[view]
+        found = ensemble.probability(observed)
+        if not _BEYOND_CHANCE < found < PER_LOOK:
+            return found
+        counted = ensemble.rank(observed, self.reference.further(state.config)[view])
+        self.reference.log(f"  probability {found:.2g} by a curve, {counted:.2g} by counting")
+        return counted
+
+    def overall(self, state: State) -> float:
+        """Return the probability of the residual in all data: less than LEVEL, something is left.
+
+        Of two looks, at the data for training and validation and at the test data, the smaller
+        counts twice (Bonferroni).
+        """
+        return min(1.0, 2.0 * min(self.probability(state, view) for view in (BOTH, splits.TEST)))
 
     def explained(self, state: State, view: int = BOTH) -> float:
         """Return the share of the declared model's residual that is gone."""

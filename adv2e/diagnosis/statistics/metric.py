@@ -202,6 +202,22 @@ class Ensemble:
         found = (_tail(misfits, misfit, _log_normal), _tail(largest, loudest, _gumbel))
         return min(1.0, 2.0 * min(found))
 
+    def rank(self, values: Array, further: Array) -> float:
+        """Return how often further simulations have a misfit, or a largest deviation, as large.
+
+        As :meth:`probability`, by rank alone: a few counts of what hardly ever happens have no tail
+        that a curve would fit.  `further`, (seeds, statistics), in compressed deviations.
+        """
+        inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
+        z = (further - self.mean) / (self.sd * inflation)
+        white = z @ self.scale.whitening.T
+        found = (
+            (np.mean(white * white, axis=1), self.misfit(values)),
+            (np.abs(z).max(axis=1), np.abs(self.z(values)).max()),
+        )
+        ranks = [(1.0 + np.count_nonzero(some >= one)) / (len(some) + 1.0) for some, one in found]
+        return float(min(1.0, 2.0 * min(ranks)))
+
     @cached_property
     def typical_largest(self) -> float:
         """Mean of the largest deviation of simulations of this very model."""

@@ -257,3 +257,33 @@ def test_a_model_without_chance_is_not_what_makes_other_recordings():
     model = Ensemble.of(scale, sample)
     assert model.probability(np.arange(5.0)) == 1.0
     assert model.probability(np.arange(5.0) + 3.0) < 1e-6
+
+
+def test_events_that_hardly_ever_happen_are_counted_and_not_read_off_a_curve():
+    """A pair of events that one recording in seventy holds makes none of them stand out."""
+    draw = np.random.default_rng(5)
+    world = World(5)
+
+    def sample(count, rate=0.015):
+        rare = draw.poisson(rate, (count, 1)).astype(float)
+        return np.hstack([world.sample(count, draw), rare])
+
+    least = np.append(0.01 * world.unit, 0.1)
+    scale = Scale.of(sample(100, 0), least)
+    model = Ensemble.of(scale, sample(100, 0))  # by chance, none of these has one
+    further = scale.of_values(sample(1000))
+    level, rows = 0.005, sample(2000)
+    by_curve = np.array([model.probability(row) for row in rows]) < level
+    counted = np.array([model.rank(row, further) for row in rows[by_curve]])
+    assert by_curve.mean() > 2 * level
+    assert np.mean(counted < level) * by_curve.mean() < level
+
+
+def test_what_no_simulation_makes_stays_beyond_chance_when_counted():
+    draw = np.random.default_rng(6)
+    world = World(6)
+    scale, model = world.model(draw)
+    further = scale.of_values(world.sample(1000, draw))
+    shifted = world.sample(1, draw, shift=2.0)[0]
+    assert model.probability(shifted) < 0.005
+    assert model.rank(shifted, further) == pytest.approx(2 / 1001)
