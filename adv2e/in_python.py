@@ -17,7 +17,7 @@ from adv2e.errors import Adv2eError
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _OTHER_NAMES = {
-    **{"start": "start_s", "stop": "stop_s", "from": "take", "set": "config", "at": "at_s"},
+    **{"start": "start_s", "stop": "stop_s", "from": "take", "set": "sets", "at": "at_s"},
     **{"extent": "extent_px", "duration": "duration_s", "effect": "effects"},
 }
 _FLAGS = ("overwrite", "allow_damaged", "rotate180", "with_frames", "causes", "crop_events")

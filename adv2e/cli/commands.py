@@ -14,7 +14,8 @@ from adv2e.errors import UsageError
 _GROUPS = {
     "Input": (
         *("fps", "timestamps", "time_unit", "track", "start", "stop", "start_s", "stop_s", "crop"),
-        *("rotate180", "bayer", "pixel_format", "allow_damaged", "choice", "crop_events"),
+        *("rotate180", "bayer", "pixel_format", "allow_damaged", "choice"),
+        *("set_back", "crop_events"),
         *("frames_path", "layout_of_source", "light"),
     ),
     "Sensor and pixel": (

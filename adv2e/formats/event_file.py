@@ -131,7 +131,7 @@ class Facts:
             description = None
         if isinstance(description, dict):
             self.description = description
-            self.stated_unit = "s" if "adv2e" in description else None
+            self.stated_unit = "s" if description else None
             self.state_by_names(description, name)
         else:
             self.problems.append(f"{label}: not a JSON mapping, ignored")
@@ -141,6 +141,8 @@ class Facts:
         self.inputs.append(file)
         text = file.read_text("utf-8", errors="replace")
         self.describe(text, str(file), file.name)
+        if "adv2e" not in self.description:  # somebody else's
+            self.stated_unit = None
 
     def choose(
         self, events: Sequence[Track], frames: Sequence[Track] = ()

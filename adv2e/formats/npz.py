@@ -214,7 +214,8 @@ def _is_fine(
     headers: Mapping[str, Header], names: tuple[str, ...], where: tuple[NDArray[Any], ...]
 ) -> bool:
     """Tell whether coordinates are in 1/32 of a pixel: 16 bits, and most beyond any sensor."""
-    if names != _FINE or any(headers[name].dtype.itemsize != 2 for name in names[1:3]):
+    known = all(name in headers and headers[name].dtype.itemsize == 2 for name in names[1:3])
+    if names != _FINE or not known:
         return False
     return any(np.mean(_signed(column) > _MOST_PIXELS) > _MOST_SHARE for column in where)
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.causes import CAUSED_DTYPE, has_causes
 from adv2e.events import EVENT_DTYPE, Events, checked_events
@@ -79,12 +80,11 @@ def open_sink(
     """
     path = Path(path)
     chosen = to_write(path, format, layout)
-    version = {"adv2e": metadata["adv2e"]} if "adv2e" in metadata else {}
     request = Request(
         path=path,
         width=width,
         height=height,
-        description={**version, "width": width, "height": height, **metadata},
+        description={"adv2e": __version__, "width": width, "height": height, **metadata},
         with_frames=with_frames,
         threads=threads or default_threads(),
         causes=causes,

@@ -156,7 +156,7 @@ def test_its_section_is_as_strict_as_any_other(load):
     ):
         with pytest.raises(Exception, match=message):
             load_config((), [*sets, wrong], effects=effects)
-    with pytest.raises(Exception, match=r"user: effects of your own need their file: --effect"):
+    with pytest.raises(Exception, match=r"user: effects of your own need their file: effects=F"):
         load_config((), sets)
 
 

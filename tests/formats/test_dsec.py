@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
+from adv2e import __version__
 from adv2e.errors import DataError, OutputError
 from adv2e.events import make_events, sort_events
 from adv2e.formats.hdf5_writer import CHUNK
@@ -104,7 +105,8 @@ def test_what_is_written_is_read(tmp_path, begin):
     assert recording.layout == "dsec"
     assert np.array_equal(recording.events, events)
     assert (recording.width, recording.height) == (346, 260)
-    assert recording.metadata == {"seed": 3, "width": 346, "height": 260}
+    about = {"adv2e": __version__, "seed": 3, "width": 346, "height": 260}
+    assert recording.metadata == about
     assert [p for p in recording.problems if "below zero" not in p and "repeat" not in p] == []
 
 

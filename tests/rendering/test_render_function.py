@@ -46,7 +46,7 @@ def test_the_command_draws_the_same(events, adv2e, tmp_path, monkeypatch):
         ("a.png", {}, UsageError, "size: an array of events needs"),
         ("a.png", {"size": (4, 4)}, DataError, "events: number 4 has x 4, outside a sensor of 4x4"),
         ("a.doc", {"size": SIZE}, UsageError, r"a\.doc: a film ends in"),
-        ("a.avi", {"size": SIZE, "at_s": [1]}, UsageError, r"a\.avi: instants \(--at\) are for"),
+        ("a.avi", {"size": SIZE, "at_s": [1]}, UsageError, r"a\.avi: instants \(at_s\) are for"),
         ("a.png", {"size": SIZE, "style": "pink"}, UsageError, "style 'pink'"),
     ],
 )

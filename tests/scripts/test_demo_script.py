@@ -27,5 +27,5 @@ def test_the_demonstration_is_installed_once_and_run(tmp_path):
         subprocess.run([tmp_path / "scripts" / "demo", *arguments], check=True)
     install, *runs = (tmp_path / "calls").read_text("utf-8").splitlines()
     assert install.startswith("-m pip install ")
-    assert install.endswith("--editable .[video]")
+    assert install.endswith("--editable .")
     assert runs == [f"-m adv2e demo -o demo --overwrite{more}" for more in ("", " --seed 3")]

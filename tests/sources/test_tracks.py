@@ -100,10 +100,10 @@ def test_files_of_one_stream_take_no_other(tmp_path, name):
     assert open_events(tmp_path / name, track=0).facts.problems == []
     assert len(read_events(tmp_path / name, track="events").events) == 3
     with pytest.raises(
-        DataError, match=rf"{name}: --track 1: it holds no such track, but 0 = events"
+        DataError, match=rf"{name}: track=1: it holds no such track, but 0 = events"
     ):
         read_events(tmp_path / name, track=1)
-    with pytest.raises(DataError, match=r"--track right: it holds no such track, but 0 = events"):
+    with pytest.raises(DataError, match=r"track right: it holds no such track, but 0 = events"):
         convert(tmp_path / name, tmp_path / "b.txt", track="right")
 
 

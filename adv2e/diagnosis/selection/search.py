@@ -94,17 +94,22 @@ class Search:
         self.declared = reference.state(reference.declared)
 
     def probability(self, state: State, view: int = BOTH) -> float:
-        """Return how often chance makes a residual as large as the recording's.
+        """Return how often chance makes a residual as large as the recording's."""
+        return state.ensembles[view].probability(self.reference.observed[view])
 
-        Where that would decide, and is so rare that it is told by the tail of a curve, further
-        simulations are counted.
+    def judged(self, state: State, view: int) -> float:
+        """Return the same, to decide by whether something is left.
+
+        Where it is so rare that the tail of a curve tells it, further simulations are counted.
         """
-        observed, ensemble = self.reference.observed[view], state.ensembles[view]
-        found = ensemble.probability(observed)
+        found = self.probability(state, view)
         if not _BEYOND_CHANCE < found < PER_LOOK:
             return found
-        counted = ensemble.rank(observed, self.reference.further(state.config)[view])
-        self.reference.log(f"  probability {found:.2g} by a curve, {counted:.2g} by counting")
+        further = self.reference.further(state.config)[view]
+        counted = state.ensembles[view].rank(self.reference.observed[view], further)
+        if counted >= PER_LOOK:
+            told = f"probability {found:.2g} by a curve, but {counted:.2g} by counting"
+            self.reference.log(f"  {told} {len(further):,} further simulations")
         return counted
 
     def overall(self, state: State) -> float:
@@ -113,7 +118,7 @@ class Search:
         Of two looks, at the data for training and validation and at the test data, the smaller
         counts twice (Bonferroni).
         """
-        return min(1.0, 2.0 * min(self.probability(state, view) for view in (BOTH, splits.TEST)))
+        return min(1.0, 2.0 * min(self.judged(state, view) for view in (BOTH, splits.TEST)))
 
     def explained(self, state: State, view: int = BOTH) -> float:
         """Return the share of the declared model's residual that is gone."""
@@ -197,7 +202,7 @@ class Search:
         return state
 
     def _is_something_left(self, state: State, view: int = BOTH) -> bool:
-        if self.probability(state, view) >= PER_LOOK:
+        if self.judged(state, view) >= PER_LOOK:
             return False
         return self.explained(state, view) < 1.0 - state.left
 

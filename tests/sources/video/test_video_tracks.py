@@ -44,8 +44,8 @@ def test_the_default_track_is_taken_and_told(tmp_path, suffix, default):
     assert (source.width, source.height) == (SMALL, LARGE)[default]
     assert len(list(source.frames())) == 6
     (told,) = source.notes
-    assert "2 tracks of frames: 0 video (32x24), 1 video (64x48)" in told
-    assert f"{default} video is taken, --track chooses another" in told
+    assert "2 tracks of frames: 0 = video (32x24), 1 = video (64x48)" in told
+    assert f"{default} = video is taken, --track chooses another" in told
 
 
 def test_a_track_is_chosen_by_number_or_title(tmp_path):
@@ -55,7 +55,7 @@ def test_a_track_is_chosen_by_number_or_title(tmp_path):
         assert (source.width, source.height, source.notes) == (*size, [])
         assert [frame.image.shape[:2] for frame in source.frames()] == [size[::-1]] * 6
     for track in ("2", "-1", "middle", "\u0664"):
-        with pytest.raises(DataError, match=r"no such track, but 0 Left eye \(32x24\), 1 Right"):
+        with pytest.raises(DataError, match=r"but 0 = Left eye \(32x24\), 1 = Right"):
             open_source(path, track=track)
     with pytest.raises(DataError, match="no such track"):
         open_source(written(tmp_path / "one.mp4", "mpeg4", 25), track="1")
