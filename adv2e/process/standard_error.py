@@ -61,19 +61,23 @@ def overhearing() -> Iterator[Callable[[], bytes]]:
 
     Nothing, where standard error is not kept for ourselves.
     """
-    if _heard >= 0:
-        with suppress(OSError):  # it is no file
-            os.ftruncate(_heard, 0)
-            os.lseek(_heard, 0, os.SEEK_SET)
+    if _said_bytes():
+        os.ftruncate(_heard, 0)
+        os.lseek(_heard, 0, os.SEEK_SET)
     yield _said
 
 
+def _said_bytes() -> int:
+    """Return how much was said since it was last forgotten."""
+    if _heard >= 0:
+        with suppress(OSError):  # it is no file
+            return os.lseek(_heard, 0, os.SEEK_END)
+    return 0
+
+
 def _said() -> bytes:
-    if _heard < 0:
+    size = _said_bytes()
+    if not size:
         return b""
-    with suppress(OSError):
-        size = os.fstat(_heard).st_size
-        if size:
-            os.lseek(_heard, 0, os.SEEK_SET)
-            return os.read(_heard, min(size, 1 << 16))
-    return b""
+    os.lseek(_heard, 0, os.SEEK_SET)
+    return os.read(_heard, min(size, 1 << 16))

@@ -80,7 +80,7 @@ def _packed(content: Content) -> bytes:
 def all_seeds(scratch: Path) -> list[Seed]:
     """Return every seed; `scratch` is a folder for files that only libraries can write."""
     seeds = [*_stacks(), *_events(), *_recordings(), *_images(), *_texts()]
-    with quiet():
+    with quiet:
         return [
             *seeds,
             *_packets(scratch),

@@ -33,6 +33,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -83,10 +84,14 @@ def full_scale_of(dtype: DTypeLike) -> float:
     DataError
         For data types that have no such number.
     """
-    name = np.dtype(dtype).name
-    if name not in _FULL_SCALES:
-        raise DataError(f"frames of {name}: give {', '.join(_FULL_SCALES)}")
-    return _FULL_SCALES[name]
+    return _full_scale(np.dtype(dtype))
+
+
+@cache  # it is asked of every frame, and NumPy makes the name anew
+def _full_scale(dtype: np.dtype[Any]) -> float:
+    if dtype.name not in _FULL_SCALES:
+        raise DataError(f"frames of {dtype.name}: give {', '.join(_FULL_SCALES)}")
+    return _FULL_SCALES[dtype.name]
 
 
 def encoding_of_images(dtype: DTypeLike) -> str:

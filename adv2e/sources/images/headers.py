@@ -19,7 +19,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from adv2e.effects.frames.encoding import UNKNOWN
 from adv2e.errors import DataError
@@ -132,9 +132,17 @@ def _png(data: bytes) -> Header:
         elif kind == b"tRNS" and colours == _GREY:
             (clear,) = struct.unpack_from(">H", content)
             clear *= 255 // ((1 << depth) - 1) if depth < 8 else 1
-    header = Header(width, height, max(pictures, 1), grey=colours == _GREY_ALPHA, clear=clear)
     encoding, says = _light_of_png(light)
-    return replace(header, encoding=encoding, says=says, densities=densities)
+    return Header(
+        width,
+        height,
+        max(pictures, 1),
+        grey=colours == _GREY_ALPHA,
+        clear=clear,
+        encoding=encoding,
+        says=says,
+        densities=densities,
+    )
 
 
 def _light_of_png(chunks: dict[bytes, bytes]) -> tuple[str, str]:
@@ -159,11 +167,14 @@ def _light_of_png(chunks: dict[bytes, bytes]) -> tuple[str, str]:
 
 
 def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Yield the chunks before the picture's data: all that say how it is to be read."""
     at = 8
     while at + 12 <= len(data):
         (size,) = struct.unpack_from(">I", data, at)
         kind = data[at + 4 : at + 8]
-        yield kind, b"" if kind == b"IDAT" else data[at + 8 : at + 8 + size]
+        if kind == b"IDAT":
+            return
+        yield kind, data[at + 8 : at + 8 + size]
         at += 12 + size
 
 

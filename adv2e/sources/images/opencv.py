@@ -7,12 +7,9 @@ line that people see.
 from __future__ import annotations
 
 import importlib
-import os
 import re
 import tempfile
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,48 +33,30 @@ IMAGE_SUFFIXES = (
 
 
 class _Quiet:
-    """Sets what OpenCV prints, for all threads at once: the last to leave sets it back."""
+    """Keeps OpenCV from printing, in all threads at once: the last to leave sets it back."""
 
     def __init__(self) -> None:
+        # OpenCV 5 has cv2.utils.logging, OpenCV 4 has it only as cv2.setLogLevel
+        self._logging: Any = cv2.utils.logging if hasattr(cv2.utils, "logging") else cv2
         self._lock = threading.Lock()
-        self._inside = 0
-        self._level, self._ffmpeg = 0, False
+        self._inside = self._level = 0
 
-    def enter(self) -> None:
+    def __enter__(self) -> None:
         with self._lock:
             self._inside += 1
             if self._inside == 1:
-                self._level = _logging().getLogLevel()
-                _logging().setLogLevel(0)
-                # read by OpenCV once, when it first opens a video; -8 is AV_LOG_QUIET
-                self._ffmpeg = "OPENCV_FFMPEG_LOGLEVEL" in os.environ
-                os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+                self._level = self._logging.getLogLevel()
+                self._logging.setLogLevel(0)
 
-    def leave(self) -> None:
+    def __exit__(self, *_: object) -> None:
         with self._lock:
             self._inside -= 1
             if self._inside == 0:
-                _logging().setLogLevel(self._level)
-                if not self._ffmpeg:
-                    os.environ.pop("OPENCV_FFMPEG_LOGLEVEL", None)
+                self._logging.setLogLevel(self._level)
 
 
-def _logging() -> Any:
-    # OpenCV 5 has cv2.utils.logging, OpenCV 4 has it only as cv2.setLogLevel
-    return cv2.utils.logging if hasattr(cv2.utils, "logging") else cv2
-
-
-_QUIET = _Quiet()
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Keep OpenCV and FFmpeg from printing about the files they open, decode or write."""
-    _QUIET.enter()
-    try:
-        yield
-    finally:
-        _QUIET.leave()
+quiet = _Quiet()
+"""Context in which OpenCV prints nothing about the pictures that it decodes."""
 
 
 def rgb_of(image: Any) -> Image:
@@ -130,13 +109,11 @@ def decode_image(data: bytes, label: str) -> Pixels:
         )
     image, orientation, says = _decoded(data, label)
     image = upright(image, orientation)
-    pixels = _pixels(image, header, label)
-    says = header.says or says
-    return replace(pixels, encoding=header.encoding, says=says, densities=header.densities)
+    return _pixels(image, header, header.says or says, label)
 
 
-def _pixels(image: Any, header: Header, label: str) -> Pixels:
-    """Return an image as OpenCV gives it, with what its header says of alpha and white."""
+def _pixels(image: Any, header: Header, says: str, label: str) -> Pixels:
+    """Return an image as OpenCV gives it, with what its header says of alpha, white and light."""
     colours, alpha = rgb_of(image), _fourth(image)
     if header.grey:
         colours = np.ascontiguousarray(colours[..., 0])
@@ -147,9 +124,15 @@ def _pixels(image: Any, header: Header, label: str) -> Pixels:
     if white is not None and colours.max() > white:
         above = f"above the {white:g} that its header states"
         raise DataError(f"{label}: a number of {colours.max()}, {above}")
+    stated: dict[str, Any] = {
+        "encoding": header.encoding,
+        "says": says,
+        "densities": header.densities,
+    }
     if alpha is None:
-        return Pixels(colours, white=white)
-    return with_alpha(colours, alpha, header.alpha, full_scale_of(colours.dtype), label)
+        return Pixels(colours, white=white, **stated)
+    most = full_scale_of(colours.dtype)
+    return replace(with_alpha(colours, alpha, header.alpha, most, label), **stated)
 
 
 def upright(image: Image, orientation: int) -> Image:
@@ -194,7 +177,7 @@ def _decoded(data: bytes, label: str) -> tuple[Any, int, str]:
     orientation, says = 1, ""
     if data and _is_whole(data):
         try:
-            with quiet(), overhearing() as said:
+            with quiet, overhearing() as said:
                 image, kinds, contents = cv2.imdecodeWithMetadata(
                     np.frombuffer(data, np.uint8), flags=cv2.IMREAD_UNCHANGED
                 )

@@ -17,7 +17,7 @@ import unicodedata
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from decimal import Decimal
-from functools import partial
+from functools import cache, partial
 from itertools import groupby, pairwise
 from os.path import commonprefix
 from pathlib import PurePosixPath
@@ -44,7 +44,8 @@ def in_order(names: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the names of files of one folder in order, and what is to be told of it, in lines."""
     stems = {name: _stem(name) for name in names}
     signs = _signs(stems.values())
-    whole, decimal = partial(_key, signs=signs), partial(_key, signs=signs, form=_DECIMAL)
+    whole: Key = cache(partial(_key, signs=signs))
+    decimal: Key = cache(partial(_key, signs=signs, form=_DECIMAL))
     key, told = _settled(sorted(stems.values()), whole, decimal, signed=bool(signs))
     ordered = sorted(names, key=lambda name: (key(stems[name]), stems[name], name))
     if any(text.endswith(("-", "−")) for _, text in signs):
