@@ -118,6 +118,8 @@ class Candidate:
     of_chance : bool
         It makes chance larger or smaller more than it moves any mean, which no misfit of a few
         simulations shows: it is always simulated often.
+    is_seen : bool
+        Bursts of events show when it acts, whatever else is missing.
     """
 
     name: str
@@ -131,6 +133,7 @@ class Candidate:
     pulse: Pulse | None = None
     read_off: tuple[tuple[str, float], ...] = ()
     of_chance: bool = False
+    is_seen: bool = False
 
     @classmethod
     def joined(cls, each: Sequence[Candidate]) -> Candidate:

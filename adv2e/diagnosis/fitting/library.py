@@ -245,7 +245,7 @@ def _frame_coupling(hints: Hints) -> Iterator[Candidate]:
             yield leaps
         else:
             extra = tuple(own.keys.items())
-            yield replace(leaps, extra=extra, readouts=None, read_off=own.read_off)
+            yield replace(leaps, extra=extra, readouts=None, read_off=own.read_off, is_seen=True)
     up, down = replace(amplitude, low=0.0), replace(amplitude, high=0.0)
     for sign, leap in ((1.0, up), (-1.0, down)):
         of_pulse = pulse.keys(up=leap is up) if pulse else None
@@ -259,7 +259,9 @@ def _frame_coupling(hints: Hints) -> Iterator[Candidate]:
         )
         read_off = own.read_off if own else ()
         extra = tuple(keys.items())
-        yield Candidate("frame_coupling", (leap, tau), starts, extra, read_off=read_off)
+        yield Candidate(
+            "frame_coupling", (leap, tau), starts, extra, read_off=read_off, is_seen=True
+        )
 
 
 def _either_way(*sizes: float) -> tuple[float, ...]:

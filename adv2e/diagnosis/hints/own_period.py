@@ -43,6 +43,9 @@ _FINE_US = 10.0
 _BEGIN_SD_US = 12.0
 """Standard deviation of when bursts begin: no one knows how fast a leap rises."""
 _STAMP_SD_US = 0.3
+_LEAST_RISE_US = 1.0
+_EDGE, _BEFORE_EDGE = 0.02, 0.1
+"""Shares of a burst's events that come before its edge is passed, and a while after it."""
 _FEW = 3.0
 """A deviation told by few bursts may be larger, by this over their number."""
 
@@ -78,8 +81,13 @@ class OwnPeriod:
 
     @property
     def keys(self) -> dict[str, float]:
-        """The keys of leaps that only decay."""
-        return {PERIOD: self.period_us, DELAY: self.first.begins_us}
+        """The keys of leaps that only decay: while one rises, all pixels fire that it makes fire.
+
+        Behind all poles, an event tells where its pixel's signal was in that time: a leap that
+        rises three times as slowly parts them three times as far.
+        """
+        rise = max(self.first.lasts_us, _LEAST_RISE_US)
+        return {PERIOD: self.period_us, DELAY: self.first.begins_us, RISE: rise}
 
     def keys_of_pulse(self, up: bool) -> dict[str, float] | None:
         """Return the keys of leaps upwards or downwards, and back.
@@ -142,12 +150,37 @@ def own_period_of(stream: Stream, times_s: Array) -> OwnPeriod | None:
     turns = (start_us + first) / period + float(np.mean(steps))
     begin_sd = float(np.hypot(_BEGIN_SD_US, turns * period_sd))
 
-    def placed(burst: Burst | None) -> Burst | None:
+    def placed(burst: Burst | None, part: Array) -> Burst | None:
         if burst is None:
             return None
-        return replace(burst, begins_us=(start_us + border + burst.begins_us) % period)
+        begins, ends = _edges((part - border) % period, burst, bin_us)
+        return replace(
+            burst, begins_us=(start_us + border + begins) % period, lasts_us=ends - begins
+        )
 
-    return OwnPeriod(period, period_sd, begin_sd, *map(placed, found))
+    return OwnPeriod(period, period_sd, begin_sd, *map(placed, found, parts))
+
+
+def _edges(late_us: Array, burst: Burst, bin_us: float) -> tuple[float, float]:
+    """Return when a burst of one polarity begins and ends, finer than its bins tell [us].
+
+    `late_us`: of all events of the polarity.  As many events as are usual are taken off, and each
+    edge is where a line through a few and some more of the first, or last, begins.
+    """
+    middle = burst.begins_us + 0.5 * burst.lasts_us
+    reach = 0.5 * burst.lasts_us + 2.0 * bin_us
+    since = late_us - middle
+    usual = np.count_nonzero((np.abs(since) > reach) & (np.abs(since) <= 3.0 * reach)) / 4.0 / reach
+    inside = np.sort(since[np.abs(since) <= reach])
+
+    def edge(since: Array) -> float:
+        above = np.arange(1, len(since) + 1) - usual * (since + reach)
+        few, some = (
+            float(since[np.argmax(above >= share * above[-1])]) for share in (_EDGE, _BEFORE_EDGE)
+        )
+        return few - (some - few) * _EDGE / (_BEFORE_EDGE - _EDGE)
+
+    return middle + edge(inside), middle - edge(-inside[::-1])
 
 
 def _heights(t_us: NDArray[Any], bins: int) -> Array:

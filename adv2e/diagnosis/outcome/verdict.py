@@ -15,6 +15,10 @@ _ERROR_PARTLY, _ERROR_EXPLAINED = 0.9, 0.75
 """The same of what the error can fall by, on the test data, when something is left, and when all
 statistics are explained."""
 
+_MOST = 0.5
+"""Both shares of effects that are certain, as the events themselves show when they act: in bursts
+of all pixels, at each frame or with a period of their own.  No other effect makes those."""
+
 
 def verdict_of(outcome: Outcome, error: ErrorRow, interpolated: float = 0.0) -> Verdict:
     """Return the verdict.
@@ -26,7 +30,9 @@ def verdict_of(outcome: Outcome, error: ErrorRow, interpolated: float = 0.0) -> 
         return "consistent" if outcome.complete else "unexplained"
     gone, at_most = _gone(error, interpolated)
     if not outcome.complete:
-        partly = outcome.explained >= _PARTLY and gone >= _ERROR_PARTLY and not _too_near(error)
+        certain = all(fit.candidate.is_seen for fit in outcome.state.fits)
+        least = (_MOST, _MOST) if certain else (_PARTLY, _ERROR_PARTLY)
+        partly = outcome.explained >= least[0] and gone >= least[1] and not _too_near(error)
         return "partly_explained" if partly else "unexplained"
     if at_most < _ERROR_EXPLAINED:
         return "unexplained"

@@ -14,6 +14,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.fitting.candidates import FITTED, NOTHING, Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted, parted
 from adv2e.diagnosis.fitting.fitter import Fitter
+from adv2e.diagnosis.statistics.groups import least_deviations
 from adv2e.diagnosis.statistics.metric import Ensemble, Scale
 from adv2e.diagnosis.statistics.sampler import Sampler
 from adv2e.diagnosis.statistics.summary import BOTH, VIEWS
@@ -127,11 +128,14 @@ class Reference:
         """Scales of the statistics, one a view, from simulations of the declared model."""
         # not the simulations that misfits are compared with: those would fit too well
         sample = self.sampler.sample(self.declared, range(MANY + 1, 2 * MANY + 1))
-        least = self.sampler.statistics.least
-        return tuple(
-            Scale.of(self.error.blurred(sample[:, view], view, _OF_SCALES), least)
-            for view in range(VIEWS)
-        )
+        statistics = self.sampler.statistics
+
+        def of(view: int) -> Scale:
+            rows = self.error.blurred(sample[:, view], view, _OF_SCALES)
+            known = least_deviations(statistics.entries, statistics.least, rows.mean(axis=0))
+            return Scale.of(rows, known)
+
+        return tuple(map(of, range(VIEWS)))
 
     @property
     def doubt(self) -> float:

@@ -46,6 +46,21 @@ def stabilised(number: Array) -> Array:
     return np.asarray(2.0 * np.sqrt(np.maximum(number, 0.0) + 0.375))
 
 
+_RARE = stabilised(np.array(2.0))
+"""Numbers of events below which hardly vary, on that scale: most simulations have none."""
+
+
+def least_deviations(entries: Sequence[Entry], least: Array, mean: Array) -> Array:
+    """Return the deviation below which each statistic does not count as known, (statistics,).
+
+    That is `least`, but of numbers that are small on the `mean` of simulations it is that of a
+    Poisson number.  Where none ever came, one or two events stand for themselves, as a pixel may
+    have a dead time a little shorter than the others'; only several are more than chance.
+    """
+    is_rare = np.array([entry.is_number for entry in entries]) & (mean < _RARE)
+    return np.asarray(np.where(is_rare, np.maximum(least, 1.0), least))
+
+
 @dataclass(frozen=True)
 class Group:
     """Statistics that are counted together.

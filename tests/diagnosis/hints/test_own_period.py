@@ -59,6 +59,18 @@ def test_period_and_begin_are_read_off_with_how_well_they_are_known(period_us, d
     assert np.mean(inside) >= 0.85
 
 
+@pytest.mark.parametrize("lasts_us", [4.0, 40.0, 160.0])
+def test_how_fast_a_leap_rises_is_read_off_beside_events_of_the_scene(lasts_us):
+    for burst in (60, 600):
+        found = own_period_of(
+            events(40_000.0, on_us=13_310.0, burst=burst, lasts_us=lasts_us), frames()
+        )
+        # stamps are whole microseconds
+        assert found.on.lasts_us == pytest.approx(lasts_us, rel=0.1, abs=1.5)
+        assert found.on.begins_us == pytest.approx(13_310.0, rel=0, abs=1.5 + 0.05 * lasts_us)
+        assert found.keys[f"{NAME}rise_us"] == found.on.lasts_us
+
+
 @pytest.mark.parametrize(
     ("stream", "times_s"),
     [

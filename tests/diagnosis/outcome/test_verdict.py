@@ -1,5 +1,6 @@
 """What is said at the end of a search: verdict, remark, findings and their intervals."""
 
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -46,6 +47,23 @@ def test_what_frames_leave_of_the_error_is_not_asked_of_an_effect():
     larger = error(0.8, 0.7, 0.262, spread=0.01)
     assert verdict_of(outcome, larger, interpolated=0.135) == "unexplained"
     assert verdict_of(outcome, error(0.8, 0.35, 0.262), interpolated=0.135) == "explained"
+
+
+@pytest.mark.parametrize(
+    ("explained", "verdict"), [(0.6, "partly_explained"), (0.4, "unexplained")]
+)
+def test_an_effect_that_bursts_show_is_named_if_it_explains_most(explained, verdict):
+    _, outcome = searched(["pixel.leak.rate_hz=4"])
+    (fit,) = outcome.state.fits
+
+    def left(is_seen):
+        candidate = replace(fit.candidate, is_seen=is_seen)
+        state = replace(outcome.state, fits=(replace(fit, candidate=candidate),))
+        return replace(outcome, state=state, explained=explained, complete=False)
+
+    error_falls = error(0.9, 0.6, 0.5, spread=0.01)
+    assert verdict_of(left(True), error_falls) == verdict
+    assert verdict_of(left(False), error_falls) == "unexplained"
 
 
 @pytest.mark.parametrize("verdict", get_args(Verdict))

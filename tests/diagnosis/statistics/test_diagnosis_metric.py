@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from adv2e.diagnosis.statistics.groups import Entry, least_deviations, stabilised
 from adv2e.diagnosis.statistics.metric import (
     Ensemble,
     Scale,
@@ -277,6 +278,27 @@ def test_events_that_hardly_ever_happen_are_counted_and_not_read_off_a_curve():
     counted = np.array([model.rank(row, further) for row in rows[by_curve]])
     assert by_curve.mean() > 2 * level
     assert np.mean(counted < level) * by_curve.mean() < level
+
+
+def test_two_events_where_none_is_expected_stand_for_themselves_and_ten_do_not():
+    draw = np.random.default_rng(7)
+    world = World(7)
+    entries = [Entry("", "")] * STATISTICS + [Entry("", "", is_number=True)]
+
+    def rows(count, events):
+        number = stabilised(np.full((count, 1), float(events)))
+        return np.hstack([world.sample(count, draw), number])
+
+    sample = rows(100, 0)
+    least = least_deviations(entries, np.append(0.01 * world.unit, 0.6), sample.mean(axis=0))
+    model = Ensemble.of(Scale.of(sample, least), rows(100, 0))
+    alarms = {
+        events: np.mean([model.probability(row) < 0.005 for row in rows(400, events)])
+        for events in (0, 1, 2, 10)
+    }
+    assert alarms[2] < 0.05
+    assert alarms[0] == pytest.approx(alarms[1], abs=0.02)
+    assert alarms[10] == 1.0
 
 
 def test_what_no_simulation_makes_stays_beyond_chance_when_counted():
