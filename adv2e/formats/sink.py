@@ -97,7 +97,8 @@ class Sink:
         self._check_size(request.width, request.height)
         writer = format.load(format.writer)
         temporary = writer.stage(request.path, staging)
-        self._description, self._described = request.description, None
+        self._description = request.description
+        self._described: Path | None = None
         if temporary and not format.holds_settings:
             self._described = staging.file(beside(request.path, ".json"))
         self._holds_causes = request.causes and format.causes != ""

@@ -14,7 +14,7 @@ from adv2e.process.signals import Interrupt
 
 NAME = "standard input"
 
-_PIECE = 1 << 20
+_PIECE = 1 << 16  # as much as a pipe holds, mostly
 
 
 def standard_input() -> BufferedIOBase:
