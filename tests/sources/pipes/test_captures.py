@@ -63,7 +63,7 @@ def wait_until_read(pipe):
 
 def is_writing(folder):
     """Tell whether an output was begun: by then the capture was, too."""
-    return list(folder.glob(".adv2e.*")) != []
+    return list(folder.glob(".adv2e.*/new*")) != []
 
 
 def ended(process):
