@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -68,9 +69,11 @@ def is_writing(folder):
 
 def ended(process):
     """Return the lines on stderr of a process that ends while its pipe stays open."""
-    err = process.stderr.read().decode()
-    process.wait(timeout=120)
-    return err.splitlines()
+    pipe, process.stdin = process.stdin, None
+    _, err = process.communicate(timeout=120)
+    if pipe is not None:
+        pipe.close()
+    return err.decode().splitlines()
 
 
 @pytest.fixture
@@ -100,6 +103,7 @@ def test_a_producer_that_falls_silent(converted_from_a_file, tmp_path, threads, 
     out = tmp_path / "out"
     with capturing("-o", out / "a.txt", "--seed", "5", "--threads", threads) as process:
         send(process, y4m(frames) + (b"FRAME\n" + bytes(1000))[:cut])
+        time.sleep(1)  # it waits for more by now, or will at once
         process.send_signal(signal.SIGINT)
         told = ended(process)
     assert process.returncode == 0, told
