@@ -144,7 +144,8 @@ def command(
     TUM RGB-D, EuRoC, UZH-FPV), a TIFF of several pages, or a .npy stack of frames, grey (frames,
     rows, columns) or colour (with a fourth axis, of 3). INPUT - is standard input, through which
     Y4M or raw video comes. It may be a file of events, too: these are written in the format of OUT,
-    and nothing is simulated.
+    and nothing is simulated. Frames from a pipe end with the first Ctrl-C: the events of those that
+    came whole are written. A second Ctrl-C stops at once and leaves nothing.
 
     Without -o, the events go to <stem>.events.h5 in the current folder, or with the suffix of
     --format. The suffix of OUT chooses the format:
@@ -194,7 +195,8 @@ def command(
 
         part["along"] = SensorPath(motion, extent_px, duration_s)
     opened = Reading(source, **given, **part, frame_size=size, threads=threads)
-    with opened:  # it reads while all else that is needed is imported
+    # it reads while all else that is needed is imported
+    with opened, opened.capturing(_ENDED if log.level >= 0 else ""):
         from adv2e.conversion.pipeline import convert_reading
 
         gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
@@ -226,6 +228,8 @@ def _tell_of_much(
     if told := text_of_much(estimate(source.path, output, config, **options), output):
         log(told)
 
+
+_ENDED = "capture ended: what came is converted; a second Ctrl-C stops at once and keeps nothing"
 
 _OF_SIMULATION = (
     *("config_files", "sets", "seed", "effect_files"),

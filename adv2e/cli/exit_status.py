@@ -10,7 +10,8 @@
 143    told to stop (SIGTERM)
 ====== ===================================================================================
 
-A signal removes unfinished files and ends the program where it is; see
+The first SIGINT while frames come through a pipe ends those, and is no interruption: 0.  Any other
+signal removes unfinished files and ends the program where it is; see
 :mod:`adv2e.process.signals`.
 """
 

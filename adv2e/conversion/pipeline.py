@@ -260,6 +260,8 @@ def convert_reading(
         for events in chunks:
             out.add(events)
             del events  # or they would stay while the next ones are made
+        if recording.ended_by_hand is not None:
+            sink.describe(ended_by_hand_after_frames=recording.ended_by_hand)
     # at the end: an error is to be the only line
     taken = light_text(recording.light, recording.full_scale, config.frames)
     is_guess = config.frames.encoding == "auto" and recording.light.is_guess

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Generator, Iterator
 from concurrent.futures import Future
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -176,6 +176,10 @@ class Reading:
         """What is read: the files of the source, and the list of times if there is one."""
         source = () if self.path == STDIN else self.source.inputs
         return *source, *filter(None, [self.given["timestamps"]])
+
+    def capturing(self, told: str) -> AbstractContextManager[None]:
+        """Return a context within which Ctrl-C ends a pipe's frames, as `told`; see `Source`."""
+        return self.source.capturing(told) if self.is_open else nullcontext()
 
     def stills(self, decoding: Decoding) -> Iterator[Still]:
         """Return the frames, as `decoding` says; raises what goes wrong with them."""

@@ -97,12 +97,10 @@ class Sink:
         self._check_size(request.width, request.height)
         writer = format.load(format.writer)
         temporary = writer.stage(request.path, staging)
-        self._description: tuple[Path, str] | None = None
+        self._description = request.description
+        self._described: Path | None = None
         if temporary and not format.holds_settings:
-            self._description = (
-                staging.file(beside(request.path, ".json")),
-                to_json(request.description),
-            )
+            self._described = staging.file(beside(request.path, ".json"))
         self._holds_causes = request.causes and format.causes != ""
         self._causes = self._place_of_causes(request, staging, temporary)
         told = replace(request, causes=self._holds_causes)
@@ -156,15 +154,15 @@ class Sink:
         with staging if is_alone else nullcontext(), _closing() as stack:
             with writing(self._name):
                 staging.prepare()
-                if self._description is not None:
-                    beside, text = self._description
-                    beside.write_text(text, encoding="utf-8", newline="\n")
                 if self._causes is not None:
                     self._lines = stack.enter_context(self._causes.open("wb"))
                 made = writer(stack, *temporary)
             yield made
             with writing(self._name):
                 made.finish()
+                if self._described is not None:
+                    text = to_json(self._description)
+                    self._described.write_text(text, encoding="utf-8", newline="\n")
                 stack.close()
 
     def write_events(self, events: Events) -> None:
@@ -193,6 +191,13 @@ class Sink:
         if self.wants_frames:
             with writing(self._name):
                 self._writer.write_frame(t_ns, image)
+
+    def describe(self, **more: Any) -> None:
+        """Add to the description what is known only at the end.
+
+        Formats that begin with it do not hold that: AEDAT, bags of ROS 2, and .raw and .dat.
+        """
+        self._description.update(more)
 
     def __enter__(self) -> Sink:
         self._writer = self._open.__enter__()

@@ -3,13 +3,18 @@
 See :mod:`adv2e.process.cleanup` for why.  Where files cannot be removed like that, a signal arrives
 as an exception, and they are as for any error.
 
+Who takes what others send for as long as they please, such as frames of a camera, can have the
+first SIGINT as the end of that: see :func:`first_interrupt`.
+
 This is imported before all else, so that a signal that comes meanwhile is met: it imports little.
 """
 
 from __future__ import annotations
 
 import os
+import select
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -36,20 +41,27 @@ def stop_on_signals(*, silent: bool = False) -> list[int]:
     if threading.current_thread() is not threading.main_thread():
         return []
     caught = [number for number, handler in _usual().items() if signal.getsignal(number) is handler]
+    stop = _Stop(caught, silent)
+    for number in caught:
+        signal.signal(number, stop)
+    return caught
 
-    def stop(number: int, frame: FrameType | None) -> None:
-        for other in caught:
+
+class _Stop:
+    """Handler that ends the program."""
+
+    def __init__(self, caught: list[int], silent: bool) -> None:
+        self._caught, self._silent = caught, silent
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        for other in self._caught:
             signal.signal(other, signal.SIG_IGN)  # a second one must not stop the tidying up
         ending = KeyboardInterrupt() if number == signal.SIGINT else Terminated(number)
         if not unfinished.remove_all():
             raise ending
-        if not silent:
+        if not self._silent:
             _say_at_once(last_words(ending))
         os._exit(128 + number)
-
-    for number in caught:
-        signal.signal(number, stop)
-    return caught
 
 
 @contextmanager
@@ -61,6 +73,65 @@ def stopping_on_signals() -> Iterator[None]:
     finally:
         for number in caught:
             signal.signal(number, _usual()[number])
+
+
+class Interrupt:
+    """The first SIGINT, which ends nothing by itself; see :func:`first_interrupt`.
+
+    Attributes
+    ----------
+    came : bool
+    """
+
+    def __init__(self, wakes: int) -> None:
+        self.came = False
+        self._wakes = wakes
+
+    def comes_before(self, *descriptors: int, within_s: float | None = None) -> bool:
+        """Wait for it, until a descriptor can be read or the time is over; tell if it came."""
+        while not self.came:
+            ready, _, _ = select.select([self._wakes, *descriptors], [], [], within_s)
+            if self._wakes in ready and signal.SIGINT in os.read(self._wakes, 512):
+                self.came = True
+            if ready != [self._wakes]:  # else it was another signal
+                break
+        return self.came
+
+
+@contextmanager
+def first_interrupt(told: str) -> Iterator[Interrupt | None]:
+    """Within the context, let the first SIGINT do no more than say `told`; the second one ends.
+
+    Nothing changes, and None is given, where SIGINT would not end the program, as in Python, which
+    has a handler of its own, and on Windows, where nobody can wait for it and for a pipe at once.
+    """
+    stop = signal.getsignal(signal.SIGINT)
+    in_main = threading.current_thread() is threading.main_thread()
+    if sys.platform == "win32" or not isinstance(stop, _Stop) or not in_main:
+        yield None
+        return
+    # handlers run between two steps of Python only, too late for who has just begun to wait; but
+    # the number of the signal is written at once, whichever thread of the process gets it
+    wakes, woken = os.pipe()
+    os.set_blocking(woken, False)
+    interrupt = Interrupt(wakes)
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, stop)
+        interrupt.came = True
+        if told:
+            _say_at_once(told)
+
+    before = signal.set_wakeup_fd(woken, warn_on_full_buffer=False)
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield interrupt
+    finally:
+        if signal.getsignal(signal.SIGINT) is hear:
+            signal.signal(signal.SIGINT, stop)
+        signal.set_wakeup_fd(before)
+        os.close(wakes)
+        os.close(woken)
 
 
 def _usual() -> dict[int, Callable[[int, FrameType | None], object] | signal.Handlers]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -84,6 +85,8 @@ class Source(ABC):
         It may hold several tracks, and chooses among them itself.
     waits : bool
         Reading waits for others, and for ever if they please: it belongs in the main thread.
+    ended_by_hand : int or None
+        Number of frames after which a user ended what would have gone on; see `capturing`.
     """
 
     has_tracks = False
@@ -104,6 +107,7 @@ class Source(ABC):
         self.threads = 1
         self.packages: tuple[str, ...] = ()
         self.waits = False
+        self.ended_by_hand: int | None = None
         self.along: SensorPath | None = None
 
     def _describe(self, first: Pixels, label: str, light: Light | None = None) -> None:
@@ -145,6 +149,13 @@ class Source(ABC):
         self.full_scale = light.full_scale or first.white or usual
         self.light = replace(light, full_scale=self.full_scale, full_scale_reason=why)
         self.encoding = light.encoding
+
+    def capturing(self, told: str) -> AbstractContextManager[None]:
+        """Return a context within which a user can end frames that would come for ever.
+
+        `told` is said when the user does.  Nothing changes where frames do not come so.
+        """
+        return nullcontext()
 
     def _note(self, text: str) -> None:
         if text not in self.notes:  # frames may be read more than once

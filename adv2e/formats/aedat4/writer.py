@@ -51,6 +51,7 @@ class Aedat4Writer(Writer):
         except MissingExtraError:
             self._lz4 = None
         self._file = stack.enter_context(path.open("wb"))
+        self._text = "".join(self._xml()).encode("ascii")
         self._file.write(MAGIC + self._header(0))
         self._frames = stack.enter_context(closing(Backlog(path.parent)))
         self._buffer = np.empty(_PACKET, EVENT_DTYPE)
@@ -121,11 +122,10 @@ class Aedat4Writer(Writer):
 
     def _header(self, table_at: int) -> bytes:
         """Return the header, whose length does not depend on where the data table is."""
-        text = "".join(self._xml()).encode("ascii")
         compression = NONE if self._lz4 is None else LZ4
         fields = struct.pack("<I4s5H2x", 20, b"IOHE", 10, 24, 4, 8, 16)
         table = struct.pack("<iiqI4x", 12, compression, table_at, 8)
-        data = fields + table + struct.pack("<I", len(text)) + text + b"\0"
+        data = fields + table + struct.pack("<I", len(self._text)) + self._text + b"\0"
         return struct.pack("<I", len(data)) + data
 
     def _xml(self) -> Iterator[str]:

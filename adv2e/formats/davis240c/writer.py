@@ -56,7 +56,7 @@ class _Davis240cWriter(Writer):
     """What folder and archive share: the frames' names and list."""
 
     def __init__(self, request: Request, stack: ExitStack) -> None:
-        self._description = to_json(request.description)
+        self._description = request.description
         self._work = OrderedWork(request.threads - 1)
         stack.callback(self._work.abandon)
         self._lines: list[str] = []
@@ -101,7 +101,8 @@ class FolderWriter(_Davis240cWriter):
         """Write what is left, the list and the description."""
         self._work.finish()
         (self._folder / LIST).write_text("".join(self._lines), "ascii", newline="\n")
-        (self._folder / DESCRIPTION).write_text(self._description, "utf-8", newline="\n")
+        text = to_json(self._description)
+        (self._folder / DESCRIPTION).write_text(text, "utf-8", newline="\n")
 
 
 def _foreign(folder: Path) -> str | None:
@@ -160,7 +161,7 @@ class ZipWriter(_Davis240cWriter):
         for number in range(len(self._encoded)):
             data = self._encoded.take().tobytes()
             self._add(f"images/frame_{number:08d}.png", data, zipfile.ZIP_STORED)
-        self._add(DESCRIPTION, self._description.encode())
+        self._add(DESCRIPTION, to_json(self._description).encode())
 
     def _add(self, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
         """Add a member with the time that zip counts from."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from io import BufferedIOBase
 from pathlib import Path
-from typing import BinaryIO
 
 from adv2e.errors import DataError
 from adv2e.geometry import Size
+from adv2e.process.signals import first_interrupt
 from adv2e.sources.base import Source
 from adv2e.sources.bayer import in_colour, light_of
 from adv2e.sources.frame import Shot
@@ -21,6 +23,9 @@ from adv2e.sources.times.instants import Stamp
 from adv2e.sources.times.lists import read_list
 from adv2e.sources.wanted import GivenTimes, Selection
 
+_A_MOMENT_S = 0.2
+"""A terminal interrupts one process after the other: a producer may end before we hear of it."""
+
 
 def open_source(
     given: GivenTimes,
@@ -28,7 +33,7 @@ def open_source(
     *,
     pixel_format: str | None = None,
     size: Size | None = None,
-    file: BinaryIO | None = None,
+    file: BufferedIOBase | None = None,
 ) -> PipeSource:
     """Return the frames that come through standard input, or another stream.
 
@@ -87,6 +92,19 @@ class PipeSource(Source):
         if layout.note and selection.bayer is None:
             self.notes.append(layout.note)
 
+    @contextmanager
+    def capturing(self, told: str) -> Iterator[None]:
+        """Within the context, end the frames by the first SIGINT, which says `told`."""
+        if self._stream.pipe is None:
+            yield
+            return
+        with first_interrupt(told) as interrupt:
+            self._stream.interrupt = interrupt
+            try:
+                yield
+            finally:
+                self._stream.interrupt = None
+
     def _take_times(self) -> None:
         if self._given.timestamps is not None:
             label = str(self._given.timestamps)
@@ -119,8 +137,9 @@ class PipeSource(Source):
             line = self._stream.line(LONGEST_LINE)
             if not line:
                 return None
-            if line != b"FRAME\n" and not (line.startswith(b"FRAME ") and line.endswith(b"\n")):
-                if b"FRAME\n".startswith(line):
+            begins = line.startswith(b"FRAME ")
+            if line != b"FRAME\n" and not (begins and line.endswith(b"\n")):
+                if b"FRAME\n".startswith(line) or (begins and len(line) < LONGEST_LINE):
                     self._cut_short(before)
                     return None
                 raise DataError(f"{NAME}: damaged before frame {number}: no line FRAME")
@@ -133,9 +152,16 @@ class PipeSource(Source):
         return None
 
     def _cut_short(self, fault: str) -> None:
+        if self._was_interrupted():
+            return
         if not self.selection.allow_damaged:
             raise DataError(f"{fault}; --allow-damaged takes those before")
         self._note(fault)
+
+    def _was_interrupted(self) -> bool:
+        """Tell whether a SIGINT ended the frames, which may be known a moment after their end."""
+        interrupt = self._stream.interrupt
+        return interrupt is not None and interrupt.comes_before(within_s=_A_MOMENT_S)
 
     def _shot(self, number: int, data: bytes) -> Shot:
         label = f"{NAME}: frame {number}"
@@ -159,7 +185,18 @@ class PipeSource(Source):
             yield self._shot(number, data)
             number += 1
             data = self._next(number)
+        fault = ""
         if self._stamps is not None and number != len(self._stamps):
-            raise DataError(
-                f"{self._given.timestamps}: {len(self._stamps)} times for {number} frames"
-            )
+            fault = f"{self._given.timestamps}: {len(self._stamps)} times for {number} frames"
+            if not self._was_interrupted():
+                raise DataError(fault)
+        if self._stream.interrupt is not None and self._stream.interrupt.came:
+            self.ended_by_hand = number
+            self._note(f"{NAME}: ended by hand (Ctrl-C) after {number} frames")
+            if fault:
+                self._note(f"{fault}: the first {number} are taken")
+
+    def _too_few(self, count: int, span_ns: int) -> DataError:
+        if self.ended_by_hand is not None:
+            raise KeyboardInterrupt  # nothing came that could be kept
+        return super()._too_few(count, span_ns)

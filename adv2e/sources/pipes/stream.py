@@ -2,30 +2,49 @@
 
 from __future__ import annotations
 
+import os
+import stat
 import sys
-from typing import BinaryIO
+from contextlib import suppress
+from io import BufferedIOBase
+from typing import cast
 
 from adv2e.errors import DataError
+from adv2e.process.signals import Interrupt
 
 NAME = "standard input"
 
-_PIECE = 1 << 20
+_PIECE = 1 << 16  # as much as a pipe holds, mostly
 
 
-def standard_input() -> BinaryIO:
+def standard_input() -> BufferedIOBase:
     """Return the stream; DataError if nothing can come through it."""
     if sys.stdin is None or sys.stdin.closed:
         raise DataError(f"{NAME}: is closed; frames must come through it")
     if sys.stdin.isatty():
         raise DataError(f"{NAME}: is a terminal; frames must come through it, as from ffmpeg")
-    return sys.stdin.buffer
+    return cast(BufferedIOBase, sys.stdin.buffer)
 
 
 class Stream:
-    """A stream whose beginning can be looked at before it is read."""
+    """A stream whose beginning can be looked at before it is read.
 
-    def __init__(self, file: BinaryIO) -> None:
+    Attributes
+    ----------
+    interrupt : Interrupt or None
+        Once it came, what the pipe holds by then is all that can be read.
+    pipe : int or None
+        Descriptor, where others may send for as long as they please: not of a file.
+    """
+
+    def __init__(self, file: BufferedIOBase) -> None:
         self._file, self._seen = file, b""
+        self.interrupt: Interrupt | None = None
+        self._left: int | None = None
+        self.pipe: int | None = None
+        with suppress(OSError, ValueError):  # it has no descriptor
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                self.pipe = file.fileno()
 
     def peek(self, size: int) -> bytes:
         """Return the next bytes, fewer only where it ends; they are still to be read."""
@@ -36,10 +55,25 @@ class Stream:
         """Return so many bytes, fewer only where it ends; those that never come take no memory."""
         pieces, self._seen = [self._seen[:size]], self._seen[size:]
         left = size - len(pieces[0])
-        while left and (piece := self._file.read(min(left, _PIECE))):
+        while left and (piece := self._some(min(left, _PIECE))):
             pieces.append(piece)
             left -= len(piece)
         return b"".join(pieces)
+
+    def _some(self, most: int) -> bytes:
+        """Return what comes next, no more than that; nothing at the end.
+
+        Nothing stays in the buffer of the file, where nobody could wait for it.
+        """
+        if self.pipe is None or self.interrupt is None:
+            return self._file.read1(most)
+        if self._left is None and self.interrupt.comes_before(self.pipe):
+            self._left = _waiting_in(self.pipe)
+        if self._left is None:
+            return self._file.read1(most)
+        piece = self._file.read1(min(most, self._left)) if self._left else b""
+        self._left -= len(piece)
+        return piece
 
     def line(self, longest: int) -> bytes:
         """Return the bytes up to the end of a line, that included; no more than `longest`."""
@@ -49,3 +83,15 @@ class Stream:
             if byte == b"\n":
                 break
         return bytes(found)
+
+
+def _waiting_in(pipe: int) -> int:
+    """Return how many bytes were sent and not read yet."""
+    import fcntl  # noqa: PLC0415 - Windows has none
+    import termios  # noqa: PLC0415
+
+    try:
+        found = fcntl.ioctl(pipe, termios.FIONREAD, bytes(4))
+    except OSError:  # it does not tell
+        return 0
+    return int.from_bytes(found, sys.byteorder)

@@ -237,6 +237,13 @@ def test_no_frame_is_read_before_it_is_wanted():
     assert file.tell() <= len(data) - 7 * 72
 
 
+def test_a_mark_that_is_cut_short():
+    data = y4m([planes(16)] * 2) + b"FRAME Ip"
+    with pytest.raises(DataError, match=r"ends within frame 2; --allow-damaged takes those"):
+        list(opened(data).frames())
+    assert len(list(opened(data, allow_damaged=True).frames())) == 2
+
+
 @pytest.mark.parametrize("kept", [1, 30, 72 + 6 - 1])
 @pytest.mark.parametrize("kind", ["y4m", "raw"])
 def test_a_last_frame_that_is_cut_short(kind, kept):
