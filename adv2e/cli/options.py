@@ -210,7 +210,7 @@ def check_sets(sets: tuple[str, ...], seed: int | None, size: Size | None) -> No
     """Raise UsageError if --set says what --seed or --size says, too."""
     from adv2e.config import written_keys
 
-    keys = {"--seed": ("seed",), "--size": ("sensor", "sensor.width", "sensor.height")}
+    keys = {"--seed": ("seed",), "--size": ("sensor.width", "sensor.height")}
     given = {"--seed": seed, "--size": size}
     for key in written_keys((), sets):
         for option in (name for name in given if given[name] is not None and key in keys[name]):
