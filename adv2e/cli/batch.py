@@ -169,10 +169,13 @@ def command(
     from adv2e.batch.transfer import is_url
 
     part = None if shard is None else parse_shard(shard)
+    options.check_sets(sets, seed, size)
     if size is not None:
         sets = (*sets, f"sensor.width={size[0]}", f"sensor.height={size[1]}")
     written = lookup.to_write(Path("a"), format)
     export = _export(kind, window_us, bins, written)
+    if with_frames:
+        lookup.check_frames(written)
     with_frames = with_frames or (export is not None and export.needs_frames)
     given |= {"format": format, "with_frames": with_frames}
     suffix = next(iter(written.suffixes))

@@ -76,8 +76,8 @@ def command(
     several distances between them, each with its definition. Beside each stands the distance
     between two halves of the measured events, which is about what chance alone makes.
 
-    With a configuration (-c, --set or --seed) and frames, the command also simulates the frames
-    twice, with two seeds, and prints the distance between these two simulations.
+    With a configuration (-c, --set, --seed or --effect) and frames, the command also simulates the
+    frames twice, with two seeds, and prints the distance between these two simulations.
     """
     import numpy as np
 
@@ -114,7 +114,8 @@ def command(
 def _configured() -> bool:
     """Tell whether a configuration was asked for on the command line."""
     given = click.get_current_context().params
-    return bool(given["config_files"] or given["sets"] or given["seed"] is not None)
+    layers = (given["config_files"], given["sets"], given["effect_files"])
+    return any(layers) or given["seed"] is not None
 
 
 def _resimulation(

@@ -206,6 +206,17 @@ def config_parts(body: Body) -> Body:
     return body
 
 
+def check_sets(sets: tuple[str, ...], seed: int | None, size: Size | None) -> None:
+    """Raise UsageError if --set says what --seed or --size says, too."""
+    from adv2e.config import written_keys
+
+    keys = {"--seed": ("seed",), "--size": ("sensor.width", "sensor.height")}
+    given = {"--seed": seed, "--size": size}
+    for key in written_keys((), sets):
+        for option in (name for name in given if given[name] is not None and key in keys[name]):
+            raise click.UsageError(f"--set {key} and {option} both say it: keep one")
+
+
 def config_options(body: Body) -> Body:
     """Add those of :func:`config_parts`; the command gets ``config``, a function.
 
@@ -227,6 +238,7 @@ def config_options(body: Body) -> Body:
         def config(size: Size | None = None) -> Config:
             from adv2e.config import load_config
 
+            check_sets(sets, seed, size)
             return load_config(config_files, sets, seed, own_effects(effect_files), size=size)
 
         return body(*args, config=config, **kw)
@@ -419,6 +431,8 @@ def reporting_options(body: Body) -> Body:
     )
     @functools.wraps(body)
     def reporting(*args: Any, progress: bool | None, quiet: bool, verbose: int, **kw: Any) -> Any:
+        if quiet and verbose:
+            raise click.UsageError("-q and -v say the opposite: keep one")
         log = Log(-1 if quiet else verbose)
         if progress is None:
             progress = not quiet and sys.stderr is not None and sys.stderr.isatty()

@@ -154,10 +154,13 @@ def convert(
 
     if fps is not None and timestamps is not None:
         raise UsageError("fps and timestamps both give the times of the frames: keep one")
+    if motion is None and (extent_px is not None or duration_s is not None):
+        raise UsageError("extent_px and duration_s are of the path that motion makes")
     if takes_events(Path(source), take, track):
         simulated = {
             **{"config": config, "fps": fps, "timestamps": timestamps, "preview": preview},
             **{"bayer": bayer, "pixel_format": pixel_format, "motion": motion},
+            "allow_damaged": allow_damaged or None,
         }
         if given := [name for name, value in simulated.items() if value is not None]:
             raise UsageError(f"{source} holds events, nothing is simulated: leave out {given[0]}")

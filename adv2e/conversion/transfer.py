@@ -164,6 +164,8 @@ def convert_events(
         crop_events=crop_events,
     )
     facts = file.facts
+    if with_frames and file.shots is None:
+        raise DataError(f"{path}: holds events and no frames: leave --with-frames out")
     if causes and file.causes is None:
         raise DataError(
             f"{path}: its events have no causes; only 'adv2e convert --causes' has them"

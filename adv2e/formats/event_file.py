@@ -68,6 +68,8 @@ class Facts:
         For the reader to tell.
     has_chosen : bool
         The reader looked for the stream that the user wants.
+    needs_unit : bool
+        Neither the format nor the file says the unit of its times: what the user says counts.
     problems : list of str
         What is doubtful and what was done about it.
     description : dict
@@ -95,7 +97,7 @@ class Facts:
     ) -> None:
         self.path = path
         self.track = track
-        self.has_chosen = False
+        self.has_chosen = self.needs_unit = False
         self.inputs: list[str | Path] = []
         self.rotate180 = rotate180
         self.set_back = set_back
@@ -192,6 +194,7 @@ class Facts:
         if self.stated_unit is not None:
             unit = Unit(self.stated_unit)
         else:
+            self.needs_unit = True
             if size is None:
                 size = (int(x.max()) + 1, int(y.max()) + 1) if t.size else (1, 1)
             frames = self._frames

@@ -8,12 +8,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from adv2e.errors import DataError
+from adv2e.errors import DataError, UsageError
 from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile
 from adv2e.formats.lookup import format_of, may_hold_events
 from adv2e.formats.reading import open_events
-from adv2e.sources import open_source
+from adv2e.sources import STDIN, open_source
 from adv2e.sources.base import Source
 from adv2e.sources.listed import ListedSource, Picture, Timed, timed
 from adv2e.sources.stored import EVENTS
@@ -37,9 +37,9 @@ def open_frames(path: str | Path, **given: Any) -> Source:
     turn = given.get("rotate180", False)
     if turn and selection.bayer is not None:
         raise DataError(f"{path}: --bayer is not known of frames that --rotate180 turns: give one")
-    file = open_events(
-        path, time_unit=given.get("time_unit"), rotate180=turn, track=given.get("track")
-    )
+    # a list that the user gives has times of its own, which are those of the unit
+    unit = None if times.timestamps else times.time_unit
+    file = open_events(path, time_unit=unit, rotate180=turn, track=given.get("track"))
     if file.shots is None:
         raise DataError(f"{path}: holds events and no frames")
     return _source(file, times, selection)
@@ -49,7 +49,7 @@ def _source(file: EventFile, given: GivenTimes, selection: Selection) -> Source:
     """Return the frames of an event file as a source."""
     assert file.shots is not None
     path = file.facts.path
-    times = Timed(list(file.shots()), list(file.facts.problems), [])
+    times = Timed(list(file.shots()), [f"{path}: {line}" for line in file.facts.problems], [])
     if given:
         pictures = [Picture(shot.label, None, shot.load) for shot in times.shots]
         times = timed(given, pictures, path, str(path))
@@ -83,8 +83,12 @@ def takes_events(path: Path, choice: str | None = None, track: str | int | None 
     ------
     DataError
         The input cannot be read.
+    UsageError
+        Events are wanted of standard input.
     """
     if choice is not None:
+        if choice == "events" and str(path) == STDIN:
+            raise UsageError("--from events needs a file: frames come through standard input")
         return choice == "events"
     if not (path.exists() and may_hold_events(path)):
         return False

@@ -80,6 +80,8 @@ def open_events(
         file: EventFile = found.load(found.reader)(path, facts)
         if not facts.has_chosen:
             facts.choose([Track("events")])
+        if time_unit is not None and not facts.needs_unit:
+            facts.tell(f"--time-unit {time_unit} is not followed: the file says what its times are")
         facts.inputs.append(beside_of_causes(path))
         inside = found.load(found.causes)(path) if found.causes else None
     file = _named(replace(file, causes=inside or found_beside(path)))

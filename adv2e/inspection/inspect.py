@@ -88,7 +88,7 @@ def inspect(
         return _of_source(source, progress or (lambda done, total: None))
     of_frames = {
         "--fps": fps, "--timestamps": timestamps, "--bayer": bayer,
-        "--pixel-format": pixel_format,
+        "--pixel-format": pixel_format, "--allow-damaged": allow_damaged or None,
     }  # fmt: skip
     for option in (name for name, value in of_frames.items() if value is not None):
         raise DataError(f"{path}: its events are described: leave {option} out")

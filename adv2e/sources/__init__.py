@@ -116,6 +116,8 @@ def open_source(
             " WxH says the size of its frames"
         )
     if str(path) == STDIN:
+        if along is not None:
+            raise UsageError("--motion moves before one picture: INPUT must be its file")
         from adv2e.sources.pipes import source as pipe  # noqa: PLC0415  (needs OpenCV)
 
         return pipe.open_source(given, selection, pixel_format=pixel_format, size=frame_size)

@@ -128,7 +128,8 @@ class ListedSource(Source):
     Raises
     ------
     DataError
-        Fewer than two frames, in all or selected, or an unreadable first frame.
+        Fewer than two frames, in all or selected, or an unreadable first frame; what can be decoded
+        of damaged ones is wanted.
     """
 
     def __init__(
@@ -142,6 +143,8 @@ class ListedSource(Source):
         light: Light | None = None,
     ) -> None:
         super().__init__(path, kind, selection, has_clock)
+        if selection.allow_damaged:
+            raise DataError(f"{path}: --allow-damaged is for video: leave it out")
         shots = self._shots = timed.shots
         # of an archive or a stack, they are names of no file
         self.inputs += [*filter(None, [timed.found]), *(shot.label for shot in shots)]

@@ -31,12 +31,19 @@ def open_source(path: Path, given: GivenTimes, selection: Selection, along: Sens
     Raises
     ------
     UsageError
-        Times of frames are given as a list.
+        What is for frames that exist is given: a list of times, or its unit, a mosaic, damage.
     DataError
         It is no picture, or cannot be read.
     """
     if given.timestamps is not None:
         raise UsageError("--motion makes the frames: give --fps, or no times")
+    of_frames = {
+        "--time-unit": given.time_unit,
+        "--bayer": selection.bayer,
+        "--allow-damaged": selection.allow_damaged,
+    }
+    for option in (name for name, value in of_frames.items() if value):
+        raise UsageError(f"--motion makes the frames of one picture: leave {option} out")
     if path.suffix.lower() not in IMAGE_SUFFIXES:
         raise DataError(f"{path}: --motion moves before one picture, such as photo.png")
     return StillSource(path, given, selection, along)

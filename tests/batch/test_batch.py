@@ -122,6 +122,9 @@ def test_wrong_settings_are_told_before_anything_is_written(batch, source, tmp_p
     assert "did you mean" in done.err or "pixel.leak" in done.err
     done = batch(source, dest, "--shard", "3/2")
     assert done.status == 2
+    done = batch(source, dest, "--with-frames", "--format", "evt3")
+    assert done.status == 2
+    assert "holds events alone; frames go to" in done.err
     assert not dest.exists()
 
 

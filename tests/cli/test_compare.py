@@ -87,6 +87,17 @@ def test_a_configuration_gives_the_floor_of_two_seeds(adv2e, pair, simulation):
     assert simulation[0][2] == 1
 
 
+def test_an_effect_of_the_user_is_a_configuration(adv2e, pair, simulation, tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "from adv2e.effects.hooks import Hooks\n"
+        "class Delay(Hooks):\n"
+        "    def drive(self, times_s):\n"
+        "        return 0 * times_s\n"
+    )
+    assert adv2e("compare", *pair, "--effect", tmp_path / "mine.py").status == 0
+    assert [config.seed for _, config, _ in simulation] == [0, 1]
+
+
 def test_the_largest_seed_has_another_beside_it(adv2e, pair, simulation):
     args = ("-c", "ideal", "--set", "frames.encoding=linear", "--seed", str(2**64 - 1))
     assert adv2e("compare", *pair, *args).status == 0

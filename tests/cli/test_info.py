@@ -154,7 +154,8 @@ def test_other_commands_tell_the_reading_too(adv2e, event_file, command):
 
 
 @pytest.mark.parametrize(
-    "options", [("--fps", "10"), ("--timestamps", "none.txt"), ("--bayer", "RGGB")]
+    "options",
+    [("--fps", "10"), ("--timestamps", "none.txt"), ("--bayer", "RGGB"), ("--allow-damaged",)],
 )
 def test_options_of_frames_are_not_ignored_for_events(adv2e, event_file, options):
     outcome = adv2e("info", event_file, *options)

@@ -240,6 +240,14 @@ def test_frames_are_refused_where_they_cannot_be_stored(adv2e, tmp_path):
     assert not (tmp_path / "b.raw").exists()
 
 
+def test_frames_that_are_not_there_are_not_stored_without_a_word(adv2e, tmp_path):
+    write(tmp_path / "a.h5", events_of())
+    told = adv2e("convert", "a.h5", "-o", "b.h5", "--with-frames")
+    assert told.status == 1
+    assert "a.h5: holds events and no frames: leave --with-frames out" in told.err
+    assert not (tmp_path / "b.h5").exists()
+
+
 def test_a_recording_is_no_picture_to_move_before(adv2e, tmp_path):
     write(tmp_path / "a.aedat4", events_of(), frames_of())
     told = adv2e("convert", "a.aedat4", "-o", "b.txt", "--motion", "pan")
@@ -254,7 +262,9 @@ def test_events_out_of_order_that_all_lie_outside_leave_none(adv2e, tmp_path):
     assert adv2e_read(tmp_path / "b.h5").events.size == 0
 
 
-@pytest.mark.parametrize("option", [{"bayer": "RGGB"}, {"motion": "pan"}, {"fps": 30}])
+@pytest.mark.parametrize(
+    "option", [{"bayer": "RGGB"}, {"motion": "pan"}, {"fps": 30}, {"allow_damaged": True}]
+)
 def test_arguments_of_a_simulation_are_refused(option, tmp_path):
     write(tmp_path / "a.h5", events_of())
     with pytest.raises(UsageError, match=f"nothing is simulated: leave out {next(iter(option))}"):

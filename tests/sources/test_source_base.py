@@ -118,6 +118,11 @@ def test_a_selection_of_fewer_than_two_frames_is_refused(stack, options, message
         open_source(stack[0], fps=10, **options)
 
 
+def test_damage_is_allowed_of_video_alone(stack):
+    with pytest.raises(DataError, match=r"stack\.npy: --allow-damaged is for video: leave it out"):
+        open_source(stack[0], fps=10, allow_damaged=True)
+
+
 def test_missing_input(tmp_path):
     with pytest.raises(DataError, match=r"none\.mp4: no such file or folder"):
         open_source(tmp_path / "none.mp4")

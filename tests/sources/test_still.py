@@ -142,6 +142,10 @@ def test_python_does_what_the_command_does(adv2e, tmp_path):
         (("photo.png", "--extent", "3"), 2, "--extent and --duration are of the path"),
         (("photo.png", "--motion", "pan", "--extent", "40"), 1, "too few for a path of 40 pixels"),
         (("clip.mp4", "--motion", "pan"), 1, "--motion moves before one picture"),
+        (("-", "--motion", "pan"), 2, "--motion moves before one picture: INPUT must be its file"),
+        (("photo.png", "--motion", "pan", "--time-unit", "ms"), 2, "leave --time-unit out"),
+        (("photo.png", "--motion", "pan", "--bayer", "rggb"), 2, "leave --bayer out"),
+        (("photo.png", "--motion", "pan", "--allow-damaged"), 2, "leave --allow-damaged out"),
         (("photo.png", "--motion", "pan", "--extent", "1", "--duration", "1e5", "--fps", "1000"),
          1, "100,000,001 frames along the path"),
     ],
@@ -152,6 +156,15 @@ def test_what_cannot_be(given, status, told, adv2e, tmp_path):
     found = adv2e("convert", *given, "-o", "a.txt")
     assert (found.status, told in found.err) == (status, True), found.err
     assert not (tmp_path / "a.txt").exists()
+
+
+def test_in_python_a_path_has_its_measures_and_they_a_path():
+    photo()
+    for given in ({"extent_px": 3}, {"duration_s": 1}):
+        with pytest.raises(
+            UsageError, match="extent_px and duration_s are of the path that motion"
+        ):
+            package().convert("photo.png", "a.txt", **given)
 
 
 def test_paths_that_cannot_be():

@@ -468,8 +468,8 @@ def test_of_topics_of_images_alone_the_user_chooses(tmp_path):
     assert not any(frame.image.any() for frame in first.frames())
     assert all(np.array_equal(frame.image, GREY) for frame in second.frames())
     assert first.doubts == [
-        "2 tracks of frames: 0 = /left/image_raw (2 messages), 1 = /right/image_raw (2 messages):"
-        " 0 = /left/image_raw is taken, --track chooses another"
+        f"{tmp_path / 'o.bag'}: 2 tracks of frames: 0 = /left/image_raw (2 messages), 1 ="
+        " /right/image_raw (2 messages): 0 = /left/image_raw is taken, --track chooses another"
     ]
     assert second.doubts == []
 

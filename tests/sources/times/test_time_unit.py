@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError, UsageError
+from adv2e.events import make_events
 from adv2e.formats.reading import read_events
+from adv2e.formats.writing import open_sink, write_events
 from adv2e.sources import open_source
 
 PER_S = {"s": 1, "ms": 1000, "us": 10**6, "ns": 10**9}
@@ -247,3 +249,25 @@ def test_other_commands_take_the_unit(adv2e, tmp_path):
     assert (settled.status, "no unit" in settled.err, settled.out) == (0, False, told.out)
     drawn = adv2e("render", path, "-o", tmp_path / "a.png", "--time-unit", "us")
     assert (drawn.status, "no unit" in drawn.err) == (0, False)
+
+
+@pytest.mark.parametrize("name", ["a.raw", "a.aedat", "a.es", "a.h5", "a.txt"])
+def test_a_unit_for_times_of_a_known_one_is_told(adv2e, tmp_path, name):
+    path = tmp_path / name
+    write_events(path, make_events(t=[10, 20], x=[0, 3], y=[0, 2], p=[1, 0]), (4, 3))
+    told = adv2e("convert", path, "-o", tmp_path / "out.csv", "--time-unit", "ms")
+    assert told.status == 0
+    assert f"{path}: --time-unit ms is not followed: the file says what its times are" in told.err
+    assert read_events(tmp_path / "out.csv").events["t"].tolist() == [10, 20]
+
+
+def test_a_unit_beside_a_list_is_that_of_the_list(adv2e, tmp_path):
+    path, times = tmp_path / "a.h5", tmp_path / "times.txt"
+    with open_sink(path, width=40, height=30, metadata={}, with_frames=True) as sink:
+        for number in range(3):
+            sink.write_frame(number * 10**7, np.full((30, 40), 60 * number, np.uint8))
+    times.write_text("0\n40\n80\n")
+    words = ("--from", "frames", "--timestamps", times, "--time-unit", "ms", "--with-frames")
+    told = adv2e("convert", path, "-o", tmp_path / "out.h5", *words)
+    assert (told.status, "not followed" in told.err) == (0, False), told.err
+    assert read_events(tmp_path / "out.h5").frame_times_ns.tolist() == [0, 40_000_000, 80_000_000]
