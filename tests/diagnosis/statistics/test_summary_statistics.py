@@ -22,6 +22,7 @@ from made_up.streams import (
 
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.splits import Split
+from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.hints.lamps import strongest_lines
 from adv2e.diagnosis.statistics import intervals, rates, spectrum, stamps, timing
 from adv2e.diagnosis.statistics.summary import BOTH, VIEWS, SummaryStatistics
@@ -69,6 +70,19 @@ def test_a_group_has_as_many_values_as_entries(group):
     for row in raw:
         assert group.values(row).shape == (len(group.entries),)
     assert np.all(np.asarray(group.least) > 0)
+
+
+def test_the_order_of_events_of_one_stamp_does_not_matter():
+    draw = np.random.default_rng(4)
+    events = random_stream(4000, 11).events()
+    events["t"] -= events["t"] % 500  # many of one stamp, of other pixels mostly
+    _, first = np.unique(events[["t", "x", "y"]], return_index=True)
+    events = events[first]
+    shuffled = draw.permutation(events)
+    shuffled = shuffled[np.argsort(shuffled["t"], kind="stable")]
+    assert np.any(shuffled != events)
+    measured = (ALL.measure(Stream.of(one, WIDTH, HEIGHT)) for one in (events, shuffled))
+    np.testing.assert_array_equal(*measured)
 
 
 @settings(deadline=None, max_examples=25)
