@@ -190,8 +190,9 @@ def _kind_of_folder(path: Path) -> str:
     from adv2e.files.zips import Members  # noqa: PLC0415
     from adv2e.sources import davis240c, gopro, listings  # noqa: PLC0415
 
-    if davis240c.is_recording(path):
+    files = Members(path)
+    if davis240c.is_recording(files):
         return "davis240c"
-    if listings.find_listing(Members(path)):
+    if listings.find_listing(files):
         return "listings"
     return "gopro" if gopro.find_sequence(path) else "images.source"

@@ -25,9 +25,8 @@ from adv2e.sources.times.names import member_of
 from adv2e.sources.wanted import GivenTimes, Selection
 
 
-def is_recording(folder: Path) -> bool:
-    """Tell whether a folder has this layout: a list of images that are in folders below it."""
-    files = Members(folder)
+def is_recording(files: Members) -> bool:
+    """Tell whether files have this layout: a list of images that are in folders below it."""
     if not files.has(LIST):
         return False
     if files.has(EVENTS):

@@ -32,7 +32,8 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
         images and lists.
     """
     files = Members(path)
-    if files.enter(LIST):
+    lists = files.enter(LIST)
+    if len(lists) > 1 or (lists and davis240c.is_recording(files)):
         return davis240c.open_source(path, given, selection)
     names = files.archived()
     for top in ("", *sorted({name.partition("/")[0] + "/" for name in names if "/" in name})):

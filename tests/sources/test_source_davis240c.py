@@ -130,7 +130,7 @@ def test_stamps_that_occur_twice_are_named_by_line(recording):
 
 def test_a_list_without_names(pack, recording):
     (recording / "images.txt").write_text("0.1\n0.2\n")
-    with pytest.raises(DataError, match=r"images\.txt line 1: expected 'time name'"):
+    with pytest.raises(DataError, match=r"images\.txt: 2 times for the 3 frames"):
         open_source(pack())
 
 

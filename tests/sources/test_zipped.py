@@ -82,6 +82,29 @@ def test_the_list_of_a_data_set(path, top):
     assert [frame.t_ns for frame in source.frames()] == [10**8, 2 * 10**8, 3 * 10**8]
 
 
+@pytest.mark.parametrize("top", ["", "clip/"])
+@pytest.mark.parametrize(
+    ("below", "more", "kind", "encoding"),
+    [
+        ("", {}, "images", "srgb"),
+        ("", {"events.txt": "0.001 1 1 1\n"}, "davis240c", "linear"),
+        ("images/", {}, "davis240c", "linear"),
+    ],
+)
+def test_a_folder_and_its_zip_have_the_same_light(tmp_path, top, below, more, kind, encoding):
+    lines = "".join(f"{0.01 * n:.2f} {below}{name}\n" for n, name in enumerate(FRAMES))
+    members = {below + name: data for name, data in FRAMES.items()}
+    files = {"images.txt": lines, **members, **more}
+    for name, data in files.items():
+        file = tmp_path / "clip" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(data if isinstance(data, bytes) else data.encode())
+    packed = pack(tmp_path / "a.zip", {top + name: data for name, data in files.items()})
+    for source in (open_source(tmp_path / "clip"), open_source(packed)):
+        assert (source.kind, source.light.encoding) == (kind, encoding)
+        assert values(source) == [10, 20, 90, 100]
+
+
 def test_images_in_several_folders_are_named(path):
     with pytest.raises(DataError, match=r"a\.zip: images in more than one folder of it, a and b/c"):
         open_source(pack(path, {"a/1.png": png(1), "b/c/1.png": png(2)}), fps=10)
