@@ -29,8 +29,10 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
+from adv2e.files.zips import Members
 from adv2e.formats.lookup import format_of, may_hold_events
 from adv2e.sources import VIDEO_SUFFIXES, open_source
+from adv2e.sources.davis240c import is_recording
 from adv2e.sources.gopro import find_sequence
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES
 from adv2e.sources.images.order import natural_key
@@ -248,12 +250,19 @@ def _suffix(name: str) -> str:
 
 
 def _kind_of_folder(path: Path) -> str:
-    if (path / "images.txt").is_file():
+    if (path / "images.txt").is_file() and _is_recording(path):
         return "davis240c"
     if find_sequence(path):
         return "gopro"
     is_bag = may_hold_events(path) and "r" in format_of(path).frames
     return "auto" if is_bag else ""
+
+
+def _is_recording(path: Path) -> bool:
+    try:
+        return is_recording(Members(path))
+    except DataError:  # what is wrong with its list is told when it is converted
+        return True
 
 
 def _names(root: Path, paths: list[Path]) -> list[str]:

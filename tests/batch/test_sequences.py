@@ -155,6 +155,17 @@ def test_a_list_of_something_else_does_not_make_a_folder_a_sequence(tmp_path):
     assert names(tmp_path) == ["a"]
 
 
+def test_pictures_with_a_list_beside_them_are_pictures_as_for_convert(tmp_path):
+    trees.pictures(tmp_path / "walk")
+    shown = sorted(path.name for path in (tmp_path / "walk").iterdir())
+    lines = "".join(f"{0.01 * k:.2f} {name}\n" for k, name in enumerate(shown))
+    (tmp_path / "walk" / "images.txt").write_text(lines)
+    assert names(tmp_path, "images") == ["walk"]
+    assert names(tmp_path) == ["walk"]
+    (tmp_path / "walk" / "events.txt").write_text("0.001 1 1 1\n")
+    assert names(tmp_path, "davis240c") == ["walk"]
+
+
 def test_what_another_layout_would_take_is_told(tree):
     told = find_sequences(tree, "gopro").told()
     assert any("4 more: --layout videos takes that" in line for line in told)
