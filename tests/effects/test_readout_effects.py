@@ -334,6 +334,30 @@ def test_leaps_with_a_period_of_their_own(start_s):
         assert hook.signal(np.array([start_s + leap - 5e-6]))[0] < 0.1 * np.exp(-9.0)
 
 
+def test_what_is_left_of_leaps_before_the_first_frame_decays_from_the_beginning():
+    coupling = FrameCoupling(
+        amplitude=0.2, tau_us=1500.0, delay_us=-41.0, rise_us=40.0, period_us=4000.0
+    )
+    hook = FrameCouplingHooks(coupling)
+    hook.begin(View(2, 2, 0, 0.0))
+    assert len(list(hook.light((t, None) for t in (0, 2_000_000)))) == 2
+    times = np.array([0.0, 0.5e-3, 1.5e-3])
+    waited = times + 1e-6  # since it rose
+    before = np.arange(9) * 4e-3
+    wanted = 0.2 * np.exp(-(waited + before[:, None]) / 1.5e-3).sum(axis=0)
+    np.testing.assert_allclose(hook.signal(times), wanted, rtol=1e-3)
+    # the pixel has settled with it: as it decays, OFF events come
+    config = load_config(
+        ["ideal"],
+        ["readout.frame_coupling={amplitude: 0.3, tau_us: 1500, delay_us: -41, rise_us: 40,"
+         " period_us: 40000}"],
+    )  # fmt: skip
+    still = ((0, np.full((3, 4), 90.0)), (20_000_000, np.full((3, 4), 90.0)))
+    events = np.concatenate(list(events_from_light(iter(still), config, threads=1)))
+    assert len(events) == 12
+    assert not events["p"].any()
+
+
 @pytest.mark.parametrize("tau_us", [150.0, 600.0])
 def test_where_the_coupling_has_decayed_long_steps_make_the_same_events(monkeypatch, tau_us):
     planned = []

@@ -20,7 +20,8 @@ All pixels that are within A of a threshold fire at the leap, and others when th
 When a DAVIS240C watches a scene in motion, these are a tenth of all events: ON in the 0.4 ms before
 each frame, OFF in about a millisecond after it.
 
-The pixels are at rest at the first frame: there is no leap before it.  A leap is a rise over
+The pixels are at rest at the first frame: there is no leap before it, but with period_us, those
+before have gone on, and what is left of them is there from the beginning.  A leap is a rise over
 rise_us.  If that is 0, it is a rise over a twelfth of tau, or of w where that is shorter.  The rise
 is the longest step of time there.  Then it decays: nothing shows before the leap, and its height is
 met.  A line through a step of a twelfth of tau of the decay is off by A/1152.  Intervals that begin
@@ -133,7 +134,9 @@ class FrameCouplingHooks(Hooks):
         self._leaps: list[float] = []
         self._sums: list[float] = []
         if self._period_s:
-            self._next = math.ceil((view.start_s - _SAME_S - self._delay_s) / self._period_s)
+            lasts_s = self._rise_s + self._width_s + _FADED * self._tau_s
+            first_s = view.start_s - _SAME_S - lasts_s - self._delay_s
+            self._next = math.ceil(first_s / self._period_s)
 
     def light(self, frames: Frames) -> Frames:
         """Yield the frames as they are, each once all leaps before it are known."""
@@ -143,8 +146,9 @@ class FrameCouplingHooks(Hooks):
         ahead_ns = max(0, math.ceil(-self._delay_s * 1e9))
         held: deque[tuple[int, NDArray[Any]]] = deque()
         for number, frame in enumerate(frames):
-            if number % self._every == 0:
-                self._leap(frame[0] * 1e-9 + self._delay_s)
+            leap_s = frame[0] * 1e-9 + self._delay_s
+            if number % self._every == 0 and leap_s >= self.view.start_s - _SAME_S:
+                self._leap(leap_s)
             held.append(frame)
             while held and held[0][0] + ahead_ns <= frame[0]:
                 yield held.popleft()
@@ -159,8 +163,6 @@ class FrameCouplingHooks(Hooks):
             yield frame
 
     def _leap(self, time: float) -> None:
-        if time < self.view.start_s - _SAME_S:
-            return
         left = 0.0
         if self._leaps:
             left = self._sums[-1] * float(np.exp((self._leaps[-1] - time) / self._tau_s))
@@ -172,7 +174,8 @@ class FrameCouplingHooks(Hooks):
         left = self._left(times_s)
         if self._width_s:
             left = left - self._left(times_s - self._width_s)
-        return np.where(times_s > self.view.start_s, self.parameters.amplitude * left, 0.0)
+        from_s = -math.inf if self._period_s else self.view.start_s
+        return np.where(times_s > from_s, self.parameters.amplitude * left, 0.0)
 
     def _left(self, times_s: Times) -> NDArray[np.float64]:
         """Return what is left of all leaps up to each time, of a leap of one."""
