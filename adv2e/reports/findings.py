@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,18 @@ from adv2e.reports.keys import meaning_of, summary_of, unit_of
 from adv2e.reports.labels import heading_of
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.next_steps import next_steps
-from adv2e.reports.quantities import interval_text, probability_text, unit_text, value_text
+from adv2e.reports.quantities import (
+    interval_text,
+    percent_text,
+    probability_text,
+    unit_text,
+    value_text,
+)
 from adv2e.reports.result import Diagnosis, Interval, ListInterval
 from adv2e.reports.tables import Column, table
+
+_LEAST_P = 0.01
+"""Probability from which on chance may make what is left."""
 
 MARKS = {
     "consistent": ("✓", "Consistent"),
@@ -54,8 +64,24 @@ def main_error(diagnosis: Diagnosis) -> Markup:
     chance: list[object] = ["Would chance alone make differences as large as these? ", before]
     if diagnosis.effects:
         chance += [" before, ", after, " after"]
-    parts.append(tag("p", *chance, ".", class_="note"))
+    parts.append(tag("p", *chance, f". {_meaning(diagnosis)}", class_="note"))
     return tag("figure", *parts, class_="main")
+
+
+def _meaning(diagnosis: Diagnosis) -> str:
+    """Say what p, and the error beside its floor, mean for this recording."""
+    p = diagnosis.global_p_after
+    if math.isnan(p):
+        return "Here, nobody knows."
+    text = "Here, it would not" if p < _LEAST_P else "Here, it may"
+    for row in diagnosis.errors[:1]:
+        after, floor = row.after.value, row.floor
+        most = floor.value if floor.interval is None else floor.interval[1]
+        if after <= max(most, floor.value):
+            text += ", and the error is at its floor"
+        elif floor.value > 0.0 and math.isfinite(after):
+            text += f", and the error is {percent_text(after / floor.value - 1.0)} above its floor"
+    return f"{text}."
 
 
 def other_errors(diagnosis: Diagnosis) -> Markup:
