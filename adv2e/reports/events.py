@@ -10,7 +10,7 @@ from adv2e.reports.quantities import estimate_text, number_text
 from adv2e.reports.result import Diagnosis, Snapshot, Total
 from adv2e.reports.tables import Column, table
 
-_NAMES = ("measured", "as declared", "with what was found")
+_NAMES = ("measured", "as declared (before)", "with what was found (after)")
 
 
 def events(diagnosis: Diagnosis) -> Markup:

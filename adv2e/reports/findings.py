@@ -14,7 +14,9 @@ from adv2e.reports.labels import heading_of
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.next_steps import next_steps
 from adv2e.reports.quantities import (
+    NO_UNIT,
     interval_text,
+    native,
     percent_text,
     probability_text,
     unit_text,
@@ -52,8 +54,9 @@ def main_error(diagnosis: Diagnosis) -> Markup:
     """Return the error before and after, beside its floor: that which ``report.json`` gives."""
     parts: list[object] = []
     for row in diagnosis.errors[:1]:
-        lines = f" Lines: {diagnosis.wording.intervals}." if row.before.interval else ""
-        about = f"Error: {row.name}. Floor: {diagnosis.wording.floor}.{lines}"
+        words = diagnosis.wording
+        lines = f" Lines: {words.intervals}." if row.before.interval else ""
+        about = f"Error: {row.name}; {words.error}. Floor: {words.floor}.{lines}"
         heading = "Error on data that was not used for fitting"
         parts.append(tag("figcaption", heading))
         parts += [error_chart(row, changed=bool(diagnosis.effects)), tag("p", about, class_="note")]
@@ -61,7 +64,7 @@ def main_error(diagnosis: Diagnosis) -> Markup:
         tag("strong", f"p {probability_text(p)}", class_="line")
         for p in (diagnosis.global_p_before, diagnosis.global_p_after)
     )
-    chance: list[object] = ["Would chance alone make differences as large as these? ", before]
+    chance: list[object] = ["Probability that chance alone differs as much: ", before]
     if diagnosis.effects:
         chance += [" before, ", after, " after"]
     parts.append(tag("p", *chance, f". {_meaning(diagnosis)}", class_="note"))
@@ -73,7 +76,7 @@ def _meaning(diagnosis: Diagnosis) -> str:
     p = diagnosis.global_p_after
     if math.isnan(p):
         return "Here, nobody knows."
-    text = "Here, it would not" if p < _LEAST_P else "Here, it may"
+    text = f"Here, chance {'does not' if p < _LEAST_P else 'may'} make all that is left"
     for row in diagnosis.errors[:1]:
         after, floor = row.after.value, row.floor
         most = floor.value if floor.interval is None else floor.interval[1]
@@ -138,6 +141,8 @@ def _keys(
         unit, meaning = unit_of(path, diagnosis.own), meaning_of(path, diagnosis.own)
         row = [tag("code", path), _value(value, interval)]
         row += [interval_text(interval)] * (intervals is not None)
+        if not unit and isinstance(native(value), (int, float)):
+            unit = NO_UNIT
         row += [declared_text(diagnosis, path), unit_text(unit), meaning]
         rows.append(row)
     return table(caption, columns, rows)

@@ -10,6 +10,7 @@ import numpy as np
 from adv2e.reports.charts.sensor_map import CLIP_SD, Map, colour_bar, map_image
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.quantities import (
+    NO_UNIT,
     NOTHING,
     alike_texts,
     number_text,
@@ -162,7 +163,10 @@ def detectable(given: Sequence[Detectable]) -> Markup:
     if not given:
         return Markup()
     columns = [Column("effect"), Column("key"), Column("size", number=True), Column("unit")]
-    rows = [(one.name, tag("code", one.key), _size(one.size), unit_text(one.unit)) for one in given]
+    rows = [
+        (one.name, tag("code", one.key), _size(one.size), unit_text(one.unit) or NO_UNIT)
+        for one in given
+    ]
     caption = (
         "An effect of this size would have been seen about 8 times in 10;"
         f" {NOTHING}: no size that is physical would, or the simulations made do not tell"

@@ -94,9 +94,8 @@ def rejected(diagnosis: Diagnosis) -> Markup:
         Column("why not"),
     ]
     caption = (
-        "Effects tried and not added, those that explain most first: the share of the declared"
-        " model's difference (sum of squares of all numbers compared) that each alone takes away,"
-        f" on data that it was not fitted to; below 0 it adds to it; {NOTHING}: not known"
+        "Effects tried and not added, those that explain most first. Explains:"
+        f" {diagnosis.wording.explained}; below 0: it adds to it; {NOTHING}: not known"
     )
     rows = []
     for one in given:

@@ -279,6 +279,16 @@ def test_every_number_that_is_compared_has_its_unit(full):
         assert 'data-label="z before [sd]"' in row
 
 
+def test_errors_and_keys_without_a_unit_say_so(full):
+    assert "as a share of the measured events: 0 is no difference, 1 as much as with no" in full
+    row = re.search(r"<code>readout.loss.fraction</code>.*?</tr>", full)[0]
+    assert 'data-label="unit">no unit<' in row
+    row = re.search(r"<code>pixel.thresholds.on</code>.*?</tr>", full)[0]
+    assert 'data-label="unit">ln<' in row
+    row = re.search(r"<code>frames.encoding</code>.*?</tr>", full)[0]  # a word, no number
+    assert "no unit" not in row
+
+
 def pictures_of_events(text):
     """Return names, numbers of events and pictures, as they stand beside one another."""
     (beside,) = re.findall('<div class="three">(.*?)</div>', text)
@@ -301,7 +311,7 @@ def test_events_are_shown_as_measured_declared_and_found_in_the_same_colours():
     number[0, 0, 4, 5] = number[1, 0, 0, 0] = 2
     text = page(replace(everything(), snapshot=Snapshot(0.25, 0.02, *number)))
     names, numbers, split, images = pictures_of_events(text)
-    assert names == ("measured", "as declared", "with what was found")
+    assert names == ("measured", "as declared (before)", "with what was found (after)")
     assert numbers == ("3 events", "6 events", "1 event")
     assert split == ("1 ON, 2 OFF", "4 ON, 2 OFF", "1 ON, 0 OFF")
     assert "Events of 20 ms: 0.250 to 0.270 s after the first frame" in text
@@ -326,8 +336,8 @@ def test_events_are_shown_as_measured_declared_and_found_in_the_same_colours():
 def test_where_nothing_was_found_two_pictures_are_shown(full):
     assert len(pictures_of_events(full)[0]) == 3
     text = page(replace(everything(), verdict="consistent", effects=[]))
-    assert pictures_of_events(text)[0] == ("measured", "as declared")
-    assert 'data-label="with what was found"' not in text
+    assert pictures_of_events(text)[0] == ("measured", "as declared (before)")
+    assert 'data-label="with what was found' not in text
 
 
 def test_a_time_without_events_is_shown():
@@ -344,8 +354,8 @@ def test_totals_come_before_all_other_numbers():
     cells = re.findall(r'data-label="([^"]*)">([^<]*)<', row)
     assert cells == [
         ("measured", "12.0"),
-        ("as declared", "34 (30 to 38)"),
-        ("with what was found", "13.0"),
+        ("as declared (before)", "34 (30 to 38)"),
+        ("with what was found (after)", "13.0"),
         ("unit", "events"),
     ]
     assert text.index(row) == text.index('scope="row"')  # the first row of all tables
@@ -360,13 +370,15 @@ def test_maps_of_usual_sensors_keep_the_page_small():
 
 
 def test_remarks_end_in_what_they_mean_here(full):
-    told = re.findall("<p[^>]*>(Would chance.*?|Many numbers were.*?)</p>", full)
+    told = re.findall("<p[^>]*>(Probability.*?|Many numbers were.*?)</p>", full)
     assert len(told) == 2
-    assert "Here, it may, and the error is 16 % above its floor." in told[0]
+    assert (
+        "Here, chance may make all that is left, and the error is 16 % above its floor." in told[0]
+    )
     assert "Here, these are the marks of what was found" in told[1]
     left = replace(everything(), verdict="unexplained", effects=[], global_p_after=1e-4)
     text = page(left)
-    assert "Here, it would not" in text
+    assert "Here, chance does not make all that is left" in text
     assert "Here, something that the library lacks makes these differences." in text
 
 
