@@ -73,7 +73,7 @@ def test_an_axis_shows_all_that_can_be_drawn(values, log, tight):
 
 
 def test_axes_begin_at_zero_where_nothing_is_below():
-    for values in ([1.0, 10], [9.0, 10], [0.0, 5], [7.0, 7]):
+    for values in ([1.0, 10], [9.0, 10], [0.0, 5], [7.0, 7], [0.0, 0]):
         axis = axis_over([np.array(values)], 0, 1, log=False)
         assert (axis.low, axis.ticks()[0][1]) == (0, "0")
     assert axis_over([np.array([-3.0, 10])], 0, 1, log=False).low < -3
@@ -88,6 +88,13 @@ def test_rates_are_drawn_from_zero_on():
     bottom, top = texts(svg, "end")["0"][1] - 4, texts(svg, "end")["10"][1] - 4
     assert line[0][1] == pytest.approx(top, abs=0.2)
     assert bottom - top > 80  # ten of some twelve are most of the height
+
+
+def test_rates_across_begin_at_zero_too():
+    against_rates = replace(flat("rate against rate", 1), x=np.array([200.0, 300, 400]))
+    assert texts(curve_chart(against_rates), "middle")["0"][0] == pytest.approx(58)
+    bins = replace(against_rates, x=np.array([200.0, 300, 400, 500]))
+    assert "0" not in texts(curve_chart(bins), "middle")
 
 
 def test_bins_with_names_have_them_at_their_middles():

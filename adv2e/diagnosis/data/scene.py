@@ -87,14 +87,15 @@ class Scene:
 
     @property
     def bounds_of_speed(self) -> tuple[str, ...]:
-        """Name and bounds of each class of speed: of the change of log light."""
+        """Name of each class of speed, with its bounds: of the change of log light."""
         low, high = (f"{border:.2g}" for border in self.speed_borders)
-        bounds = "at rest", f"below {low} ln/s", f"{low} to {high} ln/s", f"from {high} ln/s"
-        return tuple(map("{} ({})".format, SPEED_NAMES, bounds))
+        bounds = f"below {low} ln/s", f"{low} to {high} ln/s", f"from {high} ln/s"
+        still, *others = SPEED_NAMES
+        return still, *map("{} ({})".format, others, bounds)
 
     @property
     def bounds_of_light(self) -> tuple[str, ...]:
-        """Name and bounds of each class of brightness; 255 DN is white."""
+        """Name of each class of brightness, with its bounds; 255 DN is white."""
         low, high = (f"{border:.3g}" for border in self.brightness_borders)
         bounds = f"below {low} DN", f"{low} to {high} DN", f"from {high} DN"
         return tuple(map("{} ({})".format, LIGHT_NAMES, bounds))

@@ -12,6 +12,7 @@ from adv2e.diagnosis.data.scene import BRIGHTNESSES, LIGHT_NAMES, Placed, Scene
 from adv2e.diagnosis.statistics.counting import sum_slopes, sum_slopes_beside
 from adv2e.diagnosis.statistics.groups import Array, Entry, Group, counts, share
 from adv2e.diagnosis.statistics.rates import spans_text
+from adv2e.reports.quantities import NO_UNIT
 
 LAGS_MS = (-20.0, -8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 _PAIRS_MS = ((-2.0, 4.0), (-8.0, 16.0))
@@ -21,7 +22,7 @@ _BESIDE_MS = (2.0, 10.0)
 class Slopes:
     """Change of log light about events, bounded so that single large steps do not decide.
 
-    `unit`: what a change is a part of, from -1 to 1.
+    `change`: what is summed up, in words; from -1 to 1.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -29,7 +30,7 @@ class Slopes:
         moving = np.abs(scene.slope[scene.speed > 0])
         typical = max(float(np.median(moving)) if moving.size else 1.0, 1e-6)
         bounded = scene.slope / (np.abs(scene.slope) + np.float32(typical))
-        self.unit = f"of 1 (a change s [ln/s] counts as s/(|s| + {typical:.3g}))"
+        self.change = f"mean change s of log light, as s/(|s| + {typical:.3g} ln/s),"
         self.bounded = np.ascontiguousarray(bounded.T)
 
     def count(
@@ -61,9 +62,9 @@ def lag(slopes: Slopes) -> Group:
     entries = [
         Entry(
             f"change {lag:g} ms before, {light}",
-            f"mean change of log light {_when(lag)} an event, in its direction, where it is"
+            f"{slopes.change} {_when(lag)} an event, in its direction, where it is"
             f" {slopes.scene.bounds_of_light[k]}",
-            slopes.unit,
+            NO_UNIT,
         )
         for lag in LAGS_MS
         for k, light in enumerate(LIGHT_NAMES)
@@ -86,8 +87,8 @@ def drift(slopes: Slopes) -> Group:
     entries = [
         Entry(
             f"lag {b:g} less {a:g} ms, time {k + 1}/{segments}",
-            f"mean change of log light {_when(b)} an event less that {_when(a)} it, {spans[k]}",
-            slopes.unit,
+            f"{slopes.change} {_when(b)} an event less that {_when(a)} it, {spans[k]}",
+            NO_UNIT,
         )
         for a, b in _PAIRS_MS
         for k in range(segments)
@@ -108,9 +109,9 @@ def shift(slopes: Slopes) -> Group:
     entries = [
         Entry(
             f"change {name} of the event, {lag:g} ms before",
-            f"mean change of log light one pixel {side} an event less that on its other side,"
+            f"{slopes.change} one pixel {side} an event less that on its other side,"
             f" {_when(lag)} it, in its direction",
-            slopes.unit,
+            NO_UNIT,
         )
         for lag in _BESIDE_MS
         for name, side in (("right", "right of"), ("below", "below"))

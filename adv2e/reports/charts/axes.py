@@ -94,7 +94,8 @@ def axis_over(
     size = max(abs(low), abs(high))
     if high - low <= 1e-6 * size:  # neighbouring numbers are no axis
         room = 0.5 * size or 0.5
-    return Axis(low if low == 0 < high else low - room, high + room, start, end)
+    begins = low == 0 and (high > 0 or not tight)
+    return Axis(low if begins else low - room, high + room, start, end)
 
 
 def _log_axis(low: float, high: float, start: float, end: float, tight: bool) -> Axis:

@@ -169,7 +169,8 @@ def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
     rows = [curve.measured]
     for band in (curve.before, curve.after):
         rows += [band.middle, band.low, band.high]
-    across = axis_over([x], _LEFT, WIDTH - _RIGHT, log=curve.x_log, tight=True)
+    tight = curve.x_log or len(x) > len(curve.measured)  # points may have room, bins need none
+    across = axis_over([x], _LEFT, WIDTH - _RIGHT, log=curve.x_log, tight=tight)
     up = axis_over([drawable(row) for row in rows], bottom, top, log=curve.y_log)
     if across is None or up is None:
         return None
