@@ -32,9 +32,7 @@ def _pictures(seen: Snapshot, names: Sequence[str]) -> Markup:
         caption = tag("figcaption", tag("span", name, class_="line"), told, split)
         figures.append(tag("figure", caption, event_picture(number, top, f"{name}: {told}")))
     first, last = seen.start_s, seen.start_s + seen.length_s
-    title = (
-        f"Events of {1e3 * seen.length_s:.4g} ms: {first:.3f} to {last:.3f} s after the first frame"
-    )
+    title = f"Events of {1e3 * seen.length_s:.4g} ms: {first:.3f} to {last:.3f} s after the start"
     most = f", in full colour from {top} events of a pixel on" * (top > 1)
     note = (
         f"White: no event; red: ON; blue: OFF; purple: both{most}; the same in all pictures. This"

@@ -138,7 +138,7 @@ class Snapshot:
     Attributes
     ----------
     start_s, length_s : float
-        When the time begins, after the first frame, and how long it is.
+        When the time begins, after the start of what was looked at, and how long it is.
     measured, before, after : (2, rows, columns) integers
         Numbers of OFF events and of ON events.
     """

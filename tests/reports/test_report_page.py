@@ -314,7 +314,7 @@ def test_events_are_shown_as_measured_declared_and_found_in_the_same_colours():
     assert names == ("measured", "as declared (before)", "with what was found (after)")
     assert numbers == ("3 events", "6 events", "1 event")
     assert split == ("1 ON, 2 OFF", "4 ON, 2 OFF", "1 ON, 0 OFF")
-    assert "Events of 20 ms: 0.250 to 0.270 s after the first frame" in text
+    assert "Events of 20 ms: 0.250 to 0.270 s after the start" in text
     # all before what is to be done, at the same size
     assert text.index('class="three"') < text.index("What to do next")
     assert len({image.shape for image in images}) == 1

@@ -13,6 +13,7 @@ from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.splits import Split
 from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.data.stream import Stream
+from adv2e.reports.quantities import short_text
 
 STILL = 0
 SPEEDS = 4
@@ -88,7 +89,7 @@ class Scene:
     @property
     def bounds_of_speed(self) -> tuple[str, ...]:
         """Name of each class of speed, with its bounds: of the change of log light."""
-        low, high = (f"{border:.2g}" for border in self.speed_borders)
+        low, high = (short_text(border, 2) for border in self.speed_borders.tolist())
         bounds = f"below {low} ln/s", f"{low} to {high} ln/s", f"from {high} ln/s"
         still, *others = SPEED_NAMES
         return still, *map("{} ({})".format, others, bounds)
@@ -96,7 +97,7 @@ class Scene:
     @property
     def bounds_of_light(self) -> tuple[str, ...]:
         """Name of each class of brightness, with its bounds; 255 DN is white."""
-        low, high = (f"{border:.3g}" for border in self.brightness_borders)
+        low, high = (short_text(border, 3) for border in self.brightness_borders.tolist())
         bounds = f"below {low} DN", f"{low} to {high} DN", f"from {high} DN"
         return tuple(map("{} ({})".format, LIGHT_NAMES, bounds))
 

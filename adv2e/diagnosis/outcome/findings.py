@@ -72,7 +72,6 @@ def rejected_of(
     given = [held[name] for name in names if name in held and name not in kept.names]
     declared = reference.declared
     configs = [_alone(one, declared, candidates) for one in given]
-    reference.begin("judging what was not added")
     known = [config for config in configs if config is not None]
     reference.sampler.rough.samples([declared, *known], _SEEDS)  # all at once, then held
     fitter = reference.fitter(splits.VALIDATION, declared, rough=True)

@@ -274,7 +274,7 @@ def _by_time(scene: Scene, before: Sequence[Placed]) -> Iterator[_Axes]:
     borders_s = np.linspace(0.0, float(scene.seconds.sum()), 25)
     yield _Axes(
         "Events over time",
-        "time after the first frame [s]",
+        "time after the start [s]",
         _PER_SENSOR,
         borders_s,
         _course(scene, borders_s),

@@ -25,6 +25,7 @@ from adv2e.diagnosis.outcome.picture import (
     totals_of,
 )
 from adv2e.diagnosis.statistics.rates import by_load
+from adv2e.reports.quantities import short_text
 
 SCENE = some_scene(seed=5)
 MEASURED = placed(random_stream(800, 1), SCENE)
@@ -41,13 +42,14 @@ def test_thirds_are_named_with_their_bounds_and_units():
             assert curve.x_names == ("dark", "medium", "bright")
             assert all(part in curve.x_label for part in (dark, medium, bright))
     low, high = SCENE.brightness_borders
-    assert (dark, bright) == (f"dark (below {low:.3g} DN)", f"bright (from {high:.3g} DN)")
+    bounds = f"dark (below {short_text(low, 3)} DN)", f"bright (from {short_text(high, 3)} DN)"
+    assert (dark, bright) == bounds
     light = wandering_light(seed=5)[1:].reshape(20, -1)
     assert light[SCENE.brightness == 0].max() <= low * 1.001
     assert light[SCENE.brightness == 2].min() >= high * 0.999
     speed = CURVES["Rate against speed"]
     assert speed.x_names == ("still", "slow", "moving", "fast")
-    assert f"fast (from {SCENE.speed_borders[1]:.2g} ln/s)" in speed.x_label
+    assert f"fast (from {short_text(SCENE.speed_borders[1], 2)} ln/s)" in speed.x_label
 
 
 def test_rates_say_of_how_many_events_they_are():
