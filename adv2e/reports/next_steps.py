@@ -8,11 +8,10 @@ from pathlib import Path
 
 from adv2e.reports.labels import label_of
 from adv2e.reports.result import Diagnosis
-from adv2e.reports.standing_out import standing_out
+from adv2e.reports.standing_out import of_each_kind
 from adv2e.reports.trials import SEPARATIONS
 from adv2e.reports.wording import OF_TABLES
 
-_MOST_GROUPS = 3
 _OWN_EFFECT = "adv2e diagnose RECORDING -c DECLARED.yaml --effect my_effect.py"
 _WHAT_FOR = {
     "consistent": "The declared model is good as it is. Make events from another video with it:",
@@ -60,7 +59,7 @@ def _own_effect(found: Diagnosis) -> Step:
     if found.wording is OF_TABLES:  # no own effects compete there
         text = "Check whether the errors of the rows are larger than stated, for example 10 %:"
         return Step(text, "adv2e characterise TABLE -c DECLARED.yaml --error 0.1")
-    groups = [one.group for one in standing_out(found.signatures) if one.after][:_MOST_GROUPS]
+    groups = [one.group for one in of_each_kind(found.signatures) if one.after]
     why = f" It has to change what differs here: {', '.join(groups)}." if groups else ""
     text = "Write the effect that you suspect as a class of your own, and let it compete."
     return Step(f"{text}{why}", _OWN_EFFECT)

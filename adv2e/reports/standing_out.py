@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from adv2e.reports.quantities import alike_texts, unit_text
+from adv2e.reports.quantities import NO_UNIT, alike_texts, unit_text
 
 if TYPE_CHECKING:
     from adv2e.reports.result import Signature
@@ -63,6 +63,14 @@ def _standing(
     return rank, Standing(group, len(members), before, after, farthest)
 
 
+def of_each_kind(signatures: Sequence[Signature]) -> list[Standing]:
+    """Return the first group of each kind of those that stand out: for a few lines, not a table."""
+    found: dict[str, Standing] = {}
+    for one in standing_out(signatures):
+        found.setdefault(one.farthest.kind, one)
+    return list(found.values())
+
+
 def kind_rank(signature: Signature) -> int:
     """Return which kind a statistic is of: 0 for numbers of events, which come first."""
     return _KINDS.index(signature.kind)
@@ -71,7 +79,7 @@ def kind_rank(signature: Signature) -> int:
 def compared_text(signature: Signature) -> str:
     """Return a statistic with its measured value and that of the model found, and their unit."""
     measured, expected = alike_texts((signature.measured, signature.after))
-    unit = unit_text(signature.unit)
+    unit = unit_text(signature.unit) if signature.unit != NO_UNIT else f"({NO_UNIT})"
     return f"{signature.meaning}: {measured} {unit} measured, {expected} simulated"
 
 

@@ -14,12 +14,11 @@ from adv2e.reports.quantities import (
     value_text,
 )
 from adv2e.reports.result import Diagnosis, ErrorRow
-from adv2e.reports.standing_out import compared_text, standing_out
+from adv2e.reports.standing_out import compared_text, of_each_kind
 from adv2e.reports.trials import by_explained
 
 WIDTH = 100
 _MOST_PARAMETERS = 5
-_MOST_STANDING = 3
 _MOST_CHECKS = 2
 
 
@@ -97,6 +96,6 @@ def _parameters(diagnosis: Diagnosis) -> list[str]:
 def _standing(diagnosis: Diagnosis) -> list[str]:
     """Return what differs besides what the sentence names."""
     lines = []
-    for one in standing_out(diagnosis.signatures)[1:_MOST_STANDING]:
+    for one in of_each_kind(diagnosis.signatures)[1:]:
         lines += [f"  {line}" for line in _wrapped(compared_text(one.farthest), 2)]
     return lines

@@ -92,14 +92,18 @@ def test_where_nothing_is_left_the_page_tells_what_differed():
 
 
 @pytest.mark.parametrize("verdict", ["unexplained", "partly_explained", "consistent"])
-def test_the_summary_tells_it_where_nothing_is_named(verdict):
-    text = summary_text(replace(everything(), verdict=verdict, effects=[], signatures=SIGNATURES))
+def test_the_summary_tells_the_first_of_each_kind_where_nothing_is_named(verdict):
+    kinds = {"c1": "time", "b2": "other"}
+    given = [replace(one, kind=kinds.get(one.name, "count")) for one in SIGNATURES]
+    given = [one for one in given if one.name not in ("b1", "c2")]
+    found = replace(everything(), verdict=verdict, effects=[], signatures=given)
     lines = [
         "  what c1 means: 12.0 events measured, 67.0 simulated",
         "  what b2 means: 12.0 events measured, 67.0 simulated",
     ]
-    told = [line for line in text.splitlines() if line.startswith("  what ")]
+    told = [line for line in summary_text(found).splitlines() if line.startswith("  what ")]
     assert told == (lines if verdict == "unexplained" else [])
+    assert ("it shows in the what e1 means" in found.sentence) == (verdict != "consistent")
 
 
 def test_the_summary_stays_short_where_much_stands_out():
