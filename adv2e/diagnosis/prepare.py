@@ -98,7 +98,10 @@ def prepare(
         )
         log(f"thresholds that match the totals: {thresholds_of(declared)}")
         if miss > TOLERANCE:
-            notes.append(f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}")
+            notes.append(
+                f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}, so"
+                " something else than the thresholds makes too many or too few"
+            )
         simulator.begin(DECLARED)
     streams = simulator.streams(declared, PILOT_SEEDS)
     own_period = None if known else own_period_of(looked_at_by(evidence, scene), evidence.times_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,20 @@ from adv2e.reports.keys import meaning_of, summary_of, unit_of
 from adv2e.reports.labels import heading_of
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.next_steps import next_steps
-from adv2e.reports.quantities import interval_text, probability_text, unit_text, value_text
+from adv2e.reports.quantities import (
+    NO_UNIT,
+    interval_text,
+    native,
+    percent_text,
+    probability_text,
+    unit_text,
+    value_text,
+)
 from adv2e.reports.result import Diagnosis, Interval, ListInterval
 from adv2e.reports.tables import Column, table
+
+_LEAST_P = 0.01
+"""Probability from which on chance may make what is left."""
 
 MARKS = {
     "consistent": ("✓", "Consistent"),
@@ -42,8 +54,9 @@ def main_error(diagnosis: Diagnosis) -> Markup:
     """Return the error before and after, beside its floor: that which ``report.json`` gives."""
     parts: list[object] = []
     for row in diagnosis.errors[:1]:
-        lines = f" Lines: {diagnosis.wording.intervals}." if row.before.interval else ""
-        about = f"Error: {row.name}. Floor: {diagnosis.wording.floor}.{lines}"
+        words = diagnosis.wording
+        lines = f" Lines: {words.intervals}." if row.before.interval else ""
+        about = f"Error: {row.name}; {words.error}. Floor: {words.floor}.{lines}"
         heading = "Error on data that was not used for fitting"
         parts.append(tag("figcaption", heading))
         parts += [error_chart(row, changed=bool(diagnosis.effects)), tag("p", about, class_="note")]
@@ -51,11 +64,27 @@ def main_error(diagnosis: Diagnosis) -> Markup:
         tag("strong", f"p {probability_text(p)}", class_="line")
         for p in (diagnosis.global_p_before, diagnosis.global_p_after)
     )
-    chance: list[object] = ["Would chance alone make differences as large as these? ", before]
+    chance: list[object] = ["Probability that chance alone differs as much: ", before]
     if diagnosis.effects:
         chance += [" before, ", after, " after"]
-    parts.append(tag("p", *chance, ".", class_="note"))
+    parts.append(tag("p", *chance, f". {_meaning(diagnosis)}", class_="note"))
     return tag("figure", *parts, class_="main")
+
+
+def _meaning(diagnosis: Diagnosis) -> str:
+    """Say what p, and the error beside its floor, mean for this recording."""
+    p = diagnosis.global_p_after
+    if math.isnan(p):
+        return "Here, nobody knows."
+    text = f"Here, chance {'does not' if p < _LEAST_P else 'may'} make all that is left"
+    for row in diagnosis.errors[:1]:
+        after, floor = row.after.value, row.floor
+        most = floor.value if floor.interval is None else floor.interval[1]
+        if after <= max(most, floor.value):
+            text += ", and the error is at its floor"
+        elif floor.value > 0.0 and math.isfinite(after):
+            text += f", and the error is {percent_text(after / floor.value - 1.0)} above its floor"
+    return f"{text}."
 
 
 def other_errors(diagnosis: Diagnosis) -> Markup:
@@ -112,6 +141,8 @@ def _keys(
         unit, meaning = unit_of(path, diagnosis.own), meaning_of(path, diagnosis.own)
         row = [tag("code", path), _value(value, interval)]
         row += [interval_text(interval)] * (intervals is not None)
+        if not unit and isinstance(native(value), (int, float)):
+            unit = NO_UNIT
         row += [declared_text(diagnosis, path), unit_text(unit), meaning]
         rows.append(row)
     return table(caption, columns, rows)

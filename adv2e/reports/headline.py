@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from adv2e.reports.keys import unit_of
 from adv2e.reports.labels import label_of, part_of
 from adv2e.reports.quantities import (
-    alike_texts,
     beside,
     interval_text,
     number_text,
@@ -15,7 +14,7 @@ from adv2e.reports.quantities import (
     scaled,
     value_text,
 )
-from adv2e.reports.standing_out import standing_out
+from adv2e.reports.standing_out import compared_text, standing_out
 
 if TYPE_CHECKING:
     from adv2e.reports.result import Diagnosis, Finding
@@ -91,9 +90,7 @@ def _errors(found: Diagnosis) -> str:
 
 
 def _most(found: Diagnosis) -> str:
-    """Say what differs most from the model, in numbers."""
+    """Say what differs from the model, in numbers: those of events before all else."""
     for one in standing_out(found.signatures)[:1]:
-        far = one.farthest
-        measured, expected = alike_texts((far.measured, far.after))
-        return f"; most different is: {far.meaning}, {measured} measured, {expected} simulated"
+        return f"; it shows in the {compared_text(one.farthest)}"
     return _errors(found)

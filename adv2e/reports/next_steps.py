@@ -8,7 +8,7 @@ from pathlib import Path
 
 from adv2e.reports.labels import label_of
 from adv2e.reports.result import Diagnosis
-from adv2e.reports.standing_out import standing_out
+from adv2e.reports.standing_out import of_each_kind
 from adv2e.reports.trials import SEPARATIONS
 from adv2e.reports.wording import OF_TABLES
 
@@ -59,10 +59,8 @@ def _own_effect(found: Diagnosis) -> Step:
     if found.wording is OF_TABLES:  # no own effects compete there
         text = "Check whether the errors of the rows are larger than stated, for example 10 %:"
         return Step(text, "adv2e characterise TABLE -c DECLARED.yaml --error 0.1")
-    why = ""
-    for one in standing_out(found.signatures)[:1]:
-        if one.after:
-            why = f" What differs most ({one.group}) is what it has to change."
+    groups = [one.group for one in of_each_kind(found.signatures) if one.after]
+    why = f" It has to change what differs here: {', '.join(groups)}." if groups else ""
     text = "Write the effect that you suspect as a class of your own, and let it compete."
     return Step(f"{text}{why}", _OWN_EFFECT)
 

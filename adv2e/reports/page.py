@@ -6,6 +6,7 @@ from pathlib import Path
 
 from adv2e.reports import findings, residual, trials
 from adv2e.reports.charts.curve_chart import curves
+from adv2e.reports.events import events
 from adv2e.reports.markup import Markup, tag
 from adv2e.reports.result import Diagnosis
 from adv2e.reports.style import STYLE
@@ -21,7 +22,7 @@ _UNFOLD = (
 def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
     """Return the page as HTML: UTF-8, no loads from elsewhere, the same bytes every time.
 
-    Its first screen holds the finding, the error, and what to do next; `folder` is where
+    It begins with the finding, the error, the events, and what to do next; `folder` is where
     ``model.yaml`` lies.  Sections that hold nothing are left out.
     """
     found = diagnosis
@@ -57,6 +58,7 @@ def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
         tag("p", "Declared model: ", found.declared, class_="note"),
         findings.finding(found),
         findings.main_error(found),
+        events(found),
         findings.what_next(found, folder),
         *(
             tag("section", tag("h2", heading), content)

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 NOTHING = "-"
 """Stands where there is no number."""
 
+NO_UNIT = "no unit"
+"""Stands beside a number that has none."""
+
 _LARGER = {"us": ((1e6, "s"), (1e3, "ms")), "ns": ((1e6, "ms"), (1e3, "µs"))}
 """From which number on another unit is easier to read, the largest first."""
 

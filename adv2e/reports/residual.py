@@ -10,6 +10,7 @@ import numpy as np
 from adv2e.reports.charts.sensor_map import CLIP_SD, Map, colour_bar, map_image
 from adv2e.reports.markup import Markup, join, tag
 from adv2e.reports.quantities import (
+    NO_UNIT,
     NOTHING,
     alike_texts,
     number_text,
@@ -18,8 +19,11 @@ from adv2e.reports.quantities import (
     unit_text,
 )
 from adv2e.reports.result import Detectable, Diagnosis, ResidualMap, Signature
-from adv2e.reports.standing_out import LARGE_Z, standing_out
+from adv2e.reports.standing_out import LARGE_Z, kind_rank, standing_out
 from adv2e.reports.tables import SHOWN, Column, table
+
+_CHANCE = math.erfc(LARGE_Z / math.sqrt(2.0))
+"""Share that a normal deviation has beyond :data:`LARGE_Z`."""
 
 _GROUPS = 6
 """Groups that are not folded away."""
@@ -39,7 +43,8 @@ def maps(given: Sequence[ResidualMap]) -> Markup:
     note = (
         "Measured minus simulated, in standard deviations (sd) of chance: red where more was"
         f" measured, blue where less, from {-CLIP_SD:g} or less to {CLIP_SD:g} or more; grey:"
-        " pixels that were left out."
+        " pixels that were left out. Here, look for a pattern (single pixels, rows, edges of the"
+        f" scene) where far more than the {_CHANCE:.1%} of chance is beyond ±{LARGE_Z:g} sd."
     )
     scale = tag("figure", colour_bar(), tag("figcaption", note, class_="note"))
     return tag("div", *parts, scale, class_="maps")
@@ -64,60 +69,79 @@ def groups(diagnosis: Diagnosis) -> Markup:
     left = diagnosis.verdict in ("unexplained", "partly_explained")
     found = standing_out(diagnosis.signatures, left=left)
     if not found:
-        return tag("p", f"No number differs by more than {LARGE_Z:g} standard deviations.")
-    names = ["measured", "before", "after", "far off before", "far off after"]
+        nothing = f"No number differs by more than {LARGE_Z:g} standard deviations"
+        return tag("p", f"{nothing}: here, the simulation is as the recording is.")
+    names, counted = ["measured", "before", "after"], ["far off before", "far off after"]
     if not diagnosis.effects:  # both are the declared model
-        names = ["measured", "simulated", "far off"]
-    columns = [Column("what"), *(Column(name, number=True) for name in names)]
+        names, counted = ["measured", "simulated"], ["far off"]
+    numbers, far_off = ([Column(name, number=True) for name in some] for some in (names, counted))
+    columns = [Column("what"), *numbers, Column("unit"), *far_off]
     rows = []
     for one in found:
         name = join(one.group, tag("span", one.farthest.meaning, class_="meaning long"))
-        values = _values(one.farthest)
+        values, unit = _values(one.farthest)[: len(names)], unit_text(one.farthest.unit)
         far = [f"{number} of {one.number}" for number in (one.before, one.after)]
-        rows.append([name, *values, *far] if diagnosis.effects else [name, *values[:2], far[0]])
+        rows.append([name, *values, unit, *far[: len(counted)]])
     models = ": before with the declared model, after with the model found" * bool(
         diagnosis.effects
     )
     lead = (
-        "Many numbers were compared, in groups. Each row shows the number of a group that differs"
-        f" most, as measured and as simulated{models}."
-        f" Far off: how many of the group differ by more than {LARGE_Z:g} standard deviations."
+        "Many numbers were compared, in groups: first numbers of events, then their times, then all"
+        " else. Each row shows the number of a group that differs most, as measured and as"
+        f" simulated{models}. Far off: how many of the group differ by more than {LARGE_Z:g}"
+        f" standard deviations (sd) of chance. {_meaning(diagnosis, left)}"
     )
     caption = "Groups of numbers, on data that was not used for fitting"
     return join(tag("p", lead), table(caption, columns, rows, folded_from=_GROUPS))
 
 
+def _meaning(diagnosis: Diagnosis, left: bool) -> str:
+    """Say what the groups that stand out mean for this recording."""
+    if left:
+        return "Here, something that the library lacks makes these differences."
+    if not diagnosis.effects:
+        return "Here, these few are what chance makes of so many numbers."
+    return "Here, these are the marks of what was found: after it, they should be near."
+
+
 def signatures(given: Sequence[Signature]) -> Markup:
-    """Return the summary statistics, the most telling ones first."""
+    """Return all statistics by kind, numbers of events first; of one kind, the farthest first."""
     if not given:
         return Markup()
-    columns = [Column("number"), Column("group")] + [
-        Column(name, number=True) for name in ("measured", "before", "after", "z before", "z after")
+    columns = [
+        *(Column("number"), Column("group")),
+        *(Column(name, number=True) for name in ("measured", "before", "after")),
+        Column("unit"),
+        *(Column(name, number=True) for name in ("z before [sd]", "z after [sd]")),
     ]
     rows = [_signature(one) for one in sorted(given, key=_rank)]
     far = sum(abs(one.z_before) > LARGE_Z for one in given)
     still = sum(abs(one.z_after) > LARGE_Z for one in given)
     lead = (
-        "z: distance of the recording from the simulations, in their standard deviations. Beyond"
-        f" ±{LARGE_Z:g} (marked ▲ or ▼): {far} of {len(given)} before, {still} after."
+        "z: distance of the recording from the simulations, in their standard deviations (sd)."
+        f" Beyond ±{LARGE_Z:g} (marked ▲ or ▼): {far} of {len(given)} before, {still} after."
     )
-    caption = "Numbers on data that was not used for fitting, those that differed most first"
+    caption = (
+        "Numbers on data that was not used for fitting: numbers of events, then times, then all"
+        " else; of each, those that differed most first"
+    )
     return join(tag("p", lead), table(caption, columns, rows, folded_from=SHOWN))
 
 
-def _rank(signature: Signature) -> tuple[float, float]:
-    """Return a number that is least for the largest distance; unknown ones come last."""
+def _rank(signature: Signature) -> tuple[float, ...]:
+    """Return what is least for the largest distance of the first kind; unknown ones come last."""
     before, after = (
         math.inf if math.isnan(z) else -abs(z) for z in (signature.z_before, signature.z_after)
     )
-    return before, after
+    return kind_rank(signature), before, after
 
 
 def _signature(one: Signature) -> tuple[object, ...]:
     name = join(
         tag("span", one.name, title=one.meaning), tag("span", one.meaning, class_="meaning long")
     )
-    return name, one.group, *_values(one), _z(one.z_before), _z(one.z_after)
+    z = _z(one.z_before), _z(one.z_after)
+    return name, one.group, *_values(one), unit_text(one.unit), *z
 
 
 def _values(one: Signature) -> list[str]:
@@ -139,7 +163,10 @@ def detectable(given: Sequence[Detectable]) -> Markup:
     if not given:
         return Markup()
     columns = [Column("effect"), Column("key"), Column("size", number=True), Column("unit")]
-    rows = [(one.name, tag("code", one.key), _size(one.size), unit_text(one.unit)) for one in given]
+    rows = [
+        (one.name, tag("code", one.key), _size(one.size), unit_text(one.unit) or NO_UNIT)
+        for one in given
+    ]
     caption = (
         "An effect of this size would have been seen about 8 times in 10;"
         f" {NOTHING}: no size that is physical would, or the simulations made do not tell"

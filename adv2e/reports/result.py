@@ -15,6 +15,9 @@ from adv2e.reports.wording import OF_RECORDINGS, Wording
 
 Verdict = Literal["consistent", "explained", "partly_explained", "not_identifiable", "unexplained"]
 
+Kind = Literal["count", "time", "other"]
+"""Of summary statistics: numbers and rates of events, times of events, and all else."""
+
 Interval = tuple[float, float]
 """Lower and upper end of a 95 % interval."""
 ListInterval = tuple[tuple[float, ...], tuple[float, ...]]
@@ -41,7 +44,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Rejected:
-    """An effect that was tried and not added, and why; `held_out`: misfit with it, before 1."""
+    """An effect that was tried and not added, and why.
+
+    `held_out`: misfit with it on data that it was not fitted to, as a share of that of the declared
+    model; the rest is what it explains.
+    """
 
     name: str
     reason: str
@@ -96,6 +103,9 @@ class Signature:
         Its value in the recording, and on average in the two models' simulations.
     z_before, z_after : float
         Distance of the recording from the simulations in their standard deviations.
+    unit : str
+        Of the values; of a share or a ratio: of what to what.
+    kind : str
     """
 
     name: str
@@ -106,6 +116,38 @@ class Signature:
     after: float
     z_before: float
     z_after: float
+    unit: str
+    kind: Kind = "other"
+
+
+@dataclass(frozen=True)
+class Total:
+    """A number that describes all events of a recording, and of simulations: mean and 95 %."""
+
+    name: str
+    unit: str
+    measured: float
+    before: Estimate
+    after: Estimate
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Events of one short time, as measured and in a simulation of either model.
+
+    Attributes
+    ----------
+    start_s, length_s : float
+        When the time begins, after the start of what was looked at, and how long it is.
+    measured, before, after : (2, rows, columns) integers
+        Numbers of OFF events and of ON events.
+    """
+
+    start_s: float
+    length_s: float
+    measured: NDArray[np.int64]
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -132,6 +174,8 @@ class Curve:
     before, after : Band
     x_log, y_log : bool
         Logarithmic axes.
+    x_names : sequence of str
+        Names of the bins, in the place of numbers at their borders.
     """
 
     title: str
@@ -143,6 +187,7 @@ class Curve:
     after: Band
     x_log: bool = False
     y_log: bool = False
+    x_names: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -196,6 +241,9 @@ class Diagnosis:
         Probability of a residual as large if nothing were missing, in all data that are compared:
         below 0.01 something is left.
     signatures : list of Signature
+    totals : sequence of Total
+    snapshot : Snapshot, optional
+        None where there are no events to show, as of tables.
     curves, maps
         The picture of the residual.
     detectable : list of Detectable
@@ -245,6 +293,8 @@ class Diagnosis:
     wording: Wording = OF_RECORDINGS
     declared_values: Mapping[str, Any] = field(default_factory=dict)
     defaults: Collection[str] = ()
+    totals: Sequence[Total] = ()
+    snapshot: Snapshot | None = None
 
     @property
     def sentence(self) -> str:

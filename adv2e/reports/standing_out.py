@@ -1,5 +1,6 @@
 """What stands out of a residual: of each group of summary statistics, the one farthest off.
 
+Numbers of events come first, then their times, then all else: so engineers look at a residual.
 Neighbouring statistics of a group tell much the same, so that the groups that stand out, and how,
 say more of what is missing than a list of the largest distances.
 """
@@ -11,10 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from adv2e.reports.quantities import NO_UNIT, alike_texts, unit_text
+
 if TYPE_CHECKING:
     from adv2e.reports.result import Signature
 
 
+_KINDS = ("count", "time", "other")
 LARGE_Z = 3.0
 """Distances in standard deviations from here on stand out."""
 
@@ -34,9 +38,10 @@ class Standing:
 
 
 def standing_out(signatures: Sequence[Signature], *, left: bool = True) -> list[Standing]:
-    """Return the groups of which a statistic stands out from either model, the farthest first.
+    """Return the groups of which a statistic stands out from either model.
 
-    Those that stand out from the model found come before the others, unless nothing is `left`.
+    Those that stand out from the model found come before the others, unless nothing is `left`; of
+    either, they are sorted by kind, and of one kind, the farthest comes first.
     """
     groups: dict[str, list[Signature]] = {}
     for one in signatures:
@@ -47,14 +52,35 @@ def standing_out(signatures: Sequence[Signature], *, left: bool = True) -> list[
 
 def _standing(
     group: str, members: Sequence[Signature], left: bool
-) -> tuple[tuple[bool, float], Standing]:
+) -> tuple[tuple[bool, int, float], Standing]:
     """Return the group, after what it is ranked by."""
     before = sum(_size(one.z_before) > LARGE_Z for one in members)
     after = sum(_size(one.z_after) > LARGE_Z for one in members)
     of_found = left and after > 0
     distances = [_size(one.z_after if of_found else one.z_before) for one in members]
     farthest = members[distances.index(max(distances))]
-    return (not of_found, -max(distances)), Standing(group, len(members), before, after, farthest)
+    rank = not of_found, kind_rank(farthest), -max(distances)
+    return rank, Standing(group, len(members), before, after, farthest)
+
+
+def of_each_kind(signatures: Sequence[Signature]) -> list[Standing]:
+    """Return the first group of each kind of those that stand out: for a few lines, not a table."""
+    found: dict[str, Standing] = {}
+    for one in standing_out(signatures):
+        found.setdefault(one.farthest.kind, one)
+    return list(found.values())
+
+
+def kind_rank(signature: Signature) -> int:
+    """Return which kind a statistic is of: 0 for numbers of events, which come first."""
+    return _KINDS.index(signature.kind)
+
+
+def compared_text(signature: Signature) -> str:
+    """Return a statistic with its measured value and that of the model found, and their unit."""
+    measured, expected = alike_texts((signature.measured, signature.after))
+    unit = unit_text(signature.unit) if signature.unit != NO_UNIT else f"({NO_UNIT})"
+    return f"{signature.meaning}: {measured} {unit} measured, {expected} simulated"
 
 
 def _size(z: float) -> float:

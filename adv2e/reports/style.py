@@ -103,6 +103,9 @@ figcaption { font-size: 0.9rem; font-weight: 600; margin: 6px 0; }
 figcaption.note { font-weight: 400; }
 .side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(340px, 100%), 1fr)); }
 .side { gap: 18px 24px; align-items: start; margin: 10px 0; }
+.three { display: grid; grid-template-columns: repeat(3, minmax(0, 1fr)); gap: 6px 12px; }
+.three figure { align-self: end; }
+.three img.map { border: 1px solid var(--line); }
 img.map { width: 100%; height: auto; image-rendering: pixelated; display: block; }
 svg { display: block; width: 100%; max-width: 560px; height: auto; }
 svg text { font-size: 11px; fill: var(--soft); }

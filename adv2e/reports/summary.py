@@ -8,18 +8,17 @@ from adv2e.reports.headline import declared_text
 from adv2e.reports.keys import unit_of
 from adv2e.reports.markup import plain
 from adv2e.reports.quantities import (
-    alike_texts,
     interval_text,
     number_text,
     probability_text,
     value_text,
 )
 from adv2e.reports.result import Diagnosis, ErrorRow
-from adv2e.reports.standing_out import standing_out
+from adv2e.reports.standing_out import compared_text, of_each_kind
+from adv2e.reports.trials import by_explained
 
 WIDTH = 100
 _MOST_PARAMETERS = 5
-_MOST_STANDING = 3
 _MOST_CHECKS = 2
 
 
@@ -57,7 +56,7 @@ def details_text(diagnosis: Diagnosis) -> str:
         f"nuisance {key} = {value_text(value)} {unit_of(key)}".rstrip()
         for key, value in diagnosis.nuisances.items()
     ]
-    lines += [f"rejected {one.name}: {one.reason}" for one in diagnosis.rejected]
+    lines += [f"rejected {one.name}: {one.reason}" for one in by_explained(diagnosis.rejected)]
     lines += [f"note: {note}" for note in diagnosis.notes]
     return "\n".join(map(plain, lines))
 
@@ -95,10 +94,8 @@ def _parameters(diagnosis: Diagnosis) -> list[str]:
 
 
 def _standing(diagnosis: Diagnosis) -> list[str]:
-    """Return what differs most besides what the sentence names."""
+    """Return what differs besides what the sentence names."""
     lines = []
-    for one in standing_out(diagnosis.signatures)[1:_MOST_STANDING]:
-        measured, expected = alike_texts((one.farthest.measured, one.farthest.after))
-        text = f"{one.farthest.meaning}: {measured} measured, {expected} simulated"
-        lines += [f"  {line}" for line in _wrapped(text, 2)]
+    for one in of_each_kind(diagnosis.signatures)[1:]:
+        lines += [f"  {line}" for line in _wrapped(compared_text(one.farthest), 2)]
     return lines

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 from adv2e.reports.keys import summary_of, unit_of
 from adv2e.reports.markup import Markup, join, tag
-from adv2e.reports.quantities import NOTHING, number_text, unit_text, value_text
+from adv2e.reports.quantities import NOTHING, unit_text, value_text
 from adv2e.reports.result import Diagnosis, Finding, Rejected
 from adv2e.reports.tables import SHOWN, Column, table
 
@@ -82,15 +85,18 @@ def _paths(diagnosis: Diagnosis) -> dict[str, list[str]]:
 
 def rejected(diagnosis: Diagnosis) -> Markup:
     """Return what was tried and not added, and why."""
-    given = diagnosis.rejected
+    given = by_explained(diagnosis.rejected)
     if not given:
         return Markup()
-    columns = [Column("effect, and the values it was tried with"), Column("why not")]
-    caption = "Effects tried and not added"
-    judged = any(one.held_out is not None for one in given)
-    if judged:  # none is where each is fitted much worse than what was added
-        columns.append(Column("difference left", number=True))
-        caption += "; 1 is the difference that the declared model leaves, on other data"
+    columns = [
+        Column("effect, and the values it was tried with"),
+        Column("explains", number=True),
+        Column("why not"),
+    ]
+    caption = (
+        "Effects tried and not added, those that explain most first. Explains:"
+        f" {diagnosis.wording.explained}; below 0: it adds to it; {NOTHING}: not known"
+    )
     rows = []
     for one in given:
         tried = [
@@ -98,6 +104,20 @@ def rejected(diagnosis: Diagnosis) -> Markup:
             for path, value in one.parameters.items()
         ]
         lines = [tag("span", text, class_="meaning") for text in tried]
-        held_out = NOTHING if one.held_out is None else number_text(one.held_out)
-        rows.append((join(one.name, *lines), one.reason, *[held_out] * judged))
+        rows.append((join(one.name, *lines), _explained(one), one.reason))
     return table(caption, columns, rows, folded_from=SHOWN)
+
+
+def by_explained(given: Sequence[Rejected]) -> list[Rejected]:
+    """Return effects sorted by what they explain, most first; unknown shares come last."""
+    return sorted(given, key=lambda one: math.inf if _is_unknown(one) else one.held_out or 0.0)
+
+
+def _is_unknown(one: Rejected) -> bool:
+    return one.held_out is None or math.isnan(one.held_out)
+
+
+def _explained(one: Rejected) -> str:
+    if one.held_out is None or not math.isfinite(one.held_out):
+        return NOTHING
+    return f"{round(100.0 * (1.0 - one.held_out), 1) + 0.0:,.1f} %"

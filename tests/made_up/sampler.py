@@ -94,7 +94,7 @@ class MadeUpSampler:
         self._means = {}
         self.statistics = SimpleNamespace(
             least=np.full(STATISTICS, 0.01),
-            entries=[Entry(f"statistic {k}", "") for k in range(STATISTICS)],
+            entries=[Entry(f"statistic {k}", "", "sd") for k in range(STATISTICS)],
         )
 
     def mean(self, config):

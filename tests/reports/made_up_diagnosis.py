@@ -18,6 +18,8 @@ from adv2e.reports.result import (
     Rejected,
     ResidualMap,
     Signature,
+    Snapshot,
+    Total,
 )
 
 MODEL = {
@@ -127,7 +129,22 @@ def _signatures():
         for n in range(20)
     ]
     meaning = "Where two events of a pixel follow each other at once, no dead time is at work."
-    return [Signature(name, group, meaning, *values) for name, group, *values in rows]
+    units = {"time between events": "ms", "levels": "events", "lag": "ms"}
+    kinds = {"time between events": "time", "levels": "count"}
+    return [
+        Signature(
+            name, group, meaning, *values, units.get(group, "of 1"), kinds.get(group, "other")
+        )
+        for name, group, *values in rows
+    ]
+
+
+def snapshot(width=87, height=65):
+    """Return events of 10 ms, twice as many as declared."""
+    draw = np.random.default_rng(3)
+    shape = 2, height, width
+    few, many, after = (draw.poisson(mean, shape) for mean in (0.1, 0.2, 0.1))
+    return Snapshot(0.12, 0.01, few, many, after)
 
 
 def everything() -> Diagnosis:
@@ -202,6 +219,17 @@ def everything() -> Diagnosis:
             "pixel.thresholds.on": 0.2,
         },
         defaults=["pixel.low_pass.cutoff_hz"],
+        totals=[
+            Total("ON events", "events", 158_661.0, Estimate(261_448.0), Estimate(158_932.0)),
+            Total(
+                "time from an event to the next of its pixel, median",
+                "ms",
+                9.1,
+                Estimate(4.2, (4.1, 4.3)),
+                Estimate(9.0, (8.9, 9.2)),
+            ),
+        ],
+        snapshot=snapshot(),
     )
 
 
@@ -228,6 +256,8 @@ def nothing() -> Diagnosis:
         model={},
         facts={},
         declared_values={},
+        totals=[],
+        snapshot=None,
     )
 
 
@@ -266,8 +296,8 @@ def strange() -> Diagnosis:
         global_p_before=0.0,
         global_p_after=1.0,
         signatures=[
-            Signature(HOSTILE, HOSTILE, HOSTILE, nan, inf, -inf, nan, inf),
-            Signature("s", "g", "m", 1e300, 1e-300, 0.0, -inf, 1e12),
+            Signature(HOSTILE, HOSTILE, HOSTILE, nan, inf, -inf, nan, inf, HOSTILE),
+            Signature("s", "g", "m", 1e300, 1e-300, 0.0, -inf, 1e12, "u"),
         ],
         curves=[
             _odd_curve([1.0], [2.0]),
@@ -289,6 +319,8 @@ def strange() -> Diagnosis:
         split=HOSTILE,
         notes=[HOSTILE],
         declared_values={path: [np.float32(0.1), nan], "pixel.leak.rate_hz": None},
+        totals=[Total(HOSTILE, HOSTILE, nan, Estimate(inf, (nan, inf)), Estimate(-1e300))],
+        snapshot=Snapshot(nan, 1e-300, *np.zeros((3, 2, 1, 1), np.int64)),
         model={"pixel": {"thresholds": {"on": np.float32(0.25)}, "leak": None}},
         facts={HOSTILE: HOSTILE},
     )

@@ -87,8 +87,8 @@ def test_where_nothing_is_missing_the_sentence_gives_the_error():
 
 def test_what_is_not_explained_is_told_by_what_differs_most():
     told = found("unexplained", effects=[]).sentence
-    assert told.startswith("Something is missing that no known effect explains; most different")
-    assert told.endswith(", 0.710 measured, 0.660 simulated.")
+    assert told.startswith("Something is missing that no known effect explains; it shows in the")
+    assert told.endswith(": 0.710 of 1 measured, 0.660 simulated.")
     told = found("unexplained", effects=[], signatures=[]).sentence
     assert told.endswith("model is 1.38, and chance alone makes 0.270.")
 
@@ -134,8 +134,8 @@ def test_where_something_is_left_the_next_step_is_an_own_effect_and_why():
     assert "--effect my_effect.py" in own.line
     (own,) = next_steps(found("unexplained", effects=[]), "found")
     assert own.line == "adv2e diagnose RECORDING -c DECLARED.yaml --effect my_effect.py"
-    assert "What differs most (order) is what it has to change." in own.text
-    quiet = [Signature("s", "g", "m", 1.0, 1.0, 1.0, 0.0, 0.0)]
+    assert "It has to change what differs here: order." in own.text
+    quiet = [Signature("s", "g", "m", 1.0, 1.0, 1.0, 0.0, 0.0, "events")]
     (own,) = next_steps(found("unexplained", effects=[], signatures=quiet), "found")
     assert "has to change" not in own.text
 

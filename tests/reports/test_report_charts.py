@@ -72,9 +72,38 @@ def test_an_axis_shows_all_that_can_be_drawn(values, log, tight):
     assert axis.ticks()
 
 
-def test_axes_reach_down_to_a_zero_that_is_near():
-    assert axis_over([np.array([1.0, 10])], 0, 1, log=False).low == 0
-    assert axis_over([np.array([9.0, 10])], 0, 1, log=False).low > 8
+def test_axes_begin_at_zero_where_nothing_is_below():
+    for values in ([1.0, 10], [9.0, 10], [0.0, 5], [7.0, 7], [0.0, 0]):
+        axis = axis_over([np.array(values)], 0, 1, log=False)
+        assert (axis.low, axis.ticks()[0][1]) == (0, "0")
+    assert axis_over([np.array([-3.0, 10])], 0, 1, log=False).low < -3
+    assert axis_over([np.array([9.0, 10])], 0, 1, log=False, tight=True).low == 9
+
+
+def test_rates_are_drawn_from_zero_on():
+    high = flat("rate of events", 1)  # far above zero
+    svg = curve_chart(high)
+    assert texts(svg, "end")["0"][1] == max(y for _, y in texts(svg, "end").values())
+    (line,) = path_of(svg, "curve before")
+    bottom, top = texts(svg, "end")["0"][1] - 4, texts(svg, "end")["10"][1] - 4
+    assert line[0][1] == pytest.approx(top, abs=0.2)
+    assert bottom - top > 80  # ten of some twelve are most of the height
+
+
+def test_rates_across_begin_at_zero_too():
+    against_rates = replace(flat("rate against rate", 1), x=np.array([200.0, 300, 400]))
+    assert texts(curve_chart(against_rates), "middle")["0"][0] == pytest.approx(58)
+    bins = replace(against_rates, x=np.array([200.0, 300, 400, 500]))
+    assert "0" not in texts(curve_chart(bins), "middle")
+
+
+def test_bins_with_names_have_them_at_their_middles():
+    curve = replace(flat("thirds", 1), x=np.arange(4.0), x_names=("dark", "medium", "bright"))
+    labels = texts(curve_chart(curve), "middle")
+    assert labels.keys() >= {"dark", "medium", "bright"}
+    places = [labels[name][0] for name in ("dark", "medium", "bright")]
+    assert places == pytest.approx([58 + 288 * share for share in (1 / 6, 1 / 2, 5 / 6)], abs=0.1)
+    assert not {"0", "1", "2", "3"} & labels.keys()
 
 
 def test_lines_have_gaps_and_lone_points():

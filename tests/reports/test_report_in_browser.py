@@ -50,7 +50,9 @@ def full_size():
         curves=given.curves * 5,
         maps=[ResidualMap(f"{name} events", *draw.normal(size=(2, 260, 346))) for name in "ab"],
         signatures=[
-            Signature(f"s {k}", f"group {k % 16}", f"number of events {k} " * 6, k, 9, k, k, 0.1)
+            Signature(
+                f"s {k}", f"group {k % 16}", f"number of events {k} " * 6, k, 9, k, k, 0.1, "events"
+            )
             for k in range(450)
         ],
         rejected=[Rejected(name, long, {f"pixel.{name}.size_us": 1234.5}, 0.9) for name in names],

@@ -1,9 +1,11 @@
 """``report.html``: well formed, alone, escaped, and with everything in it."""
 
+import base64
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import cv2
 import numpy as np
 import pytest
 from camera.catalogue import LIBRARY
@@ -11,7 +13,8 @@ from made_up_diagnosis import HOSTILE, everything, nothing, strange
 
 from adv2e.reports.findings import MARKS
 from adv2e.reports.page import page
-from adv2e.reports.result import ResidualMap, Signature
+from adv2e.reports.result import Estimate, Rejected, ResidualMap, Signature, Snapshot, Total
+from adv2e.reports.summary import details_text
 from adv2e.reports.trials import SEPARATIONS
 from adv2e.reports.wording import OF_TABLES
 
@@ -93,14 +96,18 @@ def test_texts_are_shown_as_they_are():
     assert shown.count(whole) >= 15
 
 
-def test_misfits_have_a_column_where_any_is_known(full):
-    held = everything()
-    assert any(one.held_out is not None for one in held.rejected)
-    assert "difference left" in Outline(full).texts
-    bare = replace(held, rejected=[replace(one, held_out=None) for one in held.rejected])
-    texts = Outline(page(bare)).texts
-    assert "difference left" not in texts
-    assert "Effects tried and not added" in texts
+def test_what_was_tried_is_sorted_by_what_it_explains():
+    shares = {"a": 0.9, "b": None, "c": 0.352, "d": 1.25, "e": float("nan"), "f": 0.7}
+    given = [Rejected(name, f"why not {name}", {}, share) for name, share in shares.items()]
+    tried = replace(everything(), rejected=given)
+    section = page(tried).partition(">Effects tried and not added")[2].partition("</table>")[0]
+    rows = re.findall(r'scope="row">(\w).*?data-label="explains">([^<]*)<', section)
+    wanted = ["64.8 %", "30.0 %", "10.0 %", "-25.0 %", "-", "-"]
+    assert rows == list(zip("cfadbe", wanted, strict=True))
+    told = details_text(tried)
+    assert [told.index(f"why not {name}") for name in "cfadbe"] == sorted(
+        told.index(f"why not {name}") for name in shares
+    )
 
 
 def test_headings_come_in_order(full):
@@ -193,7 +200,7 @@ def test_the_page_says_what_was_found(full):
         SEPARATIONS["reset_overshoot"],
         "no line in the spectrum beyond chance",
         "frames.flicker.depth = 0.002",
-        "0.998",
+        "0.2 %",
         "740",
         "3.4 %",
         "Blocks of 0.5 s",
@@ -238,8 +245,12 @@ def signature_names(text):
 
 def test_signatures_are_sorted_marked_and_folded(full):
     names, section = signature_names(full)
-    wanted = sorted(everything().signatures, key=lambda one: -abs(one.z_before))
+    kinds = ["count", "time", "other"]
+    wanted = sorted(
+        everything().signatures, key=lambda one: (kinds.index(one.kind), -abs(one.z_before))
+    )
     assert names == [one.name for one in wanted]
+    assert names[:3] == ["events", "ON share", "shortest 1 % of times"]
     assert section.count("<details>") == 1
     large = [z for one in wanted for z in (one.z_before, one.z_after) if abs(z) > 3]
     assert len(re.findall("▲|▼", section)) == len(large) + 2  # and once each in words
@@ -250,7 +261,7 @@ def test_signatures_are_sorted_marked_and_folded(full):
 def test_short_tables_are_not_folded_and_unknown_distances_come_last():
     nan = float("nan")
     rows = [
-        Signature(n, "g", "m", 1, 1, 1, z, 0)
+        Signature(n, "g", "m", 1, 1, 1, z, 0, "events")
         for n, z in zip("abcd", (nan, 1, -9, nan), strict=True)
     ]
     names, section = signature_names(page(replace(everything(), signatures=rows)))
@@ -258,11 +269,117 @@ def test_short_tables_are_not_folded_and_unknown_distances_come_last():
     assert "<details>" not in section
 
 
+def test_every_number_that_is_compared_has_its_unit(full):
+    rows = re.findall(r"<tr><th.*?</tr>", full[full.index(">All numbers that") :])
+    units = {one.meaning: one.unit for one in everything().signatures}
+    compared = [row for row in rows if any(meaning in row for meaning in units)]
+    assert len(compared) == len(everything().signatures)
+    for row in compared:
+        assert re.search(r'data-label="unit">(ms|events|of 1)<', row)
+        assert 'data-label="z before [sd]"' in row
+
+
+def test_errors_and_keys_without_a_unit_say_so(full):
+    assert "as a share of the measured events: 0 is no difference, 1 as much as with no" in full
+    row = re.search(r"<code>readout.loss.fraction</code>.*?</tr>", full)[0]
+    assert 'data-label="unit">no unit<' in row
+    row = re.search(r"<code>pixel.thresholds.on</code>.*?</tr>", full)[0]
+    assert 'data-label="unit">ln<' in row
+    row = re.search(r"<code>frames.encoding</code>.*?</tr>", full)[0]  # a word, no number
+    assert "no unit" not in row
+
+
+def pictures_of_events(text):
+    """Return names, numbers of events and pictures, as they stand beside one another."""
+    (beside,) = re.findall('<div class="three">(.*?)</div>', text)
+    found = re.findall(
+        r'class="line">(.*?)</span>([\d,]+ events?)<span class="meaning">(.*?)</span>'
+        r'.*?base64,([^"]*)"',
+        beside,
+    )
+    names, numbers, split, data = zip(*found, strict=True)
+    images = [
+        cv2.imdecode(np.frombuffer(base64.b64decode(one), np.uint8), cv2.IMREAD_COLOR)
+        for one in data
+    ]
+    return names, numbers, split, images
+
+
+def test_events_are_shown_as_measured_declared_and_found_in_the_same_colours():
+    number = np.zeros((3, 2, 6, 8), np.int64)  # of each picture: OFF, ON
+    number[0, 1, 2, 3], number[1, 1, 2, 3], number[2, 1, 2, 3] = 1, 4, 1
+    number[0, 0, 4, 5] = number[1, 0, 0, 0] = 2
+    text = page(replace(everything(), snapshot=Snapshot(0.25, 0.02, *number)))
+    names, numbers, split, images = pictures_of_events(text)
+    assert names == ("measured", "as declared (before)", "with what was found (after)")
+    assert numbers == ("3 events", "6 events", "1 event")
+    assert split == ("1 ON, 2 OFF", "4 ON, 2 OFF", "1 ON, 0 OFF")
+    assert "Events of 20 ms: 0.250 to 0.270 s after the start" in text
+    # all before what is to be done, at the same size
+    assert text.index('class="three"') < text.index("What to do next")
+    assert len({image.shape for image in images}) == 1
+    scale = images[0].shape[1] // 8
+    measured, declared, found = (
+        image[scale // 2 :: scale, scale // 2 :: scale] for image in images
+    )
+    # one event has one colour in all, and more are stronger
+    np.testing.assert_array_equal(measured[2, 3], found[2, 3])
+    assert declared[2, 3].sum() < measured[2, 3].sum()
+    np.testing.assert_array_equal(measured[4, 5], declared[0, 0])
+    blue, _, red = measured[2, 3].astype(int)
+    assert red > blue
+    blue, _, red = measured[4, 5].astype(int)
+    assert blue > red
+    assert (measured[5] == 255).all()
+
+
+def test_where_nothing_was_found_two_pictures_are_shown(full):
+    assert len(pictures_of_events(full)[0]) == 3
+    text = page(replace(everything(), verdict="consistent", effects=[]))
+    assert pictures_of_events(text)[0] == ("measured", "as declared (before)")
+    assert 'data-label="with what was found' not in text
+
+
+def test_a_time_without_events_is_shown():
+    empty = Snapshot(0.0, 1.0, *np.zeros((3, 2, 4, 5), np.int64))
+    _, numbers, _, images = pictures_of_events(page(replace(everything(), snapshot=empty)))
+    assert set(numbers) == {"0 events"}
+    assert all((image == 255).all() for image in images)
+
+
+def test_totals_come_before_all_other_numbers():
+    totals = [Total("ON events", "events", 12.0, Estimate(34.0, (30.0, 38.0)), Estimate(13.0))]
+    text = page(replace(everything(), totals=totals))
+    row = re.search(r'scope="row">ON events</th>.*?</tr>', text)[0]
+    cells = re.findall(r'data-label="([^"]*)">([^<]*)<', row)
+    assert cells == [
+        ("measured", "12.0"),
+        ("as declared (before)", "34 (30 to 38)"),
+        ("with what was found (after)", "13.0"),
+        ("unit", "events"),
+    ]
+    assert text.index(row) == text.index('scope="row"')  # the first row of all tables
+    assert text.index(row) < text.index("What to do next")
+
+
 def test_maps_of_usual_sensors_keep_the_page_small():
     draws = np.random.default_rng(5).normal(size=(2, 260, 346))
     maps = [ResidualMap("m", *draws), ResidualMap("n", *draws[::-1])]
     text = page(replace(everything(), maps=maps))
     assert len(text.encode()) < 2_000_000
+
+
+def test_remarks_end_in_what_they_mean_here(full):
+    told = re.findall("<p[^>]*>(Probability.*?|Many numbers were.*?)</p>", full)
+    assert len(told) == 2
+    assert (
+        "Here, chance may make all that is left, and the error is 16 % above its floor." in told[0]
+    )
+    assert "Here, these are the marks of what was found" in told[1]
+    left = replace(everything(), verdict="unexplained", effects=[], global_p_after=1e-4)
+    text = page(left)
+    assert "Here, chance does not make all that is left" in text
+    assert "Here, something that the library lacks makes these differences." in text
 
 
 def test_of_one_model_one_map_is_shown(full):

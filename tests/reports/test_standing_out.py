@@ -14,8 +14,9 @@ from adv2e.reports.summary import summary_text
 NAN = float("nan")
 
 
-def signature(name, group, z_before, z_after):
-    return Signature(name, group, f"what {name} means", 12.0, 345.0, 67.0, z_before, z_after)
+def signature(name, group, z_before, z_after, kind="count"):
+    meaning = f"what {name} means"
+    return Signature(name, group, meaning, 12.0, 345.0, 67.0, z_before, z_after, "events", kind)
 
 
 SIGNATURES = [
@@ -47,11 +48,25 @@ def test_groups_that_still_stand_out_come_first_the_farthest_before_the_others()
     ]
 
 
+def test_numbers_of_events_come_first_then_times_then_all_else():
+    kinds = {"covariance": "other", "gaps": "time", "fewer": "count", "many": "count"}
+    size = {"covariance": 90.0, "gaps": 40.0, "fewer": 4.0, "many": 7.0}
+    given = [signature(name, name, size[name], size[name], kind) for name, kind in kinds.items()]
+    wanted = ["many", "fewer", "gaps", "covariance"]
+    assert [one.group for one in standing_out(given)] == wanted
+    unexplained = replace(everything(), verdict="unexplained", effects=[], signatures=given)
+    text = groups(unexplained)
+    assert [text.index(f"what {name} means") for name in wanted] == sorted(
+        text.index(f"what {name} means") for name in wanted
+    )
+    assert "it shows in the what many means: 12.0 events measured" in unexplained.sentence
+
+
 def test_nothing_stands_out_of_chance():
     quiet = [signature(f"s{k}", "g", 0.9 * k, -0.9 * k) for k in range(4)]
     assert standing_out(quiet) == []
     text = groups(replace(everything(), signatures=quiet))
-    assert "No number differs by more than 3 standard deviations." in text
+    assert "No number differs by more than 3 standard deviations: here, the simulation is" in text
 
 
 def test_the_page_tells_how_each_group_stands_out():
@@ -66,7 +81,7 @@ def test_where_nothing_was_found_one_model_is_shown():
     nothing = replace(everything(), verdict="unexplained", effects=[], signatures=SIGNATURES)
     text = groups(nothing)
     headings = re.findall('<th scope="col"[^>]*>([^<]*)', text)
-    assert headings == ["what", "measured", "simulated", "far off"]
+    assert headings == ["what", "measured", "simulated", "unit", "far off"]
     assert "model found" not in text
 
 
@@ -77,14 +92,18 @@ def test_where_nothing_is_left_the_page_tells_what_differed():
 
 
 @pytest.mark.parametrize("verdict", ["unexplained", "partly_explained", "consistent"])
-def test_the_summary_tells_it_where_nothing_is_named(verdict):
-    text = summary_text(replace(everything(), verdict=verdict, effects=[], signatures=SIGNATURES))
+def test_the_summary_tells_the_first_of_each_kind_where_nothing_is_named(verdict):
+    kinds = {"c1": "time", "b2": "other"}
+    given = [replace(one, kind=kinds.get(one.name, "count")) for one in SIGNATURES]
+    given = [one for one in given if one.name not in ("b1", "c2")]
+    found = replace(everything(), verdict=verdict, effects=[], signatures=given)
     lines = [
-        "  what c1 means: 12.0 measured, 67.0 simulated",
-        "  what b2 means: 12.0 measured, 67.0 simulated",
+        "  what c1 means: 12.0 events measured, 67.0 simulated",
+        "  what b2 means: 12.0 events measured, 67.0 simulated",
     ]
-    told = [line for line in text.splitlines() if line.startswith("  what ")]
+    told = [line for line in summary_text(found).splitlines() if line.startswith("  what ")]
     assert told == (lines if verdict == "unexplained" else [])
+    assert ("it shows in the what e1 means" in found.sentence) == (verdict != "consistent")
 
 
 def test_the_summary_stays_short_where_much_stands_out():

@@ -54,7 +54,10 @@ def check_known_light(measured: Placed, scene: Scene, light: NDArray[np.float32]
 def _brightness(light: NDArray[np.float32]) -> str:
     brightest = float(light.max()) / _WHITE_DN
     if np.all(light == light[0]):
-        return "the frames are all the same: nothing that moves can be simulated from them"
+        return (
+            "the frames are all the same: nothing that moves can be simulated from them, so only"
+            " noise can be judged"
+        )
     if brightest < _DIM:
         return (
             f"the brightest light of the frames is {brightest:.2g} of white: is"
@@ -67,7 +70,7 @@ def _gaps(times_us: NDArray[np.float64]) -> list[str]:
     intervals = np.diff(times_us)
     return [
         f"no frames from {times_us[k] / 1e6:.3f} to {times_us[k + 1] / 1e6:.3f} s: what moves there"
-        " is made up"
+        " is made up, so look at the time before or after it (--start, --stop)"
         for k in np.flatnonzero(intervals > _GAP * np.median(intervals))[:3]
     ]
 

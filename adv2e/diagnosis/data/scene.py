@@ -13,10 +13,13 @@ from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.splits import Split
 from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.data.stream import Stream
+from adv2e.reports.quantities import short_text
 
 STILL = 0
 SPEEDS = 4
 BRIGHTNESSES = 3
+SPEED_NAMES = ("still", "slow", "moving", "fast")
+LIGHT_NAMES = ("dark", "medium", "bright")
 STILL_PER_S = 0.3
 """Change of log light below which a pixel counts as still [1/s]."""
 _MEMORY_S = 0.05
@@ -36,6 +39,8 @@ class Scene:
         0: still for a while; 1 to 3: thirds of what moves.
     brightness : (frames - 1, pixels) uint8
         Thirds of what moves.
+    speed_borders, brightness_borders : (2,)
+        Between the thirds, [ln/s] and [DN].
     split : Split
     width, height : int
     leaps : Leaps, optional
@@ -46,6 +51,8 @@ class Scene:
     slope: NDArray[np.float32]
     speed: NDArray[np.uint8]
     brightness: NDArray[np.uint8]
+    speed_borders: NDArray[np.float64]
+    brightness_borders: NDArray[np.float64]
     split: Split
     width: int
     height: int
@@ -65,11 +72,12 @@ class Scene:
         seconds = np.diff(times_s).astype(np.float32)
         slope = np.diff(x, axis=0) / seconds[:, None]
         uncertain = 1.5 * quantum_dn * np.exp(-np.minimum(x[1:], x[:-1])) / seconds[:, None]
-        speed, weight = _speeds(slope, seconds, np.maximum(STILL_PER_S, uncertain))
+        speed, weight, per_s = _speeds(slope, seconds, np.maximum(STILL_PER_S, uncertain))
         edges = _weighted_quantiles(x[1:], weight, BRIGHTNESSES)
         brightness = np.digitize(x[1:], edges).astype(np.uint8)
         split = Split.of(width, height, times_s[0] * 1e6, times_s[-1] * 1e6)
-        return cls(times_s * 1e6, slope, speed, brightness, split, width, height)
+        borders = per_s, np.exp(edges)
+        return cls(times_s * 1e6, slope, speed, brightness, *borders, split, width, height)
 
     @classmethod
     def of_evidence(cls, evidence: Evidence, declared: Config) -> Scene:
@@ -77,6 +85,21 @@ class Scene:
         light, quantum_dn = evidence.light(declared), evidence.quantum_dn(declared)
         scene, known = cls.of(light, evidence.times_s, quantum_dn), evidence.stimulus
         return scene if known is None else replace(scene, leaps=known.leaps)
+
+    @property
+    def bounds_of_speed(self) -> tuple[str, ...]:
+        """Name of each class of speed, with its bounds: of the change of log light."""
+        low, high = (short_text(border, 2) for border in self.speed_borders.tolist())
+        bounds = f"below {low} ln/s", f"{low} to {high} ln/s", f"from {high} ln/s"
+        still, *others = SPEED_NAMES
+        return still, *map("{} ({})".format, others, bounds)
+
+    @property
+    def bounds_of_light(self) -> tuple[str, ...]:
+        """Name of each class of brightness, with its bounds; 255 DN is white."""
+        low, high = (short_text(border, 3) for border in self.brightness_borders.tolist())
+        bounds = f"below {low} DN", f"{low} to {high} DN", f"from {high} DN"
+        return tuple(map("{} ({})".format, LIGHT_NAMES, bounds))
 
     @property
     def intervals(self) -> int:
@@ -106,8 +129,11 @@ class Scene:
 
 def _speeds(
     slope: NDArray[np.float32], seconds: NDArray[np.float32], still: NDArray[np.float32]
-) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """Return the class of speed, and the weight of each place: how much changes there."""
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float64]]:
+    """Return the class of speed, the weight of each place, which is how much changes there.
+
+    And the borders between the thirds of what moves [1/s].
+    """
     change = np.abs(slope)
     change[change < still] = 0.0
     recent = change.copy()
@@ -120,7 +146,7 @@ def _speeds(
     edges = _weighted_quantiles(recent, weight, SPEEDS - 1)
     speed = (1 + np.digitize(recent, edges)).astype(np.uint8)
     speed[recent == 0.0] = STILL
-    return speed, weight
+    return speed, weight, edges
 
 
 def _weighted_quantiles(

@@ -11,14 +11,14 @@ from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import Placed
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.outcome.error import Errors, error_rows, of_interpolation
-from adv2e.diagnosis.outcome.picture import curves_of, maps_of
+from adv2e.diagnosis.outcome.picture import curves_of, maps_of, snapshot_of, totals_of
 from adv2e.diagnosis.outcome.verdict import verdict_of
 from adv2e.diagnosis.prepare import Prepared
 from adv2e.diagnosis.selection.reference import State
 from adv2e.diagnosis.selection.search import Outcome, Search
 from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.diagnosis.statistics.uncertainty import every
-from adv2e.reports.result import Curve, ErrorRow, ResidualMap, Verdict
+from adv2e.reports.result import Curve, ErrorRow, ResidualMap, Snapshot, Total, Verdict
 
 DRAWS = 12
 """Simulations of each model that the errors are made of."""
@@ -28,7 +28,7 @@ _FIRST_DRAW = 20_000
 
 @dataclass(frozen=True)
 class Conclusion:
-    """What is said of a recording: errors, curves and maps are of the declared model and `kept`.
+    """What is said of a recording: errors and pictures are of the declared model and `kept`.
 
     That is the model that is reported: the declared one where nothing is named.
     """
@@ -38,6 +38,8 @@ class Conclusion:
     errors: list[ErrorRow]
     curves: list[Curve]
     maps: list[ResidualMap]
+    totals: list[Total]
+    snapshot: Snapshot
 
 
 def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion:
@@ -85,10 +87,7 @@ def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion
     first, second = (
         [Placed.of(stream, scene) for stream in streams] for streams in (before, after)
     )
+    seen = scene, recorded, first, second
     return Conclusion(
-        verdict,
-        kept,
-        rows,
-        curves_of(scene, recorded, first, second),
-        maps_of(scene, recorded, first, second),
+        verdict, kept, rows, curves_of(*seen), maps_of(*seen), totals_of(*seen), snapshot_of(*seen)
     )

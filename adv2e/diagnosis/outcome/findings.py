@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from adv2e.config import Config
+from adv2e.diagnosis.configurations import with_keys
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.fitting.candidates import Candidate
@@ -16,7 +18,14 @@ from adv2e.diagnosis.prepare import Prepared
 from adv2e.diagnosis.selection.reference import Reference, State
 from adv2e.diagnosis.selection.search import Outcome
 from adv2e.diagnosis.statistics.summary import BOTH
+from adv2e.errors import ConfigError
 from adv2e.reports.result import Finding, Rejected, Signature
+from adv2e.reports.trials import by_explained
+
+_LITTLE_DOUBT = 0.3
+"""Of what frames leave uncertain, in deviations of chance: added in squares, it is a twentieth."""
+_SEEDS = (1, 2)
+"""Of the rough simulations by which effects are first compared."""
 
 
 def finding_of(fit: Fitted, pixels: int, config: Config) -> Finding:
@@ -43,8 +52,14 @@ def finding_of(fit: Fitted, pixels: int, config: Config) -> Finding:
     return Finding(fit.candidate.name, settings, interval)
 
 
-def rejected_of(outcome: Outcome, kept: State, candidates: Sequence[Candidate]) -> list[Rejected]:
-    """Return the effects that were not added, in the library's order."""
+def rejected_of(
+    reference: Reference, outcome: Outcome, kept: State, candidates: Sequence[Candidate]
+) -> list[Rejected]:
+    """Return the effects that were not added, those that explain most first.
+
+    That is told by rough simulations, most of which their fits have made, on the data for
+    validation.
+    """
     names = list(dict.fromkeys(candidate.name for candidate in candidates))
     held = dict(outcome.rejected)
     if outcome.state is not kept:
@@ -54,7 +69,37 @@ def rejected_of(outcome: Outcome, kept: State, candidates: Sequence[Candidate]) 
         for fit in outcome.state.fits:
             settings = fit.candidate.settings_in(outcome.state.config, fit.point)
             held[fit.candidate.name] = Rejected(fit.candidate.name, why, settings)
-    return [held[name] for name in names if name in held and name not in kept.names]
+    given = [held[name] for name in names if name in held and name not in kept.names]
+    declared = reference.declared
+    configs = [_alone(one, declared, candidates) for one in given]
+    known = [config for config in configs if config is not None]
+    reference.sampler.rough.samples([declared, *known], _SEEDS)  # all at once, then held
+    fitter = reference.fitter(splits.VALIDATION, declared, rough=True)
+    nothing = fitter.misfit(declared, _SEEDS)
+    return by_explained(
+        [
+            one
+            if config is None
+            else replace(one, held_out=fitter.misfit(config, _SEEDS) / nothing)
+            for one, config in zip(given, configs, strict=True)
+        ]
+    )
+
+
+def _alone(one: Rejected, declared: Config, candidates: Sequence[Candidate]) -> Config | None:
+    """Return the declared model with an effect as it was tried, None where that is no model.
+
+    Values that were fitted beside another effect may not be allowed without it.
+    """
+    for candidate in candidates:
+        keys = {parameter.key for parameter in candidate.parameters}
+        if candidate.name == one.name and keys <= set(one.parameters):
+            try:
+                whole = candidate.applied(declared, candidate.scaled(candidate.starts[0]))
+                return with_keys(whole, one.parameters)
+            except ConfigError:
+                return None
+    return None
 
 
 def signatures_of(reference: Reference, declared: State, kept: State) -> list[Signature]:
@@ -63,16 +108,25 @@ def signatures_of(reference: Reference, declared: State, kept: State) -> list[Si
     of_models = [state.ensembles[splits.TEST] for state in (declared, kept)]
     means = [reference.scales[splits.TEST].values_of(one.mean) for one in of_models]
     z = [one.z(observed) for one in of_models]
-    return [
-        Signature(
-            entry.name,
-            title,
-            entry.meaning,
-            *(entry.plain(float(values[k])) for values in (observed, *means)),
-            *(float(deviations[k]) for deviations in z),
+    signatures = []
+    for k, entry in enumerate(statistics.entries):
+        measured, before, after = (entry.plain(float(values[k])) for values in (observed, *means))
+        z_before, z_after = (float(deviations[k]) for deviations in z)
+        signatures.append(
+            Signature(
+                entry.name,
+                statistics.titles[k],
+                entry.meaning,
+                measured,
+                before,
+                after,
+                z_before,
+                z_after,
+                entry.unit,
+                statistics.kinds[k],
+            )
         )
-        for k, (entry, title) in enumerate(zip(statistics.entries, statistics.titles, strict=True))
-    ]
+    return signatures
 
 
 def about_frames(prepared: Prepared) -> list[str]:
@@ -85,14 +139,14 @@ def about_frames(prepared: Prepared) -> list[str]:
     if prepared.between_frames is None:
         notes.append(
             "too few frames to leave any out: what the interpolation between them does to the"
-            " residual is not known, and may be all of it"
+            " residual is not known, and may be all of it: record with more frames a second before"
+            " you trust an effect that is named here"
         )
     else:
         doubt = prepared.between_frames.doubt(chance, BOTH)
         made_up = "the light between the frames, which is interpolated,"
         text = _uncertain(made_up, doubt, "frames left out")
-        unresolved = ": the frames hardly resolve the motion" if doubt > 1.0 else ""
-        notes.append(text + unresolved)
+        notes.append(text)
     if prepared.between_levels is not None:
         doubt = prepared.between_levels.doubt(chance, BOTH)
         untold = "the light between two levels of the frames' numbers"
@@ -103,8 +157,17 @@ def about_frames(prepared: Prepared) -> list[str]:
 def _uncertain(what: str, doubt: float, told_by: str) -> str:
     return (
         f"{what} makes the numbers compared uncertain, {doubt:.2g} times as much as chance does"
-        f" (root mean square; found by simulations with {told_by})"
+        f" (root mean square; found by simulations with {told_by}): {_meaning(doubt)}"
     )
+
+
+def _meaning(doubt: float) -> str:
+    """Say what it means here that frames make numbers so uncertain."""
+    if doubt < _LITTLE_DOUBT:
+        return "here, that hides next to nothing"
+    if doubt <= 1.0:
+        return "here, small effects stay hidden behind it"
+    return "here, the frames hardly resolve the motion, and only large effects can be found"
 
 
 def about_drifts(evidence: Evidence, model: Config) -> list[str]:
@@ -117,4 +180,5 @@ def about_drifts(evidence: Evidence, model: Config) -> list[str]:
     if not names or not evidence.run_in.frames:
         return []
     start_s = evidence.simulated.times_s[0]
-    return [f"in model.yaml {names} counts from the first frame simulated, at {start_s:.3f} s"]
+    counts = f"in model.yaml {names} counts from the first frame simulated, at {start_s:.3f} s"
+    return [f"{counts}: for another time, what it has made up to then is to be set besides"]

@@ -6,6 +6,7 @@ interval.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,18 +14,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.data.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
+from adv2e.diagnosis.data.scene import (
+    BRIGHTNESSES,
+    LIGHT_NAMES,
+    SPEED_NAMES,
+    SPEEDS,
+    STILL,
+    Placed,
+    Scene,
+)
 from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.statistics.groups import excess
 from adv2e.diagnosis.statistics.intervals import BORDERS_MS
 from adv2e.diagnosis.statistics.rates import by_load, rate_hz
 from adv2e.diagnosis.statistics.timing import LAGS_MS
-from adv2e.reports.result import Band, Curve, ResidualMap
+from adv2e.reports.result import Band, Curve, Estimate, ResidualMap, Snapshot, Total
 
 Array = NDArray[np.float64]
 Measure = Callable[[Placed], Array]
 
-_PER_PIXEL, _PER_SENSOR = "events a pixel a second", "events a second"
+_PER_PIXEL, _PER_SENSOR = "rate [events a pixel a second]", "rate [events a second]"
 _MOTION = (("in motion", True), ("at rest", False))
 _POLARITIES = (("ON", 1), ("OFF", 0))
 _LOADS = 8
@@ -55,6 +64,7 @@ class _Axes:
     x: Array
     measure: Measure
     x_log: bool = False
+    x_names: Sequence[str] = ()
 
 
 def curves_of(
@@ -71,7 +81,17 @@ def curves_of(
             _band([kind.measure(one) for one in simulated]) for simulated in (before, after)
         )
         drawn.append(
-            Curve(kind.title, kind.x_label, kind.y_label, kind.x, values, first, second, kind.x_log)
+            Curve(
+                kind.title,
+                kind.x_label,
+                kind.y_label,
+                kind.x,
+                values,
+                first,
+                second,
+                kind.x_log,
+                x_names=kind.x_names,
+            )
         )
     return drawn
 
@@ -99,6 +119,83 @@ def maps_of(
     ]
 
 
+_LENGTHS_MS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+_LEAST_SEEN = 0.125
+"""Events a pixel that a snapshot holds, or it is longer."""
+
+
+def totals_of(
+    scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
+) -> list[Total]:
+    """Return what an engineer asks first: how many events there are, and when they come.
+
+    Arguments as of :func:`curves_of`.
+    """
+
+    def rate(placed: Placed) -> float:
+        return len(placed.stream) / (scene.pixels * float(scene.seconds.sum()))
+
+    def apart_ms(placed: Placed) -> float:
+        since = placed.stream.since
+        since = since[since >= 0]
+        return 1e-3 * float(np.median(since)) if len(since) else math.nan
+
+    kinds: list[tuple[str, str, Callable[[Placed], float]]] = [
+        ("ON events", "events", lambda placed: float(np.count_nonzero(placed.stream.on))),
+        ("OFF events", "events", lambda placed: float(np.count_nonzero(placed.stream.on == 0))),
+        ("rate of ON and OFF", "events a pixel a second", rate),
+        ("time from an event to the next of its pixel, median", "ms", apart_ms),
+    ]
+    return [
+        Total(
+            name,
+            unit,
+            number(measured),
+            *(_mean([number(one) for one in placed]) for placed in (before, after)),
+        )
+        for name, unit, number in kinds
+    ]
+
+
+def snapshot_of(
+    scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
+) -> Snapshot:
+    """Return the events of the busiest short time, of the recording and of a simulation each.
+
+    Arguments as of :func:`curves_of`.  It is the busiest of all of them together, so that none is
+    shown where it has the most by chance, and as long as makes events enough to see a picture.
+    """
+    shown = measured, before[0], after[0]
+    start, stop = scene.times_us[[0, -1]]
+    streams = [placed.stream for placed in (measured, *before, *after)]
+    t = np.sort(np.concatenate([stream.t for stream in streams]))
+    enough = _LEAST_SEEN * scene.pixels * len(streams)
+    first, length = start, stop - start
+    for length_ms in _LENGTHS_MS:
+        borders = np.arange(start, stop, 500.0 * length_ms)  # two steps are a window
+        number = np.diff(np.searchsorted(t, np.r_[borders, stop]))
+        if len(number) < 3:
+            break
+        together = number[:-2] + number[1:-1]  # whole windows alone
+        k = int(np.argmax(together))
+        if together[k] >= enough:
+            first, length = borders[k], 1000.0 * length_ms
+            break
+
+    def number_of(placed: Placed) -> NDArray[np.int64]:
+        part = placed.stream.between(first, first + length)
+        cell = part.on * np.int64(scene.pixels) + part.pixel
+        number = np.bincount(cell, minlength=2 * scene.pixels)
+        return number.reshape(2, scene.height, scene.width)
+
+    return Snapshot((first - start) * 1e-6, length * 1e-6, *map(number_of, shown))
+
+
+def _mean(values: Sequence[float]) -> Estimate:
+    low, high = np.quantile(values, [0.025, 0.975])
+    return Estimate(float(np.mean(values)), (float(low), float(high)))
+
+
 def _band(rows: Sequence[Array]) -> Band:
     low, middle, high = np.quantile(np.array(rows), [0.025, 0.5, 0.975], axis=0)
     return Band(middle, low, high)
@@ -110,13 +207,13 @@ def _between_events() -> Iterator[_Axes]:
         title, label = f"a pixel, {kind} polarity", "the event before [ms]"
         yield _times(title, label, _GAPS_MS, _gaps(same))
     for kind, same in (("same", True), ("other", False)):
-        title, label = f"the sensor, {kind} row", "the event before, of any pixel [us]"
+        title, label = f"the sensor, {kind} row", "the event before, of any pixel [µs]"
         yield _times(title, label, _STAMPS_US, _stamps(same))
 
 
 def _times(of: str, since: str, borders: Array, measure: Measure) -> _Axes:
     title, label = f"Time between events of {of}", f"time since {since}"
-    return _Axes(title, label, "events", borders, measure, x_log=True)
+    return _Axes(title, label, "events in a bin", borders, measure, x_log=True)
 
 
 def _by_place(scene: Scene) -> Iterator[_Axes]:
@@ -128,12 +225,13 @@ def _by_place(scene: Scene) -> Iterator[_Axes]:
         for name, on in _POLARITIES:
             title = f"Rate against brightness, {text}, {name}"
             measure = _rates(scene, kind, BRIGHTNESSES, on)
-            yield _Axes(title, "brightness (thirds)", _PER_PIXEL, borders, measure)
-    label, borders = "speed (still, then thirds)", np.arange(SPEEDS + 1.0)
-    speed = _rates(scene, scene.speed, SPEEDS)
-    yield _Axes("Rate against speed", label, _PER_PIXEL, borders, speed)
+            label = f"thirds of brightness: {', '.join(scene.bounds_of_light)}; white: 255 DN"
+            yield _Axes(title, label, _PER_PIXEL, borders, measure, x_names=LIGHT_NAMES)
+    label = f"at rest, and thirds of speed of log light: {', '.join(scene.bounds_of_speed[1:])}"
+    borders, speed = np.arange(SPEEDS + 1.0), _rates(scene, scene.speed, SPEEDS)
+    yield _Axes("Rate against speed", label, _PER_PIXEL, borders, speed, x_names=SPEED_NAMES)
     contrasts = np.digitize(contrast(scene), _CONTRASTS[1:-1])
-    label = "change of log light within 50 ms [ln]"
+    label = "range of log light within 50 ms [ln]"
     for name, on in _POLARITIES:
         measure = _rates(scene, contrasts, len(_CONTRASTS) - 1, on)
         title = f"Rate against contrast, {name}"
@@ -148,7 +246,7 @@ def _by_place(scene: Scene) -> Iterator[_Axes]:
     borders = row_borders(scene)
     row = np.searchsorted(borders, np.arange(scene.pixels) // scene.width, "right") - 1
     rows = _rates(scene, row[None], len(borders) - 1)
-    yield _Axes("Rate against row", "row, from the top", _PER_PIXEL, borders, rows)
+    yield _Axes("Rate against row", "row, from the top [pixels]", _PER_PIXEL, borders, rows)
 
 
 def _by_time(scene: Scene, before: Sequence[Placed]) -> Iterator[_Axes]:
@@ -168,13 +266,19 @@ def _by_time(scene: Scene, before: Sequence[Placed]) -> Iterator[_Axes]:
         for name, on in _POLARITIES:
             title, label = f"Events after a leap of the light, {name}", "time since the leap [ms]"
             measure = _since_leap(scene.leaps, on)
-            yield _Axes(title, label, "events", _SINCE_LEAP_MS, measure, x_log=True)
+            yield _Axes(title, label, "events in a bin", _SINCE_LEAP_MS, measure, x_log=True)
     else:
         for text, moving in _MOTION:
             title, label = f"Place between two frames, {text}", "place [% of the frame interval]"
-            yield _Axes(title, label, "events", _PHASES, _phases(scene, moving))
+            yield _Axes(title, label, "events in a bin", _PHASES, _phases(scene, moving))
     borders_s = np.linspace(0.0, float(scene.seconds.sum()), 25)
-    yield _Axes("Events over time", "time [s]", _PER_SENSOR, borders_s, _course(scene, borders_s))
+    yield _Axes(
+        "Events over time",
+        "time after the start [s]",
+        _PER_SENSOR,
+        borders_s,
+        _course(scene, borders_s),
+    )
 
 
 def row_borders(scene: Scene) -> Array:

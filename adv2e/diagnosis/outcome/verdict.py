@@ -67,9 +67,12 @@ def _too_near(error: ErrorRow) -> bool:
 
 
 def remark_of(verdict: Verdict, outcome: Outcome) -> str:
-    """Return what a verdict says besides the effects that were found and their values."""
+    """Return what a verdict says besides the effects that were found and their values.
+
+    It ends in what that means for who has the recording.
+    """
     if verdict == "consistent":
-        return "The recording is what the declared model makes."
+        return "The recording is what the declared model makes: keep that model as it is."
     only_test = outcome.probability >= PER_LOOK
     where = " in the test data" * only_test
     share = f"{outcome.explained:.0%} of the difference"
@@ -77,18 +80,31 @@ def remark_of(verdict: Verdict, outcome: Outcome) -> str:
         return (
             "Nothing is missing in the data for training and validation, but in the test data"
             f" something is: chance makes such a difference {outcome.test_probability:.0e} times."
+            " Look at what differs before you use this model."
         )
     if verdict == "unexplained" and not outcome.state.fits:
-        return "Every effect that was tried leaves too much, or makes something else wrong."
+        return (
+            "Every effect that was tried leaves too much, or makes something else wrong: what is"
+            " missing is not in the library."
+        )
     if verdict == "unexplained":
         best = " and ".join(map(label_of, outcome.state.names))
         if outcome.complete:
-            return f"The nearest is {best}: numbers of events are then right, their times are not."
-        return f"The nearest is {best}: it would explain {share}, too little to be named."
+            near = f"The nearest is {best}: numbers of events are then right, their times are not."
+        else:
+            near = f"The nearest is {best}: it would explain {share}, too little to be named."
+        return f"{near} Do not add it."
     if verdict == "partly_explained":
-        return f"This explains {share}; something is left{where}."
+        left = f"something is left{where}"
+        return f"This explains {share}; {left}: use the model found, but know what still differs."
     if verdict == "not_identifiable":
-        return "These data cannot tell these effects apart."
+        return (
+            "These data cannot tell these effects apart: either model makes these events, and only"
+            " another recording tells which is right."
+        )
     if min(outcome.probability, outcome.test_probability) < PER_LOOK:
-        return f"This explains {outcome.explained:.1%} of the difference."
-    return "With this change nothing is left that these data show."
+        return (
+            f"This explains {outcome.explained:.1%} of the difference; the rest may be due to its"
+            " fit: use the model found."
+        )
+    return "With this change nothing is left that these data show: use the model found."

@@ -176,6 +176,8 @@ def _shortened(evidence: Evidence, intervals: int) -> Evidence:
 
 def _partial(part: Evidence, whole: Evidence, what: str, note: str) -> Evidence:
     """Return a part of a recording, which tells what of the whole was left out."""
-    note += ", as all of them would take too long to simulate often enough"
+    note += (
+        ", as all of them would take too long to simulate often enough: what is said holds there"
+    )
     masked = Masked(what, 1.0 - len(part.stream) / len(whole.stream))
     return replace(part, masked=[*whole.masked, masked], notes=[*whole.notes, note])

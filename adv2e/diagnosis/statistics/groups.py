@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,12 +12,13 @@ from numpy.typing import NDArray
 
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import Placed
+from adv2e.reports.result import Kind
 
 Array = NDArray[np.float64]
 
 POLARITIES = ("OFF", "ON")
-SPEED_NAMES = ("still", "slow", "moving", "fast")
-LIGHT_NAMES = ("dark", "medium", "bright")
+COVARIANCE, SURPLUS = "sd²", "sd"
+"""Units of what is counted in standard deviations of chance."""
 
 
 @dataclass(frozen=True)
@@ -28,22 +30,31 @@ class Entry:
     name : str
     meaning : str
         What it measures, in a sentence.
-    is_number : bool
-        A number, of events or pixels, which is compared as :func:`stabilised` puts it.
+    unit : str
+        Of what its meaning says; of a share or a ratio: of what to what.
+    plain : callable
+        Takes the statistic as it is compared, returns it as its meaning says.
     """
 
     name: str
     meaning: str
-    is_number: bool = False
-
-    def plain(self, value: float) -> float:
-        """Return the statistic as its meaning says, not as it is compared."""
-        return max(0.25 * value * value - 0.375, 0.0) if self.is_number else value
+    unit: str
+    plain: Callable[[float], float] = float
 
 
 def stabilised(number: Array) -> Array:
     """Return numbers of events on a scale on which a Poisson number deviates by 1 everywhere."""
     return np.asarray(2.0 * np.sqrt(np.maximum(number, 0.0) + 0.375))
+
+
+def counted(value: float) -> float:
+    """Return the number that :func:`stabilised` made a value of."""
+    return max(0.25 * value * value - 0.375, 0.0)
+
+
+def exponential(value: float) -> float:
+    """Return what the natural logarithm was taken of."""
+    return math.exp(min(value, 700.0))
 
 
 _RARE = stabilised(np.array(2.0))
@@ -57,7 +68,7 @@ def least_deviations(entries: Sequence[Entry], least: Array, mean: Array) -> Arr
     Poisson number.  Where none ever came, one or two events stand for themselves, as a pixel may
     have a dead time a little shorter than the others'; only several are more than chance.
     """
-    is_rare = np.array([entry.is_number for entry in entries]) & (mean < _RARE)
+    is_rare = np.array([entry.plain is counted for entry in entries]) & (mean < _RARE)
     return np.asarray(np.where(is_rare, np.maximum(least, 1.0), least))
 
 
@@ -75,6 +86,8 @@ class Group:
         Takes a stream, returns sums that add up over the parts of the data, (parts, numbers).
     values : callable
         Takes the sums of a part, or of several added, and returns the statistics, (entries,).
+    kind : str
+        What reports sort it by.
     """
 
     title: str
@@ -82,11 +95,12 @@ class Group:
     entries: list[Entry]
     count: Callable[[Placed], Array]
     values: Callable[[Array], Array] = stabilised
+    kind: Kind = "other"
 
 
-def numbers(named: Iterable[tuple[str, str]]) -> list[Entry]:
+def numbers(named: Iterable[tuple[str, str]], unit: str = "events") -> list[Entry]:
     """Return the entries of numbers of events, by name and meaning."""
-    return [Entry(name, f"number of {meaning}", is_number=True) for name, meaning in named]
+    return [Entry(name, f"number of {meaning}", unit, counted) for name, meaning in named]
 
 
 def counts(

@@ -37,11 +37,14 @@ def intervals(*, at_rest: bool = False) -> Group:
     bin_of = np.searchsorted(borders_us, np.arange(longest_us + 1), "right")
     entries = numbers(
         (
-            f"{pair} after {text}{where}",
-            f"pairs of events of a pixel{where}, {text} apart, {pair.replace('-', ' then ')}",
-        )
-        for text in _bins_text(borders_ms)
-        for pair in _PAIRS
+            (
+                f"{pair} after {text}{where}",
+                f"pairs of events of a pixel{where}, {text} apart, {pair.replace('-', ' then ')}",
+            )
+            for text in _bins_text(borders_ms)
+            for pair in _PAIRS
+        ),
+        "pairs",
     )
 
     def count(placed: Placed) -> Array:
@@ -53,7 +56,7 @@ def intervals(*, at_rest: bool = False) -> Group:
         cell = gap * 4 + stream.on[used] * 2 + stream.on_before[used]
         return counts(placed.part[used], cell, len(entries))
 
-    return Group("time between events of a pixel", 0.6, entries, count)
+    return Group("time between events of a pixel", 0.6, entries, count, kind="time")
 
 
 def runs() -> Group:
@@ -76,7 +79,7 @@ def runs() -> Group:
         place = _PLACE_OF[np.minimum(index - start, 9)]
         return counts(placed.part[order], place * 2 + on[order], len(entries))
 
-    return Group("runs of one polarity", 0.6, entries, count)
+    return Group("runs of one polarity", 0.6, entries, count, kind="time")
 
 
 def neighbours() -> Group:
@@ -100,4 +103,4 @@ def neighbours() -> Group:
         cell = np.searchsorted(borders_us, since, "right")
         return np.concatenate([counts(placed.part, one, bins) for one in cell.T], axis=1)
 
-    return Group("neighbouring pixels", 0.6, entries, count)
+    return Group("neighbouring pixels", 0.6, entries, count, kind="time")

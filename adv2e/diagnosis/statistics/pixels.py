@@ -2,33 +2,99 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import Placed, Scene
-from adv2e.diagnosis.statistics.groups import Array, Entry, Group, excess, stabilised
+from adv2e.diagnosis.statistics.groups import (
+    COVARIANCE,
+    SURPLUS,
+    Array,
+    Entry,
+    Group,
+    counted,
+    excess,
+    exponential,
+    stabilised,
+)
 
 _HALVES = 2
+_QUIET = 1e-3
+"""Variance that is added before a logarithm is taken."""
+
+
+def _surplus(logarithm: float) -> float:
+    return exponential(logarithm) - 1.0
+
+
+def _spread(logarithm: float) -> float:
+    return math.sqrt(max(exponential(logarithm) - _QUIET, 0.0))
+
+
+def _covariance(name: str, of: str) -> Entry:
+    meaning = f"covariance over the pixels: {of}, in squares of the standard deviation of chance"
+    return Entry(name, meaning, COVARIANCE)
+
+
+def _gradient(name: str, to: str) -> Entry:
+    meaning = f"rise of the surplus of events of a pixel from the middle of the sensor to {to}"
+    return Entry(name, f"{meaning}, in standard deviations (sd) of chance", SURPLUS)
+
+
 _SILENT = Entry(
-    "silent pixels", "number of pixels that should have fired and did not", is_number=True
+    "silent pixels", "number of pixels that should have fired and did not", "pixels", counted
 )
 _ENTRIES = [
-    Entry("spread of ON", "spread of ON events over the pixels, relative to that expected"),
-    Entry("spread of OFF", "spread of OFF events over the pixels, relative to that expected"),
-    Entry("ON with OFF", "whether pixels with too many ON events have too many OFF events"),
-    Entry("ON persists", "whether pixels with too many ON events have them all the time"),
-    Entry("OFF persists", "whether pixels with too many OFF events have them all the time"),
-    Entry("ON becomes OFF", "whether too many ON events are followed or preceded by too many OFF"),
-    Entry("loudest pixels", "surplus of events in the busiest hundredth of the pixels (log)"),
-    Entry("loudest pixel", "surplus of events in the busiest pixel (log)"),
+    *(
+        Entry(
+            f"spread of {polarity}",
+            f"mean square of the surplus of {polarity} events of a pixel over what is expected (1"
+            " by chance alone), in squares of the standard deviation of chance",
+            COVARIANCE,
+        )
+        for polarity in ("ON", "OFF")
+    ),
+    _covariance("ON with OFF", "surplus of ON events with surplus of OFF events of the same pixel"),
+    _covariance(
+        "ON persists", "surplus of ON events in the first half of the time with the second"
+    ),
+    _covariance(
+        "OFF persists", "surplus of OFF events in the first half of the time with the second"
+    ),
+    _covariance(
+        "ON becomes OFF",
+        "surplus of ON events in one half of the time with that of OFF events in the other half",
+    ),
+    *(
+        Entry(
+            name,
+            f"surplus of events in {which}, in standard deviations (sd) of chance",
+            SURPLUS,
+            _surplus,
+        )
+        for name, which in (
+            ("loudest pixels", "the busiest hundredth of the pixels"),
+            ("loudest pixel", "the busiest pixel"),
+        )
+    ),
     _SILENT,
-    Entry("rows", "differences of whole rows in their number of events (log)"),
-    Entry("columns", "differences of whole columns in their number of events (log)"),
-    Entry("beside", "whether pixels with too many events lie beside one another"),
-    Entry("below", "whether pixels with too many events lie below one another"),
-    Entry("towards the corners", "surplus of events towards the corners of the sensor"),
-    Entry("left to right", "surplus of events towards the right of the sensor"),
-    Entry("top to bottom", "surplus of events towards the bottom of the sensor"),
+    *(
+        Entry(
+            f"{line}s",
+            f"spread of the mean surplus of events of a {line} from {line} to {line}, in standard"
+            " deviations (sd) of chance",
+            SURPLUS,
+            _spread,
+        )
+        for line in ("row", "column")
+    ),
+    _covariance("beside", "surplus of events of a pixel with that of the pixel beside it"),
+    _covariance("below", "surplus of events of a pixel with that of the pixel below it"),
+    _gradient("towards the corners", "its nearer borders, by the square of the distance"),
+    _gradient("left to right", "its right border"),
+    _gradient("top to bottom", "its bottom"),
 ]
 
 
@@ -80,8 +146,8 @@ def pixels(scene: Scene, expected: Array) -> Group:
                 np.log1p(max(0.0, float(ordered[-top:].mean()))),
                 np.log1p(max(0.0, float(ordered[-1]))),
                 float(stabilised(silent.sum())),
-                float(np.log(np.var(both.mean(axis=1)) + 1e-3)),
-                float(np.log(np.var(both.mean(axis=0)) + 1e-3)),
+                float(np.log(np.var(both.mean(axis=1)) + _QUIET)),
+                float(np.log(np.var(both.mean(axis=0)) + _QUIET)),
                 _product(bounded[:, 1:], bounded[:, :-1]),
                 _product(bounded[1:], bounded[:-1]),
                 *(_slope(bounded, *way) for way in ways),

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.data.scene import BRIGHTNESSES, SPEEDS, STILL, Placed, Scene
+from adv2e.diagnosis.data.scene import (
+    BRIGHTNESSES,
+    LIGHT_NAMES,
+    SPEED_NAMES,
+    SPEEDS,
+    STILL,
+    Placed,
+    Scene,
+)
 from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.statistics.groups import (
-    LIGHT_NAMES,
     POLARITIES,
-    SPEED_NAMES,
+    SURPLUS,
     Array,
     Entry,
     Group,
@@ -32,12 +40,16 @@ SINCE_LEAP_MS = (
 )
 
 
-def rates() -> Group:
+def rates(scene: Scene) -> Group:
     """Return numbers of events by speed, brightness and polarity."""
     entries = numbers(
-        (f"{p} events, {speed}, {light}", f"{p} events where the picture is {light} and {speed}")
-        for speed in SPEED_NAMES
-        for light in LIGHT_NAMES
+        (
+            f"{p} events, {speed}, {light}",
+            f"{p} events where the picture is {scene.bounds_of_light[j]} and"
+            f" {scene.bounds_of_speed[k]}",
+        )
+        for k, speed in enumerate(SPEED_NAMES)
+        for j, light in enumerate(LIGHT_NAMES)
         for p in POLARITIES
     )
 
@@ -45,17 +57,15 @@ def rates() -> Group:
         cell = (placed.speed * BRIGHTNESSES + placed.brightness) * 2 + placed.stream.on
         return counts(placed.part, cell, SPEEDS * BRIGHTNESSES * 2)
 
-    return Group("number of events", 0.6, entries, count)
+    return Group("number of events", 0.6, entries, count, kind="count")
 
 
 def course(start_us: float, stop_us: float) -> Group:
     """Return numbers of events over the time of the recording."""
-    borders = np.linspace(start_us, stop_us, _COURSE + 1)[1:-1]
+    borders_us = np.linspace(start_us, stop_us, _COURSE + 1)
+    borders, spans = borders_us[1:-1], spans_text(borders_us)
     entries = numbers(
-        (
-            f"{p} events, {where}, time {k + 1}/{_COURSE}",
-            f"{p} events {where} in part {k + 1} of {_COURSE} of the time",
-        )
+        (f"{p} events, {where}, time {k + 1}/{_COURSE}", f"{p} events {where} {spans[k]}")
         for k in range(_COURSE)
         for where in _MOTION
         for p in POLARITIES
@@ -66,7 +76,13 @@ def course(start_us: float, stop_us: float) -> Group:
         cell = (step * 2 + (placed.speed != STILL)) * 2 + placed.stream.on
         return counts(placed.part, cell, _COURSE * 4)
 
-    return Group("events over time", 0.6, entries, count)
+    return Group("events over time", 0.6, entries, count, kind="count")
+
+
+def spans_text(borders_us: Array) -> list[str]:
+    """Return in words when the parts of a recording are, by their borders [us]."""
+    seconds = (borders_us - borders_us[0]) * 1e-6
+    return [f"from {a:.3g} to {b:.3g} s of the recording" for a, b in itertools.pairwise(seconds)]
 
 
 def rate_hz(scene: Scene, simulations: Sequence[Placed]) -> Array:
@@ -97,8 +113,8 @@ def load(rate_hz: Array) -> Group:
     entries = numbers(
         (
             f"{p} events, load {k + 1}/{_LOADS}",
-            f"{p} events in part {k + 1} of {_LOADS} of the times, from times of few events on the"
-            " whole sensor to times of many",
+            f"{p} events at the times when the declared model makes"
+            f" {_range_text(rate_hz[step_of == k])} events a second on the whole sensor",
         )
         for k in range(_LOADS)
         for p in POLARITIES
@@ -107,7 +123,11 @@ def load(rate_hz: Array) -> Group:
     def count(placed: Placed) -> Array:
         return counts(placed.part, step_of[placed.interval] * 2 + placed.stream.on, _LOADS * 2)
 
-    return Group("load of the readout", 0.6, entries, count)
+    return Group("load of the readout", 0.6, entries, count, kind="count")
+
+
+def _range_text(rates: Array) -> str:
+    return f"{rates.min():,.0f} to {rates.max():,.0f}" if rates.size else "no"
 
 
 def phase(scene: Scene) -> Group:
@@ -115,8 +135,9 @@ def phase(scene: Scene) -> Group:
     entries = [
         Entry(
             f"{p} events, {where}, {k * 10}-{k * 10 + 10} % after a frame",
-            f"number of {p} events {where} from {k * 10} to {k * 10 + 10} % of the time between two"
-            " frames, less a tenth of all, in standard deviations",
+            f"surplus of {p} events {where} from {k * 10} to {k * 10 + 10} % of the time between"
+            " two frames over a tenth of all, in standard deviations (sd) of chance",
+            SURPLUS,
         )
         for k in range(_PHASES)
         for where in _MOTION
@@ -133,19 +154,20 @@ def phase(scene: Scene) -> Group:
         number = raw.reshape(_PHASES, 4)
         return excess(number, number.sum(axis=0) / _PHASES).ravel()
 
-    return Group("time since the last frame", 0.6, entries, count, values)
+    return Group("time since the last frame", 0.6, entries, count, values, kind="time")
 
 
-def since_leap(leaps: Leaps) -> Group:
+def since_leap(scene: Scene, leaps: Leaps) -> Group:
     """Return numbers of events by the time since the light leapt, polarity and brightness."""
     bins = list(zip((0.0, *SINCE_LEAP_MS), SINCE_LEAP_MS, strict=False))
     entries = numbers(
         (
             f"{p} events {a:g}-{b:g} ms after a leap, {light}",
-            f"{p} events {a:g} to {b:g} ms after the light leapt, where it is {light}",
+            f"{p} events {a:g} to {b:g} ms after the light leapt, where it is"
+            f" {scene.bounds_of_light[j]}",
         )
         for a, b in bins
-        for light in LIGHT_NAMES
+        for j, light in enumerate(LIGHT_NAMES)
         for p in POLARITIES
     )
     borders_us = np.array(SINCE_LEAP_MS) * 1e3
@@ -157,7 +179,7 @@ def since_leap(leaps: Leaps) -> Group:
         cell = (step * BRIGHTNESSES + placed.brightness[used]) * 2 + placed.stream.on[used]
         return counts(placed.part[used], cell, len(entries))
 
-    return Group("time since the light leapt", 0.6, entries, count)
+    return Group("time since the light leapt", 0.6, entries, count, kind="time")
 
 
 def since_burst(period_us: float, begins_us: float) -> Group:
@@ -183,4 +205,4 @@ def since_burst(period_us: float, begins_us: float) -> Group:
         cell = ((step * 2 + (placed.speed != STILL)) * 2 + placed.stream.on)[used]
         return counts(placed.part[used], cell, len(entries))
 
-    return Group("time since a burst of all pixels", 0.6, entries, count)
+    return Group("time since a burst of all pixels", 0.6, entries, count, kind="time")

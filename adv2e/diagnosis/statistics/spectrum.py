@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.scene import Placed, Scene
-from adv2e.diagnosis.statistics.groups import Array, Entry, Group, counts
+from adv2e.diagnosis.statistics.groups import Array, Entry, Group, counts, exponential
 
 BIN_US = 1000
 _BANDS_HZ = ((30, 90), (90, 99), (99, 101), (101, 119), (119, 121), (121, 240), (240, 490))
@@ -48,8 +48,10 @@ def spectrum(scene: Scene) -> Group:
     entries = [
         Entry(
             f"line in the {kind} rate, {low}-{high} Hz",
-            f"how far the strongest frequency from {low} to {high} Hz stands out in the rate of"
-            f" {of} events (log)",
+            f"power of the strongest frequency from {low} to {high} Hz in the rate of {of} events,"
+            " over the median power of its neighbours",
+            "times that power",
+            exponential,
         )
         for kind, of in (("total", "all"), ("signed", "ON less OFF"))
         for low, high in _BANDS_HZ

@@ -12,6 +12,7 @@ from adv2e.diagnosis.statistics.groups import (
     Entry,
     Group,
     counts,
+    exponential,
     numbers,
     share,
     stabilised,
@@ -35,7 +36,11 @@ _BIN_OF = np.searchsorted(_BIN_BORDERS_US[1:-1], np.arange(int(_BIN_BORDERS_US[-
 def ticks() -> Group:
     """Return shares of stamps that are whole multiples of a time."""
     entries = [
-        Entry(f"stamps on {tick} us", f"share of time stamps that are multiples of {tick} us")
+        Entry(
+            f"stamps on {tick} us",
+            f"share of time stamps that are multiples of {tick} us",
+            "of all stamps",
+        )
         for tick in TICKS_US
     ]
 
@@ -61,6 +66,7 @@ def gaps() -> Group:
             f"same row within {n} us",
             f"share that follows an event of its own row, of events less than {n} us after the one"
             " before",
+            "of these events",
         )
         for n in _NEAR_US
     ]
@@ -79,7 +85,7 @@ def gaps() -> Group:
         number, near = raw[: len(_GAPS_US) + 1], raw[len(_GAPS_US) + 1 :]
         return np.concatenate([stabilised(number), (near[1::2] + 0.5) / (near[::2] + 1.0)])
 
-    return Group("time between events of the sensor", 0.002, entries, count, values)
+    return Group("time between events of the sensor", 0.002, entries, count, values, kind="time")
 
 
 def row_gaps() -> Group:
@@ -90,8 +96,9 @@ def row_gaps() -> Group:
     entries = [
         Entry(
             f"{100 * q:g} % of gaps between rows",
-            f"time from one row to the next that {100 * q:g} % of such times are shorter than (log"
-            " us)",
+            f"time from one row to the next that {100 * q:g} % of such times are shorter than",
+            "us",
+            exponential,
         )
         for q in _QUANTILES
     ]
@@ -112,4 +119,4 @@ def row_gaps() -> Group:
         gap = _BIN_BORDERS_US[k] + in_bin * np.diff(_BIN_BORDERS_US)[k]
         return np.asarray(np.log(np.maximum(gap, 0.5)))
 
-    return Group("time between rows", 0.02, entries, count, values)
+    return Group("time between rows", 0.02, entries, count, values, kind="time")

@@ -16,6 +16,7 @@ from adv2e.diagnosis.statistics.rates import course, load, phase, rate_hz, rates
 from adv2e.diagnosis.statistics.spectrum import spectrum
 from adv2e.diagnosis.statistics.stamps import gaps, row_gaps, ticks
 from adv2e.diagnosis.statistics.timing import Slopes, drift, lag, shift
+from adv2e.reports.result import Kind
 
 BOTH = splits.COUNT
 """The view that joins the data for training and validation."""
@@ -36,7 +37,7 @@ class SummaryStatistics:
 
     Attributes
     ----------
-    titles : list of str
+    titles, kinds : list of str
         Of the group of each statistic.
     least : (statistics,)
         Deviation below which each does not count as known.
@@ -53,10 +54,10 @@ class SummaryStatistics:
         of_light = (
             [shift(slopes), phase(scene), spectrum(scene)]
             if scene.leaps is None
-            else [since_leap(scene.leaps)]
+            else [since_leap(scene, scene.leaps)]
         )
         self.groups: list[Group] = [
-            rates(),
+            rates(scene),
             course(scene.times_us[0], scene.times_us[-1]),
             load(rate_hz(scene, placed)),
             intervals(),
@@ -77,6 +78,7 @@ class SummaryStatistics:
             [np.broadcast_to(group.least, len(group.entries)) for group in self.groups]
         )
         self.titles: list[str] = [group.title for group in self.groups for _ in group.entries]
+        self.kinds: list[Kind] = [group.kind for group in self.groups for _ in group.entries]
 
     def measure(self, stream: Stream) -> Array:
         """Return all statistics of a stream, (views, statistics)."""

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data import splits
-from adv2e.diagnosis.data.scene import BRIGHTNESSES, Placed, Scene
+from adv2e.diagnosis.data.scene import BRIGHTNESSES, LIGHT_NAMES, Placed, Scene
 from adv2e.diagnosis.statistics.counting import sum_slopes, sum_slopes_beside
-from adv2e.diagnosis.statistics.groups import LIGHT_NAMES, Array, Entry, Group, counts, share
+from adv2e.diagnosis.statistics.groups import Array, Entry, Group, counts, share
+from adv2e.diagnosis.statistics.rates import spans_text
+from adv2e.reports.quantities import NO_UNIT
 
 LAGS_MS = (-20.0, -8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 _PAIRS_MS = ((-2.0, 4.0), (-8.0, 16.0))
@@ -18,13 +20,17 @@ _BESIDE_MS = (2.0, 10.0)
 
 
 class Slopes:
-    """Change of log light about events, bounded so that single large steps do not decide."""
+    """Change of log light about events, bounded so that single large steps do not decide.
+
+    `change`: what is summed up, in words; from -1 to 1.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         moving = np.abs(scene.slope[scene.speed > 0])
-        typical = float(np.median(moving)) if moving.size else 1.0
-        bounded = scene.slope / (np.abs(scene.slope) + np.float32(max(typical, 1e-6)))
+        typical = max(float(np.median(moving)) if moving.size else 1.0, 1e-6)
+        bounded = scene.slope / (np.abs(scene.slope) + np.float32(typical))
+        self.change = f"mean change s of log light, as s/(|s| + {typical:.3g} ln/s),"
         self.bounded = np.ascontiguousarray(bounded.T)
 
     def count(
@@ -56,10 +62,12 @@ def lag(slopes: Slopes) -> Group:
     entries = [
         Entry(
             f"change {lag:g} ms before, {light}",
-            f"mean change of log light {_when(lag)} an event, in its direction, in {light} places",
+            f"{slopes.change} {_when(lag)} an event, in its direction, where it is"
+            f" {slopes.scene.bounds_of_light[k]}",
+            NO_UNIT,
         )
         for lag in LAGS_MS
-        for light in LIGHT_NAMES
+        for k, light in enumerate(LIGHT_NAMES)
     ]
 
     def count(placed: Placed) -> Array:
@@ -75,11 +83,12 @@ def lag(slopes: Slopes) -> Group:
 def drift(slopes: Slopes) -> Group:
     """Return how the lag changes from segment to segment of the recording."""
     segments = slopes.scene.split.segments
+    spans = spans_text(slopes.scene.split.borders_us)
     entries = [
         Entry(
             f"lag {b:g} less {a:g} ms, time {k + 1}/{segments}",
-            f"mean change of log light {_when(b)} an event less that {_when(a)} it, in part"
-            f" {k + 1} of {segments} of the time",
+            f"{slopes.change} {_when(b)} an event less that {_when(a)} it, {spans[k]}",
+            NO_UNIT,
         )
         for a, b in _PAIRS_MS
         for k in range(segments)
@@ -100,8 +109,9 @@ def shift(slopes: Slopes) -> Group:
     entries = [
         Entry(
             f"change {name} of the event, {lag:g} ms before",
-            f"mean change of log light one pixel {side} an event less that on its other side,"
+            f"{slopes.change} one pixel {side} an event less that on its other side,"
             f" {_when(lag)} it, in its direction",
+            NO_UNIT,
         )
         for lag in _BESIDE_MS
         for name, side in (("right", "right of"), ("below", "below"))

@@ -218,11 +218,14 @@ def _remark(chosen: Choice, selector: Selector) -> str:
     change = f"error on light held out: {chosen.before.error:.3g} before"
     change += f", {chosen.after.error:.3g} after"
     if chosen.verdict == "consistent":
-        return "The declared model fits the table within its errors."
+        return "The declared model fits the table within its errors: keep that model as it is."
     if chosen.verdict == "unexplained":
-        return f"No effect does better than a constant ({change}, {selector.constant:.3g} with it)."
+        constant = f"{change}, {selector.constant:.3g} with it"
+        return f"No effect does better than a constant ({constant}): do not add any."
     if chosen.verdict == "not_identifiable":
-        return f"The table cannot tell these effects apart ({change})."
+        told = "only another table tells which is right"
+        return f"The table cannot tell these effects apart ({change}): {told}."
     if chosen.verdict == "partly_explained":
-        return f"More than the errors of the table is left ({change})."
-    return f"What is left is within the errors of the table ({change})."
+        told = "use the model found, but know what still differs"
+        return f"More than the errors of the table is left ({change}): {told}."
+    return f"What is left is within the errors of the table ({change}): use the model found."

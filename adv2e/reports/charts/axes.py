@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,13 +33,17 @@ def drawable(values: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis from `low` to `high`, which lie at `start` and `end` in the picture."""
+    """An axis from `low` to `high`, which lie at `start` and `end` in the picture.
+
+    `names`: of values, in the place of numbers at round ones.
+    """
 
     low: float
     high: float
     start: float
     end: float
     log: bool = False
+    names: Sequence[tuple[float, str]] = ()
 
     def place(self, values: Floats) -> Floats:
         """Return where `values` lie; NaN for NaN and for what a logarithm does not have."""
@@ -54,6 +58,8 @@ class Axis:
 
     def ticks(self) -> list[tuple[float, str]]:
         """Return places in the picture and labels."""
+        if self.names:
+            return [(self.at(value), name) for value, name in self.names]
         ticks = log_ticks(self.low, self.high) if self.log else linear_ticks(self.low, self.high)
         return [
             (self.at(tick), label) for tick, label in zip(ticks, tick_labels(ticks), strict=True)
@@ -72,8 +78,8 @@ def axis_over(
 ) -> Axis | None:
     """Return an axis that shows all `values`, or None if there is nothing to show.
 
-    They are :func:`drawable`; a logarithm shows only those above zero.  A `tight` axis has no room
-    beyond the values, nor down to a zero near them.
+    They are :func:`drawable`; a logarithm shows only those above zero.  An axis begins at zero
+    where no value is below, so that heights compare as numbers do; a `tight` one at the values.
     """
     shown = np.concatenate([np.ravel(part) for part in values] or [np.empty(0)])
     shown = shown[np.isfinite(shown) & ((shown > 0) | (not log))]
@@ -82,13 +88,14 @@ def axis_over(
     low, high = float(shown.min()), float(shown.max())
     if log:
         return _log_axis(low, high, start, end, tight)
-    if not tight and 0 < low <= 0.3 * high:
+    if not tight and low > 0:
         low = 0.0
     room = 0.0 if tight else 0.05 * (high - low)
     size = max(abs(low), abs(high))
     if high - low <= 1e-6 * size:  # neighbouring numbers are no axis
         room = 0.5 * size or 0.5
-    return Axis(low if low == 0 < high else low - room, high + room, start, end)
+    begins = low == 0 and (high > 0 or not tight)
+    return Axis(low if begins else low - room, high + room, start, end)
 
 
 def _log_axis(low: float, high: float, start: float, end: float, tight: bool) -> Axis:

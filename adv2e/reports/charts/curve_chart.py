@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -169,10 +169,14 @@ def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
     rows = [curve.measured]
     for band in (curve.before, curve.after):
         rows += [band.middle, band.low, band.high]
-    across = axis_over([x], _LEFT, WIDTH - _RIGHT, log=curve.x_log, tight=True)
+    tight = curve.x_log or len(x) > len(curve.measured)  # points may have room, bins need none
+    across = axis_over([x], _LEFT, WIDTH - _RIGHT, log=curve.x_log, tight=tight)
     up = axis_over([drawable(row) for row in rows], bottom, top, log=curve.y_log)
     if across is None or up is None:
         return None
+    if curve.x_names:
+        middles = 0.5 * (x[1:] + x[:-1])
+        across = replace(across, names=list(zip(middles, curve.x_names, strict=True)))
     return _Frame(across, up, across.place(x))
 
 

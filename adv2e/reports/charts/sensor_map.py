@@ -61,8 +61,13 @@ def map_image(values: Map, description: str) -> Markup:
 
     `values`, (rows, columns): residual in standard deviations, NaN: masked; row 0 is at the top.
     """
-    factor = max(1, -(-_WIDTH // max(values.shape)))
-    picture = colours(values).repeat(factor, axis=0).repeat(factor, axis=1)
+    return image_of(colours(values), description)
+
+
+def image_of(picture: Picture, description: str) -> Markup:
+    """Return a picture of a sensor, RGB (rows, columns, 3), enlarged, as an ``img`` element."""
+    factor = max(1, -(-_WIDTH // max(picture.shape[:2])))
+    picture = picture.repeat(factor, axis=0).repeat(factor, axis=1)
     done, data = cv2.imencode(".png", picture[:, :, ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
     assert done
     encoded = base64.b64encode(data.tobytes()).decode("ascii")

@@ -82,11 +82,15 @@ def test_missing_frames_are_told():
     times[10:] += 30e6 * PERIOD_S
     lines = told(scene=dataclasses.replace(SCENE, times_us=times))
     start, stop = times[9] / 1e6, times[10] / 1e6
-    assert lines == [f"no frames from {start:.3f} to {stop:.3f} s: what moves there is made up"]
+    assert lines == [
+        f"no frames from {start:.3f} to {stop:.3f} s: what moves there is made up, so look at the"
+        " time before or after it (--start, --stop)"
+    ]
 
 
 def test_frames_in_the_dark_or_all_the_same_are_told():
     assert "is frames.full_scale right?" in told(light=LIGHT / 1000.0)[0]
     assert told(light=np.repeat(LIGHT[:1], FRAMES, axis=0)) == [
-        "the frames are all the same: nothing that moves can be simulated from them"
+        "the frames are all the same: nothing that moves can be simulated from them, so only noise"
+        " can be judged"
     ]

@@ -1,5 +1,7 @@
 """Curves and maps of a residual: shapes, labels, and numbers where there are data."""
 
+import re
+
 import numpy as np
 import pytest
 from made_up.streams import (
@@ -15,14 +17,100 @@ from made_up.streams import (
 )
 
 from adv2e.diagnosis.data.scene import STILL
-from adv2e.diagnosis.outcome.picture import contrast, curves_of, maps_of
+from adv2e.diagnosis.outcome.picture import (
+    contrast,
+    curves_of,
+    maps_of,
+    snapshot_of,
+    totals_of,
+)
 from adv2e.diagnosis.statistics.rates import by_load
+from adv2e.reports.quantities import short_text
 
 SCENE = some_scene(seed=5)
 MEASURED = placed(random_stream(800, 1), SCENE)
 BEFORE = [placed(random_stream(400, seed), SCENE) for seed in range(10, 15)]
 AFTER = [placed(random_stream(800, seed), SCENE) for seed in range(20, 25)]
 CURVES = {curve.title: curve for curve in curves_of(SCENE, MEASURED, BEFORE, AFTER)}
+
+
+def test_thirds_are_named_with_their_bounds_and_units():
+    dark, medium, bright = SCENE.bounds_of_light
+    for where in ("in motion", "at rest"):
+        for polarity in ("ON", "OFF"):
+            curve = CURVES[f"Rate against brightness, {where}, {polarity}"]
+            assert curve.x_names == ("dark", "medium", "bright")
+            assert all(part in curve.x_label for part in (dark, medium, bright))
+    low, high = SCENE.brightness_borders
+    bounds = f"dark (below {short_text(low, 3)} DN)", f"bright (from {short_text(high, 3)} DN)"
+    assert (dark, bright) == bounds
+    light = wandering_light(seed=5)[1:].reshape(20, -1)
+    assert light[SCENE.brightness == 0].max() <= low * 1.001
+    assert light[SCENE.brightness == 2].min() >= high * 0.999
+    speed = CURVES["Rate against speed"]
+    assert speed.x_names == ("still", "slow", "moving", "fast")
+    assert f"fast (from {short_text(SCENE.speed_borders[1], 2)} ln/s)" in speed.x_label
+
+
+def test_rates_say_of_how_many_events_they_are():
+    for curve in CURVES.values():
+        if curve.title.startswith(("Rate", "Events over time")):
+            assert re.search(r"rate \[events a (pixel a )?second\]", curve.y_label)
+
+
+def test_totals_are_numbers_rates_and_times_with_units():
+    on, off, rate, apart = totals_of(SCENE, MEASURED, BEFORE, AFTER)
+    stream = MEASURED.stream
+    number = np.count_nonzero(stream.on)
+    assert (on.name, on.measured, on.unit) == ("ON events", number, "events")
+    assert (off.name, off.measured) == ("OFF events", len(stream) - number)
+    seconds = STOP_US * 1e-6
+    assert rate.measured == pytest.approx(len(stream) / (WIDTH * HEIGHT * seconds))
+    assert rate.unit == "events a pixel a second"
+    gaps = [np.diff(stream.t[stream.pixel == pixel]) for pixel in range(WIDTH * HEIGHT)]
+    assert apart.measured == pytest.approx(np.median(np.concatenate(gaps)) / 1e3)
+    assert apart.unit == "ms"
+    numbers = [np.count_nonzero(one.stream.on) for one in BEFORE]
+    assert on.before.value == pytest.approx(np.mean(numbers))
+    assert min(numbers) <= on.before.interval[0] <= on.before.interval[1] <= max(numbers)
+    assert off.after.value == pytest.approx(2 * off.before.value, rel=0.2)
+
+
+def test_totals_of_nothing_are_no_numbers():
+    nothing = [placed(random_stream(0), SCENE)] * 2
+    on, _, _, apart = totals_of(SCENE, MEASURED, nothing, nothing)
+    assert on.before.value == 0.0
+    assert np.isnan(apart.before.value)
+
+
+def test_a_snapshot_holds_the_events_of_its_time_in_all_three():
+    seen = snapshot_of(SCENE, MEASURED, BEFORE, AFTER)
+    first = SCENE.times_us[0] + 1e6 * seen.start_s
+    last = first + 1e6 * seen.length_s
+    for number, of in ((seen.measured, MEASURED), (seen.before, BEFORE[0]), (seen.after, AFTER[0])):
+        stream = of.stream
+        inside = (stream.t >= first) & (stream.t < last)
+        assert number.shape == (2, HEIGHT, WIDTH)
+        for on in (0, 1):
+            pixel = stream.pixel[inside & (stream.on == on)]
+            expected = np.bincount(pixel, minlength=WIDTH * HEIGHT).reshape(HEIGHT, WIDTH)
+            np.testing.assert_array_equal(number[on], expected)
+    assert seen.measured.sum() > 0.05 * WIDTH * HEIGHT
+
+
+def test_a_snapshot_is_of_the_busiest_time():
+    t = np.r_[np.arange(0, STOP_US, 2000), np.arange(120_100, 122_000, 10)]
+    busy = placed(stream_of(t, t % WIDTH, t % HEIGHT, t % 2), SCENE)
+    seen = snapshot_of(SCENE, busy, [busy], [busy])
+    assert 0.118 <= seen.start_s <= 0.121
+    assert seen.length_s == pytest.approx(0.001)
+
+
+def test_a_snapshot_of_few_events_is_of_all_the_time():
+    few = placed(random_stream(3, 1), SCENE)
+    seen = snapshot_of(SCENE, few, [few], [placed(random_stream(0), SCENE)])
+    assert (seen.start_s, seen.length_s) == (0.0, pytest.approx(STOP_US * 1e-6))
+    assert (seen.measured.sum(), seen.after.sum()) == (3, 0)
 
 
 def test_titles_are_unique_and_axes_have_labels():

@@ -5,7 +5,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from made_up.sampler import GONE, candidates, error, searched
+from made_up.sampler import GONE, candidates, error, outside, searched
 from made_up.streams import stream_of
 from scipy.stats import chi2
 
@@ -34,7 +34,9 @@ def test_what_is_missing_in_the_last_part_alone_is_not_overlooked():
     assert outcome.state.names == ("leak",)
     verdict = verdict_of(outcome, GONE)
     assert verdict == "partly_explained"
-    assert remark_of(verdict, outcome).endswith("left in the test data.")
+    assert "; something is left in the test data: use the model found" in remark_of(
+        verdict, outcome
+    )
 
 
 def test_what_frames_leave_of_the_error_is_not_asked_of_an_effect():
@@ -71,7 +73,14 @@ def test_every_verdict_has_a_remark(verdict):
     _, outcome = searched(["pixel.leak.rate_hz=4"])
     told = remark_of(verdict, outcome)
     assert told[0].isupper()
-    assert told.endswith(".")
+    advice = {
+        "consistent": "keep that model as it is",
+        "explained": "use the model found",
+        "partly_explained": "use the model found, but know what still differs",
+        "not_identifiable": "only another recording tells which is right",
+        "unexplained": "Do not add it",
+    }
+    assert told.endswith(f"{advice[verdict]}.")
     # what was found is told by the sentence, with its numbers
     assert ("leak" in told) == (verdict == "unexplained")
 
@@ -82,13 +91,28 @@ def test_statistics_alone_are_no_explanation():
     verdict = verdict_of(outcome, error(1.19, 0.88, 0.64))
     assert verdict == "unexplained"
     assert remark_of(verdict, outcome).startswith("The nearest is leak: numbers of events are")
-    refused = {one.name: one for one in rejected_of(outcome, search.declared, candidates())}
+    refused = {
+        one.name: one
+        for one in rejected_of(search.reference, outcome, search.declared, candidates())
+    }
     assert refused["leak"].reason.startswith("would account for every statistic")
     # but chance may have made it
     assert verdict_of(outcome, error(1.19, 0.80, 0.64, 0.04)) == "unexplained"
     assert verdict_of(outcome, error(1.19, 0.80, 0.64, 0.06)) == "explained"
     assert verdict_of(outcome, error(0.65, 0.66, 0.64)) == "explained"  # says nothing of leak
     assert verdict_of(outcome, error(0.45, 0.38, 0.42)) == "explained"
+
+
+def test_what_was_not_added_is_told_with_the_share_that_it_explains():
+    search, outcome = searched(["pixel.leak.rate_hz=4"], beyond=outside(8.0))
+    given = rejected_of(search.reference, outcome, search.declared, candidates())
+    assert {"leak", "refractory"} <= {one.name for one in given}
+    left = [one.held_out for one in given]
+    assert left == sorted(left)
+    assert given[0].name == "leak"
+    # of squares: those of the leak are gone, those of nothing else
+    assert 0.0 < given[0].held_out < 0.6
+    assert all(0.6 < share < 1.2 for share in left[1:])
 
 
 def test_intervals_of_a_list_are_lists():
@@ -120,6 +144,6 @@ def test_from_when_on_drifts_count_in_a_piece_of_a_recording():
     assert about_drifts(whole, drifting) == about_drifts(piece, DECLARED) == []
     (told,) = about_drifts(piece, drifting)
     counts = "clock_drift_ppm counts from the first frame simulated, at"
-    assert told == f"in model.yaml {counts} {piece.run_in.times_s[0]:.3f} s"
+    assert told.startswith(f"in model.yaml {counts} {piece.run_in.times_s[0]:.3f} s: for another")
     both = load_config([], ["frames.clock_drift_ppm=300", "pixel.thresholds.drift_per_s=0.1"])
     assert "clock_drift_ppm and drift_per_s" in about_drifts(piece, both)[0]

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from adv2e.diagnosis.statistics.groups import Entry, least_deviations, stabilised
+from adv2e.diagnosis.statistics.groups import Entry, counted, least_deviations, stabilised
 from adv2e.diagnosis.statistics.metric import (
     Ensemble,
     Scale,
@@ -283,7 +283,7 @@ def test_events_that_hardly_ever_happen_are_counted_and_not_read_off_a_curve():
 def test_two_events_where_none_is_expected_stand_for_themselves_and_ten_do_not():
     draw = np.random.default_rng(7)
     world = World(7)
-    entries = [Entry("", "")] * STATISTICS + [Entry("", "", is_number=True)]
+    entries = [Entry("", "", "")] * STATISTICS + [Entry("", "", "events", counted)]
 
     def rows(count, events):
         number = stabilised(np.full((count, 1), float(events)))

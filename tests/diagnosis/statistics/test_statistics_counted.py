@@ -53,7 +53,7 @@ def test_rates(stream):
     where, expected = placed(stream, SCENE), np.zeros((PARTS, 4, 3, 2))
     for k, (_, _, on, part) in enumerate(events(where)):
         expected[part, where.speed[k], where.brightness[k], on] += 1
-    same(rates.rates().count(where), expected.reshape(PARTS, -1))
+    same(rates.rates(SCENE).count(where), expected.reshape(PARTS, -1))
 
 
 @several

@@ -1,6 +1,7 @@
 """Statistics of all groups: their form, and that each responds to what its meaning says."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -48,6 +49,38 @@ def test_names_are_unique_and_meanings_are_given():
     assert len(set(titles)) >= len(titles) - 1  # intervals, and those at rest
 
 
+def test_every_statistic_has_a_unit_and_covariances_say_of_what():
+    for entry in ALL.entries:
+        assert entry.unit, entry.name
+        assert "(log" not in entry.meaning
+        if entry.unit == "sd²":
+            assert re.search("covariance .* with |mean square of the surplus", entry.meaning)
+        if entry.unit in ("sd", "sd²"):
+            assert "of chance" in entry.meaning
+    with_light = [e.meaning for e in ALL.entries if "where the picture is" in e.meaning]
+    assert len(with_light) == 24
+    assert all(" DN)" in meaning for meaning in with_light)
+    times = [e.meaning for e in ALL.entries if ", time " in e.name]
+    assert times
+    assert all(re.search(r"from [\d.]+ to [\d.]+ s of the recording", one) for one in times)
+
+
+def test_statistics_have_kinds_by_which_they_are_sorted():
+    kinds = dict(zip(ALL.titles, ALL.kinds, strict=True))
+    assert kinds["number of events"] == kinds["events over time"] == "count"
+    assert kinds["time between events of a pixel"] == kinds["time between rows"] == "time"
+    assert kinds["from pixel to pixel"] == kinds["frequencies in the rate"] == "other"
+
+
+def test_logarithms_are_told_as_what_they_are_of():
+    entries = {entry.name: entry for entry in ALL.entries}
+    assert entries["50 % of gaps between rows"].plain(np.log(80.0)) == pytest.approx(80.0)
+    assert entries["loudest pixel"].plain(np.log1p(6.0)) == pytest.approx(6.0)
+    assert entries["rows"].plain(np.log(0.25 + 1e-3)) == pytest.approx(0.5)
+    assert entries["silent pixels"].plain(2.0 * np.sqrt(7.375)) == pytest.approx(7.0)
+    assert np.isfinite(entries["line in the total rate, 99-101 Hz"].plain(1e6))
+
+
 def test_numbers_of_events_are_told_as_such():
     stream = random_stream(3000, 9)
     values = ALL.measure(stream)
@@ -59,8 +92,8 @@ def test_numbers_of_events_are_told_as_such():
     rates = ALL.groups[0].entries
     assert sum(told[entry.name] for entry in rates) == pytest.approx(np.count_nonzero(inside))
     for entry in ALL.entries:
-        is_told = entry.meaning.startswith("number of") and "deviations" not in entry.meaning
-        assert entry.is_number == is_told, entry
+        is_told = entry.meaning.startswith("number of")
+        assert (entry.unit in ("events", "pixels", "pairs")) == is_told, entry
 
 
 @pytest.mark.parametrize("group", ALL.groups, ids=lambda group: group.title)
