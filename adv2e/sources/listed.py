@@ -128,8 +128,7 @@ class ListedSource(Source):
     Raises
     ------
     DataError
-        Fewer than two frames, in all or selected, or an unreadable first frame; what can be decoded
-        of damaged ones is wanted.
+        Fewer than two frames, in all or selected, or an unreadable first frame.
     """
 
     def __init__(
@@ -143,8 +142,6 @@ class ListedSource(Source):
         light: Light | None = None,
     ) -> None:
         super().__init__(path, kind, selection, has_clock)
-        if selection.allow_damaged:
-            raise DataError(f"{path}: --allow-damaged is for video: leave it out")
         shots = self._shots = timed.shots
         # of an archive or a stack, they are names of no file
         self.inputs += [*filter(None, [timed.found]), *(shot.label for shot in shots)]
@@ -153,6 +150,10 @@ class ListedSource(Source):
             light = light_of(pattern)
         self.doubts += timed.doubts
         self.notes += timed.notes
+        if selection.allow_damaged:
+            self.notes.append(
+                f"{path}: --allow-damaged is for video: a picture is read whole, or is an error"
+            )
         self._count()
         self.doubts += gap_doubts([shot.t_ns for shot in shots], str(path))
         first = shots[0].load()
