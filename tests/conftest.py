@@ -12,12 +12,10 @@ from typing import NamedTuple
 # before NumPy is imported: threads of its BLAS, in several processes at once, wait for one another
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import numpy as np
 import pytest
+import warm
 
 from adv2e.cli import main
-from adv2e.config import load_config
-from adv2e.conversion.simulation import simulate
 from adv2e.process.memory import collect_seldom
 
 collect_seldom()  # to search the compiler's objects for cycles took a fourteenth of the run
@@ -40,11 +38,8 @@ def _no_test_hangs() -> Iterator[None]:
 @pytest.fixture(autouse=True, scope="session")
 def _solvers_are_compiled() -> None:
     """Compile both solvers, if need be: tests look at all that a command says, and at its time."""
-    frames = np.zeros((3, 4, 5), np.float32)
-    for form in ("exact", "paper"):
-        config = load_config([], [f"pixel.low_pass.update={form}"])
-        for _ in simulate(frames, [0.0, 0.1, 0.2], config, threads=1):
-            pass
+    for form in warm.FORMS:
+        warm.compile_solver(form)
 
 
 class Outcome(NamedTuple):
