@@ -140,12 +140,12 @@ def test_opencv_stays_quiet_until_the_last_has_left():
     inside, leave = threading.Event(), threading.Event()
 
     def other():
-        with quiet():
+        with quiet:
             inside.set()
             leave.wait(10)
 
     thread = threading.Thread(target=other)
-    with quiet():
+    with quiet:
         thread.start()
         assert inside.wait(10)
     assert logging.getLogLevel() == 0
