@@ -250,7 +250,7 @@ def _suffix(name: str) -> str:
 
 
 def _kind_of_folder(path: Path) -> str:
-    if (path / "images.txt").is_file() and _is_recording(path):
+    if _is_recording(path):
         return "davis240c"
     if find_sequence(path):
         return "gopro"
