@@ -13,6 +13,8 @@ from adv2e.comparison.smoothed_error import smoothed_errors
 from adv2e.events import EVENT_DTYPE
 from adv2e.formats.reading import read_events
 
+pytestmark = pytest.mark.thorough
+
 SIZE, DURATION_S, FAST_HZ = (24, 18), 0.3, 4000.0
 SCENE = patchwork(SIZE, seed=6, speed=1.5)
 

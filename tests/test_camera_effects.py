@@ -12,6 +12,8 @@ from test_camera import SIZE, STILL, measured
 from adv2e import load_config, simulate
 from adv2e.comparison.smoothed_error import smoothed_errors
 
+pytestmark = pytest.mark.thorough
+
 DURATION_S = 0.3
 SCENE = patchwork(SIZE, seed=6)
 DECLARED = merged(BENCH, STILL, {"frames": {"full_scale": 65535}})

@@ -6,6 +6,8 @@ from camera import Camera
 from camera.settings import BENCH, merged
 from test_camera import DURATION_S, SCENE, SIZE, STILL, by_pixel, measured, simulated
 
+pytestmark = pytest.mark.thorough
+
 HIDDEN = {
     "slew limit": {"slew_limit": {"per_s": 15.0}},
     "overshoot": {"reset_overshoot": {"fraction": 0.3}},

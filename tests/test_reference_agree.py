@@ -17,6 +17,8 @@ from reference.stimuli import Stimulus
 from reference.twin import simulate_twin
 from scipy.special import expi
 
+pytestmark = pytest.mark.thorough
+
 AGREE_US = 1.0
 
 UNFILTERED = Circuit(cutoff_hz=None, linear_below=0.0)

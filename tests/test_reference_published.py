@@ -13,6 +13,8 @@ from reference.circuit import PURE, Circuit
 from reference.dense_ode import dense_truth
 from reference.twin import simulate_twin
 
+pytestmark = pytest.mark.thorough
+
 V2E = Circuit(dark_cutoff_hz=300 * 20 / 275)
 
 # Count of events over true count, and mean |time error| [us] of the events in order, at 24 fps,

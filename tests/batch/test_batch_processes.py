@@ -55,7 +55,12 @@ def job(tmp_path, name, *sets, effects=()):
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 @pytest.mark.parametrize(
     "number",
-    [signal.SIGSEGV, signal.SIGKILL, signal.SIGABRT, -signal.SIGTERM, -signal.SIGINT],
+    [
+        signal.SIGSEGV,
+        -signal.SIGINT,
+        pytest.param(signal.SIGKILL, marks=pytest.mark.thorough),
+        pytest.param(-signal.SIGTERM, marks=pytest.mark.thorough),
+    ],
 )
 def test_a_process_that_dies_fails_its_sequence_alone(tmp_path, number):
     effect = tmp_path / "ending.py"
@@ -73,6 +78,7 @@ def test_a_process_that_dies_fails_its_sequence_alone(tmp_path, number):
     assert not (tmp_path / "b.h5").exists()
 
 
+@pytest.mark.thorough
 def test_processes_stay_alive_over_many(tmp_path, monkeypatch):
     made = []
     whole = processes.start
@@ -185,7 +191,8 @@ def alive(group):
     return True
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.thorough
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_ended_and_called_again_the_bytes_are_the_same(batch, longer, of_longer, tmp_path, number):
     dest = tmp_path / "to"
     process = begun(longer, dest, *QUICK, "--jobs", 2)
@@ -207,6 +214,7 @@ def test_ended_and_called_again_the_bytes_are_the_same(batch, longer, of_longer,
     assert not [*dest.rglob(".adv2e*")]
 
 
+@pytest.mark.thorough
 def test_a_second_batch_on_the_same_folder_is_refused(batch, longer, of_longer, tmp_path):
     dest = tmp_path / "to"
     process = begun(longer, dest, *QUICK, "--jobs", 2)

@@ -18,7 +18,10 @@ from adv2e.batch import cluster as engine
 from adv2e.batch.cluster import Proof
 
 pytest.importorskip("distributed")
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.skipif(sys.platform == "win32", reason="needs signals"),
+]
 
 EFFECT = """
 import os, signal, time

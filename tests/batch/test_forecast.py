@@ -52,6 +52,7 @@ def test_the_forecast_is_the_total_on_average(tmp_path, monkeypatch):
     assert all(one.looked_at <= 6 for one in found)
 
 
+@pytest.mark.thorough
 def test_a_dry_run_tells_what_is_coming(batch, tmp_path):
     root, dest = tmp_path / "from", tmp_path / "to"
     for k in range(9):

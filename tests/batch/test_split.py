@@ -16,6 +16,8 @@ from adv2e.batch.work import Job
 from adv2e.conversion import parts as stored
 from adv2e.light import intervals
 
+pytestmark = pytest.mark.thorough
+
 SIZE = (96, 80)
 """Of the frames: of 7,680 pixels, four strips."""
 

@@ -8,6 +8,8 @@ from camera.readout import Stream, echo, sign_flips
 from camera.scene import Still
 from camera.settings import merged
 
+pytestmark = pytest.mark.thorough
+
 
 def outside(**sections):
     return {"outside": sections}

@@ -11,6 +11,8 @@ from camera.scene import Flat, Still
 from camera.scenes import patchwork
 from camera.settings import merged
 
+pytestmark = pytest.mark.thorough
+
 GRID = (30, 20)
 
 

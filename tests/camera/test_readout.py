@@ -6,6 +6,8 @@ import pytest
 from camera.helpers import SHARP, ramp, seen, still
 from camera.readout import Stream, arbiter, loss, tick
 
+pytestmark = pytest.mark.thorough
+
 US = 1e-6
 
 

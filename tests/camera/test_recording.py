@@ -14,6 +14,8 @@ from camera.catalogue import LIBRARY, NOTHING, OUTSIDE, SIZES, cases
 from camera.recording import png
 from camera.settings import BENCH, check, find, merged
 
+pytestmark = pytest.mark.thorough
+
 HIDDEN = {"pixel": {"refractory": {"period_us": 4000.0}}, "outside": {"echo": {"share": 0.1}}}
 HIDDEN["outside"]["echo"]["delay_us"] = 7000.0
 

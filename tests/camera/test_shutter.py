@@ -9,6 +9,8 @@ from camera.scene import Flat, Still
 from camera.scenes import patchwork
 from camera.shutter import encoded, exposed
 
+pytestmark = pytest.mark.thorough
+
 
 def frames(scene, hidden=None, **options):
     given = {"size": (6, 4), "duration_s": 0.1, "fps": 100.0, **options}

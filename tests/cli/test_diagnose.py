@@ -98,6 +98,7 @@ def told(progress):
     return list(dict.fromkeys(stage for stage, _ in shown)), [int(count) for _, count in shown]
 
 
+@pytest.mark.thorough
 def test_a_missing_effect_is_named_by_the_command_and_in_python_whatever_the_threads(
     adv2e, recordings, short, example, tmp_path, monkeypatch
 ):

@@ -80,6 +80,7 @@ def test_a_second_process_finds_the_code(start):
     assert said(start(1)) == ["20", "1"]
 
 
+@pytest.mark.thorough
 def test_a_read_only_installation_is_served_and_not_touched(package, start):
     before = {path: path.stat().st_mtime_ns for path in package.rglob("*")}
     for path in (*before, package):
@@ -93,6 +94,7 @@ def test_a_read_only_installation_is_served_and_not_touched(package, start):
             path.chmod(path.stat().st_mode | stat.S_IWUSR)
 
 
+@pytest.mark.thorough
 def test_processes_that_start_at_once_do_not_disturb_each_other(start):
     arguments = [(1,), (1.5,), (2.5, 2), (2, 2.5)]
     results = [said(process) for process in [start(*numbers) for numbers in arguments]]
@@ -101,6 +103,7 @@ def test_processes_that_start_at_once_do_not_disturb_each_other(start):
     assert said(start(1, 1.5)) == ["20", "25.0", "2"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kept", [0, 0.5])
 def test_a_file_cut_short_is_made_again(start, tmp_path, kept):
     said(start(1))
@@ -112,6 +115,7 @@ def test_a_file_cut_short_is_made_again(start, tmp_path, kept):
     assert said(start(1)) == ["20", "1"]
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(os.name != "posix", reason="modes of POSIX")
 def test_without_a_trusted_folder_code_is_compiled_and_not_kept(start, tmp_path):
     said(start(1))
@@ -187,6 +191,7 @@ with compiled.watched(wait):
 """
 
 
+@pytest.mark.thorough
 def test_nobody_waits_for_a_process_that_compiles(start):
     said(start(1))
     compiling = start(code=COMPILES_FOR_LONG)
@@ -199,6 +204,7 @@ def test_nobody_waits_for_a_process_that_compiles(start):
     assert said(start(1, 1.5)) == ["20", "25.0", "2"]
 
 
+@pytest.mark.thorough
 def test_writing_waits_for_another_process_that_does(start, tmp_path):
     said(start(1))
     (folder,) = tmp_path.glob("cache/adv2e/kernels-*")
@@ -256,6 +262,7 @@ def test_what_is_imported_after_the_compiler_extends_it(tmp_path):
     assert (run.stdout, run.returncode) == ("0 2048\n", 0), run.stderr
 
 
+@pytest.mark.thorough
 def test_what_has_one_byte_changed_is_not_loaded_but_made_again(start, tmp_path, monkeypatch):
     """Flip a byte 200 times: nothing damaged stays, and some of these times it runs."""
     said(start(1))

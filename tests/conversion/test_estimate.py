@@ -32,6 +32,7 @@ def folder(path, count):
     return path
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("make", [video, folder])
 @pytest.mark.parametrize("part", [{}, {"start_s": 0.5, "stop_s": 2.5}])
 @pytest.mark.parametrize("name", ["a.h5", "a.txt"])

@@ -179,6 +179,7 @@ print(peak(20), peak(100))
 """
 
 
+@pytest.mark.thorough
 def test_memory_does_not_grow_with_length():
     """A hundred frames take no more than twenty, in a process that does nothing else."""
     done = subprocess.run(

@@ -46,6 +46,7 @@ def recording(part):
     return Evidence("made up", frames, TIMES_S, kept, WIDTH, HEIGHT)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("part", "seen"), [(splits.TRAIN, True), (splits.TEST, False)])
 def test_bursts_are_looked_for_before_the_last_look(part, seen):
     evidence = recording(part)

@@ -9,9 +9,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from trees_of_batch import clip
 
 from documentation.documents import ROOT, Document
+
+pytestmark = pytest.mark.thorough
 
 
 def test_the_tasks_of_the_array_do_the_whole(tmp_path):

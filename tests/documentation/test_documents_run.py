@@ -110,7 +110,13 @@ def run_block(block: Block, adv2e, said: str) -> str:
     return ""
 
 
-@pytest.mark.parametrize("name", DOCUMENTS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name == "README.md" else pytest.mark.thorough)
+        for name in DOCUMENTS
+    ],
+)
 def test_all_that_a_document_shows_runs(name, adv2e, tmp_path):
     document, said = DOCUMENTS[name], ""
     make_inputs(tmp_path, (block.text for block in document.blocks if block.language != "text"))

@@ -15,6 +15,8 @@ from adv2e.formats.lookup import layouts
 from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink
 
+pytestmark = pytest.mark.thorough
+
 TYPES = ["u1", "i1", "u2", "i8", "u8", "f2", "f8", "S3", "?", ">i4", "c8"]
 
 
@@ -53,7 +55,7 @@ def read_or_refuse(path):
         assert (recording.events["x"] < recording.width).all()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_one_dataset_is_another(whole, data):
     name = data.draw(st.sampled_from(datasets_of(whole)))

@@ -32,7 +32,9 @@ def second_pole(hz, **circuit):
     return Circuit(follower_hz=hz, **circuit), {"source_follower": SourceFollower(cutoff_hz=hz)}
 
 
-@pytest.mark.parametrize("hz", [60.0, 300.0, 1000.0, 10_000.0])
+@pytest.mark.parametrize(
+    "hz", [60.0, 300.0, 1000.0, pytest.param(10_000.0, marks=pytest.mark.thorough)]
+)
 @pytest.mark.parametrize(("fps", "L"), [(10, 10), (24, 1), (240, 1), (1000, 1)])
 def test_edges_ramps_and_textures(hz, fps, L):
     stimulus = stimuli.standard(fps, L=L, pixels=16, frames=5)

@@ -200,6 +200,7 @@ for sections, additions in (
 """
 
 
+@pytest.mark.thorough
 def test_compiled_equals_plain_python():
     """Times agree to 5 ns: the compiled code may round a product and a sum once, in float32 too."""
     script = _PLAIN.format(tests=str(Path(__file__).resolve().parents[1]))

@@ -251,6 +251,7 @@ def normals(seed, stream, i, block, number, two):
     return drawn[first : first + size, 0].astype(float)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("interval_us", [4000.0, 20_000.0])
 @pytest.mark.parametrize("follower_hz", [None, 100.0, 1000.0])
 def test_events_are_those_of_the_path_of_which_everything_is_drawn(follower_hz, interval_us):

@@ -149,6 +149,7 @@ def hot_times(pixel, fraction, rate_hz, seed, end_s):
     return times[times < end_s]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
 @pytest.mark.parametrize("dead_time", [None, 800.0])
 @pytest.mark.parametrize("first", ["settled", "running"])

@@ -41,6 +41,7 @@ def evidence_of(light, times):
     return Evidence("made up", list(light), times, Stream.of(empty_events(), 16, 12), 16, 12)
 
 
+@pytest.mark.thorough
 def test_simulations_without_the_bias_are_nearer_to_a_camera(tmp_path):
     """The camera sees the scene itself, whose edges move a pixel between two of its frames."""
     recorded = Recorded(tmp_path, 3, duration_s=0.6, fps=200.0)

@@ -30,6 +30,7 @@ def shifted(recorded, *shift):
     return with_keys(recorded.declared, {"frames.shift_px": list(shift)})
 
 
+@pytest.mark.thorough
 def test_simulations_without_the_bias_are_nearer_to_a_camera(recorded):
     """The camera's event pixels see the scene where they are."""
     config = shifted(recorded, *SHIFT)

@@ -135,6 +135,7 @@ def test_a_constant_at_one_step_size_and_few_lights_is_not_identifiable():
     )
 
 
+@pytest.mark.thorough
 def test_latency_that_grows_with_light_is_unexplained():
     found = verdict_of(table(50.0 * LIGHT**0.4))
     assert found.verdict == "unexplained"

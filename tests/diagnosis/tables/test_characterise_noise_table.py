@@ -119,6 +119,7 @@ def test_a_median_tells_hot_pixels():
     assert found.model["pixel"]["hot_pixels"]["fraction"] == 0.01
 
 
+@pytest.mark.thorough
 def test_noise_that_falls_as_one_over_light_is_unexplained():
     found = verdict_of(table(5.0 / LUX, 5.0 / LUX, on_median=5.0 / LUX))
     assert found.verdict == "unexplained"

@@ -42,6 +42,7 @@ def table(sources):
     return parse_table("\n".join(lines), "noise.csv")
 
 
+@pytest.mark.thorough
 def test_noise_behind_a_second_pole_is_found_and_predicts_light_held_out():
     measured, declared = table(TRUTH), read_declared([], KNOWN)
     settings = Settings(white=255.0, judge=["light_dn=40"])

@@ -78,6 +78,7 @@ def test_rates_behind_two_poles_are_those_of_our_pixel(sources):
     assert slow * law[1] == pytest.approx(off, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_noise_behind_the_second_pole_falls_as_the_first_gets_faster():
     """What one pole cannot: its rate is the corner times a number."""
 
@@ -94,6 +95,7 @@ def test_noise_behind_the_second_pole_falls_as_the_first_gets_faster():
     assert two[1] < 0.2 * two[0]
 
 
+@pytest.mark.thorough
 def test_rates_over_the_pixels_are_those_of_our_pixels():
     seconds = 12.0
     sources = NoisySources(

@@ -90,6 +90,7 @@ def converted_from_a_file(adv2e, tmp_path):
     return convert
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("threads", "cut"),
     [
