@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import cv2
 
 from adv2e.errors import UsageError
+from adv2e.rendering.gif import GifFile
 from adv2e.rendering.layout import Cell, compose, default_scale, sheet
 from adv2e.rendering.output import NotWritten
 from adv2e.rendering.styles import Style
 from adv2e.rendering.video import CODERS, VideoFile
 
-if TYPE_CHECKING:
-    from adv2e.rendering.gif import GifWriter
-
-SUFFIXES = (*CODERS, ".gif", ".png")
+SUFFIXES = (*CODERS, ".png")
 """The kinds of file there are."""
 
 
@@ -42,13 +39,8 @@ class Film:
 
     def __init__(self, path: Path, fps: float, style: Style, scale: int | None) -> None:
         self._style, self._scale = style, scale
-        self._file: VideoFile | GifWriter
-        if check_suffix(path) == ".gif":
-            from adv2e.rendering.gif import GifWriter, palette  # noqa: PLC0415 - compiled
-
-            self._file = GifWriter(path, fps, palette(style))
-        else:
-            self._file = VideoFile(path, fps)
+        is_gif = check_suffix(path) == ".gif"
+        self._file = GifFile(path, fps, style) if is_gif else VideoFile(path, fps)
 
     def wanted_from(self, number: int) -> int:
         """Return the first instant, counted from 0, at or after `number` that is shown: that."""

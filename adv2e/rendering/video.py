@@ -1,4 +1,4 @@
-"""Film files that browsers play, and one without loss, by PyAV.
+"""Film files that browsers play, and one without loss, by PyAV; :mod:`.gif` adds GIF.
 
 ========= =============================================== ====================================
 ``.mp4``  H.264                                           everything
@@ -38,6 +38,7 @@ CODERS: dict[str, tuple[str, str, str, dict[str, str]]] = {
     ".mp4": ("mp4", "libx264", "yuv420p", _H264),
     ".webm": ("webm", "libvpx", "yuv420p", _VP8),
     ".avi": ("avi", "huffyuv", "rgb24", {}),
+    ".gif": ("gif", "gif", "pal8", {}),
 }
 """By suffix: container, coder, kind of pixels, and options of the coder."""
 
@@ -68,7 +69,7 @@ def _writing() -> Iterator[None]:
 
 
 class VideoFile:
-    """A film in an .mp4, .webm or .avi file, written picture by picture.
+    """A film in a file of its suffix, written picture by picture.
 
     Raises
     ------
@@ -85,23 +86,28 @@ class VideoFile:
         self._count = self._size = 0
 
     def add(self, picture: Picture) -> None:
-        """Append a picture (rows, columns, 3), RGB, all of one size; odd sizes gain a line."""
-        rows, columns = picture.shape[:2]
-        if rows % 2 or columns % 2:  # the coder halves the resolution of colour
-            picture = np.pad(picture, ((0, rows % 2), (0, columns % 2), (0, 0)), mode="edge")
+        """Append a picture (rows, columns, 3), RGB, all of one size."""
+        frame = self._frame(picture)
         with _writing():
             if self._container is None:
-                self._open(picture.shape[1], picture.shape[0])
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+                self._open(frame.width, frame.height)
             self._container.mux(self._stream.encode(frame))
             self._check()
         self._count += 1
 
-    def _open(self, width: int, height: int) -> None:
+    def _frame(self, picture: Picture) -> av.VideoFrame:
+        """Return a picture as the coder takes it: of an odd size, it gains a line."""
+        rows, columns = picture.shape[:2]
+        if rows % 2 or columns % 2:  # the coder halves the resolution of colour
+            picture = np.pad(picture, ((0, rows % 2), (0, columns % 2), (0, 0)), mode="edge")
+        return av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+
+    def _open(self, width: int, height: int, **more: str) -> None:
+        """Open the file for pictures of a size, with `more` options of the container."""
         kind, coder, pixels, options = CODERS[self._path.suffix.lower()]
         # FFmpeg takes parts of names for addresses and patterns
         self._file = _File(self._path, "wb")
-        self._container = av.open(self._file, "w", format=kind)
+        self._container = av.open(self._file, "w", format=kind, options=more)
         self._stream = self._container.add_stream(coder, rate=self._rate, options=options)
         self._stream.width, self._stream.height = width, height
         self._stream.pix_fmt = pixels

@@ -349,7 +349,7 @@ def no_room(*args):
 
 @pytest.mark.parametrize(
     "fails",
-    ["adv2e.formats.monash.writer.MonashWriter.finish", "adv2e.rendering.gif.GifWriter.finish"],
+    ["adv2e.formats.monash.writer.MonashWriter.finish", "adv2e.rendering.gif.GifFile.finish"],
 )
 def test_events_and_preview_come_together_or_not_at_all(adv2e, video, tmp_path, monkeypatch, fails):
     target, preview = tmp_path / "out" / "a.h5", tmp_path / "out" / "a.gif"

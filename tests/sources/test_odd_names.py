@@ -13,7 +13,7 @@ import pytest
 
 from adv2e.files.names import shown
 from adv2e.formats.reading import read_events
-from adv2e.rendering.gif import GifWriter, palette
+from adv2e.rendering.gif import GifFile
 from adv2e.rendering.styles import Style
 from adv2e.sources import open_source
 
@@ -64,7 +64,7 @@ def test_video(write_video, picture, odd, suffix, codec, monkeypatch):
 
 def test_gif_whose_name_is_a_pattern(tmp_path, picture):
     path = tmp_path / "clip%d.gif"
-    writer = GifWriter(path, 20, palette(Style()))
+    writer = GifFile(path, 20, Style())
     for n in range(3):
         writer.add(picture(n, (32, 32, 3)))
     writer.finish()
