@@ -1,444 +1,69 @@
 #!/usr/bin/env python
-"""Digests of the events of many configurations and inputs, to compare commits by.
+"""Digests of what adv2e makes of many inputs and configurations, to compare commits by.
 
-Each case is one simulation of a small sequence made here, with one and with two threads, through
-`adv2e.simulate` or ``adv2e convert``, so that any commit can be asked::
+There are four kinds of cases, all of which are made here:
+
+events      simulations of small sequences, through `adv2e.simulate` or ``adv2e convert``
+info        what ``adv2e info --json`` tells of inputs of every kind, whole and damaged
+datasets    what ``adv2e export`` makes
+reports     what ``adv2e diagnose`` reports
+
+So any commit can be asked::
 
     python scripts/event_digests.py --out before.json --keep --package ../clone-of-before
     python scripts/event_digests.py --out after.json --keep
     python scripts/event_digests.py --compare before.json after.json
 
-``--keep`` stores the events too, in a folder beside the file; the comparison then says of what
-differs how many events are still the same one (the same pixel's n-th event, with the same
-polarity), and by how much their times differ.
+Of what differs, the comparison tells the keys.  ``--keep`` stores the events too, in a folder
+beside the file; the comparison then says of what differs how many events are still the same one
+(the same pixel's n-th event, with the same polarity), and by how much their times differ.
 """
 
 from __future__ import annotations
 
 import fnmatch
-import hashlib
-import importlib.util
 import json
-import os
-import re
-import subprocess
 import sys
 import tempfile
-import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
-from numpy.typing import NDArray
+from digests import datasets, information, reports, simulations
+from digests.comparison import changed, comparison, kept
 
-ROWS, COLUMNS, COUNT, RATE_HZ = 36, 48, 30, 120.0
+Run = Callable[[int, Path], Any]
+"""Runs a case with so many threads in a folder; returns events and a digest, or what it holds."""
 
-Array = NDArray[Any]
-Clip = tuple[Array, Array]
-"""Frames and their times [s]."""
-
-OWN_EFFECT = '''\
-"""An effect of one's own that acts at every place of the signal path."""
-
-import numpy as np
-
-from adv2e.effects.hooks import Hooks
-
-
-class Everything(Hooks):
-    stage = "pixel"
-
-    def light(self, frames):
-        for t_ns, image in frames:
-            yield t_ns + 1000, image * np.float32(1.1)
-
-    def gain(self, times_s):
-        return 1 + 0.2 * np.sin(40 * times_s)
-
-    def drive(self, times_s):
-        return 0.1 * np.sin(70 * times_s)
-
-    def signal(self, times_s):
-        across = np.linspace(0, 0.2, self.view.columns)
-        ramp = np.broadcast_to(across, (self.view.rows, self.view.columns))
-        return np.sin(90 * times_s)[:, None, None] * ramp
-
-    def thresholds(self, times_s):
-        factor = 1 + 0.3 * np.sin(30 * times_s)
-        return factor, 2 - factor
-
-    def events(self, chunks):
-        for events in chunks:
-            pixels = events["y"].astype(np.int64) * self.view.columns + events["x"]
-            yield events[self.view.uniforms("loss", pixels, events["t"]) > 0.1]
-'''
-
-
-# --- inputs --------------------------------------------------------------------------------------
-
-
-def scene(rows: int = ROWS, columns: int = COLUMNS, count: int = COUNT) -> Array:
-    """Return light in 0..1, (count, rows, columns): moving waves, a bar, dark and still corners."""
-    t = np.arange(count)[:, None, None] / count
-    y = np.arange(rows)[None, :, None] / rows
-    x = np.arange(columns)[None, None, :] / columns
-    wave = 0.5 + 0.45 * np.sin(2 * np.pi * (3 * x + 2 * y - 2 * t))
-    bar = np.abs(x - (0.1 + 0.8 * t)) < 0.08
-    light = np.where(bar, 1.0, wave * np.exp(-4 * y))
-    still = (y > 0.85) | (x < 0.06)
-    return np.where(still, 0.35, light).clip(0, 1)
-
-
-def times(count: int = COUNT) -> Array:
-    return np.arange(count) / RATE_HZ
-
-
-def grey(**size: int) -> Clip:
-    light = scene(**size)
-    return np.round(255 * light).astype(np.uint8), times(len(light))
-
-
-def colour() -> Clip:
-    light = scene()
-    channels = np.stack([light, light**0.7, 1 - light], -1)
-    return np.round(255 * channels).astype(np.uint8), times()
-
-
-def flash() -> Clip:
-    """Large steps up and down, with times at rest between them."""
-    level = np.array([20, 20, 200, 200, 200, 3, 3, 255, 255, 0] * 3, np.uint8)
-    frames = np.broadcast_to(level[:, None, None], (COUNT, ROWS, COLUMNS)).copy()
-    frames[:, :, ::2] //= 2
-    return frames, times()
-
-
-def irregular() -> Clip:
-    frames, _ = grey()
-    number = np.arange(COUNT)
-    return frames, 12.5 + (number + 0.4 * np.sin(number * 2.3)) / RATE_HZ
-
-
-def constant(level: int = 90) -> Clip:
-    return np.full((COUNT, ROWS, COLUMNS), level, np.uint8), times()
-
-
-CLIPS: Mapping[str, Callable[[], Clip]] = {
-    "grey": grey,
-    "large": lambda: grey(rows=130, columns=173, count=12),
-    "one pixel": lambda: grey(rows=1, columns=1),
-    "odd size": lambda: grey(rows=5, columns=7),
-    "16 bits": lambda: (np.round(65535 * scene()).astype(np.uint16), times()),
-    "float32": lambda: (scene().astype(np.float32), times()),
-    "float64": lambda: (scene(), times()),
-    "colour": colour,
-    "colour floats": lambda: (np.stack([scene()] * 3, -1).astype(np.float32), times()),
-    "flash": flash,
-    "irregular": irregular,
-    "constant": constant,
-    "black": lambda: constant(0),
-    "two frames": lambda: grey(count=2),
-    "slow": lambda: (grey(count=6)[0], np.arange(6) / 4.0),
+KINDS: Mapping[str, tuple[Callable[[], Mapping[str, Run]], tuple[int, ...]]] = {
+    "events": (simulations.cases, (1, 2)),
+    "info": (information.cases, (1,)),
+    "datasets": (datasets.cases, (1, 2)),
+    "reports": (reports.cases, (2,)),
 }
+"""Cases of each kind, and the numbers of threads that they are run with."""
+
+WORDS = {"info": "info", "dataset": "datasets", "report": "reports"}
+"""Kinds of cases, by the first word of their names; others are events."""
 
 
-# --- cases ---------------------------------------------------------------------------------------
-
-LINEAR = "frames.encoding=linear"
-
-NOISELESS = (
-    "pixel.thresholds.mismatch=0", "pixel.leak=null", "pixel.shot_noise=null",
-    "sampling.L=1", "pixel.initial_reference=settled",
-)  # fmt: skip
-"""The exact circuit with dead time and nothing that is drawn."""
-
-BUSY = (
-    "sampling.L=1", "pixel.leak.rate_hz=8", "pixel.leak.photo_rate_hz=5",
-    "pixel.shot_noise.rate_hz=20",
-)  # fmt: skip
-"""The exact circuit with leak, noise and mismatch that show in a short clip."""
-
-QUIET_CASES = """
-plain
-no refractory: pixel.refractory=null
-long refractory: pixel.refractory.period_us=20000
-unequal thresholds: pixel.thresholds.on=0.12; pixel.thresholds.off=0.31
-slow: pixel.low_pass.cutoff_hz=30
-fast and dark: pixel.low_pass.cutoff_hz=3000; pixel.low_pass.dark_cutoff_hz=0
-pure logarithm: pixel.log_response.linear_below=0
-knee 20: pixel.log_response.linear_below=20
-no low pass: pixel.low_pass=null
-no low pass nor refractory: pixel.low_pass=null; pixel.refractory=null
-linear L: sampling.L=7
-flow L: sampling.L=4; sampling.interpolation=flow
-printed: sampling.L=5; sampling.last_interval=printed
-running reference: pixel.initial_reference=running
-random reference: pixel.initial_reference=random
-tick: readout.tick_us=100
-"""
-"""Added to NOISELESS."""
-
-BUSY_CASES = """
-plain
-seed: seed=18446744073709551615
-no refractory: pixel.refractory=null
-leak alone: pixel.shot_noise=null; pixel.leak.jitter=0
-shot noise alone: pixel.leak=null
-mismatch: pixel.thresholds.mismatch=0.1
-jitter: pixel.leak.jitter=0.3
-L 10: sampling.L=10
-no low pass: pixel.low_pass=null
-printed: sampling.L=5; sampling.last_interval=printed
-hot pixels: pixel.hot_pixels={fraction: 0.05, rate_hz: 300}
-dead pixels: pixel.dead_pixels.fraction=0.1
-dark current: pixel.dark_current.dn=10
-photoreceptor noise: pixel.photoreceptor_noise.rms=0.05
-source follower: pixel.source_follower.cutoff_hz=200
-fast source follower: pixel.source_follower.cutoff_hz=5000
-slew limit: pixel.slew_limit.per_s=20
-reset overshoot: pixel.reset_overshoot.fraction=0.3
-threshold drift: pixel.thresholds.drift_per_s=0.5
-all poles: pixel.source_follower.cutoff_hz=300; pixel.slew_limit.per_s=40; \
-pixel.reset_overshoot.fraction=-0.2; pixel.photoreceptor_noise.rms=0.03; \
-pixel.thresholds.drift_per_s=-0.5; pixel.hot_pixels={fraction: 0.02, rate_hz: 100}
-flicker: frames.flicker={frequency_hz: 100, depth: 0.3}
-exposure: frames.exposure_us=6000
-black level: frames.black_level_dn=5
-black depth: frames.black_depth_dn=8
-clock: frames.clock_offset_us=-1234; frames.clock_drift_ppm=900
-shift: frames.shift_px=[1.5,-0.25]
-encoding srgb: frames.encoding=srgb
-encoding gamma: frames.encoding=gamma:2.4; frames.full_scale=200
-encoding hlg L: frames.encoding=hlg; sampling.L=3
-arbiter: readout.arbiter={event_ns: 3000, row_ns: 8000}
-event loss: readout.loss.fraction=0.3
-frame coupling: readout.frame_coupling={amplitude: 0.3, tau_us: 500}
-readout: readout.arbiter={event_ns: 500, row_ns: 0}; readout.loss.fraction=0.1; readout.tick_us=10
-"""
-"""Added to BUSY."""
-
-
-@dataclass(frozen=True)
-class Case:
-    """One simulation through `adv2e.simulate`."""
-
-    sets: Sequence[str] = ()
-    clip: str = "grey"
-    files: Sequence[str] = ()
-    own: bool = False
-
-
-def cases() -> dict[str, Case]:
-    """Return all simulations through `adv2e.simulate`, by name."""
-    shipped = ("adv2e", "paper", "v2e", "vid2e", "ideal", "davis240c", "davis346")
-    # the clips stay as small as they are
-    found = {f"config {name}": Case(["sensor=null"], files=[name]) for name in shipped}
-    for title, base, table in (
-        ("noiseless", NOISELESS, QUIET_CASES), ("noise", BUSY, BUSY_CASES),
-    ):  # fmt: skip
-        for line in table.strip().splitlines():
-            name, _, sets = line.partition(": ")
-            found[f"{title}, {name}"] = Case([*base, *filter(None, sets.split("; "))])
-    for update in ("zero_order_hold", "first_order_hold", "euler", "paper"):
-        sets = [f"pixel.low_pass.update={update}", "sampling.L=2", "sampling.K=5"]
-        found[f"{update}, noiseless"] = Case([*NOISELESS, *sets])
-        found[f"{update}, noise"] = Case([*BUSY, *sets])
-    sets = [
-        "pixel.low_pass.update=first_order_hold", "sampling.L=3", "sampling.K=10",
-        "sampling.last_interval=printed", "pixel.refractory=null",
-    ]  # fmt: skip
-    found["first_order_hold, printed"] = Case([*NOISELESS, *sets])
-    sets = [
-        "pixel.leak.jitter=0.3", "pixel.leak.rate_hz=8", "pixel.hot_pixels.fraction=0.05",
-        "pixel.hot_pixels.rate_hz=300",
-    ]  # fmt: skip
-    found["paper, jitter and hot pixels"] = Case(sets, files=["paper"])
-    for clip in CLIPS:
-        found[f"clip {clip}, noiseless"] = Case(NOISELESS, clip)
-        found[f"clip {clip}, noise"] = Case(BUSY, clip)
-    found["clip flash, ideal"] = Case(clip="flash", files=["ideal"])
-    found["clip large, default"] = Case(clip="large")
-    found["own effect"] = Case(BUSY, own=True)
-    found["own effect, paper"] = Case(["sampling.L=2"], files=["paper"], own=True)
-    return found
-
-
-def simulated(case: Case, threads: int, folder: Path) -> Array:
-    """Return the events of a case."""
-    import adv2e  # noqa: PLC0415
-
-    # whatever a commit takes grey frames for; what a case says comes after it
-    light = [] if case.clip == "colour" else [LINEAR]
-    config = adv2e.load_config(list(case.files), [*light, *case.sets])
-    effects = [_own_effect(folder)()] if case.own else []
-    frames, instants = CLIPS[case.clip]()
-    chunks = adv2e.simulate(frames, instants, config, effects=effects, threads=threads)
-    return np.concatenate(list(chunks))
-
-
-def _own_effect(folder: Path) -> Any:
-    path = folder / "everything.py"
-    path.write_text(OWN_EFFECT)
-    spec = importlib.util.spec_from_file_location("everything", path)
-    if spec is None or spec.loader is None:
-        raise ImportError(path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.Everything
-
-
-# --- the command line ----------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Command:
-    """One call of ``adv2e convert``: an input that `make` writes, and how to convert it."""
-
-    make: Callable[[Path], Path]
-    output: str
-    options: Sequence[str] = field(default=())
-
-
-def npy(folder: Path) -> Path:
-    path = folder / "stack.npy"
-    np.save(path, grey()[0])
-    return path
-
-
-def images(folder: Path) -> Path:
-    """Write a folder of grey images as PGM, which numpy alone can write."""
-    into = folder / "images"
-    into.mkdir()
-    for number, image in enumerate(np.round(65535 * scene()).astype(">u2")):
-        head = f"P5 {COLUMNS} {ROWS} 65535\n".encode()
-        (into / f"frame_{number:04d}.pgm").write_bytes(head + image.tobytes())
-    return into
-
-
-def video(folder: Path) -> Path:
-    """Write a film of colour frames without compression, as YUV4MPEG2."""
-    luma = np.round(16 + 219 * scene()).astype(np.uint8)
-    blue, red = 255 - luma[:, ::2, ::2] // 2, 64 + luma[:, ::2, ::2] // 2
-    path = folder / "film.y4m"
-    with path.open("wb") as file:
-        file.write(f"YUV4MPEG2 W{COLUMNS} H{ROWS} F{RATE_HZ:.0f}:1 Ip A1:1 C420jpeg\n".encode())
-        for planes in zip(luma, blue, red, strict=True):
-            file.write(b"FRAME\n" + b"".join(plane.tobytes() for plane in planes))
-    return path
-
-
-def recording(folder: Path) -> Path:
-    """Write the frames of a DAVIS240C folder, with irregular times."""
-    into = images(folder)
-    _, instants = irregular()
-    lines = [f"{t:.9f} {p.name}\n" for t, p in zip(instants, sorted(into.iterdir()), strict=True)]
-    (into / "images.txt").write_text("".join(lines))
-    return into
-
-
-NPY = ("--fps", "120", "--set", LINEAR)
-
-COMMANDS: Mapping[str, Command] = {
-    "command npy to txt": Command(npy, "out.txt", NPY),
-    "command npy to h5": Command(npy, "out.h5", NPY),
-    "command video to h5 with frames": Command(video, "out.h5", ["--with-frames"]),
-    "command video to txt, L 1": Command(video, "out.txt", ["--set", "sampling.L=1"]),
-    "command images to zip": Command(images, "out.zip", ["--fps", "30000/1001"]),
-    "command recording to folder": Command(
-        recording, "out", ["-c", "davis240c", "--set", "sensor=null"]
-    ),
-    "command recording to standard output": Command(
-        recording, "-", ["--start", "0.05", "--stop", "0.2", "--t0", "zero", "--set", "seed=3"]
-    ),
-    "command own effect": Command(npy, "out.txt", [*NPY, "--effect", "everything.py"]),
-}
-
-
-def converted(command: Command, threads: int, folder: Path) -> tuple[Array, str]:
-    """Return the events in the output, and a digest of all that it holds."""
-    (folder / "everything.py").write_text(OWN_EFFECT)
-    source = command.make(folder)
-    words = ["convert", str(source), "-o", command.output, "--threads", str(threads), "-q"]
-    done = subprocess.run(
-        [sys.executable, "-m", "adv2e", *words, *command.options],
-        cwd=folder, check=False, capture_output=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
-    if done.returncode:
-        raise RuntimeError(done.stderr.decode().strip())
-    if command.output == "-":
-        return _text_events(done.stdout), sha(done.stdout)
-    out = folder / command.output
-    if out.suffix == ".h5":
-        return _hdf5(out)
-    parts = dict(_parts(out))
-    text = parts.get("events.txt", parts.get(out.name, b""))
-    return _text_events(text), sha(*(name.encode() + data for name, data in sorted(parts.items())))
-
-
-def _parts(out: Path) -> Iterator[tuple[str, bytes]]:
-    """Yield the files of an output; not what is said about how it was made."""
-    if out.suffix == ".zip":
-        with zipfile.ZipFile(out) as archive:
-            for name in archive.namelist():
-                if not name.endswith(".json"):
-                    yield name, archive.read(name)
-        return
-    for path in [out] if out.is_file() else sorted(out.rglob("*")):
-        if path.is_file() and path.suffix != ".json":
-            yield path.name, path.read_bytes()
-
-
-def _text_events(text: bytes) -> Array:
-    rows = [line.split() for line in text.decode().splitlines()]
-    moments = [round(float(t) * 1e6) for t, *_ in rows]
-    rest = np.array([row[1:] for row in rows], np.int64).reshape(-1, 3)
-    return _events(np.array(moments, np.int64), *rest.T)
-
-
-def _hdf5(path: Path) -> tuple[Array, str]:
-    import h5py  # noqa: PLC0415
-
-    found: dict[str, Array] = {}
-    with h5py.File(path) as file:
-        file.visititems(
-            lambda name, item: found.update({name: item[()]})
-            if isinstance(item, h5py.Dataset) else None
-        )  # fmt: skip
-    ts, xs, ys, ps = (found[f"events/{name}"] for name in ("ts", "xs", "ys", "ps"))
-    moments = np.round(ts * 1e6) if ts.dtype.kind == "f" else ts
-    digest = sha(*(f"{n} {found[n].dtype}".encode() + found[n].tobytes() for n in sorted(found)))
-    return _events(moments, xs, ys, ps), digest
-
-
-def _events(t: Array, x: Array, y: Array, p: Array) -> Array:
-    events = np.empty(t.size, [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
-    events["t"], events["x"], events["y"], events["p"] = t, x, y, p
-    return events
-
-
-# --- running and comparing -----------------------------------------------------------------------
-
-
-def sha(*parts: bytes) -> str:
-    digest = hashlib.sha256()
-    for part in parts:
-        digest.update(part)
-    return digest.hexdigest()
-
-
-def one(name: str, run: Callable[[int, Path], tuple[Array, str]]) -> tuple[dict[str, Any], Array]:
-    """Return what is written of one case, and its events."""
+def one(name: str, run: Run, threads: tuple[int, ...] = (1, 2)) -> tuple[dict[str, Any], Any]:
+    """Return what is written of one case, and its events, if it makes any."""
     found = []
     try:
-        for threads in (1, 2):
+        for count in threads:
             with tempfile.TemporaryDirectory(prefix="adv2e-digests-") as folder:
-                found.append(run(threads, Path(folder)))
+                found.append(run(count, Path(folder)))
     except Exception as error:  # a case that a commit lacks must not hide the others
-        return {"error": f"{type(error).__name__}: {error}"}, np.empty(0)
-    (events, digest), (_, other) = found
+        return {"error": f"{type(error).__name__}: {error}"}, None
+    first, last = found[0], found[-1]
+    if isinstance(first, dict):
+        return {"holds": first} | (
+            {"two_threads": changed(first, last)} if first != last else {}
+        ), None
+    (events, digest), (_, other) = first, last
     on = int(np.count_nonzero(events["p"]))
     about = {"digest": digest, "events": int(events.size), "on": on, "off": int(events.size) - on}
     if other != digest:
@@ -446,72 +71,11 @@ def one(name: str, run: Callable[[int, Path], tuple[Array, str]]) -> tuple[dict[
     return about, events
 
 
-def all_cases() -> dict[str, Callable[[int, Path], tuple[Array, str]]]:
-    """Return what runs each case, by name."""
-
-    def simulation(case: Case) -> Callable[[int, Path], tuple[Array, str]]:
-        def run(threads: int, folder: Path) -> tuple[Array, str]:
-            events = simulated(case, threads, folder)
-            return events, sha(events.tobytes())
-
-        return run
-
-    def conversion(command: Command) -> Callable[[int, Path], tuple[Array, str]]:
-        return lambda threads, folder: converted(command, threads, folder)
-
-    return {name: simulation(case) for name, case in cases().items()} | {
-        name: conversion(command) for name, command in COMMANDS.items()
-    }
-
-
-def kept(path: Path, name: str) -> Path:
-    """Return where the events of a case of the results in `path` are kept."""
-    return path.with_suffix("") / (re.sub(r"\W+", "_", name) + ".npz")
-
-
-def difference(name: str, a: Path, b: Path) -> str:
-    """Return how many events are the same ones, and how far their times are apart."""
-    if not (kept(a, name).is_file() and kept(b, name).is_file()):
-        return "events not kept"
-    before, after = (np.load(kept(path, name))["events"] for path in (a, b))
-    keys, polarities, instants = zip(
-        *(_numbered(events) for events in (before, after)), strict=True
-    )
-    _, i, j = np.intersect1d(*keys, assume_unique=True, return_indices=True)
-    same = polarities[0][i] == polarities[1][j]
-    apart = np.abs(instants[0][i] - instants[1][j])[same]
-    return (
-        f"{same.sum()} the same, {np.count_nonzero(apart)} of them at other times,"
-        f" at most {apart.max(initial=0)} us apart"
-    )
-
-
-def _numbered(events: Array) -> tuple[Array, Array, Array]:
-    """Return (pixel, number of the event in the pixel) as one integer, polarity and time."""
-    pixels = events["y"].astype(np.int64) << 16 | events["x"]
-    order = np.argsort(pixels, kind="stable")
-    pixels = pixels[order]
-    first = np.flatnonzero(np.diff(pixels, prepend=-1))
-    number = np.arange(pixels.size) - np.repeat(first, np.diff(first, append=pixels.size))
-    return pixels << 31 | number, events["p"][order], events["t"][order]
-
-
-def comparison(a: Path, b: Path) -> list[str]:
-    """Return a line for each case that differs."""
-    before, after = (json.loads(path.read_text()) for path in (a, b))
-    lines = []
-    for name in [*before, *(name for name in after if name not in before)]:
-        x, y = before.get(name), after.get(name)
-        if x == y:
-            continue
-        if x is None or y is None:
-            lines.append(f"{name}: only in {b if x is None else a}")
-        elif "error" in x or "error" in y:
-            lines.append(f"{name}: {x.get('error', 'ran')} -> {y.get('error', 'runs')}")
-        else:
-            counts = " -> ".join(f"{z['events']} ({z['on']} ON)" for z in (x, y))
-            lines.append(f"{name}: {counts}; {difference(name, a, b)}")
-    return lines
+def _kinds(ctx: click.Context, param: click.Parameter, text: str) -> set[str]:
+    kinds = set(text.split(","))
+    if unknown := kinds - {*KINDS}:
+        raise click.BadParameter(f"{', '.join(sorted(unknown))}: no such kind", ctx, param)
+    return kinds
 
 
 @click.command()
@@ -522,6 +86,9 @@ def comparison(a: Path, b: Path) -> list[str]:
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     help="Folder that holds the package adv2e.  [default: the installed one]",
 )
+@click.option(
+    "--kinds", default=",".join(KINDS), show_default=True, callback=_kinds, help="Kinds of cases."
+)
 @click.option("--only", default="*", metavar="GLOB", help="Cases by name.")
 @click.option(
     "--compare", nargs=2, type=click.Path(exists=True, path_type=Path), metavar="A B",
@@ -531,12 +98,18 @@ def main(
     out: Path | None,
     keep: bool,
     package: Path | None,
+    kinds: set[str],
     only: str,
     compare: tuple[Path, Path] | None,
 ) -> None:
-    """Write digests of the events of many cases, or compare two such files."""
+    """Write digests of what many cases make, or compare two such files."""
+
+    def wanted(name: str) -> bool:
+        kind = WORDS.get(name.split(maxsplit=1)[0], "events")
+        return kind in kinds and fnmatch.fnmatchcase(name, only)
+
     if compare:
-        lines = comparison(*compare)
+        lines = comparison(*compare, wanted)
         click.echo("\n".join(lines) or "no differences")
         sys.exit(bool(lines))
     if out is None:
@@ -544,16 +117,17 @@ def main(
     if package:
         sys.path.insert(0, str(package.resolve()))
     results, wrong = {}, []
-    for name, run in all_cases().items():
-        if not fnmatch.fnmatch(name, only):
-            continue
-        results[name], events = one(name, run)
-        about = results[name]
-        if "error" in about or "two_threads" in about:
-            wrong.append(f"{name}: {about.get('error', 'depends on the number of threads')}")
-        if keep and "error" not in about:
-            kept(out, name).parent.mkdir(parents=True, exist_ok=True)
-            np.savez_compressed(kept(out, name), events=events)
+    for cases, threads in KINDS.values():
+        for name, run in cases().items():
+            if not wanted(name):
+                continue
+            results[name], events = one(name, run, threads)
+            about = results[name]
+            if "error" in about or "two_threads" in about:
+                wrong.append(f"{name}: {about.get('error', 'depends on the number of threads')}")
+            elif keep and events is not None:
+                kept(out, name).parent.mkdir(parents=True, exist_ok=True)
+                np.savez_compressed(kept(out, name), events=events)
     out.write_text(json.dumps(results, indent=1) + "\n")
     click.echo(f"{len(results)} cases, {sum(r.get('events', 0) for r in results.values())} events")
     if wrong:

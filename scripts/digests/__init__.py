@@ -1,0 +1,1 @@
+"""Cases that ``event_digests.py`` makes digests of, and what tells two results apart."""
