@@ -19,7 +19,7 @@ from adv2e.formats.reading import Recording, read_events
 from adv2e.geometry import Size
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
-from adv2e.sources import OPENERS, STDIN, Source, open_source
+from adv2e.sources import OPENERS, PICTURES, STDIN, Source, open_source
 from adv2e.sources.frame import Light
 from adv2e.sources.stored import EVENTS, LIST
 from adv2e.sources.times.rates import Rate
@@ -113,7 +113,8 @@ def _has_only_frames(path: Path) -> bool:
 
         files = Members(path)
         return bool(files.enter(LIST) or images_in(files)) and not files.enter(EVENTS)
-    return path.suffix.lower() in OPENERS and not may_hold_events(path)
+    suffix = path.suffix.lower()
+    return (suffix in OPENERS or suffix in PICTURES) and not may_hold_events(path)
 
 
 def _of_recording(recording: Recording) -> dict[str, Any]:

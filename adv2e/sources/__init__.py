@@ -23,7 +23,8 @@ VIDEO_SUFFIXES = (
 )
 """Files that are opened as video."""
 
-_PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".exr", ".hdr", ".pgm", ".ppm", ".pfm")
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".exr", ".hdr", ".pgm", ".ppm", ".pfm")
+"""Pictures: an input if they are animated, else for what moves a sensor before them."""
 
 STDIN = "-"
 """What standard input is called."""
@@ -152,7 +153,7 @@ def _opener(path: Path) -> str:
         return f"adv2e.sources.{_kind_of_folder(path)}"
     if suffix in OPENERS:
         return OPENERS[suffix]
-    if suffix in _PICTURES:
+    if suffix in PICTURES:
         if suffix in (".png", ".webp") and (kind := _animated(path)):
             return kind
         raise DataError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.server
+import json
 import shutil
 import threading
 
@@ -108,6 +109,15 @@ def test_animated_png_is_a_film(tmp_path, name):
     assert (source.kind, source.width, source.height, len(frames)) == ("video", 64, 48, 5)
     assert [frame.t_ns for frame in frames] == [40_000_000 * n for n in range(5)]
     assert all(np.array_equal(f.image, g) for f, g in zip(frames, pictures(5), strict=True))
+
+
+def test_info_takes_an_animated_png_for_what_convert_does(adv2e, tmp_path):
+    path = animated(tmp_path / "clip.png", "apng", "apng")
+    told = json.loads(adv2e("info", path, "--json").out)
+    assert told["frames"]["count"] == len(list(open_source(path).frames()))
+    cv2.imwrite(str(tmp_path / "still.png"), np.zeros((4, 4), np.uint8))
+    outcome = adv2e("info", tmp_path / "still.png")
+    assert (outcome.status, "a single picture makes no events" in outcome.err) == (1, True)
 
 
 def test_animated_webp_is_refused(tmp_path):
