@@ -41,7 +41,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 import numpy as np
 from networks.evsegnet import evsegnet
-from real.recording import read
 from writing import as_written, one_line_errors, output_option, table, write_report
 
 from adv2e.errors import DataError
@@ -49,6 +48,7 @@ from experiments.labels.labelled import CLASSES, Folder, from_ess, of_shapes, re
 from experiments.labels.scores import MEASURES, confusion, last_and_best, of_one_class, scores_of
 from experiments.labels.small import WINDOWS, Small
 from experiments.labels.training import update_of
+from experiments.recordings import read
 from experiments.trainings import options
 from experiments.trainings import seeds as of_seeds
 from experiments.trainings.jobs import all_done, all_measured, keep_references, kept_references

@@ -12,7 +12,6 @@ from typing import Any
 import click
 import numpy as np
 from numpy.typing import NDArray
-from real.recording import decoder_of
 
 from adv2e.config.model import Sensor
 from adv2e.errors import DataError
@@ -20,6 +19,7 @@ from adv2e.light.sensor import fitting_of
 from adv2e.sources import open_source
 from experiments.images import textures
 from experiments.images.sequences import Pair
+from experiments.recordings import decoder_of
 from experiments.simulators.clip import Clip, Simulator
 from experiments.trainings.training import written
 

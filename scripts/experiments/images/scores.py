@@ -14,11 +14,11 @@ from networks import torch_module
 from networks.firenet import NETWORKS, Images, Network, grid_of, reconstructed
 from networks.lpips import Lpips
 from numpy.typing import NDArray
-from real.measures import similarity
-from real.recording import Real, read
 
 from adv2e.errors import DataError
 from adv2e.events import Events, cut
+from experiments.judge import similarity
+from experiments.recordings import Recording, read
 
 CUTS = {
     "boxes_6dof": (5.0, 20.0), "calibration": (5.0, 20.0), "dynamic_6dof": (5.0, 20.0),
@@ -40,13 +40,13 @@ class Part:
     Attributes
     ----------
     name : str
-    real : Real
+    real : Recording
     spans : sequence of (int, int)
         Frame intervals [us].
     """
 
     name: str
-    real: Real
+    real: Recording
     spans: Sequence[tuple[int, int]]
 
     @cached_property

@@ -33,13 +33,13 @@ import click
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from real.recording import Real
 
 from adv2e.errors import DataError
 from adv2e.events import Events, cut, make_events, sort_events
 from adv2e.export.ev_segnet import DDD17, DDD17_ROWS
 from adv2e.representations.event_images import event_image
 from experiments.labels import shapes
+from experiments.recordings import Recording
 from experiments.simulators.clip import Clip, Simulator
 from experiments.trainings.training import written
 
@@ -88,7 +88,7 @@ def rendered(
     return found
 
 
-def of_shapes(real: Real, every: int = 5) -> list[Sample]:
+def of_shapes(real: Recording, every: int = 5) -> list[Sample]:
     """Return pictures of measured events of dark shapes on a bright wall, one frame in `every`.
 
     Labels are the frames themselves: what is darker than Otsu's threshold is shape.  Sides are cut
@@ -97,7 +97,7 @@ def of_shapes(real: Real, every: int = 5) -> list[Sample]:
     columns, rows = (8 * (one // 8) for one in real.size)
     found = []
     span = real.windows.start + WINDOW_US, real.windows.stop
-    for number, (frame, t_us) in enumerate(zip(real.frames(), real.times_us, strict=True)):
+    for number, (frame, t_us) in enumerate(zip(real.source.frames(), real.times_us, strict=True)):
         if number % every or not span[0] <= t_us <= span[1]:
             continue
         grey = cv2.GaussianBlur(np.asarray(frame.image), (0, 0), 1.0)

@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 
 import click
 import numpy as np
-from real.recording import Real
 from writing import table
 
 from adv2e.errors import DataError
 from adv2e.events import Events
 from experiments.passages.edges import Edges, Values
 from experiments.passages.measures import Latencies, Passages, apart, latencies
+from experiments.recordings import Recording
 from experiments.simulators.clip import Simulator
 
 BEHIND_DN = (1.0, 8.0)
@@ -210,7 +210,10 @@ def since_first(of: Latencies, half: int | None = None) -> Values:
 
 
 def report(
-    real: Real, exposures_us: Values, sweeps: Sequence[Sweep], simulators: Sequence[Simulator]
+    real: Recording,
+    exposures_us: Values,
+    sweeps: Sequence[Sweep],
+    simulators: Sequence[Simulator],
 ) -> tuple[str, dict[str, Any]]:
     """Return what sweeps of a recording tell, beside rendered edges of the same speed.
 

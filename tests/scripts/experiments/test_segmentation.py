@@ -23,9 +23,9 @@ pytest.importorskip("matplotlib", reason="curves are drawn by Matplotlib (extra 
 from experiments import segmentation  # noqa: E402
 from experiments.labels import labelled, shapes, training  # noqa: E402
 from experiments.labels import scores as label_scores  # noqa: E402
+from experiments.recordings import read  # noqa: E402
 from experiments.simulators.named import named  # noqa: E402
 from networks.unet import unet  # noqa: E402
-from real.recording import read  # noqa: E402
 
 SIZE = 32, 24
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from real.recording import still_pixels, still_rate
+from experiments.recordings import still_pixels, still_rate
 
 from adv2e.events import make_events
 
