@@ -5,8 +5,8 @@ Each trial makes a few clips, converts them undisturbed, and converts them again
 killed process or a full disk ends the work, up to three times.  Then the work is called once more,
 and every byte is compared::
 
-    python scripts/soak.py --minutes 60
-    python scripts/soak.py --trials 20 --seed 3 -o soak.md
+    python scripts/dev/soak.py --minutes 60
+    python scripts/dev/soak.py --trials 20 --seed 3 -o soak.md
 
 After each end, no file under its final name may differ from that of the undisturbed run, no process
 may be left, and the exit status must be that of the signal.  At the end nothing may lie beside the
@@ -31,6 +31,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import click
 import cv2

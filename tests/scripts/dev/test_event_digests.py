@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import event_digests
 import numpy as np
 from click.testing import CliRunner
+from dev import event_digests
 
 
 def test_a_case_is_written_and_compared(tmp_path: Path) -> None:

@@ -14,12 +14,11 @@ import pytest
 if sys.platform != "linux":
     pytest.skip("the fuzzer needs fork and /proc", allow_module_level=True)
 
-from fuzzing import running
-from fuzzing.mutations import mutated
-from fuzzing.running import Limits, judged
-from fuzzing.seeds import all_seeds
+from dev import fuzz_readers
+from dev.fuzz_readers import Limits, judged
+from dev.fuzz_seeds import all_seeds, mutated
 
-SCRIPT = Path(__file__).parents[3] / "scripts" / "fuzzing" / "fuzz_readers.py"
+SCRIPT = Path(__file__).parents[3] / "scripts" / "dev" / "fuzz_readers.py"
 
 
 def test_some_damaged_files_of_every_kind():
@@ -70,10 +69,10 @@ LINE = b"adv2e: error: a.png: damaged\n"
     ],
 )
 def test_what_ends_badly_is_seen(tmp_path, monkeypatch, action, wrong):
-    monkeypatch.setattr(running, "_command", lambda _: action())
-    monkeypatch.setattr(running, "_virtual_bytes", lambda: 1 << 46)  # this process holds much
+    monkeypatch.setattr(fuzz_readers, "_command", lambda _: action())
+    monkeypatch.setattr(fuzz_readers, "_virtual_bytes", lambda: 1 << 46)  # this process holds much
     cpu_s, wall_s = (0.5, 3.0) if wrong == "too slow" else (20.0, 60.0)
-    found = running.run([], tmp_path, Limits(cpu_s=cpu_s, wall_s=wall_s, mib=200))
+    found = fuzz_readers.run([], tmp_path, Limits(cpu_s=cpu_s, wall_s=wall_s, mib=200))
     assert wrong in found.wrong if wrong else not found.wrong, found
 
 
@@ -83,9 +82,9 @@ def test_what_is_mapped_from_files_here_is_not_taken_off_there(tmp_path, monkeyp
         file.truncate(300 << 20)
         mapped = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
     assert not any(mapped[:: 1 << 12])  # looks at every page
-    monkeypatch.setattr(running, "_command", lambda _: _allocate())
-    monkeypatch.setattr(running, "_virtual_bytes", lambda: 1 << 46)
-    assert "MiB" in running.run([], tmp_path, Limits(mib=200)).wrong
+    monkeypatch.setattr(fuzz_readers, "_command", lambda _: _allocate())
+    monkeypatch.setattr(fuzz_readers, "_virtual_bytes", lambda: 1 << 46)
+    assert "MiB" in fuzz_readers.run([], tmp_path, Limits(mib=200)).wrong
     mapped.close()
 
 

@@ -4,8 +4,8 @@
 Takes the package of each commit out of git into a temporary folder (nothing in the repository
 changes) and runs the same timings with both, in fresh processes and interleaved rounds::
 
-    python scripts/compare_commits.py HEAD~1 HEAD
-    python scripts/compare_commits.py main . --setting '346x260: *' --rounds 9
+    python scripts/dev/compare_commits.py HEAD~1 HEAD
+    python scripts/dev/compare_commits.py main . --setting '346x260: *' --rounds 9
 
 ``.`` stands for the working tree as it is.  The compiled code of each is kept by a digest of its
 sources, so each is compiled once.
@@ -15,12 +15,15 @@ from __future__ import annotations
 
 import fnmatch
 import subprocess
+import sys
 import tarfile
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import click
 from benchmarks.machine import about

@@ -7,7 +7,7 @@ import pytest
 from adv2e.compiled import code_cache
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks /proc")
-soak = pytest.importorskip("soak") if sys.platform.startswith("linux") else None
+soak = pytest.importorskip("dev.soak") if sys.platform.startswith("linux") else None
 
 HALF = """
 import sys, time

@@ -1,4 +1,4 @@
-"""scripts/compare_commits.py takes packages out of git and says whether events are the same."""
+"""scripts/dev/compare_commits.py takes packages out of git and says whether events are the same."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
-import compare_commits as script
 import pytest
 from benchmarks import processes, settings
+from dev import compare_commits as script
 
 
 @pytest.fixture
