@@ -13,7 +13,6 @@ sources, so each is compiled once.
 
 from __future__ import annotations
 
-import fnmatch
 import subprocess
 import sys
 import tarfile
@@ -26,10 +25,18 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import click
-from benchmarks.machine import about
-from benchmarks.options import of_a_plan
-from benchmarks.processes import REPOSITORY, Job, JobError, Log, Measured, run_rounds
-from benchmarks.settings import OFF_NAME, Plan
+from benchmarks.measure import (
+    REPOSITORY,
+    Job,
+    JobError,
+    Log,
+    Measured,
+    Plan,
+    about,
+    of_a_plan,
+    run_rounds,
+)  # fmt: skip
+from benchmarks.speed import OFF_NAME, chosen, setting_jobs
 from writing import output_option, table, write_report
 
 USUAL = (f"346x260: {OFF_NAME}", "346x260: all effects, shot 5 Hz")
@@ -88,17 +95,9 @@ def checked_out(commit: str, folder: Path, repository: Path = REPOSITORY) -> Pat
 
 
 def pairs_of_jobs(plan: Plan, globs: Sequence[str], packages: Sequence[Path]) -> list[Job]:
-    """Return each chosen job once for each package, next to each other.
-
-    Raises
-    ------
-    JobError
-        No setting has such a name.
-    """
-    chosen = [j for j in plan.jobs() if any(fnmatch.fnmatch(j.name, glob) for glob in globs)]
-    if not chosen:
-        raise JobError(f"--setting {', '.join(globs)}: no setting has such a name")
-    return [replace(job, package=str(p), digest=True) for job in chosen for p in packages]
+    """Return each chosen job once for each package, next to each other."""
+    jobs = chosen(list(setting_jobs(plan)), globs, "--setting")
+    return [replace(job, package=str(p)) for job in jobs for p in packages]
 
 
 def report(found: Sequence[Measured], before: str, after: str) -> str:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import dataclass, field, replace
+from importlib import metadata
 from typing import Any
 
 import numpy as np
+from benchmarks.worker import TOOLS
 
 from adv2e.effects.frames.encoding import encode_light
 from adv2e.errors import MissingExtraError
@@ -50,19 +52,16 @@ class EventCV:
     @property
     def nature(self) -> str:
         """The tool and its version."""
-        from benchmarks.tools.eventcv import versions  # noqa: PLC0415 - only where it is used
-
         how = ", without its noise" if QUIET.items() <= self.arguments.items() else ""
-        return f"the tool itself, EventCV {versions()['eventcv']}{how}"
+        return f"the tool itself, EventCV {metadata.version('eventcv')}{how}"
 
     def events(self, clip: Clip, seed: int) -> Events:
         """Return the events of a clip."""
-        from benchmarks.tools.eventcv import columns, simulator  # noqa: PLC0415
-
         light, rate = clip.even(self.parts)
         coded = encode_light(np.clip(light, 0.0, 255.0), "srgb").astype(np.float32)
-        run = simulator({"arguments": {**THRESHOLDS, **self.arguments, "seed": seed}})
-        t, x, y, p = columns(run(coded, float(rate)))
+        tool = TOOLS["eventcv"]
+        run = tool.simulator({"arguments": {**THRESHOLDS, **self.arguments, "seed": seed}}, None)
+        t, x, y, p = tool.columns(run(coded, float(rate)))
         return sort_events(make_events(t + int(clip.times_ns[0]) // 1000, x, y, p))
 
     @property

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.events import Events, make_events, sort_events
@@ -50,13 +53,22 @@ class V2e:
 
     def events(self, clip: Clip, seed: int) -> Events:
         """Return the events of a clip."""
-        from benchmarks.tools.v2e import columns, simulator  # noqa: PLC0415 - it needs PyTorch
+        if (folder := str(self.folder.resolve())) not in sys.path:
+            sys.path.insert(0, folder)
+        from v2ecore.emulator import EventEmulator  # noqa: PLC0415 - known only now
 
         light, rate = clip.even(self.parts)
         # seed 0 means no seed there
-        options = {"folder": self.folder, "arguments": {**self.arguments, "seed": seed + 1}}
-        t, x, y, p = columns(simulator({**options, "threads": None})(light, float(rate)))
-        return sort_events(make_events(t + int(clip.times_ns[0]) // 1000, x, y, p))
+        emulator = EventEmulator(device="cpu", **{**self.arguments, "seed": seed + 1})
+        found = [
+            emulator.generate_events(frame.astype(np.float32), k / float(rate))
+            for k, frame in enumerate(light)
+        ]
+        # rows are time [s], column, row, polarity (1 or -1); None where a frame makes none
+        rows = [np.asarray(part, np.float64)[:, :4] for part in found if part is not None]
+        t, x, y, p = np.concatenate([np.empty((0, 4)), *rows]).T
+        first_us = int(clip.times_ns[0]) // 1000
+        return sort_events(make_events(np.rint(t * 1e6) + first_us, x, y, p > 0))
 
     @property
     def levels(self) -> tuple[float, float]:

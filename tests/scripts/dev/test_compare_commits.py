@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from benchmarks import processes, settings
+from benchmarks import measure
 from dev import compare_commits as script
 
 
@@ -55,7 +55,7 @@ def test_jobs_run_their_own_package_wherever_one_stands(tmp_path, monkeypatch):
     job = script.Job(name="any", action="adv2e:tell")
     for name in ("before", "after"):
         own = replace(job, package=str(tmp_path / name))
-        assert processes.run_job(own).report["package"] == name
+        assert measure.run_job(own).report["package"] == name
 
 
 def test_unknown_commit_is_told_in_one_line(repository, tmp_path):
@@ -67,7 +67,7 @@ def test_other_events_are_shouted():
     def found(name, package, wall, digest):
         job = script.Job(name=name, package=package)
         report = {"wall_s": wall, "cpu_s": wall, "events": 7, "digest": digest, "versions": {}}
-        return script.Measured(job, [processes.Round(report, wall, 0.0)])
+        return script.Measured(job, [measure.Round(report, wall, 0.0)])
 
     every = [
         found("same", "a", 1.0, "x"),
@@ -84,7 +84,7 @@ def test_other_events_are_shouted():
 
 
 def test_settings_that_do_not_exist_are_an_error(tmp_path, monkeypatch):
-    monkeypatch.setattr(settings, "stored", lambda clip, folder: folder)
+    monkeypatch.setattr(measure, "stored", lambda clip, folder: folder)
     plan = script.Plan(tmp_path, True, 1)
     with pytest.raises(script.JobError, match="no setting has such a name"):
         script.pairs_of_jobs(plan, ["nothing"], [tmp_path])

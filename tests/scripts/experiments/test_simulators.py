@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -235,8 +236,8 @@ class EventEmulator:
 """
 
 
-def test_v2e_is_given_even_frames_its_seed_and_its_thresholds(tmp_path):
-    pytest.importorskip("torch", reason="v2e needs PyTorch")
+def test_v2e_is_given_even_frames_its_seed_and_its_thresholds(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "path", list(sys.path))
     (tmp_path / "v2ecore").mkdir()
     (tmp_path / "v2ecore" / "__init__.py").touch()
     (tmp_path / "v2ecore" / "emulator.py").write_text(EMULATOR)
@@ -245,3 +246,5 @@ def test_v2e_is_given_even_frames_its_seed_and_its_thresholds(tmp_path):
     assert on["t"].tolist() == list(range(7_000_000, 7_100_001, 10_000))
     assert (on["x"] == 4).all()
     assert (on["y"] == 4).all()
+    for name in ("v2ecore", "v2ecore.emulator"):
+        sys.modules.pop(name)
