@@ -3,13 +3,31 @@
 from __future__ import annotations
 
 import random
+import sys
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import chain, zip_longest
+from pathlib import Path
 from typing import Any
 
-from studies.verdicts.camera import camera, catalogue, settings
+REPOSITORY = Path(__file__).parents[2]
+
+"""Recordings are by the camera of its tests, which shares no code with adv2e."""
+
+
+def _module(name: str) -> Any:
+    folder = str(REPOSITORY / "tests")
+    if folder not in sys.path:
+        sys.path.append(folder)
+    return import_module(name)
+
+
+camera = _module("camera")
+catalogue = _module("camera.catalogue")
+settings = _module("camera.settings")
+stimulus = _module("camera.stimulus")
 
 NOTHING, LIBRARY, LEFT_OUT, OUTSIDE, PAIRS = KINDS = (
     "nothing",
@@ -146,3 +164,12 @@ def pairs(names: Sequence[str]) -> list[tuple[str, ...]]:
 def shard(cases: Sequence[Case], number: int, count: int) -> list[Case]:
     """Return every `count`-th case from the `number`-th on, counted from 1."""
     return list(cases[number - 1 :: count])
+
+
+_STEPS = 8
+"""Pictures that are made up between two frames, where they move."""
+
+
+def sampling(interpolation: str) -> dict[str, Any]:
+    """Return what is declared of the pictures between frames that are blended, or moved."""
+    return {"interpolation": interpolation, "L": 1 if interpolation == "linear" else _STEPS}

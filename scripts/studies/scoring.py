@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from studies.verdicts.cases import LIBRARY, NOTHING, OWN_PERIOD, PAIRS
-from studies.verdicts.results import Line
+from studies.cases import LIBRARY, NOTHING, OWN_PERIOD, PAIRS
+from studies.results import Line
 
 ALONE, ALIKE, PARTLY = "named alone", "among look-alikes", "named, something left"
 BOTH, ONE = "both named", "one named"

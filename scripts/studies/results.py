@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 Line = dict[str, Any]
-"""A finished case; see :func:`studies.verdicts.run.diagnosed`."""
+"""A finished case; see :func:`studies.run.diagnosed`."""
 
 ENDING = ".jsonl"
 

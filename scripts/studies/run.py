@@ -18,15 +18,10 @@ from adv2e.diagnosis.data.evidence import Evidence, read_evidence
 from adv2e.diagnosis.diagnose import diagnose
 from adv2e.diagnosis.known_light import read_known_light
 from adv2e.reports.result import Diagnosis
-from studies.verdicts.camera import REPOSITORY, camera, settings, stimulus
-from studies.verdicts.cases import Case
-from studies.verdicts.options import sampling
-from studies.verdicts.results import Line
+from studies.cases import REPOSITORY, Case, camera, sampling, settings, stimulus
+from studies.results import Line
 
-_PARTS = "scripts/studies/verdicts"
-STUDIED = (
-    "adv2e", "tests/camera", *(f"{_PARTS}/{name}.py" for name in ("cases", "options", "run")),
-)  # fmt: skip
+STUDIED = ("adv2e", "tests/camera", "scripts/studies/cases.py", "scripts/studies/run.py")
 """What results depend on: their commit is the last that changed any of it."""
 
 
