@@ -298,7 +298,8 @@ def relative_table(measured: Sequence[Measured]) -> str:
             str(a.ratio(b).times(megapixel_frames(b) / megapixel_frames(a))) if a and b else "-"
             for a, b in pairs
         ]
-        rows.append([name, *cells])
+        if any(cell != "-" for cell in cells):
+            rows.append([name, *cells])
     return table(("relative time", SMALL, LARGE), rows) if rows else ""
 
 

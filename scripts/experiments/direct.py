@@ -35,10 +35,9 @@ from adv2e.diagnosis.fitting.nuisances import TOLERANCE
 from adv2e.events import Events, empty_events
 from adv2e.sources.times.instants import seconds
 from experiments import side_by_side
+from experiments.clip import Simulator
 from experiments.recordings import SCORE, Judged, Recording, halves, read, trial_options
-from experiments.simulators.clip import Simulator
-from experiments.simulators.named import natures, simulator_options
-from experiments.simulators.pixel import Pixel
+from experiments.simulators import Pixel, natures, simulator_options
 
 HEADER = (
     "Configurations named after a tool are that tool's parameters in the pixel of adv2e, not the"

@@ -52,10 +52,10 @@ from networks.firenet import NETWORKS, Network
 from numpy.typing import NDArray
 from writing import as_written, output_option, table, write_report
 
+from experiments.clip import Simulator
 from experiments.judge import Judge, Row
 from experiments.recordings import read, trial_options
-from experiments.simulators.clip import Simulator
-from experiments.simulators.named import natures, simulator_options
+from experiments.simulators import natures, simulator_options
 
 REFERENCE = "ideal"
 

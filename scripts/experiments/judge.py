@@ -25,8 +25,8 @@ from adv2e.comparison.floor import half_split
 from adv2e.comparison.windows import Windows
 from adv2e.errors import DataError
 from adv2e.events import Events, cut, empty_events, sort_events
+from experiments.clip import Simulator
 from experiments.recordings import SCORE, Recording, halves
-from experiments.simulators.clip import Simulator
 
 JITTER_MS = 2.0
 """Standard deviation of the times of the third floor [ms]."""

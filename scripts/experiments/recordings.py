@@ -23,7 +23,7 @@ from adv2e.errors import DataError
 from adv2e.events import Events, Window, cut
 from adv2e.formats.reading import read_events
 from adv2e.sources import Source, open_source
-from experiments.simulators.clip import Clip, Simulator
+from experiments.clip import Clip, Simulator
 
 SCORE = "relative_5_bins_smoothed"
 """The distance that tables judge by."""

@@ -12,8 +12,7 @@ import pytest
 from click.testing import CliRunner
 from experiments import direct
 from experiments.recordings import read
-from experiments.simulators.by_file import ByFile
-from experiments.simulators.pixel import Pixel
+from experiments.simulators import ByFile, Pixel
 from written_recordings import write_recording
 
 from adv2e import load_config, simulate, write_events

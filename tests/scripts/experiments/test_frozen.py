@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from experiments import frozen, judge
 from experiments.judge import likeness, similarity
 from experiments.recordings import read
-from experiments.simulators.pixel import Pixel
+from experiments.simulators import Pixel
 from networks.firenet import NETWORKS, Network, firenet
 from written_recordings import write_recording
 

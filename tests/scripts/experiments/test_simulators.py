@@ -9,11 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from experiments.simulators.by_file import ByFile
-from experiments.simulators.clip import Clip
-from experiments.simulators.named import NAMES, EventsOf, named
-from experiments.simulators.v2e import V2e
-from experiments.simulators.voltmeter import (
+from experiments.clip import Clip
+from experiments.simulators import NAMES, ByFile, EventsOf, V2e, named
+from experiments.voltmeter import (
     CONSTANTS,
     Voltmeter,
     chance_of_on,

@@ -10,8 +10,7 @@ from experiments import judge
 from networks.e2vid import PARAMETERS, e2vid
 from networks.firenet import PARAMETERS as OF_FIRENET
 from networks.firenet import firenet, grid_of, reconstructed
-from networks.image_loss import similarity, structural_loss
-from networks.lpips import BACKBONE, LAYERS, LINEAR, Lpips
+from networks.image_loss import BACKBONE, LAYERS, LINEAR, Lpips, similarity, structural_loss
 
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.events import make_events

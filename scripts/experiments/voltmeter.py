@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import Events, make_events, sort_events
-from experiments.simulators.clip import Clip
+from experiments.clip import Clip
 
 Values = NDArray[np.float64]
 

@@ -23,10 +23,9 @@ from writing import table
 
 from adv2e.errors import DataError
 from adv2e.events import Events
-from experiments.passages.edges import Edges, Values
-from experiments.passages.measures import Latencies, Passages, apart, latencies
+from experiments.clip import Simulator
+from experiments.edges import Edges, Latencies, Passages, Values, apart, latencies
 from experiments.recordings import Recording
-from experiments.simulators.clip import Simulator
 
 BEHIND_DN = (1.0, 8.0)
 """Light of the thing: bounds [DN]."""

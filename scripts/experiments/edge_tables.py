@@ -12,8 +12,7 @@ import numpy as np
 from writing import load_pyplot, save_figure, table
 
 from adv2e.events import Events
-from experiments.passages.edges import Band, Values
-from experiments.passages.measures import After, Latencies, Passages, after_stop, apart, latencies
+from experiments.edges import After, Band, Latencies, Passages, Values, after_stop, apart, latencies
 
 FEWEST = 0.3
 """Latencies of events are told where this share of the passages have such an event."""

@@ -27,21 +27,23 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import click
 import cv2
 import numpy as np
+from networks import torch_module
+from networks.unet import unet
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.events import Events, cut, make_events, sort_events
 from adv2e.export.ev_segnet import DDD17, DDD17_ROWS
 from adv2e.representations.event_images import event_image
-from experiments.labels import shapes
+from experiments.clip import Clip, Simulator
 from experiments.recordings import Recording
-from experiments.simulators.clip import Clip, Simulator
-from experiments.trainings.training import written
+from experiments.scenes import HZ, shape_clip
+from experiments.training import Training, Update, identity, written
 
 IGNORED = 255
 WINDOW_US = 50_000
@@ -77,9 +79,9 @@ def rendered(
 ) -> list[Sample]:
     """Return pictures of moving shapes, so many windows of 50 ms of each seed."""
     found = []
-    step = shapes.HZ * WINDOW_US // 10**6
+    step = HZ * WINDOW_US // 10**6
     for seed in seeds:
-        clip, labels = shapes.moving(seed, step * windows + 1, size)
+        clip, labels = shape_clip(seed, step * windows + 1, size)
         events = simulator.events(clip, seed)
         found += [
             (channels(events, size, int(clip.times_ns[k]) // 1000), labels[k])
@@ -283,3 +285,164 @@ def _measured(place: Path, times_ns: NDArray[np.int64], piece: Sequence[int]) ->
     first, last = np.searchsorted(t, (begin, times_ns[piece[-1] - 1]))
     x, y, p = xyp[first:last].T
     return sort_events(make_events(t=t[first:last] // 1000, x=x, y=y, p=p > 0))
+
+
+MEASURES = {"last accuracy": True, "last mIoU": True, "best accuracy": True, "best mIoU": True}
+"""And whether larger is better."""
+
+
+def confusion(net: Any, samples: Samples, classes: int, device: str) -> NDArray[np.int64]:
+    """Return how many pixels of each class (rows) are said to be of each (columns)."""
+    torch = torch_module()
+    counts = np.zeros((classes, classes), np.int64)
+    with torch.inference_mode():
+        for number in range(len(samples)):
+            picture, label = samples[number]
+            said = net(torch.from_numpy(picture)[None].to(device))[0].argmax(0).cpu().numpy()
+            known = label < classes
+            pairs = classes * label[known].astype(np.int64) + said[known]
+            counts += np.bincount(pairs, minlength=classes**2).reshape(classes, classes)
+    return counts
+
+
+def scores_of(counts: NDArray[np.int64]) -> dict[str, float]:
+    """Return accuracy and mIoU."""
+    hit = np.diag(counts)
+    union = counts.sum(0) + counts.sum(1) - hit
+    shares = hit / np.maximum(union, 1)
+    return {"accuracy": float(hit.sum() / max(counts.sum(), 1)), "mIoU": float(shares.mean())}
+
+
+def of_one_class(samples: Samples, classes: int) -> dict[str, float]:
+    """Return accuracy and mIoU of saying the most common class of all pixels."""
+    counts = np.zeros(classes, np.int64)
+    for number in range(len(samples)):
+        label = samples[number][1]
+        counts += np.bincount(label[label < classes], minlength=classes)
+    said = np.zeros((classes, classes), np.int64)
+    said[:, counts.argmax()] = counts
+    return scores_of(said)
+
+
+def last_and_best(checks: Sequence[dict[str, float]]) -> dict[str, float]:
+    """Return the measures of the last test and of the best one."""
+    best = max(checks, key=lambda one: one["mIoU"])
+    names = ("accuracy", "mIoU")
+    return {
+        f"{when} {name}": one[name]
+        for when, one in (("last", checks[-1]), ("best", best))
+        for name in names
+    }
+
+
+def picture(net: Any, sample: Sample) -> NDArray[np.uint8]:
+    """Return labels, what a network says, and the number of events, side by side."""
+    torch = torch_module()
+    with torch.inference_mode():
+        said = net(torch.from_numpy(sample[0])[None])[0].argmax(0).numpy()
+    counts = sample[0][:2].max(0) / 2 + 0.5
+    return np.rint(255 * np.hstack([sample[1] == 1, said == 1, counts])).astype(np.uint8)
+
+
+def update_of(samples: Samples, batch: int, device: str, changed: bool) -> Update:
+    """Return one step: pictures by chance, mirrored, and `changed` as Ev-SegNet does."""
+    torch = torch_module()
+
+    def update(net: Any, optimiser: Any, rng: np.random.Generator) -> float:
+        chosen = rng.integers(len(samples), size=batch)
+        pairs = [augmented(samples[int(k)], rng, changed) for k in chosen]
+        pictures, labels = (
+            torch.from_numpy(np.stack(one)).to(device) for one in zip(*pairs, strict=True)
+        )
+        optimiser.zero_grad()
+        loss = loss_of(net(pictures), labels)
+        loss.backward()
+        optimiser.step()
+        return float(loss.detach())
+
+    return update
+
+
+def loss_of(scores: Any, labels: Any) -> Any:
+    """Return the mean cross entropy over pixels with a class."""
+    functional = torch_module().nn.functional
+    return functional.cross_entropy(scores, labels.long(), ignore_index=IGNORED)
+
+
+def augmented(sample: Sample, rng: np.random.Generator, changed: bool) -> Sample:
+    """Return a picture with its labels, mirrored in a half of all cases.
+
+    With `changed` it is also made 0.5 to 2 times as large, shifted by a fifth at most, and turned
+    by 10 degrees at most, by the nearest pixel; what comes from outside is 0, and of no class.
+    """
+    picture, label = sample
+    if rng.random() < 0.5:
+        picture, label = picture[..., ::-1], label[:, ::-1]
+    if changed:
+        rows, columns = label.shape
+        scale, turn = rng.uniform(0.5, 2), np.deg2rad(rng.uniform(-10, 10))
+        shift = rng.uniform(-0.2, 0.2, 2) * (rows, columns)
+        y, x = np.indices(label.shape) - np.reshape([rows - 1, columns - 1], (2, 1, 1)) / 2
+        y, x = y - shift[0], x - shift[1]
+        from_y = (np.cos(turn) * y - np.sin(turn) * x) / scale + (rows - 1) / 2
+        from_x = (np.sin(turn) * y + np.cos(turn) * x) / scale + (columns - 1) / 2
+        at_y, at_x = (np.rint(one).astype(int) for one in (from_y, from_x))
+        inside = (at_y >= 0) & (at_y < rows) & (at_x >= 0) & (at_x < columns)
+        at_y, at_x = np.clip(at_y, 0, rows - 1), np.clip(at_x, 0, columns - 1)
+        picture = np.where(inside, picture[:, at_y, at_x], np.float32(0))
+        label = np.where(inside, label[at_y, at_x], np.uint8(IGNORED))
+    return np.ascontiguousarray(picture), np.ascontiguousarray(label)
+
+
+WINDOWS = 8
+"""Pictures of each clip."""
+EPOCH = 50
+"""Steps between tests."""
+
+
+@dataclass(frozen=True)
+class Small:
+    """One training on rendered shapes, and its tests on pictures that are given."""
+
+    simulator: Simulator
+    seed: int
+    tested: tuple[Sample, ...]
+    tested_on: str
+    steps: int
+    rate: float
+    clips: int
+    side: int
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides its numbers."""
+        return {**self._training, "steps": self.steps}
+
+    @property
+    def _training(self) -> dict[str, Any]:
+        return {
+            **identity(self.simulator), "seed": self.seed,
+            "network": "unet", "rate": self.rate, "batch": 4, "clips": self.clips,
+            "side": self.side, "tested on": self.tested_on, "pictures tested": len(self.tested),
+        }  # fmt: skip
+
+    def run(self, folder: Path) -> dict[str, Any]:
+        """Train in a folder, and test."""
+        first = 1000 * self.seed
+        samples = rendered(
+            range(first, first + self.clips), self.simulator, (self.side, self.side), WINDOWS
+        )
+
+        def check(net: Any) -> dict[str, float]:
+            return scores_of(confusion(net, self.tested, 2, "cpu"))
+
+        made = Training(
+            lambda: unet(2), update_of(samples, 4, "cpu", False), self._training, EPOCH, check,
+            "mIoU",
+        )  # fmt: skip
+        net, curve = made.run(folder, self.steps)
+        cv2.imwrite(str(folder / "last.png"), picture(net, self.tested[-1]))
+        return {
+            "measures": last_and_best(curve.checks),
+            **curve.summary(),
+        }

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from adv2e.errors import MissingExtraError
 from adv2e.events import Events, make_events, sort_events
-from experiments.passages.edges import Edges, Values
-from experiments.simulators.clip import Clip
+from experiments.clip import Clip
+from experiments.edges import Edges, Values
 
 CIRCUIT: dict[str, Any] = {
     "linear_below": 0.0,  # the logarithm everywhere, as in a photoreceptor
