@@ -27,8 +27,8 @@ Beside the pixel, ``frame_effects`` and ``arbiter`` hold the loops of effects on
 Where the time goes
 -------------------
 One core, nanoseconds a pixel and frame unless it says otherwise, by
-``scripts/benchmarks/limits.py``, ``scripts/benchmarks/speed.py`` and ``perf``; the parts are of an
-AMD EPYC (Zen 5), in brackets what an Intel Xeon of half that speed takes.
+``scripts/benchmarks/speed.py``, ``scripts/benchmarks/limits.py`` at commit b916649, and ``perf``;
+the parts are of an AMD EPYC (Zen 5), in brackets what an Intel Xeon of half that speed takes.
 
 ==================================== ===========================================================
 what the machine allows              memory 35 (15) GB/s, so that a float32 frame is read in 0.1

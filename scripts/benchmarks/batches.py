@@ -20,7 +20,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -30,10 +30,20 @@ from writing import output_option, table, write_report
 
 from adv2e.background import default_threads
 from benchmarks.clips import Clip, as_srgb, encoded, stored
-from benchmarks.machine import about
-from benchmarks.options import of_a_plan
-from benchmarks.processes import Job, Log, Measured, number, run_rounds
-from benchmarks.settings import ALL, CUTOFF_HZ, IDEAL, THRESHOLD, Plan
+from benchmarks.measure import (
+    ALL,
+    IDEAL,
+    THRESHOLD,
+    Job,
+    Log,
+    Measured,
+    Plan,
+    about,
+    number,
+    of_a_plan,
+    peer_arguments,
+    run_rounds,
+)  # fmt: skip
 
 CLIPS, QUICK_CLIPS = 200, 20
 FRAMES, FPS = 31, 30.0
@@ -42,40 +52,12 @@ SETS = {
     "all effects": (LEVELS, *ALL),
     "noise off": (LEVELS, *(one for one in IDEAL if one.startswith("pixel.") and "=null" in one)),
 }
-_PEER = {"pos_thres": THRESHOLD, "neg_thres": THRESHOLD, "cutoff_hz": CUTOFF_HZ, "upsample": "10"}
-PEER = {
-    "all effects": {
-        **_PEER, "sigma_thres": 0.03, "leak_rate_hz": 0.1, "shot_noise_rate_hz": 5.0,
-        "refractory_us": 500,
-    },
-    "noise off": {
-        **_PEER, "sigma_thres": 0.0, "leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0,
-        "refractory_us": 0,
-    },
-}  # fmt: skip
-
-_EVENTCV_FILE = "benchmarks.tools.eventcv_file"
-
 ABOUT = (
     f"Clips of 346x260, {FRAMES} frames at {FPS:g} a second, as MP4 (mp4v). Thresholds 0.2 and the"
     " same effects in both tools; all effects: with shot noise of 5 Hz. Whole processes, from start"
     " to end, compiled beforehand; of the pixel, the time after warming up. Median (least..most);"
     " ratios are paired by round."
 )
-
-
-@dataclass(frozen=True)
-class Ways:
-    """The ways to convert the same clips, as jobs."""
-
-    pixel: Job
-    batch: Job
-    loop: Job
-    peer: Job | None
-
-    def jobs(self) -> list[Job]:
-        """Return those that there are."""
-        return [one for one in (self.pixel, self.batch, self.loop, self.peer) if one is not None]
 
 
 def make_clips(folder: Path, count: int, moving: float) -> Path:
@@ -93,15 +75,15 @@ def make_clips(folder: Path, count: int, moving: float) -> Path:
     return made
 
 
-def ways(clips: Path, scratch: Path, threads: int, pixel: str) -> Ways:
-    """Return the jobs; `pixel`: which of SETS."""
+def ways(clips: Path, scratch: Path, threads: int, pixel: str) -> list[Job]:
+    """Return the ways to convert the same clips, the pixel alone first; `pixel`: one of SETS."""
     program = [sys.executable, "-m", "adv2e"]
     sets = [word for one in SETS[pixel] for word in ("--set", one)]
     paths = sorted(str(path) for path in clips.glob("*.mp4"))
 
     def job(name: str, folder: str, script: str) -> Job:
         options = {"script": script, "target": str(scratch / folder)}
-        return Job(name=name, action="benchmarks.batching:shell", options=options, threads=threads)
+        return Job(name=name, action="shell", options=options, threads=threads)
 
     def loop(command: Sequence[str], folder: str, after: Sequence[str]) -> str:
         out = shlex.quote(str(scratch / folder)) + '/"$(basename "$f" .mp4)".h5'
@@ -109,29 +91,19 @@ def ways(clips: Path, scratch: Path, threads: int, pixel: str) -> Ways:
         call = f'{shlex.join(command)} "$f" {option}{out} {shlex.join(after)}'
         return f"for f in {shlex.quote(str(clips))}/*.mp4; do {call}; done"
 
-    whole = [*program, "batch", str(clips), str(scratch / "batch"), *sets, "-q"]
-    found = importlib.util.find_spec("eventcv") is not None
-    return Ways(
-        Job(
-            name="the pixel alone",
-            action="benchmarks.batching:pixel",
-            options={"clips": paths, "sets": list(SETS[pixel]), "threads": threads},
-            threads=threads,
-        ),
-        job("`adv2e batch`", "batch", shlex.join(whole)),
-        job(
-            "shell loop of `adv2e convert`",
-            "loop",
-            loop([*program, "convert"], "loop", [*sets, "-q", "--threads", str(threads)]),
-        ),
-        job(
-            "shell loop of EventCV, 10 sub-steps",
-            "peer",
-            loop([sys.executable, "-m", _EVENTCV_FILE], "peer", [json.dumps(PEER[pixel])]),
-        )
-        if found
-        else None,
-    )
+    alone = {"clips": paths, "sets": list(SETS[pixel])}
+    batch = [*program, "batch", str(clips), str(scratch / "batch"), *sets, "-q"]
+    convert = loop([*program, "convert"], "loop", [*sets, "-q", "--threads", str(threads)])
+    found = [
+        Job(name="the pixel alone", action="simulate_clips", options=alone, threads=threads),
+        job("`adv2e batch`", "batch", shlex.join(batch)),
+        job("shell loop of `adv2e convert`", "loop", convert),
+    ]
+    if importlib.util.find_spec("eventcv") is not None:
+        given = json.dumps(peer_arguments(pixel == "all effects", "10"))
+        peer = loop([sys.executable, "-m", "benchmarks.worker"], "peer", [given])
+        found.append(job("shell loop of EventCV, 10 sub-steps", "peer", peer))
+    return found
 
 
 def report(found: Sequence[Measured], count: int) -> str:
@@ -169,12 +141,11 @@ def main(plan: Plan, log: Log, moving: float, pixel: str, output: Path | None) -
     clips = make_clips(plan.folder, count, moving)
     with tempfile.TemporaryDirectory(prefix="adv2e-batches-") as folder:
         made = ways(clips, Path(folder), plan.threads or default_threads(), pixel)
-        first = {**made.pixel.options, "clips": made.pixel.options["clips"][:1]}
-        warm = [replace(made.pixel, options=first)]
-        found = run_rounds(made.jobs(), plan.rounds, log, warm=warm)
+        first = {**made[0].options, "clips": made[0].options["clips"][:1]}
+        found = run_rounds(made, plan.rounds, log, warm=[replace(made[0], options=first)])
     part = f"{pixel.capitalize()}; something moves in {100 * moving:g} % of the rows."
     text = f"{report(found, count)}\n\n{part} {about(found)}"
-    write_report(text, output, {"measured": [one.as_dict() for one in found]})
+    write_report(text, output, {"measured": [asdict(one) for one in found]})
 
 
 if __name__ == "__main__":

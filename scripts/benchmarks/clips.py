@@ -26,7 +26,8 @@ _PERIOD = 1024  # pixels after which the texture repeats
 _SLOPE = 1.25  # of the amplitude spectrum
 _DARKEST, _BRIGHTEST = 6.0, 250.0
 _SPIN = 0.12  # rad/s
-_SPEED = 80.0  # px/s, what `speed` is relative to
+_SPEED = 80.0  # px/s
+_CONTRAST = 0.75  # standard deviation of the logarithm of the texture, before clipping
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,10 +41,6 @@ class Clip:
         Frames a second.
     seed : int
         Of texture and disks.
-    speed : float
-        Of all motion, relative to a pan at 80 px/s.
-    contrast : float
-        Standard deviation of the logarithm of the texture, before clipping.
     moving : float
         Share of the rows, around the middle, in which anything moves; the rest keeps its first
         frame.
@@ -54,8 +51,6 @@ class Clip:
     frames: int
     fps: float = 240.0
     seed: int = 20260
-    speed: float = 1.0
-    contrast: float = 0.75
     moving: float = 1.0
 
     @property
@@ -67,22 +62,21 @@ class Clip:
     def name(self) -> str:
         """A file name that tells every recipe from every other."""
         parts = [f"{self.width}x{self.height}x{self.frames}", f"{self.fps:g}fps"]
-        for field, usual in _USUAL.items():
-            value = getattr(self, field)
-            if value != usual:
-                parts.append(f"{field}{value:g}")
+        for name, usual in (("seed", 20260), ("moving", 1.0)):
+            if getattr(self, name) != usual:
+                parts.append(f"{name}{getattr(self, name):g}")
         return "_".join(parts)
 
     def render(self) -> Iterator[NDArray[np.uint8]]:
         """Yield the frames, uint8 (rows, columns)."""
         rng = np.random.default_rng(self.seed)
-        texture = _texture(rng, self.contrast)
+        texture = _texture(rng)
         disks = _Disks.draw(rng, self)
         rows, columns = np.mgrid[: self.height, : self.width].astype(np.float32)
         u, v = columns - self.width / 2, rows - self.height / 2
         still: NDArray[np.uint8] | None = None
         for time in self.times:
-            image = _panned(texture, u, v, self.speed, float(time))
+            image = _panned(texture, u, v, float(time))
             disks.paint(image, float(time))
             frame = np.clip(np.rint(image), 0, 255).astype(np.uint8)
             if self.moving < 1.0:
@@ -91,10 +85,7 @@ class Clip:
             yield frame
 
 
-_USUAL: dict[str, float] = {"seed": 20260, "speed": 1.0, "contrast": 0.75, "moving": 1.0}
-
-
-def _texture(rng: np.random.Generator, contrast: float) -> NDArray[np.float32]:
+def _texture(rng: np.random.Generator) -> NDArray[np.float32]:
     """Return periodic noise of grey values, (1024, 1024)."""
     across, down = np.fft.rfftfreq(_PERIOD), np.fft.fftfreq(_PERIOD)
     frequency = np.hypot(down[:, None], across[None, :])
@@ -103,16 +94,13 @@ def _texture(rng: np.random.Generator, contrast: float) -> NDArray[np.float32]:
     spectrum = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / frequency**_SLOPE
     noise = np.fft.irfft2(spectrum, s=(_PERIOD, _PERIOD))
     noise /= noise.std()
-    bright = np.exp(contrast * noise - 2.2 * contrast)  # 1 at 2.2 standard deviations
+    bright = np.exp(_CONTRAST * noise - 2.2 * _CONTRAST)  # 1 at 2.2 standard deviations
     grey = _DARKEST + (_BRIGHTEST - _DARKEST) * bright
     return np.clip(grey, _DARKEST, _BRIGHTEST).astype(np.float32)
 
 
-def _panned(
-    texture: NDArray[np.float32], u: Any, v: Any, speed: float, time: float
-) -> NDArray[np.float64]:
-    """Return the texture as seen at `time`: panned on a winding path, turned about the centre."""
-    t = speed * time
+def _panned(texture: NDArray[np.float32], u: Any, v: Any, t: float) -> NDArray[np.float64]:
+    """Return the texture as seen at `t`: panned on a winding path, turned about the centre."""
     angle = _SPIN * t
     right = _SPEED * t + 30 * np.sin(2.1 * t)
     down = 0.6 * _SPEED * np.sin(1.3 * t)
@@ -129,7 +117,6 @@ class _Disks:
     velocity: Array
     radius: Array
     grey: Array
-    speed: float
 
     @classmethod
     def draw(cls, rng: np.random.Generator, clip: Clip) -> _Disks:
@@ -139,13 +126,12 @@ class _Disks:
             velocity=rng.normal(0, 1.2 * _SPEED, (count, 2)),
             radius=rng.uniform(0.02, 0.06, count) * min(clip.height, 400),
             grey=rng.choice([12.0, 40.0, 190.0, 240.0], count),
-            speed=clip.speed,
         )
 
     def paint(self, image: Array, time: float) -> None:
         """Paint the disks, with an edge 1.5 pixels wide, over `image`."""
         height, width = image.shape
-        path = self.centre + self.velocity * (self.speed * time)
+        path = self.centre + self.velocity * time
         for (x, y), radius, grey in zip(
             path % (width + 40, height + 40) - 20, self.radius, self.grey, strict=True
         ):

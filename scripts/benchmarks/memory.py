@@ -16,9 +16,14 @@ and with ``-o FILE.md`` also to that file, with the raw numbers in ``FILE.json``
 
 from __future__ import annotations
 
+import math
+import os
+import re
 import statistics
+import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -31,13 +36,20 @@ import cv2
 from writing import output_option, table, write_report
 
 from benchmarks.clips import Burst, Clip, stored
-from benchmarks.machine import about, machine_line
-from benchmarks.options import of_a_plan
-from benchmarks.processes import Job, JobError, Log, Measured, number, run_rounds
-from benchmarks.settings import Plan
-from benchmarks.watching import Moment, count_in, watched
+from benchmarks.measure import (
+    Job,
+    JobError,
+    Log,
+    Measured,
+    Plan,
+    about,
+    machine_line,
+    number,
+    of_a_plan,
+    run_rounds,
+)  # fmt: skip
+from benchmarks.worker import count_in
 
-ACTION = "benchmarks.watching:convert"
 FORMATS = ("h5", "txt", "zip")
 FACTORS = (1, 10)
 SCENE, BURST = "scene", "burst"
@@ -136,7 +148,7 @@ def job_of(case: Case, plan: Plan, scratch: Path) -> Job:
     if case.clip == BURST:
         arguments += ["--set", SHORT_DEAD_TIME]
     options = {"arguments": arguments}
-    return Job(name=case.name, clip=str(clip), fps=fps, options=options, action=ACTION)
+    return Job(name=case.name, clip=str(clip), fps=fps, options=options, action="convert")
 
 
 def converting(clip: Path, fps: float, output: Path, plan: Plan) -> list[str]:
@@ -198,7 +210,7 @@ def measure_lengths(plan: Plan, scratch: Path, log: Log) -> tuple[str, list[dict
                 *converting(clip, LONG_FPS, scratch / f"{name}.h5", plan),
                 "--overwrite", "--no-progress", "--set", "sampling.L=1",
             ]  # fmt: skip
-            jobs.append(Job(name=name, options={"arguments": arguments}, action=ACTION))
+            jobs.append(Job(name=name, options={"arguments": arguments}, action="convert"))
     found = run_rounds(jobs, plan.rounds, log, warm=jobs[:1])
     peaks = {one.job.name: one.last["peak_mib"] for one in found}
     rows = [
@@ -207,7 +219,7 @@ def measure_lengths(plan: Plan, scratch: Path, log: Log) -> tuple[str, list[dict
     ]
     head = ("most memory [MiB]", *(f"{frames:,} frames" for frames in LENGTHS))
     text = "\n\n".join([f"# Memory by length\n\n{about(found)}", table(head, rows)])
-    return text, [one.as_dict() for one in found]
+    return text, [asdict(one) for one in found]
 
 
 def measure(
@@ -219,7 +231,7 @@ def measure(
     found = run_rounds(jobs, plan.rounds, log, warm=jobs[:1])
     pairs = [(by_name[one.job.name], one) for one in found]
     text = "\n\n".join([f"# Memory\n\n{about(found)}", ABOUT, report(pairs)])
-    return text, [one.as_dict() for one in found]
+    return text, [asdict(one) for one in found]
 
 
 def report(pairs: Sequence[tuple[Case, Measured]]) -> str:
@@ -237,6 +249,75 @@ def report(pairs: Sequence[tuple[Case, Measured]]) -> str:
 
 
 # --- one long clip --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A look at a running conversion.
+
+    Attributes
+    ----------
+    seconds : float
+        Time since its start.
+    frames : int
+        Frames taken.
+    rss_mib : float
+        Memory.
+    cpu_s : float
+        Processor time of all its threads.
+    """
+
+    seconds: float
+    frames: int
+    rss_mib: float
+    cpu_s: float = math.nan
+
+
+def watched(command: Sequence[str]) -> tuple[list[Moment], str]:
+    """Run a conversion that shows its progress; return what was seen of it, and what it printed.
+
+    Linux only: memory is read from /proc.
+
+    Raises
+    ------
+    JobError
+        It failed; the message is the last line that it wrote.
+    """
+    began = time.perf_counter()
+    moments: list[Moment] = []
+    told = ""
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        while text := process.stderr.read1(4096).decode(errors="replace"):
+            told = (told + text)[-4096:]
+            taken = frames_taken(told)
+            if taken is not None and not (moments and moments[-1].frames == taken):
+                seconds = time.perf_counter() - began
+                moments.append(Moment(seconds, taken, *_look(process.pid)))
+        printed = process.stdout.read().decode()
+    if process.returncode:
+        lines = told.strip().splitlines() or [f"exit status {process.returncode}"]
+        raise JobError(lines[-1])
+    return moments, printed
+
+
+def frames_taken(progress: str) -> int | None:
+    """Return the number of frames that a progress bar told last, ``12/34 [``; None: none yet."""
+    found = re.findall(r"(\d+)/\d+ \[", progress)
+    return int(found[-1]) if found else None
+
+
+def _look(pid: int) -> tuple[float, float]:
+    """Return memory [MiB] and processor time [s] of a process; NaN when it has just ended."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    # behind the name, which may hold anything: state, ten others, time as user and as system
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    found = re.search(r"VmRSS:\s+(\d+)", status)
+    if found is None:
+        return math.nan, math.nan
+    ticks = int(fields[11]) + int(fields[12])
+    return int(found[1]) / 1024, ticks / os.sysconf("SC_CLK_TCK")
 
 
 def measure_long(
@@ -262,21 +343,16 @@ def measure_long(
 def long_clip(folder: Path, width: int, height: int, frames: int) -> Path:
     """Make a folder of so many images, which are links to a few, to and fro; return it."""
     folder.mkdir()
-    recipe = Clip(
-        width=width,
-        height=height,
-        frames=min(LONG_CYCLE, frames),
-        fps=LONG_FPS,
-        moving=LONG_MOVING,
-    )
+    cycle = min(LONG_CYCLE, frames)
+    recipe = Clip(width=width, height=height, frames=cycle, fps=LONG_FPS, moving=LONG_MOVING)
     made = []
     for k, frame in enumerate(recipe.render()):
         made.append(folder / f"{k:08d}.png")
         if not cv2.imwrite(str(made[-1]), frame):
             raise OSError(f"{folder}: cannot write pictures there")
-    cycle = made + made[-2:0:-1]
+    to_and_fro = made + made[-2:0:-1]
     for k in range(len(made), frames):
-        (folder / f"{k:08d}.png").hardlink_to(cycle[k % len(cycle)])
+        (folder / f"{k:08d}.png").hardlink_to(to_and_fro[k % len(to_and_fro)])
     return folder
 
 

@@ -1,150 +1,185 @@
 #!/usr/bin/env python
-"""How fast adv2e is, how exact, and how other tools do on the same frames.
+"""How fast adv2e is, and EventCV on the same frames.
 
 Makes its own clips, and runs every measurement in a process of its own, in interleaved rounds::
 
     python scripts/benchmarks/speed.py --quick
-    python scripts/benchmarks/speed.py --peer-python other/bin/python -o out/benchmark.md
+    python scripts/benchmarks/speed.py --end-to-end --peer-python other/bin/python -o benchmark.md
 
 Writes Markdown to standard output and with ``-o FILE.md`` also to that file, with the raw numbers
-in ``FILE.json`` and the figure of accuracy against cost in ``FILE.png``.  ``--peer-python`` names a
-Python in which ``eventcv``, ``evlib`` (with PyTorch) or what v2e needs is installed; what is not
-there is left out, and said so.
+in ``FILE.json``.  ``--peer-python`` names a Python in which ``eventcv`` is installed; where it is
+not, it is left out, and said so.
 """
 
 from __future__ import annotations
 
 import fnmatch
+import shutil
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import click
-from writing import load_pyplot, output_option, write_report
+from writing import output_option, table, write_report
 
-from benchmarks.end_to_end import end_to_end, end_to_end_report
-from benchmarks.figures import draw_frontier
-from benchmarks.frontier import Point, frontier
-from benchmarks.machine import about, machine_line
-from benchmarks.options import of_a_plan
-from benchmarks.processes import Job, JobError, Log, Measured, run_rounds
-from benchmarks.report import frontier_table, speed_tables
-from benchmarks.settings import Peers, Plan
-
-PROBES = {"eventcv": "import eventcv", "evlib": "import evlib, torch"}
-"""What must work in the peers' Python for a tool to take part."""
-
-
-@dataclass
-class Results:
-    """What was measured, part by part."""
-
-    speed: list[Measured] = field(default_factory=list)
-    points: list[Point] = field(default_factory=list)
-    files: list[Measured] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    def measured(self) -> list[Measured]:
-        """Return every measurement."""
-        return [*self.speed, *(point.measured for point in self.points), *self.files]
-
-    def markdown(self) -> str:
-        """Return the whole report."""
-        every = self.measured()
-        parts = ["# Benchmark", about(every), *self.notes]
-        if self.speed:
-            parts += ["## Speed", speed_tables(self.speed)]
-        if self.points:
-            parts += ["## Accuracy against cost", frontier_table(self.points)]
-        if self.files:
-            parts += ["## File to file", end_to_end_report(self.files)]
-        return "\n\n".join(parts)
-
-    def raw(self) -> dict[str, Any]:
-        """Return all numbers, for JSON."""
-        return {
-            "machine": machine_line(),
-            "speed": [one.as_dict() for one in self.speed],
-            "frontier": [{**p.as_dict(), **p.measured.as_dict()} for p in self.points],
-            "files": [one.as_dict() for one in self.files],
-            "notes": self.notes,
-        }
-
-
-@click.command()
-@of_a_plan(rounds=3, quick_rounds=1)
-@click.option("--only", default="*", metavar="GLOB", help="Only settings of such names (speed).")
-@click.option("--speed/--no-speed", default=True, show_default=True)
-@click.option("--frontier/--no-frontier", "accuracy", default=True, show_default=True)
-@click.option("--end-to-end/--no-end-to-end", "files", help="Also MP4 to files.  [default: no]")
-@click.option(
-    "--peer-python",
-    type=click.Path(exists=True, dir_okay=False),
-    help="Python with other tools.  [default: this one]",
+from benchmarks.clips import Clip, as_srgb, encoded, stored
+from benchmarks.measure import (
+    ALL,
+    DEAD_TIME,
+    IDEAL,
+    LEAK,
+    MISMATCH,
+    SHOT,
+    Job,
+    JobError,
+    Log,
+    Measured,
+    Plan,
+    about,
+    machine_line,
+    number,
+    of_a_plan,
+    peer_arguments,
+    run_rounds,
 )
-@click.option(
-    "--v2e",
-    type=click.Path(exists=True, file_okay=False, path_type=Path),
-    help="Folder with the sources of v2e, for the peers' Python.",
+
+SHIPPED_KNEE = "pixel.log_response.linear_below=2.72"
+ALL_WEAK = (*ALL[:-1], "pixel.shot_noise.rate_hz=0.1")
+POLE = "pixel.source_follower.cutoff_hz=1000"
+NOISE = "pixel.photoreceptor_noise.rms=0.03"
+TWO_POLES = (
+    "pixel.dark_current.dn=10",
+    "pixel.low_pass={cutoff_hz: 2200, dark_cutoff_hz: 0.1}",
+    "pixel.source_follower.cutoff_hz=100",
 )
-@output_option
-def main(
-    plan: Plan,
-    log: Log,
-    only: str,
-    speed: bool,
-    accuracy: bool,
-    files: bool,
-    peer_python: str | None,
-    v2e: Path | None,
-    output: Path | None,
-) -> None:
-    """Measure the speed of adv2e and of other tools, and what exactness costs."""
-    if accuracy and output:
-        load_pyplot()  # before the work, so that a missing package costs no time
-    results = Results()
-    peers = find_peers(peer_python or sys.executable, v2e, results.notes)
-    if speed:
-        jobs = chosen_jobs(plan, peers, only)
-        results.speed = run_rounds(jobs, plan.rounds, log, warm=plan.warm())
-    with tempfile.TemporaryDirectory(prefix="adv2e-benchmark-") as scratch:
-        if accuracy:
-            results.points = frontier(plan, peers, Path(scratch), log)
-        if files:
-            results.files = end_to_end(plan, peers, Path(scratch), results.notes, log)
-    results.notes += [f"Failed: {failure}." for failure in log.failures]
-    write_report(results.markdown(), output, results.raw())
-    if output and results.points:
-        draw_frontier(results.points, output.with_suffix(".png"))
+"""What still pixels of a DAVIS346 say; see configs/davis346.yaml."""
+
+OFF_NAME = "exact, noise off"
+"""The setting that others are compared with."""
+
+SMALL, LARGE, AT_REST = "346x260", "1280x720", "346x260, 9/10 at rest"
+CAMERAS = {
+    "240x180": Clip(width=240, height=180, frames=480),
+    SMALL: Clip(width=346, height=260, frames=480),
+    LARGE: Clip(width=1280, height=720, frames=97),
+    AT_REST: Clip(width=346, height=260, frames=1920, moving=0.1),
+}
+"""Clips by name."""
+
+SPEED_ABOUT = (
+    "Frames in memory to sorted events in memory, compiled and warmed up (four frames; then the"
+    " garbage of the imports is collected, and 0.4 s waited for threads that spin, whatever the"
+    " tool), each run in a process of its own,"
+    " rounds interleaved: median (least..most). Mpx-frames: pixels times frames, in"
+    " millions, as the pixel sees them (after interpolation). Time: wall time relative to the first"
+    " row of the table, paired by round. Peak memory is that of the whole process, with the"
+    " interpreter, libraries, clip and all events."
+)
+FILES_ABOUT = (
+    "346x260, 240 frames a second, light coded as sRGB, MP4 (mp4v). Whole processes, from start to"
+    " end, so with imports and compiled code loaded from its cache: median (least..most)."
+)
 
 
-def find_peers(python: str, v2e: Path | None, notes: list[str]) -> Peers:
-    """Return which tools work in the peers' Python; note those that do not."""
-    probes = {
-        **PROBES,
-        "v2e": f"import sys; sys.path.insert(0, {str(v2e)!r}); import v2ecore.emulator",
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """A configuration of adv2e on a clip.
+
+    Attributes
+    ----------
+    clip, name : str
+        One of :data:`CAMERAS`, and what the table calls it.
+    sets : tuple of str
+        What it adds to the ideal pixel.
+    share : float
+        Share of the clip's frames, for slow ones.
+    stride : int
+        Every how many frames are taken.
+    """
+
+    clip: str
+    name: str
+    sets: tuple[str, ...] = ()
+    share: float = 1.0
+    stride: int = 1
+
+
+def settings() -> Iterator[Setting]:
+    """Yield all settings of adv2e."""
+    main = {
+        OFF_NAME: (),
+        "all effects, shot 5 Hz": ALL,
+        "all effects, shot 0.1 Hz": ALL_WEAK,
     }
-    if v2e is None:
-        del probes["v2e"]
-    found = []
-    for name, probe in probes.items():
-        done = subprocess.run([python, "-c", probe], capture_output=True, text=True, check=False)
-        if done.returncode:
-            reason = (done.stderr.strip().splitlines() or ["it does not start"])[-1]
-            notes.append(f"{name} took no part: {reason}.")
-        else:
-            found.append(name)
-    return Peers(python, tuple(found), v2e if "v2e" in found else None)
+    for clip in CAMERAS:
+        for name, sets in main.items():
+            yield Setting(clip=clip, name=name, sets=sets)
+        for name, sets in main.items():
+            # pixels that pass the knee between two frames are solved one by one: few at this one
+            yield Setting(clip=clip, name=f"knee 2.72: {name}", sets=(*sets, SHIPPED_KNEE))
+    alone = {
+        "mismatch 0.03": (MISMATCH,),
+        "leak 0.1 Hz": (LEAK,),
+        "dead time 0.5 ms": (DEAD_TIME,),
+        "shot 5 Hz": (SHOT,),
+        "second pole 300 Hz": ("pixel.source_follower.cutoff_hz=300",),
+        "second pole 1000 Hz": (POLE,),
+        "overshoot 0.1": ("pixel.reset_overshoot.fraction=0.1",),
+        "second pole 1000 Hz, all effects, shot 0.1 Hz": (*ALL_WEAK, POLE),
+    }
+    for name, sets in alone.items():
+        yield Setting(clip=SMALL, name=name, sets=sets)
+    for form in ("first_order_hold", "paper"):
+        sets = (f"pixel.low_pass.update={form}", "sampling.K=10")
+        yield Setting(clip=SMALL, name=f"{form}, K = 10", sets=sets, share=0.5)
+    noisy = {
+        "photoreceptor noise 0.03": (NOISE,),
+        "photoreceptor noise 0.03, second pole 1000 Hz": (NOISE, POLE),
+        "two poles as measured": TWO_POLES,
+        "two poles and noise as measured": (*TWO_POLES, "pixel.photoreceptor_noise.rms=0.055"),
+    }
+    for name, sets in noisy.items():
+        yield Setting(clip=SMALL, name=name, sets=sets)
+        yield Setting(clip=AT_REST, name=name, sets=sets, share=0.25)
+    decoded = ("frames.encoding=srgb", SHIPPED_KNEE, "sampling.L=10")
+    yield Setting(clip=SMALL, name="sRGB decoded, L = 10, noise off", sets=decoded, stride=10)
 
 
-def chosen_jobs(plan: Plan, peers: Peers, only: str) -> list[Job]:
+def _clip(name: str, plan: Plan) -> Clip:
+    """Return the clip of that name, in quick mode a short one."""
+    clip = CAMERAS[name]
+    return replace(clip, frames=25 if clip.width > 400 else 49) if plan.quick else clip
+
+
+def setting_jobs(plan: Plan) -> Iterator[Job]:
+    """Yield the jobs of adv2e, on frames in memory."""
+    for one in settings():
+        clip = _clip(one.clip, plan)
+        frames = max(8, round(one.share * clip.frames / one.stride))
+        name = f"{one.clip}: {one.name}"
+        yield plan.job(name, clip, one.sets, frames=frames, stride=one.stride)
+
+
+def peer_jobs(plan: Plan, python: str) -> Iterator[Job]:
+    """Yield the jobs of EventCV, on frames in memory."""
+    for camera in (SMALL, LARGE):
+        clip = str(as_srgb(stored(_clip(camera, plan), plan.folder)))
+        for steps, effects in (("off", 0), ("10", 0), ("adaptive", 0), ("10", 1)):
+            what = "all effects" if effects else "noise off"
+            options = {"arguments": peer_arguments(bool(effects), steps)}
+            name = f"{camera}: EventCV, sub-steps {steps}, {what}"
+            yield Job(
+                name=name, tool="eventcv", python=python, clip=clip, options=options,
+                threads=plan.threads,
+            )  # fmt: skip
+
+
+def chosen(jobs: Sequence[Job], globs: Sequence[str], option: str) -> list[Job]:
     """Return the jobs whose names fit; those of a clip stay together, its first one first.
 
     Raises
@@ -152,13 +187,184 @@ def chosen_jobs(plan: Plan, peers: Peers, only: str) -> list[Job]:
     JobError
         None does.
     """
-    jobs = [*plan.jobs(), *plan.peer_jobs(peers)]
     clips = {job.name.partition(": ")[0]: None for job in jobs}
     ordered = [job for clip in clips for job in jobs if job.name.startswith(f"{clip}: ")]
-    chosen = [job for job in ordered if fnmatch.fnmatch(job.name, only)]
-    if not chosen:
-        raise JobError(f"--only {only}: no setting has such a name; names are 'clip: setting'")
-    return chosen
+    found = [job for job in ordered if any(fnmatch.fnmatch(job.name, one) for one in globs)]
+    if not found:
+        raise JobError(
+            f"{option} {', '.join(globs)}: no setting has such a name; names are 'clip: setting'"
+        )
+    return found
+
+
+def file_jobs(plan: Plan, peer: str | None, scratch: Path, notes: list[str]) -> list[Job]:
+    """Return whole conversions of a video; what cannot be measured is added to `notes`."""
+    camera = CAMERAS[SMALL]
+    # what both tools take video for: the same light then as of the frames in memory
+    clip = as_srgb(stored(replace(camera, frames=97) if plan.quick else camera, plan.folder))
+    video = str(encoded(clip, camera.fps))
+    quiet = (*(one for one in IDEAL if not one.startswith("sampling.")), "sampling.L=1")
+    cases = {
+        "adv2e to HDF5, noise off, L = 1": (".h5", quiet),
+        "adv2e to text, noise off, L = 1": (".txt", quiet),
+        "adv2e to HDF5, as shipped, L = 1": (".h5", ("sampling.L=1",)),
+        "adv2e to text, as shipped, L = 1": (".txt", ("sampling.L=1",)),
+        "adv2e to HDF5, as shipped (L = 10)": (".h5", ()),
+    }
+    commands = {}
+    for k, (name, (suffix, sets)) in enumerate(cases.items()):
+        target = str(scratch / f"out{k}{suffix}")
+        words = [word for one in sets for word in ("--set", one)]
+        words += ["--threads", str(plan.threads)] if plan.threads else []
+        program = [sys.executable, "-m", "adv2e", "convert", video, "-o", target]
+        commands[name] = [*program, "--overwrite", "-q", *words], target
+    if peer is not None and not (shutil.which("ffmpeg") and shutil.which("ffprobe")):
+        notes.append("EventCV reads files through ffmpeg and ffprobe, which are not on PATH.")
+        peer = None
+    for steps in ("off", "10", "adaptive") if peer else ():
+        target = str(scratch / f"eventcv_{steps}.h5")
+        given = peer_arguments(False, steps)
+        given["threshold"] = given.pop("pos_thres")
+        del given["neg_thres"]
+        words = [w for k, v in given.items() for w in (f"--{k.replace('_', '-')}", f"{v}")]
+        program = [str(peer), "-m", "eventcv", "simulate", video, target, "--quiet"]
+        commands[f"EventCV to HDF5, sub-steps {steps}, noise off"] = [*program, *words], target
+    return [
+        Job(
+            name=name, action="run_command", options={"command": command, "target": target},
+            threads=plan.threads,
+        )
+        for name, (command, target) in commands.items()
+    ]  # fmt: skip
+
+
+# --- tables --------------------------------------------------------------------------------------
+
+
+def seen_frames(one: Measured) -> int:
+    """Return the number of frames after interpolation by the last ``sampling.L``."""
+    factor = 1
+    for given in one.job.options.get("sets", ()):
+        key, _, value = given.partition("=")
+        factor = int(value) if key == "sampling.L" else factor
+    return (int(one.last["frames"]) - 1) * factor + 1
+
+
+def megapixel_frames(one: Measured) -> float:
+    """Return pixels times frames that the pixel sees, in millions."""
+    return float(one.last["pixels"]) * seen_frames(one) / 1e6
+
+
+def speed_tables(measured: Sequence[Measured]) -> str:
+    """Return a table a clip; jobs are named ``clip: what``."""
+    clips: dict[str, list[Measured]] = {}
+    for one in measured:
+        clips.setdefault(one.job.name.partition(": ")[0], []).append(one)
+    head = (
+        "setting", "Mpx-frames/s", "a CPU second", "CPU ns a pixel-frame", "time", "frames",
+        "M events", "Mev/s", "peak MiB",
+    )  # fmt: skip
+    parts = [
+        f"**{clip}**\n\n{table(head, [_speed_row(one, rows[0]) for one in rows])}"
+        for clip, rows in clips.items()
+    ]
+    return "\n\n".join([SPEED_ABOUT, *parts])
+
+
+def _speed_row(one: Measured, first: Measured) -> list[str]:
+    size, events = megapixel_frames(one), one.last["events"] / 1e6
+    return [
+        one.job.name.partition(": ")[2],
+        str(one.wall_s().inverse(size)),
+        number(size / one.cpu_s().median),
+        number(1e3 * one.cpu_s().median / size),
+        str(one.ratio(first).times(megapixel_frames(first) / size)),  # lengths may differ
+        number(seen_frames(one)),
+        number(events),
+        number(events / one.wall_s().median),
+        one.peak_text(),
+    ]
+
+
+def relative_table(measured: Sequence[Measured]) -> str:
+    """Return how long EventCV takes, relative to adv2e with the same effects; empty without it."""
+    named = {one.job.name: one for one in measured}
+    peers = [name.partition(": ")[2] for name in named if "EventCV" in name]
+    rows = []
+    for name in dict.fromkeys(peers):
+        own = "all effects, shot 5 Hz" if "all effects" in name else OFF_NAME
+        pairs = [[named.get(f"{clip}: {one}") for one in (name, own)] for clip in (SMALL, LARGE)]
+        cells = [
+            str(a.ratio(b).times(megapixel_frames(b) / megapixel_frames(a))) if a and b else "-"
+            for a, b in pairs
+        ]
+        if any(cell != "-" for cell in cells):
+            rows.append([name, *cells])
+    return table(("relative time", SMALL, LARGE), rows) if rows else ""
+
+
+def files_table(found: Sequence[Measured]) -> str:
+    """Return the table of whole conversions."""
+    head = ("conversion", "wall s", "CPU s", "time", "MB", "peak MiB")
+    rows = [
+        [
+            one.job.name, str(one.wall_s()), number(one.cpu_s().median), str(one.ratio(found[0])),
+            number(one.last["bytes"] / 1e6), one.peak_text(),
+        ]
+        for one in found
+    ]  # fmt: skip
+    return f"{FILES_ABOUT}\n\n{table(head, rows)}"
+
+
+@click.command()
+@of_a_plan(rounds=3, quick_rounds=1)
+@click.option("--only", default="*", metavar="GLOB", help="Only settings of such names (speed).")
+@click.option("--speed/--no-speed", default=True, show_default=True)
+@click.option("--end-to-end", "files", is_flag=True, help="Also MP4 to files.")
+@click.option(
+    "--peer-python", type=click.Path(exists=True, dir_okay=False), default=sys.executable,
+    help="Python with EventCV.  [default: this one]",
+)  # fmt: skip
+@output_option
+def main(
+    plan: Plan, log: Log, only: str, speed: bool, files: bool, peer_python: str,
+    output: Path | None,
+) -> None:  # fmt: skip
+    """Measure the speed of adv2e and of EventCV."""
+    parts: list[str] = []
+    notes: list[str] = []
+    found: list[Measured] = []
+    peer = peer_of(peer_python, notes)
+    if speed:
+        peers = peer_jobs(plan, peer) if peer else ()
+        jobs = chosen([*setting_jobs(plan), *peers], [only], "--only")
+        found += run_rounds(jobs, plan.rounds, log, warm=plan.warm())
+        parts += ["## Speed", speed_tables(found), relative_table(found)]
+    if files:
+        with tempfile.TemporaryDirectory(prefix="adv2e-benchmark-") as scratch:
+            jobs = file_jobs(plan, peer, Path(scratch), notes)
+            whole = run_rounds(jobs, plan.rounds, log, warm=jobs[:5])
+        found += whole
+        parts += ["## File to file", files_table(whole)]
+    notes += [f"Failed: {failure}." for failure in log.failures]
+    text = "\n\n".join(filter(None, ["# Benchmark", about(found), *notes, *parts]))
+    numbers = {
+        "machine": machine_line(),
+        "notes": notes,
+        "measured": [asdict(one) for one in found],
+    }
+    write_report(text, output, numbers)
+
+
+def peer_of(python: str, notes: list[str]) -> str | None:
+    """Return the Python if EventCV works in it; note it if it does not."""
+    command = [python, "-c", "import eventcv"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if not done.returncode:
+        return python
+    reason = (done.stderr.strip().splitlines() or ["it does not start"])[-1]
+    notes.append(f"EventCV took no part: {reason}.")
+    return None
 
 
 if __name__ == "__main__":

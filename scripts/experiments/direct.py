@@ -26,22 +26,40 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import click
 import numpy as np
-from real.model import SCORE, Bench, Judged
-from real.recording import Real, halves, read
-from real.table import COLUMNS, definitions, markdown, marks, preamble
-from writing import as_written, output_option, write_report
+from writing import as_written, output_option, table, write_report
 
 from adv2e.comparison.distances import MEASURES, distances
-from adv2e.comparison.floor import Floor
+from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows
 from adv2e.diagnosis.fitting.nuisances import TOLERANCE
-from adv2e.events import Events
+from adv2e.events import Events, empty_events
 from adv2e.sources.times.instants import seconds
 from experiments import side_by_side
-from experiments.recordings import Measured, trial_options
-from experiments.simulators.clip import Simulator
-from experiments.simulators.named import natures, simulator_options
-from experiments.simulators.pixel import Pixel
+from experiments.clip import Simulator
+from experiments.recordings import SCORE, Judged, Recording, halves, read, trial_options
+from experiments.simulators import Pixel, natures, simulator_options
+
+HEADER = (
+    "Configurations named after a tool are that tool's parameters in the pixel of adv2e, not the"
+    " tool.\n\n"
+    "Pairs are simulated / measured; events and ON share are those of the intervals compared."
+    " Distances are value (floor), the floor being the distance between seeds of the same"
+    " configuration. †: its seeds give the same events; its floor is between random references to"
+    " start from."
+    " still: events a second of a pixel whose grey value, and that of its neighbours, keeps still."
+    " Half split: distance between two halves of the measured events, split by chance. As far as"
+    " events are a Poisson process, their true rate would come about as near."
+)
+COLUMNS = {
+    "bins_shared_window": "shared window",
+    "bins_own_span": "own window",
+    "bins_z_scored": "z-scored",
+    "relative_5_bins": "5 bins",
+    "relative_5_bins_smoothed": "smoothed 5",
+    "relative_1_bin_smoothed": "smoothed 1",
+    "error": "over time",
+}
+"""Measures and what the table calls them."""
 
 
 @click.command(help=as_written(__doc__))
@@ -63,14 +81,14 @@ def main(
     pages: Path | None,
     output: Path | None,
 ) -> None:
-    parts = [preamble(), natures(simulators)]
+    parts = [HEADER, natures(simulators)]
     numbers: dict[str, Any] = {"simulators": {one.name: one.nature for one in simulators}}
     for path in recordings:
-        measured = Measured(read(path))
-        for problem in measured.real.problems:
+        measured = read(path)
+        for problem in measured.problems:
             _say(f"{path}: {problem}")
         shipped = {one.name: one for one in simulators}
-        trials = [Trial(measured, shipped, measured.real.windows, "thresholds as shipped")]
+        trials = [Trial(measured, shipped, measured.windows, "thresholds as shipped")]
         if matching:
             trials.append(with_matched_totals(measured, simulators))
         for trial in trials:
@@ -78,7 +96,7 @@ def main(
             parts.append(trial.section(rows))
             numbers[trial.heading] = {label: row.numbers() for label, row in rows.items()}
             if pages is not None:
-                name = f"{measured.real.name} {trial.title}".replace(" ", "-")
+                name = f"{measured.name} {trial.title}".replace(" ", "-")
                 side_by_side.write(pages / f"{name}.html", trial.page(rows))
     write_report("\n\n".join([*parts, definitions()]), output, numbers)
 
@@ -112,9 +130,9 @@ class Row:
         return {"distances": self.judged.values, "floors": self.judged.floor, **told}
 
 
-def with_matched_totals(measured: Measured, simulators: Sequence[Simulator]) -> Trial:
+def with_matched_totals(measured: Recording, simulators: Sequence[Simulator]) -> Trial:
     """Return the trial of simulators whose totals match on the first half, on the second."""
-    first, second = halves(measured.real.windows)
+    first, second = halves(measured.windows)
     found = measured.all_matched(simulators, first)
     about = (
         "Thresholds, each in the unit of its simulator, are such that the totals of ON and of OFF"
@@ -132,7 +150,7 @@ class Trial:
 
     Parameters
     ----------
-    measured : Measured
+    real : Recording
     simulators : mapping of str to Simulator
         By label.
     windows : Windows
@@ -141,20 +159,15 @@ class Trial:
 
     def __init__(
         self,
-        measured: Measured,
+        real: Recording,
         simulators: Mapping[str, Simulator],
         windows: Windows,
         title: str,
         about: str = "",
     ) -> None:
-        self.measured, self.windows, self.title, self.about = measured, windows, title, about
+        self.real, self.windows, self.title, self.about = real, windows, title, about
         self.simulators = simulators
-        self.heading = f"{measured.real.name}: {title}"
-
-    @property
-    def real(self) -> Real:
-        """The recording."""
-        return self.measured.real
+        self.heading = f"{real.name}: {title}"
 
     def judged(self, seeds: int) -> dict[str, Row]:
         """Return a row a simulator, by label."""
@@ -168,16 +181,15 @@ class Trial:
 
     def judge(self, simulator: Simulator, seeds: int) -> Row:
         """Return how far a simulator is, means over seeds."""
-        against = Bench(self.real, None).against
-        streams = self.measured.made(simulator, self.windows, range(seeds))
-        found = against(streams, self.windows)
+        streams = self.real.made(simulator, self.windows, range(seeds))
+        found = self.real.against(streams, self.windows)
         repeats = all(np.array_equal(streams[0], one) for one in streams[1:])
         if repeats:
             floor: Floor = dict.fromkeys(found.floor)
             if isinstance(simulator, Pixel):
                 other = simulator.from_random_references()
-                others = self.measured.made(other, self.windows, range(seeds))
-                floor = against(others, self.windows).floor
+                others = self.real.made(other, self.windows, range(seeds))
+                floor = self.real.against(others, self.windows).floor
             found = replace(found, floor=floor)
         return Row(found, streams[0], repeats)
 
@@ -188,13 +200,17 @@ class Trial:
             f"{real.size[0]}x{real.size[1]} pixels, {np.count_nonzero(real.still):,} of them still;"
             f" {len(windows.used)} of {windows.total} frame intervals, {_span(windows)}."
         )
-        if self.measured.silences:
-            silent = sum(stop - start for start, stop in self.measured.silences)
+        if real.silences:
+            silent = sum(stop - start for start, stop in real.silences)
             compared += (
                 f" The camera recorded nothing for {silent / 1e6:.2f} s, which are left out."
             )
         judged = {label: row.judged for label, row in rows.items()}
-        text = markdown(judged, marks(real.events, windows, real.size))
+        marks = {
+            "half split (Poisson)": half_split(real.events, windows, *real.size),
+            "no events at all": distances(real.events, empty_events(), windows, *real.size).values,
+        }
+        text = markdown(judged, marks)
         return f"## {self.heading}\n\n{f'{compared} {self.about}'.strip()}\n\n{text}"
 
     def page(self, rows: Mapping[str, Row]) -> str:
@@ -203,16 +219,49 @@ class Trial:
         wanted = {start for start, _ in used}
         frames = {
             int(t_us): np.clip(light, 0, 255).astype(np.uint8)
-            for t_us, light in zip(real.times_us[real.used], self.measured.clip.frames, strict=True)
+            for t_us, light in zip(real.times_us, real.clip.frames, strict=True)
             if t_us in wanted
         }
-        measured = self.measured.seen(real.events, self.windows)
+        measured = real.seen(real.events, self.windows)
         columns = [side_by_side.Column("measured", "the camera", measured)]
         for (label, row), simulator in zip(rows.items(), self.simulators.values(), strict=True):
             scores = distances(measured, row.events, self.windows, *real.size).per_window[SCORE]
             columns.append(side_by_side.Column(label, simulator.nature, row.events, scores))
         about = f"Numbers with two digits: {COLUMNS[SCORE]}, {MEASURES[SCORE].definition}."
         return side_by_side.page(self.heading, frames, used, real.size, columns, about)
+
+
+def definitions() -> str:
+    """Return what each distance is, as a list."""
+    lines = [f"- {COLUMNS[name]}: {about.definition}." for name, about in MEASURES.items()]
+    return "\n".join(["## Distances", "", *lines])
+
+
+def markdown(judged: Mapping[str, Judged], marks: Mapping[str, Floor]) -> str:
+    """Return the table of simulators, and of the marks to go by."""
+    names = ["simulator", "events", "ON share", *COLUMNS.values(), "still"]
+    rows = [[label, *_cells(one)] for label, one in judged.items()]
+    for label, found in marks.items():
+        rows.append([label, "", "", *(number(found[name]) for name in COLUMNS), ""])
+    return table(names, rows)
+
+
+def _cells(judged: Judged) -> list[str]:
+    made, measured = judged.made, judged.measured
+    ratio = made.events / measured.events if measured.events else None
+    return [
+        f"{made.events:,.0f} / {measured.events:,.0f} ({number(ratio)})",
+        f"{number(made.on_share)} / {number(measured.on_share)}",
+        *(f"{number(judged.values[name])} ({number(judged.floor[name])})" for name in COLUMNS),
+        f"{number(made.still_hz)} / {number(measured.still_hz)}",
+    ]
+
+
+def number(value: float | None) -> str:
+    """Return a number with as many digits as count, or a dash for None."""
+    if value is None:
+        return "-"
+    return f"{value:.2f}" if value < 100 else f"{value:.0f}"
 
 
 if __name__ == "__main__":

@@ -20,8 +20,8 @@ FireNet, FireNet+
 distance
     ``relative_5_bins_smoothed`` of :mod:`adv2e.comparison.distances`; 1 is as far as no events.
 still
-    Events a second of a pixel whose frames keep still (:func:`real.recording.still_pixels`), of
-    those below and above 10 DN.
+    Events a second of a pixel whose frames keep still (``still_pixels`` of
+    :mod:`experiments.recordings`), of those below and above 10 DN.
 ON share, events
     Of all events, and their number over the measured one.
 
@@ -50,13 +50,12 @@ import cv2
 import numpy as np
 from networks.firenet import NETWORKS, Network
 from numpy.typing import NDArray
-from real.recording import read
 from writing import as_written, output_option, table, write_report
 
+from experiments.clip import Simulator
 from experiments.judge import Judge, Row
-from experiments.recordings import Measured, trial_options
-from experiments.simulators.clip import Simulator
-from experiments.simulators.named import natures, simulator_options
+from experiments.recordings import read, trial_options
+from experiments.simulators import natures, simulator_options
 
 REFERENCE = "ideal"
 
@@ -84,11 +83,11 @@ def main(
     networks = [Network(name, weights) for name in NETWORKS]
     parts, numbers = [natures(simulators)], {}
     for path in recordings:
-        judge = Judge(Measured(read(path)), networks)
+        judge = Judge(read(path), networks)
         like = ", ".join(judge.loaded())
         tables = {"thresholds as shipped": {one.name: one for one in simulators}}
         if matching:
-            tables["totals matched before"] = judge.measured.all_matched(simulators, judge.first)
+            tables["totals matched before"] = judge.real.all_matched(simulators, judge.first)
         for title, each in tables.items():
             heading = f"{judge.real.name}: {title}"
             rows = [judge.simulated(one, label, seeds) for label, one in each.items()]

@@ -1,6 +1,11 @@
 """Judges streams of events by what frozen networks see in them, by distance and by still pixels.
 
 What each measure is stands in :mod:`experiments.frozen`.
+
+References
+----------
+.. [1] Z. Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity",
+   IEEE Transactions on Image Processing 13(4), 2004, doi:10.1109/TIP.2003.819861.
 """
 
 from __future__ import annotations
@@ -8,21 +13,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
+import cv2
 import numpy as np
 from networks.firenet import NETWORKS, Images, Network
 from numpy.typing import NDArray
-from real.measures import likeness, similarity
-from real.model import SCORE, Bench
-from real.recording import halves
 
 from adv2e.comparison.distances import distances
 from adv2e.comparison.floor import half_split
 from adv2e.comparison.windows import Windows
 from adv2e.errors import DataError
 from adv2e.events import Events, cut, empty_events, sort_events
-from experiments.recordings import Measured
-from experiments.simulators.clip import Simulator
+from experiments.clip import Simulator
+from experiments.recordings import SCORE, Recording, halves
 
 JITTER_MS = 2.0
 """Standard deviation of the times of the third floor [ms]."""
@@ -48,9 +52,9 @@ class Still:
     duration_s: float
 
     @classmethod
-    def of(cls, measured: Measured, windows: Windows) -> Still:
+    def of(cls, measured: Recording, windows: Windows) -> Still:
         """Return those of a recording; parts without still pixels are left out."""
-        still, dark = measured.real.still, measured.clip.frames.mean(axis=0) < DARK_DN
+        still, dark = measured.still, measured.clip.frames.mean(axis=0) < DARK_DN
         parts = {"dark": still & dark, "bright": still & ~dark}
         silent = sum(
             max(0, min(stop, windows.stop) - max(start, windows.start))
@@ -113,14 +117,14 @@ class Judge:
 
     Parameters
     ----------
-    measured : Measured
+    real : Recording
     networks : sequence of Network
     """
 
-    def __init__(self, measured: Measured, networks: Sequence[Network]) -> None:
-        self.measured, self.real, self.networks = measured, measured.real, networks
+    def __init__(self, real: Recording, networks: Sequence[Network]) -> None:
+        self.real, self.networks = real, networks
         self.first, self.test = halves(self.real.windows)
-        self.still = Still.of(measured, self.test)
+        self.still = Still.of(real, self.test)
         self.events = cut(self.real.events, self.test.start, self.test.stop)
         self.images = self.reconstructed(self.events)
 
@@ -131,8 +135,8 @@ class Judge:
 
     def simulated(self, simulator: Simulator, label: str, seeds: int) -> Row:
         """Return how near a simulator is, means over seeds."""
-        streams = self.measured.made(simulator, self.test, range(seeds))
-        judged = Bench(self.real, None).against(streams, self.test)
+        streams = self.real.made(simulator, self.test, range(seeds))
+        judged = self.real.against(streams, self.test)
         images = [self.reconstructed(one) for one in streams]
         values = _means([self._of_stream(*one) for one in zip(streams, images, strict=True)])
         values["distance"] = judged.values[SCORE]
@@ -180,8 +184,7 @@ class Judge:
             Not more than the frames mirrored: the weights are not read as they are meant.
         """
         stops = [stop for _, stop in self.test.used]
-        times = self.real.times_us[self.real.used]
-        frames = self.measured.clip.frames[np.isin(times, stops)]
+        frames = self.real.clip.frames[np.isin(self.real.times_us, stops)]
         for name, images in self.images.items():
             pairs = list(zip(images, frames, strict=True))
             like = float(np.mean([likeness(*pair) for pair in pairs]))
@@ -217,6 +220,29 @@ class Judge:
 
     def _still_names(self) -> list[str]:
         return [f"{part} {sign}" for part in self.still.parts for sign in ("ON", "OFF")]
+
+
+def similarity(a: NDArray[Any], b: NDArray[Any]) -> float:
+    """Return the mean structural similarity of two images between 0 and 1.
+
+    As [1]_: means, variances and covariance under a Gaussian of 1.5 pixels (11 x 11), constants
+    0.01**2 and 0.03**2.  1 for equal images.
+    """
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+
+    def mean(image: NDArray[Any]) -> NDArray[Any]:
+        return cv2.GaussianBlur(image, (11, 11), 1.5)
+
+    at_a, at_b = mean(a), mean(b)
+    spread = mean(a * a) - at_a**2 + mean(b * b) - at_b**2
+    both = mean(a * b) - at_a * at_b
+    light = (2 * at_a * at_b + 1e-4) / (at_a**2 + at_b**2 + 1e-4)
+    return float(np.mean(light * (2 * both + 9e-4) / (spread + 9e-4)))
+
+
+def likeness(image: NDArray[Any], frame: NDArray[Any]) -> float:
+    """Return the correlation of an image with a frame's light [DN], under a logarithm of DN + 5."""
+    return float(np.corrcoef(np.ravel(image), np.log(np.ravel(frame) + 5.0))[0, 1])
 
 
 def alike(images: Images, others: Images) -> float:

@@ -12,7 +12,7 @@
     E2VID or FireNet (:mod:`networks.e2vid`, :mod:`networks.firenet`) from scratch, on events that
     one simulator makes of GOPRO_Large_all (240 frames a second, by way of
     seungjunnah.github.io/Datasets/gopro.html), or of textures that move
-    (:mod:`experiments.images.textures`).  Light is linear throughout.  Called again, it goes on.
+    (:mod:`experiments.scenes`).  Light is linear throughout.  Called again, it goes on.
 ``test``
     The images that trained networks make of measured events, against the frames.  DATA is a folder
     with the seven DAVIS240C sequences, folders or zips as they are published
@@ -23,7 +23,7 @@
     measured recording: what two cores can do.  ``report`` makes its tables again.
 
 The loss is the mean absolute difference plus 1 less the mean structural similarity (SSIM); with
-``--lpips`` LPIPS alone, as E2VID has it, by weights in a folder (:mod:`networks.lpips`).  E2VID's
+``--lpips`` LPIPS alone, as E2VID has it, by weights in a folder (:mod:`networks.image_loss`).  Its
 second term, consistency over time along known flow, is left out.
 
 Measures are means over all images: MSE and SSIM of images as they are made (clipped to black and
@@ -43,24 +43,36 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 import cv2
 import numpy as np
-from networks.lpips import Lpips
+from networks.image_loss import Lpips
 from writing import as_written, one_line_errors, output_option, table, write_report
 
-from experiments.images.clips import gopro_sequences, kept, moving_textures
-from experiments.images.scores import MEASURES, made_of, measures_of, parts, picture, references
-from experiments.images.sequences import Batches
-from experiments.images.small import EVERY, Small
-from experiments.images.training import BUILD, LOSS, trained, update_of
-from experiments.trainings import options
-from experiments.trainings import seeds as of_seeds
-from experiments.trainings.jobs import (
+from experiments import training
+from experiments.images import (
+    BUILD,
+    EVERY,
+    LOSS,
+    MEASURES,
+    Batches,
+    Small,
+    gopro_sequences,
+    kept,
+    made_of,
+    measures_of,
+    moving_textures,
+    parts,
+    picture,
+    references,
+    trained,
+    update_of,
+)
+from experiments.training import (
+    Training,
     all_done,
     all_measured,
     identity,
     keep_references,
     kept_references,
 )
-from experiments.trainings.training import Training
 
 _lpips_option = click.option(
     "--lpips", "features", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
@@ -100,19 +112,19 @@ def main() -> None:
 @click.option("--textures", "clips", type=click.IntRange(min=1), help="So many clips of textures.")
 @click.option("--network", type=click.Choice(list(BUILD)), default="e2vid", show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@options.counted("--steps", 300_000)
-@options.rate_option(1e-4)
-@options.counted("--batch", 2, "Runs at a time.")
-@options.counted("--length", 40, "Windows of a run.")
-@options.counted("--truncate", 40, "Windows that a gradient spans; a step of Adam each.")
+@training.counted("--steps", 300_000)
+@training.rate_option(1e-4)
+@training.counted("--batch", 2, "Runs at a time.")
+@training.counted("--length", 40, "Windows of a run.")
+@training.counted("--truncate", 40, "Windows that a gradient spans; a step of Adam each.")
 @click.option("--crop", type=_Size(), default="128x128", show_default=True)
 @click.option("--size", type=_Size(), default="240x180", show_default=True, help="Of the sensor.")
-@options.counted("--every", EVERY, "Frames from an image to the next.")
-@options.counted("--frames", 481, "Of a piece of a sequence.")
-@options.counted("--checkpoint", 500, "Steps between checkpoints.")
+@training.counted("--every", EVERY, "Frames from an image to the next.")
+@training.counted("--frames", 481, "Of a piece of a sequence.")
+@training.counted("--checkpoint", 500, "Steps between checkpoints.")
 @click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True)
 @_lpips_option
-@options.simulators_option("adv2e")
+@training.simulators_option("adv2e")
 @one_line_errors()
 def train(
     output: Path, gopro: Path | None, clips: int | None, network: str, seed: int, steps: int,
@@ -123,7 +135,7 @@ def train(
     """Train a network on the events of one simulator in the folder OUTPUT; called again, go on."""
     if (gopro is None) == (clips is None):
         raise click.UsageError("say --gopro FOLDER or --textures N, and not both")
-    simulators = options.anew(names, sets, v2e_sources)
+    simulators = training.anew(names, sets, v2e_sources)
     if len(simulators) != 1:
         raise click.UsageError(f"--simulators {names}: train takes one")
     (simulator,) = simulators
@@ -190,16 +202,16 @@ def _tables(found: dict[str, dict[str, dict[str, float]]]) -> str:
 @click.argument("output", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER")
 @click.argument("recording", type=click.Path(exists=True, path_type=Path))
 @click.option("--network", type=click.Choice(list(BUILD)), default="firenet", show_default=True)
-@options.counted("--seeds", 5)
-@options.counted("--steps", 400)
-@options.rate_option(1e-3)
-@options.counted("--clips", 40, "Of each seed, 0.37 s each.")
-@options.counted("--side", 64, "Of the clips [pixels].")
-@options.counted("--jobs", 1, "Trainings at a time, on one thread each.")
+@training.counted("--seeds", 5)
+@training.counted("--steps", 400)
+@training.rate_option(1e-3)
+@training.counted("--clips", 40, "Of each seed, 0.37 s each.")
+@training.counted("--side", 64, "Of the clips [pixels].")
+@training.counted("--jobs", 1, "Trainings at a time, on one thread each.")
 @_lpips_option
 @_weights_option
-@options.simulators_option(options.SMALL)
-@options.report_option
+@training.simulators_option(training.SMALL)
+@training.report_option
 @one_line_errors()
 def small(
     output: Path, recording: Path, network: str, seeds: int, steps: int, rate: float, clips: int,
@@ -213,7 +225,7 @@ def small(
     trainings = [
         Small(simulator, seed, recording, network, steps, rate, clips, side, features)
         for seed in range(seeds)
-        for simulator in options.anew(names, sets, v2e_sources)
+        for simulator in training.anew(names, sets, v2e_sources)
     ]
     all_done(trainings, output, jobs)
     _report(output, to)
@@ -228,11 +240,11 @@ def _report(folder: Path, output: Path | None) -> None:
         f"{one['network']}, {one['steps']} steps of {seconds:.2f} s on one thread, {one['clips']}"
         f" clips of {one['side']}x{one['side']} pixels a seed; tested on {one['recording']}."
     )
-    text = f"{about}\n\n{of_seeds.report(found, MEASURES, kept)}"
+    text = f"{about}\n\n{training.report(found, MEASURES, kept)}"
     write_report(text, output, {"trainings": found, "beside": kept})
 
 
-main.add_command(options.report_command(_report))
+main.add_command(training.report_command(_report))
 
 if __name__ == "__main__":
     main()

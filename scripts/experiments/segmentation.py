@@ -41,18 +41,27 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 import numpy as np
 from networks.evsegnet import evsegnet
-from real.recording import read
 from writing import as_written, one_line_errors, output_option, table, write_report
 
 from adv2e.errors import DataError
-from experiments.labels.labelled import CLASSES, Folder, from_ess, of_shapes, rendered
-from experiments.labels.scores import MEASURES, confusion, last_and_best, of_one_class, scores_of
-from experiments.labels.small import WINDOWS, Small
-from experiments.labels.training import update_of
-from experiments.trainings import options
-from experiments.trainings import seeds as of_seeds
-from experiments.trainings.jobs import all_done, all_measured, keep_references, kept_references
-from experiments.trainings.training import Training
+from experiments import training
+from experiments.labels import (
+    CLASSES,
+    MEASURES,
+    WINDOWS,
+    Folder,
+    Small,
+    confusion,
+    from_ess,
+    last_and_best,
+    of_one_class,
+    of_shapes,
+    rendered,
+    scores_of,
+    update_of,
+)
+from experiments.recordings import read
+from experiments.training import Training, all_done, all_measured, keep_references, kept_references
 
 TESTED = "dvs-voltmeter"
 POWER = 0.9
@@ -68,14 +77,14 @@ def main() -> None:
 @click.argument("ess", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.argument("output", type=click.Path(file_okay=False, path_type=Path))
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@options.simulators_option("")
+@training.simulators_option("")
 @one_line_errors()
 def prepare(
     ess: Path, output: Path, seed: int, names: str, sets: tuple[str, ...],
     v2e_sources: Path | None,
 ) -> None:  # fmt: skip
     """Write DDD17 as Ev-SegNet has it: measured events, or those of one simulator."""
-    simulators = options.anew(names, sets, v2e_sources)
+    simulators = training.anew(names, sets, v2e_sources)
     if len(simulators) > 1:
         raise click.UsageError(f"--simulators {names}: prepare takes one, or none for measured")
     counts = from_ess(ess, output, simulators[0] if simulators else None, seed)
@@ -90,9 +99,9 @@ def prepare(
     help="Data set whose split test is used.  [default: DATA]",
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@options.counted("--epochs", 500)
-@options.counted("--batch", 8, least=2)
-@options.rate_option(1e-3, "Of Adam, at first; it falls to nothing.")
+@training.counted("--epochs", 500)
+@training.counted("--batch", 8, least=2)
+@training.rate_option(1e-3, "Of Adam, at first; it falls to nothing.")
 @click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True)
 @output_option
 @one_line_errors()
@@ -135,15 +144,15 @@ def train(
     help="shapes_6dof, or another recording of dark shapes on a bright wall.",
 )  # fmt: skip
 @click.option("--test-simulator", "tester", default=TESTED, show_default=True)
-@options.counted("--test-clips", 20, "Of the test on rendered shapes.")
-@options.counted("--seeds", 5)
-@options.counted("--steps", 1600)
-@options.rate_option(1e-3)
-@options.counted("--clips", 40, "Of each seed, 0.4 s each.")
-@options.counted("--side", 64, "Of the clips, a multiple of 8 [pixels].")
-@options.counted("--jobs", 1, "Trainings at a time, on one thread each.")
-@options.simulators_option(options.SMALL)
-@options.report_option
+@training.counted("--test-clips", 20, "Of the test on rendered shapes.")
+@training.counted("--seeds", 5)
+@training.counted("--steps", 1600)
+@training.rate_option(1e-3)
+@training.counted("--clips", 40, "Of each seed, 0.4 s each.")
+@training.counted("--side", 64, "Of the clips, a multiple of 8 [pixels].")
+@training.counted("--jobs", 1, "Trainings at a time, on one thread each.")
+@training.simulators_option(training.SMALL)
+@training.report_option
 @one_line_errors()
 def small(
     output: Path, measured: Path | None, tester: str, test_clips: int, seeds: int, steps: int,
@@ -153,13 +162,13 @@ def small(
     """Train for each simulator and seed in FOLDER, and test; called again, go on."""
     if side % 8:
         raise click.UsageError(f"--side {side}: must be a multiple of 8")
-    simulators = options.anew(names, sets, v2e_sources)
+    simulators = training.anew(names, sets, v2e_sources)
     if measured is None:
         if tester in [one.name for one in simulators]:
             raise click.UsageError(
                 f"--test-simulator {tester}: is one of those that are trained on"
             )
-        (other,) = options.anew(tester, (), v2e_sources)
+        (other,) = training.anew(tester, (), v2e_sources)
         # seeds that no training has
         samples = rendered(range(10**6, 10**6 + test_clips), other, (side, side), WINDOWS)
         about = f"rendered shapes by {other.name} ({other.nature})"
@@ -188,11 +197,11 @@ def _report(folder: Path, output: Path | None) -> None:
         f" {one['tested on']}. The best test of each training is chosen by the test data itself."
     )
     kept = kept_references(folder)
-    text = f"{about}\n\n{of_seeds.report(found, MEASURES, kept)}"
+    text = f"{about}\n\n{training.report(found, MEASURES, kept)}"
     write_report(text, output, {"trainings": found, "beside": kept})
 
 
-main.add_command(options.report_command(_report))
+main.add_command(training.report_command(_report))
 
 if __name__ == "__main__":
     main()

@@ -42,16 +42,16 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 import cv2
 import numpy as np
-from real.recording import read
 from writing import as_written, load_pyplot, one_line_errors, output_option, write_report
 
 from adv2e.events import Events
-from experiments.passages.edges import PAIRS, Edges
-from experiments.passages.report import TRUTH, Part, draw, row_of
-from experiments.passages.sweeps import Sweep, SweepType, exposures_of, report
-from experiments.passages.truth import AS_THE_CIRCUIT, Camera, Dense
-from experiments.simulators.clip import Clip, Simulator
-from experiments.simulators.named import named, simulator_options
+from experiments.clip import Clip, Simulator
+from experiments.edge_tables import TRUTH, Part, draw, row_of
+from experiments.edges import PAIRS, Edges
+from experiments.recordings import read
+from experiments.simulators import named, simulator_options
+from experiments.sweeps import Sweep, SweepType, exposures_of, report
+from experiments.truth import AS_THE_CIRCUIT, Camera, Dense
 
 TOLD = ("paper", "v2e")
 """Configurations that are told the logarithm of the circuit; ``adv2e`` and ``vid2e`` have it."""

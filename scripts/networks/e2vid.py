@@ -7,7 +7,7 @@ batch normalisation, that of the image, too.  Kernels are of 5 pixels, those of 
 residual blocks of 3.  Decoders enlarge bilinearly first, which leaves no pattern of a chessboard.
 
 Events go in as :func:`networks.firenet.grid_of` has them.  This is the net alone: weights come from
-:mod:`experiments.images.training`.  Needs PyTorch, which this project itself never does.
+:mod:`experiments.images`.  Needs PyTorch, which this project itself never does.
 
 References
 ----------

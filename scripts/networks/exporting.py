@@ -15,6 +15,7 @@ import torch
 from numpy.typing import NDArray
 from onnx_ir.passes.common import ClearMetadataAndDocStringPass
 from torch import Tensor, nn
+from torch.nn import functional
 
 from adv2e.errors import OutputError
 from adv2e.files.staging import Staging
@@ -126,3 +127,22 @@ def _frames(channels: int, rows: int, columns: int, speed: int) -> Iterator[NDAr
     blobs = (blobs - blobs.min()) / np.ptp(blobs)
     for part in (blobs[..., :columns], blobs[..., speed:]):
         yield np.ascontiguousarray(part[None])
+
+
+def sample(frame: Tensor, flow: Tensor, ends: tuple[int, int], outside: str) -> Tensor:
+    """Return what a frame holds at each pixel's own place plus the flow, interpolated linearly.
+
+    Parameters
+    ----------
+    frame, flow : Tensor
+        (1, channels, rows, columns) and (1, 2, rows, columns); the flow is columns, then rows.
+    ends : tuple of int
+        The row and column that mean the last ones: what is sampled is stretched about the first.
+    outside : str
+        What surrounds the frame: ``zeros``, or its ``border``.
+    """
+    rows, columns = frame.shape[2:]
+    x = torch.arange(columns) + flow[:, 0]
+    y = torch.arange(rows)[:, None] + flow[:, 1]
+    places = torch.stack((x * (2 / ends[1]) - 1, y * (2 / ends[0]) - 1), 3)
+    return functional.grid_sample(frame, places, padding_mode=outside, align_corners=True)

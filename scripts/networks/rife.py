@@ -24,8 +24,7 @@ import torch
 from torch import Tensor, nn
 
 from adv2e.errors import DataError
-from networks.exporting import Network
-from networks.sampling import sample
+from networks.exporting import Network, sample
 
 MULTIPLE = 64
 WEIGHTS = "flownet.pkl"

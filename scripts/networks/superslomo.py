@@ -34,8 +34,7 @@ from torch.nn import functional
 
 from adv2e.errors import DataError
 from networks import damage_told
-from networks.exporting import Network
-from networks.sampling import sample
+from networks.exporting import Network, sample
 
 MULTIPLE = 32
 """Of rows and columns: they are halved five times."""

@@ -40,7 +40,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 from writing import load_pyplot, one_line_errors, write_report
 
-from studies.verdicts.cases import (
+from studies.cases import (
     KINDS,
     LIBRARY,
     MIDDLE,
@@ -52,12 +52,33 @@ from studies.verdicts.cases import (
     SIZES,
     Case,
     Plan,
+    catalogue,
     shard,
 )
-from studies.verdicts.options import Names
-from studies.verdicts.results import ENDING, append, finished, identity, latest, read
+from studies.results import ENDING, append, finished, identity, latest, read
 
 ALL = ",".join
+
+
+class Names(click.ParamType):
+    """Names out of a list, with commas between them."""
+
+    name = "names"
+
+    def __init__(self, known: tuple[str, ...]) -> None:
+        self.known = known
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """Return the names, in the order of the list."""
+        if isinstance(value, tuple):
+            return value
+        names = str(value).split(",")
+        for name in names:
+            if name not in self.known:
+                self.fail(f"{name!r}: none of {', '.join(self.known)}", param, ctx)
+        return tuple(name for name in self.known if name in names)
 
 
 class Shard(click.ParamType):
@@ -119,7 +140,7 @@ def _setup(
     interpolation: str,
     known_light: bool,
 ) -> Any:
-    from studies.verdicts.run import Setup  # noqa: PLC0415 - it loads the simulator
+    from studies.run import Setup  # noqa: PLC0415 - it loads the simulator
 
     return Setup(*size, seconds, fps, int(bits), interpolation, known_light)
 
@@ -158,8 +179,7 @@ def run(
     """Record and diagnose the cases that FOLDER does not have yet."""
     from adv2e.diagnosis.fitting.library import OF_FRAMES  # noqa: PLC0415
     from adv2e.diagnosis.fitting.library import names as library_names  # noqa: PLC0415
-    from studies.verdicts import run as running  # noqa: PLC0415 - it loads the simulator
-    from studies.verdicts.camera import catalogue  # noqa: PLC0415
+    from studies import run as running  # noqa: PLC0415 - it loads the simulator
 
     say = partial(click.echo, err=True)
     setup = _setup(**recording)
@@ -208,8 +228,6 @@ def record(
     Beside FILE.zip come FILE.declared.yaml, what a diagnosis may know, and FILE.truth.yaml; with
     --known-light also FILE.stimulus.csv, for 'adv2e diagnose --light'.
     """
-    from studies.verdicts.camera import catalogue  # noqa: PLC0415 - it loads the camera
-
     if path.suffix != ".zip":
         raise click.BadParameter(f"{path}: must end with .zip", param_hint="FILE.zip")
     for one in (path, path.with_suffix(".declared.yaml"), path.with_suffix(".truth.yaml")):
@@ -245,8 +263,8 @@ def record(
 @one_line_errors()
 def report(folder: Path, output: Path, commit: str | None) -> None:
     """Write tables of the cases in FOLDER to FILE.md, and a figure beside it."""
-    from studies.verdicts.figure import draw  # noqa: PLC0415
-    from studies.verdicts.tables import report as tables  # noqa: PLC0415
+    from studies.tables import draw  # noqa: PLC0415 - it loads the simulator
+    from studies.tables import report as tables  # noqa: PLC0415
 
     lines = latest(read(folder))
     if not lines:

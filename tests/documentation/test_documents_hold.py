@@ -32,6 +32,8 @@ def test_links_lead_to_files_and_headings(name):
 @each
 def test_files_that_are_named_exist(name):
     text = DOCUMENTS[name].path.read_text("utf-8")
+    # a script that made a table and is gone stands with the commit that has it
+    text = re.sub(r"`scripts/[\w/]+\.py`\s+at\s+commit\s+[0-9a-f]{7,}", "", text)
     paths = re.findall(r"(?<![\w/.])((?:scripts|tests|configs|adv2e)/[\w/.]*\w)", text)
     for path in paths:
         assert (ROOT / path).exists(), path

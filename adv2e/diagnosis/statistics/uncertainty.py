@@ -18,9 +18,9 @@ much as every second; where they do not, the two changes are about as large, as 
 r of the two tells what to expect, :math:`f = (1.2 / r)^{1.8}`, from 0.2 to 1.  Frames that are
 moved along their optical flow are wrong where that is, whatever the time between them: e hardly
 goes with d, nor f with r, and f = 0.7, as where frames are too few to tell r.
-``scripts/studies/interpolation_error.py`` measures e, and what is left of it beside its doubt, on
-scenes seen at 2000 frames a second of which a 4th to 64th is taken; numbers here were chosen on
-others like them.
+``scripts/studies/interpolation_error.py`` as of commit b916649 measured e, and what is left of it
+beside its doubt, on scenes seen at 2000 frames a second of which a 4th to 64th is taken; numbers
+here were chosen on others like them.
 
 **Between levels**, d is what rounding to every third level changes.  It has hardly the direction of
 e, but is two to five times as large (of four scenes of 60 to 250 frames a second in 8 bits and 16:

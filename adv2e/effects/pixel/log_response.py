@@ -35,7 +35,7 @@ class LogResponse(Section):
         unit="DN",
         meaning="linear below this value, logarithmic above; 0: logarithm everywhere",
         at_least=0,
-        source="e: no kink at the knee; least distance in scripts/studies/knee.py",
+        source="e: no kink at the knee; least distance, see adv2e/kernel/README.md",
     )
     floor: float = parameter(
         0.1,

@@ -1,4 +1,4 @@
-"""The clips, the cases and the tables of scripts/benchmarks/watching.py."""
+"""The clips, the cases and the tables of scripts/benchmarks/memory.py."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from benchmarks import clips, memory, processes, watching
+from benchmarks import clips, measure, memory, worker
 
 
 def test_cases_have_names_of_their_own_and_cover_everything():
@@ -29,16 +29,16 @@ def test_a_conversion_tells_its_peak_and_its_events(tmp_path):
     burst = clips.Burst(width=40, height=30, frames=4, fps=30.0, swing=1.2)
     clip = clips.stored(burst, tmp_path)
     arguments = ["convert", str(clip), "--fps", "30", "-o", str(tmp_path / "a.txt")]
-    report = watching.convert({"options": {"arguments": arguments}})
+    report = worker.convert({"options": {"arguments": arguments}})
     assert report["events"] == len((tmp_path / "a.txt").read_text().splitlines())
     assert report["peak_mib"] is None or report["peak_mib"] > 50
     with pytest.raises(RuntimeError, match="exit status 1"):  # it exists already
-        watching.convert({"options": {"arguments": arguments}})
+        worker.convert({"options": {"arguments": arguments}})
 
 
 def test_progress_is_read_from_the_bar():
-    assert watching.frames_taken("compiling\n") is None
-    assert watching.frames_taken(" 1%| 12/900 [00:01\r 2%| 25/900 [00:02<01:10, 12unit/s]") == 25
+    assert memory.frames_taken("compiling\n") is None
+    assert memory.frames_taken(" 1%| 12/900 [00:01\r 2%| 25/900 [00:02<01:10, 12unit/s]") == 25
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -49,18 +49,18 @@ def test_a_run_is_watched_and_its_failure_told():
         "    print(f'{k}/5 [', file=sys.stderr, flush=True); time.sleep(0.05)\n"
         "print('a: 1,234 events (50 % ON)')\n"
     )
-    moments, printed = watching.watched([sys.executable, "-c", script])
+    moments, printed = memory.watched([sys.executable, "-c", script])
     assert [moment.frames for moment in moments][-1] == 4
     assert all(moment.rss_mib > 1 for moment in moments)
     assert 0 <= moments[0].cpu_s <= moments[-1].cpu_s < 10
-    assert watching.count_in(printed) == 1234
-    with pytest.raises(processes.JobError, match="no such thing"):
-        watching.watched([sys.executable, "-c", "raise SystemExit('no such thing')"])
+    assert worker.count_in(printed) == 1234
+    with pytest.raises(measure.JobError, match="no such thing"):
+        memory.watched([sys.executable, "-c", "raise SystemExit('no such thing')"])
 
 
 def test_the_long_table_tells_each_tenth():
     moments = [
-        watching.Moment(k * 0.01 * (1 + (k > 900)), k, 100 + k / 100, k * 0.005)
+        memory.Moment(k * 0.01 * (1 + (k > 900)), k, 100 + k / 100, k * 0.005)
         for k in range(1, 1001)
     ]
     rows = memory.long_table(moments, 1000).splitlines()[2:]
@@ -68,7 +68,7 @@ def test_the_long_table_tells_each_tenth():
     assert rows[0].startswith("| 1 | 10.0 | 5.00 ")
     assert rows[9].startswith("| 10 | 20.0 ")
     assert rows[9].endswith("| 110 |")
-    with pytest.raises(processes.JobError, match="tenth 1 "):
+    with pytest.raises(measure.JobError, match="tenth 1 "):
         memory.long_table(moments[200:], 1000)
 
 

@@ -11,10 +11,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from experiments import direct
-from experiments.recordings import Measured
-from experiments.simulators.by_file import ByFile
-from experiments.simulators.pixel import Pixel
-from real.recording import read
+from experiments.recordings import read
+from experiments.simulators import ByFile, Pixel
 from written_recordings import write_recording
 
 from adv2e import load_config, simulate, write_events
@@ -45,7 +43,7 @@ def recording(tmp_path):
 
 @pytest.fixture
 def measured(recording):
-    return Measured(read(str(recording)))
+    return read(str(recording))
 
 
 def tables(text):
@@ -69,7 +67,7 @@ def run(*arguments):
 
 def trial(measured, *simulators):
     return direct.Trial(
-        measured, {one.name: one for one in simulators}, measured.real.windows, "as shipped"
+        measured, {one.name: one for one in simulators}, measured.windows, "as shipped"
     )
 
 
@@ -106,7 +104,7 @@ def test_identical_events_are_at_distance_zero(measured):
     assert row.repeats
     assert set(row.judged.values.values()) == {0.0}
     assert min(row.judged.floor.values()) > 0
-    events, windows = measured.real.events, measured.real.windows
+    events, windows = measured.events, measured.windows
     inside = (events["t"] >= 20_000) & (events["t"] < windows.stop)
     assert row.judged.made.events == inside.sum() > 100
 
@@ -115,7 +113,7 @@ def test_the_floor_is_the_distance_between_seeds_relative_to_the_measured_events
     simulator = Pixel("adv2e", "", load_config(["adv2e"]), 1)
     row = trial(measured, simulator).judge(simulator, 2)
     a, b = (events_of(load_config("adv2e", LIGHT, seed)) for seed in (0, 1))
-    windows, events = measured.real.windows, measured.real.events
+    windows, events = measured.windows, measured.events
     assert row.judged.floor == distances(a, b, windows, WIDTH, HEIGHT, whole=events).values
 
 
@@ -168,12 +166,12 @@ def test_what_was_not_recorded_is_not_compared(tmp_path):
     events = events[(events["t"] < 45_000) | (events["t"] >= 70_000)]
     events = np.concatenate([events] * 40)  # so that a gap cannot be by chance
     events = events[np.argsort(events["t"], kind="stable")]
-    measured = Measured(read(str(write_recording(tmp_path / "gap", TIMES, moving_waves(), events))))
+    measured = read(str(write_recording(tmp_path / "gap", TIMES, moving_waves(), events)))
     ((start, stop),) = measured.silences
     assert 44_000 < start < 45_000
     assert 70_000 <= stop < 71_000
-    (made,) = measured.made(Pixel("same", "", TRUTH, 1), measured.real.windows, [0])
-    assert len(made) == len(np.unique(measured.seen(measured.real.events, measured.real.windows)))
+    (made,) = measured.made(Pixel("same", "", TRUTH, 1), measured.windows, [0])
+    assert len(made) == len(np.unique(measured.seen(measured.events, measured.windows)))
 
 
 def test_frames_by_a_curve_are_brought_to_light(tmp_path, measured):
@@ -224,5 +222,5 @@ def test_a_folder_without_events_fails_with_one_line_and_leaves_no_file(tmp_path
 def test_events_of_a_simulator_by_file_are_cut_to_the_windows(measured, tmp_path):
     made = tmp_path / "made.h5"
     write_events(made, make_events([1, 50_000, 119_000], [1, 2, 3], [1, 2, 3], [1, 0, 1]), (16, 12))
-    (events,) = measured.made(ByFile("one", made), measured.real.windows, [0])
+    (events,) = measured.made(ByFile("one", made), measured.windows, [0])
     assert events["t"].tolist() == [50_000]

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from experiments import frozen, judge
-from experiments.recordings import Measured
-from experiments.simulators.pixel import Pixel
+from experiments.judge import likeness, similarity
+from experiments.recordings import read
+from experiments.simulators import Pixel
 from networks.firenet import NETWORKS, Network, firenet
-from real.measures import likeness, similarity
-from real.recording import read
 from written_recordings import write_recording
 
 from adv2e import simulate
@@ -47,7 +46,7 @@ CAMERA = load_config(
 @pytest.fixture
 def recording(tmp_path):
     frames = moving_edge_beside_a_wall()
-    return Measured(read(str(write_recording(tmp_path / "edge", TIMES, frames, events_of(CAMERA)))))
+    return read(str(write_recording(tmp_path / "edge", TIMES, frames, events_of(CAMERA))))
 
 
 class Counts:

@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass
 
 import pytest
-from experiments.trainings import jobs, seeds
-from experiments.trainings.options import anew
+from experiments import training
+from experiments.training import anew
 
 from adv2e.errors import DataError
 
@@ -34,24 +34,26 @@ class Noted:
 
 def test_what_was_done_is_not_done_again(tmp_path):
     trainings = [Noted(k) for k in range(3)]
-    jobs.all_done(trainings[:2], tmp_path, 1)
-    jobs.all_done(trainings, tmp_path, 1)
+    training.all_done(trainings[:2], tmp_path, 1)
+    training.all_done(trainings, tmp_path, 1)
     assert [(tmp_path / f"a-seed{k}" / "count").read_text() for k in range(3)] == ["x"] * 3
-    found = jobs.all_measured(tmp_path)
-    assert seeds.values_of(found, "MSE") == {"a": [0.0, 0.1, 0.2]}
+    found = training.all_measured(tmp_path)
+    assert training.values_of(found, "MSE") == {"a": [0.0, 0.1, 0.2]}
 
 
 def test_other_settings_are_done_anew_and_not_mixed(tmp_path):
-    jobs.all_done([Noted(0), Noted(1)], tmp_path, 1)
-    jobs.all_done([Noted(1, steps=4)], tmp_path, 1)
-    assert json.loads((tmp_path / "a-seed1" / jobs.MEASURED).read_text())["settings"]["steps"] == 4
+    training.all_done([Noted(0), Noted(1)], tmp_path, 1)
+    training.all_done([Noted(1, steps=4)], tmp_path, 1)
+    assert (
+        json.loads((tmp_path / "a-seed1" / training.MEASURED).read_text())["settings"]["steps"] == 4
+    )
     with pytest.raises(DataError, match="trainings with steps"):
-        jobs.all_measured(tmp_path)
+        training.all_measured(tmp_path)
 
 
 def test_a_simulator_is_known_by_all_it_is():
     plain, again, set_other = (
-        jobs.identity(anew("ideal", sets, None)[0])
+        training.identity(anew("ideal", sets, None)[0])
         for sets in ((), (), ("pixel.thresholds.on=0.3",))
     )
     assert plain == again
@@ -61,4 +63,4 @@ def test_a_simulator_is_known_by_all_it_is():
 
 def test_an_empty_folder_is_one_line(tmp_path):
     with pytest.raises(DataError, match="small makes them"):
-        jobs.all_measured(tmp_path)
+        training.all_measured(tmp_path)

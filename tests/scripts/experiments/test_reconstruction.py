@@ -20,12 +20,11 @@ torch = pytest.importorskip("torch", reason="PyTorch (extra experiments) is too 
 pytest.importorskip("skimage", reason="textures are of scikit-image (extra experiments)")
 pytest.importorskip("matplotlib", reason="curves are drawn by Matplotlib (extra experiments)")
 
-from experiments import reconstruction  # noqa: E402
-from experiments.images import scores, textures, training  # noqa: E402
-from experiments.images.clips import gopro_folders  # noqa: E402
-from experiments.images.sequences import Batches, Pair  # noqa: E402
-from experiments.simulators.clip import Clip  # noqa: E402
-from experiments.simulators.named import named  # noqa: E402
+from experiments import images, reconstruction  # noqa: E402
+from experiments.clip import Clip  # noqa: E402
+from experiments.images import Batches, Pair, gopro_folders  # noqa: E402
+from experiments.scenes import texture_clip  # noqa: E402
+from experiments.simulators import named  # noqa: E402
 from networks.firenet import firenet  # noqa: E402
 
 SIZE = WIDTH, HEIGHT = 24, 16
@@ -42,7 +41,7 @@ def call(*words):
 
 
 def test_a_texture_is_the_same_light_at_any_rate():
-    slow, fast = (textures.moving(5, count, SIZE, hz) for count, hz in ((4, 120), (7, 240)))
+    slow, fast = (texture_clip(5, count, SIZE, hz) for count, hz in ((4, 120), (7, 240)))
     np.testing.assert_allclose(slow.frames, fast.frames[::2], atol=1e-3)
     assert slow.times_ns.tolist() == fast.times_ns[::2].tolist()
     assert np.abs(np.diff(fast.frames, axis=0)).mean() > 0.1
@@ -50,14 +49,14 @@ def test_a_texture_is_the_same_light_at_any_rate():
 
 
 def test_textures_differ_by_seed_alone():
-    first, again, other = (textures.moving(seed, 2, SIZE).frames for seed in (1, 1, 2))
+    first, again, other = (texture_clip(seed, 2, SIZE).frames for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
 
 
 def pair_of(seed, frames=33, size=SIZE):
     (simulator,) = named(["ideal"], threads=1)
-    return Pair.simulated(textures.moving(seed, frames, size), simulator, 0, 8)
+    return Pair.simulated(texture_clip(seed, frames, size), simulator, 0, 8)
 
 
 def test_a_grid_of_a_part_is_that_of_a_loop_over_events():
@@ -113,7 +112,7 @@ def test_too_short_a_sequence_is_one_line():
 def test_firenet_learns(tmp_path):
     batches = Batches([pair_of(7, 33, (16, 16))], 1, 4, (16, 16))
     net, rng = firenet(), np.random.default_rng(0)
-    step = training.update_of(batches, 4, "cpu")
+    step = images.update_of(batches, 4, "cpu")
     optimiser = torch.optim.Adam(net.parameters(), lr=3e-3)
     losses = [step(net, optimiser, rng) for _ in range(60)]
     assert np.mean(losses[-10:]) < 0.75 * np.mean(losses[:5])
@@ -132,20 +131,20 @@ def test_a_gradient_spans_as_many_windows_as_it_is_told():
     for truncate, steps in ((4, 1), (3, 2), (1, 4)):
         net = firenet()
         optimiser = Counted(net.parameters(), lr=1e-3)
-        training.update_of(batches, truncate, "cpu")(net, optimiser, np.random.default_rng(0))
+        images.update_of(batches, truncate, "cpu")(net, optimiser, np.random.default_rng(0))
         assert optimiser.steps == steps
 
 
 def test_a_state_that_is_detached_has_its_values():
     held = torch.ones(2, requires_grad=True)
-    inner = training.detached([(held * 2, held), held * 3])
+    inner = images.detached([(held * 2, held), held * 3])
     assert inner[0][0].tolist() == [2, 2]
     assert not any(one.requires_grad for one in (inner[0][0], inner[0][1], inner[1]))
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    frames = np.rint(textures.moving(11, 7, SIZE, 20).frames).astype(np.uint8)
+    frames = np.rint(texture_clip(11, 7, SIZE, 20).frames).astype(np.uint8)
     times = 1.2 + np.arange(7) / 20
     events = np.concatenate(list(simulate(frames, times, CONFIG, threads=1)))
     place = tmp_path_factory.mktemp("data") / "slider_depth"
@@ -154,32 +153,32 @@ def recording(tmp_path_factory):
 
 def test_measures_are_those_of_their_definitions():
     frames = np.random.default_rng(0).random((2, 20, 30)).astype(np.float32)
-    same = scores.measures_of(frames, frames, None)
+    same = images.measures_of(frames, frames, None)
     assert same["MSE"] == same["equalised MSE"] == 0
     assert same["SSIM"] == same["equalised SSIM"] == pytest.approx(1)
-    darker = scores.measures_of(0.5 * frames, frames, None)
+    darker = images.measures_of(0.5 * frames, frames, None)
     assert darker["MSE"] == pytest.approx(np.mean((0.5 * frames) ** 2), rel=1e-6)
     assert darker["equalised MSE"] < 0.001
 
 
 def test_sequences_of_davis240c_are_cut(recording):
-    (whole,) = scores.parts(recording)
+    (whole,) = images.parts(recording)
     assert len(whole.spans) == 4
     assert whole.frames.shape == (4, HEIGHT, WIDTH)
-    (cut_one,) = scores.parts(recording.parent)
+    (cut_one,) = images.parts(recording.parent)
     assert (cut_one.name, len(cut_one.spans)) == ("slider_depth", 4)
-    assert scores.CUTS["slider_depth"] == (1.0, 2.5)
+    assert images.CUTS["slider_depth"] == (1.0, 2.5)
     # events begin after the first frame, so that it begins no interval
     first = cv2.imread(str(recording / "images" / "frame_00000002.png"), cv2.IMREAD_GRAYSCALE)
     np.testing.assert_allclose(whole.frames[0], first / 255, atol=1e-6)
 
 
 def test_a_sequence_without_its_cut_is_one_line(tmp_path):
-    frames = np.rint(textures.moving(11, 5, SIZE, 20).frames).astype(np.uint8)
+    frames = np.rint(texture_clip(11, 5, SIZE, 20).frames).astype(np.uint8)
     events = np.concatenate(list(simulate(frames, 20, CONFIG, threads=1)))
     write_recording(tmp_path / "boxes_6dof", np.arange(5) / 20, frames, events)
     with pytest.raises(DataError, match="no frame interval with events within"):
-        list(scores.parts(tmp_path))
+        list(images.parts(tmp_path))
 
 
 TINY = ("--frames", 25, "--length", 2, "--batch", 1, "--size", "24x16", "--crop", "16x16")
@@ -201,7 +200,7 @@ def test_a_network_is_trained_and_tested(tmp_path, recording):
     found = json.loads(out.with_suffix(".json").read_text())["slider_depth"]
     assert set(found) == {str(run), "one grey"}
     assert found["one grey"]["MSE"] == pytest.approx(
-        np.mean([frame.var() for frame in next(scores.parts(recording)).frames]), rel=1e-3
+        np.mean([frame.var() for frame in next(images.parts(recording)).frames]), rel=1e-3
     )
     assert cv2.imread(str(tmp_path / "pictures" / "slider_depth.png")).shape == (16, 48, 3)
 
@@ -209,7 +208,7 @@ def test_a_network_is_trained_and_tested(tmp_path, recording):
 def test_sequences_of_gopro_are_found_and_cut_in_pieces(tmp_path):
     folder = tmp_path / "GOPRO_Large_all" / "train" / "GOPR0001_11_00"
     folder.mkdir(parents=True)
-    frames = textures.moving(4, 52, (48, 32)).frames
+    frames = texture_clip(4, 52, (48, 32)).frames
     for k, frame in enumerate(frames):
         coded = np.repeat(np.rint(frame).astype(np.uint8)[..., None], 3, 2)
         cv2.imwrite(str(folder / f"{k + 1:06d}.png"), coded)

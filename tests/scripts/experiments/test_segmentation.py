@@ -20,12 +20,12 @@ torch = pytest.importorskip("torch", reason="PyTorch (extra experiments) is too 
 pytest.importorskip("skimage", reason="scipy and scikit-image are of the extra experiments")
 pytest.importorskip("matplotlib", reason="curves are drawn by Matplotlib (extra experiments)")
 
+from experiments import labels as labelled  # noqa: E402
 from experiments import segmentation  # noqa: E402
-from experiments.labels import labelled, shapes, training  # noqa: E402
-from experiments.labels import scores as label_scores  # noqa: E402
-from experiments.simulators.named import named  # noqa: E402
+from experiments.recordings import read  # noqa: E402
+from experiments.scenes import shape_clip  # noqa: E402
+from experiments.simulators import named  # noqa: E402
 from networks.unet import unet  # noqa: E402
-from real.recording import read  # noqa: E402
 
 SIZE = 32, 24
 
@@ -40,8 +40,8 @@ def simulator():
 
 
 def test_a_shape_is_what_is_dark_at_any_rate():
-    clip, labels = shapes.moving(2, 5, SIZE, 120)
-    fast, finer = shapes.moving(2, 9, SIZE, 240)
+    clip, labels = shape_clip(2, 5, SIZE, 120)
+    fast, finer = shape_clip(2, 9, SIZE, 240)
     np.testing.assert_allclose(clip.frames, fast.frames[::2], atol=1e-3)
     assert np.array_equal(labels, finer[::2])
     assert 0.02 < labels.mean() < 0.98
@@ -59,7 +59,7 @@ def test_channels_are_of_the_last_50_ms():
 
 def test_rendered_pictures_belong_to_their_labels(simulator):
     samples = labelled.rendered([2], simulator, SIZE, 3)
-    clip, labels = shapes.moving(2, 37, SIZE)
+    clip, labels = shape_clip(2, 37, SIZE)
     events = simulator.events(clip, 2)
     assert len(samples) == 3
     for number, (picture, label) in enumerate(samples, 1):
@@ -77,7 +77,7 @@ def test_a_picture_and_its_labels_are_changed_alike(changed):
     picture = np.repeat(label[None].astype(np.float32), 6, 0)
     kinds = set()
     for _ in range(20):
-        made, said = training.augmented((picture, label), rng, changed)
+        made, said = labelled.augmented((picture, label), rng, changed)
         known = said != labelled.IGNORED
         assert np.array_equal(made[3][known], said[known])
         assert not made[:, ~known].any()
@@ -92,7 +92,7 @@ def test_scores_are_those_of_a_loop_over_pixels():
     labels[labels == 3] = labelled.IGNORED
     pictures = rng.normal(size=(5, 4, 8, 8)).astype(np.float32)
     samples = list(zip(pictures, labels, strict=True))
-    counts = label_scores.confusion(lambda x: x, samples, 4, "cpu")
+    counts = labelled.confusion(lambda x: x, samples, 4, "cpu")
     wanted = np.zeros((4, 4), int)
     for picture, label in samples:
         for y in range(8):
@@ -100,13 +100,13 @@ def test_scores_are_those_of_a_loop_over_pixels():
                 if label[y, x] != labelled.IGNORED:
                     wanted[label[y, x], np.argmax(picture[:, y, x])] += 1
     assert np.array_equal(counts, wanted)
-    scores = label_scores.scores_of(counts)
+    scores = labelled.scores_of(counts)
     shares = [
         wanted[k, k] / (wanted[k].sum() + wanted[:, k].sum() - wanted[k, k]) for k in range(4)
     ]
     assert scores["mIoU"] == pytest.approx(np.mean(shares))
     assert scores["accuracy"] == pytest.approx(np.trace(wanted) / wanted.sum())
-    assert label_scores.scores_of(np.diag([3, 0])) == {"accuracy": 1, "mIoU": 0.5}
+    assert labelled.scores_of(np.diag([3, 0])) == {"accuracy": 1, "mIoU": 0.5}
 
 
 def test_one_class_for_all_pixels_is_scored_as_a_network_that_says_it():
@@ -115,9 +115,9 @@ def test_one_class_for_all_pixels_is_scored_as_a_network_that_says_it():
     samples = [(np.zeros((3, 4, 4), np.float32), label) for label in labels]
     says_one = np.zeros((1, 3, 4, 4), np.float32)
     says_one[0, 1] = 1
-    counts = label_scores.confusion(lambda _: torch.from_numpy(says_one), samples, 3, "cpu")
-    found = label_scores.of_one_class(samples, 3)
-    assert found == label_scores.scores_of(counts)
+    counts = labelled.confusion(lambda _: torch.from_numpy(says_one), samples, 3, "cpu")
+    found = labelled.of_one_class(samples, 3)
+    assert found == labelled.scores_of(counts)
     assert found["accuracy"] == 17 / 20
 
 
@@ -125,14 +125,14 @@ def test_pixels_of_no_class_teach_nothing():
     scores = torch.randn(1, 3, 4, 4, requires_grad=True)
     labels = torch.full((1, 4, 4), labelled.IGNORED, dtype=torch.uint8)
     labels[0, 1, 2] = 1
-    training.loss_of(scores, labels).backward()
+    labelled.loss_of(scores, labels).backward()
     assert (scores.grad.abs().sum(1)[0] > 0).sum() == 1
 
 
 def test_the_small_net_learns(simulator):
     samples = labelled.rendered([2, 5], simulator, SIZE, 3)
     net, rng = unet(2), np.random.default_rng(0)
-    step = training.update_of(samples, 2, "cpu", False)
+    step = labelled.update_of(samples, 2, "cpu", False)
     optimiser = torch.optim.Adam(net.parameters(), lr=2e-3)
     losses = [step(net, optimiser, rng) for _ in range(60)]
     assert np.mean(losses[-10:]) < 0.6 * np.mean(losses[:5])
@@ -140,7 +140,7 @@ def test_the_small_net_learns(simulator):
 
 def test_last_and_best_are_both_told():
     checks = [{"step": k, "accuracy": a, "mIoU": m} for k, a, m in ((1, 0.5, 0.4), (2, 0.6, 0.3))]
-    assert label_scores.last_and_best(checks) == {
+    assert labelled.last_and_best(checks) == {
         "last accuracy": 0.6, "last mIoU": 0.3, "best accuracy": 0.5, "best mIoU": 0.4,
     }  # fmt: skip
 
@@ -285,11 +285,11 @@ def test_small_trains_each_once_and_reports(tmp_path):
     assert "16 pictures: rendered shapes by dvs-voltmeter" in first.stdout
     assert "| one class for all pixels | 0." in first.stdout
     numbers = json.loads((tmp_path / "small.json").read_text())["trainings"]
-    assert all(set(one["measures"]) == set(label_scores.MEASURES) for one in numbers)
+    assert all(set(one["measures"]) == set(labelled.MEASURES) for one in numbers)
 
 
 def test_small_is_tested_on_a_recording(tmp_path):
-    clip, labels = shapes.moving(2, 49, (44, 30))
+    clip, labels = shape_clip(2, 49, (44, 30))
     frames = np.rint(clip.frames).astype(np.uint8)
     config = load_config("ideal", "frames.encoding=linear")
     events = np.concatenate(list(simulate(frames, 240, config, threads=1)))

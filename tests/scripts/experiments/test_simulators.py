@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
-from experiments.simulators.by_file import ByFile
-from experiments.simulators.clip import Clip
-from experiments.simulators.named import NAMES, EventsOf, named
-from experiments.simulators.v2e import V2e
-from experiments.simulators.voltmeter import (
+from experiments.clip import Clip
+from experiments.simulators import NAMES, ByFile, EventsOf, V2e, named
+from experiments.voltmeter import (
     CONSTANTS,
     Voltmeter,
     chance_of_on,
@@ -235,8 +234,8 @@ class EventEmulator:
 """
 
 
-def test_v2e_is_given_even_frames_its_seed_and_its_thresholds(tmp_path):
-    pytest.importorskip("torch", reason="v2e needs PyTorch")
+def test_v2e_is_given_even_frames_its_seed_and_its_thresholds(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "path", list(sys.path))
     (tmp_path / "v2ecore").mkdir()
     (tmp_path / "v2ecore" / "__init__.py").touch()
     (tmp_path / "v2ecore" / "emulator.py").write_text(EMULATOR)
@@ -245,3 +244,5 @@ def test_v2e_is_given_even_frames_its_seed_and_its_thresholds(tmp_path):
     assert on["t"].tolist() == list(range(7_000_000, 7_100_001, 10_000))
     assert (on["x"] == 4).all()
     assert (on["y"] == 4).all()
+    for name in ("v2ecore", "v2ecore.emulator"):
+        sys.modules.pop(name)

@@ -6,12 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from experiments import timing
-from experiments.passages import measures, sweeps, truth
-from experiments.passages.edges import Edges
-from experiments.passages.measures import Passages, after_stop, apart, latencies
-from experiments.passages.report import row_of
-from experiments.simulators.named import named
+from experiments import sweeps, timing, truth
+from experiments.edge_tables import row_of
+from experiments.edges import WINDOW_US, Edges, Passages, after_stop, apart, latencies
+from experiments.simulators import named
 from scipy.stats import wasserstein_distance
 from writing import load_pyplot
 
@@ -64,7 +62,7 @@ def test_events_of_others_are_not_counted():
         (31_000, 0, 1, 1),
         (31_000, 1, 1, 1),
         (32_000, 1, 1, 0),
-        (20_001 + measures.WINDOW_US, 0, 0, 1),  # too late
+        (20_001 + WINDOW_US, 0, 0, 1),  # too late
     ]
     events = sort_events(make_events(*np.array(rows, np.int64).T))
     on, off = (latencies(events, passages, band) for band in (0, 1))

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from experiments.trainings.training import BEST, CHECKPOINT, CURVE, Training, number_of_parameters
+from experiments.training import BEST, CHECKPOINT, CURVE, Training, number_of_parameters
 
 from adv2e.errors import DataError
 

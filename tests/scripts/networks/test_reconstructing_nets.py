@@ -6,12 +6,11 @@ import sys
 
 import numpy as np
 import pytest
+from experiments import judge
 from networks.e2vid import PARAMETERS, e2vid
 from networks.firenet import PARAMETERS as OF_FIRENET
 from networks.firenet import firenet, grid_of, reconstructed
-from networks.image_loss import similarity, structural_loss
-from networks.lpips import BACKBONE, LAYERS, LINEAR, Lpips
-from real import measures
+from networks.image_loss import BACKBONE, LAYERS, LINEAR, Lpips, similarity, structural_loss
 
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.events import make_events
@@ -78,7 +77,7 @@ def test_similarity_is_that_of_the_measure():
     a, b = np.random.default_rng(0).random((2, 20, 30))
     b = 0.7 * a + 0.3 * b
     found = similarity(*(torch.from_numpy(one)[None, None] for one in (a, b)))
-    assert float(found) == pytest.approx(measures.similarity(a, b), abs=1e-9)
+    assert float(found) == pytest.approx(judge.similarity(a, b), abs=1e-9)
     assert (
         float(structural_loss(torch.full((1, 1, 9, 9), 0.5), torch.full((1, 1, 9, 9), 0.5))) < 1e-6
     )

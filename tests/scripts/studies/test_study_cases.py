@@ -2,7 +2,7 @@
 
 import pytest
 from camera.catalogue import LIBRARY, OUTSIDE
-from studies.verdicts import cases
+from studies import cases
 
 
 @pytest.fixture

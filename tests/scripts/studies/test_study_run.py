@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from camera.catalogue import LIBRARY
 from click.testing import CliRunner
+from studies import cases, results, scoring
 from studies import diagnosis as study
-from studies.verdicts import cases, results, scoring
-from studies.verdicts import run as study_run
+from studies import run as study_run
 from study_lines import SETUP, line_of
 
 

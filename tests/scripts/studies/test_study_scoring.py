@@ -1,7 +1,7 @@
 """Scores of the study of the diagnosis."""
 
 import pytest
-from studies.verdicts import scoring
+from studies import scoring
 from study_lines import found, line_of
 
 

@@ -5,7 +5,7 @@ import pytest
 from camera.catalogue import LIBRARY
 from click.testing import CliRunner
 from studies import diagnosis as study
-from studies.verdicts import figure, results, tables
+from studies import results, tables
 from study_lines import found, line_of
 
 
@@ -80,12 +80,12 @@ def test_failures_come_with_what_competed():
 
 def test_the_confusion_matrix_shares_look_alikes():
     lines = [line for line in made_up() if line["kind"] == "library"]
-    matrix = figure.confusion(lines)
+    matrix = tables.confusion(lines)
     place = LIBRARY.index
     assert matrix[place("leak")][[place("leak"), place("photo_leak")]].tolist() == [0.5, 0.5]
     assert matrix[place("flicker"), place("shot_noise")] == 1.0
     assert matrix.sum() == pytest.approx(len(lines))
-    missed = figure.confusion([line_of(effects=("readout",), verdict="consistent")])
+    missed = tables.confusion([line_of(effects=("readout",), verdict="consistent")])
     assert np.argwhere(missed).tolist() == [[place("readout"), len(LIBRARY) + 1]]
 
 

@@ -1,1 +1,0 @@
-"""Parts of ``fuzz_readers.py``."""

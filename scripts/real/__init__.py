@@ -1,1 +1,0 @@
-"""Real recordings: read, simulated, searched for effects; and what measurements say of pixels."""
