@@ -1,4 +1,4 @@
-"""What ``adv2e export`` makes of a small recording, as it is read back.
+"""Data sets that ``adv2e export`` makes of a small recording, as they are read back.
 
 Numbers, their types and their names count; how files are packed, and when, does not.
 """

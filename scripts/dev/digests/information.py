@@ -1,4 +1,4 @@
-"""What ``adv2e info --json`` tells of inputs of every kind, whole and damaged.
+"""Answers of ``adv2e info --json`` on inputs of every kind, whole and damaged.
 
 It tells nothing of the bytes of files, nor of when they were written.
 """

@@ -1,4 +1,4 @@
-"""What ``adv2e diagnose`` reports of two small recordings that ``adv2e convert`` made.
+"""Reports of ``adv2e diagnose`` on two small recordings that ``adv2e convert`` made.
 
 Few effects compete, for all take minutes.
 """
