@@ -13,6 +13,7 @@ from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 from adv2e.files.names import shown
 from adv2e.formats import lookup
+from adv2e.process import bars
 
 if TYPE_CHECKING:
     from adv2e.batch.exports import Export
@@ -299,10 +300,8 @@ class _Told:
             if coming is not None and is_much(coming.bytes, coming.room):
                 self._log(coming.text())
         if self._progress:
-            from tqdm import tqdm
-
             self._bar = self._stack.enter_context(
-                tqdm(total=total, unit="B", unit_scale=True, desc="batch", leave=False)
+                bars.bar(total=total, unit="B", unit_scale=True, desc="batch")
             )
 
     def moved(self, task: Task, share: float) -> None:

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from adv2e import compiled
+from adv2e.process import bars
 
 _MANY = 20
 """Functions that take long enough to be worth a line: a solver has twice as many and more."""
@@ -36,9 +37,7 @@ def compilation_told(log: Callable[[str], None] | None, progress: bool) -> Itera
             when = f"in every run, as it cannot be kept: {lost}" if lost else "once"
             log(f"compiling the pixel's kernel ({when}; about a minute)")
         if progress and bar is None:
-            from tqdm import tqdm
-
-            bar = tqdm(desc="compiling", unit="function", leave=False)
+            bar = bars.bar(desc="compiling", unit="function")
         known.update(parts)
         if bar is not None:
             bar.total = len(known)

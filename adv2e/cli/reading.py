@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from adv2e.process import bars
+
 _SHARE = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
 
@@ -20,9 +22,7 @@ def reading_told(
     if not progress:
         yield None
         return
-    from tqdm import tqdm
-
-    with tqdm(desc=f"reading {Path(path).name}", unit=" frames", leave=False) as bar:
+    with bars.bar(desc=f"reading {Path(path).name}", unit=" frames") as bar:
 
         def told(done: int, total: int | None) -> None:
             if total is not None:

@@ -39,6 +39,7 @@ from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.interpolation import network_of
 from adv2e.light.pictures import drawn, picture_white
 from adv2e.light.sensor import fitting_of
+from adv2e.process import bars
 from adv2e.sources import STDIN
 from adv2e.sources.base import Source
 
@@ -388,9 +389,7 @@ def _shown(
 
     The bar goes with the `stack`: a line that tells an error does not follow it.
     """
-    from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and most runs in scripts need none
-
-    bar = stack.enter_context(tqdm(total=count, unit=" frames", leave=False))
+    bar = stack.enter_context(bars.bar(total=count, unit=" frames"))
 
     def counted() -> Iterator[Still]:
         for still in stills:

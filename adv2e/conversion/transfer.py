@@ -35,6 +35,7 @@ from adv2e.formats.sink import Sink
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of, picture_white
+from adv2e.process import bars
 from adv2e.sources.frame import Light, Pixels
 from adv2e.sources.wanted import Selection
 
@@ -301,9 +302,7 @@ class _Bar:
     """A bar on stderr for a file that is read twice."""
 
     def __init__(self, path: str) -> None:
-        from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and scripts need none
-
-        self._bar = tqdm(desc=f"looking through {Path(path).name}", leave=False)
+        self._bar = bars.bar(desc=f"looking through {Path(path).name}")
         self._bar.bar_format = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
     def __enter__(self) -> Progress:

@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from adv2e.config import Config, Written, files_among, load_config, names_of, written_keys
 from adv2e.config.user_effects import user_effects
 from adv2e.diagnosis.configurations import without_user_effects
@@ -20,6 +18,7 @@ from adv2e.diagnosis.fitting.library import names
 from adv2e.diagnosis.known_light import read_known_light
 from adv2e.errors import UsageError
 from adv2e.geometry import Rectangle, parse_rectangle
+from adv2e.process import bars
 from adv2e.reports.files import check_folder, write_reports
 from adv2e.reports.result import Diagnosis
 
@@ -211,7 +210,7 @@ def _stages(shown: bool, say: Callable[[str], None] | None) -> Iterator[Callable
     began = said = time.monotonic()
     layout = "{desc}: {n_fmt} simulations in {elapsed}"
     last = "reading the recording"
-    with tqdm(desc=last, bar_format=layout, leave=False, disable=not shown) as bar:
+    with bars.bar(desc=last, bar_format=layout, disable=not shown) as bar:
 
         def tell(stage: str, simulations: int) -> None:
             nonlocal last, said

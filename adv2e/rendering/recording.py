@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from tqdm import tqdm
 
 from adv2e.errors import DataError
 from adv2e.files.distinct import check_distinct
 from adv2e.light.pictures import drawn_frame
+from adv2e.process import bars
 from adv2e.rendering.preview import open_preview
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import MOST_PICTURES, Caption, Timeline, caption, microseconds
@@ -130,7 +130,8 @@ def _feed(
     """Hand on the part to show: each frame, then the events before it."""
     events = recording.events
     begin, end = np.searchsorted(events["t"], [first_us, until_us])
-    with tqdm(total=int(end - begin), unit="event", unit_scale=True, disable=not progress) as bar:
+    total = int(end - begin)
+    with bars.bar(total=total, unit="event", unit_scale=True, disable=not progress) as bar:
         for frame, t_us in _frames(recording, until_us, frames):
             if frame is None:
                 preview.no_more_frames()

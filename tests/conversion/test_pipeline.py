@@ -444,7 +444,8 @@ def test_what_is_written_is_done_though_nothing_can_be_said(video, tmp_path, std
         pytest.skip("this system has no /dev/full")
     target = tmp_path / "a.h5"
     code = "from adv2e.__main__ import main; main()"
-    arguments = ["convert", str(video), "-o", str(target), "-v", "--preview", f"{tmp_path}/a.gif"]
+    preview = ["--preview", f"{tmp_path}/a.gif"]
+    arguments = ["convert", str(video), "-o", str(target), "-v", "--progress", *preview]
     with open("/dev/full" if stderr == "full" else os.devnull, "wb") as full:  # noqa: PTH123
         done = subprocess.run(
             [sys.executable, "-c", code, *arguments],
