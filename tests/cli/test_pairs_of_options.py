@@ -145,7 +145,7 @@ def fits_info(row):
 
 EXPORT = {
     "input": ["frames.h5", "recording", "e.txt --size 16x12"],
-    "to": ["voxel", "e2vid", "ev-segnet"],
+    "to": [("--to", "voxel"), ("--to", "e2vid"), ("--to", "ev-segnet")],
     "cut": [("--window", "20ms"), ("--count", "50"), ("--at", "images"), NO],
     "bins": [NO, ("--bins", "3")],
     "normalise": [NO, ("--normalise", "e2vid"), ("--normalise", "event_cnn_minimal")],
@@ -169,9 +169,10 @@ _OF_EXPORTS = {
 
 
 def fits_export(row):
-    to, cut, text = row.get("to"), row.get("cut"), row.get("input", "").startswith("e.txt")
-    if to is None:
+    cut, text = row.get("cut"), row.get("input", "").startswith("e.txt")
+    if "to" not in row:
         return not (text and cut == ("--at", "images"))
+    to = row["to"][-1]
     foreign = {name for names in _OF_EXPORTS.values() for name in names} - {*_OF_EXPORTS[to]}
     if any(row.get(name) for name in foreign):
         return False
@@ -337,11 +338,24 @@ def bytes_below(path):
     return {str(one): one.read_bytes() for one in files if one.is_file()}
 
 
+def words_of(command, row, path):
+    """Return the words of a row whose output, and preview, go to the folder of a path."""
+    output = "-" if path.name == "-" else str(path)
+    words = [*row["input"].split(), *([output] if command == "batch" else [])]
+    words += row.get("output", "").split()[1:]
+    for factor, way in row.items():
+        if factor == "preview" and way:
+            words += ["--preview", str(path.with_name(f"preview{Path(way[1]).suffix}"))]
+        elif factor not in ("input", "output", "existing"):
+            words += way
+    return words if command in ("info", "compare", "batch") else [*words, "-o", output]
+
+
 def is_whole(command, words, path, out):
     """Tell whether what a row made can be read back."""
     if command in ("info", "compare"):
         return json.loads(out) if "--json" in words else out
-    if "-" in words[words.index("-o") + 1 :] if "-o" in words else False:
+    if words[-2:] == ["-o", "-"]:
         return out
     if command == "convert":
         return read_events(path).events.size > 0
@@ -352,28 +366,24 @@ def is_whole(command, words, path, out):
     return "--dry-run" in words or bytes_below(path)
 
 
-BESIDE = ("output", "preview", "causes", "threads", "voice", "existing")
-
-
 @pytest.mark.thorough
 def test_what_is_written_beside_events_does_not_change_them(called, tmp_path):
+    nothing_beside = dict.fromkeys(("preview", "causes", "threads", "voice"), NO)
     for number, row in enumerate(rows_of("convert")[::3]):
-        name, *about = row["output"].split()
+        name = row["output"].split()[0]
         path, usual = (tmp_path / str(number) / one for one in (name, "usual.h5"))
         if name == "-":
             continue
-        words = [*row["input"].split(), *itertools.chain(*(
-            value for key, value in row.items() if key not in ("input", *BESIDE)
-        ))]  # fmt: skip
-        more = [*about, *row["causes"], *row["threads"], *row["voice"]]
-        for given in ((*words, "-o", str(usual)), (*words, *more, "-o", str(path))):
+        alone = {**row, **nothing_beside, "output": "usual.h5"}
+        words = words_of("convert", row, path)
+        for given in (words_of("convert", alone, usual), words):
             outcome = called("convert", *given)
             assert outcome.status == 0, (given, outcome.err)
         expected, found = read_events(usual), read_events(path)
         assert (found.width, found.height) == (expected.width, expected.height), words
         for name in "txyp":
             same = np.array_equal(found.events[name], expected.events[name])
-            assert same, (name, words, more)
+            assert same, (name, words)
 
 
 @pytest.mark.parametrize(
@@ -392,23 +402,9 @@ def test_some_rows_of_options(command, called, tmp_path):
 def hold(command, rows, called, tmp_path):
     refused = []
     for number, row in enumerate(rows):
-        kind, existing = row["input"], row.get("existing", "new")
-        name, *about = row.get("output", "a").split()
+        existing, name = row.get("existing", "new"), row.get("output", "a").split()[0]
         path = tmp_path / f"{command}{number}" / name
-        words = [*kind.split(), *about, *itertools.chain(*(
-            value for key, value in row.items() if key not in ("input", "output", "existing", "to")
-        ))]  # fmt: skip
-        if "--preview" in words:
-            place = words.index("--preview") + 1
-            words[place] = str(path.with_name(f"preview{Path(words[place]).suffix}"))
-        if command == "export":
-            words += ["--to", row["to"]]
-        elif command == "batch":
-            words += [*row["to"]]
-        if command == "batch":
-            words.insert(1, str(path))
-        elif command not in ("info", "compare"):
-            words += ["-o", "-" if name == "-" else str(path)]
+        words = words_of(command, row, path)
         outcome = called(command, *words)
         told = f"adv2e {command} {' '.join(words)}\n{outcome.err}"
         errors = [line for line in outcome.err.splitlines() if line.startswith("adv2e: error")]
