@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from types import ModuleType
 from typing import NamedTuple
@@ -22,6 +23,19 @@ collect_seldom()  # to search the compiler's objects for cycles took a fourteent
 
 LONGEST_S = 400
 """After that a test hangs.  Where it does so is printed before; see faulthandler_timeout."""
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark as thorough all cases of a test but the first few, of which it says how many."""
+    seen: Counter[str] = Counter()
+    for item in items:
+        quick = item.get_closest_marker("quick_cases")
+        if quick is not None:
+            test = item.nodeid.partition("[")[0]
+            seen[test] += 1
+            if seen[test] > quick.args[0]:
+                item.add_marker("thorough")
 
 
 @pytest.fixture(autouse=True)

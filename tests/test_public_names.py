@@ -40,6 +40,7 @@ def examples(thing, name):
 
 
 @pytest.mark.parametrize("name", sorted({*NAMES, "adv2e"} - {"diagnose"}))
+@pytest.mark.quick_cases(1)
 def test_the_example_of_each_works(name, tmp_path, monkeypatch):
     """That of diagnose takes long: it is run where a diagnosis is made, in tests/cli."""
     monkeypatch.chdir(tmp_path)

@@ -49,6 +49,7 @@ def test_the_command_offers_all_kinds():
     ],
     ids=["windows", "images", "ev-segnet", "10ms"],
 )
+@pytest.mark.quick_cases(1)
 def test_an_export_is_what_the_command_of_its_own_makes(batch, source, tmp_path, words, make):
     dest = tmp_path / "to"
     done = batch(source, dest, "--export", *words)
@@ -165,6 +166,7 @@ def test_two_that_would_make_one_folder_are_refused(batch, source, tmp_path):
     assert not (tmp_path / "to").exists()
 
 
+@pytest.mark.thorough
 def test_files_beside_those_of_events_are_compared_too(batch, source, tmp_path):
     dest = tmp_path / "to"
     call = (source, dest, "--format", "txt", "--causes")

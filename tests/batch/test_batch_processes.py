@@ -62,6 +62,7 @@ def job(tmp_path, name, *sets, effects=()):
         pytest.param(-signal.SIGTERM, marks=pytest.mark.thorough),
     ],
 )
+@pytest.mark.thorough
 def test_a_process_that_dies_fails_its_sequence_alone(tmp_path, number):
     effect = tmp_path / "ending.py"
     effect.write_text(ENDING)
@@ -91,6 +92,7 @@ def test_processes_stay_alive_over_many(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("at_prompt", [False, True])
+@pytest.mark.quick_cases(1)
 def test_no_code_of_the_current_folder_runs(tmp_path, monkeypatch, at_prompt):
     """Neither as a module of Python's own or of ours, nor as one that Python looks for itself."""
     one = job(tmp_path, "a")
@@ -105,6 +107,7 @@ def test_no_code_of_the_current_folder_runs(tmp_path, monkeypatch, at_prompt):
     assert not (tmp_path / "RAN").exists()
 
 
+@pytest.mark.thorough
 def test_a_script_that_calls_for_a_batch_runs_once(tmp_path):
     clip(tmp_path / "from" / "a.avi")
     script = tmp_path / "script.py"
@@ -135,6 +138,7 @@ class Loud(Hooks):
 """
 
 
+@pytest.mark.thorough
 def test_what_is_printed_in_a_process_is_no_answer(tmp_path, capfd):
     effect = tmp_path / "loud.py"
     effect.write_text(LOUD)

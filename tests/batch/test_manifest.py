@@ -39,6 +39,7 @@ def test_lines_stay_and_the_last_of_a_name_counts(tmp_path):
 
 @settings(max_examples=200, deadline=None)
 @given(kept=st.integers(0, 1000))
+@pytest.mark.thorough
 def test_a_torn_line_is_cut_off_and_nothing_else(tmp_path_factory, kept):
     path = manifest_path(tmp_path_factory.mktemp("m"), None)
     records = [done(f"s{k}") for k in range(4)]

@@ -63,6 +63,7 @@ URLS = ("memory://from", "memory://to")
 
 
 @pytest.mark.parametrize("format", ["h5", "txt", "folder"])
+@pytest.mark.quick_cases(1)
 def test_the_bytes_are_those_of_a_local_batch_and_they_are_kept(
     batch, store, source, tmp_path, format
 ):

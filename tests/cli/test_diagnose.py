@@ -195,6 +195,7 @@ class Broken(Hooks):
 """
 
 
+@pytest.mark.thorough
 def test_an_own_effect_that_raises_is_named_with_its_line(adv2e, recordings, short, tmp_path):
     effect, out = tmp_path / "broken.py", tmp_path / "out"
     effect.write_text(BROKEN, "utf-8")

@@ -238,6 +238,7 @@ NOT_REMOVED = """
         pytest.param(NOT_REMOVED, id="not removed"),
     ],
 )
+@pytest.mark.quick_cases(1)
 def test_a_signal_ends_it_tidily(tmp_path, work, name, status):
     script = WAITING.replace("{work}", work)
     with running_python(script, cwd=tmp_path, text=True) as process:
@@ -286,6 +287,7 @@ def test_a_closed_stdout_is_141_and_quiet():
     assert err == b""
 
 
+@pytest.mark.thorough
 def test_a_stdout_that_was_closed_before_is_141_and_quiet(tmp_path):
     frames = tmp_path / "frames.npy"
     np.save(frames, np.full((3, 4, 6), 90, np.uint8))

@@ -27,6 +27,7 @@ def levels(path):
 
 
 @pytest.mark.parametrize("name", ["out.mp4", "out.avi", "out.gif", "out.png"])
+@pytest.mark.quick_cases(1)
 def test_makes_the_file_and_says_so(adv2e, recording, tmp_path, name):
     path = tmp_path / name
     outcome = adv2e("render", recording, "-o", path, "--fps", 10)

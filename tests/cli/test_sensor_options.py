@@ -138,6 +138,7 @@ def test_crop_alone_leaves_the_numbers_as_they_are(adv2e, clip, tmp_path):
     ],
     ids=["colour", "linear colour", "deep colour", "float colour", "grey", "float grey"],
 )
+@pytest.mark.quick_cases(1)
 def test_stored_frames_are_the_light_on_the_sensor(adv2e, tmp_path, frames, name, encoding):
     np.save(tmp_path / "clip.npy", frames)
     words = ["--fps", 100, "--size", "8x6", "--set", f"frames.encoding={encoding}", "--with-frames"]
@@ -252,6 +253,7 @@ def test_frames_of_one_size_in_a_simulation():
 
 @pytest.mark.parametrize("fit", ["crop", "pad", "stretch"])
 @pytest.mark.parametrize("cut", [(), ("--crop", "8,4,40,36"), ("--rotate180",)])
+@pytest.mark.quick_cases(1)
 def test_files_say_where_a_point_of_the_frames_lies_on_the_sensor(adv2e, tmp_path, fit, cut):
     frames = np.zeros((3, 48, 64), np.float32)
     frames[:, 20:28, 24:32] = 1  # its middle is column 28, row 24

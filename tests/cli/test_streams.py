@@ -49,6 +49,7 @@ def test_the_library_would_have_said_more(folder):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of another kind")
+@pytest.mark.thorough
 def test_last_words_on_a_signal_are_still_said(tmp_path):
     np.save(tmp_path / "s.npy", np.random.default_rng(0).random((3000, 60, 80), np.float32))
     child = subprocess.Popen(
@@ -72,6 +73,7 @@ def test_tracebacks_and_warnings_of_python_are_still_seen(tmp_path):
 
 
 @pytest.mark.parametrize("subsampling", [0x111111, 0x221111])
+@pytest.mark.quick_cases(1)
 def test_a_jpeg_of_which_a_part_is_missing_is_not_filled_with_grey(tmp_path, subsampling):
     how = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, subsampling)
     noise = np.random.default_rng(0).integers(0, 255, (2, 60, 80, 3), np.uint8)

@@ -133,6 +133,7 @@ def test_a_film_of_a_stray_time_is_refused(tmp_path, capsys):
     assert not (tmp_path / "o.mp4").exists()
 
 
+@pytest.mark.thorough
 def test_an_hour_without_events_is_drawn_if_it_is_asked_for(tmp_path, capsys):
     path, film = write(tmp_path / "a.txt", "0 1 1 1", "0.1 2 2 0", "900 1 1 1"), tmp_path / "o.gif"
     for options, status in (
@@ -146,6 +147,7 @@ def test_an_hour_without_events_is_drawn_if_it_is_asked_for(tmp_path, capsys):
         assert ("27,000 pictures" in capsys.readouterr().err) is (status == 1)
 
 
+@pytest.mark.thorough
 def test_windows_up_to_a_stray_time_are_refused(tmp_path, capsys):
     path = write(tmp_path / "a.txt", "0 1 1 1", "0.1 2 2 0", "3600 1 1 1")
     export = ["export", path, "-o", str(tmp_path / "grids"), "--to", "voxel", "--bins", "1"]

@@ -75,6 +75,7 @@ def said(process):
     return out.split()
 
 
+@pytest.mark.thorough
 def test_a_second_process_finds_the_code(start):
     assert said(start(1)) == ["20", "0"]
     assert said(start(1)) == ["20", "1"]
@@ -139,6 +140,7 @@ print(*(one.__name__ for one in seen), len(compiled.parts_of(seen[0])) if seen e
 """
 
 
+@pytest.mark.thorough
 def test_whoever_watches_is_told_of_what_is_compiled_and_numba_stays_as_it_was(start):
     assert said(start(code=WATCH)) == ["outer", "inner", "2"]
     assert said(start(code=WATCH)) == ["0"]
@@ -160,6 +162,7 @@ print(numba.config.DISABLE_JIT, numba.config.OPT._raw_value, numba.config.CPU_NA
 
 
 @pytest.mark.parametrize("before", [False, True])
+@pytest.mark.thorough
 def test_a_file_of_settings_in_the_current_folder_is_not_read(start, tmp_path, before):
     if before:
         (tmp_path / ".numba_config.yaml").write_text("disable_jit: 1\ncpu_name: generic\n")
@@ -218,12 +221,14 @@ def test_writing_waits_for_another_process_that_does(start, tmp_path):
     assert said(waiting) == ["25.0", "0"]
 
 
+@pytest.mark.thorough
 def test_code_is_compiled_again_when_what_it_calls_has_changed(package, start):
     assert said(start(1)) == ["20", "0"]
     (package / "inner.py").write_text(INNER.replace("x + 1", "x + 2"))
     assert said(start(1)) == ["30", "0"]
 
 
+@pytest.mark.thorough
 def test_numba_cache_dir_comes_first(start, tmp_path):
     said(start(1, NUMBA_CACHE_DIR=str(tmp_path / "mine")))
     assert list(tmp_path.glob("mine/adv2e/kernels-*/**/*.nbc"))
@@ -247,6 +252,7 @@ def test_the_digest_covers_the_constants_that_compiled_code_takes_in():
     assert seen > 20
 
 
+@pytest.mark.thorough
 def test_what_is_imported_after_the_compiler_extends_it(tmp_path):
     script = (
         "from adv2e import compiled\n"

@@ -54,6 +54,7 @@ def normal_law(mean, deviation, above=-math.inf):
         ("{normal: [0.1, 0.2]}", normal_law(0.1, 0.2, above=0.01)),
     ],
 )
+@pytest.mark.quick_cases(1)
 def test_numbers_follow_their_law(form, law):
     found = draws(ON, form)
     assert found.min() > 0
@@ -68,6 +69,7 @@ def test_numbers_follow_their_law(form, law):
         ("{uniform: [2, 5]}", [2, 3, 4, 5]),
     ],
 )
+@pytest.mark.quick_cases(1)
 def test_whole_numbers_are_each_as_likely(form, values):
     found = draws("sampling.L", form)
     assert found.dtype == np.int64

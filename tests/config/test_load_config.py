@@ -341,6 +341,7 @@ def test_aliases_within_aliases_are_counted_where_they_stand(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["[" * 5000, "{a: " * 5000, "a:\n" + "- " * 5000, "? " * 5000])
+@pytest.mark.quick_cases(1)
 def test_text_nested_too_deeply(tmp_path, text):
     (tmp_path / "deep.yaml").write_text(text)
     with pytest.raises(ConfigError, match=r"deep\.yaml.*not YAML"):

@@ -105,6 +105,7 @@ def test_those_that_are_drawn_go_over_every_pixel_and_no_other_command_takes_the
         assert all(first[1][key] != second[1][key] for key in own if "choice" not in own[key])
 
 
+@pytest.mark.thorough
 def test_those_that_are_drawn_are_as_their_sources_say():
     spreads = {}
     for name in RANDOM:

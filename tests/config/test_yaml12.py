@@ -126,6 +126,7 @@ def test_an_alias_is_its_anchor():
         ("a: 1" + "0" * 5000, "is not a value of !!int"),
     ],
 )
+@pytest.mark.thorough
 def test_a_mistake_is_one_line_with_its_place(text, message):
     with pytest.raises(ConfigError) as caught:
         parse(text, FILE)
@@ -164,6 +165,7 @@ def test_nan_reads_back():
 
 @settings(max_examples=200)
 @given(st.text() | st.sampled_from(["on", "no", "Null", "~", "1e3", "a: b", "a #b", "", " x", "é"]))
+@pytest.mark.thorough
 def test_texts_read_back_exactly_under_both_schemas(text):
     written = scalar_text(text)
     assert "\n" not in written

@@ -49,6 +49,7 @@ def test_the_estimate_is_near_what_is_made(tmp_path, monkeypatch, make, part, na
 
 
 @pytest.mark.parametrize("share", [0.1, 0.3])
+@pytest.mark.quick_cases(1)
 def test_a_share_of_the_frames_is_enough_or_nothing_is_told(tmp_path, share):
     source = video(tmp_path / "in.avi", 120)
     found = estimate(source, "a.h5", "adv2e", threads=1, share=share)
@@ -59,6 +60,7 @@ def test_a_share_of_the_frames_is_enough_or_nothing_is_told(tmp_path, share):
 
 
 @pytest.mark.parametrize("count", [2, 3, 5])
+@pytest.mark.quick_cases(1)
 def test_of_few_frames_all_are_seen(tmp_path, count):
     source = folder(tmp_path / "in", count)
     found = estimate(source, "a.h5", "adv2e", threads=1)
@@ -101,6 +103,7 @@ def test_amounts_are_rounded():
     assert amount_text(123456, 5.1e6, 75) == "about 120,000 events, 5.10MB and 01:15"
 
 
+@pytest.mark.thorough
 def test_more_events_than_max_events_are_an_error_that_leaves_nothing(adv2e, tmp_path):
     source = video(tmp_path / "in.avi", 30)
     done = adv2e("convert", source, "-o", tmp_path / "a.h5", "--set", "max_events=1000")

@@ -126,6 +126,7 @@ def test_start_and_stop_and_preview(adv2e, video, tmp_path):
     assert cv2.imread(str(preview)) is not None
 
 
+@pytest.mark.thorough
 def test_text_to_standard_output(adv2e, video, tmp_path):
     adv2e("convert", video, "-o", tmp_path / "a.txt")
     command = [sys.executable, "-m", "adv2e", "convert", str(video), "-o", "-"]
@@ -268,6 +269,7 @@ def inputs_of_all_kinds(root, folder):
 
 
 @pytest.mark.parametrize("linked", ["", "hard", "symbolic"])
+@pytest.mark.quick_cases(1)
 def test_nothing_that_is_read_beside_the_input_is_written_over(adv2e, folder, tmp_path, linked):
     for command, read in list(inputs_of_all_kinds(tmp_path, folder)):
         target, before = read, read.read_bytes()
@@ -287,6 +289,7 @@ def test_nothing_that_is_read_beside_the_input_is_written_over(adv2e, folder, tm
         assert read.read_bytes() == before, (command, read)
 
 
+@pytest.mark.thorough
 def test_lists_and_texts_are_read_again_where_the_output_is_replaced(adv2e, folder, tmp_path):
     text, stamps = tmp_path / "ev.txt", tmp_path / "stamps.txt"
     text.write_text("0.1 1 2 1\n0.2 3 4 0\n")
@@ -351,6 +354,7 @@ def no_room(*args):
     "fails",
     ["adv2e.formats.monash.writer.MonashWriter.finish", "adv2e.rendering.gif.GifFile.finish"],
 )
+@pytest.mark.thorough
 def test_events_and_preview_come_together_or_not_at_all(adv2e, video, tmp_path, monkeypatch, fails):
     target, preview = tmp_path / "out" / "a.h5", tmp_path / "out" / "a.gif"
     arguments = ("convert", video, "-o", target, "--preview", preview)
@@ -382,6 +386,7 @@ ODD = {
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file systems elsewhere refuse some names")
 @pytest.mark.parametrize("name", ODD.values(), ids=ODD)
+@pytest.mark.thorough
 def test_any_name_that_the_system_takes(adv2e, video, tmp_path, name):
     folder = tmp_path / name[:40]
     folder.mkdir()
@@ -418,6 +423,7 @@ def test_names_of_effects_and_configurations_are_stored_as_text(adv2e, video, tm
     assert names_of([model]) == "\\xff\\n.yaml"
 
 
+@pytest.mark.thorough
 def test_a_name_that_begins_with_a_dash(adv2e, video, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     video.rename("-v.avi")
@@ -439,6 +445,7 @@ def test_a_name_that_is_too_long_is_told_before_the_work(
 
 @pytest.mark.skipif(sys.platform == "win32", reason="files of POSIX")
 @pytest.mark.parametrize("stderr", ["full", "closed"])
+@pytest.mark.thorough
 def test_what_is_written_is_done_though_nothing_can_be_said(video, tmp_path, stderr):
     if stderr == "full" and not Path("/dev/full").exists():
         pytest.skip("this system has no /dev/full")

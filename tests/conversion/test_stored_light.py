@@ -91,6 +91,7 @@ def write_images(tmp_path):
 
 @pytest.mark.parametrize("name", INPUTS)
 @pytest.mark.parametrize("layout", ["rec.zip", "rec"])
+@pytest.mark.quick_cases(1)
 def test_converted_again_a_recording_gives_the_same_events(adv2e, made, tmp_path, name, layout):
     source, told = made(name)
     outcome = adv2e("convert", source, *told, *QUIET, "-o", tmp_path / layout)
@@ -106,6 +107,7 @@ def test_converted_again_a_recording_gives_the_same_events(adv2e, made, tmp_path
 
 
 @pytest.mark.parametrize("name", INPUTS)
+@pytest.mark.quick_cases(1)
 def test_frames_in_hdf5_have_the_light_that_they_had_but_for_8_bits(adv2e, made, tmp_path, name):
     source, told = made(name)
     output = tmp_path / "rec.h5"

@@ -54,6 +54,7 @@ def here(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("target", NAMES)
 @pytest.mark.parametrize("source", NAMES)
+@pytest.mark.quick_cases(1)
 def test_events_and_size_come_over(source, target, adv2e, tmp_path):
     events = events_of()
     write(tmp_path / "from" / source, events)
@@ -306,6 +307,7 @@ def test_no_events_need_a_size(tmp_path):
         assert adv2e_convert("a.txt", "b.h5").events == 0
 
 
+@pytest.mark.thorough
 def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
     from adv2e.formats import hdf5
 

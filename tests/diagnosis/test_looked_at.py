@@ -57,6 +57,7 @@ def test_bursts_are_looked_for_before_the_last_look(part, seen):
     assert all(bool(one.pulse) is seen for one in found)
 
 
+@pytest.mark.thorough
 def test_a_pulse_that_is_declared_is_not_told():
     evidence = recording(splits.TRAIN)
     declared = load_config(["ideal"], ["sampling.L=1", PULSE])

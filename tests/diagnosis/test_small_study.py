@@ -33,9 +33,9 @@ def large(name):
     return next(cases(name, size="large")).hidden
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.thorough)])
-def test_nothing_is_found_where_nothing_is_missing(seed, tmp_path):
-    found = diagnosis_of({}, seed, tmp_path)
+@pytest.mark.thorough
+def test_nothing_is_found_where_nothing_is_missing(tmp_path):
+    found = diagnosis_of({}, 1, tmp_path)
     assert found.verdict == "consistent"
     assert found.effects == []
     assert found.errors[0].after.value == found.errors[0].before.value

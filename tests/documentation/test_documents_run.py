@@ -113,7 +113,7 @@ def run_block(block: Block, adv2e, said: str) -> str:
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=() if name == "README.md" else pytest.mark.thorough)
+        pytest.param(name, marks=() if name == "adv2e/light/README.md" else pytest.mark.thorough)
         for name in DOCUMENTS
     ],
 )
@@ -174,6 +174,7 @@ for place, *words in json.load(sys.stdin):
 """One process for all, as importing the package takes longer than all else."""
 
 
+@pytest.mark.thorough
 def test_options_of_scripts_that_are_not_run_are_right():
     calls = [
         [str(command), *words[words[0] == "python" :]]

@@ -182,6 +182,7 @@ def distances_in_log(light, exposure):
 @pytest.mark.parametrize(
     ("period", "exposure", "most"), [(20e3, 5e3, 0.8), (40e3, 15e3, 0.4), (60e3, 30e3, 0.3)]
 )
+@pytest.mark.quick_cases(1)
 def test_what_an_exposure_takes_away_comes_back(period, exposure, most):
     lost, left, *_ = distances_in_log(swinging(period), exposure)
     assert lost > 0.03

@@ -38,6 +38,7 @@ def swing(t):
 
 @pytest.mark.parametrize("knee", [0, 20])
 @pytest.mark.parametrize("low_pass", ["{cutoff_hz: 300, dark_cutoff_hz: 20}", "null"])
+@pytest.mark.quick_cases(1)
 def test_a_swing_is_that_of_frames_taken_very_often(knee, low_pass):
     sets = f"pixel.log_response.linear_below={knee}", f"pixel.low_pass={low_pass}"
     fine, coarse = np.arange(4001) / 20_000, np.arange(101) / 500

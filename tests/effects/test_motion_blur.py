@@ -95,6 +95,7 @@ def test_a_known_smear_comes_back(dtype):
 
 
 @pytest.mark.parametrize(("scene", "share"), [(pan, 0.4), (disk, 0.8)])
+@pytest.mark.thorough
 def test_what_moves_becomes_sharp(scene, share):
     times = np.arange(4.0)
     blurred = [exposed(scene, t, 0.5) for t in times]
@@ -103,6 +104,7 @@ def test_what_moves_becomes_sharp(scene, share):
         assert error(after, scene(t)) < share * error(before, scene(t))
 
 
+@pytest.mark.thorough
 def test_uneven_times_count():
     times = np.array([0.0, 1.0, 1.5, 2.5])
     blurred = [exposed(pan, t, 0.5) for t in times]
@@ -111,6 +113,7 @@ def test_uneven_times_count():
         assert error(after, pan(t)) < 0.4 * error(before, pan(t))
 
 
+@pytest.mark.thorough
 def test_pixels_at_rest_stay_to_the_bit():
     frames = [exposed(disk, t, 0.5) for t in (0.0, 1.0)]
     x, y = pixels()
@@ -129,6 +132,7 @@ def test_frames_of_which_no_motion_is_known_stay_as_they_are():
             assert after is before
 
 
+@pytest.mark.thorough
 def test_light_that_is_zero_is_allowed():
     def dark(t):
         light = disk(t)

@@ -28,6 +28,7 @@ def stack(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.thorough
 def test_a_pipe_as_input(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     os.mkfifo(path)
@@ -47,6 +48,7 @@ def test_a_device_and_a_socket_as_input(tmp_path):
 
 
 @pytest.mark.parametrize("option", ["-c", "--timestamps", "--effect"])
+@pytest.mark.quick_cases(1)
 def test_a_pipe_as_text(tmp_path, stack, option):
     os.mkfifo(tmp_path / "pipe")
     rate = () if option == "--timestamps" else ("--fps", "10")
@@ -56,6 +58,7 @@ def test_a_pipe_as_text(tmp_path, stack, option):
 
 
 @pytest.mark.parametrize("name", ["images.txt", "frame_1.png", "events.txt", "a_ts.npy"])
+@pytest.mark.quick_cases(1)
 def test_a_pipe_within_a_folder_is_no_part_of_it(tmp_path, name):
     folder = tmp_path / "folder"
     folder.mkdir()
@@ -65,6 +68,7 @@ def test_a_pipe_within_a_folder_is_no_part_of_it(tmp_path, name):
     assert found.stderr.count("\n") == 1
 
 
+@pytest.mark.thorough
 def test_text_through_an_open_descriptor(stack):
     found = run("info", stack, "--timestamps", "/dev/stdin", input="0.0\n0.1\n0.3\n")
     assert found.returncode == 0, found.stderr
@@ -76,6 +80,7 @@ def test_text_through_an_open_descriptor(stack):
     assert "seed: 77" in found.stdout, found.stderr
 
 
+@pytest.mark.thorough
 def test_links_that_lead_to_each_other(tmp_path):
     for suffix in (".mp4", ".npy", ".txt", ""):
         (tmp_path / f"a{suffix}").symlink_to(tmp_path / f"b{suffix}")

@@ -370,6 +370,7 @@ for at in range(100):
 @pytest.mark.parametrize(
     ("kind", "exchanges"), [("single", True), *product(("pair", "folder"), (True, False))]
 )
+@pytest.mark.quick_cases(1)
 def test_killed_at_any_step_it_leaves_the_old_or_the_new(
     tmp_path, kind, exchanges, overwrite, after
 ):

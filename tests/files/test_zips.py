@@ -43,6 +43,7 @@ def bomb(path, name, before=b""):
 
 
 @pytest.mark.parametrize("name", ["events.txt", "images.txt", "images/a.png", "adv2e.json"])
+@pytest.mark.quick_cases(1)
 def test_a_member_that_fills_the_memory(tmp_path, name):
     path = bomb(tmp_path / "a.zip", name)
     assert path.stat().st_size < 1 << 20
@@ -53,6 +54,7 @@ def test_a_member_that_fills_the_memory(tmp_path, name):
             list(open_source(path).frames())
 
 
+@pytest.mark.thorough
 def test_an_array_that_fills_the_memory(tmp_path):
     path = tmp_path / "a.npz"
     np.savez_compressed(path, x=[1], y=[1], p=[1], t=np.zeros(HUGE >> 3))

@@ -74,6 +74,7 @@ def crowd():
 
 @pytest.mark.parametrize(("name", "reader"), BY_OTHERS)
 @pytest.mark.parametrize("events", [late, lambda _: random(9000), lambda _: crowd()])
+@pytest.mark.quick_cases(1)
 def test_others_read_what_is_written(tmp_path, name, reader, events):
     path = write(file_of(tmp_path, name), name, events(name))
 
@@ -93,6 +94,7 @@ def test_others_read_few_events(tmp_path, name, reader, count):
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("events", [late, lambda _: random(300_000), lambda _: crowd()])
+@pytest.mark.quick_cases(1)
 def test_what_is_written_is_read(tmp_path, name, events):
     path = write(file_of(tmp_path, name), name, events(name))
 
@@ -116,6 +118,7 @@ def test_no_events_keep_their_geometry(tmp_path, name):
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=20, deadline=None)
 @given(cuts=st.lists(st.integers(0, 210), max_size=6), steps=st.sampled_from([2, 9000, 9_000_000]))
+@pytest.mark.thorough
 def test_bytes_do_not_depend_on_parts(name, cuts, steps):
     events = random(200, 1, steps)
     with tempfile.TemporaryDirectory() as folder:
@@ -162,6 +165,7 @@ def good_file(name):
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=200, deadline=None)
 @given(data=st.data())
+@pytest.mark.quick_cases(1)
 def test_damaged_files_are_read_or_refused(name, data):
     with tempfile.TemporaryDirectory() as folder:
         path = file_of(folder, name)

@@ -50,6 +50,7 @@ def run(*arguments):
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
+@pytest.mark.quick_cases(1)
 def test_what_is_converted_is_what_simulate_gives(name, clip, tmp_path):
     out, plain = tmp_path / name, tmp_path / f"plain_{name}"
     config = load_config([], NOISY, 3)

@@ -166,6 +166,7 @@ def test_a_json_file_of_others_states_the_size_and_no_unit(tmp_path):
     assert int(recording.events["t"][-1]) == T[-1]
 
 
+@pytest.mark.thorough
 def test_a_size_that_events_contradict_is_an_error(adv2e, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with h5py.File(tmp_path / "a.h5", "w") as file:

@@ -155,6 +155,7 @@ def good(tmp_path_factory):
 
 @settings(max_examples=200, deadline=None)
 @given(data=st.data())
+@pytest.mark.thorough
 def test_damaged_lines(good, data):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "a.csv")

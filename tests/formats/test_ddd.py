@@ -25,6 +25,7 @@ def columns_of(recording):
     return [(int(e["t"]), int(e["x"]), int(e["y"]), int(e["p"])) for e in recording.events]
 
 
+@pytest.mark.thorough
 def test_events_and_frames_as_a_twin_has_them(tmp_path):
     rng = np.random.default_rng(0)
     packets, t = [], 10_000
@@ -187,6 +188,7 @@ def test_a_frame_larger_than_its_bytes_is_named(tmp_path):
 
 @settings(max_examples=200, deadline=None)
 @given(data=st.data())
+@pytest.mark.thorough
 def test_whatever_the_rows_hold_is_read_or_refused(data):
     packets = [polarity(CORNERS, room=1), special(1), frame(50, image(0, 3, 4)), imu()] * 2
     packets.append(polarity(CORNERS))

@@ -87,6 +87,7 @@ def test_a_last_event_at_a_whole_millisecond_is_found(tmp_path):
 
 
 @pytest.mark.parametrize("begin", [0, 4_000_000_000, -3, EPOCH_US])
+@pytest.mark.quick_cases(1)
 def test_times_beyond_32_bits(tmp_path, begin):
     t = begin + np.array([0, 5, 2**32 - 1, 2**32, 2**32 + 1, 3 * 2**32 + 7, 3 * 2**32 + 8])
     events = make_events(t, np.arange(7), np.arange(7), [1, 0] * 3 + [1])

@@ -19,6 +19,7 @@ def event(passed, x, y, p):
 
 
 @pytest.mark.parametrize("events", [1, 100, 3000, 250_000])
+@pytest.mark.quick_cases(1)
 def test_bytes_that_stand_alone_lie_anywhere(tmp_path, events):
     draw = np.random.default_rng(3)
     x, y, passed, p = (draw.integers(0, n, events).tolist() for n in (10, 8, 127, 2))

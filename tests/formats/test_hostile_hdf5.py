@@ -130,6 +130,7 @@ for make in (made.virtual, made.virtual_of_itself):
 """
 
 
+@pytest.mark.thorough
 def test_virtual_datasets_are_refused_by_name(tmp_path):
     # apart: HDF5 may crash at the end of a process that has made one of itself
     run = subprocess.run(
@@ -140,6 +141,7 @@ def test_virtual_datasets_are_refused_by_name(tmp_path):
 
 
 @pytest.mark.parametrize("command", ["info", "compare", "render", "diagnose"])
+@pytest.mark.quick_cases(1)
 def test_commands_end_in_one_line(tmp_path, command):
     path = changed(tmp_path / "a.h5", "events/xs", virtual("events/xs", whole(tmp_path / "b.h5")))
     more = {"compare": [path], "render": ["-o", tmp_path / "o.png"],
@@ -196,6 +198,7 @@ def test_a_dataset_in_place_of_the_group_of_images(tmp_path):
 
 
 @pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.thorough
 def test_events_of_which_nothing_is_there(tmp_path, packed):
     path = tmp_path / "a.h5"
     count = 1 << (27 if packed else 40)

@@ -68,6 +68,7 @@ def test_nothing_a_rest_and_something_else(tmp_path):
             read_events(tmp_path / "noise.bin")
 
 
+@pytest.mark.thorough
 def test_many_come_back(tmp_path):
     draw = np.random.default_rng(1)
     t = np.sort(draw.integers(0, 310_000, 300_000))

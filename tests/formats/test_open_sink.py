@@ -151,6 +151,7 @@ def write_all(folder):
             sink.write_events(events_of(4, 1000))
 
 
+@pytest.mark.thorough
 def test_bytes_do_not_depend_on_process_or_day(tmp_path):
     code = """
 import time
@@ -166,6 +167,7 @@ write_all(Path(sys.argv[1]))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs resource limits")
+@pytest.mark.thorough
 def test_full_disk_is_one_line_and_leaves_nothing(tmp_path):
     code = """
 import resource

@@ -53,6 +53,7 @@ def test_events_to_events(tmp_path):
     assert np.array_equal(read_events(tmp_path / "b.txt").events, TURNED)
 
 
+@pytest.mark.thorough
 def test_without_a_size_nothing_can_be_turned(tmp_path):
     write_events(tmp_path / "a.txt", EVENTS, (4, 3))
     (tmp_path / "a.txt.json").unlink()

@@ -42,6 +42,7 @@ def streams(draw):
 
 @settings(max_examples=15, deadline=None)
 @given(streams())
+@pytest.mark.thorough
 def test_events_and_geometry_survive(stream):
     width, height, events = stream
     with tempfile.TemporaryDirectory() as folder:
@@ -70,6 +71,7 @@ def test_corners_at_epoch_times_with_nothing_to_complain_of(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.quick_cases(1)
 def test_many_blocks_and_chunks(tmp_path, name):
     rng = np.random.default_rng(0)
     count = 300_000

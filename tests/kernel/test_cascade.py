@@ -36,6 +36,7 @@ def second_pole(hz, **circuit):
     "hz", [60.0, 300.0, 1000.0, pytest.param(10_000.0, marks=pytest.mark.thorough)]
 )
 @pytest.mark.parametrize(("fps", "L"), [(10, 10), (24, 1), (240, 1), (1000, 1)])
+@pytest.mark.thorough
 def test_edges_ramps_and_textures(hz, fps, L):
     stimulus = stimuli.standard(fps, L=L, pixels=16, frames=5)
     agreement = agreement_with_ode(stimulus, *second_pole(hz))
@@ -46,6 +47,7 @@ def test_edges_ramps_and_textures(hz, fps, L):
 
 
 @pytest.mark.parametrize("hz", [300.0, 5000.0])
+@pytest.mark.thorough
 def test_dead_time_and_leak(hz):
     stimulus = stimuli.standard(24, L=10, pixels=16, frames=5)
     circuit, sections = second_pole(hz, dead_time_us=800.0, leak_hz=3.0, photo_leak_hz=6.0)
@@ -64,6 +66,7 @@ def test_dead_time_and_leak(hz):
         (10_000.0, 200.0, 10.0),
     ],
 )  # fmt: skip
+@pytest.mark.thorough
 def test_whichever_pole_is_slower(cutoff, dark, hz):
     stimulus = stimuli.texture(pixels=16, frames=5, fps=30.0, L=10)
     circuit, sections = second_pole(hz, cutoff_hz=cutoff, dark_cutoff_hz=dark)
@@ -74,6 +77,7 @@ def test_whichever_pole_is_slower(cutoff, dark, hz):
     assert agreement.max_dt_us < 1.0
 
 
+@pytest.mark.thorough
 def test_flashes_and_light_beyond_white():
     draw = np.random.default_rng(4)
     dark = draw.uniform(1.0, 20.0, 30)
@@ -109,6 +113,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("causes", [False, True])
+@pytest.mark.thorough
 def test_same_events_as_in_steps_of_time(name, causes):
     """With all noise of the pixel's own; a rest in the middle, and a recording of 0.2 s."""
     draw = np.random.default_rng(8)

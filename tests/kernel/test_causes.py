@@ -110,6 +110,7 @@ def check(found, causes, twin, moves, *, within_us, other=PHOTORECEPTOR_NOISE, t
 
 @pytest.mark.parametrize("dead_us", [None, 800.0])
 @pytest.mark.parametrize("first", ["settled", "running"])
+@pytest.mark.thorough
 def test_leak_and_noise_events(first, dead_us):
     knots, pixels, jitter = 13, 60, 0.2
     light = moving_light(knots, pixels, seed=6, step=0.15)
@@ -218,6 +219,7 @@ def noise_path(light, times, steps, rms, pixel):
 
 @pytest.mark.parametrize("follower_hz", [None, 250.0])
 @pytest.mark.parametrize("dead_us", [None, 800.0])
+@pytest.mark.quick_cases(1)
 def test_photoreceptor_noise_beside_light_and_leak(dead_us, follower_hz):
     knots, pixels, rms = 11, 12, 0.09
     light = moving_light(knots, pixels, seed=2, step=0.1)
@@ -251,6 +253,7 @@ def test_photoreceptor_noise_beside_light_and_leak(dead_us, follower_hz):
 
 
 @pytest.mark.parametrize(("dead_us", "cause"), [(None, FRAME_COUPLING), (800.0, OWN_EFFECT)])
+@pytest.mark.quick_cases(1)
 def test_what_is_added_to_the_signal(dead_us, cause):
     knots, pixels = 9, 24
     light = moving_light(knots, pixels, seed=8, step=0.2)

@@ -65,6 +65,7 @@ def check_steps(stimulus, sections, truth, until):
 
 @pytest.mark.parametrize("name", CIRCUITS)
 @pytest.mark.parametrize(("fps", "L"), [(10, 10), (24, 10), (240, 1), (1000, 1)])
+@pytest.mark.quick_cases(1)
 def test_edges_ramps_and_textures(name, fps, L):
     circuit, sections = CIRCUITS[name]
     stimulus = stimuli.standard(fps, L=L, pixels=24, frames=7)
@@ -77,6 +78,7 @@ def test_edges_ramps_and_textures(name, fps, L):
 
 
 @pytest.mark.parametrize(("fps", "L"), [(24, 10), (240, 1), (1000, 1)])
+@pytest.mark.thorough
 def test_all_effects_in_steps_of_time(fps, L):
     circuit, sections = WITH_EFFECTS
     stimulus = stimuli.standard(fps, L=L, pixels=24, frames=7)
@@ -84,6 +86,7 @@ def test_all_effects_in_steps_of_time(fps, L):
 
 
 @pytest.mark.parametrize("fps", [24, 240])
+@pytest.mark.quick_cases(1)
 def test_with_second_pole_dead_time_and_leak(fps):
     stimulus = stimuli.standard(fps, L=10, pixels=16, frames=5)
     agreement, *_ = compare(stimulus, *WITH_EFFECTS)
@@ -94,6 +97,7 @@ def test_with_second_pole_dead_time_and_leak(fps):
 
 @pytest.mark.parametrize("fps", [24, 240])
 @pytest.mark.parametrize("effects", [{"dead_time"}, {"leak"}, {"dead_time", "leak"}])
+@pytest.mark.quick_cases(1)
 def test_with_dead_time_and_leak(fps, effects):
     circuit, sections = Circuit(), {}
     if "dead_time" in effects:
@@ -141,6 +145,7 @@ def test_turning_points_and_returns():
 
 
 @pytest.mark.parametrize("effects", [{}, {"refractory": Refractory(period_us=800.0)}])
+@pytest.mark.quick_cases(1)
 def test_flashes(effects):
     """So many pixels step by e-folds that the whole strip's interval is cut up."""
     rng = np.random.default_rng(4)
@@ -156,6 +161,7 @@ def test_flashes(effects):
     assert agreement.max_dt_us < 1.0
 
 
+@pytest.mark.thorough
 def test_fast_and_slow_corners():
     stimulus = stimuli.texture(pixels=16, frames=5, fps=30.0, L=10)
     for cutoff, dark in ((20.0, 1.0), (3000.0, 200.0), (30_000.0, 0.0)):

@@ -89,6 +89,7 @@ def run(pixel, light, K=10, printed=False, **options):
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("printed", [False, True])
+@pytest.mark.thorough
 def test_tiles_chunks_and_threads_change_nothing(name, printed, monkeypatch):
     sections = dict(CASES[name])
     light, same = clip(), {"printed": printed, "additions": sections.pop("additions", None)}
@@ -105,6 +106,7 @@ def test_tiles_chunks_and_threads_change_nothing(name, printed, monkeypatch):
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("causes", [False, True])
+@pytest.mark.quick_cases(1)
 def test_a_share_has_the_events_of_the_whole_at_its_pixels(name, causes):
     sections = dict(CASES[name])
     light, same = clip(), {"causes": causes, "additions": sections.pop("additions", None)}

@@ -31,6 +31,7 @@ def there_and_back(seed, pixels, polarity):
 @pytest.mark.parametrize("polarity", [1, -1])
 @pytest.mark.parametrize("leak_hz", [0.0, 3.0, 30.0])
 @pytest.mark.parametrize("lengths", [(2.0, 8.0), (0.3, 33.0)])
+@pytest.mark.quick_cases(1)
 def test_thresholds_next_to_the_turning_point(polarity, leak_hz, lengths):
     """What is just reached fires once, what is just missed does not: both times to 1 us."""
     pixels = 24
@@ -66,6 +67,7 @@ def test_levels_that_are_approached_and_never_reached():
 
 
 @pytest.mark.parametrize("dead_time_us", [None, 600.0])
+@pytest.mark.quick_cases(1)
 def test_returns_to_earlier_grey_values(dead_time_us):
     """Back and forth between whole grey values: the last threshold of each way is never reached."""
     draw = np.random.default_rng(2)
@@ -79,6 +81,7 @@ def test_returns_to_earlier_grey_values(dead_time_us):
 
 
 @pytest.mark.parametrize("leak_hz", [60.0, 100.0])
+@pytest.mark.quick_cases(1)
 def test_leak_overtakes_a_slow_signal_while_the_light_rises(leak_hz):
     """The distance falls with the signal first, and then rises with the leak: OFF lies between."""
     pixels, draw = 200, np.random.default_rng(8)
@@ -98,6 +101,7 @@ def test_leak_overtakes_a_slow_signal_while_the_light_rises(leak_hz):
 
 
 @pytest.mark.parametrize("leak_hz", [0.0, 50.0])
+@pytest.mark.quick_cases(1)
 def test_hundreds_of_crossings_in_one_interval(leak_hz):
     x = np.log([[6.0, 30.0, 250.0, 21.0]])
     moved = np.log([[250.0, 250.0, 6.0, 22.0]])
@@ -110,6 +114,7 @@ def test_hundreds_of_crossings_in_one_interval(leak_hz):
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.quick_cases(1)
 def test_crossings_both_ways_at_small_thresholds(seed):
     light = walks(seed, 5, 16)
     circuit = Circuit(on=0.01, off=0.013, dead_time_us=[None, 50.0, 700.0][seed])
@@ -125,6 +130,7 @@ def first_event(path, circuit):
 
 @pytest.mark.parametrize("where", ["inside", "end", "beyond", "several", "turn"])
 @pytest.mark.parametrize("leak_hz", [0.0, 20.0])
+@pytest.mark.quick_cases(1)
 def test_dead_times_that_end(where, leak_hz):
     """Inside the interval, at its end, beyond it, after several, and where the signal turns."""
     lengths = [3.0, 10.0, 10.0, 2.0, 2.0, 2.0, 20.0]
@@ -148,6 +154,7 @@ def test_dead_times_that_end(where, leak_hz):
 
 
 @pytest.mark.parametrize("dead_time_us", [30.0, 400.0, 4_000.0, 15_000.0, 50_000.0])
+@pytest.mark.quick_cases(1)
 def test_dead_times_from_short_to_longer_than_the_intervals(dead_time_us):
     light = walks(11, 25, 24)
     circuit = Circuit(dead_time_us=dead_time_us, on=0.05, off=0.06, leak_hz=5.0)
@@ -161,6 +168,7 @@ def test_dead_times_from_short_to_longer_than_the_intervals(dead_time_us):
 
 @pytest.mark.parametrize("drive", ["falls", "rests", "rises"])
 @pytest.mark.parametrize("leaks", [(5.0, 0.0), (0.0, 30.0), (40.0, 60.0)])
+@pytest.mark.quick_cases(1)
 def test_a_falling_signal_that_leak_brings_back(drive, leaks):
     """It dips to the lower level, and returns: fires where it is reached, not where it is missed.
 
@@ -189,6 +197,7 @@ def test_a_falling_signal_that_leak_brings_back(drive, leaks):
 
 @pytest.mark.parametrize("dead_time_us", [None, 900.0])
 @pytest.mark.parametrize("leaks", [(100.0, 0.0), (0.0, 100.0), (100.0, 300.0)])
+@pytest.mark.quick_cases(1)
 def test_leak_that_outruns_the_signal(dead_time_us, leaks):
     light = walks(21, 7, 20, steps=(0.01, 0.1, 0.4))
     circuit = Circuit(
@@ -220,6 +229,7 @@ BEYOND = {
 
 
 @pytest.mark.parametrize("name", BEYOND)
+@pytest.mark.quick_cases(1)
 def test_light_that_takes_pieces(name):
     circuit, options = BEYOND[name]
     light = walks(len(name), 8, 24, **options)
@@ -228,6 +238,7 @@ def test_light_that_takes_pieces(name):
 
 @pytest.mark.parametrize("dark_cutoff_hz", [5.0, 21.8])
 @pytest.mark.parametrize("leak_hz", [0.0, 10.0])
+@pytest.mark.quick_cases(1)
 def test_into_darkness_and_out_of_it(dark_cutoff_hz, leak_hz):
     light = walks(2, 9, 24, lo=0.2, hi=40.0)
     light[2, ::2] = light[5:7, ::3] = light[3:5, 1::4] = 0.0
@@ -236,6 +247,7 @@ def test_into_darkness_and_out_of_it(dark_cutoff_hz, leak_hz):
 
 
 @pytest.mark.parametrize("floor", [5.0, 0.1, 0.002])
+@pytest.mark.quick_cases(1)
 def test_the_floor_under_a_pure_logarithm(floor):
     light = walks(2, 9, 24, lo=0.5 * floor, hi=200.0, steps=(0.3, 2.0))
     light[3, ::3] = 0.0
@@ -280,6 +292,7 @@ def test_a_floor_below_a_thousandth():
     check(light, clock([20.0] * 5), circuit)
 
 
+@pytest.mark.thorough
 def test_leak_events_long_after_an_edge():
     """Default leak and dead time: after steps of three e-folds, the lag at the reset is rounded by
     some 1e-7, which a leak of 0.02 a second takes microseconds to cross, seconds later.

@@ -40,6 +40,7 @@ def one_by_one(light):
 
 
 @pytest.mark.parametrize("pixels", SIZES)
+@pytest.mark.quick_cases(1)
 def test_images_give_what_their_pixels_alone_give(pixels):
     assert np.abs(np.diff(np.log(CLIP), axis=0)).max() < LARGEST_STEP
     alone = one_by_one(CLIP)
@@ -51,6 +52,7 @@ def test_images_give_what_their_pixels_alone_give(pixels):
 
 
 @pytest.mark.parametrize("pixels", SIZES)
+@pytest.mark.quick_cases(1)
 def test_flashes_give_what_their_pixels_alone_give(pixels):
     clip = walks(7, len(CLIP), 13, lo=2.0, steps=(0.05, 0.5, 1.2))
     alone = one_by_one(clip)
@@ -71,6 +73,7 @@ def test_noise_does_not_depend_on_the_size_of_the_image():
         assert found.max_dt_us < LAST_BITS_US
 
 
+@pytest.mark.thorough
 def test_what_neighbours_do_does_not_count():
     """Each lane goes its own way, in whatever company: beside busy pixels, and beside resting ones.
 

@@ -32,6 +32,7 @@ def shot_candidates(pixels, rate_hz, seed, end_s):
 
 @pytest.mark.parametrize("dead_time_us", [None, 700.0, 9_000.0])
 @pytest.mark.parametrize("leak_hz", [0.0, 30.0])
+@pytest.mark.quick_cases(1)
 def test_shot_noise_at_500_hz_among_signal_events(dead_time_us, leak_hz):
     seed, rate_hz = 4, 500.0
     light, times = walks(31, 8, 20, lo=1.0), clock([4.0, 12.0, 1.0, 33.0, 4.0, 4.0, 33.0])

@@ -68,6 +68,7 @@ def events(light, times, pixel, seed, **options):
 
 
 @pytest.mark.parametrize("first", range(0, 60, 10))
+@pytest.mark.quick_cases(1)
 def test_in_lanes_as_in_steps_of_time(first, monkeypatch):
     count = 0
     for seed in range(first, first + 10):

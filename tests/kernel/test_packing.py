@@ -156,6 +156,7 @@ def test_the_largest_number_that_can_be_packed(t0):
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("times_ns", [[0, 1_000], [5_000_400, 9_167_066, 13_333_733]])
 @pytest.mark.parametrize("yielded", [1, 5_000, 1 << 20])
+@pytest.mark.quick_cases(1)
 def test_tiles_are_put_together_in_order(monkeypatch, threads, times_ns, yielded):
     """Bursts of several tiles at a few times: many ties, more events than are sorted at once."""
     monkeypatch.setattr(sorting, "_YIELDED", yielded)

@@ -78,6 +78,7 @@ def tables(rms=0.05, follower_hz=300.0, length=4000.0, step=0.1, level=0.2, whit
 
 
 @pytest.mark.parametrize("follower_hz", [0.0, 60.0, 300.0, 5000.0])
+@pytest.mark.quick_cases(1)
 def test_bridges_stay_within_their_bounds(follower_hz):
     """Of fifty thousand bridges of each corner none leaves its bounds."""
     noise, found, corners, samples, levels = tables(follower_hz=follower_hz)
@@ -310,6 +311,7 @@ def moving_texture(frames=30):
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.quick_cases(1)
 def test_noise_of_next_to_nothing_leaves_events_where_they_are(name):
     """Every pixel goes through the cells of its noise, and nothing but rounding moves."""
     stack, times = moving_texture()
@@ -359,6 +361,7 @@ def test_causes_of_events_beside_noise(follower_hz):
 
 
 @pytest.mark.parametrize("follower_hz", [None, 400.0])
+@pytest.mark.quick_cases(1)
 def test_as_many_events_beside_moving_light_as_in_steps_of_time(follower_hz):
     """Other draws of the same law: numbers agree within their spread over seeds, by polarity."""
     stack, times = moving_texture(20)

@@ -108,6 +108,7 @@ CIRCUITS = {
 @pytest.mark.parametrize("noise_hz", [0.0, 2.0])
 @pytest.mark.parametrize("jitter", [0.0, 0.1, 0.3])
 @pytest.mark.parametrize("circuit", CIRCUITS)
+@pytest.mark.quick_cases(1)
 def test_leak_goes_on_from_the_first_moment_as_later(circuit, jitter, noise_hz):
     """The camera has run before: no burst, no pause, and the rate that `characterise` expects."""
     dead_s = 2e-3

@@ -142,6 +142,7 @@ def strip(request):
     return Strip(seed, length, circuit, rows, x0, x1, *signal)
 
 
+@pytest.mark.quick_cases(1)
 def test_end_values(strip):
     circuit, rows, length, x0, x1 = (
         strip.circuit, strip.given.copy(), strip.length, strip.x0, strip.x1

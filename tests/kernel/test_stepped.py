@@ -95,6 +95,7 @@ def test_noise_events_and_leak_are_those_of_the_solved_path(name):
 
 
 @pytest.mark.parametrize("follower_hz", [None, 500.0])
+@pytest.mark.quick_cases(1)
 def test_photoreceptor_noise_moves_the_signal(follower_hz):
     """At rest the noise is known from its draws: a line between its knots, behind both poles."""
     pixels, seed, rms = 12, 4, 0.12
@@ -136,6 +137,7 @@ def test_photoreceptor_noise_moves_the_signal(follower_hz):
 
 @pytest.mark.parametrize("method", ["auto", "stepped"])
 @pytest.mark.parametrize("follower_hz", [None, 300.0])
+@pytest.mark.quick_cases(1)
 def test_photoreceptor_noise_makes_as_many_events_as_the_camera_has(follower_hz, method):
     follower = {"cutoff_hz": follower_hz} if follower_hz else None
     dead = {"period_us": 500.0}

@@ -49,6 +49,7 @@ DEAD = {"refractory": Refractory(period_us=900.0)}
 
 @pytest.mark.parametrize("per_s", [15.0, 40.0, 120.0])
 @pytest.mark.parametrize("follower_hz", [None, 250.0])
+@pytest.mark.quick_cases(1)
 def test_slew_limit(per_s, follower_hz):
     sections = {"slew_limit": SlewLimit(per_s=per_s)}
     if follower_hz:
@@ -76,6 +77,7 @@ def test_slew_limit_holds_for_the_stepped_forms_too():
 
 @pytest.mark.parametrize("fraction", [-0.3, 0.15, 0.4])
 @pytest.mark.parametrize("dead_us", [None, 900.0])
+@pytest.mark.quick_cases(1)
 def test_reset_overshoot_and_noise_events(fraction, dead_us):
     noise = [(0.0031, 2, 1), (0.00312, 2, -1), (0.02004, 7, -1), (0.0391, 2, -1)]
     sections = {"reset_overshoot": ResetOvershoot(fraction=fraction)}
@@ -97,6 +99,7 @@ def test_reset_overshoot_and_noise_events(fraction, dead_us):
 
 
 @pytest.mark.parametrize("per_s", [-8.0, 6.0])
+@pytest.mark.quick_cases(1)
 def test_threshold_drift(per_s):
     thresholds = Thresholds(on=0.2, off=0.15, mismatch=0.0, drift_per_s=per_s)
     found = solve(LIGHT, TIMES, pixel(thresholds=thresholds, **DEAD))
@@ -117,6 +120,7 @@ def wave(share, frequency):
 
 
 @pytest.mark.parametrize("wide", [False, True])
+@pytest.mark.quick_cases(1)
 def test_drive_signal_and_thresholds_that_change(wide):
     """Courses for all pixels alike, and one a pixel."""
     shape = np.linspace(0.5, 1.5, LIGHT.shape[1]) if wide else np.ones(1)

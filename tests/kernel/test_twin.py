@@ -108,6 +108,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("interval_s", [1 / 240, 1 / 1000])
+@pytest.mark.quick_cases(1)
 def test_exact_and_in_steps_of_time(name, interval_s):
     sections, circuit = CASES[name]
     light = moving_light(14, 32, seed=len(name))
@@ -124,6 +125,7 @@ def test_stepped_forms_behind_a_second_pole_from_rest(update):
 
 
 @pytest.mark.parametrize("L", [1, 10])
+@pytest.mark.thorough
 def test_exact_with_the_printed_last_interval(L):
     light = moving_light(21, 8, seed=4, step=0.1)
     circuit = Circuit(K=4, L=L, printed_last_interval=True)

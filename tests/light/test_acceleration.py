@@ -184,6 +184,7 @@ def test_motion_is_found_once_for_each_pair(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", range(8))
+@pytest.mark.quick_cases(1)
 def test_no_path_is_faster_than_the_fastest(seed):
     rng = np.random.default_rng(seed)
     u, v, p, q, j, k = rng.normal(0.0, 3.0, (6, *SHAPE)).astype(np.float32)

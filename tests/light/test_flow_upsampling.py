@@ -174,6 +174,7 @@ def test_threads_and_order_of_pairs_change_nothing():
             assert np.array_equal(one, two)
 
 
+@pytest.mark.thorough
 def test_double_precision_is_kept():
     a, b = pan(0.0).astype(np.float64), pan(1.0).astype(np.float64)
     single = made(a.astype(np.float32), b.astype(np.float32), L=2)[0]

@@ -284,6 +284,7 @@ def test_a_generator_that_reuses_its_buffer_gives_the_same_events(interpolation,
 @pytest.mark.parametrize("L", [1, 3, 10])
 @pytest.mark.parametrize("printed", [False, True])
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+@pytest.mark.quick_cases(1)
 def test_events_do_not_depend_on_the_parts(monkeypatch, L, printed, dtype):
     frames, times = clip(12, dtype, (6, 9)), 1e-9 * np.array(clock(12))
     config = Config(

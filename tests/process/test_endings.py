@@ -38,6 +38,7 @@ def is_long(path):
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("threads", ["1", "2"])
 @pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
+@pytest.mark.thorough
 def test_a_signal_ends_a_conversion_without_a_trace(long_stack, tmp_path, name, status, threads):
     target = tmp_path / "results"
     target.mkdir()
@@ -52,6 +53,7 @@ def test_a_signal_ends_a_conversion_without_a_trace(long_stack, tmp_path, name, 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("name", ["out.h5", "out"])
+@pytest.mark.thorough
 def test_what_a_killed_conversion_left_goes_with_the_next(adv2e, long_stack, tmp_path, name):
     target = tmp_path / "results"
     (target / "sub").mkdir(parents=True)
@@ -80,6 +82,7 @@ def is_written(target):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("threads", ["1", "2"])
+@pytest.mark.quick_cases(1)
 def test_a_signal_ends_a_conversion_in_the_midst_of_compiled_code(tmp_path, threads):
     """Frames half a minute apart: each call makes millions of leak events."""
     stack, times = tmp_path / "stack.npy", tmp_path / "times.txt"
@@ -102,6 +105,7 @@ def test_a_signal_ends_a_conversion_in_the_midst_of_compiled_code(tmp_path, thre
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.thorough
 def test_an_interrupt_ends_a_conversion_whose_reader_has_stopped_reading(long_stack):
     with started(long_stack, "-") as process:
         assert process.stdout.read(100).startswith(b"0.0")
@@ -111,6 +115,7 @@ def test_an_interrupt_ends_a_conversion_whose_reader_has_stopped_reading(long_st
 
 
 @pytest.mark.parametrize("name", ["out.txt", "out.h5", "out.zip", "out"])
+@pytest.mark.thorough
 def test_a_full_disk_ends_a_conversion_at_once(long_stack, tmp_path, name):
     resource = pytest.importorskip("resource")
     target = tmp_path / "results"

@@ -70,6 +70,7 @@ def test_an_image_for_which_memory_is_short(monkeypatch):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems limit memory otherwise")
 @pytest.mark.parametrize("mib", [60, 150, 220, 400])
+@pytest.mark.quick_cases(1)
 def test_a_limit_on_memory(tmp_path, mib):
     np.save(tmp_path / "s.npy", np.zeros((3, 4, 5), np.uint8))
     (tmp_path / "e.txt").write_text("0.1 1 1 1\n0.2 2 2 0\n")

@@ -25,6 +25,7 @@ def make(path, *, frames=True, **more):
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".webm", ".avi", ".gif", ".png"])
+@pytest.mark.thorough
 def test_only_the_finished_file_is_left(tmp_path, suffix):
     path = tmp_path / f"view{suffix}"
     make(path)
@@ -53,6 +54,7 @@ for limit in [size - 1, *(size * k // steps for k in range(steps))]:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs resource limits")
 @pytest.mark.parametrize("name", ["view.mp4", "view.webm", "v.avi", "v.gif", "v.png"])
+@pytest.mark.quick_cases(1)
 def test_a_full_disk_is_told_with_the_name_of_the_file(tmp_path, name):
     path = tmp_path / name
     steps = 1 if path.suffix == ".gif" else 24

@@ -61,6 +61,7 @@ def pieces(draw):
     st.sampled_from([1, 10_000, 33_333]),
     st.booleans(),
 )
+@pytest.mark.thorough
 def test_pieces_in_any_order(made, name, with_frames, window_us, told):
     events, frames, parts, order = made
     if not frames:
@@ -109,6 +110,7 @@ SETTINGS = {
 
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("sets", SETTINGS.values(), ids=SETTINGS.keys())
+@pytest.mark.quick_cases(1)
 def test_preview_of_a_conversion_is_what_render_makes_of_its_file(clip, tmp_path, sets, threads):
     for target, preview in (("out.zip", "film.avi"), ("out.h5", "sheet.png")):
         output, made, expected = (tmp_path / name for name in (target, preview, "_" + preview))

@@ -148,6 +148,7 @@ _KEYS = st.text(max_size=20) | st.sampled_from(["on", "off", "yes", "n", "null",
         max_size=4,
     )
 )
+@pytest.mark.thorough
 def test_readers_of_either_version_of_yaml_read_what_was_written(model):
     text = model_text(replace(everything(), model=model))
     assert yaml.safe_load(text) == model

@@ -362,6 +362,7 @@ def test_totals_come_before_all_other_numbers():
     assert text.index(row) < text.index("What to do next")
 
 
+@pytest.mark.thorough
 def test_maps_of_usual_sensors_keep_the_page_small():
     draws = np.random.default_rng(5).normal(size=(2, 260, 346))
     maps = [ResidualMap("m", *draws), ResidualMap("n", *draws[::-1])]

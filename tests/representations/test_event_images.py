@@ -33,6 +33,7 @@ def slow_image(events, window, scale=True):
 
 
 @pytest.mark.parametrize("scale", [True, False])
+@pytest.mark.quick_cases(1)
 def test_channels_are_those_of_the_definition(events, scale):
     window = 0, 100_001
     found = event_image(events, SIZE, window, scale_counts=scale)

@@ -131,6 +131,7 @@ def test_recording_as_folder_and_zip(write_images, picture, odd):
 
 
 @pytest.mark.parametrize("suffix", ["txt", "h5", "npz"])
+@pytest.mark.quick_cases(1)
 def test_events(adv2e, odd, tmp_path, suffix):
     stack = np.repeat(np.arange(0, 250, 50, dtype=np.uint8), 16).reshape(5, 4, 4)
     np.save(tmp_path / "stack.npy", stack)
@@ -166,6 +167,7 @@ def test_conversion_gives_the_same_events_and_stores_a_name(adv2e, write_video, 
 
 
 @pytest.mark.parametrize("environment", [{"PYTHONIOENCODING": "ascii"}, {}])
+@pytest.mark.quick_cases(1)
 def test_messages_are_one_line_in_any_locale(tmp_path, environment):
     names = [tmp_path / f"{name}.mp4" for name in NAMES[5:12]]
     code = """if True:

@@ -141,6 +141,7 @@ def test_every_command_has_the_option(adv2e, tmp_path, monkeypatch, command, opt
     assert adv2e(*command, option, "").status == 2
 
 
+@pytest.mark.thorough
 def test_a_batch_has_one_rule_for_all(adv2e, tmp_path):
     for name in ("a", "b"):
         (tmp_path / "in" / name).mkdir(parents=True)

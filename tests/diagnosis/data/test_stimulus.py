@@ -168,6 +168,7 @@ def test_events_of_unknown_light_are_refused(table, recording, span):
         read_known_light(recording(*span), path)
 
 
+@pytest.mark.thorough
 def test_of_too_many_pixels_some_in_even_distances_are_kept(table, recording, monkeypatch):
     path = table("time_s,light_dn\n0,20\n0.5,60\n")
     evidence = read_known_light(recording(0, 499_999, Size(200, 120), 300_000), path)

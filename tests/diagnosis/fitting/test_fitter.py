@@ -70,6 +70,7 @@ def test_a_fit_sees_its_view_only(view):
     assert fit.config.pixel.leak.rate_hz == pytest.approx(3.0, rel=0.15)
 
 
+@pytest.mark.thorough
 def test_the_covariance_is_that_of_repeated_draws():
     sampler = MadeUpSampler()
     truth = load_config([], ["pixel.thresholds.on=0.25", "pixel.thresholds.off=0.22"])
@@ -91,6 +92,7 @@ def test_the_covariance_is_that_of_repeated_draws():
     assert np.all(np.abs(off) < 4 * stated / np.sqrt(40))
 
 
+@pytest.mark.thorough
 def test_the_covariance_of_simulations_does_not_depend_on_weights():
     """Chance moves statistics together, and by twice as much as they are weighed by."""
     pattern = MadeUpSampler().patterns["pixel.thresholds.on"]

@@ -36,6 +36,7 @@ def rounds(count, seeds=6):
 
 
 @pytest.mark.parametrize("alike", [0.0, 0.9])
+@pytest.mark.thorough
 def test_where_simulations_leap_the_end_of_a_fit_and_its_covariance_are_right(alike):
     """Two parameters, the one of which can be taken for the other in nine parts of ten."""
     sampler = LeapingLaboratory()

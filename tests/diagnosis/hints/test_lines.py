@@ -24,6 +24,7 @@ def seen_at(fps, seconds):
 @pytest.mark.parametrize(
     ("hz", "fps"), [(100.0, 23.7), (100.0, 25.0), (100.0, 50.0), (120.0, 24.0), (120.0, 30.0)]
 )
+@pytest.mark.quick_cases(1)
 def test_lamps_are_found_whatever_the_frame_rate(hz, fps):
     pilot = [random_stream(8000, seed, stop_us=1_000_000) for seed in range(8)]
     found = strongest_lines(lit(hz, 1.0, 3), pilot, seen_at(fps, 1.0))
@@ -64,6 +65,7 @@ def test_lines_of_short_recordings_are_frequencies(frames):
 
 
 @pytest.mark.parametrize("fps", [1.0, 2.0, 3.0])
+@pytest.mark.thorough
 def test_recordings_with_few_frames_a_second_have_no_wrong_lines(fps):
     pilot = [random_stream(8000, seed, stop_us=4_000_000) for seed in range(8)]
     scene = seen_at(fps, 4.0)

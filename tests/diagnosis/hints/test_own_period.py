@@ -41,6 +41,7 @@ def frames(start_s=0.0, interval_us=2000.0):
     ("period_us", "delay_us", "start_s"),
     [(40_000.0, 13_310.0, 0.0), (33_333.3, 7100.0, 3.0), (16_683.3, 16_600.0, 60.0)],
 )
+@pytest.mark.quick_cases(1)
 def test_period_and_begin_are_read_off_with_how_well_they_are_known(period_us, delay_us, start_s):
     inside = []
     for seed in range(10):

@@ -37,6 +37,7 @@ def events(on_us=None, off_us=None, interval_us=INTERVAL_US, burst=60, seed=1):
 @pytest.mark.parametrize(
     ("on_us", "off_us"), [(700.0, 1900.0), (39_600.0, 550.0), (27_300.0, 14_100.0)]
 )
+@pytest.mark.quick_cases(1)
 def test_when_both_bursts_begin(on_us, off_us):
     found = pulse_of(events(on_us, off_us), TIMES_S)
     assert found.on.begins_us == pytest.approx(on_us, abs=110.0)
@@ -47,6 +48,7 @@ def test_when_both_bursts_begin(on_us, off_us):
 
 
 @pytest.mark.parametrize("on_us", [39_990.0, 85.0, 160.0])
+@pytest.mark.quick_cases(1)
 def test_sharp_bursts_over_the_border_of_a_bin_are_no_drift(on_us):
     draw = np.random.default_rng(1)
     quiet, count = events(), 19 * 100
@@ -61,6 +63,7 @@ def test_sharp_bursts_over_the_border_of_a_bin_are_no_drift(on_us):
 
 
 @pytest.mark.parametrize("ppm", [-6400.0, 900.0, 15_000.0])
+@pytest.mark.quick_cases(1)
 def test_bursts_tell_how_fast_the_clock_of_the_frames_is(ppm):
     found = pulse_of(events(3000.0, 9000.0, INTERVAL_US * (1.0 + 1e-6 * ppm)), TIMES_S)
     assert found.drift_ppm == pytest.approx(ppm, abs=80.0)
@@ -69,6 +72,7 @@ def test_bursts_tell_how_fast_the_clock_of_the_frames_is(ppm):
 
 
 @pytest.mark.parametrize(("fps", "rounded_us"), [(60.0, 100.0), (30.0, 1.0), (24.0, 200.0)])
+@pytest.mark.quick_cases(1)
 def test_stamps_that_are_rounded_are_no_drift(fps, rounded_us):
     """Their usual interval is not their mean one."""
     draw = np.random.default_rng(6)
@@ -84,6 +88,7 @@ def test_stamps_that_are_rounded_are_no_drift(fps, rounded_us):
 
 
 @pytest.mark.parametrize("ppm", [0.0, 40.0, -5000.0])
+@pytest.mark.quick_cases(1)
 def test_long_recordings_tell_more_of_the_clock(ppm):
     draw = np.random.default_rng(4)
     interval, count = INTERVAL_US * (1.0 + 1e-6 * ppm), 500
@@ -110,6 +115,7 @@ def test_long_recordings_tell_more_of_the_clock(ppm):
     ],
     ids=["none", "on alone", "off alone", "few", "irregular", "two frames"],
 )
+@pytest.mark.quick_cases(1)
 def test_no_pulse(stream, times_s):
     assert pulse_of(stream, times_s) is None
 
@@ -127,6 +133,7 @@ ON, OFF = Burst(39_600.0, 300.0, 0.124), Burst(600.0, 900.0, 0.09)
 
 
 @pytest.mark.parametrize("tick_us", [INTERVAL_US, 0.5 * INTERVAL_US, 0.1 * INTERVAL_US])
+@pytest.mark.quick_cases(1)
 def test_coarse_stamps_are_no_pulse(tick_us):
     quiet = events()
     t = (quiet.t // tick_us * tick_us).astype(np.int64)

@@ -103,6 +103,7 @@ def test_statistics_alone_are_no_explanation():
     assert verdict_of(outcome, error(0.45, 0.38, 0.42)) == "explained"
 
 
+@pytest.mark.thorough
 def test_what_was_not_added_is_told_with_the_share_that_it_explains():
     search, outcome = searched(["pixel.leak.rate_hz=4"], beyond=outside(8.0))
     given = rejected_of(search.reference, outcome, search.declared, candidates())

@@ -27,6 +27,7 @@ def test_chance_alone_gains_less_than_it_may():
 
 @pytest.mark.parametrize("misfit", [0.0, 10.0, 30.0])
 @pytest.mark.parametrize("shared", [0, 32])
+@pytest.mark.quick_cases(1)
 def test_a_model_that_does_nothing_gains_what_chance_may(misfit, shared):
     """Also where much is left, which multiplies the chance of the simulations."""
     draw = np.random.default_rng([int(misfit), shared])

@@ -54,6 +54,7 @@ def test_an_effect_that_would_be_turned_round_makes_no_pair():
     assert {"leak", "shot_noise"} not in found
 
 
+@pytest.mark.thorough
 def test_two_effects_are_found_where_neither_gains_alone(nothing_holds_alone):
     told = []
     _, outcome = searched(BOTH_MISSING, log=told.append)
@@ -68,6 +69,7 @@ def test_two_effects_are_found_where_neither_gains_alone(nothing_holds_alone):
     assert {"leak", "shot_noise"} <= set(outcome.rejected)
 
 
+@pytest.mark.thorough
 def test_two_that_do_as_well_are_alternatives(nothing_holds_alone):
     sampler = MadeUpSampler(alike={"pixel.leak.rate_hz": "pixel.shot_noise.rate_hz"})
     truth = ["pixel.refractory.period_us=3000", "pixel.leak.rate_hz=4"]

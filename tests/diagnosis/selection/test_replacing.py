@@ -36,6 +36,7 @@ def sampler_with_a_mixture():
     return sampler
 
 
+@pytest.mark.thorough
 def test_another_takes_the_place_of_what_stood_for_two():
     sampler = sampler_with_a_mixture()
     observed = sampler.measure(load_config([], PAIR), RECORDING)
@@ -54,6 +55,7 @@ def test_another_takes_the_place_of_what_stood_for_two():
     assert told[-1] == "replaced event_loss by refractory"
 
 
+@pytest.mark.thorough
 def test_nothing_takes_the_place_of_what_is_missing_beside_something_unknown():
     """Nor does the attempt change why other effects were not added."""
     sampler = MadeUpSampler(strength=60.0)
@@ -67,6 +69,7 @@ def test_nothing_takes_the_place_of_what_is_missing_beside_something_unknown():
     assert search.reference.rejections.held == held
 
 
+@pytest.mark.thorough
 def test_the_search_goes_on_from_what_was_replaced(monkeypatch):
     """Beside the mixture, only dead time is good enough to be added."""
     refused = ["something else stands out"]

@@ -116,6 +116,7 @@ def test_what_no_effect_makes_is_not_explained():
     assert set(outcome.rejected) | set(outcome.state.names) == set(EFFECTS)
 
 
+@pytest.mark.thorough
 def test_patches_on_something_unknown_are_not_laid_one_on_another(monkeypatch):
     monkeypatch.setattr(joint_fits_module, "objections", lambda *of_what: [])
     told = []
@@ -150,6 +151,7 @@ def test_an_effect_beside_something_unknown_is_a_part():
     assert verdict_of(outcome, error(math.nan, math.nan, math.nan)) == "partly_explained"
 
 
+@pytest.mark.thorough
 def test_what_cannot_be_undone_in_full_leaves_more_that_is_put_down_to_the_fit():
     library = [
         dataclasses.replace(one, left=0.2 if one.name == "refractory" else one.left)
@@ -165,6 +167,7 @@ def test_what_cannot_be_undone_in_full_leaves_more_that_is_put_down_to_the_fit()
     assert verdict_of(outcome, GONE) != "explained"
 
 
+@pytest.mark.thorough
 def test_a_small_effect_beside_a_large_one_is_found():
     """It is less than what a fit may leave, but no fit leaves it."""
     truth = ["pixel.refractory.period_us=8000", "pixel.leak.rate_hz=0.3"]
@@ -178,6 +181,7 @@ def test_a_small_effect_beside_a_large_one_is_found():
 
 
 @pytest.mark.parametrize(("rate", "size"), [(0.1, 12.0), (0.17, 11.0)])
+@pytest.mark.quick_cases(1)
 def test_what_a_fit_may_leave_is_given_no_name_but_that_of_most_of_it(rate, size):
     truth = ["pixel.refractory.period_us=8000", f"pixel.leak.rate_hz={rate}"]
     told = []
@@ -334,6 +338,7 @@ def test_the_same_recording_has_the_same_result():
     assert one.rejected == two.rejected
 
 
+@pytest.mark.thorough
 def test_two_effects_that_hide_one_another_are_found_together():
     """Alone, either leaves so much of the other that what it changes most stands out."""
     sampler = MadeUpSampler(strength=60.0)

@@ -63,6 +63,7 @@ def all_before(first):
 
 
 @pytest.mark.parametrize("sets", [["frames.exposure_us=4000"], ["sampling.interpolation=flow"]])
+@pytest.mark.quick_cases(1)
 def test_a_coupling_of_nothing_takes_no_steps_of_time(simulator, monkeypatch, sets):
     config = load_config([], [*LINEAR, *sets])
     nothing = "readout.frame_coupling={amplitude: 0, tau_us: 300}"
@@ -219,6 +220,7 @@ UNEVEN = ["sampling.max_motion_px=0.7"]
         [*UNEVEN, "frames.exposure_us=6000"],
     ],
 )
+@pytest.mark.quick_cases(1)
 def test_frames_along_the_motion_are_made_once_and_the_same(monkeypatch, exposed):
     made = []
     monkeypatch.setattr(
@@ -304,6 +306,7 @@ def test_where_nothing_is_between_the_frames_they_are_the_recorded_ones(simulato
 
 @pytest.mark.parametrize("phase", [-2.0, 0.3, 2.9])
 @pytest.mark.parametrize("line_hz", [85.0, 84.5, 85.6])
+@pytest.mark.quick_cases(1)
 def test_phase_and_frequency_of_a_lamp_are_read_off_the_events(line_hz, phase):
     frames = [np.full((24, 32), 40 + 5 * k, np.uint8) for k in range(21)]
     evidence = Evidence("made up", frames, 0.01 * np.arange(21), random_stream(10), 32, 24)

@@ -71,6 +71,7 @@ def test_too_few_frames_tell_nothing():
     assert between_frames(Pilot(evidence, DECLARED, None, {}, none)) is None
 
 
+@pytest.mark.thorough
 def test_frames_that_are_left_out_were_read_out_all_the_same():
     """Of a scene at rest nothing hangs on what is between the frames, leaps at each or not."""
     light = np.repeat(wandering_light(frames=1).astype(np.float32), 41, axis=0)

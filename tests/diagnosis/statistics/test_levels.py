@@ -41,6 +41,7 @@ def pilot_of(evidence, declared):
     return Pilot(evidence, declared, statistics, streams, lambda made: Simulator(made, 2))
 
 
+@pytest.mark.thorough
 def test_the_doubt_covers_what_8_bits_change(recorded):
     """What they change is told by the same camera's frames of 16 bits, which see the same light."""
     pilot = pilot_of(*of_8_bits(recorded))

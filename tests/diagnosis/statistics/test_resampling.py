@@ -51,6 +51,7 @@ def test_whole_pixels_are_shifted_without_error(recorded):
         assert resampling.error(shifted(recorded, *shift)) is None
 
 
+@pytest.mark.thorough
 def test_shifts_that_hardly_differ_have_the_same_error(recorded):
     resampling = Resampling(recorded.sampler, recorded.declared)
     one = resampling.error(shifted(recorded, 0.3, 0.0))
@@ -59,6 +60,7 @@ def test_shifts_that_hardly_differ_have_the_same_error(recorded):
     assert np.abs(other.bias).sum() > np.abs(one.bias).sum() > 0.0
 
 
+@pytest.mark.thorough
 def test_a_declared_shift_is_not_moved_there_and_back(recorded):
     """What it takes from the frames is the same wherever they are."""
     moved = shifted(recorded, *SHIFT)

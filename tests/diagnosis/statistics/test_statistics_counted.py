@@ -4,6 +4,7 @@ import bisect
 import itertools
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from made_up.streams import HEIGHT, STOP_US, WIDTH, placed, some_scene, streams
 
@@ -129,6 +130,7 @@ def test_runs(stream):
 
 @several
 @given(streams())
+@pytest.mark.thorough
 def test_lag(stream):
     where = placed(stream, SCENE)
     number, sums = np.zeros((PARTS, 3)), np.zeros((PARTS, len(timing.LAGS_MS), 3))

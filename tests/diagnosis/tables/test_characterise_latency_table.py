@@ -99,6 +99,7 @@ def test_nothing_missing_is_consistent():
     assert found.nuisances["pixel.low_pass.cutoff_hz"] == pytest.approx(CUTOFF_HZ, rel=0.03)
 
 
+@pytest.mark.thorough
 def test_a_second_pole_is_named_with_its_corner():
     found = verdict_of(table([ode_latency_us(e, follower_hz=800.0) for e in LIGHT]))
     (effect,) = found.effects
@@ -115,6 +116,7 @@ def test_a_dark_corner_is_a_dark_current_or_a_corner_in_the_dark():
     assert {effect.name for effect in found.effects} <= {"low_pass", "dark_current"}
 
 
+@pytest.mark.thorough
 def test_a_slew_limit_shows_in_steps_of_several_sizes():
     steps = np.repeat([0.5, 1.0, 3.0], LIGHT.size)
     light = np.tile(LIGHT, 3)
@@ -150,11 +152,13 @@ def test_a_declared_corner_that_is_wrong_is_a_finding():
     assert value == pytest.approx(CUTOFF_HZ, rel=0.05)
 
 
+@pytest.mark.thorough
 def test_the_same_seed_gives_the_same_report():
     measured = table([ode_latency_us(e, follower_hz=800.0) for e in LIGHT])
     assert verdict_of(measured, seed=4).effects == verdict_of(measured, seed=4).effects
 
 
+@pytest.mark.thorough
 def test_the_command_writes_a_report_and_a_model_that_loads(tmp_path):
     light = np.tile(LIGHT, 2)
     latency = [ode_latency_us(e, follower_hz=800.0) for e in light]
@@ -309,11 +313,13 @@ def test_errors_may_be_in_another_unit_than_latencies(unit, factor):
     np.testing.assert_allclose(held.error, 0.03, rtol=1e-6)
 
 
+@pytest.mark.thorough
 def test_an_offset_beyond_all_latencies_is_no_crash():
     found = verdict_of(table([ode_latency_us(e) for e in LIGHT]), ["frames.clock_offset_us=-99999"])
     assert np.isfinite(found.errors[0].before.value)
 
 
+@pytest.mark.thorough
 def test_two_keys_of_one_effect_are_one_finding():
     latency = [ode_latency_us(e, dark_hz=200.0) for e in LIGHT]
     sets = ["pixel.low_pass.cutoff_hz=300", "pixel.low_pass.dark_cutoff_hz=5"]

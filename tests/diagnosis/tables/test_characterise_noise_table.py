@@ -95,6 +95,7 @@ def test_nothing_missing_is_consistent():
         ("shot_noise", 1.0 - 0.75 * LUX / 1000, 1.0 - 0.75 * LUX / 1000),
     ],
 )
+@pytest.mark.quick_cases(1)
 def test_the_effect_is_named_with_its_rate(name, on, off):
     found = verdict_of(table(on, off, on_median=on))
     assert [effect.name for effect in found.effects] == [name]
@@ -152,6 +153,7 @@ def test_a_share_needs_the_length_of_the_recording():
         verdict_of(parse_table(text, "noise.csv"))
 
 
+@pytest.mark.thorough
 def test_a_share_counts_as_the_rate_that_gives_it():
     share = 1.0 - (1.0 - 0.6) * np.ones(5)
     measured = table(np.full(5, 0.012), np.zeros(5), on_share=share)
@@ -162,6 +164,7 @@ def test_a_share_counts_as_the_rate_that_gives_it():
 
 
 @pytest.mark.parametrize("seconds", [0.5, 2.0, 20.0])
+@pytest.mark.quick_cases(1)
 def test_medians_of_few_events_are_those_of_whole_numbers(seconds):
     rng = np.random.default_rng(1)
     shot = 0.5 * (1.0 - 0.75 * LUX / 1000)

@@ -59,6 +59,7 @@ def test_noise_behind_a_second_pole_is_found_and_predicts_light_held_out():
         assert selector.fitted((by_name[name],)).error > 5.0 * floor
 
 
+@pytest.mark.thorough
 def test_hot_pixels_that_are_spread_are_named():
     known = [*KNOWN, "pixel.photoreceptor_noise=null", "pixel.shot_noise.rate_hz=0.2"]
     sources = NoisySources(

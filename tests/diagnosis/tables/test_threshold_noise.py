@@ -64,6 +64,7 @@ def simulated(sources: NoisySources, seconds: float, seed: int = 1) -> np.ndarra
     ],
     ids=["first pole slower", "dim", "second pole slower"],
 )  # fmt: skip
+@pytest.mark.quick_cases(1)
 def test_rates_behind_two_poles_are_those_of_our_pixel(sources):
     seconds = 8.0
     off, on = simulated(sources, seconds).mean(axis=1) / (0.5 * seconds)
@@ -137,6 +138,7 @@ def test_rates_over_the_pixels_are_those_of_our_pixels():
     ],
     ids=["one pole", "two poles, thresholds nearly equal", "long dead time"],
 )  # fmt: skip
+@pytest.mark.quick_cases(1)
 def test_equal_thresholds_lead_back_to_where_the_last_event_began(sources):
     seconds = 6.0
     off, on = simulated(sources, seconds).mean(axis=1) / (0.5 * seconds)
@@ -145,6 +147,7 @@ def test_equal_thresholds_lead_back_to_where_the_last_event_began(sources):
     assert rates.off_mean[0] == pytest.approx(off, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_the_most_sensitive_pixels_are_in_the_mean():
     """Thresholds that differ by 22 %: one pixel in a thousand has most of the events."""
     sources = NoisySources(
@@ -165,6 +168,7 @@ def test_the_most_sensitive_pixels_are_in_the_mean():
     assert rates.on[0] < 0.01 * rates.on_mean[0]
 
 
+@pytest.mark.thorough
 def test_a_mean_over_few_pixels_is_that_of_their_own_thresholds():
     """In the bright few pixels have all events, and how many of them there are is chance."""
     sources = NoisySources(

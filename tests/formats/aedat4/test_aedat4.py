@@ -330,6 +330,7 @@ def good(tmp_path_factory):
 
 @settings(max_examples=200, deadline=None)
 @given(data=st.data())
+@pytest.mark.thorough
 def test_damaged_files(good, data):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "a.aedat4")
@@ -337,6 +338,7 @@ def test_damaged_files(good, data):
         read_or_refused(path, 1000)
 
 
+@pytest.mark.thorough
 def test_parts_are_bounded(tmp_path):
     events = many(2_500_000)
 

@@ -514,6 +514,7 @@ def test_what_else_a_bag_holds_is_named(tmp_path):
         read_events(tmp_path / "o.bag")
 
 
+@pytest.mark.thorough
 def test_a_chunk_that_fills_the_memory(tmp_path):
     path = tmp_path / "o.bag"
     with Bag(path, compression=rosbag1.Writer.CompressionFormat.BZ2) as bag:
@@ -547,6 +548,7 @@ def good(tmp_path_factory):
 @pytest.mark.parametrize("suffix", [".bag", ".mcap"])
 @settings(max_examples=200, deadline=None)
 @given(data=st.data())
+@pytest.mark.quick_cases(1)
 def test_damaged_bags(good, suffix, data):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, f"a{suffix}")

@@ -122,6 +122,7 @@ def random_decimals(count):
         yield rng.choice(["", "-", "+"]) + number + (exponent if rng.random() < 0.5 else "")
 
 
+@pytest.mark.thorough
 def test_times_agree_with_exact_decimal_arithmetic():
     for text in random_decimals(2000):
         exact = Decimal(text) * 1_000_000
@@ -227,6 +228,7 @@ def test_broken_metadata_are_a_problem_not_an_error(tmp_path):
     st.booleans(),
     st.integers(0, 6),
 )
+@pytest.mark.thorough
 def test_lines_written_plainly_are_read_as_all_others(rows, point, decimals):
     lines = [
         f"{whole}.{part} {x} {y} {p}" if point else f"{whole} {x} {y} {p}"

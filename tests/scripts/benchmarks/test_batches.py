@@ -8,6 +8,7 @@ from benchmarks import batches
 from click.testing import CliRunner
 
 
+@pytest.mark.thorough
 def test_all_ways_are_measured(tmp_path, monkeypatch):
     monkeypatch.setattr(batches, "QUICK_CLIPS", 1)
     monkeypatch.setattr(batches, "FRAMES", 3)

@@ -79,6 +79,7 @@ def test_a_stored_clip_is_not_made_again(tmp_path):
 # Processes ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_a_process_reports_what_it_ran(small):
     job = ideal_job(small, frames=9)
     report = measure.run_job(job).report

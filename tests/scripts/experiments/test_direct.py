@@ -161,6 +161,7 @@ def test_other_simulators_come_by_file_and_have_no_floor(recording, tmp_path):
     assert numbers["waves: thresholds as shipped"]["theirs †"]["distances"]["error"] == 0.0
 
 
+@pytest.mark.thorough
 def test_what_was_not_recorded_is_not_compared(tmp_path):
     events = events_of(TRUTH)
     events = events[(events["t"] < 45_000) | (events["t"] >= 70_000)]

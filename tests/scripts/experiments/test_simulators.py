@@ -148,6 +148,7 @@ def test_passage_times_without_drift_are_levy():
 
 @pytest.mark.parametrize("drift", [-3e-3, -2e-4, 0.0, 1e-4, 2e-3])
 @pytest.mark.parametrize(("up", "down"), [(1.0, 1.0), (0.4, 1.6)])
+@pytest.mark.thorough
 def test_the_chance_of_on_and_its_times_are_those_of_a_walk_in_small_steps(drift, up, down):
     deviation, paths, step = 0.03, 4_000, 0.25
     rng = np.random.default_rng(3)

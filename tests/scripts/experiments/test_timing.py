@@ -116,6 +116,7 @@ def test_light_is_half_way_at_the_passage_and_rests_after_the_stop():
     )
 
 
+@pytest.mark.thorough
 def test_the_dense_truth_is_the_filter_integrated_step_by_step(monkeypatch):
     """A column that the edge passes, and one at which it stops, by Euler steps of 1 us."""
     monkeypatch.setattr(truth, "MISMATCH", 0.0)
@@ -149,6 +150,7 @@ def test_the_camera_sees_the_edges_and_its_pixel_can_be_told():
     assert pixel.dark_current.dn == 3.0
 
 
+@pytest.mark.thorough
 def test_a_filter_is_nearer_to_the_dim_truth_than_none():
     tell = []
     simulators = named(["ideal", "adv2e"], sets=["pixel.log_response.linear_below=0"])

@@ -142,6 +142,7 @@ def test_what_goes_wrong_is_part_of_the_line(monkeypatch):
     json.dumps(line)
 
 
+@pytest.mark.thorough
 def test_a_recording_is_kept_as_the_study_makes_it(tmp_path):
     path = tmp_path / "new" / "echo.zip"
     options = ["--seed", "2", "--size", "16x12", "--seconds", "0.1", "--effect-size", "large"]
@@ -179,6 +180,7 @@ def test_a_recording_that_cannot_be_kept_is_told(name, effects, message, tmp_pat
     assert all(one.read_bytes() == b"mine" for one in held)
 
 
+@pytest.mark.thorough
 def test_of_a_known_light_the_table_is_what_the_pixels_saw_by_its_clock(tmp_path):
     setup = study_run.Setup(8, 8, 0.5, known_light=True)
     path = tmp_path / "one.zip"

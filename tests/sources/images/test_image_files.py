@@ -315,6 +315,7 @@ def stack(tmp_path, *values, dtype=np.uint16):
         ((0.1, 0.5, 0.1), np.float32, None),
     ],
 )
+@pytest.mark.quick_cases(1)
 def test_whole_numbers_far_below_white_are_told_with_the_key(adv2e, tmp_path, values, dtype, key):
     source = stack(tmp_path, *values, dtype=dtype)
     told = ("--fps", "50", "-o", tmp_path / "a.h5", "--overwrite")

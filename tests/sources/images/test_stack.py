@@ -206,6 +206,7 @@ WHOLE.append(tiff([RAMP] * 3, description=b"ImageJ=1\nimages=3\n\0", directories
     st.lists(st.tuples(st.floats(0, 0.999), st.sampled_from([0, 1, 2, 255])), max_size=6),
     st.floats(0.5, 1.5),
 )
+@pytest.mark.thorough
 def test_any_damage_gives_frames_or_an_error(tmp_path_factory, whole, changes, end):
     data = bytearray(whole)
     for place, value in changes:

@@ -117,6 +117,7 @@ def test_a_producer_that_falls_silent(converted_from_a_file, tmp_path, threads, 
     assert read_events(out / "a.txt").metadata["ended_by_hand_after_frames"] == 6
 
 
+@pytest.mark.thorough
 def test_frames_that_wait_in_the_pipe_have_come(converted_from_a_file, tmp_path):
     frames = frames_of(40)
     with capturing("-o", tmp_path / "out" / "a.csv", "-q", "--seed", "5") as process:
@@ -145,6 +146,7 @@ while True:
 
 
 @pytest.mark.parametrize("pauses", [True, False], ids=["pauses within a frame", "goes on"])
+@pytest.mark.thorough
 def test_a_terminal_interrupts_the_producer_too(converted_from_a_file, tmp_path, pauses):
     """Both are in one group, as in a pipeline of a shell."""
     frames = frames_of(5, LARGE)
@@ -170,6 +172,7 @@ def test_a_terminal_interrupts_the_producer_too(converted_from_a_file, tmp_path,
     assert (out / "a.txt").read_bytes() == converted_from_a_file(whole, ".txt")
 
 
+@pytest.mark.thorough
 def test_a_stream_that_is_cut_without_an_interrupt_is_damaged(tmp_path):
     with capturing("-o", tmp_path / "a.h5") as process:
         _, err = process.communicate(y4m(frames_of(3))[:-1], timeout=120)
@@ -204,6 +207,7 @@ def test_a_second_interrupt_ends_at_once_and_leaves_nothing(tmp_path):
 @pytest.mark.parametrize(
     ("name", "piped"), [("SIGTERM", True), ("SIGINT", False)], ids=["SIGTERM", "no pipe"]
 )
+@pytest.mark.quick_cases(1)
 def test_what_ends_the_program_as_ever(tmp_path, name, piped):
     """Another signal; and SIGINT while frames come from a file, which ends by itself."""
     out, stored = tmp_path / "out", tmp_path / "stored.y4m"
@@ -225,6 +229,7 @@ def test_what_ends_the_program_as_ever(tmp_path, name, piped):
 
 
 @pytest.mark.parametrize("count", [0, 1])
+@pytest.mark.quick_cases(1)
 def test_nothing_is_kept_of_less_than_two_frames(tmp_path, count):
     out = tmp_path / "out"
     out.mkdir()
@@ -239,6 +244,7 @@ def test_nothing_is_kept_of_less_than_two_frames(tmp_path, count):
     assert list(out.iterdir()) == []
 
 
+@pytest.mark.thorough
 def test_more_times_than_frames_came(tmp_path):
     times = tmp_path / "times.txt"
     times.write_text("".join(f"{k / 50:.3f}\n" for k in range(10)))
@@ -251,6 +257,7 @@ def test_more_times_than_frames_came(tmp_path):
     assert read_events(tmp_path / "a.h5").events["t"].max() <= 60_000
 
 
+@pytest.mark.thorough
 def test_in_python_an_interrupt_is_one(tmp_path):
     script = """
 import signal, sys

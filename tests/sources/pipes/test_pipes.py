@@ -314,6 +314,7 @@ def test_through_a_pipe_it_is_converted_and_told_of(tmp_path):
     assert (report["layout"], report["frames"]["count"]) == ("raw", 4)
 
 
+@pytest.mark.thorough
 def test_nothing_is_left_of_a_conversion_that_fails(tmp_path):
     data = y4m([planes(40 + 30 * n) for n in range(6)])[:-5]
     done = run("convert", "-", "-o", tmp_path / "a.h5", data=data)

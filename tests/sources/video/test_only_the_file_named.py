@@ -55,6 +55,7 @@ TEXTS = {
 
 
 @pytest.mark.parametrize("kind", TEXTS)
+@pytest.mark.quick_cases(1)
 def test_texts_that_name_others_are_no_videos(tmp_path, monkeypatch, kind, asked):
     requests, port = asked
     monkeypatch.chdir(tmp_path)
