@@ -184,6 +184,7 @@ PIECES = st.sampled_from(
 
 @settings(max_examples=200, deadline=None)
 @given(st.one_of(st.text(), st.lists(PIECES, max_size=60).map("".join)))
+@pytest.mark.thorough
 def test_any_text_is_a_list_or_an_error(text):
     try:
         found = parse_list(text, "t.txt")

@@ -21,6 +21,7 @@ from dev.fuzz_seeds import all_seeds, mutated
 SCRIPT = Path(__file__).parents[3] / "scripts" / "dev" / "fuzz_readers.py"
 
 
+@pytest.mark.thorough
 def test_some_damaged_files_of_every_kind():
     found = subprocess.run(
         [sys.executable, SCRIPT, "--count", "60", "--seed", "20"],

@@ -25,6 +25,7 @@ def trial(tmp_path, number, seed=0):
 
 
 @pytest.mark.parametrize("number", [25, 36])  # small ones
+@pytest.mark.thorough
 def test_nothing_is_lost(tmp_path, number):
     assert code_cache().folder is not None  # or each run would compile
     one, record = trial(tmp_path, number)
