@@ -31,5 +31,6 @@ def with_room(keys, times, used, needed):
 @kernel
 def _grown(array, used, entries):
     new = np.empty(entries, array.dtype)
-    new[:used] = array[:used]
+    for entry in range(used):  # a slice would compile the text of an error of shapes, 6 s long
+        new[entry] = array[entry]
     return new
