@@ -25,7 +25,6 @@ from adv2e.events import Events, cut
 from adv2e.light.sensor import fitting_of
 from adv2e.sources import open_source
 from experiments.clip import Clip, Simulator
-from experiments.judge import similarity
 from experiments.recordings import Recording, decoder_of, read
 from experiments.scenes import texture_clip
 from experiments.training import CHECKPOINT, Training, Update, checkpoint, identity, written
@@ -285,6 +284,24 @@ def parts(data: Path) -> Iterator[Part]:
 def equalised(image: NDArray[Any]) -> NDArray[np.float64]:
     """Return an image whose histogram, of 256 values, is even."""
     return cv2.equalizeHist(np.rint(255 * image).astype(np.uint8)) / 255.0
+
+
+def similarity(a: NDArray[Any], b: NDArray[Any]) -> float:
+    """Return the mean structural similarity of two images between 0 and 1; 1 for equal ones.
+
+    Means, variances and covariance are under a Gaussian of 1.5 pixels (11 x 11), the constants
+    0.01**2 and 0.03**2, as in doi:10.1109/TIP.2003.819861.
+    """
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+
+    def mean(image: NDArray[Any]) -> NDArray[Any]:
+        return cv2.GaussianBlur(image, (11, 11), 1.5)
+
+    at_a, at_b = mean(a), mean(b)
+    spread = mean(a * a) - at_a**2 + mean(b * b) - at_b**2
+    both = mean(a * b) - at_a * at_b
+    light = (2 * at_a * at_b + 1e-4) / (at_a**2 + at_b**2 + 1e-4)
+    return float(np.mean(light * (2 * both + 9e-4) / (spread + 9e-4)))
 
 
 def measures_of(images: Images, frames: Images, lpips: Lpips | None) -> dict[str, float]:
