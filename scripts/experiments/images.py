@@ -27,7 +27,7 @@ from adv2e.sources import open_source
 from experiments.clip import Clip, Simulator
 from experiments.recordings import Recording, decoder_of, read
 from experiments.scenes import texture_clip
-from experiments.training import CHECKPOINT, Training, Update, checkpoint, identity, written
+from experiments.training import CHECKPOINT, Update, checkpoint, written
 
 Array = NDArray[np.float32]
 
@@ -217,9 +217,6 @@ CUTS = {
 }  # fmt: skip
 """Sequences of DAVIS240C and the part that is used [s], as EVREAL has it (config/dataset/ECD.json,
 github.com/ercanburak/EVREAL)."""
-MEASURES = {"MSE": False, "SSIM": True, "equalised MSE": False, "equalised SSIM": True,
-            "LPIPS": False}  # fmt: skip
-"""And whether larger is better."""
 GREY = "one grey"
 
 
@@ -392,7 +389,7 @@ def trained(run: Path) -> Any:
     """
     path = run / CHECKPOINT
     if not path.is_file():
-        raise DataError(f"{path}: not there; give a folder that train or small made")
+        raise DataError(f"{path}: not there; give a folder that train made")
     state, rest = checkpoint(path)
     network = rest["settings"].get("network")
     if network not in BUILD:
@@ -400,61 +397,3 @@ def trained(run: Path) -> Any:
     net = BUILD[network]()
     net.load_state_dict(state["net"])
     return net.eval()
-
-
-LENGTH = 11
-"""Windows of a run."""
-EVERY = 8
-"""Frames of a window."""
-
-
-@dataclass(frozen=True)
-class Small:
-    """One training on moving textures, and its test on a recording."""
-
-    simulator: Simulator
-    seed: int
-    recording: Path
-    network: str
-    steps: int
-    rate: float
-    clips: int
-    side: int
-    features: Path | None
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """All that decides its numbers."""
-        return {
-            **self._training, "steps": self.steps, "recording": self.recording.resolve().name,
-            "LPIPS": self.features is not None,
-        }  # fmt: skip
-
-    @property
-    def _training(self) -> dict[str, Any]:
-        return {
-            **identity(self.simulator), "seed": self.seed, "network": self.network,
-            "rate": self.rate, "batch": 2, "length": LENGTH,
-            "clips": self.clips, "side": self.side, "loss": LOSS,
-        }  # fmt: skip
-
-    def run(self, folder: Path) -> dict[str, Any]:
-        """Train in a folder, and test."""
-        side = (self.side, self.side)
-        first = 1000 * self.seed
-        clips = (
-            texture_clip(k, EVERY * LENGTH + 1, side) for k in range(first, first + self.clips)
-        )
-        pairs = [Pair.simulated(clip, self.simulator, self.seed, EVERY) for clip in clips]
-        step = update_of(Batches(pairs, 2, LENGTH, side), LENGTH, "cpu")
-        training = Training(BUILD[self.network], step, self._training)
-        net, curve = training.run(folder, self.steps)
-        lpips = None if self.features is None else Lpips(self.features)
-        (part,) = parts(self.recording)
-        images = made_of(net, part)
-        cv2.imwrite(str(folder / "last.png"), picture(part, [images]))
-        return {
-            "measures": measures_of(images, part.frames, lpips),
-            **curve.summary(),
-            "events": sum(len(pair.events) for pair in pairs),
-        }
