@@ -34,16 +34,9 @@ Array = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Pair:
-    """Events of a clip, and some of its images.
+    """Sorted events of a clip, and some of its images.
 
-    Attributes
-    ----------
-    events : Events
-        Sorted.
-    images : array of float32, (images, rows, columns)
-        Light, 0 black and 1 white.
-    times_us : array of int64, (images,)
-        On the clock of the events.
+    Images are light, 0 black and 1 white; their times [us] are on the clock of the events.
     """
 
     events: Events
@@ -79,20 +72,9 @@ class Pair:
 
 @dataclass(frozen=True)
 class Batches:
-    """What a training draws: runs of windows, of a part of the picture, mirrored or not.
+    """Draws of a training: runs of windows, of a part of the picture, mirrored or not.
 
-    Attributes
-    ----------
-    pairs : sequence of Pair
-    batch, length : int
-        Runs at a time, and windows of each.
-    crop : (int, int)
-        Columns and rows of the part.
-
-    Raises
-    ------
-    DataError
-        A pair has too few images or pixels.
+    It draws `batch` runs of `length` windows at a time, of `crop` columns and rows.
     """
 
     pairs: Sequence[Pair]
@@ -146,13 +128,7 @@ def moving_textures(count: int, seed: int, size: tuple[int, int], frames: int) -
 
 
 def gopro_folders(folder: Path) -> list[Path]:
-    """Return the sequences of ``GOPRO_Large_all`` that are for training.
-
-    Raises
-    ------
-    DataError
-        There is none.
-    """
+    """Return the sequences of ``GOPRO_Large_all`` that are for training."""
     inside = folder / "train"
     place = inside if inside.is_dir() else folder
     found = sorted(one for one in place.iterdir() if one.is_dir() and one.name.startswith("GOPR"))
@@ -182,10 +158,7 @@ def gopro_clips(folder: Path, size: tuple[int, int], frames: int) -> Iterator[Cl
 
 
 def kept(
-    sequences: Sequences,
-    simulator: Simulator,
-    folder: Path,
-    settings: dict[str, Any],
+    sequences: Sequences, simulator: Simulator, folder: Path, settings: dict[str, Any]
 ) -> Iterator[Pair]:
     """Yield events and images of all clips, which are simulated where they were not before."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -222,15 +195,7 @@ GREY = "one grey"
 
 @dataclass(frozen=True)
 class Part:
-    """The part of a recording that is used.
-
-    Attributes
-    ----------
-    name : str
-    real : Recording
-    spans : sequence of (int, int)
-        Frame intervals [us].
-    """
+    """The part of a recording that is used: its frame intervals [us]."""
 
     name: str
     real: Recording
@@ -256,13 +221,7 @@ class Part:
 
 
 def parts(data: Path) -> Iterator[Part]:
-    """Yield the sequences of DAVIS240C in a folder with their cuts, or the recording that it is.
-
-    Raises
-    ------
-    DataError
-        It is neither, or a sequence has nothing in its cut.
-    """
+    """Yield the sequences of DAVIS240C in a folder with their cuts, or the recording that it is."""
     there = {
         name: path for name in CUTS for path in (data / f"{name}.zip", data / name) if path.exists()
     }
@@ -380,13 +339,7 @@ def detached(state: Any) -> Any:
 
 
 def trained(run: Path) -> Any:
-    """Return the network of a training.
-
-    Raises
-    ------
-    DataError
-        The folder holds no checkpoint of one of these networks.
-    """
+    """Return the network of a training."""
     path = run / CHECKPOINT
     if not path.is_file():
         raise DataError(f"{path}: not there; give a folder that train made")

@@ -83,13 +83,7 @@ class Folder:
 
     @classmethod
     def of(cls, folder: Path, split: str, size: tuple[int, int] | None) -> Folder:
-        """Return the split in a folder.
-
-        Raises
-        ------
-        DataError
-            There is none, or a picture lacks labels.
-        """
+        """Return the split in a folder."""
         ways = (("events", split, "labels", split), (split, "events", split, "labels"))
         for a, b, c, d in ways:
             events = sorted((folder / a / b).glob("*.npy"))
@@ -134,11 +128,6 @@ def from_ess(folder: Path, output: Path, simulator: Simulator | None, seed: int)
     simulator : Simulator, optional
         Makes the events from the images; default: the measured ones.
     seed : int
-
-    Raises
-    ------
-    DataError
-        The folder is not as ESS has it.
     """
     places = sorted(path for path in folder.glob("dir*") if path.is_dir())
     if len(places) != 7:

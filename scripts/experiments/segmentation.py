@@ -55,7 +55,7 @@ from experiments.labels import (
 from experiments.training import Training
 
 NETWORKS = {"evsegnet": (evsegnet, len(CLASSES), (352, 224)), "unet": (unet, 2, None)}
-"""What builds each, its classes, and columns and rows to which pictures are brought."""
+"""Builder of each network, its classes, and columns and rows to which pictures are brought."""
 POWER = 0.9
 """Of the fall of the rate, as Ev-SegNet has it."""
 

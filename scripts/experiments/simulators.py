@@ -38,16 +38,7 @@ OF_A_TOOL = "its parameters in the pixel of adv2e, not the tool"
 
 @dataclass(frozen=True)
 class Pixel:
-    """The pixel of adv2e.
-
-    Attributes
-    ----------
-    name, nature : str
-    config : Config
-        Its seed and sensor do not count.
-    threads : int, optional
-        Default: all cores.
-    """
+    """The pixel of adv2e; seed and sensor of its configuration do not count."""
 
     name: str
     nature: str
@@ -90,20 +81,7 @@ THRESHOLDS = {"pos_thres": 0.2, "neg_thres": 0.2}
 
 @dataclass(frozen=True)
 class EventCV:
-    """EventCV.
-
-    Attributes
-    ----------
-    arguments : dict
-        Of ``eventcv.simulate``.
-    parts : int
-        Even steps of an interval.
-
-    Raises
-    ------
-    MissingExtraError
-        It is not installed.
-    """
+    """EventCV, with arguments of ``eventcv.simulate``, and so many even steps of an interval."""
 
     name: str = "eventcv"
     arguments: dict[str, Any] = field(default_factory=dict)
@@ -148,22 +126,7 @@ V2E_DEFAULTS = {
 
 @dataclass(frozen=True)
 class V2e:
-    """v2e.
-
-    Attributes
-    ----------
-    folder : Path
-        Holds ``v2ecore/``.
-    arguments : dict
-        Of its ``EventEmulator``.
-    parts : int
-        Even steps of an interval.
-
-    Raises
-    ------
-    DataError
-        The folder does not hold its sources.
-    """
+    """v2e out of a folder with ``v2ecore/``, with arguments of its ``EventEmulator``."""
 
     folder: Path
     arguments: dict[str, float] = field(default_factory=lambda: dict(V2E_DEFAULTS))
@@ -215,12 +178,7 @@ FIRST_FRAME = "start"
 class ByFile:
     """Events that are there already.
 
-    Attributes
-    ----------
-    name : str
-    path : Path
-    added : float or None
-        What is added to their times [s]; None: the time of the clip's first frame.
+    `added` to their times [s]; None: the time of the clip's first frame.
     """
 
     name: str
@@ -240,13 +198,7 @@ class ByFile:
         return recording.events, (recording.width, recording.height), stated
 
     def events(self, clip: Clip, seed: int) -> Events:
-        """Return the events of a clip.
-
-        Raises
-        ------
-        DataError
-            They are of another size, or none is within the clip.
-        """
+        """Return the events of a clip."""
         events, size, stated = self._held
         if size != clip.size if stated else size[0] > clip.size[0] or size[1] > clip.size[1]:
             raise DataError(
@@ -288,23 +240,8 @@ def named(
 ) -> list[Simulator]:
     """Return simulators in this order, those by file last.
 
-    Parameters
-    ----------
-    names : sequence of str
-        ``dvs-voltmeter``, ``eventcv``, ``eventcv-quiet``, or what :func:`adv2e.load_config` takes.
-    files : sequence of ByFile
-    sets : sequence of str
-        ``KEY=VALUE`` for all configurations of adv2e.
-    v2e_sources : Path, optional
-        With it ``v2e`` is the tool itself.
-    threads : int, optional
-
-    Raises
-    ------
-    ConfigError
-        A name is unknown, or stands twice.
-    MissingExtraError
-        A tool is not installed.
+    Names are ``dvs-voltmeter``, ``eventcv``, ``eventcv-quiet``, or what :func:`adv2e.load_config`
+    takes; `sets` are for all of these.  With `v2e_sources`, ``v2e`` is the tool itself.
     """
     asked = [Path(name).stem for name in names] + [one.name for one in files]
     for name in asked:

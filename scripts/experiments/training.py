@@ -41,16 +41,9 @@ Update = Callable[[Any, Any, np.random.Generator], float]
 
 @dataclass
 class Curve:
-    """What a training went through.
+    """Course of a training: the loss of each step, and checks in between.
 
-    Attributes
-    ----------
-    losses : list of float
-        One a step.
-    checks : list of mapping
-        What was measured in between, and ``step``, after how many.
-    seconds : float
-        How long the steps took, over all runs.
+    ``step`` of a check is after how many; `seconds` is how long the steps took, over all runs.
     """
 
     losses: list[float] = field(default_factory=list)
@@ -64,26 +57,12 @@ class Curve:
 
 @dataclass(frozen=True)
 class Training:
-    """What is trained, and how.
+    """A training: network, step, and settings.
 
-    Attributes
-    ----------
-    build : callable
-        Returns the network, by PyTorch's chance.
-    update : Update
-    settings : mapping
-        All that decides the numbers besides the number of steps, for JSON.  ``seed`` and ``rate``
-        (of Adam) are needed.
-    every : int
-        Steps between checkpoints.
-    check : callable, optional
-        Measures the network at each of them, and at the end.
-    best_by : str, optional
-        The measure to go by: the larger the better.
-    device : str
-        ``cpu`` or ``cuda``.
-    slowing : callable, optional
-        Returns the share of the rate that a step has, from its number.
+    `build` returns the network, by PyTorch's chance.  `settings` are all that decides the numbers
+    besides the number of steps, for JSON; ``seed`` and ``rate`` (of Adam) are needed.  After
+    `every` steps comes a checkpoint, where `check` measures the network; of the measure `best_by`
+    larger is better.  `slowing` returns the share of the rate that a step has, from its number.
     """
 
     build: Callable[[], Any]
@@ -96,16 +75,7 @@ class Training:
     slowing: Callable[[int], float] | None = None
 
     def run(self, folder: Path, steps: int) -> tuple[Any, Curve]:
-        """Train up to a number of steps, from where the folder is; return network and curve.
-
-        Raises
-        ------
-        DataError
-            The folder holds a training with other settings or of more steps, or the loss is not
-            finite any more.
-        MissingExtraError
-            PyTorch or Matplotlib is not installed.
-        """
+        """Train up to a number of steps, from where the folder is; return network and curve."""
         torch = torch_module()
         load_pyplot()  # rather now than after the first steps
         folder.mkdir(parents=True, exist_ok=True)
@@ -197,13 +167,7 @@ class Training:
 
 
 def checkpoint(path: Path) -> tuple[Any, dict[str, Any]]:
-    """Return the states that a checkpoint holds, and what else: settings, chance, curve.
-
-    Raises
-    ------
-    DataError
-        It is none.
-    """
+    """Return the states that a checkpoint holds, and what else: settings, chance, curve."""
     with damage_told(f"{path}: no checkpoint of a training"):
         state = torch_module().load(path, map_location="cpu", weights_only=True)
         return state, json.loads(state["rest"])

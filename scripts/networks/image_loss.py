@@ -69,11 +69,6 @@ class Lpips:
     ----------
     folder : Path
         Where both files are.
-
-    Raises
-    ------
-    DataError
-        A file does not hold these weights.
     """
 
     def __init__(self, folder: Path) -> None:
