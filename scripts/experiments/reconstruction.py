@@ -16,6 +16,7 @@
     with the seven DAVIS240C sequences, folders or zips as they are published
     (rpg.ifi.uzh.ch/davis_data.html), of which the cuts of EVREAL are used; or any one recording
     with frames, which is used as a whole.
+
 The loss is the mean absolute difference plus 1 less the mean structural similarity (SSIM); with
 ``--lpips`` LPIPS alone, as E2VID has it, by weights in a folder (:mod:`networks.image_loss`).  Its
 second term, consistency over time along known flow, is left out.
