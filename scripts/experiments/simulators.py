@@ -76,11 +76,27 @@ class Pixel:
 
 QUIET = {"leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0}
 THRESHOLDS = {"pos_thres": 0.2, "neg_thres": 0.2}
-"""Its defaults [ln]."""
+"""Defaults of EventCV and v2e [ln]."""
+
+
+class _Tool:
+    """A tool of another project, which has its thresholds among its arguments."""
+
+    arguments: dict[str, Any]
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Its thresholds of ON and OFF [ln]."""
+        held = {**THRESHOLDS, **self.arguments}
+        return held["pos_thres"], held["neg_thres"]
+
+    def with_levels(self, on: float, off: float) -> Any:
+        """Return it with other thresholds [ln]."""
+        return replace(self, arguments={**self.arguments, "pos_thres": on, "neg_thres": off})
 
 
 @dataclass(frozen=True)
-class EventCV:
+class EventCV(_Tool):
     """EventCV, with arguments of ``eventcv.simulate``, and so many even steps of an interval."""
 
     name: str = "eventcv"
@@ -106,26 +122,16 @@ class EventCV:
         t, x, y, p = tool.columns(run(coded, float(rate)))
         return sort_events(make_events(t + int(clip.times_ns[0]) // 1000, x, y, p))
 
-    @property
-    def levels(self) -> tuple[float, float]:
-        """Its thresholds of ON and OFF [ln]."""
-        held = {**THRESHOLDS, **self.arguments}
-        return held["pos_thres"], held["neg_thres"]
-
-    def with_levels(self, on: float, off: float) -> EventCV:
-        """Return it with other thresholds [ln]."""
-        return replace(self, arguments={**self.arguments, "pos_thres": on, "neg_thres": off})
-
 
 V2E_DEFAULTS = {
-    "pos_thres": 0.2, "neg_thres": 0.2, "sigma_thres": 0.03, "cutoff_hz": 300.0,
-    "leak_rate_hz": 0.01, "shot_noise_rate_hz": 0.001, "refractory_period_s": 0.0005,
+    **THRESHOLDS, "sigma_thres": 0.03, "cutoff_hz": 300.0, "leak_rate_hz": 0.01,
+    "shot_noise_rate_hz": 0.001, "refractory_period_s": 0.0005,
 }  # fmt: skip
 """Of its command line; those of its class differ."""
 
 
 @dataclass(frozen=True)
-class V2e:
+class V2e(_Tool):
     """v2e out of a folder with ``v2ecore/``, with arguments of its ``EventEmulator``."""
 
     folder: Path
@@ -160,15 +166,6 @@ class V2e:
         first_us = int(clip.times_ns[0]) // 1000
         return sort_events(make_events(np.rint(t * 1e6) + first_us, x, y, p > 0))
 
-    @property
-    def levels(self) -> tuple[float, float]:
-        """Its thresholds of ON and OFF [ln]."""
-        return self.arguments["pos_thres"], self.arguments["neg_thres"]
-
-    def with_levels(self, on: float, off: float) -> V2e:
-        """Return it with other thresholds [ln]."""
-        return replace(self, arguments={**self.arguments, "pos_thres": on, "neg_thres": off})
-
 
 FIRST_FRAME = "start"
 """In place of a number of seconds: that of the clip's first frame."""
@@ -178,7 +175,7 @@ FIRST_FRAME = "start"
 class ByFile:
     """Events that are there already.
 
-    `added` to their times [s]; None: the time of the clip's first frame.
+    Their times are made later by `added` [s]; None: by the time of the clip's first frame.
     """
 
     name: str
