@@ -1,4 +1,4 @@
-"""What scripts write: tables, reports with their numbers, figures, errors in one line."""
+"""Output of scripts: tables, reports with their numbers, figures, errors in one line."""
 
 from __future__ import annotations
 
@@ -56,13 +56,7 @@ def write_report(text: str, output: Path | None, numbers: object = None) -> None
 
 
 def load_pyplot() -> Any:
-    """Return Matplotlib's pyplot, drawing to files only.
-
-    Raises
-    ------
-    MissingExtraError
-        Matplotlib is not installed.
-    """
+    """Return Matplotlib's pyplot, drawing to files only."""
     try:
         importlib.import_module("matplotlib").use("Agg")
         return importlib.import_module("matplotlib.pyplot")

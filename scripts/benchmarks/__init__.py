@@ -1,1 +1,1 @@
-"""What the benchmark scripts share: clips, fresh processes, tools, time errors, tables, figures."""
+"""Benchmarks, and the clips, fresh processes and tables that they share."""

@@ -111,15 +111,10 @@ def report(found: Sequence[Measured], count: int) -> str:
     size = count * FRAMES * 346 * 260 / 1e6
     pixel = found[0]
     rows = [
-        [
-            one.job.name,
-            str(one.wall_s()),
-            number(one.cpu_s().median),
-            str(one.wall_s().inverse(size)),
-            str(pixel.ratio(one)),
-        ]
+        [one.job.name, str(one.wall_s()), number(one.cpu_s().median),
+         str(one.wall_s().inverse(size)), str(pixel.ratio(one))]
         for one in found
-    ]
+    ]  # fmt: skip
     head = (f"{count} clips", "wall s", "CPU s", "Mpx-frames/s", "rate of the pixel alone")
     return "\n\n".join([ABOUT, table(head, rows)])
 

@@ -32,18 +32,10 @@ _CONTRAST = 0.75  # standard deviation of the logarithm of the texture, before c
 
 @dataclass(frozen=True, kw_only=True)
 class Clip:
-    """A recipe.
+    """A recipe, with `fps` frames a second.
 
-    Attributes
-    ----------
-    width, height, frames : int
-    fps : float
-        Frames a second.
-    seed : int
-        Of texture and disks.
-    moving : float
-        Share of the rows, around the middle, in which anything moves; the rest keeps its first
-        frame.
+    Anything moves only in the share `moving` of the rows, around the middle; the rest keeps its
+    first frame.
     """
 
     width: int
@@ -166,17 +158,9 @@ FLIPPED = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Burst:
-    """Recipe of a clip in which the whole field flickers, with noise.
+    """Recipe of a clip in which the whole field flickers, with noise: bright and dark in turn.
 
-    Attributes
-    ----------
-    width, height, frames : int
-    fps : float
-        Frames a second; one bright, one dark in turn.
-    swing : float
-        Between dark and bright [ln units].
-    seed : int
-        Of the noise.
+    `swing` is between dark and bright [ln units].
     """
 
     width: int
@@ -220,13 +204,7 @@ def stored(clip: Clip | Burst, folder: Path) -> Path:
 
 
 def encoded(source: Path, fps: float) -> Path:
-    """Return the clip as MP4 (codec mp4v) beside its ``.npy`` file; make it if need be.
-
-    Raises
-    ------
-    OSError
-        OpenCV cannot encode here.
-    """
+    """Return the clip as MP4 (codec mp4v) beside its ``.npy`` file; make it if need be."""
     path = source.with_suffix(".mp4")
     if not path.exists():
         frames = np.load(source, mmap_mode="r")

@@ -77,26 +77,10 @@ class JobError(Adv2eError):
 class Job:
     """One thing to measure.
 
-    Attributes
-    ----------
-    name : str
-        What tables call it.
-    action : str
-        Function of :mod:`benchmarks.worker` that does it, or ``module:function``.
-    options : dict
-        What that function takes besides the rest.
-    tool : str
-        ``adv2e`` or ``eventcv``.
-    clip : str
-        ``.npy`` file of the frames.
-    frames, stride, fps : int, int, float
-        The first `frames` of every `stride`-th; rate of the file's frames [Hz].
-    python : str
-        Interpreter.
-    package : str
-        Folder that holds the package ``adv2e`` to use.
-    threads : int, optional
-        Threads of the tool; default: all cores.
+    `action` is a function of :mod:`benchmarks.worker`, or ``module:function``, which also takes
+    `options`.  Of the frames in the file `clip`, the first `frames` of every `stride`-th are taken;
+    `fps` is the rate of the file's frames [Hz].  `python` is the interpreter, `package` the folder
+    that holds the package ``adv2e``; `threads` of the tool are all cores by default.
     """
 
     name: str
@@ -114,7 +98,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Round:
-    """What one process reported, and how busy the machine was with other things."""
+    """Report of one process, and how busy the machine was with other things."""
 
     report: dict[str, Any]
     process_s: float
@@ -130,7 +114,7 @@ class Measured:
 
     @property
     def last(self) -> dict[str, Any]:
-        """What the last process reported: counts and versions, which do not change."""
+        """Report of the last process: counts and versions, which do not change."""
         return self.rounds[-1].report
 
     def wall_s(self) -> Spread:
@@ -204,21 +188,8 @@ def run_rounds(
 ) -> list[Measured]:
     """Run every job once a round, each in a process of its own; the order turns with each round.
 
-    A job that fails is left out, and noted in the log.
-
-    Parameters
-    ----------
-    jobs : sequence of Job
-    rounds : int
-    log : Log
-    warm : sequence of Job
-        Run before, uncounted: what they compile is then in the cache, and the compiler's memory is
-        not counted.
-
-    Raises
-    ------
-    JobError
-        Warming up failed.
+    A job that fails is left out, and noted in the log.  Those to `warm` up are run before,
+    uncounted: what they compile is then in the cache, and the compiler's memory is not counted.
     """
     found = [Measured(job) for job in jobs]
     for job in warm:
@@ -247,18 +218,15 @@ _WORKER = (
 
 
 def run_job(job: Job) -> Round:
-    """Run `job` once, in a fresh process.
-
-    Raises
-    ------
-    JobError
-        It failed; the message is the last line that it wrote.
-    """
+    """Run `job` once, in a fresh process."""
     command = [job.python, "-c", _WORKER, json.dumps(asdict(job))]
+    paths = [job.package, str(SCRIPTS)] if job.tool == "adv2e" else [str(SCRIPTS)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    if job.threads:
+        names = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+        environment |= dict.fromkeys(names, str(job.threads))
     busy, own, began = _busy_s(), children_cpu_s(), time.perf_counter()
-    done = subprocess.run(
-        command, env=_environment(job), capture_output=True, text=True, check=False
-    )
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     took = time.perf_counter() - began
     if done.returncode:
         lines = done.stderr.strip().splitlines() or [f"exit status {done.returncode}"]
@@ -267,15 +235,6 @@ def run_job(job: Job) -> Round:
     if busy is not None:
         others = max(0.0, ((_busy_s() or busy) - busy - (children_cpu_s() - own)) / took)
     return Round(json.loads(done.stdout.splitlines()[-1]), took, others)
-
-
-def _environment(job: Job) -> dict[str, str]:
-    paths = [job.package, str(SCRIPTS)] if job.tool == "adv2e" else [str(SCRIPTS)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    if job.threads:
-        for name in ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-            environment[name] = str(job.threads)
-    return environment
 
 
 def _busy_s() -> float | None:

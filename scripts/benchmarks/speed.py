@@ -57,7 +57,7 @@ TWO_POLES = (
     "pixel.low_pass={cutoff_hz: 2200, dark_cutoff_hz: 0.1}",
     "pixel.source_follower.cutoff_hz=100",
 )
-"""What still pixels of a DAVIS346 say; see configs/davis346.yaml."""
+"""Parameters by still pixels of a DAVIS346; see configs/davis346.yaml."""
 
 OFF_NAME = "exact, noise off"
 """The setting that others are compared with."""
@@ -88,18 +88,9 @@ FILES_ABOUT = (
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """A configuration of adv2e on a clip.
+    """A configuration of adv2e on one of :data:`CAMERAS`: what it adds to the ideal pixel.
 
-    Attributes
-    ----------
-    clip, name : str
-        One of :data:`CAMERAS`, and what the table calls it.
-    sets : tuple of str
-        What it adds to the ideal pixel.
-    share : float
-        Share of the clip's frames, for slow ones.
-    stride : int
-        Every how many frames are taken.
+    Slow ones take a `share` of the clip's frames; of these, every `stride`-th is taken.
     """
 
     clip: str
@@ -111,11 +102,7 @@ class Setting:
 
 def settings() -> Iterator[Setting]:
     """Yield all settings of adv2e."""
-    main = {
-        OFF_NAME: (),
-        "all effects, shot 5 Hz": ALL,
-        "all effects, shot 0.1 Hz": ALL_WEAK,
-    }
+    main = {OFF_NAME: (), "all effects, shot 5 Hz": ALL, "all effects, shot 0.1 Hz": ALL_WEAK}
     for clip in CAMERAS:
         for name, sets in main.items():
             yield Setting(clip=clip, name=name, sets=sets)
@@ -180,13 +167,7 @@ def peer_jobs(plan: Plan, python: str) -> Iterator[Job]:
 
 
 def chosen(jobs: Sequence[Job], globs: Sequence[str], option: str) -> list[Job]:
-    """Return the jobs whose names fit; those of a clip stay together, its first one first.
-
-    Raises
-    ------
-    JobError
-        None does.
-    """
+    """Return the jobs whose names fit; those of a clip stay together, its first one first."""
     clips = {job.name.partition(": ")[0]: None for job in jobs}
     ordered = [job for clip in clips for job in jobs if job.name.startswith(f"{clip}: ")]
     found = [job for job in ordered if any(fnmatch.fnmatch(job.name, one) for one in globs)]

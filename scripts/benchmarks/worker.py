@@ -74,17 +74,11 @@ def children_cpu_s() -> float:
 
 
 class Tool(NamedTuple):
-    """A tool.
+    """A tool, and the packages that it needs.
 
-    Attributes
-    ----------
-    simulator : callable
-        From options and threads to a function of (frames, fps), which returns events in whatever
-        form the tool gives them.
-    columns : callable
-        From these to int64 times [us], columns, rows and polarities (1 or 0).
-    packages : tuple of str
-        What ran, besides Python.
+    `simulator` makes of options and threads a function of (frames, fps), which returns events in
+    whatever form the tool gives them; `columns` makes of these int64 times [us], columns, rows and
+    polarities (1 or 0).
     """
 
     simulator: Callable[[dict[str, Any], int | None], Callable[[Any, float], Any]]
@@ -190,13 +184,7 @@ def simulate_clips(spec: dict[str, Any]) -> dict[str, Any]:
 
 
 def run_command(spec: dict[str, Any]) -> dict[str, Any]:
-    """Run a command line; return its cost and the size of the file or folder `target` it wrote.
-
-    Raises
-    ------
-    RuntimeError
-        It failed.
-    """
+    """Run a command line; return its cost and the size of the file or folder `target` it wrote."""
     options, before = spec["options"], children_cpu_s()
     # Python keeps what it made of sources, as it usually does for users
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
@@ -228,13 +216,7 @@ def shell(spec: dict[str, Any]) -> dict[str, Any]:
 
 
 def convert(spec: dict[str, Any]) -> dict[str, Any]:
-    """Run ``adv2e convert`` in this process; return its cost, peak memory and events.
-
-    Raises
-    ------
-    RuntimeError
-        It failed; it has said why on standard error.
-    """
+    """Run ``adv2e convert`` in this process; return its cost, peak memory and events."""
     from adv2e.cli import main  # noqa: PLC0415 - in the process that is measured
 
     printed = io.StringIO()
@@ -254,13 +236,7 @@ def convert(spec: dict[str, Any]) -> dict[str, Any]:
 
 
 def count_in(summary: str) -> int:
-    """Return the number of events that the summary of a conversion tells.
-
-    Raises
-    ------
-    RuntimeError
-        It tells none.
-    """
+    """Return the number of events that the summary of a conversion tells."""
     found = re.search(r": ([\d,]+) events ", summary)
     if found is None:
         raise RuntimeError(f"no number of events in {summary!r}")

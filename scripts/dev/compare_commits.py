@@ -47,13 +47,10 @@ USUAL = (f"346x260: {OFF_NAME}", "346x260: all effects, shot 5 Hz")
 @click.argument("before")
 @click.argument("after")
 @click.option(
-    "--setting",
-    "globs",
-    multiple=True,
-    metavar="GLOB",
+    "--setting", "globs", multiple=True, metavar="GLOB",
     help="Settings of benchmarks/speed.py by name; repeatable.  [default: noise off and all"
     " effects]",
-)
+)  # fmt: skip
 @of_a_plan(rounds=7, quick_rounds=7)
 @output_option
 def main(
@@ -72,13 +69,7 @@ def main(
 
 
 def checked_out(commit: str, folder: Path, repository: Path = REPOSITORY) -> Path:
-    """Return a folder with the package as of `commit`; ``.``: the working tree itself.
-
-    Raises
-    ------
-    JobError
-        Git knows no such commit.
-    """
+    """Return a folder with the package as of `commit`; ``.``: the working tree itself."""
     if commit == ".":
         return repository
     command = ["git", "-C", str(repository), "archive", "--format=tar", commit, "adv2e", "configs"]
@@ -122,14 +113,8 @@ def pairs(found: Sequence[Measured]) -> list[tuple[Measured, Measured]]:
 def _row(a: Measured, b: Measured) -> list[str]:
     same = a.last["digest"] == b.last["digest"]
     counts = f"{a.last['events']:,} / {b.last['events']:,}"
-    return [
-        a.job.name,
-        str(a.wall_s()),
-        str(b.wall_s()),
-        str(b.ratio(a)),
-        str(b.ratio(a, "cpu_s")),
-        "identical" if same else f"DIFFERENT: {counts}",
-    ]
+    times = a.wall_s(), b.wall_s(), b.ratio(a), b.ratio(a, "cpu_s")
+    return [a.job.name, *map(str, times), "identical" if same else f"DIFFERENT: {counts}"]
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import click
 import numpy as np
-from dev.digests import datasets, information, reports, simulations
+from dev.digests import commands, simulations
 from dev.digests.comparison import changed, comparison, kept
 
 Run = Callable[[int, Path], Any]
@@ -41,9 +41,9 @@ Run = Callable[[int, Path], Any]
 
 KINDS: Mapping[str, tuple[Callable[[], Mapping[str, Run]], tuple[int, ...]]] = {
     "events": (simulations.cases, (1, 2)),
-    "info": (information.cases, (1,)),
-    "datasets": (datasets.cases, (1, 2)),
-    "reports": (reports.cases, (2,)),
+    "info": (commands.information, (1,)),
+    "datasets": (commands.datasets, (1, 2)),
+    "reports": (commands.reports, (2,)),
 }
 """Cases of each kind, and the numbers of threads that they are run with."""
 
@@ -62,9 +62,8 @@ def one(name: str, run: Run, threads: tuple[int, ...] = (1, 2)) -> tuple[dict[st
         return {"error": f"{type(error).__name__}: {error}"}, None
     first, last = found[0], found[-1]
     if isinstance(first, dict):
-        return {"holds": first} | (
-            {"two_threads": changed(first, last)} if first != last else {}
-        ), None
+        other = {} if first == last else {"two_threads": changed(first, last)}
+        return {"holds": first, **other}, None
     (events, digest), (_, other) = first, last
     on = int(np.count_nonzero(events["p"]))
     about = {"digest": digest, "events": int(events.size), "on": on, "off": int(events.size) - on}
@@ -97,13 +96,9 @@ def _kinds(ctx: click.Context, param: click.Parameter, text: str) -> set[str]:
     help="Compare two results.",
 )  # fmt: skip
 def main(
-    out: Path | None,
-    keep: bool,
-    package: Path | None,
-    kinds: set[str],
-    only: str,
+    out: Path | None, keep: bool, package: Path | None, kinds: set[str], only: str,
     compare: tuple[Path, Path] | None,
-) -> None:
+) -> None:  # fmt: skip
     """Write digests of what many cases make, or compare two such files."""
 
     def wanted(name: str) -> bool:

@@ -14,15 +14,14 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-import cv2
 import h5py
 import numpy as np
+from dev.digests.event_files import EVENT_FILES, HEIGHT, WIDTH, events
+from dev.digests.pictures import FPS, PICTURES, Make, images, pictures, stack
 
-from adv2e.events import make_events
-from adv2e.formats.lookup import layouts
-from adv2e.formats.writing import open_sink
 from adv2e.sources.images.opencv import quiet
 
 ODD_NUMBERS = (
@@ -179,9 +178,6 @@ def _with_checksums(data: bytes) -> bytes:
 Content = dict[str, bytes]
 """Bytes by name; a name with a slash lies in a folder."""
 
-COUNT, ROWS, COLUMNS = 4, 12, 16
-"""Frames of a seed, and their size."""
-
 
 @dataclass(frozen=True)
 class Seed:
@@ -194,7 +190,7 @@ class Seed:
     content : dict
         Its files.
     commands : tuple of tuples of str
-        Arguments of ``adv2e``, one of them is taken; ``{}`` is the folder of the files.
+        Arguments of ``adv2e`` in the folder of the files, one of them is taken.
     archive : str
         Name of the archive that the files are packed into; empty: they lie there.
     """
@@ -225,282 +221,107 @@ def _is_text(name: str) -> bool:
 
 def _packed(content: Content) -> bytes:
     file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(file, "w") as archive:
         for name, data in content.items():
-            archive.writestr(name, data)
+            # without the time of now, so that the same number makes the same file
+            archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
     return file.getvalue()
 
 
 def all_seeds(scratch: Path) -> list[Seed]:
-    """Return every seed; `scratch` is a folder for files that only libraries can write."""
-    seeds = [*_stacks(), *_events(), *_recordings(), *_images(), *_texts()]
+    """Return every seed; `scratch` is an empty folder."""
+    made = [
+        *(_written(scratch, words, make, _of_frames) for words, make in PICTURES.items()),
+        *(_written(scratch, words, make, _of_frames) for words, make in MORE_FRAMES.items()),
+        *(_written(scratch, words, make, _of_events) for words, make in EVENT_FILES.items()),
+        *(_written(scratch, words, make, _of_events) for words, make in MORE_EVENTS.items()),
+    ]
+    whole = next(seed for seed in made if seed.name == "monash.h5").content["monash.h5"]
+    structured = _Structured(
+        "structure of HDF5", {"a.h5": whole, "b.h5": whole}, _of_events("a.h5")
+    )
+    return [*made, *[structured] * 4, *_texts()]
+
+
+def _written(
+    scratch: Path, words: str, make: Make, commands: Callable[..., tuple[tuple[str, ...], ...]]
+) -> Seed:
+    """Return the seed of what is written under the first of the words, and what lies beside it."""
+    name, *options = words.split()
+    folder = scratch / re.sub(r"\W", "_", words)
+    folder.mkdir()
     with quiet:
-        return [
-            *seeds,
-            *_packets(scratch),
-            *_hdf5(scratch),
-            *_camera_files(scratch),
-            *_videos(scratch),
-        ]
-
-
-def _frames(dtype: str = "u1", *, colour: bool = False) -> np.ndarray:
-    shape = (COUNT, ROWS, COLUMNS, 3) if colour else (COUNT, ROWS, COLUMNS)
-    made = np.random.default_rng(0).random(shape)
-    return (made if dtype.startswith("f") else made * 250).astype(dtype)
-
-
-def _npy(array: np.ndarray) -> bytes:
-    file = io.BytesIO()
-    np.save(file, array)
-    return file.getvalue()
-
-
-def _info(name: str, *more: str) -> tuple[str, ...]:
-    return ("info", f"{{}}/{name}", *more)
-
-
-def _convert(name: str, *more: str) -> tuple[str, ...]:
-    return ("convert", f"{{}}/{name}", "-o", "{}/out.txt", "-c", "ideal", *more)
-
-
-def _render(name: str) -> tuple[str, ...]:
-    return ("render", f"{{}}/{name}", "-o", "{}/out.png")
-
-
-def _compare(name: str) -> tuple[str, ...]:
-    return ("compare", f"{{}}/{name}", f"{{}}/{name}")
-
-
-def _stacks() -> list[Seed]:
-    both = (_info("a.npy", "--fps", "10"), _convert("a.npy", "--fps", "10"))
-    seeds = [
-        Seed(f"npy {dtype}", {"a.npy": _npy(_frames(dtype))}, both)
-        for dtype in ("u1", "<u2", ">f4", "f8")
-    ]
-    strewn = np.asfortranarray(_frames(colour=True))
-    times = _npy(np.arange(COUNT) * 0.01)
-    lines = "".join(f"{n * 0.01:.6f}\n" for n in range(COUNT)).encode()
-    return [
-        *seeds,
-        Seed("npy fortran", {"a.npy": _npy(strewn)}, both),
-        Seed("npy times", {"a.npy": _npy(_frames()), "a_ts.npy": times}, (_info("a.npy"),)),
-        Seed(
-            "npy list",
-            {"a.npy": _npy(_frames()), "list.txt": lines},
-            (_info("a.npy", "--timestamps", "{}/list.txt"),),
-        ),
-    ]
-
-
-def _columns() -> dict[str, np.ndarray]:
-    draw = np.random.default_rng(1)
-    count = 60
-    return {
-        "t": np.sort(draw.random(count)), "x": draw.integers(0, COLUMNS, count),
-        "y": draw.integers(0, ROWS, count), "p": draw.integers(0, 2, count),
-    }  # fmt: skip
-
-
-def _event_lines(header: str = "") -> bytes:
-    rows = zip(*_columns().values(), strict=True)
-    return (header + "".join(f"{t:.9f} {x} {y} {p}\n" for t, x, y, p in rows)).encode()
-
-
-def _of_events(name: str) -> tuple[tuple[str, ...], ...]:
-    return (_info(name), _info(name), _render(name), _compare(name))
-
-
-def _events() -> list[Seed]:
-    columns = _columns()
-    whole = columns | {"t_us": (columns["t"] * 1e6).astype(np.int64), "width": np.int64(20)}
-    del whole["t"]
-    text = {"a.txt": _event_lines()}
-    described = {"a.txt.json": json.dumps({"adv2e": "0", "width": 20, "height": 20}).encode()}
-    table = np.zeros(60, [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
-    table["x"], table["y"] = columns["x"], columns["y"]
-    npz = {f"{name}.npy": _npy(np.asarray(values)) for name, values in columns.items()}
-    return [
-        Seed("text", text, _of_events("a.txt")),
-        Seed("text described", text | described, _of_events("a.txt")),
-        Seed("text sized", {"a.txt": _event_lines("20 20\n")}, _of_events("a.txt")),
-        Seed("text zip", text, _of_events("a.zip"), archive="a.zip"),
-        Seed("npz", npz, _of_events("a.npz"), archive="a.npz"),
-        Seed(
-            "npz us",
-            {f"{name}.npy": _npy(np.asarray(values)) for name, values in whole.items()},
-            _of_events("a.npz"),
-            archive="a.npz",
-        ),
-        Seed(
-            "csv", {"a.csv": _event_lines("t_s x y p\n").replace(b" ", b",")}, _of_events("a.csv")
-        ),
-        Seed("npz table", {"e.npy": _npy(table)}, _of_events("a.npz"), archive="a.npz"),
-    ]
-
-
-def _image(suffix: str, frame: np.ndarray, *how: int) -> bytes:
-    done, data = cv2.imencode(suffix, frame, how)
-    assert done, suffix
-    return data.tobytes()
-
-
-def _recordings() -> list[Seed]:
-    frames = _frames()
-    content = {
-        "events.txt": _event_lines(),
-        "images.txt": "".join(f"{n * 0.2} images/{n}.png\n" for n in range(COUNT)).encode(),
-        "adv2e.json": json.dumps(
-            {"adv2e": "0.1.0", "seed": 1, "width": COLUMNS, "height": ROWS,
-             "source": {"name": "a", "encoding": "srgb"},
-             "frames": {"encoding": "gamma:2.2", "full_scale": 255.0}}
-        ).encode(),
-        **{f"images/{n}.png": _image(".png", frame) for n, frame in enumerate(frames)},
-    }  # fmt: skip
-    folder = {f"r/{name}": data for name, data in content.items()}
-    return [
-        Seed("recording zip", content, (*_of_events("a.zip"), _convert("a.zip")), archive="a.zip"),
-        Seed("recording folder", folder, (*_of_events("r"), _convert("r"))),
-    ]
-
-
-def _images() -> list[Seed]:
-    grey, colour, deep = _frames(), _frames(colour=True), _frames("u2")
-    kinds: dict[str, Callable[[int], bytes]] = {
-        "png": lambda n: _image(".png", colour[n]),
-        "png 16": lambda n: _image(".png", deep[n]),
-        "jpg": lambda n: _image(".jpg", colour[n]),
-        "tif": lambda n: _image(".tif", deep[n]),
-        "tif float": lambda n: _image(".tif", _frames("f4")[n]),
-        "bmp": lambda n: _image(".bmp", colour[n]),
-        "webp": lambda n: _image(".webp", colour[n]),
-        "pfm": lambda n: _image(".pfm", _frames("f4")[n]),
-        "hdr": lambda n: _image(".hdr", _frames("f4", colour=True)[n]),
-        "ppm": lambda n: _image(".ppm", colour[n]),
-        "pgm": lambda n: (
-            f"P2\n{COLUMNS} {ROWS}\n255\n".encode() + " ".join(map(str, grey[n].ravel())).encode()
-        ),
+        make(folder / name)
+    stem = name.partition(".")[0]
+    files = {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.glob(f"{stem}*")) + sorted(folder.glob(f"{stem}*/**/*"))
+        if path.is_file()
     }
-    both = (_info("f", "--fps", "10"), _convert("f", "--fps", "10"))
-    seeds = []
-    for kind, encode in kinds.items():
-        suffix = kind.split()[0]
-        files = {f"f/{n:03d}.{suffix}": encode(n) for n in range(COUNT)}
-        seeds.append(Seed(f"images {kind}", files, both))
-    files = {f"f/{n:03d}.png": _image(".png", frame) for n, frame in enumerate(grey)}
-    named = "".join(f"{n * 0.01} {n:03d}.png\n" for n in range(COUNT)).encode()
-    plain = "".join(f"{n * 0.01}\n" for n in range(COUNT)).encode()
-    in_us = "".join(f"f/{n:03d}.png {n * 10_000}\n" for n in range(COUNT)).encode()
-    for name, lines in (("images", named), ("timestamps", plain), ("info", in_us)):
-        seeds.append(Seed(f"list {name}", files | {f"f/{name}.txt": lines}, (_info("f"),)))
-    return seeds
+    archive = name if name.endswith((".zip", ".npz")) else ""
+    if archive:
+        with zipfile.ZipFile(folder / name) as packed:
+            files = {one: packed.read(one) for one in packed.namelist()}
+    return Seed(words, files, commands(name, *options), archive)
+
+
+def _of_frames(name: str, *options: str) -> tuple[tuple[str, ...], ...]:
+    return ("info", name, *options), ("convert", name, "-o", "out.txt", "-c", "ideal", *options)
+
+
+def _of_events(name: str, *options: str) -> tuple[tuple[str, ...], ...]:
+    info, render = ("info", name, *options), ("render", name, "-o", "out.png")
+    return info, info, render, ("compare", name, name), ("convert", name, "-o", "out.txt")
+
+
+def _strewn(path: Path) -> None:
+    """Write frames as FORTRAN has them in memory."""
+    np.save(path, np.asfortranarray(pictures(colour=True)))
+
+
+def _table(path: Path) -> None:
+    np.savez(path, e=events())
+
+
+def _packed_columns(path: Path) -> None:
+    """Write columns as others do: chunks, compressed, times as numbers with a point."""
+    made = events()
+    with h5py.File(path, "w") as file:
+        for name, values in (("t", made["t"] * 1e-6), *((one, made[one]) for one in "xyp")):
+            how = {"chunks": (256,), "compression": "gzip", "shuffle": True}
+            file.create_dataset(f"events/{name}s", data=values, **how)
+        file.attrs["sensor_resolution"] = (HEIGHT, WIDTH)
+
+
+MORE_FRAMES: dict[str, Make] = {
+    f"strewn.npy{FPS}": _strewn,
+    f"big_endian.npy{FPS}": partial(stack, dtype=">f4"),
+    f"double.npy{FPS}": partial(stack, dtype="f8"),
+    **{
+        f"images_{suffix}{FPS}": partial(images, suffix=f".{suffix}", colour=True)
+        for suffix in ("bmp", "webp", "ppm")
+    },
+    f"images_16{FPS}": partial(images, suffix=".tif", dtype="u2"),
+    f"images_pfm{FPS}": partial(images, suffix=".pfm", dtype="f4"),
+}
+"""Beside what digests are made of."""
+
+MORE_EVENTS: dict[str, Make] = {"table.npz": _table, "packed.h5": _packed_columns}
 
 
 def _texts() -> list[Seed]:
     config = (Path(__file__).parents[2] / "configs" / "adv2e.yaml").read_bytes()
     shared = b"a: &a {on: 0.3, off: .2}\npixel: {thresholds: *a, refractory: {period_us: 500.0}}\n"
-    check = ("config", "check", "{}/a.yaml")
-    table = b"light,latency_us\n" + b"".join(b"%d,%d\n" % (n, 5000 - 50 * n) for n in range(1, 20))
+    check = ("config", "check", "a.yaml")
+    table = b"light_dn,latency_us\n" + b"".join(
+        b"%d,%d\n" % (n, 5000 - 50 * n) for n in range(1, 20)
+    )
     return [
         Seed("config", {"a.yaml": config}, (check,)),
         Seed("config small", {"a.yaml": shared[25:]}, (check,)),
         Seed("config aliases", {"a.yaml": shared}, (check,)),
-        Seed("table", {"a.csv": table}, (("characterise", "{}/a.csv", "-o", "{}/report"),)),
+        Seed("table", {"a.csv": table}, (("characterise", "a.csv", "-o", "report"),)),
     ]
-
-
-def _packets(scratch: Path) -> list[Seed]:
-    """Files of packets, as this program writes them."""
-    columns = _columns()
-    events = make_events((columns["t"] * 1e6).astype(int), *(columns[name] for name in "xyp"))
-    seeds = []
-    for name in ("a.aedat4", "a.bag"):
-        path, size = scratch / name, {"width": COLUMNS, "height": ROWS}
-        with open_sink(path, **size, metadata={}, with_frames=True, overwrite=True) as sink:
-            for n, frame in enumerate(_frames()):
-                sink.write_frame(n * 200_000_000, frame)
-            sink.write_events(events)
-        commands = (*_of_events(name), _convert(name))
-        seeds.append(Seed(path.suffix[1:], {name: path.read_bytes()}, commands))
-    return seeds
-
-
-def _hdf5(scratch: Path) -> list[Seed]:
-    commands = (*_of_events("a.h5"), _convert("a.h5"))
-    seeds = []
-    for packed in (False, True):
-        path = scratch / "a.h5"
-        _write_hdf5(path, packed=packed)
-        name = "hdf5 packed" if packed else "hdf5"
-        seeds += [Seed(name, {"a.h5": path.read_bytes()}, commands[:4])] * 2
-    for layout in layouts()[1:]:
-        path = scratch / f"{layout}.h5"
-        _write_layout(path, layout)
-        seeds.append(Seed(f"hdf5 {layout}", {"a.h5": path.read_bytes()}, commands[:4]))
-    _write_ddd(scratch / "ddd.h5")
-    seeds.append(Seed("hdf5 ddd", {"a.h5": (scratch / "ddd.h5").read_bytes()}, commands[:4]))
-    return [*seeds, _Structured("hdf5 structure", {}, commands[:4])]
-
-
-def _write_ddd(path: Path) -> None:
-    times, x, y, p = (np.rint(c * 1e6).astype("<u4") if c.dtype.kind == "f" else c.astype("<u4")
-                      for c in _columns().values())  # fmt: skip
-    words = np.stack([x << 17 | y << 2 | p << 1 | 1, times], axis=1).astype("<u4")
-    packets = [(1, 8, words.tobytes())]
-    for n, frame in enumerate(_frames()):
-        head = np.array([3, 0, 0, n * 200_000, n * 200_000 + 9, COLUMNS, ROWS, 0, 0], "<i4")
-        packets.append((2, 36 + 2 * frame.size, head.tobytes() + frame.astype("<u2").tobytes()))
-    with h5py.File(path, "w") as file:
-        data = file.create_dataset("dvs/data", (16, 3), h5py.vlen_dtype(np.uint8), chunks=(8, 3))
-        for row, (kind, size, body) in enumerate(packets):
-            number = len(body) // size
-            parts = b"15", struct.pack("<hhiiiiii", kind, 1, size, 4, 0, *[number] * 3), body
-            for column, part in enumerate(parts):
-                data[row, column] = np.frombuffer(part, np.uint8)
-        file["dvs/timestamp"] = np.arange(16)
-
-
-def _write_layout(path: Path, layout: str) -> None:
-    with open_sink(
-        path, width=COLUMNS, height=ROWS, metadata={}, layout=layout, with_frames=True,
-        overwrite=True,
-    ) as sink:  # fmt: skip
-        for n, frame in enumerate(_frames()):
-            sink.write_frame(200_000_000 * n, frame)
-        columns = _columns()
-        sink.write_events(make_events(np.rint(columns.pop("t") * 1e6), **columns))
-
-
-def _write_hdf5(path: Path, *, packed: bool) -> None:
-    with h5py.File(path, "w") as file:
-        how = {"chunks": (16,), "compression": "gzip", "shuffle": True} if packed else {}
-        for name, values in _columns().items():
-            file.create_dataset(f"events/{name}s", data=values, **how)
-        file.attrs["sensor_resolution"] = (ROWS, COLUMNS)
-        file.attrs["adv2e"] = json.dumps({"adv2e": "0", "width": COLUMNS, "height": ROWS})
-        for n, frame in enumerate(_frames()):
-            file[f"images/image{n:09d}"] = frame
-            file[f"images/image{n:09d}"].attrs["timestamp"] = 0.2 * n
-
-
-def _camera_files(scratch: Path) -> list[Seed]:
-    t, x, y, p = _columns().values()
-    events = make_events((t * 1e6).astype(np.int64), x, y, p)
-    seeds = []
-    for name, suffix in (
-        ("evt3", ".raw"),
-        ("evt2", ".raw"),
-        ("dat", ".dat"),
-        ("es", ".es"),
-        ("aedat2", ".aedat"),
-    ):
-        path = scratch / f"a{suffix}"
-        with open_sink(
-            path, width=COLUMNS, height=ROWS, metadata={}, format=name, overwrite=True
-        ) as sink:
-            sink.write_events(events)
-        seeds.append(Seed(name, {path.name: path.read_bytes()}, _of_events(path.name)))
-    return seeds
 
 
 class _Structured(Seed):
@@ -508,8 +329,8 @@ class _Structured(Seed):
 
     def write(self, folder: Path, draw: random.Random) -> None:
         """Write the file, and one beside it that it may point to."""
-        _write_hdf5(folder / "b.h5", packed=False)
-        _write_hdf5(folder / "a.h5", packed=draw.random() < 0.5)
+        for name, data in self.content.items():
+            (folder / name).write_bytes(data)
         with h5py.File(folder / "a.h5", "a") as file:
             names = [f"events/{name}s" for name in "txyp"]
             name = draw.choice([*names, *names, "images/image000000000", "images", "events"])
@@ -584,26 +405,3 @@ def _odd_attributes(
 
 _ODD_OBJECTS = (_odd_array, _odd_array, _huge, _link, _link, _virtual, _raw, _nothing,
                 _odd_attributes, _odd_attributes)  # fmt: skip
-
-
-def _videos(scratch: Path) -> list[Seed]:
-    seeds = []
-    for suffix, code in (("mp4", "mp4v"), ("avi", "MJPG"), ("mkv", "mp4v"), ("mov", "mp4v")):
-        path = scratch / f"a.{suffix}"
-        writer = cv2.VideoWriter(
-            str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*code), 25.0, (64, 48)
-        )
-        if not writer.isOpened():
-            continue
-        for frame in np.random.default_rng(3).integers(0, 255, (COUNT, 48, 64, 3), np.uint8):
-            writer.write(frame)
-        writer.release()
-        name = f"a.{suffix}"
-        seeds.append(
-            Seed(f"video {suffix}", {name: path.read_bytes()}, (_info(name), _convert(name)))
-        )
-    planes = b"".join(
-        b"FRAME\n" + frame.tobytes() + bytes(ROWS * COLUMNS // 2) for frame in _frames()
-    )
-    y4m = f"YUV4MPEG2 W{COLUMNS} H{ROWS} F25:1 Ip C420jpeg\n".encode() + planes
-    return [*seeds, Seed("video y4m", {"a.y4m": y4m}, (_info("a.y4m"), _convert("a.y4m")))]

@@ -16,7 +16,6 @@ results.  The exit status is 1 if anything of that does not hold (Linux only).
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import random
 import resource
@@ -63,15 +62,7 @@ _SETS = (
 
 @dataclass
 class Record:
-    """What was done, and what went wrong.
-
-    Attributes
-    ----------
-    counts : Counter
-        Of trials, ends by kind, files and bytes compared.
-    losses : list of str
-        Each thing that did not hold, with the trial's number.
-    """
+    """Counts of trials, ends, files and bytes, and each thing that did not hold."""
 
     counts: Counter[str] = field(default_factory=Counter)
     losses: list[str] = field(default_factory=list)
@@ -148,17 +139,7 @@ def as_in_front() -> None:
 
 
 class Trial:
-    """One set of clips and one command, undisturbed and disturbed.
-
-    Parameters
-    ----------
-    number : int
-    seed : int
-    root : Path
-        Folder of its own.
-    record : Record
-        Takes what is done and what goes wrong.
-    """
+    """One set of clips and one command, undisturbed and disturbed, in a folder of its own."""
 
     def __init__(self, number: int, seed: int, root: Path, record: Record) -> None:
         self._draw = random.Random(f"{seed}-{number}")
@@ -185,7 +166,8 @@ class Trial:
             split = self._split if dest.name == "dest" else []
             return [*program, "batch", str(self._source), str(dest), *self._options, *split]
         target = str(dest / "out")
-        return [*program, "convert", str(self._source), "-o", target, *self._options]
+        convert = [*program, "convert", str(self._source), "-o", target, "--overwrite"]
+        return [*convert, *self._options]
 
     def lose(self, what: str) -> None:
         """Note something that does not hold."""
@@ -218,11 +200,8 @@ class Trial:
 
     def _finish(self, dest: Path) -> None:
         dest.mkdir(exist_ok=True)
-        command = self.command(dest)
-        if not self._is_batch:
-            command.append("--overwrite")
         done = subprocess.run(
-            command, capture_output=True, text=True, check=False, timeout=_HANGS_S
+            self.command(dest), capture_output=True, text=True, check=False, timeout=_HANGS_S
         )
         self._record.counts["runs to the end"] += 1
         if done.returncode:
@@ -234,17 +213,11 @@ class Trial:
         begin: Callable[[], None] = as_in_front
         if kind == "full disk":
             begin = partial(small_disk, int(10 ** self._draw.uniform(2, 6)))
-        command = self.command(dest)
-        if not self._is_batch:
-            command.append("--overwrite")
         process = subprocess.Popen(
-            command,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
+            self.command(dest), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
             start_new_session=True,
             preexec_fn=begin,  # noqa: PLW1509 - this program has one thread
-        )
+        )  # fmt: skip
         self._record.counts[f"ended by {kind}"] += 1
         if kind != "full disk":
             time.sleep(self._draw.uniform(0, 1.1 * took_s))
@@ -332,16 +305,12 @@ def main(minutes: float, trials: int | None, seed: int, output: Path | None) -> 
             Trial(number, seed, Path(folder), record).run()
         number += 1
         left = max(0.0, until - time.monotonic()) / 60
-        click.echo(
-            f"\r{number} trials, {len(record.losses)} losses, {left:.0f} min left ",
-            nl=False,
-            err=True,
-        )
+        told = f"\r{number} trials, {len(record.losses)} losses, {left:.0f} min left "
+        click.echo(told, nl=False, err=True)
     click.echo(err=True)
     for loss in record.losses:
         click.echo(loss, err=True)
-    numbers = json.loads(json.dumps({"counts": record.counts, "losses": record.losses}))
-    write_report(record.text(), output, numbers)
+    write_report(record.text(), output, {"counts": record.counts, "losses": record.losses})
     if record.losses:
         raise click.exceptions.Exit(1)
 

@@ -16,15 +16,7 @@ from adv2e.events import Events
 
 @dataclass(frozen=True)
 class Clip:
-    """A clip, in linear light.
-
-    Attributes
-    ----------
-    frames : array of uint8 or float32, (frames, rows, columns)
-        Light [DN of 255].
-    times_ns : array of int64, (frames,)
-        Increasing [ns].
-    """
+    """A clip: linear light [DN of 255], and increasing times [ns]."""
 
     frames: NDArray[Any]
     times_ns: NDArray[np.int64]

@@ -36,7 +36,7 @@ from adv2e.events import Events, empty_events
 from adv2e.sources.times.instants import seconds
 from experiments import side_by_side
 from experiments.clip import Simulator
-from experiments.recordings import SCORE, Judged, Recording, halves, read, trial_options
+from experiments.recordings import SCORE, Judged, Recording, halves, read
 from experiments.simulators import Pixel, natures, simulator_options
 
 HEADER = (
@@ -64,23 +64,25 @@ COLUMNS = {
 
 @click.command(help=as_written(__doc__))
 @click.option(
-    "--page",
-    "pages",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="FOLDER",
+    "--page", "pages", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
     help="Write a page a table there: measured and simulated events frame by frame.",
-)
-@trial_options
+)  # fmt: skip
+@click.option(
+    "--match-totals", "matching", is_flag=True,
+    help="Add a table: thresholds set so that the totals of the first half of the frame intervals"
+    " match, judged on the second.",
+)  # fmt: skip
+@click.option(
+    "--seeds", type=click.IntRange(min=2), default=2, show_default=True,
+    help="Simulations of each; values are their means, floors the means over their pairs.",
+)  # fmt: skip
+@click.argument("recordings", metavar="RECORDING...", nargs=-1, required=True)
 @simulator_options
 @output_option
 def main(
-    recordings: tuple[str, ...],
-    simulators: list[Simulator],
-    seeds: int,
-    matching: bool,
-    pages: Path | None,
-    output: Path | None,
-) -> None:
+    recordings: tuple[str, ...], simulators: list[Simulator], seeds: int, matching: bool,
+    pages: Path | None, output: Path | None,
+) -> None:  # fmt: skip
     parts = [HEADER, natures(simulators)]
     numbers: dict[str, Any] = {"simulators": {one.name: one.nature for one in simulators}}
     for path in recordings:
@@ -107,17 +109,7 @@ def _say(text: str) -> None:
 
 @dataclass(frozen=True)
 class Row:
-    """A simulator on a recording.
-
-    Attributes
-    ----------
-    judged : Judged
-        Means over seeds.
-    events : Events
-        Of its first seed.
-    repeats : bool
-        All seeds give the same events.
-    """
+    """A simulator on a recording: means over seeds, events of its first, whether all are equal."""
 
     judged: Judged
     events: Events
@@ -146,25 +138,12 @@ def _span(windows: Windows) -> str:
 
 
 class Trial:
-    """Simulators on some of the frame intervals of a recording.
-
-    Parameters
-    ----------
-    real : Recording
-    simulators : mapping of str to Simulator
-        By label.
-    windows : Windows
-    title, about : str
-    """
+    """Simulators, by label, on some of the frame intervals of a recording."""
 
     def __init__(
-        self,
-        real: Recording,
-        simulators: Mapping[str, Simulator],
-        windows: Windows,
-        title: str,
+        self, real: Recording, simulators: Mapping[str, Simulator], windows: Windows, title: str,
         about: str = "",
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.real, self.windows, self.title, self.about = real, windows, title, about
         self.simulators = simulators
         self.heading = f"{real.name}: {title}"

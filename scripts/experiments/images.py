@@ -25,26 +25,18 @@ from adv2e.events import Events, cut
 from adv2e.light.sensor import fitting_of
 from adv2e.sources import open_source
 from experiments.clip import Clip, Simulator
-from experiments.judge import similarity
 from experiments.recordings import Recording, decoder_of, read
 from experiments.scenes import texture_clip
-from experiments.training import CHECKPOINT, Training, Update, checkpoint, identity, written
+from experiments.training import CHECKPOINT, Update, checkpoint, written
 
 Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Events of a clip, and some of its images.
+    """Sorted events of a clip, and some of its images.
 
-    Attributes
-    ----------
-    events : Events
-        Sorted.
-    images : array of float32, (images, rows, columns)
-        Light, 0 black and 1 white.
-    times_us : array of int64, (images,)
-        On the clock of the events.
+    Images are light, 0 black and 1 white; their times [us] are on the clock of the events.
     """
 
     events: Events
@@ -80,20 +72,9 @@ class Pair:
 
 @dataclass(frozen=True)
 class Batches:
-    """What a training draws: runs of windows, of a part of the picture, mirrored or not.
+    """Draws of a training: runs of windows, of a part of the picture, mirrored or not.
 
-    Attributes
-    ----------
-    pairs : sequence of Pair
-    batch, length : int
-        Runs at a time, and windows of each.
-    crop : (int, int)
-        Columns and rows of the part.
-
-    Raises
-    ------
-    DataError
-        A pair has too few images or pixels.
+    It draws `batch` runs of `length` windows at a time, of `crop` columns and rows.
     """
 
     pairs: Sequence[Pair]
@@ -147,13 +128,7 @@ def moving_textures(count: int, seed: int, size: tuple[int, int], frames: int) -
 
 
 def gopro_folders(folder: Path) -> list[Path]:
-    """Return the sequences of ``GOPRO_Large_all`` that are for training.
-
-    Raises
-    ------
-    DataError
-        There is none.
-    """
+    """Return the sequences of ``GOPRO_Large_all`` that are for training."""
     inside = folder / "train"
     place = inside if inside.is_dir() else folder
     found = sorted(one for one in place.iterdir() if one.is_dir() and one.name.startswith("GOPR"))
@@ -183,10 +158,7 @@ def gopro_clips(folder: Path, size: tuple[int, int], frames: int) -> Iterator[Cl
 
 
 def kept(
-    sequences: Sequences,
-    simulator: Simulator,
-    folder: Path,
-    settings: dict[str, Any],
+    sequences: Sequences, simulator: Simulator, folder: Path, settings: dict[str, Any]
 ) -> Iterator[Pair]:
     """Yield events and images of all clips, which are simulated where they were not before."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -218,23 +190,12 @@ CUTS = {
 }  # fmt: skip
 """Sequences of DAVIS240C and the part that is used [s], as EVREAL has it (config/dataset/ECD.json,
 github.com/ercanburak/EVREAL)."""
-MEASURES = {"MSE": False, "SSIM": True, "equalised MSE": False, "equalised SSIM": True,
-            "LPIPS": False}  # fmt: skip
-"""And whether larger is better."""
 GREY = "one grey"
 
 
 @dataclass(frozen=True)
 class Part:
-    """The part of a recording that is used.
-
-    Attributes
-    ----------
-    name : str
-    real : Recording
-    spans : sequence of (int, int)
-        Frame intervals [us].
-    """
+    """The part of a recording that is used: its frame intervals [us]."""
 
     name: str
     real: Recording
@@ -260,13 +221,7 @@ class Part:
 
 
 def parts(data: Path) -> Iterator[Part]:
-    """Yield the sequences of DAVIS240C in a folder with their cuts, or the recording that it is.
-
-    Raises
-    ------
-    DataError
-        It is neither, or a sequence has nothing in its cut.
-    """
+    """Yield the sequences of DAVIS240C in a folder with their cuts, or the recording that it is."""
     there = {
         name: path for name in CUTS for path in (data / f"{name}.zip", data / name) if path.exists()
     }
@@ -285,6 +240,24 @@ def parts(data: Path) -> Iterator[Part]:
 def equalised(image: NDArray[Any]) -> NDArray[np.float64]:
     """Return an image whose histogram, of 256 values, is even."""
     return cv2.equalizeHist(np.rint(255 * image).astype(np.uint8)) / 255.0
+
+
+def similarity(a: NDArray[Any], b: NDArray[Any]) -> float:
+    """Return the mean structural similarity of two images between 0 and 1; 1 for equal ones.
+
+    Means, variances and covariance are under a Gaussian of 1.5 pixels (11 x 11), the constants
+    0.01**2 and 0.03**2, as in doi:10.1109/TIP.2003.819861.
+    """
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+
+    def mean(image: NDArray[Any]) -> NDArray[Any]:
+        return cv2.GaussianBlur(image, (11, 11), 1.5)
+
+    at_a, at_b = mean(a), mean(b)
+    spread = mean(a * a) - at_a**2 + mean(b * b) - at_b**2
+    both = mean(a * b) - at_a * at_b
+    light = (2 * at_a * at_b + 1e-4) / (at_a**2 + at_b**2 + 1e-4)
+    return float(np.mean(light * (2 * both + 9e-4) / (spread + 9e-4)))
 
 
 def measures_of(images: Images, frames: Images, lpips: Lpips | None) -> dict[str, float]:
@@ -366,16 +339,10 @@ def detached(state: Any) -> Any:
 
 
 def trained(run: Path) -> Any:
-    """Return the network of a training.
-
-    Raises
-    ------
-    DataError
-        The folder holds no checkpoint of one of these networks.
-    """
+    """Return the network of a training."""
     path = run / CHECKPOINT
     if not path.is_file():
-        raise DataError(f"{path}: not there; give a folder that train or small made")
+        raise DataError(f"{path}: not there; give a folder that train made")
     state, rest = checkpoint(path)
     network = rest["settings"].get("network")
     if network not in BUILD:
@@ -383,61 +350,3 @@ def trained(run: Path) -> Any:
     net = BUILD[network]()
     net.load_state_dict(state["net"])
     return net.eval()
-
-
-LENGTH = 11
-"""Windows of a run."""
-EVERY = 8
-"""Frames of a window."""
-
-
-@dataclass(frozen=True)
-class Small:
-    """One training on moving textures, and its test on a recording."""
-
-    simulator: Simulator
-    seed: int
-    recording: Path
-    network: str
-    steps: int
-    rate: float
-    clips: int
-    side: int
-    features: Path | None
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """All that decides its numbers."""
-        return {
-            **self._training, "steps": self.steps, "recording": self.recording.resolve().name,
-            "LPIPS": self.features is not None,
-        }  # fmt: skip
-
-    @property
-    def _training(self) -> dict[str, Any]:
-        return {
-            **identity(self.simulator), "seed": self.seed, "network": self.network,
-            "rate": self.rate, "batch": 2, "length": LENGTH,
-            "clips": self.clips, "side": self.side, "loss": LOSS,
-        }  # fmt: skip
-
-    def run(self, folder: Path) -> dict[str, Any]:
-        """Train in a folder, and test."""
-        side = (self.side, self.side)
-        first = 1000 * self.seed
-        clips = (
-            texture_clip(k, EVERY * LENGTH + 1, side) for k in range(first, first + self.clips)
-        )
-        pairs = [Pair.simulated(clip, self.simulator, self.seed, EVERY) for clip in clips]
-        step = update_of(Batches(pairs, 2, LENGTH, side), LENGTH, "cpu")
-        training = Training(BUILD[self.network], step, self._training)
-        net, curve = training.run(folder, self.steps)
-        lpips = None if self.features is None else Lpips(self.features)
-        (part,) = parts(self.recording)
-        images = made_of(net, part)
-        cv2.imwrite(str(folder / "last.png"), picture(part, [images]))
-        return {
-            "measures": measures_of(images, part.frames, lpips),
-            **curve.summary(),
-            "events": sum(len(pair.events) for pair in pairs),
-        }

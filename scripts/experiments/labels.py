@@ -33,7 +33,6 @@ import click
 import cv2
 import numpy as np
 from networks import torch_module
-from networks.unet import unet
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
@@ -41,9 +40,8 @@ from adv2e.events import Events, cut, make_events, sort_events
 from adv2e.export.ev_segnet import DDD17, DDD17_ROWS
 from adv2e.representations.event_images import event_image
 from experiments.clip import Clip, Simulator
-from experiments.recordings import Recording
 from experiments.scenes import HZ, shape_clip
-from experiments.training import Training, Update, identity, written
+from experiments.training import Update, written
 
 IGNORED = 255
 WINDOW_US = 50_000
@@ -68,47 +66,6 @@ class Samples(Protocol):
         """Return one."""
 
 
-def channels(events: Events, size: tuple[int, int], end_us: int) -> NDArray[np.float32]:
-    """Return the channels of the events of the last 50 ms, (6, rows, columns)."""
-    window = end_us - WINDOW_US, end_us
-    return np.ascontiguousarray(event_image(cut(events, *window), size, window).transpose(2, 0, 1))
-
-
-def rendered(
-    seeds: Sequence[int], simulator: Simulator, size: tuple[int, int], windows: int
-) -> list[Sample]:
-    """Return pictures of moving shapes, so many windows of 50 ms of each seed."""
-    found = []
-    step = HZ * WINDOW_US // 10**6
-    for seed in seeds:
-        clip, labels = shape_clip(seed, step * windows + 1, size)
-        events = simulator.events(clip, seed)
-        found += [
-            (channels(events, size, int(clip.times_ns[k]) // 1000), labels[k])
-            for k in range(step, len(labels), step)
-        ]
-    return found
-
-
-def of_shapes(real: Recording, every: int = 5) -> list[Sample]:
-    """Return pictures of measured events of dark shapes on a bright wall, one frame in `every`.
-
-    Labels are the frames themselves: what is darker than Otsu's threshold is shape.  Sides are cut
-    to multiples of 8.
-    """
-    columns, rows = (8 * (one // 8) for one in real.size)
-    found = []
-    span = real.windows.start + WINDOW_US, real.windows.stop
-    for number, (frame, t_us) in enumerate(zip(real.source.frames(), real.times_us, strict=True)):
-        if number % every or not span[0] <= t_us <= span[1]:
-            continue
-        grey = cv2.GaussianBlur(np.asarray(frame.image), (0, 0), 1.0)
-        _, dark = cv2.threshold(grey, 0, 1, cv2.THRESH_BINARY_INV | cv2.THRESH_OTSU)
-        picture = channels(real.events, real.size, int(t_us))
-        found.append((picture[:, :rows, :columns], dark[:rows, :columns].astype(np.uint8)))
-    return found
-
-
 @dataclass(frozen=True)
 class Folder:
     """A split of a data set in the layout of Ev-SegNet, read when it is asked for.
@@ -117,22 +74,16 @@ class Folder:
     ----------
     pairs : list of (Path, Path)
         Channels and labels.
-    size : (int, int)
+    size : (int, int), optional
         Columns and rows to which both are brought, by the nearest pixel.
     """
 
     pairs: list[tuple[Path, Path]]
-    size: tuple[int, int]
+    size: tuple[int, int] | None
 
     @classmethod
-    def of(cls, folder: Path, split: str, size: tuple[int, int]) -> Folder:
-        """Return the split in a folder.
-
-        Raises
-        ------
-        DataError
-            There is none, or a picture lacks labels.
-        """
+    def of(cls, folder: Path, split: str, size: tuple[int, int] | None) -> Folder:
+        """Return the split in a folder."""
         ways = (("events", split, "labels", split), (split, "events", split, "labels"))
         for a, b, c, d in ways:
             events = sorted((folder / a / b).glob("*.npy"))
@@ -159,7 +110,7 @@ class Folder:
             shape = None if label is None else label.shape
             raise DataError(f"{label_path}: {shape}, but its events are {picture.shape[:2]}")
         picture, label = (
-            cv2.resize(one, self.size, interpolation=cv2.INTER_NEAREST_EXACT)
+            cv2.resize(one, self.size or one.shape[1::-1], interpolation=cv2.INTER_NEAREST_EXACT)
             for one in (picture[..., :6].astype(np.float32), label)
         )
         return np.ascontiguousarray(picture.transpose(2, 0, 1)), label
@@ -177,11 +128,6 @@ def from_ess(folder: Path, output: Path, simulator: Simulator | None, seed: int)
     simulator : Simulator, optional
         Makes the events from the images; default: the measured ones.
     seed : int
-
-    Raises
-    ------
-    DataError
-        The folder is not as ESS has it.
     """
     places = sorted(path for path in folder.glob("dir*") if path.is_dir())
     if len(places) != 7:
@@ -189,27 +135,50 @@ def from_ess(folder: Path, output: Path, simulator: Simulator | None, seed: int)
     counts = {}
     for split, numbers in ESS_SPLITS.items():
         made = 0
-        for kind in ("events", "labels"):
-            (output / kind / split).mkdir(parents=True, exist_ok=True)
         labels = output / "labels" / split
         for place in (places[number] for number in numbers):
             for name, picture, label in _pictures(place, labels, simulator, seed):
-                path = output / "events" / split / f"{name}.npy"
-                written(path, lambda to, held=picture: _save(to, held))
-                done, data = cv2.imencode(".png", label)
-                assert done
-                # the label last: it says that both are there
-                raw = data.tobytes()
-                written(labels / f"{name}.png", lambda to, held=raw: to.write_bytes(held))
+                _keep(output, split, name, picture, label)
             click.echo(f"{place.name}: done ({split})", err=True)
             made += len(list(labels.glob(f"{place.name}_*.png")))
         counts[split] = made
     return counts
 
 
-def _save(path: Path, picture: NDArray[np.float32]) -> None:
-    with path.open("wb") as file:
-        np.save(file, picture, allow_pickle=False)
+def _keep(
+    output: Path, split: str, name: str, picture: NDArray[np.float32], label: NDArray[np.uint8]
+) -> None:
+    """Write channels (rows, columns, 6) and labels in the layout of Ev-SegNet."""
+    for kind in ("events", "labels"):
+        (output / kind / split).mkdir(parents=True, exist_ok=True)
+
+    def save(path: Path) -> None:
+        with path.open("wb") as file:
+            np.save(file, picture, allow_pickle=False)
+
+    written(output / "events" / split / f"{name}.npy", save)
+    done, data = cv2.imencode(".png", label)
+    assert done
+    # the label last: it says that both are there
+    raw = data.tobytes()
+    written(output / "labels" / split / f"{name}.png", lambda path: path.write_bytes(raw))
+
+
+def write_shapes(output: Path, simulator: Simulator, clips: int, seed: int, side: int) -> None:
+    """Write pictures of moving dark shapes in the layout of Ev-SegNet, 8 a clip.
+
+    The shapes are the same for all simulators, others for each seed, and half as many are of test.
+    """
+    step = HZ * WINDOW_US // 10**6
+    for split, first in (("train", 1000 * seed), ("test", 10**6 + 1000 * seed)):
+        for number in range(first, first + (clips if split == "train" else clips // 2)):
+            clip, labels = shape_clip(number, 8 * step + 1, (side, side))
+            events = simulator.events(clip, number)
+            for k in range(step, len(labels), step):
+                end = int(clip.times_ns[k]) // 1000
+                window = end - WINDOW_US, end
+                picture = event_image(cut(events, *window), (side, side), window)
+                _keep(output, split, f"shapes_{number:07d}_{k:04d}", picture, labels[k])
 
 
 def _pictures(
@@ -287,10 +256,6 @@ def _measured(place: Path, times_ns: NDArray[np.int64], piece: Sequence[int]) ->
     return sort_events(make_events(t=t[first:last] // 1000, x=x, y=y, p=p > 0))
 
 
-MEASURES = {"last accuracy": True, "last mIoU": True, "best accuracy": True, "best mIoU": True}
-"""And whether larger is better."""
-
-
 def confusion(net: Any, samples: Samples, classes: int, device: str) -> NDArray[np.int64]:
     """Return how many pixels of each class (rows) are said to be of each (columns)."""
     torch = torch_module()
@@ -324,24 +289,9 @@ def of_one_class(samples: Samples, classes: int) -> dict[str, float]:
     return scores_of(said)
 
 
-def last_and_best(checks: Sequence[dict[str, float]]) -> dict[str, float]:
-    """Return the measures of the last test and of the best one."""
-    best = max(checks, key=lambda one: one["mIoU"])
-    names = ("accuracy", "mIoU")
-    return {
-        f"{when} {name}": one[name]
-        for when, one in (("last", checks[-1]), ("best", best))
-        for name in names
-    }
-
-
-def picture(net: Any, sample: Sample) -> NDArray[np.uint8]:
-    """Return labels, what a network says, and the number of events, side by side."""
-    torch = torch_module()
-    with torch.inference_mode():
-        said = net(torch.from_numpy(sample[0])[None])[0].argmax(0).numpy()
-    counts = sample[0][:2].max(0) / 2 + 0.5
-    return np.rint(255 * np.hstack([sample[1] == 1, said == 1, counts])).astype(np.uint8)
+def last_and_best(checks: Sequence[dict[str, float]]) -> dict[str, dict[str, float]]:
+    """Return the last test and the best one."""
+    return {"last": checks[-1], "best": max(checks, key=lambda one: one["mIoU"])}
 
 
 def update_of(samples: Samples, batch: int, device: str, changed: bool) -> Update:
@@ -392,57 +342,3 @@ def augmented(sample: Sample, rng: np.random.Generator, changed: bool) -> Sample
         picture = np.where(inside, picture[:, at_y, at_x], np.float32(0))
         label = np.where(inside, label[at_y, at_x], np.uint8(IGNORED))
     return np.ascontiguousarray(picture), np.ascontiguousarray(label)
-
-
-WINDOWS = 8
-"""Pictures of each clip."""
-EPOCH = 50
-"""Steps between tests."""
-
-
-@dataclass(frozen=True)
-class Small:
-    """One training on rendered shapes, and its tests on pictures that are given."""
-
-    simulator: Simulator
-    seed: int
-    tested: tuple[Sample, ...]
-    tested_on: str
-    steps: int
-    rate: float
-    clips: int
-    side: int
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """All that decides its numbers."""
-        return {**self._training, "steps": self.steps}
-
-    @property
-    def _training(self) -> dict[str, Any]:
-        return {
-            **identity(self.simulator), "seed": self.seed,
-            "network": "unet", "rate": self.rate, "batch": 4, "clips": self.clips,
-            "side": self.side, "tested on": self.tested_on, "pictures tested": len(self.tested),
-        }  # fmt: skip
-
-    def run(self, folder: Path) -> dict[str, Any]:
-        """Train in a folder, and test."""
-        first = 1000 * self.seed
-        samples = rendered(
-            range(first, first + self.clips), self.simulator, (self.side, self.side), WINDOWS
-        )
-
-        def check(net: Any) -> dict[str, float]:
-            return scores_of(confusion(net, self.tested, 2, "cpu"))
-
-        made = Training(
-            lambda: unet(2), update_of(samples, 4, "cpu", False), self._training, EPOCH, check,
-            "mIoU",
-        )  # fmt: skip
-        net, curve = made.run(folder, self.steps)
-        cv2.imwrite(str(folder / "last.png"), picture(net, self.tested[-1]))
-        return {
-            "measures": last_and_best(curve.checks),
-            **curve.summary(),
-        }

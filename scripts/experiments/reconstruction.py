@@ -5,8 +5,6 @@
 
     python scripts/experiments/reconstruction.py train runs/adv2e --gopro GOPRO_Large_all
     python scripts/experiments/reconstruction.py test DAVIS240C runs/adv2e -o results.md
-    python scripts/experiments/reconstruction.py small runs cups -o small.md
-    python scripts/experiments/reconstruction.py report runs -o small.md
 
 ``train``
     E2VID or FireNet (:mod:`networks.e2vid`, :mod:`networks.firenet`) from scratch, on events that
@@ -18,9 +16,6 @@
     with the seven DAVIS240C sequences, folders or zips as they are published
     (rpg.ifi.uzh.ch/davis_data.html), of which the cuts of EVREAL are used; or any one recording
     with frames, which is used as a whole.
-``small``
-    A training for each simulator and seed on moving textures, each on one thread, tested on one
-    measured recording: what two cores can do.  ``report`` makes its tables again.
 
 The loss is the mean absolute difference plus 1 less the mean structural similarity (SSIM); with
 ``--lpips`` LPIPS alone, as E2VID has it, by weights in a folder (:mod:`networks.image_loss`).  Its
@@ -42,18 +37,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import click
 import cv2
-import numpy as np
 from networks.image_loss import Lpips
 from writing import as_written, one_line_errors, output_option, table, write_report
 
 from experiments import training
 from experiments.images import (
     BUILD,
-    EVERY,
     LOSS,
-    MEASURES,
     Batches,
-    Small,
     gopro_sequences,
     kept,
     made_of,
@@ -65,14 +56,7 @@ from experiments.images import (
     trained,
     update_of,
 )
-from experiments.training import (
-    Training,
-    all_done,
-    all_measured,
-    identity,
-    keep_references,
-    kept_references,
-)
+from experiments.training import Training, identity
 
 _lpips_option = click.option(
     "--lpips", "features", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
@@ -119,7 +103,7 @@ def main() -> None:
 @training.counted("--truncate", 40, "Windows that a gradient spans; a step of Adam each.")
 @click.option("--crop", type=_Size(), default="128x128", show_default=True)
 @click.option("--size", type=_Size(), default="240x180", show_default=True, help="Of the sensor.")
-@training.counted("--every", EVERY, "Frames from an image to the next.")
+@training.counted("--every", 8, "Frames from an image to the next.")
 @training.counted("--frames", 481, "Of a piece of a sequence.")
 @training.counted("--checkpoint", 500, "Steps between checkpoints.")
 @click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True)
@@ -135,10 +119,7 @@ def train(
     """Train a network on the events of one simulator in the folder OUTPUT; called again, go on."""
     if (gopro is None) == (clips is None):
         raise click.UsageError("say --gopro FOLDER or --textures N, and not both")
-    simulators = training.anew(names, sets, v2e_sources)
-    if len(simulators) != 1:
-        raise click.UsageError(f"--simulators {names}: train takes one")
-    (simulator,) = simulators
+    simulator = training.one_anew(names, sets, v2e_sources)
     sequences = (
         gopro_sequences(gopro, size, frames) if gopro
         else moving_textures(clips or 0, seed, size, frames)
@@ -197,54 +178,6 @@ def _tables(found: dict[str, dict[str, dict[str, float]]]) -> str:
         texts.append(f"## {part}\n\n{table(['network', *names], lines)}")
     return "\n\n".join(texts)
 
-
-@main.command()
-@click.argument("output", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER")
-@click.argument("recording", type=click.Path(exists=True, path_type=Path))
-@click.option("--network", type=click.Choice(list(BUILD)), default="firenet", show_default=True)
-@training.counted("--seeds", 5)
-@training.counted("--steps", 400)
-@training.rate_option(1e-3)
-@training.counted("--clips", 40, "Of each seed, 0.37 s each.")
-@training.counted("--side", 64, "Of the clips [pixels].")
-@training.counted("--jobs", 1, "Trainings at a time, on one thread each.")
-@_lpips_option
-@_weights_option
-@training.simulators_option(training.SMALL)
-@training.report_option
-@one_line_errors()
-def small(
-    output: Path, recording: Path, network: str, seeds: int, steps: int, rate: float, clips: int,
-    side: int, jobs: int, features: Path | None, weights: Path | None, names: str,
-    sets: tuple[str, ...], v2e_sources: Path | None, to: Path | None,
-) -> None:  # fmt: skip
-    """Train for each simulator and seed in FOLDER, test on a RECORDING; called again, go on."""
-    lpips = None if features is None else Lpips(features)
-    (part,) = parts(recording)
-    keep_references(output, references(part, weights, lpips))
-    trainings = [
-        Small(simulator, seed, recording, network, steps, rate, clips, side, features)
-        for seed in range(seeds)
-        for simulator in training.anew(names, sets, v2e_sources)
-    ]
-    all_done(trainings, output, jobs)
-    _report(output, to)
-
-
-def _report(folder: Path, output: Path | None) -> None:
-    found = all_measured(folder)
-    kept = kept_references(folder)
-    one = found[0]["settings"]
-    seconds = np.median([each["seconds a step"] for each in found])
-    about = (
-        f"{one['network']}, {one['steps']} steps of {seconds:.2f} s on one thread, {one['clips']}"
-        f" clips of {one['side']}x{one['side']} pixels a seed; tested on {one['recording']}."
-    )
-    text = f"{about}\n\n{training.report(found, MEASURES, kept)}"
-    write_report(text, output, {"trainings": found, "beside": kept})
-
-
-main.add_command(training.report_command(_report))
 
 if __name__ == "__main__":
     main()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -39,24 +39,6 @@ WIDEST = 25.0
 """Thresholds are sought from 1/25 to 25 times those of the simulator."""
 
 
-def trial_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add recordings, and how simulators are tried on them."""
-    for one in (
-        click.option(
-            "--match-totals", "matching", is_flag=True,
-            help="Add a table: thresholds set so that the totals of the first half of the frame"
-            " intervals match, judged on the second.",
-        ),
-        click.option(
-            "--seeds", type=click.IntRange(min=2), default=2, show_default=True,
-            help="Simulations of each; values are their means, floors the means over their pairs.",
-        ),
-        click.argument("recordings", metavar="RECORDING...", nargs=-1, required=True),
-    ):  # fmt: skip
-        command = one(command)
-    return command
-
-
 def totals(events: Events) -> tuple[int, int]:
     """Return the counts of ON and OFF events."""
     on = int(np.count_nonzero(events["p"]))
@@ -86,22 +68,8 @@ class Judged:
 class Recording:
     """A recording with frames and events.
 
-    Attributes
-    ----------
-    name : str
-        Of its folder.
-    events : Events
-        As measured.
-    source : Source
-        The frames.
-    times_us : array of int64, (frames,)
-        Their times [us].
-    windows : Windows
-        The frame intervals that the events cover.
-    still : array of bool, (rows, columns)
-        Pixels that see no change within the windows.
-    problems : list of str
-        What is doubtful.
+    `windows` are the frame intervals that the events cover; pixels that are `still` see no change
+    within these.  `problems` are what is doubtful.
     """
 
     name: str
@@ -203,13 +171,7 @@ class Recording:
 
 
 def read(folder: str) -> Recording:
-    """Return the recording in a folder: DAVIS240C, or with ``events.npz`` for ``events.txt``.
-
-    Raises
-    ------
-    DataError
-        It has no frames or no events, is damaged, or its events cover no frame interval.
-    """
+    """Return the recording in a folder: DAVIS240C, or with ``events.npz`` for ``events.txt``."""
     apart = Path(folder) / "events.npz"
     recording = read_events(apart if apart.is_file() else folder)
     source = open_source(folder)
@@ -275,13 +237,7 @@ def still_rate(events: Events, still: NDArray[np.bool_], duration_s: float) -> f
 
 
 def halves(windows: Windows) -> tuple[Windows, Windows]:
-    """Return the first half of the windows and the rest.
-
-    Raises
-    ------
-    DataError
-        There is only one window.
-    """
+    """Return the first half of the windows and the rest."""
     middle = len(windows.used) // 2
     if not middle:
         raise DataError(

@@ -37,13 +37,7 @@ View = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 @lru_cache(maxsize=len(NAMES))
 def photograph(name: str) -> NDArray[np.float32]:
-    """Return the light [DN of 255] of a photograph, (rows, columns).
-
-    Raises
-    ------
-    MissingExtraError
-        scikit-image is not installed.
-    """
+    """Return the light [DN of 255] of a photograph, (rows, columns)."""
     image = getattr(_late("skimage.data"), name)()
     return LightDecoder("srgb", 255.0, image.dtype, image.ndim == 3).decode(image)
 

@@ -32,15 +32,7 @@ small { font-weight: normal; color: #4a5565; display: block; max-width: 260px; }
 
 @dataclass(frozen=True)
 class Column:
-    """A stream of events.
-
-    Attributes
-    ----------
-    name, about : str
-    events : Events
-    scores : sequence of float or None, a frame interval each
-        Shown under its pictures.
-    """
+    """A stream of events, and scores to show under its pictures, a frame interval each."""
 
     name: str
     about: str
@@ -58,18 +50,8 @@ def page(
 ) -> str:
     """Return the page as HTML: one file, no loads from elsewhere.
 
-    Parameters
-    ----------
-    title : str
-    frames : mapping of int to (rows, columns) array
-        Frames by their time [us].
-    windows : sequence of (int, int)
-        Frame intervals [us]; of more than `MOST` some are chosen.
-    size : (int, int)
-        Columns and rows.
-    columns : sequence of Column
-    score : str
-        What the numbers under the pictures are.
+    Frames are given by their time [us]; of more than `MOST` frame intervals some are chosen.
+    `score` is what the numbers under the pictures are.
     """
     chosen = np.unique(np.linspace(0, len(windows) - 1, MOST).round().astype(int)).tolist()
     about = (
@@ -77,9 +59,7 @@ def page(
         f" A pixel has the colour of its last event: ON red, OFF blue. {score}"
     )
     head = tag(
-        "tr",
-        tag("th", "frame"),
-        *(tag("th", one.name, tag("small", one.about)) for one in columns),
+        "tr", tag("th", "frame"), *(tag("th", one.name, tag("small", one.about)) for one in columns)
     )
     rows = []
     for number in chosen:

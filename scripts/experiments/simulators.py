@@ -38,16 +38,7 @@ OF_A_TOOL = "its parameters in the pixel of adv2e, not the tool"
 
 @dataclass(frozen=True)
 class Pixel:
-    """The pixel of adv2e.
-
-    Attributes
-    ----------
-    name, nature : str
-    config : Config
-        Its seed and sensor do not count.
-    threads : int, optional
-        Default: all cores.
-    """
+    """The pixel of adv2e; seed and sensor of its configuration do not count."""
 
     name: str
     nature: str
@@ -85,25 +76,28 @@ class Pixel:
 
 QUIET = {"leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0}
 THRESHOLDS = {"pos_thres": 0.2, "neg_thres": 0.2}
-"""Its defaults [ln]."""
+"""Defaults of EventCV and v2e [ln]."""
+
+
+class _Tool:
+    """A tool of another project, which has its thresholds among its arguments."""
+
+    arguments: dict[str, Any]
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Its thresholds of ON and OFF [ln]."""
+        held = {**THRESHOLDS, **self.arguments}
+        return held["pos_thres"], held["neg_thres"]
+
+    def with_levels(self, on: float, off: float) -> Any:
+        """Return it with other thresholds [ln]."""
+        return replace(self, arguments={**self.arguments, "pos_thres": on, "neg_thres": off})
 
 
 @dataclass(frozen=True)
-class EventCV:
-    """EventCV.
-
-    Attributes
-    ----------
-    arguments : dict
-        Of ``eventcv.simulate``.
-    parts : int
-        Even steps of an interval.
-
-    Raises
-    ------
-    MissingExtraError
-        It is not installed.
-    """
+class EventCV(_Tool):
+    """EventCV, with arguments of ``eventcv.simulate``, and so many even steps of an interval."""
 
     name: str = "eventcv"
     arguments: dict[str, Any] = field(default_factory=dict)
@@ -128,42 +122,17 @@ class EventCV:
         t, x, y, p = tool.columns(run(coded, float(rate)))
         return sort_events(make_events(t + int(clip.times_ns[0]) // 1000, x, y, p))
 
-    @property
-    def levels(self) -> tuple[float, float]:
-        """Its thresholds of ON and OFF [ln]."""
-        held = {**THRESHOLDS, **self.arguments}
-        return held["pos_thres"], held["neg_thres"]
-
-    def with_levels(self, on: float, off: float) -> EventCV:
-        """Return it with other thresholds [ln]."""
-        return replace(self, arguments={**self.arguments, "pos_thres": on, "neg_thres": off})
-
 
 V2E_DEFAULTS = {
-    "pos_thres": 0.2, "neg_thres": 0.2, "sigma_thres": 0.03, "cutoff_hz": 300.0,
-    "leak_rate_hz": 0.01, "shot_noise_rate_hz": 0.001, "refractory_period_s": 0.0005,
+    **THRESHOLDS, "sigma_thres": 0.03, "cutoff_hz": 300.0, "leak_rate_hz": 0.01,
+    "shot_noise_rate_hz": 0.001, "refractory_period_s": 0.0005,
 }  # fmt: skip
 """Of its command line; those of its class differ."""
 
 
 @dataclass(frozen=True)
-class V2e:
-    """v2e.
-
-    Attributes
-    ----------
-    folder : Path
-        Holds ``v2ecore/``.
-    arguments : dict
-        Of its ``EventEmulator``.
-    parts : int
-        Even steps of an interval.
-
-    Raises
-    ------
-    DataError
-        The folder does not hold its sources.
-    """
+class V2e(_Tool):
+    """v2e out of a folder with ``v2ecore/``, with arguments of its ``EventEmulator``."""
 
     folder: Path
     arguments: dict[str, float] = field(default_factory=lambda: dict(V2E_DEFAULTS))
@@ -197,15 +166,6 @@ class V2e:
         first_us = int(clip.times_ns[0]) // 1000
         return sort_events(make_events(np.rint(t * 1e6) + first_us, x, y, p > 0))
 
-    @property
-    def levels(self) -> tuple[float, float]:
-        """Its thresholds of ON and OFF [ln]."""
-        return self.arguments["pos_thres"], self.arguments["neg_thres"]
-
-    def with_levels(self, on: float, off: float) -> V2e:
-        """Return it with other thresholds [ln]."""
-        return replace(self, arguments={**self.arguments, "pos_thres": on, "neg_thres": off})
-
 
 FIRST_FRAME = "start"
 """In place of a number of seconds: that of the clip's first frame."""
@@ -215,12 +175,7 @@ FIRST_FRAME = "start"
 class ByFile:
     """Events that are there already.
 
-    Attributes
-    ----------
-    name : str
-    path : Path
-    added : float or None
-        What is added to their times [s]; None: the time of the clip's first frame.
+    Their times are made later by `added` [s]; None: by the time of the clip's first frame.
     """
 
     name: str
@@ -240,13 +195,7 @@ class ByFile:
         return recording.events, (recording.width, recording.height), stated
 
     def events(self, clip: Clip, seed: int) -> Events:
-        """Return the events of a clip.
-
-        Raises
-        ------
-        DataError
-            They are of another size, or none is within the clip.
-        """
+        """Return the events of a clip."""
         events, size, stated = self._held
         if size != clip.size if stated else size[0] > clip.size[0] or size[1] > clip.size[1]:
             raise DataError(
@@ -288,23 +237,8 @@ def named(
 ) -> list[Simulator]:
     """Return simulators in this order, those by file last.
 
-    Parameters
-    ----------
-    names : sequence of str
-        ``dvs-voltmeter``, ``eventcv``, ``eventcv-quiet``, or what :func:`adv2e.load_config` takes.
-    files : sequence of ByFile
-    sets : sequence of str
-        ``KEY=VALUE`` for all configurations of adv2e.
-    v2e_sources : Path, optional
-        With it ``v2e`` is the tool itself.
-    threads : int, optional
-
-    Raises
-    ------
-    ConfigError
-        A name is unknown, or stands twice.
-    MissingExtraError
-        A tool is not installed.
+    Names are ``dvs-voltmeter``, ``eventcv``, ``eventcv-quiet``, or what :func:`adv2e.load_config`
+    takes; `sets` are for all of these.  With `v2e_sources`, ``v2e`` is the tool itself.
     """
     asked = [Path(name).stem for name in names] + [one.name for one in files]
     for name in asked:

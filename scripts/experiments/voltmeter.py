@@ -58,10 +58,7 @@ def motion(
     k1, k2, k3, k4, k5, k6 = constants
     light = 0.5 * (before.astype(np.float64) + after)
     change = (after.astype(np.float64) - before) / step_us
-    return (
-        k1 * change / (light + k2) + k4 + k5 * light,
-        k3 * np.sqrt(light) / (light + k2) + k6,
-    )
+    return (k1 * change / (light + k2) + k4 + k5 * light, k3 * np.sqrt(light) / (light + k2) + k6)
 
 
 def chance_of_on(up: Values, down: Values, drift: Values, deviation: Values) -> Values:

@@ -33,13 +33,7 @@ def output_options(body: Callable[..., None]) -> Callable[..., None]:
 
 
 def late(name: str) -> Any:
-    """Return a module of this package that needs PyTorch.
-
-    Raises
-    ------
-    MissingExtraError
-        PyTorch, or what it needs to write ONNX, is not installed.
-    """
+    """Return a module of this package that needs PyTorch."""
     try:
         return importlib.import_module(f"networks.{name}")
     except ImportError as error:
@@ -47,13 +41,7 @@ def late(name: str) -> Any:
 
 
 def torch_module() -> Any:
-    """Return PyTorch.
-
-    Raises
-    ------
-    MissingExtraError
-        It is not installed.
-    """
+    """Return PyTorch."""
     try:
         return importlib.import_module("torch")
     except ImportError as error:
@@ -65,13 +53,7 @@ _DAMAGED = pickle.UnpicklingError, EOFError, LookupError, RuntimeError, TypeErro
 
 @contextmanager
 def damage_told(complaint: str) -> Iterator[None]:
-    """Turn what PyTorch raises for files that it did not write, or not so, into one line.
-
-    Raises
-    ------
-    DataError
-        `complaint`, and in brackets the reason.
-    """
+    """Turn what PyTorch raises for files that it did not write, or not so, into one line."""
     try:
         yield
     except _DAMAGED as error:

@@ -36,11 +36,6 @@ def e2vid() -> Any:
     It takes grids (batch, bins, rows, columns) and the state that it returned before, None for
     zeros; it returns images (batch, 1, rows, columns) between 0 black and 1 white, and the next
     state.  Pictures whose sides are no multiples of 8 are mirrored at their ends.
-
-    Raises
-    ------
-    MissingExtraError
-        PyTorch is not installed.
     """
     return _class(torch_module())()
 

@@ -37,11 +37,6 @@ def evsegnet(classes: int) -> Any:
 
     It takes pictures (batch, 6, rows, columns), two or more at a time while it is trained, sides
     multiples of 32, and returns scores (batch, classes, rows, columns).
-
-    Raises
-    ------
-    MissingExtraError
-        PyTorch is not installed.
     """
     return _classes(torch_module())[0](classes)
 

@@ -30,7 +30,7 @@ _OPSET = 18
 
 @dataclass(frozen=True)
 class Network:
-    """What is exported.
+    """A network that is exported.
 
     Parameters
     ----------
@@ -53,13 +53,7 @@ class Network:
 
 
 def export(load: Callable[[], Network], source: Path, output: Path, *, overwrite: bool) -> None:
-    """Load a network from `source` and write it.
-
-    Raises
-    ------
-    OutputError
-        The output exists, or does not do what the network does.
-    """
+    """Load a network from `source` and write it."""
     with Staging(overwrite, [source]) as staging:
         temporary = staging.file(output)
         network = load()

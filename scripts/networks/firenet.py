@@ -26,6 +26,7 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,11 +61,6 @@ def firenet() -> Any:
     As its authors have it, gates begin orthogonal and without bias.  It takes grids (batch, bins,
     rows, columns) and the state that it returned before, None for zeros; it returns images (batch,
     1, rows, columns), about 0 black and 1 white, and the next state.
-
-    Raises
-    ------
-    MissingExtraError
-        PyTorch is not installed.
     """
     return _class(torch_module())()
 
@@ -202,16 +198,9 @@ def _weights(path: Path) -> Any:
     torch = torch_module()
     stub = types.ModuleType("parse_config")
     stub.ConfigParser = type("ConfigParser", (), {"__module__": "parse_config"})  # type: ignore[attr-defined]
-    before = sys.modules.get("parse_config")
-    sys.modules["parse_config"] = stub
-    try:
-        with (
-            damage_told(f"{path}: no checkpoint of PyTorch"),
-            torch.serialization.safe_globals([stub.ConfigParser, pathlib.PosixPath]),
-        ):
-            return torch.load(path, map_location="cpu", weights_only=True)["state_dict"]
-    finally:
-        if before is None:
-            del sys.modules["parse_config"]
-        else:
-            sys.modules["parse_config"] = before
+    with (
+        patch.dict(sys.modules, {"parse_config": stub}),
+        damage_told(f"{path}: no checkpoint of PyTorch"),
+        torch.serialization.safe_globals([stub.ConfigParser, pathlib.PosixPath]),
+    ):
+        return torch.load(path, map_location="cpu", weights_only=True)["state_dict"]

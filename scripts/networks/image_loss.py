@@ -35,7 +35,7 @@ def structural_loss(made: Any, wanted: Any) -> Any:
 
 
 def similarity(a: Any, b: Any) -> Any:
-    """Return the mean of :func:`experiments.judge.similarity` over a batch, differentiable."""
+    """Return the mean of :func:`experiments.images.similarity` over a batch, differentiable."""
     torch = torch_module()
     functional = torch.nn.functional
     place = torch.arange(-_REACH, _REACH + 1, dtype=a.dtype, device=a.device)
@@ -69,11 +69,6 @@ class Lpips:
     ----------
     folder : Path
         Where both files are.
-
-    Raises
-    ------
-    DataError
-        A file does not hold these weights.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -132,11 +132,6 @@ def load(path: Path, *, is_any: bool) -> Network:
         A wheel, or a folder where one was unpacked.
     is_any : bool
         Also where the files are not the known ones.
-
-    Raises
-    ------
-    DataError
-        Something is not there, or not the known one.
     """
     files = _read(path, is_any=is_any)
     theirs = _modules(files)["IFNet_HDv3"].IFNet("cpu").eval()

@@ -134,11 +134,6 @@ def load(checkpoint: Path, mean: float | None) -> Network:
         ``state_dictAT``.
     mean : float or None
         Subtracted from all channels; None for what the weights were trained with.
-
-    Raises
-    ------
-    DataError
-        It is not such a checkpoint.
     """
     raw = checkpoint.read_bytes()
     content = _unpickled(checkpoint, raw)

@@ -22,11 +22,6 @@ def unet(classes: int, channels: int = 6) -> Any:
 
     It takes pictures (batch, channels, rows, columns), sides multiples of 8, and returns scores
     (batch, classes, rows, columns).
-
-    Raises
-    ------
-    MissingExtraError
-        PyTorch is not installed.
     """
     return _class(torch_module())(classes, channels)
 

@@ -1,4 +1,4 @@
-"""What is diagnosed, and in which order, so that a study cut short has some of everything."""
+"""Cases of the study, and their order, so that a study cut short has some of everything."""
 
 from __future__ import annotations
 
@@ -14,28 +14,15 @@ from typing import Any
 
 REPOSITORY = Path(__file__).parents[2]
 
-"""Recordings are by the camera of its tests, which shares no code with adv2e."""
+# recordings are by the camera of the tests, which shares no code with adv2e
+sys.path.append(str(REPOSITORY / "tests"))
+camera: Any = import_module("camera")
+catalogue: Any = import_module("camera.catalogue")
+settings: Any = import_module("camera.settings")
+stimulus: Any = import_module("camera.stimulus")
 
-
-def _module(name: str) -> Any:
-    folder = str(REPOSITORY / "tests")
-    if folder not in sys.path:
-        sys.path.append(folder)
-    return import_module(name)
-
-
-camera = _module("camera")
-catalogue = _module("camera.catalogue")
-settings = _module("camera.settings")
-stimulus = _module("camera.stimulus")
-
-NOTHING, LIBRARY, LEFT_OUT, OUTSIDE, PAIRS = KINDS = (
-    "nothing",
-    "library",
-    "leave-one-out",
-    "outside",
-    "pairs",
-)
+KINDS = ("nothing", "library", "leave-one-out", "outside", "pairs")
+NOTHING, LIBRARY, LEFT_OUT, OUTSIDE, PAIRS = KINDS
 OWN_PERIOD = "own-period"
 """A kind that is studied where it is asked for: an effect at frames of another rate."""
 SMALL, MIDDLE, LARGE = SIZES = catalogue.SIZES
@@ -81,7 +68,7 @@ class Case:
 
     @property
     def hidden(self) -> dict[str, Any]:
-        """What the camera does and the declared configuration does not say."""
+        """Part of the camera's configuration that is not declared."""
         if self.kind == OWN_PERIOD:
             held = [catalogue.with_own_period(name, self.size).hidden for name in self.effects]
             return dict(settings.merged({}, *held))
@@ -164,12 +151,3 @@ def pairs(names: Sequence[str]) -> list[tuple[str, ...]]:
 def shard(cases: Sequence[Case], number: int, count: int) -> list[Case]:
     """Return every `count`-th case from the `number`-th on, counted from 1."""
     return list(cases[number - 1 :: count])
-
-
-_STEPS = 8
-"""Pictures that are made up between two frames, where they move."""
-
-
-def sampling(interpolation: str) -> dict[str, Any]:
-    """Return what is declared of the pictures between frames that are blended, or moved."""
-    return {"interpolation": interpolation, "L": 1 if interpolation == "linear" else _STEPS}

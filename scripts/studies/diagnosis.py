@@ -57,45 +57,25 @@ from studies.cases import (
 )
 from studies.results import ENDING, append, finished, identity, latest, read
 
-ALL = ",".join
 
+def _names(known: tuple[str, ...]) -> Callable[..., tuple[str, ...]]:
+    """Return what reads names out of a list, with commas between them, in the list's order."""
 
-class Names(click.ParamType):
-    """Names out of a list, with commas between them."""
-
-    name = "names"
-
-    def __init__(self, known: tuple[str, ...]) -> None:
-        self.known = known
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, ...]:
-        """Return the names, in the order of the list."""
-        if isinstance(value, tuple):
-            return value
-        names = str(value).split(",")
+    def read_names(ctx: click.Context, param: click.Parameter, text: str) -> tuple[str, ...]:
+        names = text.split(",")
         for name in names:
-            if name not in self.known:
-                self.fail(f"{name!r}: none of {', '.join(self.known)}", param, ctx)
-        return tuple(name for name in self.known if name in names)
+            if name not in known:
+                raise click.BadParameter(f"{name!r}: none of {', '.join(known)}", ctx, param)
+        return tuple(name for name in known if name in names)
+
+    return read_names
 
 
-class Shard(click.ParamType):
-    """``I/N``: the I-th of N parts."""
-
-    name = "I/N"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        """Return both numbers."""
-        if isinstance(value, tuple):
-            return value
-        number, _, count = str(value).partition("/")
-        if number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
-            return int(number), int(count)
-        return self.fail(f"{value!r}: must be I/N with I from 1 to N, such as 3/16", param, ctx)
+def _shard(ctx: click.Context, param: click.Parameter, text: str) -> tuple[int, int]:
+    number, _, count = text.partition("/")
+    if number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
+        return int(number), int(count)
+    raise click.BadParameter(f"{text!r}: must be I/N with I from 1 to N, such as 3/16", ctx, param)
 
 
 def _size(ctx: click.Context, param: click.Parameter, text: str) -> tuple[int, int]:
@@ -132,17 +112,10 @@ def _of_recordings(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-def _setup(
-    size: tuple[int, int],
-    seconds: float,
-    fps: float,
-    bits: str,
-    interpolation: str,
-    known_light: bool,
-) -> Any:
+def _setup(size: tuple[int, int], seconds: float, bits: str, **more: Any) -> Any:
     from studies.run import Setup  # noqa: PLC0415 - it loads the simulator
 
-    return Setup(*size, seconds, fps, int(bits), interpolation, known_light)
+    return Setup(*size, seconds, bits=int(bits), **more)
 
 
 @click.group()
@@ -152,10 +125,15 @@ def main() -> None:
 
 @main.command("run")
 @click.argument("folder", type=click.Path(file_okay=False, path_type=Path))
-@click.option("--kinds", type=Names((*KINDS, OWN_PERIOD)), default=ALL(KINDS), show_default=True)
-@click.option("--sizes", type=Names(SIZES), default=ALL(SIZES), show_default=True)
+@click.option(
+    "--kinds", callback=_names((*KINDS, OWN_PERIOD)), default=",".join(KINDS), show_default=True
+)
+@click.option("--sizes", callback=_names(SIZES), default=",".join(SIZES), show_default=True)
 @click.option("--only", multiple=True, metavar="EFFECT", help="Only with this effect. Repeatable.")
-@click.option("--shard", "part", type=Shard(), default="1/1", show_default=True)
+@click.option(
+    "--shard", "part", metavar="I/N", callback=_shard, default="1/1", show_default=True,
+    help="The I-th of N parts.",
+)  # fmt: skip
 @click.option("--repeats", type=click.IntRange(min=1), default=1, show_default=True)
 @click.option("--nothing", type=click.IntRange(min=0), default=100, show_default=True)
 @_of_recordings
@@ -163,19 +141,10 @@ def main() -> None:
 @click.option("--most", type=click.IntRange(min=1), help="Stop after so many cases.")
 @click.option("-v", "verbose", is_flag=True, help="Show what competes.")
 def run(
-    folder: Path,
-    kinds: tuple[str, ...],
-    sizes: tuple[str, ...],
-    only: tuple[str, ...],
-    part: tuple[int, int],
-    seed: int,
-    repeats: int,
-    nothing: int,
-    threads: int,
-    most: int | None,
-    verbose: bool,
-    **recording: Any,
-) -> None:
+    folder: Path, kinds: tuple[str, ...], sizes: tuple[str, ...], only: tuple[str, ...],
+    part: tuple[int, int], seed: int, repeats: int, nothing: int, threads: int, most: int | None,
+    verbose: bool, **recording: Any,
+) -> None:  # fmt: skip
     """Record and diagnose the cases that FOLDER does not have yet."""
     from adv2e.diagnosis.fitting.library import OF_FRAMES  # noqa: PLC0415
     from adv2e.diagnosis.fitting.library import names as library_names  # noqa: PLC0415
@@ -238,12 +207,8 @@ def record(
     if unknown or len(effects) > 2:
         what = f"{unknown[0]!r}: none of {', '.join(known)}" if unknown else "two at most"
         raise click.BadParameter(what, param_hint="EFFECT")
-    if len(effects) == 2:
-        kind = PAIRS
-    elif effects:
-        kind = LIBRARY if effects[0] in catalogue.LIBRARY else OUTSIDE
-    else:
-        kind = NOTHING
+    of_one = LIBRARY if {*effects} <= {*catalogue.LIBRARY} else OUTSIDE
+    kind = (NOTHING, of_one, PAIRS)[len(effects)]
     case = Case(kind, effects, effect_size if effects else NO_SIZE, 0)
     path.parent.mkdir(parents=True, exist_ok=True)
     setup = _setup(**recording)

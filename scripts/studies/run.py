@@ -18,11 +18,11 @@ from adv2e.diagnosis.data.evidence import Evidence, read_evidence
 from adv2e.diagnosis.diagnose import diagnose
 from adv2e.diagnosis.known_light import read_known_light
 from adv2e.reports.result import Diagnosis
-from studies.cases import REPOSITORY, Case, camera, sampling, settings, stimulus
+from studies.cases import REPOSITORY, Case, camera, settings, stimulus
 from studies.results import Line
 
 STUDIED = ("adv2e", "tests/camera", "scripts/studies/cases.py", "scripts/studies/run.py")
-"""What results depend on: their commit is the last that changed any of it."""
+"""Paths that results depend on: their commit is the last that changed any of it."""
 
 
 @dataclass(frozen=True)
@@ -45,19 +45,20 @@ class Setup:
         """Return the camera of a case, with a scene before it."""
         size, seed = (self.width, self.height), case.seed(study_seed)
         scene = (
-            stimulus.scene(stimulus.bench(self.seconds, seed))
-            if self.known_light
+            stimulus.scene(stimulus.bench(self.seconds, seed)) if self.known_light
             else camera.SCENES[case.scene(study_seed)](size, seed=seed)
-        )
+        )  # fmt: skip
+        declared = {
+            "frames": {"full_scale": 2**self.bits - 1},
+            # pictures between frames are blended, or moved in eight steps
+            "sampling": {
+                "interpolation": self.interpolation, "L": 1 if self.interpolation == "linear" else 8
+            },
+        }  # fmt: skip
         return camera.Camera(
-            scene,
-            settings.merged(settings.BENCH, self._declared()),
-            hidden=case.hidden,
-            size=size,
-            duration_s=self.seconds,
-            fps=self.fps,
-            seed=seed,
-        )
+            scene, settings.merged(settings.BENCH, declared), hidden=case.hidden, size=size,
+            duration_s=self.seconds, fps=self.fps, seed=seed,
+        )  # fmt: skip
 
     def read(self, path: Path, case: Case, study_seed: int) -> Evidence:
         """Return the recording of a case, which lies at `path`; a table of light comes beside."""
@@ -71,13 +72,6 @@ class Setup:
         table = path.with_suffix(".stimulus.csv")
         stimulus.write_table(table, stimulus.stamped(rows, *clock))
         return read_known_light(path, table)
-
-    def _declared(self) -> dict[str, Any]:
-        """Return what is declared of the frames."""
-        return {
-            "frames": {"full_scale": 2**self.bits - 1},
-            "sampling": sampling(self.interpolation),
-        }
 
 
 def commit() -> str:
@@ -129,15 +123,12 @@ def diagnosed(
             recorded = time.perf_counter()
             declared = load_config([path.with_name("recording.declared.yaml")])
             found = diagnose(
-                setup.read(path, case, study_seed),
-                declared,
-                without=case.without,
-                sizes=False,
-                threads=threads,
-                log=noted,
-            )
+                setup.read(path, case, study_seed), declared, without=case.without, sizes=False,
+                threads=threads, log=noted,
+            )  # fmt: skip
         line |= outcome(found)
-        line["truth"] = {key: _value(recorder.truth, key) for key in _fitted(found)}
+        fitted = [key for one in found.effects for key in one.parameters]
+        line["truth"] = {key: settings.find(recorder.truth, key, None) for key in fitted}
         line["seconds"] = {
             "recording": round(recorded - began, 1),
             "diagnosis": round(time.perf_counter() - recorded, 1),
@@ -146,13 +137,8 @@ def diagnosed(
         frames = traceback.extract_tb(error.__traceback__)
         where = f"{Path(frames[-1].filename).name}:{frames[-1].lineno}"
         line["failed"] = f"{type(error).__name__}: {error} ({where})"
-    line |= {
-        "ended": round(time.time()),
-        "threads": threads,
-        "load": round(os.getloadavg()[0], 1),
-        "log": lines,
-    }
-    return line
+    load = round(os.getloadavg()[0], 1)
+    return line | {"ended": round(time.time()), "threads": threads, "load": load, "log": lines}
 
 
 def outcome(found: Diagnosis) -> Line:
@@ -161,11 +147,7 @@ def outcome(found: Diagnosis) -> Line:
     return {
         "verdict": found.verdict,
         "found": [
-            {
-                "name": one.name,
-                "parameters": dict(one.parameters),
-                "interval": {key: list(ends) for key, ends in one.interval.items()},
-            }
+            {"name": one.name, "parameters": dict(one.parameters), "interval": dict(one.interval)}
             for one in found.effects
         ],
         "alternatives": found.alternatives,
@@ -177,12 +159,3 @@ def outcome(found: Diagnosis) -> Line:
         "events": int(found.facts["events"].replace(",", "")),
         "simulations": int(found.facts["simulations"].replace(",", "")),
     }  # fmt: skip
-
-
-def _fitted(found: Diagnosis) -> list[str]:
-    return [key for one in found.effects for key in one.parameters]
-
-
-def _value(truth: Any, key: str) -> Any:
-    value = settings.find(truth, key, None)
-    return list(value) if isinstance(value, (list, tuple)) else value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 from studies.cases import LIBRARY, NOTHING, OWN_PERIOD, PAIRS
@@ -141,10 +140,3 @@ def interval(hits: int, count: int) -> tuple[float, float]:
     middle = (share + weight / 2) / (1 + weight)
     half = z * math.sqrt(share * (1 - share) / count + weight / (4 * count)) / (1 + weight)
     return max(0.0, middle - half), min(1.0, middle + half)
-
-
-def median(values: Sequence[float]) -> float:
-    """Return the median; NaN of none."""
-    ordered = sorted(values)
-    n = len(ordered)
-    return (ordered[(n - 1) // 2] + ordered[n // 2]) / 2 if n else math.nan

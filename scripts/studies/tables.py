@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,13 +39,13 @@ def report(lines: Sequence[Line], commit: str) -> str:
         "## How much was run\n\n" + progress_table(lines),
         "## Effects in the library, middle size: pooled\n\n" + pooled_table(lines),
         "## Nothing missing: false alarms\n\n" + alarm_table(lines),
-        "## Effects in the library: three sizes\n\n" + sizes_table(lines),
-        *_by_size("Effects in the library", lines, LIBRARY, effect_table),
-        *_by_size("Effect left out of the library", lines, LEFT_OUT, left_out_table),
-        *_by_size("Effects outside the library", lines, OUTSIDE, outside_table),
+        "## Effects in the library: three sizes\n\n" + sizes_table(_of(lines, LIBRARY)),
+        *_by_size("Effect left out of the library", lines, LEFT_OUT, strangers_table),
+        *_by_size("Effects outside the library", lines, OUTSIDE, strangers_table),
         *_by_size("Two effects", lines, PAIRS, pair_table),
-        *_by_size("Frames of another rate read out", lines, OWN_PERIOD, effect_table),
     ]
+    if own := _of(lines, OWN_PERIOD):
+        parts.append("## Frames of another rate read out\n\n" + sizes_table(own))
     failures = failure_list(lines)
     if failures:
         parts.append("## What went wrong, and what competed\n\n" + failures)
@@ -88,10 +89,10 @@ def _how(lines: Sequence[Line]) -> str:
     text = f"Recordings: {'; '.join(f'{what} ({n})' for what, n in setups.items())}."
     done = _done(lines)
     if done:
-        each = scoring.median([one["seconds"]["diagnosis"] for one in done])
-        made = scoring.median([one["seconds"]["recording"] for one in done])
-        many = scoring.median([one["simulations"] for one in done])
-        load = scoring.median([one["load"] for one in done])
+        each = median([one["seconds"]["diagnosis"] for one in done])
+        made = median([one["seconds"]["recording"] for one in done])
+        many = median([one["simulations"] for one in done])
+        load = median([one["load"] for one in done])
         threads = ", ".join(str(n) for n in sorted({one["threads"] for one in done}))
         text += (
             f" Median of a recording: {each:.0f} s for the diagnosis, {many:.0f} simulations,"
@@ -126,20 +127,14 @@ def pooled_table(lines: Sequence[Line]) -> str:
     named = [one for one, kind in zip(pool, kinds, strict=True) if kind in scoring.NAMED]
     near = [flag for one in named if (flag := scoring.is_near(one)) is not None]
     covered = [flag for one in named for flag in scoring.covered(one)]
+    misnamed = sum(kind in scoring.MISNAMED for kind in kinds)
+    at_floor = sum(map(scoring.is_at_floor, named))
     rows = [
         ("named, or among look-alikes", share(len(named), len(pool)), "9 in 10 or more"),
-        (
-            "wrong name accepted",
-            share(sum(kind in scoring.MISNAMED for kind in kinds), len(pool)),
-            "1 in 20 or fewer",
-        ),
+        ("wrong name accepted", share(misnamed, len(pool)), "1 in 20 or fewer"),
         ("named: parameters within 10 %", share(sum(near), len(near)), ""),
         ("named: truth in the 95 % interval, by key", share(sum(covered), len(covered)), ""),
-        (
-            "named: held-out error at most 1.1 of its floor",
-            share(sum(map(scoring.is_at_floor, named)), len(named)),
-            "",
-        ),
+        ("named: held-out error at most 1.1 of its floor", share(at_floor, len(named)), ""),
     ]
     return table(("", "count, share (95 %)", "wanted"), rows)
 
@@ -158,33 +153,14 @@ def alarm_table(lines: Sequence[Line]) -> str:
     return table(("", "count, share (95 %)"), rows)
 
 
-def effect_table(lines: Sequence[Line]) -> str:
-    """Return what became of each effect that the library has, and how well it was fitted."""
-    header = ("effect", *scoring.OF_ONE, "worst parameter", "error / floor", "named")
-    rows = []
-    for name, group in _grouped(lines):
-        raised = [
-            one["error"]["after"] / max(one["error"]["floor"], 1e-12)
-            for one in group
-            if "failed" not in one
-        ]
-        rows.append([
-            name, *_counts(group, scoring.OF_ONE),
-            _worst(group),
-            f"{max(raised):.2f}" if raised else "",
-            _names(group),
-        ])  # fmt: skip
-    return table(header, rows)
-
-
 def sizes_table(lines: Sequence[Line]) -> str:
-    """Return what was said of each effect of the library at each size, in few words.
+    """Return what was said of each effect at each size, in few words.
 
     Other names stand where the true one was not added, in brackets those that do as well.  Without
     a name it is the verdict; nothing stands where a case was not run.
     """
     rows = []
-    for name, group in _grouped(_of(lines, LIBRARY)):
+    for name, group in _grouped(lines):
         cells = [
             "; ".join(_in_short(one, name) for one in group if one["size"] == size)
             for size in SIZES
@@ -207,25 +183,25 @@ def _worst(lines: Sequence[Line]) -> str:
     return f"{100 * max(errors):.1f} %" if errors else ""
 
 
-def left_out_table(lines: Sequence[Line]) -> str:
+def strangers_table(lines: Sequence[Line]) -> str:
     """Return what was said where the true name was not to be had."""
     lines = _done(lines)
     wrong = [one for one in lines if scoring.outcome(one) == scoring.WRONG]
-    alike = [one for one in wrong if _neighbours(one) & _given(one)]
-    which = f" ({', '.join(name for one in alike for name in one['effects'])})" if alike else ""
-    text = (
-        f"A name was accepted with nothing left to explain: {share(len(wrong), len(lines))}; of"
-        f" these, with the same thing under another key: {len(alike)}{which}."
-    )
-    return f"{text}\n\n{_strangers(lines)}"
-
-
-def outside_table(lines: Sequence[Line]) -> str:
-    """Return what was said of effects that the library does not have."""
-    lines = _done(lines)
-    accepted = sum(scoring.outcome(one) == scoring.WRONG for one in lines)
-    text = f"A name was accepted with nothing left to explain: {share(accepted, len(lines))}."
-    return f"{text}\n\n{_strangers(lines)}"
+    text = f"A name was accepted with nothing left to explain: {share(len(wrong), len(lines))}"
+    if alike := [
+        name for one in wrong if _neighbours(one) & _given(one) for name in one["effects"]
+    ]:
+        text += (
+            f"; of these, with the same thing under another key: {len(alike)} ({', '.join(alike)})"
+        )
+    held = {kind: [one for one in lines if scoring.outcome(one) == kind]
+            for kind in scoring.OF_STRANGERS}  # fmt: skip
+    rows = [
+        [kind, str(len(found)), "; ".join(_taken_as(*group) for group in _grouped(found))]
+        for kind, found in held.items()
+        if found
+    ]
+    return f"{text}.\n\n{table(('outcome', 'cases', 'effects'), rows)}"
 
 
 def pair_table(lines: Sequence[Line]) -> str:
@@ -263,19 +239,6 @@ def _neighbours(line: Line) -> set[str]:
 
 def _given(line: Line) -> set[str]:
     return {*(one["name"] for one in line["found"]), *line["alternatives"]}
-
-
-def _strangers(lines: Sequence[Line]) -> str:
-    """Return which effects had which outcome, with the names that they were given."""
-    held: dict[str, list[Line]] = {kind: [] for kind in scoring.OF_STRANGERS}
-    for one in lines:
-        held[scoring.outcome(one)].append(one)
-    rows = [
-        [kind, str(len(found)), "; ".join(_taken_as(*group) for group in _grouped(found))]
-        for kind, found in held.items()
-        if found
-    ]
-    return table(("outcome", "cases", "effects"), rows)
 
 
 def _taken_as(name: str, lines: Sequence[Line]) -> str:

@@ -62,7 +62,7 @@ def converted(path: Path, *options: str) -> None:
 
 def simulated(path: Path) -> None:
     """Write a simulation, which tells its configuration and the causes of its events."""
-    np.save(path.parent / "clip.npy", simulations.grey()[0])
+    np.save(path.parent / "clip.npy", simulations.grey())
     words = ("--fps", "120", "--seed", "7", "--causes", "-q", "--set", simulations.LINEAR)
     done(path.parent, "convert", "clip.npy", "-o", path.name, *words)
 

@@ -27,24 +27,16 @@ def pictures(dtype: str = "u1", *, colour: bool = False, count: int = COUNT) -> 
     light = scene(ROWS, COLUMNS, count)
     if colour:
         light = np.stack([light, light**0.7, 1 - light], -1)
-    white = 1 if dtype.startswith("f") else np.iinfo(dtype).max
+    white = 1 if np.dtype(dtype).kind == "f" else np.iinfo(dtype).max
     return (white * light).astype(dtype)
 
 
 def film(
-    path: Path,
-    codec: str,
-    pixels: str = "yuv420p",
-    *,
-    numbers: Iterable[int] = range(COUNT),
-    reordered: int = 0,
-    full: bool = False,
-    tags: Sequence[int] = (2, 2, 2),
-    aspect: str = "",
-    tracks: int = 1,
-    options: Mapping[str, str] | None = None,
+    path: Path, codec: str, pixels: str = "yuv420p", *, numbers: Iterable[int] = range(COUNT),
+    reordered: int = 0, full: bool = False, tags: Sequence[int] = (2, 2, 2), aspect: str = "",
+    tracks: int = 1, options: Mapping[str, str] | None = None,
     container: Mapping[str, str] | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Write a film, with pictures at the numbers given of ticks of 40 ms.
 
     `tags` are the codes of ITU-T H.273 for primaries, transfer and matrix.
@@ -91,15 +83,9 @@ def encoded(suffix: str, image: Array, orientation: int = 0) -> bytes:
 
 
 def images(
-    path: Path,
-    names: Sequence[str] = (),
-    dtype: str = "u1",
-    *,
-    suffix: str = ".png",
-    colour: bool = False,
-    orientation: int = 0,
-    lists: Mapping[str, str] | None = None,
-) -> None:
+    path: Path, names: Sequence[str] = (), dtype: str = "u1", *, suffix: str = ".png",
+    colour: bool = False, orientation: int = 0, lists: Mapping[str, str] | None = None,
+) -> None:  # fmt: skip
     """Write images to a folder, or to a zip, with lists of which a line is given for each image.
 
     A line is a format of `s`, `ms`, `us` and `ns`, its time in these units, and of `n` and `name`.
@@ -139,7 +125,13 @@ def stack(path: Path, dtype: str = "u1", *, colour: bool = False, times: bool = 
 
 
 FPS = " --fps 25"
-LISTED = [f"{n}.png" for n in range(COUNT)]
+
+
+def listed(name: str, line: str, folder: str = "") -> Make:
+    """Return what writes images with a list, numbered ones where they lie in a folder below."""
+    names = [f"{folder}/{n}.png" for n in range(COUNT)] if folder else ()
+    return partial(images, names=names, lists={name: line})
+
 
 PICTURES: Mapping[str, Make] = {
     "h264.mp4": partial(film, codec="libx264"),
@@ -186,27 +178,18 @@ PICTURES: Mapping[str, Make] = {
     "radiance" + FPS: partial(images, dtype="f4", suffix=".hdr", colour=True),
     "mosaic --bayer rggb" + FPS: images,
     "upside_down --rotate180" + FPS: images,
-    "zipped.zip": partial(images, lists={"images.txt": "{s} {name}"}),
-    "images_txt": partial(images, lists={"images.txt": "{s} {name}"}),
-    "timestamps_txt": partial(images, lists={"timestamps.txt": "{us}"}),
-    "info_txt": partial(images, lists={"info.txt": "{name} {ms}"}),
-    "heading": partial(
-        images, lists={"timestamps.txt": "# id timestamp [ns] filename\n{n} {ns} {name}"}
+    "zipped.zip": listed("images.txt", "{s} {name}"),
+    "images_txt": listed("images.txt", "{s} {name}"),
+    "timestamps_txt": listed("timestamps.txt", "{us}"),
+    "info_txt": listed("info.txt", "{name} {ms}"),
+    "heading": listed("timestamps.txt", "# id timestamp [ns] filename\n{n} {ns} {name}"),
+    "unit --time-unit ms": listed("timestamps.txt", "{us}"),
+    "given --timestamps given/list.csv": listed("list.csv", "{s};{name}"),
+    "tum": listed("rgb.txt", "# color images\n{s} {name}", "rgb"),
+    "euroc": listed(
+        "mav0/cam0/data.csv", "#timestamp [ns],filename\n{ns},{name}", "mav0/cam0/data"
     ),
-    "unit --time-unit ms": partial(images, lists={"timestamps.txt": "{us}"}),
-    "given --timestamps given/list.csv": partial(images, lists={"list.csv": "{s};{name}"}),
-    "tum": partial(
-        images, names=[f"rgb/{name}" for name in LISTED],
-        lists={"rgb.txt": "# color images\n{s} {name}"},
-    ),
-    "euroc": partial(
-        images, names=[f"mav0/cam0/data/{name}" for name in LISTED],
-        lists={"mav0/cam0/data.csv": "#timestamp [ns],filename\n{ns},{name}"},
-    ),
-    "uzh_fpv": partial(
-        images, names=[f"img/{name}" for name in LISTED],
-        lists={"left_images.txt": "# id timestamp image_name\n{n} {s} {name}"},
-    ),
+    "uzh_fpv": listed("left_images.txt", "# id timestamp image_name\n{n} {s} {name}", "img"),
     "GOPR0372_07_00": partial(images, names=[f"sharp/{n:06d}.png" for n in range(1, 1 + COUNT)]),
     "photo.png": lambda path: cv2.imwrite(str(path), pictures()[0]),
     "pages.tif" + FPS: partial(pages, dtype="u1"),
@@ -218,4 +201,4 @@ PICTURES: Mapping[str, Make] = {
     "timed.npy": partial(stack, times=True),
     "frames.npz": lambda path: np.savez(path, frames=pictures()),
 }  # fmt: skip
-"""What is written, by the words that follow ``adv2e info``."""
+"""Writers of inputs, by the words that follow ``adv2e info``."""

@@ -18,7 +18,7 @@ VERSIONS = {"adv2e", "versions"}
 """Keys of the versions of programs, which change where nothing moved."""
 
 Holds = dict[str, Any]
-"""What a case holds: numbers, texts and digests, by the path of their key."""
+"""Content of a case: numbers, texts and digests, by the path of their key."""
 
 
 def sha(*parts: bytes) -> str:

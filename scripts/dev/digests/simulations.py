@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
+import runpy
 import subprocess
 import sys
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,8 @@ from numpy.typing import NDArray
 ROWS, COLUMNS, COUNT, RATE_HZ = 36, 48, 30, 120.0
 
 Array = NDArray[Any]
-Clip = tuple[Array, Array]
-"""Frames and their times [s]."""
+Run = Callable[[int, Path], tuple[Array, str]]
+"""Takes threads and a folder; returns events and a digest."""
 
 OWN_EFFECT = '''\
 """An effect of one's own that acts at every place of the signal path."""
@@ -74,56 +73,55 @@ def scene(rows: int = ROWS, columns: int = COLUMNS, count: int = COUNT) -> Array
     return np.where(still, 0.35, light).clip(0, 1)
 
 
-def times(count: int = COUNT) -> Array:
-    return np.arange(count) / RATE_HZ
+def grey(white: float = 255, dtype: str = "u1", **size: int) -> Array:
+    return np.round(white * scene(**size)).astype(dtype)
 
 
-def grey(**size: int) -> Clip:
-    light = scene(**size)
-    return np.round(255 * light).astype(np.uint8), times(len(light))
-
-
-def colour() -> Clip:
+def colours() -> Array:
     light = scene()
-    channels = np.stack([light, light**0.7, 1 - light], -1)
-    return np.round(255 * channels).astype(np.uint8), times()
+    return np.stack([light, light**0.7, 1 - light], -1)
 
 
-def flash() -> Clip:
+def flash() -> Array:
     """Large steps up and down, with times at rest between them."""
     level = np.array([20, 20, 200, 200, 200, 3, 3, 255, 255, 0] * 3, np.uint8)
     frames = np.broadcast_to(level[:, None, None], (COUNT, ROWS, COLUMNS)).copy()
     frames[:, :, ::2] //= 2
-    return frames, times()
+    return frames
 
 
-def irregular() -> Clip:
-    frames, _ = grey()
+def irregular_s() -> Array:
     number = np.arange(COUNT)
-    return frames, 12.5 + (number + 0.4 * np.sin(number * 2.3)) / RATE_HZ
+    return 12.5 + (number + 0.4 * np.sin(number * 2.3)) / RATE_HZ
 
 
-def constant(level: int = 90) -> Clip:
-    return np.full((COUNT, ROWS, COLUMNS), level, np.uint8), times()
-
-
-CLIPS: Mapping[str, Callable[[], Clip]] = {
+CLIPS: Mapping[str, Callable[[], Array]] = {
     "grey": grey,
     "large": lambda: grey(rows=130, columns=173, count=12),
     "one pixel": lambda: grey(rows=1, columns=1),
     "odd size": lambda: grey(rows=5, columns=7),
-    "16 bits": lambda: (np.round(65535 * scene()).astype(np.uint16), times()),
-    "float32": lambda: (scene().astype(np.float32), times()),
-    "float64": lambda: (scene(), times()),
-    "colour": colour,
-    "colour floats": lambda: (np.stack([scene()] * 3, -1).astype(np.float32), times()),
+    "16 bits": lambda: grey(65535, "u2"),
+    "float32": lambda: scene().astype(np.float32),
+    "float64": scene,
+    "colour": lambda: np.round(255 * colours()).astype(np.uint8),
+    "colour floats": lambda: np.stack([scene()] * 3, -1).astype(np.float32),
     "flash": flash,
-    "irregular": irregular,
-    "constant": constant,
-    "black": lambda: constant(0),
+    "irregular": grey,
+    "constant": lambda: np.full((COUNT, ROWS, COLUMNS), 90, np.uint8),
+    "black": lambda: np.zeros((COUNT, ROWS, COLUMNS), np.uint8),
     "two frames": lambda: grey(count=2),
-    "slow": lambda: (grey(count=6)[0], np.arange(6) / 4.0),
+    "slow": lambda: grey(count=6),
 }
+"""Frames.  They stay as small as they are."""
+
+
+def times(clip: str, count: int) -> Array:
+    """Return the times of a clip's frames [s]."""
+    return (
+        irregular_s()
+        if clip == "irregular"
+        else np.arange(count) / (4.0 if clip == "slow" else RATE_HZ)
+    )
 
 
 # --- cases ---------------------------------------------------------------------------------------
@@ -160,7 +158,7 @@ running reference: pixel.initial_reference=running
 random reference: pixel.initial_reference=random
 tick: readout.tick_us=100
 """
-"""Added to NOISELESS."""
+"""Names of cases, and what each adds to NOISELESS."""
 
 BUSY_CASES = """
 plain
@@ -199,93 +197,70 @@ event loss: readout.loss.fraction=0.3
 frame coupling: readout.frame_coupling={amplitude: 0.3, tau_us: 500}
 readout: readout.arbiter={event_ns: 500, row_ns: 0}; readout.loss.fraction=0.1; readout.tick_us=10
 """
-"""Added to BUSY."""
+"""The same, added to BUSY."""
+
+OTHERS = (
+    ("first_order_hold, printed", "", NOISELESS, "pixel.low_pass.update=first_order_hold;"
+     " sampling.L=3; sampling.K=10; sampling.last_interval=printed; pixel.refractory=null"),
+    ("paper, jitter and hot pixels", "paper", (), "pixel.leak.jitter=0.3; pixel.leak.rate_hz=8;"
+     " pixel.hot_pixels.fraction=0.05; pixel.hot_pixels.rate_hz=300"),
+)  # fmt: skip
+"""Name, configuration, what is set first, and then."""
 
 
-@dataclass(frozen=True)
-class Case:
-    """One simulation through `adv2e.simulate`."""
-
-    sets: Sequence[str] = ()
-    clip: str = "grey"
-    files: Sequence[str] = ()
-    own: bool = False
-
-
-def in_memory() -> dict[str, Case]:
-    """Return all simulations through `adv2e.simulate`, by name."""
-    shipped = ("adv2e", "paper", "v2e", "vid2e", "ideal", "davis240c", "davis346")
-    # the clips stay as small as they are
-    found = {f"config {name}": Case(["sensor=null"], files=[name]) for name in shipped}
-    for title, base, table in (
+def in_memory() -> Iterator[tuple[str, Run]]:
+    """Yield all simulations through `adv2e.simulate`, with their names."""
+    for name in ("adv2e", "paper", "v2e", "vid2e", "ideal", "davis240c", "davis346"):
+        yield f"config {name}", simulation(["sensor=null"], file=name)
+    for title, base, lines in (
         ("noiseless", NOISELESS, QUIET_CASES), ("noise", BUSY, BUSY_CASES),
     ):  # fmt: skip
-        for line in table.strip().splitlines():
+        for line in lines.strip().splitlines():
             name, _, sets = line.partition(": ")
-            found[f"{title}, {name}"] = Case([*base, *filter(None, sets.split("; "))])
+            yield f"{title}, {name}", simulation([*base, *filter(None, sets.split("; "))])
     for update in ("zero_order_hold", "first_order_hold", "euler", "paper"):
         sets = [f"pixel.low_pass.update={update}", "sampling.L=2", "sampling.K=5"]
-        found[f"{update}, noiseless"] = Case([*NOISELESS, *sets])
-        found[f"{update}, noise"] = Case([*BUSY, *sets])
-    sets = [
-        "pixel.low_pass.update=first_order_hold", "sampling.L=3", "sampling.K=10",
-        "sampling.last_interval=printed", "pixel.refractory=null",
-    ]  # fmt: skip
-    found["first_order_hold, printed"] = Case([*NOISELESS, *sets])
-    sets = [
-        "pixel.leak.jitter=0.3", "pixel.leak.rate_hz=8", "pixel.hot_pixels.fraction=0.05",
-        "pixel.hot_pixels.rate_hz=300",
-    ]  # fmt: skip
-    found["paper, jitter and hot pixels"] = Case(sets, files=["paper"])
+        yield f"{update}, noiseless", simulation([*NOISELESS, *sets])
+        yield f"{update}, noise", simulation([*BUSY, *sets])
+    for name, file, first, then in OTHERS:
+        yield name, simulation([*first, *then.split("; ")], file=file)
     for clip in CLIPS:
-        found[f"clip {clip}, noiseless"] = Case(NOISELESS, clip)
-        found[f"clip {clip}, noise"] = Case(BUSY, clip)
-    found["clip flash, ideal"] = Case(clip="flash", files=["ideal"])
-    found["clip large, default"] = Case(clip="large")
-    found["own effect"] = Case(BUSY, own=True)
-    found["own effect, paper"] = Case(["sampling.L=2"], files=["paper"], own=True)
-    return found
+        yield f"clip {clip}, noiseless", simulation(NOISELESS, clip)
+        yield f"clip {clip}, noise", simulation(BUSY, clip)
+    yield "clip flash, ideal", simulation(clip="flash", file="ideal")
+    yield "clip large, default", simulation(clip="large")
+    yield "own effect", simulation(BUSY, own=True)
+    yield "own effect, paper", simulation(["sampling.L=2"], file="paper", own=True)
 
 
-def simulated(case: Case, threads: int, folder: Path) -> Array:
-    """Return the events of a case."""
-    import adv2e  # noqa: PLC0415
-
+def simulation(
+    sets: Sequence[str] = (), clip: str = "grey", *, file: str = "", own: bool = False
+) -> Run:
+    """Return what simulates a clip, with a shipped configuration and the own effect if asked."""
     # whatever a commit takes grey frames for; what a case says comes after it
-    light = [] if case.clip == "colour" else [LINEAR]
-    config = adv2e.load_config(list(case.files), [*light, *case.sets])
-    effects = [_own_effect(folder)()] if case.own else []
-    frames, instants = CLIPS[case.clip]()
-    chunks = adv2e.simulate(frames, instants, config, effects=effects, threads=threads)
-    return np.concatenate(list(chunks))
+    light = [] if clip == "colour" else [LINEAR]
 
+    def run(threads: int, folder: Path) -> tuple[Array, str]:
+        import adv2e  # noqa: PLC0415
 
-def _own_effect(folder: Path) -> Any:
-    path = folder / "everything.py"
-    path.write_text(OWN_EFFECT)
-    spec = importlib.util.spec_from_file_location("everything", path)
-    if spec is None or spec.loader is None:
-        raise ImportError(path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.Everything
+        (folder / "everything.py").write_text(OWN_EFFECT)
+        effects = [runpy.run_path(str(folder / "everything.py"))["Everything"]()] if own else []
+        config = adv2e.load_config([file] if file else [], [*light, *sets])
+        frames = CLIPS[clip]()
+        instants = times(clip, len(frames))
+        chunks = adv2e.simulate(frames, instants, config, effects=effects, threads=threads)
+        events = np.concatenate(list(chunks))
+        return events, sha(events.tobytes())
+
+    return run
 
 
 # --- the command line ----------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Command:
-    """One call of ``adv2e convert``: an input that `make` writes, and how to convert it."""
-
-    make: Callable[[Path], Path]
-    output: str
-    options: Sequence[str] = field(default=())
-
-
 def npy(folder: Path) -> Path:
     path = folder / "stack.npy"
-    np.save(path, grey()[0])
+    np.save(path, grey())
     return path
 
 
@@ -293,7 +268,7 @@ def images(folder: Path) -> Path:
     """Write a folder of grey images as PGM, which numpy alone can write."""
     into = folder / "images"
     into.mkdir()
-    for number, image in enumerate(np.round(65535 * scene()).astype(">u2")):
+    for number, image in enumerate(grey(65535, ">u2")):
         head = f"P5 {COLUMNS} {ROWS} 65535\n".encode()
         (into / f"frame_{number:04d}.pgm").write_bytes(head + image.tobytes())
     return into
@@ -314,106 +289,80 @@ def video(folder: Path) -> Path:
 def recording(folder: Path) -> Path:
     """Write the frames of a DAVIS240C folder, with irregular times."""
     into = images(folder)
-    _, instants = irregular()
-    lines = [f"{t:.9f} {p.name}\n" for t, p in zip(instants, sorted(into.iterdir()), strict=True)]
-    (into / "images.txt").write_text("".join(lines))
+    pairs = zip(irregular_s(), sorted(into.iterdir()), strict=True)
+    (into / "images.txt").write_text("".join(f"{t:.9f} {path.name}\n" for t, path in pairs))
     return into
 
 
-NPY = ("--fps", "120", "--set", LINEAR)
-
-COMMANDS: Mapping[str, Command] = {
-    "command npy to txt": Command(npy, "out.txt", NPY),
-    "command npy to h5": Command(npy, "out.h5", NPY),
-    "command video to h5 with frames": Command(video, "out.h5", ["--with-frames"]),
-    "command video to txt, L 1": Command(video, "out.txt", ["--set", "sampling.L=1"]),
-    "command images to zip": Command(images, "out.zip", ["--fps", "30000/1001"]),
-    "command recording to folder": Command(
-        recording, "out", ["-c", "davis240c", "--set", "sensor=null"]
+COMMANDS: Mapping[str, tuple[Callable[[Path], Path], str]] = {
+    "npy to txt": (npy, f"out.txt --fps 120 --set {LINEAR}"),
+    "npy to h5": (npy, f"out.h5 --fps 120 --set {LINEAR}"),
+    "video to h5 with frames": (video, "out.h5 --with-frames"),
+    "video to txt, L 1": (video, "out.txt --set sampling.L=1"),
+    "images to zip": (images, "out.zip --fps 30000/1001"),
+    "recording to folder": (recording, "out -c davis240c --set sensor=null"),
+    "recording to standard output": (
+        recording, "- --start 0.05 --stop 0.2 --t0 zero --set seed=3",
     ),
-    "command recording to standard output": Command(
-        recording, "-", ["--start", "0.05", "--stop", "0.2", "--t0", "zero", "--set", "seed=3"]
-    ),
-    "command own effect": Command(npy, "out.txt", [*NPY, "--effect", "everything.py"]),
-}
+    "own effect": (npy, f"out.txt --fps 120 --set {LINEAR} --effect everything.py"),
+}  # fmt: skip
+"""Writes an input, and what follows ``adv2e convert INPUT -o``."""
 
 
-def converted(command: Command, threads: int, folder: Path) -> tuple[Array, str]:
-    """Return the events in the output, and a digest of all that it holds."""
-    (folder / "everything.py").write_text(OWN_EFFECT)
-    source = command.make(folder)
-    words = ["convert", str(source), "-o", command.output, "--threads", str(threads), "-q"]
-    done = subprocess.run(
-        [sys.executable, "-m", "adv2e", *words, *command.options],
-        cwd=folder, check=False, capture_output=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
-    if done.returncode:
-        raise RuntimeError(done.stderr.decode().strip())
-    if command.output == "-":
-        return _text_events(done.stdout), sha(done.stdout)
-    out = folder / command.output
+def conversion(make: Callable[[Path], Path], words: str) -> Run:
+    """Return what converts, and reads the events and a digest of all that the output holds."""
+    output, *options = words.split()
+
+    def run(threads: int, folder: Path) -> tuple[Array, str]:
+        import adv2e  # noqa: PLC0415
+
+        (folder / "everything.py").write_text(OWN_EFFECT)
+        command = [sys.executable, "-m", "adv2e", "convert", str(make(folder)), "-o", output]
+        done = subprocess.run(
+            [*command, "--threads", str(threads), "-q", *options],
+            cwd=folder, check=False, capture_output=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )  # fmt: skip
+        if done.returncode:
+            raise RuntimeError(done.stderr.decode().strip())
+        out = folder / output
+        if output == "-":
+            out = folder / "out.txt"
+            out.write_bytes(done.stdout)
+        events = adv2e.read_events(out).events
+        return events, sha(done.stdout) if output == "-" else sha(*_parts(out))
+
+    return run
+
+
+def _parts(out: Path) -> Iterator[bytes]:
+    """Yield what an output holds, with names; not what is said about how it was made."""
     if out.suffix == ".h5":
-        return _hdf5(out)
-    parts = dict(_parts(out))
-    text = parts.get("events.txt", parts.get(out.name, b""))
-    return _text_events(text), sha(*(name.encode() + data for name, data in sorted(parts.items())))
-
-
-def _parts(out: Path) -> Iterator[tuple[str, bytes]]:
-    """Yield the files of an output; not what is said about how it was made."""
+        for name, array in sorted(arrays(out).items()):
+            yield f"{name} {array.dtype}".encode() + array.tobytes()
+        return
     if out.suffix == ".zip":
         with zipfile.ZipFile(out) as archive:
-            for name in archive.namelist():
-                if not name.endswith(".json"):
-                    yield name, archive.read(name)
-        return
-    for path in [out] if out.is_file() else sorted(out.rglob("*")):
-        if path.is_file() and path.suffix != ".json":
-            yield path.name, path.read_bytes()
+            files = {name: archive.read(name) for name in archive.namelist()}
+    else:
+        paths = [out] if out.is_file() else [path for path in out.rglob("*") if path.is_file()]
+        files = {path.name: path.read_bytes() for path in paths}
+    for name, data in sorted(files.items()):
+        if not name.endswith(".json"):
+            yield name.encode() + data
 
 
-def _text_events(text: bytes) -> Array:
-    rows = [line.split() for line in text.decode().splitlines()]
-    moments = [round(float(t) * 1e6) for t, *_ in rows]
-    rest = np.array([row[1:] for row in rows], np.int64).reshape(-1, 3)
-    return _events(np.array(moments, np.int64), *rest.T)
-
-
-def _hdf5(path: Path) -> tuple[Array, str]:
+def arrays(path: Path) -> dict[str, Array]:
+    """Return the datasets of an HDF5 file, by name."""
     import h5py  # noqa: PLC0415
 
-    found: dict[str, Array] = {}
     with h5py.File(path) as file:
-        file.visititems(
-            lambda name, item: found.update({name: item[()]})
-            if isinstance(item, h5py.Dataset) else None
-        )  # fmt: skip
-    ts, xs, ys, ps = (found[f"events/{name}"] for name in ("ts", "xs", "ys", "ps"))
-    moments = np.round(ts * 1e6) if ts.dtype.kind == "f" else ts
-    digest = sha(*(f"{n} {found[n].dtype}".encode() + found[n].tobytes() for n in sorted(found)))
-    return _events(moments, xs, ys, ps), digest
+        names: list[str] = []
+        file.visit(names.append)
+        return {name: file[name][()] for name in names if isinstance(file[name], h5py.Dataset)}
 
 
-def _events(t: Array, x: Array, y: Array, p: Array) -> Array:
-    events = np.empty(t.size, [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
-    events["t"], events["x"], events["y"], events["p"] = t, x, y, p
-    return events
-
-
-def cases() -> dict[str, Callable[[int, Path], tuple[Array, str]]]:
+def cases() -> dict[str, Run]:
     """Return what runs each simulation, by name."""
-
-    def simulation(case: Case) -> Callable[[int, Path], tuple[Array, str]]:
-        def run(threads: int, folder: Path) -> tuple[Array, str]:
-            events = simulated(case, threads, folder)
-            return events, sha(events.tobytes())
-
-        return run
-
-    def conversion(command: Command) -> Callable[[int, Path], tuple[Array, str]]:
-        return lambda threads, folder: converted(command, threads, folder)
-
-    return {name: simulation(case) for name, case in in_memory().items()} | {
-        name: conversion(command) for name, command in COMMANDS.items()
-    }
+    commands = {f"command {name}": conversion(*how) for name, how in COMMANDS.items()}
+    return {**dict(in_memory()), **commands}

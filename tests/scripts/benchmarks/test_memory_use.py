@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
-from benchmarks import clips, measure, memory, worker
+from benchmarks import clips, memory, worker
 
 
 def test_cases_have_names_of_their_own_and_cover_everything():
@@ -36,46 +34,8 @@ def test_a_conversion_tells_its_peak_and_its_events(tmp_path):
         worker.convert({"options": {"arguments": arguments}})
 
 
-def test_progress_is_read_from_the_bar():
-    assert memory.frames_taken("compiling\n") is None
-    assert memory.frames_taken(" 1%| 12/900 [00:01\r 2%| 25/900 [00:02<01:10, 12unit/s]") == 25
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_a_run_is_watched_and_its_failure_told():
-    script = (
-        "import sys, time\n"
-        "for k in range(5):\n"
-        "    print(f'{k}/5 [', file=sys.stderr, flush=True); time.sleep(0.05)\n"
-        "print('a: 1,234 events (50 % ON)')\n"
-    )
-    moments, printed = memory.watched([sys.executable, "-c", script])
-    assert [moment.frames for moment in moments][-1] == 4
-    assert all(moment.rss_mib > 1 for moment in moments)
-    assert 0 <= moments[0].cpu_s <= moments[-1].cpu_s < 10
-    assert worker.count_in(printed) == 1234
-    with pytest.raises(measure.JobError, match="no such thing"):
-        memory.watched([sys.executable, "-c", "raise SystemExit('no such thing')"])
-
-
-def test_the_long_table_tells_each_tenth():
-    moments = [
-        memory.Moment(k * 0.01 * (1 + (k > 900)), k, 100 + k / 100, k * 0.005)
-        for k in range(1, 1001)
-    ]
-    rows = memory.long_table(moments, 1000).splitlines()[2:]
-    assert len(rows) == 10
-    assert rows[0].startswith("| 1 | 10.0 | 5.00 ")
-    assert rows[9].startswith("| 10 | 20.0 ")
-    assert rows[9].endswith("| 110 |")
-    with pytest.raises(measure.JobError, match="tenth 1 "):
-        memory.long_table(moments[200:], 1000)
-
-
 def test_the_long_clip_goes_to_and_fro(monkeypatch, tmp_path):
-    small = memory.Size(32, 24, 1.0, 30.0, 1.0, 4)
-    monkeypatch.setattr(memory, "LONG_SIZE", small)
-    monkeypatch.setattr(memory, "LONG_CYCLE", 4)
+    monkeypatch.setattr(memory, "LENGTH_CYCLE", 4)
     folder = memory.long_clip(tmp_path / "long", 32, 24, 9)
     files = sorted(folder.iterdir())
     content = [file.read_bytes() for file in files]

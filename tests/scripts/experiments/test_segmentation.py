@@ -8,10 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from written_recordings import write_recording
 
-from adv2e import simulate
-from adv2e.config import load_config
 from adv2e.errors import DataError
 from adv2e.events import cut, make_events
 from adv2e.representations.event_images import event_image
@@ -22,7 +19,6 @@ pytest.importorskip("matplotlib", reason="curves are drawn by Matplotlib (extra 
 
 from experiments import labels as labelled  # noqa: E402
 from experiments import segmentation  # noqa: E402
-from experiments.recordings import read  # noqa: E402
 from experiments.scenes import shape_clip  # noqa: E402
 from experiments.simulators import named  # noqa: E402
 from networks.unet import unet  # noqa: E402
@@ -49,25 +45,25 @@ def test_a_shape_is_what_is_dark_at_any_rate():
     assert np.abs(np.diff(fast.frames, axis=0)).max() > 1
 
 
-def test_channels_are_of_the_last_50_ms():
-    events = make_events(t=[40_000, 60_000, 99_999, 100_000], x=range(4), y=[0] * 4, p=[1] * 4)
-    found = labelled.channels(events, (5, 2), 100_000)
-    wanted = event_image(events[1:3], (5, 2), (50_000, 100_000))
-    assert np.array_equal(found, wanted.transpose(2, 0, 1))
-    assert found[0, 0].tolist() == [-1, 1, 1, -1, -1]
+@pytest.fixture(scope="module")
+def shapes(tmp_path_factory):
+    output = tmp_path_factory.mktemp("shapes") / "ideal"
+    call("shapes", output, "--clips", 2, "--side", 32, "--simulators", "ideal")
+    return output
 
 
-def test_rendered_pictures_belong_to_their_labels(simulator):
-    samples = labelled.rendered([2], simulator, SIZE, 3)
-    clip, labels = shape_clip(2, 37, SIZE)
-    events = simulator.events(clip, 2)
-    assert len(samples) == 3
-    for number, (picture, label) in enumerate(samples, 1):
-        assert np.array_equal(label, labels[12 * number])
-        window = cut(events, 50_000 * (number - 1), 50_000 * number)
+def test_rendered_pictures_belong_to_their_labels(shapes, simulator):
+    train, test = (labelled.Folder.of(shapes, split, None) for split in ("train", "test"))
+    assert (len(train), len(test)) == (16, 8)
+    clip, labels = shape_clip(0, 97, (32, 32))
+    events = simulator.events(clip, 0)
+    for number in range(8):
+        picture, label = train[number]
+        assert np.array_equal(label, labels[12 * (number + 1)])
+        window = cut(events, 50_000 * number, 50_000 * (number + 1))
         assert np.array_equal(picture[0] > -1, np.bincount(
-            (window["y"].astype(int) * 32 + window["x"])[window["p"] == 1], minlength=32 * 24
-        ).reshape(24, 32) > 0)  # fmt: skip
+            (window["y"].astype(int) * 32 + window["x"])[window["p"] == 1], minlength=32 * 32
+        ).reshape(32, 32) > 0)  # fmt: skip
 
 
 @pytest.mark.parametrize("changed", [False, True])
@@ -129,8 +125,8 @@ def test_pixels_of_no_class_teach_nothing():
     assert (scores.grad.abs().sum(1)[0] > 0).sum() == 1
 
 
-def test_the_small_net_learns(simulator):
-    samples = labelled.rendered([2, 5], simulator, SIZE, 3)
+def test_the_small_net_learns(shapes):
+    samples = labelled.Folder.of(shapes, "train", None)
     net, rng = unet(2), np.random.default_rng(0)
     step = labelled.update_of(samples, 2, "cpu", False)
     optimiser = torch.optim.Adam(net.parameters(), lr=2e-3)
@@ -140,9 +136,7 @@ def test_the_small_net_learns(simulator):
 
 def test_last_and_best_are_both_told():
     checks = [{"step": k, "accuracy": a, "mIoU": m} for k, a, m in ((1, 0.5, 0.4), (2, 0.6, 0.3))]
-    assert labelled.last_and_best(checks) == {
-        "last accuracy": 0.6, "last mIoU": 0.3, "best accuracy": 0.5, "best mIoU": 0.4,
-    }  # fmt: skip
+    assert labelled.last_and_best(checks) == {"last": checks[1], "best": checks[0]}
 
 
 def data_set(folder, order="events/{}", count=3):
@@ -255,7 +249,8 @@ def call(*words):
 
 
 def test_prepare_and_train(tmp_path, ess, monkeypatch):
-    monkeypatch.setattr(segmentation, "evsegnet", unet)  # a hundredth of the time
+    fast = {"evsegnet": (unet, 6, (352, 224))}  # a hundredth of the time
+    monkeypatch.setattr(segmentation, "NETWORKS", fast)
     assert "train: 10 pictures" in call("prepare", ess, tmp_path / "real").output
     data = data_set(tmp_path / "set")
     call("train", tmp_path / "run", data, "--epochs", 1, "--batch", 2)
@@ -266,50 +261,24 @@ def test_prepare_and_train(tmp_path, ess, monkeypatch):
     numbers = json.loads((tmp_path / "out.json").read_text())
     curve = json.loads((tmp_path / "other" / "curve.json").read_text())
     assert [one["step"] for one in curve["checks"]] == [2, 4]
-    assert numbers["measures"]["last mIoU"] == curve["checks"][-1]["mIoU"]
-    assert numbers["measures"]["best mIoU"] == max(one["mIoU"] for one in curve["checks"])
+    assert numbers["measures"]["last"]["mIoU"] == curve["checks"][-1]["mIoU"]
+    assert numbers["measures"]["best"]["mIoU"] == max(one["mIoU"] for one in curve["checks"])
     assert numbers["settings"]["test"] == "real"
 
 
-TINY = ("--steps", 2, "--seeds", 2, "--clips", 1, "--side", 16, "--test-clips", 2,
-        "--simulators", "ideal,v2e")  # fmt: skip
-
-
-def test_small_trains_each_once_and_reports(tmp_path):
-    first = call("small", tmp_path / "runs", *TINY)
-    files = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").glob("*/*")}
-    assert len({path.parent for path in files}) == 4
-    again = call("small", tmp_path / "runs", *TINY, "-o", tmp_path / "small.md")
-    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").glob("*/*")} == files
-    assert first.stdout == again.stdout == call("report", tmp_path / "runs").stdout
-    assert "16 pictures: rendered shapes by dvs-voltmeter" in first.stdout
-    assert "| one class for all pixels | 0." in first.stdout
-    numbers = json.loads((tmp_path / "small.json").read_text())["trainings"]
-    assert all(set(one["measures"]) == set(labelled.MEASURES) for one in numbers)
-
-
-def test_small_is_tested_on_a_recording(tmp_path):
-    clip, labels = shape_clip(2, 49, (44, 30))
-    frames = np.rint(clip.frames).astype(np.uint8)
-    config = load_config("ideal", "frames.encoding=linear")
-    events = np.concatenate(list(simulate(frames, 240, config, threads=1)))
-    place = write_recording(tmp_path / "shapes_6dof", clip.times_ns[::6] / 1e9, frames[::6], events)
-    samples = labelled.of_shapes(read(str(place)), every=2)
-    assert len(samples) >= 2
-    shown = [6 * k for k in range(9) if k % 2 == 0 and 6 * k > 12][: len(samples)]
-    for (picture, label), at in zip(samples, shown, strict=True):
-        assert picture.shape == (6, 24, 40)
-        assert np.mean(label == labels[at, :24, :40]) > 0.95
-    done = call("small", tmp_path / "runs", *TINY[:-1], "ideal", "--measured", place)
-    assert "measured events of shapes_6dof" in done.stdout
+def test_a_small_net_is_trained_on_shapes(tmp_path, shapes):
+    words = ("--network", "unet", "--epochs", 1, "-o", tmp_path / "out.md")
+    done = call("train", tmp_path / "run", shapes, *words)
+    numbers = json.loads((tmp_path / "out.json").read_text())
+    assert set(numbers["measures"]) == {"last", "best", "one class"}
+    assert "| one class | 0." in done.stdout
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("small", "runs", "--side", 20), "--side 20: must be a multiple of 8"),
-        (("small", "runs", "--test-simulator", "v2e"), "one of those that are trained on"),
-        (("prepare", ".", "out", "--simulators", "ideal,v2e"), "prepare takes one"),
+        (("shapes", "out", "--side", 20), "--side 20: must be a multiple of 8"),
+        (("prepare", ".", "out", "--simulators", "ideal,v2e"), "ideal,v2e: must be one"),
     ],
 )
 def test_wrong_words(tmp_path, monkeypatch, words, message):

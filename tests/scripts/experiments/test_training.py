@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from experiments.training import BEST, CHECKPOINT, CURVE, Training, number_of_parameters
+from experiments.training import BEST, CHECKPOINT, CURVE, Training, identity, one_anew
 
 from adv2e.errors import DataError
 
@@ -122,5 +122,10 @@ def test_a_loss_that_is_not_finite_ends_it(tmp_path):
     assert not (tmp_path / CHECKPOINT).exists()
 
 
-def test_parameters_are_counted():
-    assert number_of_parameters(build()) == 4 * 8 + 8 + 16 + 8 + 1
+def test_a_simulator_is_known_by_all_it_is():
+    plain, again, other = (
+        identity(one_anew("ideal", sets, None)) for sets in ((), (), ("pixel.thresholds.on=0.3",))
+    )
+    assert plain == again
+    assert plain["simulator"] == other["simulator"] == "ideal"
+    assert plain["digest"] != other["digest"]

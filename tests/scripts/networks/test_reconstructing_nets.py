@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from experiments import judge
+from experiments import images
 from networks.e2vid import PARAMETERS, e2vid
 from networks.firenet import PARAMETERS as OF_FIRENET
 from networks.firenet import firenet, grid_of, reconstructed
@@ -77,7 +77,7 @@ def test_similarity_is_that_of_the_measure():
     a, b = np.random.default_rng(0).random((2, 20, 30))
     b = 0.7 * a + 0.3 * b
     found = similarity(*(torch.from_numpy(one)[None, None] for one in (a, b)))
-    assert float(found) == pytest.approx(judge.similarity(a, b), abs=1e-9)
+    assert float(found) == pytest.approx(images.similarity(a, b), abs=1e-9)
     assert (
         float(structural_loss(torch.full((1, 1, 9, 9), 0.5), torch.full((1, 1, 9, 9), 0.5))) < 1e-6
     )

@@ -124,7 +124,6 @@ def test_the_table_of_sizes_says_in_short_what_was_said():
         line_of(effects=("black_level",), found=[found("dark_current")], size="large"),
         line_of(effects=("leak",), failed="ValueError: no (a.py:1)", size="small"),
         line_of(effects=("leak",), verdict="unexplained"),
-        line_of(kind="leave-one-out", effects=("shot_noise",)),
     ]
     rows = [row.split("|")[1:-1] for row in tables.sizes_table(lines).splitlines()[2:]]
     assert {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows} == {

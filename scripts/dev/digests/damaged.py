@@ -1,35 +1,16 @@
-"""Answers of ``adv2e info --json`` on inputs of every kind, whole and damaged.
-
-It tells nothing of the bytes of files, nor of when they were written.
-"""
+"""Inputs that are damaged or doubtful."""
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
 import cv2
 import numpy as np
-from dev.digests.event_files import (
-    EVENT_FILES,
-    EVENTS,
-    Change,
-    events,
-    evt21,
-    lines,
-    prophesee,
-    text,
-    written,
-)
-from dev.digests.pictures import FPS, PICTURES, Make, film, images, pictures
-from dev.digests.running import Holds, run, short
+from dev.digests.event_files import EVENTS, Change, events, evt21, lines, prophesee, text, written
+from dev.digests.pictures import FPS, Make, film, images, pictures
 from dev.digests.simulations import Array
-
-OF_LIBRARIES = re.compile(r"(?<=that can be read, or damaged: ).*")
-"""The end of an error that a library words."""
 
 
 def not_numbers(path: Path) -> None:
@@ -103,22 +84,4 @@ DAMAGED: Mapping[str, Make] = {
     "empty.mp4": Path.touch,
     "none.h5": lambda path: None,
 }  # fmt: skip
-"""The same of inputs that are damaged or doubtful."""
-
-
-def told(words: str, make: Make, folder: Path) -> Holds:
-    """Return what is told of an input, or its error."""
-    name, *options = words.split()
-    make(folder / name)
-    status, out, err = run(folder, "info", name, "--json", *options)
-    holds = short(json.loads(out)) if status == 0 else {"status": status}
-    return holds | ({"stderr": OF_LIBRARIES.sub("...", err)} if err else {})
-
-
-def cases() -> dict[str, Callable[[int, Path], Holds]]:
-    """Return what tells of each input, by name."""
-    inputs = {**PICTURES, **EVENT_FILES, **DAMAGED}
-    return {
-        f"info {words}": lambda threads, folder, words=words, make=make: told(words, make, folder)
-        for words, make in inputs.items()
-    }
+"""Writers of inputs, by the words that follow ``adv2e info``."""
