@@ -105,30 +105,59 @@ def first_interrupt(told: str) -> Iterator[Interrupt | None]:
     Nothing changes, and None is given, where SIGINT would not end the program, as in Python, which
     has a handler of its own, and on Windows, where nobody can wait for it and for a pipe at once.
     """
-    stop = signal.getsignal(signal.SIGINT)
-    in_main = threading.current_thread() is threading.main_thread()
-    if sys.platform == "win32" or not isinstance(stop, _Stop) or not in_main:
+    if not _can_wait():
         yield None
         return
-    # handlers run between two steps of Python only, too late for who has just begun to wait; but
-    # the number of the signal is written at once, whichever thread of the process gets it
+    stop = signal.getsignal(signal.SIGINT)
+    with _woken() as wakes:
+        interrupt = Interrupt(wakes)
+
+        def hear(number: int, frame: FrameType | None) -> None:
+            signal.signal(signal.SIGINT, stop)
+            interrupt.came = True
+            if told:
+                _say_at_once(told)
+
+        signal.signal(signal.SIGINT, hear)
+        try:
+            yield interrupt
+        finally:
+            if signal.getsignal(signal.SIGINT) is hear:
+                signal.signal(signal.SIGINT, stop)
+
+
+def wait_for(descriptor: int) -> None:
+    """Wait until a descriptor can be read; a signal that comes just before is not missed."""
+    if not _can_wait():
+        return
+    with _woken() as wakes:
+        ready: list[int] = []
+        while descriptor not in ready:
+            ready, _, _ = select.select([wakes, descriptor], [], [])
+            if wakes in ready:
+                os.read(wakes, 512)
+
+
+def _can_wait() -> bool:
+    """Tell whether signals end the program here, and one can be waited for beside a pipe."""
+    in_main = threading.current_thread() is threading.main_thread()
+    ends = isinstance(signal.getsignal(signal.SIGINT), _Stop)
+    return sys.platform != "win32" and in_main and ends
+
+
+@contextmanager
+def _woken() -> Iterator[int]:
+    """Give a descriptor that can be read once a signal came.
+
+    Handlers run between two steps of Python only, too late for a call that has just begun to wait;
+    but the number of the signal is written at once, whichever thread of the process gets it.
+    """
     wakes, woken = os.pipe()
     os.set_blocking(woken, False)
-    interrupt = Interrupt(wakes)
-
-    def hear(number: int, frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, stop)
-        interrupt.came = True
-        if told:
-            _say_at_once(told)
-
     before = signal.set_wakeup_fd(woken, warn_on_full_buffer=False)
-    signal.signal(signal.SIGINT, hear)
     try:
-        yield interrupt
+        yield wakes
     finally:
-        if signal.getsignal(signal.SIGINT) is hear:
-            signal.signal(signal.SIGINT, stop)
         signal.set_wakeup_fd(before)
         os.close(wakes)
         os.close(woken)

@@ -10,7 +10,7 @@ from io import BufferedIOBase
 from typing import cast
 
 from adv2e.errors import DataError
-from adv2e.process.signals import Interrupt
+from adv2e.process.signals import Interrupt, wait_for
 
 NAME = "standard input"
 
@@ -65,7 +65,10 @@ class Stream:
 
         Nothing stays in the buffer of the file, where nobody could wait for it.
         """
-        if self.pipe is None or self.interrupt is None:
+        if self.pipe is None:
+            return self._file.read1(most)
+        if self.interrupt is None:
+            wait_for(self.pipe)
             return self._file.read1(most)
         if self._left is None and self.interrupt.comes_before(self.pipe):
             self._left = _waiting_in(self.pipe)
