@@ -140,7 +140,7 @@ class Evidence:
         return course.times_ns.tolist(), course.light.astype(np.float32)[:, course.region]
 
     def cut(self, rows: slice, columns: slice) -> Evidence:
-        """Return what some of the pixels saw and sent, those of slices of rows and columns."""
+        """Return the frames and events of a rectangle of pixels, given as slices."""
         number = np.arange(self.width * self.height).reshape(self.height, self.width)
         chosen = number[rows, columns]
         place = np.full(number.size, -1, np.int32)

@@ -1,4 +1,4 @@
-"""What is reported of the effects, of the statistics, and of what readers should know besides."""
+"""Findings for the report: fitted effects, rejected ones, statistics, and notes."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def signatures_of(reference: Reference, declared: State, kept: State) -> list[Si
 
 
 def about_frames(prepared: Prepared) -> list[str]:
-    """Say how uncertain statistics are for what the frames do not tell."""
+    """Return notes on the uncertainty of the statistics that interpolation and levels make."""
     reference = prepared.reference
     chance = reference.error.chance(reference.scales[BOTH].sd, BOTH)
     notes: list[str] = []
@@ -162,7 +162,7 @@ def _uncertain(what: str, doubt: float, told_by: str) -> str:
 
 
 def _meaning(doubt: float) -> str:
-    """Say what it means here that frames make numbers so uncertain."""
+    """Return the consequence of the uncertainty that frames leave, in words."""
     if doubt < _LITTLE_DOUBT:
         return "here, that hides next to nothing"
     if doubt <= 1.0:

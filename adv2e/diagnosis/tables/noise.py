@@ -70,7 +70,7 @@ _FEWEST = 1e-8
 
 @dataclass(frozen=True)
 class NoisySources:
-    """What makes noise events in a pixel; rates in Hz, 0 standing for none."""
+    """Sources of noise events (background activity) in a pixel; rates in Hz, 0: none."""
 
     leak_hz: float = 0.0
     photo_leak_hz: float = 0.0
@@ -254,7 +254,7 @@ def _typical(values: Array, weights: Array) -> Array:
 
 
 def _rare(leak: Array, noise: Array) -> Array:
-    """Return what is left of leak events beside noise that takes the reference anew [Hz]."""
+    """Return the rate of leak events beside noise events, each of which resets the leak [Hz]."""
     leak, noise = np.broadcast_arrays(leak, np.maximum(noise, 0.0))
     left = np.array(leak, dtype=np.float64)
     both = (leak > 0.0) & (noise > 1e-12 * leak)
