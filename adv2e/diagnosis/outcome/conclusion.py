@@ -1,4 +1,4 @@
-"""From where a search ended to a verdict, on the data that are looked at once."""
+"""Verdict on the outcome of a search, by the test data, which are used only here."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from adv2e.reports.result import Finding, Rejected, Signature
 from adv2e.reports.trials import by_explained
 
 _LITTLE_DOUBT = 0.3
-"""Of what frames leave uncertain, in deviations of chance: added in squares, it is a twentieth."""
+"""Limit of negligible uncertainty by frames, in deviations of chance: it widens them by 4 %."""
 _SEEDS = (1, 2)
 """Of the rough simulations by which effects are first compared."""
 
@@ -171,7 +171,7 @@ def _meaning(doubt: float) -> str:
 
 
 def about_drifts(evidence: Evidence, model: Config) -> list[str]:
-    """Say from when on drifts of a model count, where that is not when the recording begins."""
+    """Return a note on the origin of drifts, where it is not the begin of the recording."""
     drifting = {
         "clock_drift_ppm": model.frames.clock_drift_ppm,
         "drift_per_s": model.pixel.thresholds.drift_per_s,

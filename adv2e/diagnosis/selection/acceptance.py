@@ -43,7 +43,7 @@ CLOSE = 5.0
 """Log likelihood that tells two models apart where simulations tell it: a factor of 150."""
 _DEVIATIONS = 2.0
 _OF_ONE = 2.0
-"""Of what chance gains, where nothing was chosen by it."""
+"""Deviations above the mean of chance gains, for an effect that other data chose."""
 _OFTEN = (*range(1, MANY + 1), *range(2 * MANY + 1, 4 * MANY + 1))
 """Seeds, where the first are too few; between them are those of the scales."""
 

@@ -54,7 +54,7 @@ _LEAST_OF_THE_LEFT = 0.5 / MOST_EFFECTS
 _OF_FITS = 1e-6
 """Probability of what is left below which it is looked into, though it may be the fit's."""
 _MUCH_DOUBT = 0.5
-"""Of what frames leave uncertain, in deviations of chance: from there on it hides effects."""
+"""Uncertainty by frames from which on it hides effects, in deviations of chance."""
 _MOST_OF_THE_FIT = 0.5
 """Least share of that which an effect must take away."""
 

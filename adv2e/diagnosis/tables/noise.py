@@ -78,7 +78,7 @@ class NoisySources:
     rms: float = 0.0
     """Photoreceptor noise [ln]."""
     noise_step: float = 0.0
-    """At which that noise is sampled behind one pole, in correlation times at white; 0: not."""
+    """Sampling step of that noise behind one pole, in correlation times at white; 0: none."""
     cutoff_hz: float = 0.0
     dark_cutoff_hz: float = 0.0
     follower_hz: float = 0.0
@@ -339,7 +339,7 @@ _LEAST, _GRID = 0.2, 0.78
 _COUNT = 1 + round((HIGHEST - _LEAST) / _GRID)
 _RULER = Ruler(1.5, 0.05, HIGHEST)
 _APART = _RULER.marks()[0]
-"""By how much OFF is larger than ON, where it is kept."""
+"""Differences between OFF and ON threshold at which rates are kept."""
 _RATIOS, _DEAD_TIMES, _LEAKS = (2.0, -12, 0), (2.0, -8, 6), (8.0, -6, -1)
 """Base, and least and largest exponent, of what is kept: ratios of corners; dead times and leaks in
 units of the slower pole."""
