@@ -219,7 +219,7 @@ class Masked:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything that a diagnosis found.
+    """Result of a diagnosis.
 
     Attributes
     ----------
