@@ -20,7 +20,7 @@ from adv2e.files.states import free_bytes
 
 _LOOKED_AT = 6
 _SHARE = 0.1
-"""Of what a batch takes, that a look at it may."""
+"""Longest time of a forecast, as a share of the time of the batch."""
 
 _FAR_APART = 5.0
 """Factor from which on it is said how far sequences differ."""
