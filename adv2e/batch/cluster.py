@@ -45,19 +45,19 @@ if TYPE_CHECKING:
 
 CONNECT_S = 20.0
 WAIT_S = 600.0
-"""How long a batch waits when there is no worker at all."""
+"""Longest wait of a batch while there is no worker at all [s]."""
 
 _TICK_S = 1.0
 _ANSWER_S = 10.0
 _RETRIES = 2
-"""How often a job is begun again of which the process ended, but not the worker."""
+"""Retries of a job whose process ended, but not the worker."""
 
 _ADDRESS = re.compile(r"([a-z]+://)?(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]]+):[0-9]{1,5}")
 
 
 @dataclass(frozen=True)
 class Proof:
-    """What a worker must be and see so that it does what would be done here.
+    """Check of a worker: it must have the same version of adv2e, and see the same DEST.
 
     Attributes
     ----------
@@ -77,14 +77,14 @@ class Proof:
 
     @classmethod
     def of(cls, manifest: Path | None) -> Proof:
-        """Return that for a manifest as it is now; None: DEST is a URL, which all can open."""
+        """Return the check for a manifest as it is now; None: DEST is a URL, which all can open."""
         if manifest is None:
             return cls(__version__, "", 0, "")
         text = manifest.read_bytes()
         return cls(__version__, str(manifest), len(text), hashlib.sha256(text).hexdigest())
 
     def complaint(self) -> str:
-        """Return what is wrong with the process that asks, or nothing."""
+        """Return the reason why the process that asks is unfit, or ""."""
         if self.version != __version__:
             return f"has adv2e {__version__}: install {self.version}, as here"
         if not self.manifest:
@@ -254,9 +254,9 @@ class _Workers:
         self.some_ended = False
 
     def room(self) -> int:
-        """Return how many jobs may be on their way: as many as threads.
+        """Return the number of jobs that may be submitted at a time: that of the workers' threads.
 
-        More would wait at workers, and count as suspect where those end.
+        More would wait at workers, and Dask would suspect them where a worker ends.
         """
         now = time.monotonic()
         if now >= self._asked + _TICK_S:
@@ -303,12 +303,12 @@ class _Workers:
 
 
 def _found(future: Future, job: Job) -> dict[str, Any] | None:
-    """Return what became of a job; None: the connection is lost.
+    """Return the result of a job; None: the connection is lost.
 
     Raises
     ------
     TimeoutError, OSError
-        The result is not to be had yet, as the worker that held it is lost.
+        The result cannot be fetched yet, as the worker that held it is lost.
     """
     from distributed import KilledWorker  # noqa: PLC0415 - an extra
 
@@ -347,7 +347,7 @@ _processes: list[Workers] = []
 
 
 def _do(job: Job, proof: Proof, texts: dict[str, bytes]) -> dict[str, Any]:
-    """Return what :func:`adv2e.batch.work.do` returned; or ``unfit``: this worker is of no use."""
+    """Return the result of :func:`adv2e.batch.work.do`; or ``unfit``, with the reason."""
     from distributed import Reschedule, Status, get_worker  # noqa: PLC0415 - an extra
 
     worker = get_worker()

@@ -18,7 +18,7 @@ _LISTS = ("e2vid-train.txt", "e2vid-valid.txt")
 
 @dataclass(frozen=True)
 class Export:
-    """What is made of the events of each sequence, as ``adv2e export`` does.
+    """Export of the events of each sequence, as by ``adv2e export``: kind and settings.
 
     Attributes
     ----------
@@ -37,17 +37,17 @@ class Export:
 
     @property
     def needs_frames(self) -> bool:
-        """Whether files of events must hold the frames."""
+        """True if files of events must hold the frames."""
         return self.kind != "voxel" or self.window_us is None
 
     def described(self) -> dict[str, Any]:
-        """Return what the manifest says of it."""
+        """Return the settings as the manifest records them."""
         return asdict(self)
 
     def make(
         self, events: Path, folder: Path, threads: int, doubt: Callable[[str], None]
     ) -> dict[str, Any]:
-        """Write the export of one file; return what the manifest says of it.
+        """Write the export of one file; return its entry in the manifest.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class Export:
 
 
 def write_lists(dest: Path, records: Iterable[Mapping[str, Any]]) -> None:
-    """Write which of the exported sequences are for training and which for validation.
+    """Write the lists of exported sequences for training and for validation.
 
     The order comes from their seeds, so that sequences that are added later hardly change it.
     """

@@ -1,8 +1,8 @@
-"""What a batch will make and take, told from short parts of some of its sequences.
+"""Forecast of the events, bytes and time of a batch, from short parts of some sequences.
 
-A sequence is looked at with a chance that goes with its bytes, at even steps along all of them.
-Then the mean over these of what comes from each byte, times all bytes, is that of the whole on
-average, whichever sequences there are (Hansen and Hurwitz, 1943, doi:10.1214/aoms/1177731356).
+A sequence is sampled with a probability in proportion to its bytes, at even steps along all of
+them.  Then the mean over the sample of the events from each byte, times all bytes, is an unbiased
+estimate of the total (Hansen and Hurwitz, 1943, doi:10.1214/aoms/1177731356).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from adv2e.files.states import free_bytes
 
 _LOOKED_AT = 6
 _SHARE = 0.1
-"""Of what a batch takes, that a look at it may."""
+"""Longest time of a forecast, as a share of the time of the batch."""
 
 _FAR_APART = 5.0
 """Factor from which on it is said how far sequences differ."""
@@ -28,18 +28,18 @@ _FAR_APART = 5.0
 
 @dataclass(frozen=True)
 class Forecast:
-    """What a batch will come to, about.
+    """Estimate of the events, bytes and time of a batch.
 
     Attributes
     ----------
     events, bytes, seconds : float
         Of all sequences that are to be converted.
     sequences, looked_at : int
-        How many these are, and of how many it is told.
+        Number of these sequences, and of those in the sample.
     apart : float
-        By which factor those differ in the events from a byte of source.
+        Ratio between the sampled sequences in the events from a byte of source.
     room : int
-        Bytes that are free where the results go.
+        Free disk space where the results go [bytes].
     """
 
     events: float
@@ -62,10 +62,10 @@ class Forecast:
 def forecast(
     tasks: Sequence[Task], dest: Path, job_of: Callable[[Task], Job], jobs: int
 ) -> Forecast | None:
-    """Return what converting the sequences of `tasks` will come to; None where nobody can tell.
+    """Return an estimate for the conversion of all `tasks`; None where there is too little to tell.
 
-    Looking takes about a tenth of that time at most; of few short sequences, so little tells
-    nothing.
+    It takes about a tenth of the time of the conversion at most, which is too little where
+    sequences are few and short.
 
     Parameters
     ----------

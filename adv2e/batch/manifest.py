@@ -1,4 +1,4 @@
-"""What was made from what: ``manifest.jsonl``, a line for each step, never changed afterwards.
+"""Manifest of a batch, ``manifest.jsonl``: sources and outputs, a line for each step, append-only.
 
 Each line is one JSON object and is on the disk before the next step begins.  A line that was torn,
 because the machine stopped while it was written, is cut off when the file is opened the next time.
@@ -163,7 +163,7 @@ class Manifest:
 
 
 def _lines(path: Path, file: BinaryIO) -> Iterator[dict[str, Any]]:
-    """Yield what each whole line says."""
+    """Yield the record of each whole line."""
     for number, line in enumerate(file, start=1):
         record = _record(line)
         if record is not None:
@@ -173,7 +173,7 @@ def _lines(path: Path, file: BinaryIO) -> Iterator[dict[str, Any]]:
 
 
 def _record(line: bytes) -> dict[str, Any] | None:
-    """Return what a line says; None: it is torn, or something else."""
+    """Return the record of a line; None: it is torn, or no line of a manifest."""
     if not line.endswith(b"\n"):
         return None
     try:

@@ -1,4 +1,4 @@
-"""What of a batch is to be done, and why; what is kept, and that it is still what it was."""
+"""Decide per sequence: convert, re-export or keep (by manifest and digests)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from adv2e.files.states import State, digest_of
 
 @dataclass(frozen=True)
 class Task:
-    """A sequence and what is to be done with it.
+    """Task for one sequence: convert, re-export or keep, with the reason.
 
     Attributes
     ----------
@@ -42,13 +42,13 @@ class Task:
 
     @property
     def only_export(self) -> bool:
-        """Whether its file of events is kept, and exported."""
+        """True if the file of events is kept, and only exported."""
         return self.record is not None
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What all files of a batch are made with.
+    """Settings that all files of a batch share: folder, suffix, seed, digest, export.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Wanted:
         return self.dest / (sequence.name + self.suffix)
 
     def export_folder(self, sequence: Found) -> Path | None:
-        """Return where the export of a sequence goes, if there is any."""
+        """Return the folder for the export of a sequence; None without an export."""
         if self.export is None:
             return None
         return self.dest / f"{sequence.name}.{self.export.kind}"
@@ -115,7 +115,7 @@ def plan(
     overwrite: bool = False,
     digest: Callable[[Path], str] = digest_of,
 ) -> list[Task]:
-    """Return what is to be done with each sequence; `digest` tells that of a file or folder."""
+    """Return a task for each sequence; `digest` computes that of a file or folder."""
     tasks = []
     for sequence in sequences:
         seed = seed_of(wanted.seed, sequence.name)
@@ -186,7 +186,7 @@ def _why_export(
 def outputs_in_the_way(
     tasks: Sequence[Task], records: Mapping[str, Mapping[str, Any]], wanted: Wanted
 ) -> list[Path]:
-    """Return what would be replaced, though this batch never made it."""
+    """Return the outputs that exist but were not made by this batch."""
     return [
         path
         for one in tasks
@@ -196,7 +196,7 @@ def outputs_in_the_way(
 
 
 def outputs_outside(tasks: Sequence[Task], wanted: Wanted) -> list[Path]:
-    """Return what would be written outside of DEST, as links in it lead there."""
+    """Return the outputs that links would put outside of DEST."""
     dest = wanted.dest.resolve()
     return [
         path

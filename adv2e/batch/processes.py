@@ -136,7 +136,7 @@ class Workers(cleanup.Unfinished):
             self._free.put(worker)
 
     def do(self, job: Job, is_wanted: Callable[[], bool] = lambda: True) -> dict[str, Any]:
-        """Return what :func:`do` returned in a process that is free, once one is.
+        """Return the result of a job by the next free process.
 
         Raises
         ------
@@ -208,7 +208,7 @@ class _Worker:
 
 
 def _asked(process: subprocess.Popen[bytes], job: Job) -> dict[str, Any]:
-    """Return what a process answers to a job."""
+    """Send a job to a worker process; return its result."""
     assert process.stdin is not None and process.stdout is not None
     pickle.dump(job, process.stdin)
     process.stdin.flush()

@@ -1,11 +1,11 @@
-"""Batches of which SOURCE or DEST has a URL.
+"""Batches of which SOURCE or DEST is a URL.
 
-What a batch looks at is a shadow: a temporary tree of files that have the names, sizes and times
-of those there, and nothing in them, but for manifests.  What the files there hold is not read to
-see whether it changed; size and time, or the digest that an object store tells, must do.
+A remote tree is mirrored as a temporary tree of local files with the same names, sizes and times,
+which are empty but for manifests.  Changes of remote files are recognised by size and time, or by
+the digest that an object store reports; their content is not read for that.
 
-The manifest is written here and copied there from time to time, as object stores cannot append.
-Nor can they lock: nobody refuses a second batch.
+The manifest is written locally and uploaded from time to time, as object stores cannot append.
+Nor can they lock: nothing refuses a second batch.
 """
 
 from __future__ import annotations

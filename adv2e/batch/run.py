@@ -41,7 +41,7 @@ from adv2e.light.interpolation import network_of
 
 @dataclass(frozen=True)
 class Settings:
-    """What all sequences of a batch are converted with.
+    """Settings with which all sequences of a batch are converted.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Settings:
         return load_family(self.config_files, self.sets, self.seed, effects)
 
     def wanted(self, dest: Path) -> Wanted:
-        """Return what the files are made with; ConfigError, UsageError if that is wrong."""
+        """Return the settings of the files, with their digest; ConfigError, UsageError if wrong."""
         config = self.family.config
         network = network_of(config.sampling)
         made = self.family.written()
@@ -88,7 +88,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a batch did.
+    """Outcome of a batch: tasks, failures, and number of events made.
 
     Attributes
     ----------
@@ -183,7 +183,7 @@ class Batch:
             raise type(error)(f"{shown(name)}: {error}") from None
 
     def plan(self) -> list[Task]:
-        """Return what is to be done; files that are kept are compared with their digests.
+        """Return the tasks of the batch; files that are kept are compared with their digests.
 
         Raises
         ------
@@ -212,7 +212,7 @@ class Batch:
     def forecast(
         self, tasks: Sequence[Task], jobs: int | None, threads: int | None
     ) -> Forecast | None:
-        """Return what converting will make and take; `jobs` and `threads` as for :meth:`run`."""
+        """Return an estimate of the conversion; `jobs` and `threads` as for :meth:`run`."""
         if self._digest is not None:
             return None
         waiting = [task for task in tasks if task.why and not task.only_export]
@@ -312,7 +312,7 @@ def _check_apart(wanted: Wanted, sequences: Sequence[Found]) -> None:
 
 
 def _shares(sequences: int, jobs: int | None, threads: int | None) -> tuple[int, int]:
-    """Return how many conversions run at a time, and with how many threads each."""
+    """Return the number of simultaneous conversions, and of threads for each."""
     threads = threads or default_threads()
     count = max(1, min(jobs or threads, sequences))
     return count, max(1, threads // count)
@@ -359,13 +359,13 @@ def _record(
 
 
 def error_of(record: Mapping[str, Any]) -> str:
-    """Return what went wrong with a sequence; empty: nothing."""
+    """Return the error of a sequence, "" without."""
     wrong: str = record.get("error") or record.get("export_error") or ""
     return wrong
 
 
 def table(outcome: Outcome) -> list[str]:
-    """Return what a batch did, in lines for people."""
+    """Return a table of the outcome of a batch, in lines for people."""
     count = len(outcome.tasks)
     lines = [
         f"{count} sequences: {outcome.made} made ({outcome.events:,} events), {outcome.kept} kept,"
@@ -379,7 +379,7 @@ def table(outcome: Outcome) -> list[str]:
 
 
 def reasons(tasks: Sequence[Task]) -> str:
-    """Return how many sequences are to be converted for which reason, and how many are kept."""
+    """Return the numbers of sequences to convert, by reason, and of those kept, as text."""
     count = Counter(task.why or "kept" for task in tasks)
     kept = count.pop("kept", 0)
     told = [f"{number} {why}" for why, number in count.items()]

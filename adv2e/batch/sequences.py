@@ -51,7 +51,7 @@ _RECORDINGS = {"ddd17": (".h5", ".hdf5"), "davis240c": (".zip",)}
 
 @dataclass(frozen=True)
 class Sequence:
-    """What one conversion is made of.
+    """Source of one conversion: a file or folder below the folder that was searched.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Found:
     passed: dict[str, list[Path]]
 
     def told(self) -> list[str]:
-        """Return what was passed over, a line for each reason."""
+        """Return lines on skipped files and folders, one for each reason."""
         lines = []
         for why, paths in self.passed.items():
             more = f" and {len(paths) - 1:,} more" if len(paths) > 1 else ""
@@ -187,7 +187,7 @@ class _Walk:
                 yield here, "images"
 
     def _against(self, folder: Path, images: int, *, is_beside: bool) -> str:
-        """Return why a folder of so many images is no sequence; "" if it is, or has none."""
+        """Return the reason why a folder of images is no sequence; "" if it is, or has none."""
         if images == 0:
             return ""
         if is_beside:

@@ -74,7 +74,7 @@ def reaching(url: str) -> Iterator[None]:
 
 
 def files_below(system: Any, path: str) -> dict[str, Mapping[str, Any]]:
-    """Return what is told of each file below a path, by its name there; that of a file is empty.
+    """Return the metadata of each file below a path, by relative name; "" for a path of a file.
 
     Raises
     ------
@@ -93,13 +93,13 @@ def files_below(system: Any, path: str) -> dict[str, Mapping[str, Any]]:
 
 
 def token(about: Mapping[str, Any]) -> str:
-    """Return what tells a file from another one of its name: its size, and a digest or its time."""
+    """Return a token of the content of a file: its size, and a digest or its time of change."""
     digest = next((str(about[key]) for key in _DIGESTS if about.get(key)), "")
     return f"{about['size']} {digest or changed_s(about)}"
 
 
 def changed_s(about: Mapping[str, Any]) -> float:
-    """Return when a file changed last [s]; 0: nobody knows."""
+    """Return the time of the last change of a file [s]; 0: unknown."""
     when = next((about[key] for key in _TIMES if about.get(key)), 0)
     if isinstance(when, datetime):
         return when.timestamp()
@@ -145,10 +145,10 @@ class Scratch(cleanup.Unfinished):
 
 
 def through(job: Job, do: Callable[[Job], dict[str, Any]]) -> dict[str, Any]:
-    """Return what `do` returns of a job of which a path is a URL, and what was put there.
+    """Return the result of a job with URLs: source downloaded, `do` called, output uploaded.
 
-    That stands in ``remote``: the names of the files beside the output, or below it, each with its
-    :func:`token`.
+    ``remote`` in it has the names of the uploaded files, beside the output or below it, each with
+    its :func:`token`.
     """
     with Scratch() as folder:
         here = job

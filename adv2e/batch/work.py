@@ -101,7 +101,7 @@ def do(job: Job) -> dict[str, Any]:
 
 
 def _reported(job: Job, error_key: str, work: Callable[[Job], dict[str, Any]]) -> dict[str, Any]:
-    """Return what `work` does, or, by `error_key`, what went wrong."""
+    """Return the result of `work`, or its error message under `error_key`."""
     try:
         return work(job)
     except Adv2eError as error:
@@ -136,7 +136,7 @@ def _reading(job: Job) -> Reading:
 
 
 def _key(job: Job, config: Config, source: str, share: tuple[int, int]) -> str:
-    """Return what tells a part from those that hold other events."""
+    """Return the digest of all that determines the events of a part."""
     network = network_of(config.sampling)
     settings = {key: value for key, value in job.config.items() if key != "max_events"}
     options = {
@@ -167,7 +167,7 @@ def _convert(job: Job) -> dict[str, Any]:
 
 
 def _told(warned: Iterable[warnings.WarningMessage]) -> Iterator[str]:
-    """Yield what warnings say to users, and not what libraries say of our code."""
+    """Yield the texts of warnings for users, without those of libraries about our code."""
     return (str(one.message) for one in warned if is_for_users(one.message, one.filename))
 
 
@@ -185,7 +185,7 @@ def _whole(job: Job, config: Config) -> tuple[Summary, float]:
 
 
 def _merged(job: Job, config: Config, source: str) -> tuple[Summary, float]:
-    """Write what comes of all parts; return how long these took, too."""
+    """Merge the events of all parts; return the summary, and the time that parts took [s]."""
     from adv2e.conversion.parts import merged, read_part  # noqa: PLC0415
     from adv2e.conversion.pipeline import convert_reading  # noqa: PLC0415
     from adv2e.conversion.reading import READING  # noqa: PLC0415

@@ -243,7 +243,7 @@ def _engine(
     threads: int | None,
     log: Log,
 ) -> Engine | None:
-    """Return who converts; None: processes of this machine."""
+    """Return the Dask cluster that converts; None: processes of this machine."""
     if scheduler is None:
         return None
     from adv2e.batch.cluster import Cluster
@@ -256,7 +256,7 @@ def _engine(
 def _export(
     kind: str | None, window_us: int | None, bins: int | None, written: Format
 ) -> Export | None:
-    """Return what is to be made of the events; raise UsageError where options do not fit it."""
+    """Return the settings of --export, None without; UsageError if other options do not fit it."""
     from adv2e.batch.exports import Export
 
     if window_us is not None and kind not in ("voxel", "ev-segnet"):

@@ -71,7 +71,7 @@ class Command(click.Command):
 
 
 def _hint(ctx: click.Context, given: Sequence[str], extra: Sequence[str]) -> str:
-    """Return what to type instead of `given`, of which `extra` is too much."""
+    """Return a hint for the arguments `given`, of which `extra` are too many: a line to type."""
     arguments = [item for item in ctx.command.params if isinstance(item, click.Argument)]
     typed, _, _ = ctx.command.make_parser(ctx).parse_args(list(given))
     taken = [typed[item.name] for item in arguments]
@@ -101,7 +101,7 @@ def _is_another(path: str, first: str) -> bool:
 
 
 def _pattern(paths: Sequence[str]) -> str:
-    """Return what a shell finds the paths by: a pattern if they are of one kind and place."""
+    """Return a shell pattern for paths with one suffix in one folder; else the quoted paths."""
     kinds = {(str(Path(path).parent), Path(path).suffix) for path in paths}
     folder, suffix = kinds.pop()
     if kinds or not suffix:
@@ -118,5 +118,5 @@ def _without(given: Sequence[str], left_out: Sequence[str]) -> list[str]:
 
 
 def _last(given: Sequence[str], text: str) -> int:
-    """Return where `text` stands last: before that it may be the value of an option."""
+    """Return the last index of `text`: earlier ones may be the value of an option."""
     return len(given) - 1 - given[::-1].index(text)

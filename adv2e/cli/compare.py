@@ -121,7 +121,7 @@ def _configured() -> bool:
 def _resimulation(
     measured: Recording, source: Source | None, config: Config, threads: int | None, log: Log
 ) -> Resimulation:
-    """Return how to simulate the frames of `source`, or of `measured`, again."""
+    """Return the resimulation of the frames of `source`, or of `measured`, by two seeds."""
     from dataclasses import replace
 
     from adv2e.comparison.compare import Resimulation

@@ -1,4 +1,4 @@
-"""What is said while functions are compiled: that it happens once, and how far it is."""
+"""Compilation messages: a notice that the kernel is compiled once, and a progress bar."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MANY = 20
 
 @contextmanager
 def compilation_told(log: Callable[[str], None] | None, progress: bool) -> Iterator[None]:
-    """Say when compiling begins, if it does, and show its progress on stderr.
+    """Log the start of compilation, if there is any, and show its progress on stderr.
 
     Parameters
     ----------

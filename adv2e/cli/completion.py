@@ -1,7 +1,7 @@
-"""What a shell offers when Tab is pressed: file names, and names that this program knows.
+"""Shell completion: file names, and names that this program knows.
 
-Options offer themselves, and so do those that have choices.  What is asked here imports no more
-than it must: somebody waits.
+Click completes options and their choices by itself.  Functions here import as little as they can:
+somebody waits.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Offer = list[CompletionItem]
 
 
 def starting(names: Iterable[str], incomplete: str) -> Offer:
-    """Return those of the names that begin with what was typed."""
+    """Return completions: the names that begin with the typed text `incomplete`."""
     return [CompletionItem(name) for name in names if name.startswith(incomplete)]
 
 

@@ -219,7 +219,7 @@ def command(
 def _tell_of_much(
     source: Source, config: Config, output: Path, given: dict[str, Any], log: Log
 ) -> None:
-    """Tell how much will be written, if it is very much."""
+    """Warn of a very large output, or of one larger than the free disk space, by an estimate."""
     from adv2e.conversion.estimate import estimate, may_be_much, text_of_much
 
     if not may_be_much(source):
@@ -239,12 +239,12 @@ _OF_SIMULATION = (
 
 
 def _takes_events(source: str, choice: str | None, track: str | None) -> bool:
-    """Tell whether events are to be written and nothing simulated.
+    """Tell whether to copy the events of the source, without a simulation.
 
     Raises
     ------
     DataError
-        They are, and options of a simulation are given.
+        Events are copied, but options of a simulation are given.
     """
     if choice is None and not lookup.may_hold_events(Path(source)):
         return False

@@ -75,7 +75,7 @@ def warnings_for_people() -> Iterator[None]:
 
 
 def _joined(error: BaseException) -> str:
-    """Return what a library says, which may have lines, as one."""
+    """Return the message of an exception in one line."""
     return " ".join(str(error).split())
 
 
@@ -110,7 +110,7 @@ def reporting(context: click.Context | None = None) -> Iterator[None]:
 
 
 def _explained(error: Exception, context: click.Context | None) -> int:
-    """Say what an exception means that nobody made for people; return the exit status."""
+    """Print an exception that is not one of adv2e as an error message; return the exit status."""
     traced = _trace(context)
     if told := machine_complaint(error):
         complain(f"error: {told}")

@@ -72,13 +72,13 @@ class FiniteNumber(click.FloatRange):
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg] # not generic in all versions
-    """What a function makes of a text, or ValueError with what would be right."""
+    """Parameter type by a function that parses text; its ValueError names the right form."""
 
     def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
         self.name, self._parse = name, parse
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return what `value` stands for; raise BadParameter."""
+        """Return the parsed `value`; raise BadParameter."""
         try:
             return self._parse(value)
         except ValueError as error:
@@ -109,7 +109,7 @@ RECTANGLE = Parsed("rectangle", parse_rectangle)
 
 
 def crop_option(text: str) -> Callable[[Body], Body]:
-    """Return what adds --crop, explained by `text`; the command gets ``crop``, or None."""
+    """Return a decorator that adds --crop, with the help `text`; passes ``crop``, or None."""
     return click.option("--crop", type=RECTANGLE, metavar="X,Y,W,H", help=text)
 
 
@@ -156,7 +156,7 @@ def files_given() -> list[str | Path]:
 
 
 def files_option(text: str) -> Callable[[Body], Body]:
-    """Return what adds -c, explained by `text`; the command gets ``config_files``, a tuple."""
+    """Return a decorator that adds -c, with the help `text`; passes ``config_files``, a tuple."""
     return click.option(
         "-c",
         "--config",
@@ -169,7 +169,7 @@ def files_option(text: str) -> Callable[[Body], Body]:
 
 
 def sets_option(text: str) -> Callable[[Body], Body]:
-    """Return what adds --set, explained by `text`; the command gets ``sets``, a tuple."""
+    """Return a decorator that adds --set, with the help `text`; passes ``sets``, a tuple."""
     return click.option(
         "--set",
         "sets",
@@ -341,7 +341,7 @@ def events_options(body: Body) -> Body:
 
 
 def rotate_option(what: str = "") -> Callable[[Body], Body]:
-    """Return what adds --rotate180, which turns `what`; the command gets ``rotate180``, a bool."""
+    """Return a decorator that adds --rotate180 (turns `what`); passes ``rotate180``, a bool."""
     return click.option(
         "--rotate180",
         is_flag=True,
@@ -351,7 +351,7 @@ def rotate_option(what: str = "") -> Callable[[Body], Body]:
 
 
 def track_option(what: str = "INPUT") -> Callable[[Body], Body]:
-    """Return what adds --track, one of several in `what`; the command gets ``track``, or None."""
+    """Return a decorator that adds --track (one of the tracks in `what`); passes ``track``."""
     return click.option(
         "--track",
         "--stream",

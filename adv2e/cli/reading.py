@@ -1,4 +1,4 @@
-"""How far the reading of a file is, on standard error."""
+"""Progress bar for reading a file, on standard error."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SHARE = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 def reading_told(
     path: str | Path, progress: bool
 ) -> Iterator[Callable[[int, int | None], None] | None]:
-    """Yield what is to be told of how much was read, and of how much, for a bar; None for none.
+    """Yield a callback for a progress bar (amount read, total); None without `progress`.
 
     Once all is read, events are still to be sorted and counted, which the bar then says.
     """

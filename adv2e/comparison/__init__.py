@@ -1,1 +1,1 @@
-"""How far two event streams are apart: distances, statistics of each, and noise floors."""
+"""Comparison of two event streams: distances, statistics of each, and noise floors."""

@@ -1,4 +1,4 @@
-"""Everything that is compared between a measured and a simulated recording, as one dictionary."""
+"""Comparison of a measured and a simulated recording: all measures as one dictionary."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ TWO_SEEDS = (
 
 @dataclass(frozen=True)
 class Resimulation:
-    """How to simulate again, for the floor of two seeds."""
+    """Simulation of the same frames by two seeds, for the noise floor."""
 
     simulate_events: Callable[[int], Events]
     seeds: tuple[int, int]

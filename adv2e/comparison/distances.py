@@ -23,11 +23,11 @@ BINS = 5
 
 @dataclass(frozen=True)
 class Measure:
-    """What a number means."""
+    """Definition of a distance between two streams."""
 
     definition: str
     pooled: str
-    """How the values of the windows become one: mean or median."""
+    """Pooling over the windows: mean or median."""
 
 
 _GRID = f"signed grids of {BINS} temporal bins, bilinear in time, the window's ends shared"

@@ -1,4 +1,4 @@
-r"""How much later the simulated events come, as a whole.
+r"""Latency offset: common delay of the simulated events behind the measured ones.
 
 The signed streams are correlated pixel by pixel, both smoothed with a Gaussian of 2 ms,
 

@@ -11,7 +11,7 @@ from adv2e.events import Events
 QUANTILES = (1, 5, 25, 50, 75, 95, 99)
 """Quantiles in use [%]."""
 SHORT_US = 1000
-"""What counts as a short inter-event time [us]."""
+"""Limit below which an inter-event time counts as short [us]."""
 
 STATISTICS = {
     "events": "events in the time compared",

@@ -1,4 +1,4 @@
-"""Over which stretches of time two recordings are compared.
+"""Time windows in which two recordings are compared.
 
 A window is half open, ``[start, stop)``.  Windows are the frame intervals of the measured
 recording, or, where it has no frames, pieces of one length.  Only windows that lie inside the spans
@@ -27,10 +27,10 @@ class Windows:
     """The windows in use, in order and without gaps."""
 
     kind: str
-    """What they are, in words."""
+    """Kind of the windows, in words."""
     used: tuple[Window, ...]
     total: int
-    """How many there were before those outside the spans went."""
+    """Number of windows before those outside the spans were dropped."""
 
     @property
     def start(self) -> int:

@@ -42,7 +42,7 @@ __all__ = [
 
 
 Written: TypeAlias = "str | Path | Mapping[str, Any] | Config"
-"""What says a configuration: a YAML file, the name of a shipped one, keys and values, or one."""
+"""Source of a configuration: YAML file, name of a shipped one, mapping of keys, or a Config."""
 
 
 def load_config(
@@ -96,7 +96,7 @@ def load_family(
     seed: int | None = None,
     effects: Sequence[type[Hooks]] = (),
 ) -> Family:
-    """Return what :func:`load_config` does, where numbers may be distributions.
+    """Return a family of configurations, as :func:`load_config`, with distributions as numbers.
 
     Raises
     ------
@@ -218,7 +218,7 @@ def _merged(
     seed: int | None = None,
     size: tuple[int, int] | None = None,
 ) -> Value:
-    """Return what `files`, `sets`, `seed` and `size` say, later ones on top."""
+    """Return the values of `files`, `sets`, `seed` and `size` merged, later ones on top."""
     over = [parse_set(text) for text in sets]  # what is wrong on the command line comes first
     if seed is not None:
         over.append(_tree({"seed": seed}, Origin("--seed", on_command_line=True)))
@@ -229,7 +229,7 @@ def _merged(
 
 
 def names_of(files: Written | Sequence[Written] | None = (), sets: str | Sequence[str] = ()) -> str:
-    """Return what a configuration was made from, for people: names without folders, and keys."""
+    """Return the sources of a configuration, for people: names without folders, and keys."""
     names = (
         Path(one).name if isinstance(one, (str, Path)) else f"a {type(one).__name__}"
         for one in _listed(files)

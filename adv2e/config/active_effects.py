@@ -1,4 +1,4 @@
-"""Which effects a configuration switches on, of those that work through hooks, in signal order."""
+"""Active effects of a configuration that work through hooks, in signal order."""
 
 from __future__ import annotations
 

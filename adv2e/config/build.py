@@ -31,7 +31,7 @@ class Key:
     kind: type
     """int, float, str, bool, tuple or the class of a section."""
     optional: bool
-    """Whether the value may be null."""
+    """True if the value may be null."""
     default: Any
     """The value where the key is absent; MISSING: it must be given."""
     parts: tuple[type, ...] = ()
@@ -44,7 +44,7 @@ class Key:
 
     @property
     def is_section(self) -> bool:
-        """Whether the key holds keys of its own."""
+        """True if the key is a section, with keys of its own."""
         return issubclass(self.kind, Section)
 
 

@@ -93,7 +93,7 @@ class _Tie:
 
     @property
     def is_random(self) -> bool:
-        """Whether it may differ though the other number is the same."""
+        """True if the number may differ while that of the other key is the same."""
         return isinstance(self.times, _Law) or isinstance(self.plus, _Law)
 
 
@@ -130,7 +130,7 @@ class Distributions:
             self._check_circle(path)
 
     def draw(self, seed: int) -> dict[str, Number]:
-        """Return what `seed` gives for each of them, by the path of the key.
+        """Return the numbers drawn by `seed`, by the path of the key.
 
         Raises
         ------

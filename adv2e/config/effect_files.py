@@ -82,7 +82,7 @@ def _line(effect: type[Hooks], source: bytes) -> int:
 
 
 def _complaint(effect: type[Hooks]) -> str | None:
-    """Return what is wrong with an effect, or None."""
+    """Return the error in the declaration of an effect, or None."""
     if not re.fullmatch(r"[a-z]\w*", effect.name):
         return f"name: must be lower-case letters, digits and underscores, got {effect.name!r}"
     if effect.stage not in STAGES:
@@ -108,7 +108,7 @@ _KINDS = (float, int, bool, str)
 
 
 def _key_complaint(key: Key) -> str | None:
-    """Return what is wrong with a parameter, or with where it may be fitted, or None."""
+    """Return the error in the declaration of a parameter or of its fit, or None."""
     kinds = key.parts or (key.kind,)
     if not set(kinds) <= set(_KINDS):
         wanted = ", ".join(kind.__name__ for kind in _KINDS)

@@ -28,7 +28,7 @@ def shipped() -> list[str]:
 
 
 def title(name: str) -> str:
-    """Return what a shipped configuration says of itself first, in one sentence."""
+    """Return the title of a shipped configuration: the first sentence of its comment."""
     text = (shipped_folder() / f"{name}.yaml").read_text("utf-8")
     comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
     told = re.sub(r"\s*\([^)]*\)", "", " ".join(line.lstrip("# ") for line in comment))

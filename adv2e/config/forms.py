@@ -1,4 +1,4 @@
-"""What a distribution in the place of a number looks like; :mod:`adv2e.config.distributions`."""
+"""Syntax of distributions in place of numbers; see :mod:`adv2e.config.distributions`."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ MOST_COLUMNS = 1 << 16
 
 @dataclass(frozen=True, kw_only=True)
 class Frames(Section):
-    """How the numbers in the frames stand for light."""
+    """Decoding of frames to light, and their exposure, clock and position on the sensor."""
 
     encoding: str = parameter(
         "auto",
@@ -227,7 +227,7 @@ class Pixel(Section):
 
 @dataclass(frozen=True, kw_only=True)
 class Readout(Section):
-    """What happens to events between pixel and file, and what the readout of frames does."""
+    """Readout of events from the pixel to the file, and coupling of the frame readout to pixels."""
 
     frame_coupling: FrameCoupling | None = subsection(
         None, meaning="disturbance of the event pixels by the readout of frames"

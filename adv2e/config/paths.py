@@ -17,7 +17,7 @@ def set_key(values: dict[str, Any], key: str, value: Any) -> None:
 
 
 def get_key(values: Mapping[str, Any], key: str) -> Any:
-    """Return what a dotted `key` holds, None if it or its section is absent or null."""
+    """Return the value of a dotted `key`, None if it or its section is absent or null."""
     found: Any = values
     for name in key.split("."):
         if not isinstance(found, Mapping):

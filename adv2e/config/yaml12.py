@@ -32,7 +32,7 @@ _TAG = "tag:yaml.org,2002:"
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a value was written."""
+    """Origin of a value: file and line, or option of the command line."""
 
     name: str = ""
     """File name, or the option of the command line."""

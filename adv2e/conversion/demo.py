@@ -35,7 +35,7 @@ INSTANTS_S = (0.20, 0.45, 0.90, 1.20, 1.50, 1.90)
 """Instants of the picture: in motion, but for the third and the last."""
 
 WINDOW_US = 10_000
-"""What each instant shows [us]."""
+"""Length of the event window shown at each instant [us]."""
 
 _RESTS = 1e-6  # speed below which the scene rests
 
@@ -51,14 +51,14 @@ pixel:
 """
 
 UNDECLARED = "pixel.refractory.period_us=4000"
-"""What the camera of the sample recording really has."""
+"""True refractory period of the camera of the sample recording, as a key."""
 
 _RECORDING_SEED = 12  # another chip, and other noise, than a simulation of the declared model has
 
 
 @dataclass(frozen=True)
 class Demo:
-    """What was made, and where."""
+    """Files of the demonstration, and the summary of its conversion."""
 
     clip: Path
     events: Path

@@ -1,7 +1,8 @@
-"""How much a conversion will make and take, told from short parts of its source.
+"""Estimate of the events, bytes and time of a conversion, from short parts of its source.
 
-Each part is converted to a file as the whole would be, but its pixels begin anywhere on their way
-to an event: from rest, each would first have to gather a threshold, which short parts hardly do.
+Each part is converted to a file as the whole would be, but its pixels begin anywhere between two
+events: from rest, each would first have to change by a contrast threshold, which short parts
+hardly reach.
 """
 
 from __future__ import annotations
@@ -50,15 +51,15 @@ class _Part(NamedTuple):
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a conversion will come to, about.
+    """Estimate of the events, bytes and time of a conversion.
 
     Attributes
     ----------
     events, bytes, seconds : float
     frames, seen : int
-        Frames of the source, and how many of them were looked at.
+        Number of frames of the source, and of those in the parts.
     spent : float
-        Time that looking took, but for compiling [s].
+        Time that the estimate took, without compiling [s].
     """
 
     events: float
@@ -70,7 +71,7 @@ class Estimate:
 
 
 def may_be_much(source: Source) -> bool:
-    """Tell whether a source is so large that :data:`MUCH` may come of it."""
+    """Tell whether a source is so large that its output may exceed :data:`MUCH` bytes."""
     frames = source.count or 0
     if source.waits or source.along is not None:
         return False
@@ -78,7 +79,7 @@ def may_be_much(source: Source) -> bool:
 
 
 def text_of_much(found: Estimate | None, target: Path) -> str:
-    """Return what is to be told before very much is written to a file; mostly nothing."""
+    """Return a warning of a very large output, or one without room on the disk, else ""."""
     room = free_bytes(target.absolute().parent)
     if found is None or not is_much(found.bytes, room):
         return ""
@@ -87,12 +88,12 @@ def text_of_much(found: Estimate | None, target: Path) -> str:
 
 
 def is_much(size: float, room: int) -> bool:
-    """Tell whether so many bytes are to be told before they are written where `room` is free."""
+    """Tell whether `size` [bytes] needs a warning: from :data:`MUCH` on, or from `room` on."""
     return size >= min(MUCH, room)
 
 
 def room_text(size: float, room: int) -> str:
-    """Return what is to be told where so many bytes have no room; else nothing."""
+    """Return a warning if `size` exceeds the free disk space `room` [bytes], else ""."""
     return f"; there is room for {room / 1e9:.1f} GB" if size > room else ""
 
 
@@ -208,7 +209,7 @@ def _times_s(source: Source) -> list[float]:
 
 
 def _at_none(short: _Part, of_short: float, whole: _Part, of_whole: float) -> float:
-    """Return what a conversion without any interval takes, by two of different lengths."""
+    """Return the fixed cost: intercept of a line through two parts of different length."""
     if whole.intervals == short.intervals:
         return 0.0
     slope = (of_whole - of_short) / (whole.intervals - short.intervals)

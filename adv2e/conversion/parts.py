@@ -147,7 +147,7 @@ def _compressed(events: Events) -> tuple[int, bytes]:
 
 
 def told_of_part(path: Path, key: str, causes: bool) -> dict[str, Any] | None:
-    """Return what is told at the end of a part; None: it is not there, or not whole."""
+    """Return the record at the end of a part; None: the part is missing or incomplete."""
     told: dict[str, Any] = {}
     try:
         for _ in read_part(path, key, causes, told):
@@ -200,7 +200,7 @@ def _events(data: bytes, count: int, dtype: np.dtype[Any]) -> Events:
 
 
 def _inflated(data: bytes, most: int) -> bytes:
-    """Return what was deflated, if it is whole and has at most so many bytes."""
+    """Return inflated data of at most `most` bytes; ValueError if the input is incomplete."""
     inflating = zlib.decompressobj()
     found = inflating.decompress(data, most + 1)
     if not inflating.eof or inflating.unused_data:

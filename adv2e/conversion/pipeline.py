@@ -51,12 +51,12 @@ BEHIND_BYTES = 16 << 20
 """Memory for events and frames that were made and not written yet."""
 
 BEHIND_TASKS = 1000
-"""How many pieces of them there may be."""
+"""Most pieces of events and frames that were made and not written yet."""
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a conversion did; `copied_from` is the file whose events were written, if any."""
+    """Summary of a conversion; `copied_from` is the file whose events were copied, if any."""
 
     output: str
     width: int
@@ -89,7 +89,7 @@ class Summary:
 
 
 class _Output:
-    """What frames and events go to, by `work`: the sink, the preview, if any, and the counts."""
+    """Output of frames and events, by `work`: to the sink and the preview, if any; with counts."""
 
     def __init__(
         self, sink: Sink, preview: Timeline | None, white: float, work: OrderedWork
@@ -295,12 +295,12 @@ def convert_reading(
 
 
 def decoding_of(recording: Source, config: Config) -> tuple[LightDecoder, Fitting | None]:
-    """Return how the frames of a source become light, and how they are brought to the sensor.
+    """Return the decoder of the frames of a source to light, and their fitting to the sensor.
 
     Raises
     ------
     Adv2eError
-        They do not fit the configuration.
+        The frames do not fit the configuration.
     """
     if recording.largest is not None and recording.dtype.kind == "f":
         check_white(recording.largest, recording.path, config.frames.full_scale)
@@ -326,7 +326,7 @@ def _metadata(
     fitting: Fitting | None,
     white: float | None,
 ) -> dict[str, Any]:
-    """Return what makes the file again, apart from the input itself, and what it holds.
+    """Return the metadata of a file: all that reproduces it but the input, and its content.
 
     `white` is that of the frames stored; None where there are none.
     """

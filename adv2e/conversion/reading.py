@@ -57,21 +57,21 @@ class Still:
 
 @dataclass(frozen=True)
 class Decoding:
-    """What frames are to become.
+    """Decoding of frames to light, and to pictures for the output.
 
     Parameters
     ----------
     decoder : LightDecoder
     coded : bool
-        They stay as they were read: the kernel decodes them itself.
+        Frames stay as they were read: the kernel decodes them itself.
     with_pictures : bool
-        What is seen of them is kept, too.
+        Pictures of the frames are kept, too.
     full_scale : float, optional
-        Number that somebody said to mean white.
+        Number that means white, as configured.
     eight_bit : bool
-        What is seen of them must be of 8 bits.
+        Pictures must be of 8 bits.
     fitting : Fitting, optional
-        How they are brought to the sensor; None: they have its size.
+        Fitting of the frames to the sensor; None: they have its size.
     """
 
     decoder: LightDecoder
@@ -82,7 +82,7 @@ class Decoding:
     fitting: Fitting | None = None
 
     def still(self, frame: Frame) -> Still:
-        """Return a frame as the pixel wants it; DataError if white is not what was said."""
+        """Return a frame decoded for the pixels; DataError if its white is not as configured."""
         check_floats(frame.image, frame.label, self.full_scale)
         if frame.odd_white and self.full_scale is None:
             raise DataError(f"{frame.label}: {frame.odd_white}")
@@ -168,12 +168,12 @@ class Reading:
 
     @property
     def is_open(self) -> bool:
-        """Whether there is a source, which could be opened."""
+        """True if the source was opened."""
         return isinstance(self._opened, Source)
 
     @property
     def inputs(self) -> tuple[str | Path, ...]:
-        """What is read: the files of the source, and the list of times if there is one."""
+        """Files that are read: those of the source, and the list of times if there is one."""
         source = () if self.path == STDIN else self.source.inputs
         return *source, *filter(None, [self.given["timestamps"]])
 

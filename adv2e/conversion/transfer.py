@@ -40,12 +40,12 @@ from adv2e.sources.frame import Light, Pixels
 from adv2e.sources.wanted import Selection
 
 _MADE = ("adv2e", "versions", "config", "seed", "effects", "network", "source")
-"""What a file of ours says of how its events were made, which stays true of a copy."""
+"""Metadata of a file of ours on the making of its events, which stay true of a copy."""
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Which part of a recording is wanted, and where its time begins.
+    """Part of a recording to copy, in time and space, and the origin of its time.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class _Part:
     crop: Rectangle
 
     def of(self, events: Events) -> Events:
-        """Return what is wanted of sorted events, on the clock and the sensor of the output."""
+        """Return the part of sorted events, with timestamps and coordinates of the output."""
         begin = np.searchsorted(events["t"], self.first_us, "left")
         end = np.searchsorted(events["t"], self.last_us, "right")
         x, y, width, height = self.crop
@@ -76,7 +76,7 @@ class _Part:
         return events
 
     def image_of(self, image: NDArray[Any], label: str) -> NDArray[Any]:
-        """Return what is wanted of a frame; DataError if it is not of the sensor's size."""
+        """Return the crop of a frame; DataError if it is smaller than the sensor."""
         x, y, width, height = self.crop
         if image.shape[0] < y + height or image.shape[1] < x + width:
             raise DataError(
@@ -232,7 +232,7 @@ def convert_events(
 def _part(
     path: str, size: tuple[int, int], first_us: int, wanted: Selection, crop: Rectangle | None
 ) -> _Part:
-    """Return what is wanted of a recording; DataError if the crop is not on its sensor."""
+    """Return the part of a recording to copy; DataError if the crop is not on its sensor."""
     crop = crop or Rectangle(0, 0, *size)
     if not crop.is_inside(*size):
         raise DataError(
@@ -270,7 +270,7 @@ def _white(pixels: Pixels, light: Light) -> float:
 def copied_metadata(
     file: EventFile, converted: dict[str, Any], *, frames: bool, keeps_all_bits: bool
 ) -> dict[str, Any]:
-    """Return how copied events were made, as their file says it, and what was done to them.
+    """Return the metadata of copied events: those of their file, and the copying itself.
 
     Parameters
     ----------

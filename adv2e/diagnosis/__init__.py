@@ -1,1 +1,1 @@
-"""What a recording holds that its simulation lacks: residual, cause, and the model that has it."""
+"""Diagnosis of recordings: residual, missing effect, and a configuration that explains both."""

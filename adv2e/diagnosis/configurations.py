@@ -1,4 +1,4 @@
-"""What a diagnosis does with configurations: sets keys by their paths, and takes effects away."""
+"""Configurations in a diagnosis: keys set by their paths, effects switched off."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ def from_values(values: dict[str, Any], name: str, like: Config) -> Config:
 
 
 def coupling_of(config: Config) -> FrameCoupling | None:
-    """Return what the readout of frames does to the pixels, if anything."""
+    """Return the coupling of the frame readout to the pixels; None: the configuration has none."""
     return None if config.readout is None else config.readout.frame_coupling
 
 
 def without_coupling(config: Config) -> Config:
-    """Return `config` without what the readout of frames does to the pixels.
+    """Return `config` without the coupling of the frame readout to the pixels.
 
-    Frames that are left out of a simulation, to see what is made up between others, were read out
-    all the same: with it both were to be compared without.
+    Leaving out frames measures the error of interpolation.  The camera read those frames out all
+    the same, so simulations with and without them are compared without this coupling.
     """
     if config.readout is None or coupling_of(config) is None:
         return config
@@ -72,7 +72,7 @@ def of_known_light(config: Config) -> Config:
 
 
 def of_frames_again(config: Config, given: Config) -> Config:
-    """Return what :func:`of_known_light` made of `given`, and changed, with what it took away."""
+    """Undo :func:`of_known_light`: sections of frames as in `given`, but the clock as fitted."""
     found = config.frames
     frames = replace(
         given.frames, clock_offset_us=found.clock_offset_us, clock_drift_ppm=found.clock_drift_ppm
@@ -84,7 +84,7 @@ def of_frames_again(config: Config, given: Config) -> Config:
 
 
 def own_of(config: Config) -> Own:
-    """Return what is declared of the effects of the user's own that a configuration knows."""
+    """Return the declarations of the user effects of a configuration: keys, meanings, files."""
     effects = user_effects(config)
     about = known_keys(type(config)) if effects else {}
     return Own(
@@ -98,18 +98,18 @@ def own_of(config: Config) -> Own:
 
 
 def _file_of(effect: type) -> str:
-    """Return where an effect is written, as it was named; nothing where that is no file."""
+    """Return the path of the file that defines an effect, "" where it is in no file."""
     return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "")
 
 
 def declared_of(config: Config, keys: Iterable[str]) -> dict[str, Any]:
-    """Return what a configuration holds of some keys, by path; None where their section is off."""
+    """Return the values of some keys by path; None where their section is off."""
     values = to_dict(config)
     return {key: get_key(values, key) for key in keys}
 
 
 def defaults_of(held: Mapping[str, Any], written: Collection[str] | None) -> list[str]:
-    """Return those keys that nobody wrote, as far as `written` tells: it does not name lists."""
+    """Return the keys with default values: not in `written`, which does not name lists."""
     if written is None:
         return []
     return [

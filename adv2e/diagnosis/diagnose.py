@@ -50,7 +50,7 @@ def diagnose(
     progress: Callable[[Progress], None] = lambda now: None,
     log: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
-    """Find what the declared model of a recording lacks.
+    """Find the effects that the declared model of a recording lacks.
 
     Parameters
     ----------

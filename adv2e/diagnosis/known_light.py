@@ -1,4 +1,4 @@
-"""Recordings of a known light: events, and a table that says what the light was.
+"""Recordings of a known light: events, and a table of the light over time.
 
 ::
 
@@ -175,7 +175,7 @@ def _times_ns(table: Table, column: str) -> NDArray[np.int64]:
 
 
 def _regions(name: str, columns: list[str], size: Size) -> tuple[NDArray[np.intp], Rectangle]:
-    """Return which column of light each pixel sees, (rows, columns), and the part that any does."""
+    """Return the column of light of each pixel, (rows, columns), and the rectangle around them."""
     region = np.full((size.height, size.width), _REST, np.intp)
     whole, parts = _REST, []
     for number, column in enumerate(columns):

@@ -45,7 +45,7 @@ _MATCHING_SEED = 9_999
 
 @dataclass(frozen=True)
 class Prepared:
-    """What a search begins with.
+    """Inputs of a search: recording, scene, declared model, candidates.
 
     Attributes
     ----------

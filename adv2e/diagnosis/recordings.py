@@ -191,7 +191,7 @@ USUAL = 1300
 
 
 def how_far(stage: str, simulations: int, seconds: float) -> str:
-    """Return what a diagnosis does, and an estimate of the time that it will still take."""
+    """Return the stage of a diagnosis, and an estimate of the time left."""
     text = f"{stage}: {simulations:,} simulations in {seconds:.0f} s"
     if not simulations:
         return text

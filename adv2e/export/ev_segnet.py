@@ -37,7 +37,7 @@ DDD17_ROWS = 200
 
 @dataclass(frozen=True)
 class SegmentationSettings:
-    """How pictures are made.
+    """Settings of event images for Ev-SegNet.
 
     Attributes
     ----------

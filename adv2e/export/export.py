@@ -19,12 +19,12 @@ from adv2e.files.staging import Staging, writing
 from adv2e.formats.assembly import events_in_order
 
 DESCRIPTION = "export.json"
-"""Says how an export was made."""
+"""Name of the file that describes an export."""
 
 
 @dataclass(frozen=True)
 class Cutting:
-    """How events are cut into windows: by time, by count, or at images; one of the three.
+    """Windows into which events are cut: by time, by count, or at images; one of the three.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Cutting:
 
 @dataclass(frozen=True)
 class Exported:
-    """What an export holds."""
+    """Summary of an export: its output, and numbers of sequences and items."""
 
     output: str
     sequences: int
@@ -153,7 +153,7 @@ Write = Callable[[list[Sequence], Path, dict[str, Any]], int]
 
 
 def _each(one: Callable[[Sequence, Path], tuple[tuple[int, int], int]]) -> Write:
-    """Return what writes recordings one by one; `one` returns size of the sensor and items."""
+    """Return a writer of recordings one by one; `one` returns sensor size and number of items."""
 
     def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
         for sequence in sequences:

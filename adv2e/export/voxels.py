@@ -44,7 +44,7 @@ NORMALISATIONS: dict[str, Callable[[Grid], Grid]] = {
 
 @dataclass(frozen=True)
 class VoxelSettings:
-    """How grids are made.
+    """Settings of voxel grids.
 
     Attributes
     ----------

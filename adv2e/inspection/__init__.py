@@ -1,1 +1,1 @@
-"""What a file holds, as one dictionary and as text for people."""
+"""Inspection of a file: its content as one dictionary, and as text for people."""

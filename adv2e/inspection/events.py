@@ -1,4 +1,4 @@
-"""What a stream of events holds, and what is odd about it."""
+"""Inspection of a stream of events: numbers, rates, and problems."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def describe_events(events: Events, width: int, height: int) -> dict[str, Any]:
 
 
 def causes_of(events: Events) -> dict[str, int] | None:
-    """Return how many events each cause made, by its name; None: they do not know."""
+    """Return the number of events of each cause, by its name; None: causes are not recorded."""
     if not has_causes(events):
         return None
     counts = np.bincount(events["cause"], minlength=len(CAUSES)).tolist()

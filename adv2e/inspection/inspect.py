@@ -1,4 +1,4 @@
-"""Everything that is told of one file, as one dictionary."""
+"""Inspection of one file: its content, problems and notes as one dictionary."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def inspect(
     set_back: str | None = None,
     progress: Callable[[int, int | None], None] | None = None,
 ) -> dict[str, Any]:
-    """Return what a recording, an event file or an input with frames holds, ready for JSON.
+    """Return the content of a recording, an event file or an input with frames, ready for JSON.
 
     Parameters
     ----------

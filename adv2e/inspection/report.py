@@ -1,4 +1,4 @@
-"""What a file holds, in two columns for people."""
+"""Report on the content of a file, in two columns for people."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _origin(metadata: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _placement(source: dict[str, Any]) -> str:
-    """Return how the frames came to the sensor: turned, cut out, fitted."""
+    """Return the placement of the frames on the sensor: turned, cropped, fitted."""
     parts = ["frames of {}x{}".format(*source["size"])]
     if source.get("rotate180"):
         parts.append("turned by 180 degrees")

@@ -1,1 +1,1 @@
-"""What was found in a recording or a table, written out: page, record, model, summary."""
+"""Reports of a diagnosis: HTML page, JSON record, model as YAML, summary for the terminal."""

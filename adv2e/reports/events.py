@@ -47,7 +47,7 @@ def _pictures(seen: Snapshot, names: Sequence[str]) -> Markup:
 
 
 def _totals(given: Sequence[Total], names: Sequence[str]) -> Markup:
-    """Return what describes all events, as a table."""
+    """Return a table of totals over all events."""
     columns = [Column("all events"), *(Column(name, number=True) for name in names)]
     rows = []
     for one in given:

@@ -72,7 +72,7 @@ def main_error(diagnosis: Diagnosis) -> Markup:
 
 
 def _meaning(diagnosis: Diagnosis) -> str:
-    """Say what p, and the error beside its floor, mean for this recording."""
+    """Return the meaning of p, and of the error beside its floor, for this recording."""
     p = diagnosis.global_p_after
     if math.isnan(p):
         return "Here, nobody knows."
@@ -102,7 +102,7 @@ def other_errors(diagnosis: Diagnosis) -> Markup:
 
 
 def what_next(diagnosis: Diagnosis, folder: str | Path) -> Markup:
-    """Return what to do with the finding, with lines to copy."""
+    """Return the section on next steps, with command lines to copy."""
     parts = []
     for step in next_steps(diagnosis, folder):
         parts.append(tag("p", step.text))
@@ -161,7 +161,7 @@ def nuisances(diagnosis: Diagnosis) -> Markup:
 
 
 def notes(texts: Sequence[str]) -> Markup:
-    """Return what the reader should know besides."""
+    """Return the list of notes for the reader."""
     return tag("ul", *(tag("li", text) for text in texts)) if texts else Markup()
 
 

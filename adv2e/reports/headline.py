@@ -26,9 +26,9 @@ _MOST_KEYS = 2
 
 
 def sentence_of(found: Diagnosis) -> str:
-    """Return what was found: effects with values, intervals and declared values; or what differs.
+    """Return the headline: effects found with values and intervals; or the largest difference.
 
-    It is what both the page and the terminal begin with.
+    Both the page and the summary in the terminal begin with it.
     """
     if found.verdict == "consistent":
         return f"Nothing is missing that these data show{_errors(found)}."
@@ -41,7 +41,7 @@ def sentence_of(found: Diagnosis) -> str:
 
 
 def declared_text(found: Diagnosis, path: str) -> str:
-    """Return what was declared of a key, in its own unit, for tables."""
+    """Return the declared value of a key, in its own unit, for tables."""
     if path not in found.declared_values:
         return ""
     return _with_default(_declared(found, path), found, path)
@@ -82,7 +82,7 @@ def _value(path: str, one: Finding, found: Diagnosis, *, alone: bool) -> str:
 
 
 def _errors(found: Diagnosis) -> str:
-    """Say how far the recording is from simulations, and these from one another."""
+    """Return the error of the declared model and its floor, in words."""
     for row in found.errors[:1]:
         near, floor = (number_text(one.value) for one in (row.before, row.floor))
         return f": the error of the declared model is {near}, and chance alone makes {floor}"
@@ -90,7 +90,7 @@ def _errors(found: Diagnosis) -> str:
 
 
 def _most(found: Diagnosis) -> str:
-    """Say what differs from the model, in numbers: those of events before all else."""
+    """Return the largest residual in numbers, numbers of events first; else the errors."""
     for one in standing_out(found.signatures)[:1]:
         return f"; it shows in the {compared_text(one.farthest)}"
     return _errors(found)

@@ -1,4 +1,4 @@
-"""What keys and effects are, as declared."""
+"""Declarations of keys and effects: unit, meaning, summary."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from adv2e.parameters import Parameter
 
 @dataclass(frozen=True)
 class Own:
-    """What is declared of effects of the user's own.
+    """Declarations of user effects.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ NO_OWN = Own()
 
 
 def known_keys(section: type[Config] = Config) -> Mapping[str, Parameter]:
-    """Return what is declared of each key, by its path."""
+    """Return the declaration of each key, by its path."""
     return {key.path: key.about for key in all_keys(section)}
 
 
@@ -51,7 +51,7 @@ def unit_of(path: str, own: Own = NO_OWN) -> str:
 
 
 def meaning_of(path: str, own: Own = NO_OWN) -> str:
-    """Return what the key `path` means, empty where that is not known."""
+    """Return the meaning of the key `path`, "" where it is not known."""
     about = _about(path, own)
     return about.meaning if about is not None else ""
 

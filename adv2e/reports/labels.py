@@ -1,4 +1,4 @@
-"""What effects and their keys are called in sentences for people."""
+"""Names of effects and their keys in sentences for people."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _UNIT = re.compile("_(us|ns|hz|rad|dn|px|ppm|per_s)$")
 
 
 def label_of(effect: str) -> str:
-    """Return what an effect is called in a sentence."""
+    """Return the name of an effect in a sentence."""
     return _EFFECTS.get(effect, effect.replace("_", " "))
 
 
@@ -54,7 +54,7 @@ def heading_of(effect: str) -> str:
 
 
 def part_of(path: str, *, alone: bool) -> str:
-    """Return what a key is called beside its effect; nothing if it is the only one, and clear."""
+    """Return the name of a key beside its effect, "" if it is the only key, and clear."""
     if path in _PARTS or alone:
         return _PARTS.get(path, "")
     return _UNIT.sub("", path.rpartition(".")[2]).replace("_", " ")

@@ -15,7 +15,7 @@ from adv2e.reports.result import Diagnosis
 _WIDTH = 100
 
 Comment = Callable[[str], str]
-"""What is said of a key: its unit, and where a value that was not declared is from."""
+"""Comment on a key by its path: its unit, and the origin of a value that was not declared."""
 
 
 def model_text(diagnosis: Diagnosis) -> str:

@@ -1,4 +1,4 @@
-"""What to do next with what a diagnosis found."""
+"""Next steps after a diagnosis: use the model, check the recording, record more."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _WHAT_FOR = {
 
 @dataclass(frozen=True)
 class Step:
-    """What to do, and the line to copy for it, if there is one."""
+    """Next step: advice, and a command line to copy, if there is one."""
 
     text: str
     line: str = ""
 
 
 def next_steps(found: Diagnosis, folder: str | Path) -> list[Step]:
-    """Return what to do next, the most useful first; `folder` is where the report lies."""
+    """Return the next steps, the most useful first; `folder`: of the report."""
     if found.verdict == "unexplained":
         return [*_checks(found), _own_effect(found)]
     steps = [Step(_WHAT_FOR[found.verdict], convert_line(found, folder))]
@@ -51,7 +51,7 @@ def convert_line(found: Diagnosis, folder: str | Path) -> str:
 
 
 def _checks(found: Diagnosis) -> list[Step]:
-    """Return what may be wrong with the recording, which explains more often than an effect."""
+    """Return the check of the recording to do first: mistakes are likelier than unknown effects."""
     return [Step(f"First check the recording: {note}.") for note in found.input_checks[:1]]
 
 

@@ -16,7 +16,7 @@ _UNFOLD = (
     "addEventListener('beforeprint', () =>"
     " document.querySelectorAll('details.paper').forEach(part => part.open = true))"
 )
-"""What matters is not folded away on paper; the rest is left out there."""
+"""Script that unfolds sections marked for paper before printing; other folded ones are left out."""
 
 
 def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:

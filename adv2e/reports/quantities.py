@@ -18,7 +18,7 @@ NO_UNIT = "no unit"
 """Stands beside a number that has none."""
 
 _LARGER = {"us": ((1e6, "s"), (1e3, "ms")), "ns": ((1e6, "ms"), (1e3, "µs"))}
-"""From which number on another unit is easier to read, the largest first."""
+"""Larger units, each with the number from which on it is easier to read, the largest first."""
 
 _LARGE, _SMALL = 6, -4
 """Decimal exponents from which, and below which, numbers are written with an exponent."""

@@ -63,7 +63,7 @@ def _map(title: str, model: str, values: Map) -> Markup:
 
 
 def groups(diagnosis: Diagnosis) -> Markup:
-    """Return what stands out, by group of statistics: what an effect that is missing has to do."""
+    """Return the table of the largest residuals, by group of statistics."""
     if not diagnosis.signatures:
         return Markup()
     left = diagnosis.verdict in ("unexplained", "partly_explained")
@@ -96,7 +96,7 @@ def groups(diagnosis: Diagnosis) -> Markup:
 
 
 def _meaning(diagnosis: Diagnosis, left: bool) -> str:
-    """Say what the groups that stand out mean for this recording."""
+    """Return the meaning of the large residuals for this recording, in words."""
     if left:
         return "Here, something that the library lacks makes these differences."
     if not diagnosis.effects:
@@ -129,7 +129,7 @@ def signatures(given: Sequence[Signature]) -> Markup:
 
 
 def _rank(signature: Signature) -> tuple[float, ...]:
-    """Return what is least for the largest distance of the first kind; unknown ones come last."""
+    """Return the sort key of a statistic: by kind, then the largest z-score first, NaN last."""
     before, after = (
         math.inf if math.isnan(z) else -abs(z) for z in (signature.z_before, signature.z_after)
     )
@@ -159,7 +159,7 @@ def _z(z: float) -> Markup | str:
 
 
 def detectable(given: Sequence[Detectable]) -> Markup:
-    """Return how small an effect could have been to be seen."""
+    """Return the table of detection limits: smallest detectable size of each effect."""
     if not given:
         return Markup()
     columns = [Column("effect"), Column("key"), Column("size", number=True), Column("unit")]
@@ -179,7 +179,7 @@ def _size(size: float | None) -> str:
 
 
 def data(diagnosis: Diagnosis) -> Markup:
-    """Return how the data were divided and what was set aside."""
+    """Return the section on the split of the data, and on masked data."""
     parts = [tag("p", diagnosis.split)] if diagnosis.split else []
     if diagnosis.masked:
         columns = [Column("set aside"), Column("share of events", number=True)]

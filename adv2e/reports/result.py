@@ -1,4 +1,4 @@
-"""What a diagnosis found, as plain values: what the reports are written from."""
+"""Result of a diagnosis, as plain values from which the reports are written."""
 
 from __future__ import annotations
 
@@ -219,7 +219,7 @@ class Masked:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything that a diagnosis found.
+    """Result of a diagnosis.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
-"""What stands out of a residual: of each group of summary statistics, the one farthest off.
+"""Largest residuals: of each group of summary statistics, the one with the largest z-score.
 
 Numbers of events come first, then their times, then all else: so engineers look at a residual.
-Neighbouring statistics of a group tell much the same, so that the groups that stand out, and how,
-say more of what is missing than a list of the largest distances.
+Neighbouring statistics of a group show much the same, so that groups tell more of the missing
+effect than a list of the largest z-scores.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def of_each_kind(signatures: Sequence[Signature]) -> list[Standing]:
 
 
 def kind_rank(signature: Signature) -> int:
-    """Return which kind a statistic is of: 0 for numbers of events, which come first."""
+    """Return the rank of the kind of a statistic: 0 for numbers of events, which come first."""
     return _KINDS.index(signature.kind)
 
 

@@ -50,7 +50,7 @@ def summary_text(diagnosis: Diagnosis) -> str:
 
 
 def details_text(diagnosis: Diagnosis) -> str:
-    """Return what else was found: how data were held out, nuisances, what was rejected, notes."""
+    """Return details as text: held-out data, nuisances, rejected effects, notes."""
     lines = [f"held out: {diagnosis.split}"]
     lines += [
         f"nuisance {key} = {value_text(value)} {unit_of(key)}".rstrip()
@@ -94,7 +94,7 @@ def _parameters(diagnosis: Diagnosis) -> list[str]:
 
 
 def _standing(diagnosis: Diagnosis) -> list[str]:
-    """Return what differs besides what the sentence names."""
+    """Return lines on further residuals, one for each kind after that of the headline."""
     lines = []
     for one in of_each_kind(diagnosis.signatures)[1:]:
         lines += [f"  {line}" for line in _wrapped(compared_text(one.farthest), 2)]

@@ -54,7 +54,7 @@ SEPARATIONS = {
 
 
 def alternatives(diagnosis: Diagnosis) -> Markup:
-    """Return which effects explain the residual as well, and what would separate them."""
+    """Return the table of alternatives: effects that fit as well, and how to tell them apart."""
     if not diagnosis.alternatives:
         return Markup()
     names = [finding.name for finding in diagnosis.effects] + diagnosis.alternatives
@@ -84,7 +84,7 @@ def _paths(diagnosis: Diagnosis) -> dict[str, list[str]]:
 
 
 def rejected(diagnosis: Diagnosis) -> Markup:
-    """Return what was tried and not added, and why."""
+    """Return the table of rejected effects, with the reasons."""
     given = by_explained(diagnosis.rejected)
     if not given:
         return Markup()

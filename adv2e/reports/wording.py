@@ -1,4 +1,4 @@
-"""What a report calls things: where those of recordings and of tables differ."""
+"""Wording of reports, where those of recordings and of tables differ."""
 
 from __future__ import annotations
 

@@ -27,9 +27,9 @@ from adv2e.reports.result import Masked
 LEAST_EVENTS = 1000
 """Below that nothing can be told."""
 RUN_IN_S = 0.5
-"""Of what pixels saw before, this much is simulated [s]: by then most have fired, and forgotten."""
+"""Run-in: simulated time before the first frame of interest [s]; most pixels fire in it."""
 _RUN_IN_SHARE = 0.5
-"""And no more than this share of what is looked at."""
+"""Longest run-in, as a share of the time of interest."""
 _UNCOVERED = 10.0
 """A pause at an end that is longer than the longest within by this factor is no pause."""
 
@@ -140,7 +140,7 @@ class Evidence:
         return course.times_ns.tolist(), course.light.astype(np.float32)[:, course.region]
 
     def cut(self, rows: slice, columns: slice) -> Evidence:
-        """Return what some of the pixels saw and sent, those of slices of rows and columns."""
+        """Return the frames and events of a rectangle of pixels, given as slices."""
         number = np.arange(self.width * self.height).reshape(self.height, self.width)
         chosen = number[rows, columns]
         place = np.full(number.size, -1, np.int32)

@@ -1,4 +1,4 @@
-"""What in a recording looks like a mistake: none of it is an effect of a camera."""
+"""Checks of a recording for mistakes: dark frames, gaps, missing pixels, mirrored frames."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ _EMPTY = 0.2
 _LEAST_EVENTS = 200
 """In motion, to tell what they go with."""
 _BACKWARD = -0.2
-"""How events go with the light where polarities are swapped: 1 if each follows its change."""
+"""Correlation of events with changes of light from which on polarities count as swapped."""
 _MIRRORED = 0.25
-"""By how much better they go with mirrored light."""
+"""Gain in that correlation from which on frames count as mirrored."""
 
 
 def check_inputs(measured: Placed, scene: Scene, light: NDArray[np.float32]) -> list[str]:
-    """Return what may be wrong with a recording, a line each.
+    """Return warnings about a recording, a line each.
 
-    By its events, and the light of its frames [DN], (frames, rows, columns).
+    From its events, and the light of its frames [DN], (frames, rows, columns).
     """
     found = [
         _brightness(light), *_gaps(scene.times_us), *_unseen(measured, scene),
@@ -35,7 +35,7 @@ def check_inputs(measured: Placed, scene: Scene, light: NDArray[np.float32]) -> 
 
 
 def check_known_light(measured: Placed, scene: Scene, light: NDArray[np.float32]) -> list[str]:
-    """Return what may be wrong with a recording of known light, as :func:`check_inputs` does."""
+    """Return warnings about a recording of known light, as :func:`check_inputs` does."""
     found, brightest = [], float(light.max()) / _WHITE_DN
     if np.all(light == light[0]):
         found.append("the light never changes: it tells of noise, and of nothing else")
@@ -90,10 +90,10 @@ def _unseen(measured: Placed, scene: Scene) -> list[str]:
 
 
 def _direction(measured: Placed, scene: Scene) -> str:
-    """Return in which other way the events go with the light, if they do better than as they are.
+    """Check for mirrored frames or swapped polarity by correlating events with changes of light.
 
-    Each way is told by the mean of the change of the light where and when events came, in their
-    direction, over its size.
+    The correlation is the sum of the changes of log light at the events, with the sign of their
+    polarity, over the sum of their sizes.
     """
     stream = measured.stream
     shape = scene.intervals, scene.height, scene.width

@@ -1,4 +1,4 @@
-"""What the frames say of each pixel in each frame interval: how bright it is, how it changes."""
+"""Brightness and speed classes of each pixel in each frame interval, from the frames."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ class Scene:
         return np.repeat(np.arange(self.intervals), np.diff(np.r_[0, inner, len(t_us)]))
 
     def phase_of(self, t_us: NDArray[np.int64], interval: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return where times [us] are in their frame intervals: 0 at one frame, 1 at the next."""
+        """Return the phase of times [us] in frame intervals: 0 at one frame, 1 at the next."""
         begin = self.times_us[interval]
         return np.asarray((t_us - begin) / (self.times_us[interval + 1] - begin))
 
@@ -130,9 +130,9 @@ class Scene:
 def _speeds(
     slope: NDArray[np.float32], seconds: NDArray[np.float32], still: NDArray[np.float32]
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float64]]:
-    """Return the class of speed, the weight of each place, which is how much changes there.
+    """Return classes of speed, weights (change of log light), and borders of the classes [1/s].
 
-    And the borders between the thirds of what moves [1/s].
+    The borders are those between the thirds of what moves.
     """
     change = np.abs(slope)
     change[change < still] = 0.0

@@ -1,4 +1,4 @@
-"""How a recording is divided: data to fit on, data to judge by, data that is looked at once.
+"""Split of a recording into data for training, validation and test.
 
 Neighbouring pixels and milliseconds are correlated, so the parts are blocks: tiles of pixels
 crossed with segments of time, in the manner of a Latin square, such that every part has all kinds
@@ -25,7 +25,7 @@ _PATTERN = np.array([TRAIN, VALIDATION, TRAIN, TEST], np.int8)
 
 @dataclass(frozen=True)
 class Split:
-    """Which part each pixel belongs to in each segment of time.
+    """Train, validation or test label of each pixel in each segment of time.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Split:
         return float(np.mean(self.label == part))
 
     def text(self) -> str:
-        """Say how the data are divided."""
+        """Return a sentence about the split, with the share of each part."""
         shares = ", ".join(f"{name} {self.share(k):.0%}" for k, name in enumerate(NAMES))
         return (
             f"the sensor was divided into tiles and the time into {self.segments} segments, shared"

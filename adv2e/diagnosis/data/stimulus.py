@@ -63,7 +63,7 @@ class Stimulus:
         return np.stack(columns, axis=1)
 
     def cut(self, rows: slice, columns: slice) -> Stimulus:
-        """Return what some of the pixels see."""
+        """Return the stimulus of a rectangle of pixels."""
         return replace(self, region=self.region[rows, columns])
 
     def between(self, start_ns: int, stop_ns: int) -> Stimulus:
@@ -73,13 +73,13 @@ class Stimulus:
         return replace(self, times_ns=times, light=self.at(times))
 
     def instants(self, span_ns: Sequence[int]) -> int:
-        """Return how many instants there are from the first to the last of some times."""
+        """Return the number of instants from the first to the last of some times [ns]."""
         first, last = np.searchsorted(self.times_ns, [span_ns[0], span_ns[-1]])
         return int(last - first)
 
     @cached_property
     def leaps(self) -> Leaps:
-        """When the light of each pixel leaps."""
+        """Times at which the light of each pixel leaps [us]."""
         each = [_leaps_us(self.times_ns, one) for one in self.light.T]
         return Leaps(tuple(each), self.region.ravel())
 

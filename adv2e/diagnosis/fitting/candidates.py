@@ -53,7 +53,7 @@ class FitParameter:
     of_pixels: bool = False
 
     def scaled(self, value: float) -> float:
-        """Return where on the fitted scale `value` is."""
+        """Return `value` on the fitted scale."""
         return math.log(value) if self.log else value / self.scale
 
     def value_at(self, scaled: float) -> float:
@@ -81,7 +81,7 @@ class FitParameter:
 
 
 NOTHING_KNOWN = (0.0, math.inf)
-"""Of a parameter, besides what statistics tell: where on its scale, and standard deviation."""
+"""Prior of a parameter that is known by the statistics alone: mean and standard deviation."""
 
 FITTED = 0.02
 """Share of the residual that a fit may leave."""
@@ -105,8 +105,7 @@ class Candidate:
         Share of the residual that is put down to the fit where the model has this effect: more of
         those that undo what cannot be undone in full.
     known : tuple of (float, float)
-        Of each parameter, where on its scale something else than the statistics says that it is,
-        and its standard deviation; none: nothing else tells.
+        Mean and standard deviation of the prior of each parameter, on its scale; none: no priors.
     readouts : Readouts, optional
         When frames were read out if this effect is there: of exposures that are fitted, only those
         which end then go with it, and no fit finds these from others.
@@ -155,11 +154,11 @@ class Candidate:
 
     @property
     def known_or_not(self) -> tuple[tuple[float, float], ...]:
-        """What is known of every parameter besides, if only nothing."""
+        """Prior of every parameter: `known`, or :data:`NOTHING_KNOWN` for each."""
         return self.known or (NOTHING_KNOWN,) * len(self.parameters)
 
     def scaled(self, values: Sequence[float]) -> list[float]:
-        """Return where on the fitted scales values of the parameters are."""
+        """Return values of the parameters on their fitted scales."""
         return [one.scaled(value) for one, value in zip(self.parameters, values, strict=True)]
 
     def applied(self, config: Config, point: Point) -> Config:

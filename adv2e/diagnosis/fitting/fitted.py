@@ -90,15 +90,15 @@ class Fitted:
 
     @property
     def certainty(self) -> Array:
-        """Precision of what is known of each number of the point besides, (parameters,)."""
+        """Precision of the prior of each parameter, (parameters,)."""
         return np.array([sd**-2.0 for _, sd in self.candidate.known_or_not])
 
     def amiss(self, point: Array) -> Array:
-        """Return how far a point is from what is known of it besides, (parameters,)."""
+        """Return the difference of a point from the means of the priors, (parameters,)."""
         return point - [known for known, _ in self.candidate.known_or_not]
 
     def slope(self, derivative: NDArray[Any], residual: Array) -> Slope:
-        """Return the slope at the point, with what is known of it besides; see :class:`Slope`."""
+        """Return the slope of the misfit at the point, with the priors; see :class:`Slope`."""
         return Slope.of(derivative, residual).with_known(self.certainty, self.amiss(self.point))
 
     @property
@@ -108,7 +108,7 @@ class Fitted:
 
     @property
     def at_border(self) -> bool:
-        """Whether a key has run to the end of its physical range."""
+        """True if a fitted parameter is at the end of its physical range."""
         pairs = zip(self.candidate.parameters, self.point, strict=True)
         return any(one.at_border(at) for one, at in pairs)
 

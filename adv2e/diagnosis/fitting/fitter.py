@@ -205,9 +205,9 @@ class Fitter:
         )
 
     def set_covariance(self, fit: Fitted, sample: Array) -> None:
-        """Note the covariance of a fit's point, as simulations of the fitted model tell it.
+        """Set the covariance of a fit from simulations of the fitted model.
 
-        `sample`: (simulations, statistics) of that, in compressed deviations.
+        `sample`: (simulations, statistics), in compressed deviations.
         """
         apart = (sample - sample.mean(axis=0)) @ self._whitening.T
         downhill = apart @ fit.derivative.T
@@ -217,7 +217,7 @@ class Fitter:
 
 
 def _of_mean(seeds: int) -> float:
-    """Return by how much variances grow as the mean of so many simulations varies, too."""
+    """Return the factor on variances for the variance of a mean over `seeds` simulations."""
     return 1.0 + 1.0 / seeds
 
 

@@ -89,7 +89,7 @@ def _built_in(declared: Config, hints: Hints) -> Iterator[Candidate]:
 
 
 def _fit_of(key: str) -> Fit:
-    """Return where the parameter of a key is declared to be fitted."""
+    """Return the range, scale and start of the fit of a key, as declared."""
     fit = BUILT_IN[key].fit
     assert fit is not None, key
     return fit
@@ -111,7 +111,7 @@ def _of_one(name: str, parameter: FitParameter | str, *starts: float, **options:
 
 
 def _now(values: dict[str, Any], key: str) -> float:
-    """Return what a key holds, or where its fit begins when it holds nothing."""
+    """Return the value of a key, or the start of its fit where it has none above zero."""
     held = get_key(values, key)
     return float(held) if isinstance(held, (int, float)) and held > 0 else _fit_of(key).start
 

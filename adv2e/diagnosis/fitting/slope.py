@@ -1,4 +1,4 @@
-"""How a misfit falls at a point, and in which directions a point is known."""
+"""Slope of the misfit (normal equations) at a point, and axes of its uncertainty."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Axes:
 
 @dataclass(frozen=True)
 class Slope:
-    """How the misfit falls at a point.
+    """Slope of the misfit at a point: terms of the normal equations.
 
     Attributes
     ----------
@@ -85,9 +85,9 @@ class Slope:
         return cls(total / seeds, normal, downhill, square)
 
     def with_known(self, certainty: Array, amiss: Array) -> Slope:
-        """Return the slope with what is known of the point besides, as measurements more.
+        """Return the slope with priors, which count as further measurements.
 
-        With their precision, and how far the point is from them, (parameters,).
+        `certainty`: their precision; `amiss`: difference of the point from them, (parameters,).
         """
         return Slope(
             self.derivative,

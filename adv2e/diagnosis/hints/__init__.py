@@ -1,1 +1,1 @@
-"""What can be read off a recording, so that fits start near the truth."""
+"""Starting values of fits, read off a recording: flicker, frame readout, arbiter times."""

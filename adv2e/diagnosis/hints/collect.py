@@ -1,4 +1,4 @@
-"""What a look at a recording says of where fits may start."""
+"""Starting values of fits, collected from a recording and from simulations of the model."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _HARDLY_ANY = 0.01
 
 @dataclass(frozen=True)
 class Hints:
-    """What a look at the recording says of where fits may start.
+    """Starting values of fits, read off the recording.
 
     Attributes
     ----------
@@ -58,8 +58,8 @@ class Hints:
     own_period: OwnPeriod | None = None
     too_many: tuple[float, float] = (1.0, 1.0)
     shortest_us: float | None = None
-    """Time between events of a pixel that hardly any two are nearer than, under known light: where
-    all pixels do the same at the same time, fits find a dead time from near alone."""
+    """Interval between events of a pixel, 1 % quantile [us], under known light.  All pixels then do
+    the same at the same time, so that fits find a refractory period only from near it."""
 
 
 def hints_of(
@@ -70,11 +70,11 @@ def hints_of(
     simulator: Simulator,
     own_period: OwnPeriod | None = None,
 ) -> Hints:
-    """Return hints from a recording.
+    """Return starting values of fits from a recording.
 
-    Lamps are told by the data that effects are fitted to, and what happens at each frame by all but
-    those that are looked at once; but how stamps follow one another shows in no part.  The `pilot`
-    is simulations of the declared model; `own_period` was found before.
+    Lamps are read off the training data, the readout of frames off the data for training and
+    validation, times of the arbiter off all timestamps.  The `pilot` is simulations of the declared
+    model; `own_period` was found before.
     """
 
     def train(stream: Stream) -> Stream:
@@ -111,11 +111,11 @@ def hints_of(
 
 
 def looked_at_by(evidence: Evidence, scene: Scene) -> Stream:
-    """Return the events that tell what happens at each frame: all but those looked at once."""
+    """Return the events for training and validation, off which the frame readout is read."""
     return scene.split.chosen(evidence.stream, splits.TRAIN, splits.VALIDATION)
 
 
 def _too_many(stream: Stream, pilot: Sequence[Stream], polarity: int) -> float:
-    """Return how many events of a polarity simulations have, over those of a stream."""
+    """Return the ratio of simulated to measured numbers of events of a polarity, each plus 1."""
     made = float(np.mean([np.count_nonzero(one.on == polarity) for one in pilot]))
     return (made + 1.0) / (float(np.count_nonzero(stream.on == polarity)) + 1.0)

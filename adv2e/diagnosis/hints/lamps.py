@@ -58,7 +58,7 @@ def strongest_lines(stream: Stream, pilot: Sequence[Stream], scene: Scene) -> tu
     hz = hz[above]
 
     def heights(one: Stream) -> Array:
-        """Return how far the power of all events, and of ON less OFF, is above that beside."""
+        """Return the prominence of spectral lines: of all events, and of ON less OFF."""
         step = np.minimum((one.t - start) // BIN_US, bins - 1).astype(np.int64)
         signs = np.ones(len(one)), 2.0 * one.on - 1.0
         binned = (np.bincount(step, sign, minlength=bins) for sign in signs)
@@ -133,7 +133,7 @@ def lamps_of(
 
 
 def _swing(stream: Stream, hz: float, edges_us: Array) -> Swing:
-    """Return how much more ON than OFF events swing in each part of the time, and their phase."""
+    """Return the Fourier sum at `hz` of ON less OFF events in each part of the time, complex."""
     part = np.searchsorted(edges_us, stream.t, side="right") - 1
     inside = (part >= 0) & (part < _PARTS)
     turns = np.remainder(stream.t[inside] * 1e-6 * hz, 1.0)

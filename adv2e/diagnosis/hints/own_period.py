@@ -109,7 +109,7 @@ class OwnPeriod:
         return (PERIOD, self.period_sd_us), (DELAY, self.begin_sd_us)
 
     def text(self) -> str:
-        """Return what bursts there are, for people."""
+        """Return a sentence about the bursts: shares of the events, and their period."""
         shares = [
             f"{burst.share:.0%} of the {name} events"
             for burst, name in ((self.on, "ON"), (self.off, "OFF"))
@@ -162,10 +162,10 @@ def own_period_of(stream: Stream, times_s: Array) -> OwnPeriod | None:
 
 
 def _edges(late_us: Array, burst: Burst, bin_us: float) -> tuple[float, float]:
-    """Return when a burst of one polarity begins and ends, finer than its bins tell [us].
+    """Return the begin and end of a burst of one polarity, finer than its bins [us].
 
-    `late_us`: of all events of the polarity.  As many events as are usual are taken off, and each
-    edge is where a line through a few and some more of the first, or last, begins.
+    `late_us`: of all events of the polarity.  The usual number of events is subtracted, and each
+    edge is extrapolated by a line through two quantiles of the first, or last, events.
     """
     middle = burst.begins_us + 0.5 * burst.lasts_us
     reach = 0.5 * burst.lasts_us + 2.0 * bin_us
@@ -184,7 +184,7 @@ def _edges(late_us: Array, burst: Burst, bin_us: float) -> tuple[float, float]:
 
 
 def _heights(t_us: NDArray[Any], bins: int) -> Array:
-    """Return how far the number of events in each bin is above those beside it [deviations]."""
+    """Return the excess of events in each bin over its surroundings [deviations of chance]."""
     inside = t_us[(t_us >= 0.0) & (t_us < bins * _BIN_US)]
     count = np.bincount((inside / _BIN_US).astype(np.int64), minlength=bins)
     around = np.lib.stride_tricks.sliding_window_view(

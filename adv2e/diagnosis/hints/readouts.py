@@ -1,4 +1,4 @@
-"""When frames are read out, and what that leaves in the events, as far as these tell.
+"""Frame readout times, and the bursts of events that frame readouts cause, from the events.
 
 Where the readout of a frame disturbs the event pixels
 (:mod:`adv2e.effects.readout.frame_coupling`), all of them fire at once, equally long after every
@@ -33,9 +33,9 @@ _STANDS_OUT = 10.0
 
 _BINS = 100
 _SD_BINS = 1.5
-"""Of an exposure, twice what is not known of the delay: part of a bin, and how a leap rises."""
+"""Standard deviation of an exposure [bins]: twice that of the delay."""
 _OVER_OTHERS = 3.0
-"""How often a rise is any other."""
+"""Least ratio of the largest rise to any other."""
 
 _PULSE_BINS, _SHORTEST_US, _LONGEST_US = 400, 20.0, 100.0
 """Of an interval between frames, and how long each is."""
@@ -44,14 +44,14 @@ _FEWEST = 3
 _FARTHEST = 0.02
 """Most by which the clock of the frames may be slow or fast."""
 _BEGINNING_US, _MORE = 2e6, 4
-"""What is looked at first, and how many intervals to both sides are tried with twice as much."""
+"""Length that is searched first [us]; trial intervals to both sides at each doubling of it."""
 _SHARPER = 1.5
-"""How much sharper bursts must be at another interval before that is believed: by a third they are
-where no more than the border of a bin parted them."""
+"""Factor by which bursts must be sharper for another frame interval to be believed; the border of a
+bin that parts a burst makes a third."""
 _ENOUGH = 100_000
 """Events of a polarity that tell the interval."""
 _TIMES_AS_MANY = 3.0
-"""How often as many events come in a burst as at a median time."""
+"""Least ratio of the event rate in a burst to the median rate."""
 _FOOT = 0.25
 """Share of its height at which a burst begins."""
 _LONGEST = 0.04
@@ -93,7 +93,7 @@ class Readouts:
 
 
 def readouts_of(stream: Stream, times_s: Array) -> Readouts | None:
-    """Return when frames with these stamps are read out; None: not all pixels fire at once."""
+    """Return the readout times of frames; None: pixels do not fire at once after each frame."""
     times_us = 1e6 * times_s
     interval = _regular_interval(times_us)
     if interval is None:
@@ -182,7 +182,7 @@ class Pulse:
         return with_keys(config, {DELAY: self._nearest(first.begins_us - ends)})
 
     def text(self) -> str:
-        """Return what bursts there are, for people."""
+        """Return a sentence about the bursts: shares of the events, and their times."""
         on, off = (
             f"{burst.share:.0%} of the {name} events come at once"
             f" {self._nearest(burst.begins_us) / 1e3:+.2f} ms from each frame"
@@ -220,7 +220,7 @@ def pulse_of(stream: Stream, times_s: Array, before_s: float = 0.0) -> Pulse | N
 
 
 def has_pulse(config: Config) -> bool:
-    """Tell whether a configuration says when the signal leaps, and when it leaps back."""
+    """Tell whether the frame coupling of a configuration is a pulse: a leap and a leap back."""
     coupling = coupling_of(config)
     return coupling is not None and coupling.width_us > 0.0
 
@@ -231,7 +231,7 @@ def _bin_us(interval: float) -> float:
 
 
 def folded(since: Array, interval: float, bin_us: float) -> NDArray[np.int64]:
-    """Return how many events come how long after a frame."""
+    """Return the histogram of event times folded at the frame interval, (bins,)."""
     bins = round(interval / bin_us)
     place = (since % interval / bin_us).astype(np.int64)
     return np.bincount(np.minimum(place, bins - 1), minlength=bins)

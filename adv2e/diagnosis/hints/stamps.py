@@ -1,7 +1,7 @@
-"""What the stamps of a recording say of its readout: where fits start.
+"""Timestamp resolution and arbiter times from the timestamps, where fits of the readout start.
 
-Fits do not find the times of an arbiter by steps from anywhere: stamps of a busy channel form a
-comb, and a comb of other times is as far from it as none.
+Fits do not find the times of an arbiter by steps from anywhere: timestamps of a busy channel form
+a comb, and a comb of other times is as far from it as none.
 """
 
 from __future__ import annotations

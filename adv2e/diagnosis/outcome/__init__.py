@@ -1,1 +1,1 @@
-"""What a search found: verdict, errors, pictures, report."""
+"""Verdict of a search, with its errors, findings and pictures for the report."""

@@ -1,4 +1,4 @@
-"""From where a search ended to a verdict, on the data that are looked at once."""
+"""Verdict on the outcome of a search, by the test data, which are used only here."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _FIRST_DRAW = 20_000
 
 @dataclass(frozen=True)
 class Conclusion:
-    """What is said of a recording: errors and pictures are of the declared model and `kept`.
+    """Verdict on a recording, with errors and pictures of the declared model and of `kept`.
 
-    That is the model that is reported: the declared one where nothing is named.
+    `kept` is the model that is reported: the declared one where no effect is named.
     """
 
     verdict: Verdict

@@ -33,7 +33,7 @@ class Errors:
 
     @classmethod
     def of(cls, measured: Stream, simulations: Sequence[Stream]) -> Errors:
-        """Return those of simulations; not a number if nothing was measured."""
+        """Return the errors of simulations; NaN if nothing was measured."""
         unit = _norm(measured)
         return cls(
             np.array([_apart(measured, stream, unit) for stream in simulations]),
@@ -69,12 +69,12 @@ def error_rows(before: Errors, after: Errors) -> list[ErrorRow]:
 def of_interpolation(
     measured: Stream, full: Sequence[Stream], half: Sequence[Stream], floor: float
 ) -> float:
-    """Return what the interpolation between frames adds to the error over all scales, in squares.
+    """Return the part of the error that interpolation between frames makes; it adds in squares.
 
-    About half of what leaving out every second frame adds, give or take a factor of two: between a
-    third, where frames resolve the motion, and all of it
-    (:mod:`adv2e.diagnosis.statistics.uncertainty`).  By simulations of a model with all frames, the
-    error of which has that `floor`, and with every second, each with its own chance.
+    About half of the error that leaving out every second frame adds, within a factor of two:
+    between a third, where frames resolve the motion, and all of it
+    (:mod:`adv2e.diagnosis.statistics.uncertainty`).  `full`: simulations with all frames, whose
+    error has the noise floor `floor`; `half`: with every second frame, of other seeds.
     """
     unit = _norm(measured)
     apart = np.mean([_apart(a, b, unit).mean() for a, b in zip(full, half, strict=True)])

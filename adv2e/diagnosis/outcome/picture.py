@@ -56,7 +56,7 @@ _CONTRASTS: Array = 0.025 * 2.0 ** np.arange(9.0)
 
 @dataclass(frozen=True)
 class _Axes:
-    """What a curve shows over what: labels, points or borders, and how it is measured."""
+    """Axes of a curve: labels, points or borders in x, and the measure in y."""
 
     title: str
     x_label: str
@@ -127,7 +127,7 @@ _LEAST_SEEN = 0.125
 def totals_of(
     scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
 ) -> list[Total]:
-    """Return what an engineer asks first: how many events there are, and when they come.
+    """Return totals: numbers of ON and OFF events, event rate, median inter-event interval.
 
     Arguments as of :func:`curves_of`.
     """

@@ -1,4 +1,4 @@
-"""What the end of a search says of the recording: the verdict, and what it says."""
+"""Verdict on a recording from the end of a search, and its wording."""
 
 from __future__ import annotations
 
@@ -60,16 +60,16 @@ def _gone(error: ErrorRow, interpolated: float) -> tuple[float, float]:
 def _too_near(error: ErrorRow) -> bool:
     """Tell whether simulations are farther from one another than from the recording.
 
-    They do by chance what happens there for a reason.
+    Then a simulation makes by chance what a cause makes in the recording.
     """
     after, floor = error.after.interval, error.floor.interval
     return after is not None and floor is not None and after[1] < floor[0]
 
 
 def remark_of(verdict: Verdict, outcome: Outcome) -> str:
-    """Return what a verdict says besides the effects that were found and their values.
+    """Return the remark that goes with a verdict, besides the effects and their values.
 
-    It ends in what that means for who has the recording.
+    It ends in the consequence for the user of the recording.
     """
     if verdict == "consistent":
         return "The recording is what the declared model makes: keep that model as it is."

@@ -1,1 +1,1 @@
-"""Which effects are added to the model, validated on data that they were not fitted to."""
+"""Selection of the effects that are added to the model, validated on held-out data."""

@@ -1,8 +1,9 @@
-"""Whether a model is to be taken for the one before it, and which of several explains most.
+"""Acceptance of a model in place of the one before it, and choice of the best of several.
 
-On data that it was not fitted to.  A likelihood by simulations is itself uncertain: the more is
-left of the residual, the more it hangs on which simulations it was made of.  Models that chance may
-have parted are simulated more often; what that does not tell, nobody knows.
+Both are judged on data that the model was not fitted to.  A likelihood by simulations is itself
+uncertain: the larger the residual, the more it depends on the seeds of the simulations.  Models
+whose difference may be chance are simulated more often; a difference that is still within chance
+stays undecided.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _OF_FRAMES = 60.0
 """Log likelihood that what is made up between frames may give to an effect: on data that it was not
 fitted to, up to 59 in one part and 41 in another, never in both, of frames at 60 a second."""
 _MOST_TURNS = 3.0
-"""What frames leave uncertain, in parts of what is known of it and taken off."""
+"""Error of interpolation that may be left, as a multiple of the bias that was subtracted."""
 
 BORDER = "its fit runs to the end of the physical range"
 BY_CHANCE = "what it gains on data it was not fitted to, chance could gain"
@@ -42,15 +43,15 @@ CLOSE = 5.0
 """Log likelihood that tells two models apart where simulations tell it: a factor of 150."""
 _DEVIATIONS = 2.0
 _OF_ONE = 2.0
-"""Of what chance gains, where nothing was chosen by it."""
+"""Deviations above the mean of chance gains, for an effect that other data chose."""
 _OFTEN = (*range(1, MANY + 1), *range(2 * MANY + 1, 4 * MANY + 1))
 """Seeds, where the first are too few; between them are those of the scales."""
 
 
 def objections(fit: Fitted, grown: State, ground: State, reference: Reference) -> list[str]:
-    """Return why a fitted model is not to be taken for the one before it; none: it holds.
+    """Return the reasons to reject a fitted model in favour of the one before it; none: accept it.
 
-    The first as :meth:`~adv2e.diagnosis.selection.reference.Reference.tried`.
+    `grown` is simulated as by :meth:`~adv2e.diagnosis.selection.reference.Reference.tried`.
     """
     observed = reference.observed[splits.VALIDATION]
     after, before = grown.ensembles[splits.VALIDATION], ground.ensembles[splits.VALIDATION]
@@ -76,17 +77,17 @@ def objections(fit: Fitted, grown: State, ground: State, reference: Reference) -
 
 
 def gain(after: Ensemble, before: Ensemble, observed: Array) -> float:
-    """Return what a model gains over the one before it in log likelihood."""
+    """Return the gain in log likelihood of the model `after` over the model `before`."""
     return after.log_likelihood(observed) - before.log_likelihood(observed)
 
 
 def chance_gain(
     after: Ensemble, before: Ensemble, observed: Array, deviations: float = 3.0
 ) -> float:
-    """Return what a model gains by chance over the one before it, at most.
+    """Return the largest gain in log likelihood that chance makes, `deviations` above its mean.
 
-    On recordings of the one before it, and as far as the gain hangs on which simulations the two
-    were made of, with the same seeds: where much is left, their chance is multiplied by it.
+    On recordings that `before` simulates, and with the chance of the simulations of both models
+    (same seeds), which grows with the residual.
     """
     rows = before.sample
     gains = after.likelihood_of_others(rows) - before.likelihood_of_others(rows)
@@ -95,10 +96,10 @@ def chance_gain(
 
 
 def gain_held_out(state: State, without: State, reference: Reference) -> tuple[float, float]:
-    """Return what a model gains over the same without one of its effects, and by chance at most.
+    """Return the gain of a model over itself `without` one of its effects, and the most by chance.
 
-    On data that neither was fitted to.  The effect was chosen by other data, so that what it gains
-    here is no best of many.
+    On the test data, to which neither was fitted.  The effect was chosen by other data, so that its
+    gain here is not the best of many.
     """
     observed = reference.observed[splits.TEST]
     after, before = state.ensembles[splits.TEST], without.ensembles[splits.TEST]
@@ -106,11 +107,11 @@ def gain_held_out(state: State, without: State, reference: Reference) -> tuple[f
 
 
 def stands_out(grown: State, ground: State, reference: Reference, view: int) -> bool:
-    """Tell whether a model gains what frames that tell too little do not make, in a view.
+    """Tell whether the gain in log likelihood is larger than interpolation error alone could make.
 
-    What is made up between them need not be off by chance, nor each statistic by itself: as far as
-    leaving out frames tells its direction, the gain must be more than where it is off as far as it
-    can be, either way.
+    In one view of the data.  The error of interpolation is systematic, and the same in direction
+    for many statistics.  Leaving out frames gives that direction: the gain must exceed that with
+    the largest error along it, either way.
     """
     after, before = grown.ensembles[view], reference.compared(ground, grown).ensembles[view]
     least = _OF_FRAMES
@@ -127,11 +128,11 @@ def stands_out(grown: State, ground: State, reference: Reference, view: int) -> 
 
 
 def loudness(after: Ensemble, before: Ensemble, observed: Array) -> float:
-    """Return how far the statistics that a model changes most are still off [deviations].
+    """Return the RMS residual of the statistics that a model changes most [deviations].
 
-    By the correlations that they have under the model itself: one fact that many of them tell, as
-    that few of its hot pixels lie where they were looked for, counts as one.  Under the declared
-    model, from which those of all others are taken, there may have been nothing to tell.
+    Whitened by their correlations under the model itself, so that one fact that many of them show
+    (few hot pixels in the test data, for example) counts once.  The correlations of the declared
+    model, which all else uses, may not contain that fact.
     """
     change = np.abs(before.scale.whitening @ (after.mean - before.mean))
     own = np.argsort(-change)[:_SIGNATURE]
@@ -142,10 +143,10 @@ def loudness(after: Ensemble, before: Ensemble, observed: Array) -> float:
 
 
 def _worse(after: Ensemble, before: Ensemble, observed: Array) -> tuple[int, float] | None:
-    """Return which statistic a model makes worst, and how far it stands out then [deviations].
+    """Return the index of the statistic that a model makes worst, and its residual [deviations].
 
-    None if no statistic gets worse by more than details of a simulation make, or none then stands
-    out more than anything did before.
+    None if no statistic gets worse by more than details of a simulation make, or its residual is
+    not larger than the largest was before.
     """
     now, then = np.abs(after.z(observed)), np.abs(before.z(observed))
     worst = int(np.argmax(now - then))

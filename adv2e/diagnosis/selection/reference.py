@@ -1,4 +1,4 @@
-"""What candidates are measured against: the recording, and simulations on the declared scale."""
+"""Reference for candidates: the recording, and simulations on the scale of the declared model."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FURTHER = range(1001, 2001)
 """Seeds of those that tell how often chance makes what none of the many did."""
 
 _OF_SCALES, _OF_MODELS, OF_RECORDINGS, _OF_SHIFTED = 1, 2, 3, 4
-"""What simulations stand for, each with draws of its own of what is uncertain in them."""
+"""Purposes of simulations, as random streams: each draws frame errors of its own."""
 _SEEDS = 6
 _LAST_ROUNDS = [range(first, first + _SEEDS) for first in range(21, 57, _SEEDS)]
 _ROUNDS = 4
@@ -72,7 +72,7 @@ class State:
 
 @dataclass
 class Rejections:
-    """Why effects were not added: of each round, the reason of an effect's best form."""
+    """Reasons for which effects were not added: of each round, that of an effect's best form."""
 
     held: dict[str, Rejected] = field(default_factory=dict)
     _this_round: set[str] = field(default_factory=set)
@@ -82,7 +82,7 @@ class Rejections:
         self._this_round.clear()
 
     def add(self, fit: Fitted, reason: str, *, final: bool = False) -> None:
-        """Note why an effect was not taken; `final` reasons replace those of the same round."""
+        """Note the reason to reject an effect; `final` ones replace those of the same round."""
         name = fit.candidate.name
         if final or name not in self._this_round:
             self._this_round.add(name)
@@ -139,15 +139,15 @@ class Reference:
 
     @property
     def doubt(self) -> float:
-        """What frames leave uncertain in deviations of chance, root mean square."""
+        """Uncertainty that frames leave in the statistics, in deviations of chance, RMS."""
         return self.error.doubt(self.error.chance(self.scales[BOTH].sd, BOTH), BOTH)
 
     def fitter(
         self, view: int, near: Config, sd: Array | None = None, *, rough: bool = False
     ) -> Fitter:
-        """Return what fits candidates in one view of the data, to models near one.
+        """Return a fitter of candidates in one view of the data, for models near `near`.
 
-        Simulations with shifted frames are as far off as those of that model.
+        The bias of shifted frames is that of `near`.
         """
         sampler = self.sampler.rough if rough else self.sampler
         shifted = self._resampling.error(near)
@@ -236,7 +236,7 @@ class Reference:
         return Fitted(joint, self.declared, point, reach=_REACH)
 
     def misfit(self, state: State, view: int = BOTH) -> float:
-        """Return how far the recording is from a model."""
+        """Return the misfit of a model to the recording."""
         return state.ensembles[view].misfit(self.observed[view])
 
     def likelihood(self, state: State, view: int = BOTH) -> float:

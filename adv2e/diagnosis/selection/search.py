@@ -54,14 +54,14 @@ _LEAST_OF_THE_LEFT = 0.5 / MOST_EFFECTS
 _OF_FITS = 1e-6
 """Probability of what is left below which it is looked into, though it may be the fit's."""
 _MUCH_DOUBT = 0.5
-"""Of what frames leave uncertain, in deviations of chance: from there on it hides effects."""
+"""Uncertainty by frames from which on it hides effects, in deviations of chance."""
 _MOST_OF_THE_FIT = 0.5
 """Least share of that which an effect must take away."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where the search ended."""
+    """Outcome of a search: the last model, its probability, and rejected effects."""
 
     state: State
     probability: float
@@ -94,7 +94,7 @@ class Search:
         self.declared = reference.state(reference.declared)
 
     def probability(self, state: State, view: int = BOTH) -> float:
-        """Return how often chance makes a residual as large as the recording's."""
+        """Return the probability of a residual as large as the recording's by chance."""
         return state.ensembles[view].probability(self.reference.observed[view])
 
     def judged(self, state: State, view: int) -> float:
@@ -143,7 +143,7 @@ class Search:
         )
 
     def _is_left(self, state: State) -> bool:
-        """Tell whether something is left for another effect, in either part of the data."""
+        """Tell whether a residual is left for another effect, in either part of the data."""
         return any(self._is_something_left(state, view) for view in (BOTH, splits.TEST))
 
     def _beneath_doubt(self) -> State:
@@ -172,7 +172,7 @@ class Search:
         return declared
 
     def _gains(self, trial: Trial) -> bool:
-        """Tell whether a trial gains anything on the data for validation."""
+        """Tell whether a trial gains in log likelihood on the data for validation."""
         view, reference = splits.VALIDATION, self.reference
         before = reference.tried(self.declared.config, trial.fit.config)[view]
         return gain(trial.ensembles[view], before, reference.observed[view]) > 0.0
@@ -207,29 +207,30 @@ class Search:
         return self.explained(state, view) < 1.0 - state.left
 
     def _is_open(self, state: State) -> bool:
-        """Tell whether another effect is looked for.
+        """Tell whether the search goes on for another effect.
 
-        What is small beside an effect may be its fit's, or another effect, which chance makes far
-        less often.  Of an effect that cannot be undone in full it is the former all the same.
+        A small residual may be left by the fit of an effect, or by another effect; that one is far
+        less likely by chance.  Where an effect cannot be undone in full, the residual is put down
+        to its fit.
         """
         is_unlikely = state.is_undone and self.probability(state) < _OF_FITS
         return is_unlikely or self._is_something_left(state)
 
     def _may_be_wrong(self, state: State) -> bool:
-        """Tell whether another is tried in the place of the first of two effects.
+        """Tell whether other effects are tried in place of the first of two.
 
-        Of more, each takes as long as the whole search for another effect.
+        With more effects, each replacement takes as long as the search for a further effect.
         """
         if len(state.fits) != 2 or self.probability(state) >= PER_LOOK:
             return False
         return self._is_something_left(state) or state.is_undone
 
     def _is_worth_it(self, state: State, grown: State) -> bool:
-        """Tell whether an addition that holds takes away enough of what is left.
+        """Tell whether an accepted addition explains enough of the residual.
 
-        Of what may be the fit's, it must be most.  Of more, the few effects that may be added must
-        be able to explain it with others as large: it is no patch then.  Single statistics that
-        stand out, and the last to be found, have no share to speak of.
+        Most of it, where the fit of another effect may have left it.  Otherwise a share at which
+        as many effects as may be added explain half of it; but any share where only single
+        statistics are off, or where nothing is left afterwards.
         """
         if self._is_something_left(state):
             least = _LEAST_OF_THE_LEFT
@@ -323,9 +324,10 @@ class Search:
         return state
 
     def _why_spare(self, state: State, without: State) -> str:
-        """Return why a model does without one of its effects, the others fitted again; or nothing.
+        """Return the reason to drop an effect of `state`, or "".
 
-        The data that it was fitted to are not enough: there, what has more keys is always nearer.
+        `without`: the model without it, the others fitted again.  The data for fitting do not
+        decide: there, a model with more keys always fits better.
         """
         without = self.reference.compared(without, state)
         loss = self.reference.likelihood(state) - self.reference.likelihood(without)
@@ -365,9 +367,9 @@ class Search:
         return None
 
     def _is_better(self, other: State, state: State) -> bool:
-        """Tell whether a model is taken for another with as many effects.
+        """Tell whether the model `other` replaces `state`, which has as many effects.
 
-        Of what may be the fit's, it must take away most.
+        Where the fit of `state` may have left the residual, `other` must explain most of it.
         """
         better, worse = (
             scored(self.reference, one.ensembles, count_parameters(one.fits))

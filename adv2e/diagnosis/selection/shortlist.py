@@ -1,4 +1,4 @@
-"""Which effects are worth trying on top of a model: all are fitted, few are simulated often."""
+"""Shortlist of effects to add to a model: all are fitted, few are simulated often."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
-"""What of a long recording is diagnosed: as much as can be simulated often enough.
+"""Crop of a long recording to the part that can be simulated often enough.
 
-What a simulation costs is counted, not measured, so that what is looked at is the same on every
-machine.
+The cost of a simulation is counted, not measured, so that the crop is the same on every machine.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ FINE = Coarseness(5.0)
 """Steps of time of simulations: some us off, which no statistic shows."""
 
 AFFORDABLE_S = 0.2
-"""What a simulation may take in the mean, in one thread; a diagnosis takes some thousands [s]."""
+"""Longest mean time of a simulation in one thread [s]; a diagnosis takes some thousands."""
 
 # in one thread, with the statistics of the events [s]
 INSTANT_S = 20e-9
@@ -97,7 +96,7 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
 
 
 def steps_of_time(evidence: Evidence, declared: Config) -> int:
-    """Return how many steps of time a pixel takes through a recording; 0: it takes none."""
+    """Return the number of time steps of a pixel through a recording; 0: it is solved exactly."""
     shown, hooks = evidence.simulated, active_hooks(declared)
     additions, circuit = additions_of(hooks), make_circuit(declared.pixel, declared.sampling, 0)
     if driver_of(declared.pixel, circuit, additions, "auto") != "run_stepped":

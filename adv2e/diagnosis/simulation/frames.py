@@ -66,7 +66,7 @@ class FrameCache:
 
 
 def _held(held: dict[Any, Instants], key: Any, make: Callable[[], Instants]) -> Instants:
-    """Return what is held for a key, made if it is not; what was asked for long ago is dropped."""
+    """Return the cached value of a key, made by `make` if there is none; the oldest are dropped."""
     found = held.pop(key, None) or make()
     while len(held) >= _KEPT:
         del held[next(iter(held))]
@@ -114,14 +114,14 @@ def _is_along_motion(config: Config) -> bool:
 
 
 def _is_moved(config: Config) -> bool:
-    """Tell whether moved frames may be given as frames: those that are sharp by then."""
+    """Tell whether moved frames may be given as frames: frames that are already sharp may."""
     return any(config.frames.shift_px) and (
         is_made_once(config) or config.frames.exposure_us == 0.0
     )
 
 
 def _until_moved(config: Config) -> Frames:
-    """Return what acts on the light of sharp frames, to their being moved."""
+    """Return the frame settings that act on light up to the shift: black level, depth, shift."""
     frames = config.frames
     return Frames(
         black_level_dn=frames.black_level_dn,

@@ -1,4 +1,4 @@
-"""How far a diagnosis is."""
+"""Progress of a diagnosis."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """What a diagnosis is doing.
+    """Progress of a diagnosis: its stage, and the simulations done.
 
-    How many simulations there will be in all is not known: it depends on what they show.
+    The total number of simulations is not known before: it depends on their results.
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ class Simulator:
         self.done, self._stage = 0, ""
 
     def begin(self, stage: str) -> None:
-        """Tell what the simulations that follow are for."""
+        """Begin a stage: its name is reported with the simulations that follow."""
         with self._counting:
             self._stage = stage
             self._progress(Progress(stage, self.done))

@@ -96,10 +96,10 @@ def count_gaps(
 
 @kernel
 def since_neighbours(t: Any, pixel: Any, on: Any, width: int, last: Any, since: Any) -> None:
-    """Find how long ago the latest event of the four neighbouring pixels was.
+    """Compute the time since the latest event of the four neighbouring pixels, into `since`.
 
     `last`, (pixels, 2): time of the latest event of each pixel and polarity [us], long ago at
-    first; `since`, (events, 2): since that of the other, and of the same, polarity [us].
+    first; `since`, (events, 2): time since an event of the other, and of the same, polarity [us].
     """
     pixels = last.shape[0]
     for k in range(t.shape[0]):

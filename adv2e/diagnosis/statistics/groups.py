@@ -1,4 +1,4 @@
-"""What a group of summary statistics is, and counting by part of the data."""
+"""Groups of summary statistics, and counts of events by part of the data."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ def stabilised(number: Array) -> Array:
 
 
 def counted(value: float) -> float:
-    """Return the number that :func:`stabilised` made a value of."""
+    """Return the inverse of :func:`stabilised`: the number of events."""
     return max(0.25 * value * value - 0.375, 0.0)
 
 
 def exponential(value: float) -> float:
-    """Return what the natural logarithm was taken of."""
+    """Return the exponential of a natural logarithm, without overflow."""
     return math.exp(min(value, 700.0))
 
 
@@ -106,13 +106,13 @@ def numbers(named: Iterable[tuple[str, str]], unit: str = "events") -> list[Entr
 def counts(
     part: NDArray[np.int64], cell: NDArray[Any], cells: int, weight: NDArray[Any] | None = None
 ) -> Array:
-    """Return how many events, or how much `weight`, each cell has in each part, (parts, cells)."""
+    """Return the number of events, or sum of `weight`, by part and cell, (parts, cells)."""
     number = np.bincount(part * cells + cell, weight, minlength=splits.COUNT * cells)
     return number.astype(np.float64).reshape(splits.COUNT, cells)
 
 
 def excess(number: Array, mean: Array) -> Array:
-    """Return what numbers of events are above their mean, in deviations of chance.
+    """Return the excess of numbers of events over their mean, in deviations of chance.
 
     It is zero where nothing is expected and nothing came.
     """

@@ -60,7 +60,7 @@ def intervals(*, at_rest: bool = False) -> Group:
 
 
 def runs() -> Group:
-    """Return how far into a run of one polarity events are: what a reset changes event by event."""
+    """Return numbers of events by their place in a run of one polarity, which resets change."""
     entries = numbers(
         (
             f"{place} {p} event of a run",

@@ -1,4 +1,4 @@
-r"""How far a recording is from simulations, in terms of what chance makes.
+r"""Distance of a recording from simulations, in terms of chance: misfit and likelihood.
 
 Statistics are first put in deviations of the declared model and compressed,
 
@@ -123,7 +123,7 @@ class Ensemble:
         return np.asarray(np.maximum(self.sample.std(axis=0, ddof=1), _LEAST_SD))
 
     def z(self, values: Array) -> Array:
-        """Return how far measured statistics are from this model, in its deviations."""
+        """Return z-scores: measured statistics less the mean of this model, in its deviations."""
         inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
         return np.asarray((self.scale.of_values(values) - self.mean) / (self.sd * inflation))
 
@@ -138,9 +138,10 @@ class Ensemble:
         return float(-0.5 * white @ white - np.log(self.sd).sum())
 
     def pull(self, values: Array) -> Array:
-        """Return what each simulation adds to the log likelihood by its part in mean and deviation.
+        """Return the influence of each simulation on the log likelihood, (seeds,).
 
-        To first order (influence function), and so that the mean over simulations counts, (seeds,).
+        By its part in mean and deviation, to first order (influence function), scaled such that the
+        mean over simulations counts.
         """
         z, white = self.z(values), self.scale.whitening
         downhill = white.T @ (white @ z)
@@ -152,9 +153,9 @@ class Ensemble:
         return np.asarray(of_mean + of_sd)
 
     def parted_by_chance(self, other: Ensemble, values: Array) -> float:
-        """Return how far two models of the same seeds are apart in log likelihood by chance.
+        """Return the standard deviation of the difference in log likelihood of two models.
 
-        As a deviation: as far as that hangs on which simulations the two were made of.
+        That by the choice of simulations; both models have the same seeds.
         """
         own = self.pull(values) - other.pull(values)
         return float(own.std(ddof=1) / math.sqrt(len(own)))
@@ -191,7 +192,7 @@ class Ensemble:
         return float(self._left_out[0].mean())
 
     def probability(self, values: Array) -> float:
-        """Return how often this model makes a misfit, or a largest deviation, as large.
+        """Return the probability of a misfit, or a largest deviation, as large under this model.
 
         Twice the smaller of the two probabilities, each by rank among the simulations and, beyond
         them, by the tail of a distribution fitted to them: log-normal for misfits, which are means
@@ -203,10 +204,10 @@ class Ensemble:
         return min(1.0, 2.0 * min(found))
 
     def rank(self, values: Array, further: Array) -> float:
-        """Return how often further simulations have a misfit, or a largest deviation, as large.
+        """Return the share of further simulations with a misfit, or a largest deviation, as large.
 
-        As :meth:`probability`, by rank alone: a few counts of what hardly ever happens have no tail
-        that a curve would fit.  `further`, (seeds, statistics), in compressed deviations.
+        As :meth:`probability`, by rank alone: statistics that are small counts of rare events have
+        no tail that a curve would fit.  `further`, (seeds, statistics), in compressed deviations.
         """
         inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
         z = (further - self.mean) / (self.sd * inflation)

@@ -1,4 +1,4 @@
-"""What differs from pixel to pixel: spread of the chip, silent and loud pixels, rows, columns."""
+"""Fixed-pattern statistics: spread over the pixels, silent and hot pixels, rows, columns."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def count_pixels(placed: Placed, scene: Scene) -> Array:
 
 
 def pixels(scene: Scene, expected: Array) -> Group:
-    """Return how events of each pixel are spread about those that the declared model expects.
+    """Return statistics of the events of each pixel about the number that the model expects.
 
     `expected`: (parts, numbers), mean of :func:`count_pixels` over its simulations.
     """

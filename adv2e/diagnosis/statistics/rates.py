@@ -1,4 +1,4 @@
-"""How many events there are: by polarity, speed, brightness, time, rate, place between frames."""
+"""Event counts: by polarity, speed, brightness, time, event rate and phase between frames."""
 
 from __future__ import annotations
 
@@ -80,22 +80,22 @@ def course(start_us: float, stop_us: float) -> Group:
 
 
 def spans_text(borders_us: Array) -> list[str]:
-    """Return in words when the parts of a recording are, by their borders [us]."""
+    """Return the time spans of the parts of a recording in words, from their borders [us]."""
     seconds = (borders_us - borders_us[0]) * 1e-6
     return [f"from {a:.3g} to {b:.3g} s of the recording" for a, b in itertools.pairwise(seconds)]
 
 
 def rate_hz(scene: Scene, simulations: Sequence[Placed]) -> Array:
-    """Return events a second on the whole sensor in each frame interval, mean of simulations."""
+    """Return the event rate of the sensor in each frame interval [1/s], mean of simulations."""
     number = [np.bincount(one.interval, minlength=scene.intervals) for one in simulations]
     return np.asarray(np.mean(number, axis=0) / scene.seconds)
 
 
 def by_load(rate_hz: Array, steps: int) -> NDArray[np.int64]:
-    """Return which of `steps` classes each frame interval is in, from few to many events.
+    """Return the class of event rate of each frame interval, 0 to `steps` - 1, (intervals,).
 
-    By the events a second that a model makes on the whole sensor, (frame intervals,).  Each class
-    holds about as many events.
+    `rate_hz`: event rate of the whole sensor by a model, (intervals,).  Each class holds about as
+    many events.
     """
     order = np.argsort(rate_hz, kind="stable")
     total = np.cumsum(rate_hz[order])

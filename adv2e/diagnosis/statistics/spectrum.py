@@ -15,7 +15,7 @@ _BANDS_HZ = ((30, 90), (90, 99), (99, 101), (101, 119), (119, 121), (121, 240), 
 
 
 def keeps_time(hz: NDArray[Any], scene: Scene) -> NDArray[np.bool_]:
-    """Tell which frequencies [Hz] are near whole multiples of the frame rate."""
+    """Return a mask of the frequencies [Hz] near whole multiples of the frame rate."""
     rate = 1e6 * scene.intervals / (scene.times_us[-1] - scene.times_us[0])
     near = np.abs(hz / rate - np.round(hz / rate)) * rate <= 1.5
     return np.asarray(near & (hz >= rate - 2.0))

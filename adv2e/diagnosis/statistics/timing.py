@@ -1,4 +1,4 @@
-"""When events come after the change that makes them, and where: lag, drift of the clock, shift."""
+"""Lag of events behind the change of light, its drift over time, and shift in space."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Slopes:
 
 
 def _when(lag_ms: float) -> str:
-    """Say when a time before an event is."""
+    """Return the words for a lag before an event; a negative one is after it."""
     return f"{abs(lag_ms):g} ms {'after' if lag_ms < 0.0 else 'before'}"
 
 
@@ -81,7 +81,7 @@ def lag(slopes: Slopes) -> Group:
 
 
 def drift(slopes: Slopes) -> Group:
-    """Return how the lag changes from segment to segment of the recording."""
+    """Return statistics of the lag by segment of time, which show a drift of the clock."""
     segments = slopes.scene.split.segments
     spans = spans_text(slopes.scene.split.borders_us)
     entries = [
@@ -105,7 +105,7 @@ def drift(slopes: Slopes) -> Group:
 
 
 def shift(slopes: Slopes) -> Group:
-    """Return whether the change that makes events lies beside them."""
+    """Return statistics of the change of light beside events, which show a shift in space."""
     entries = [
         Entry(
             f"change {name} of the event, {lag:g} ms before",

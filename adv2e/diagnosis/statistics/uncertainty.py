@@ -1,4 +1,4 @@
-r"""What statistics owe to light that the frames do not tell, and how well that is known.
+r"""Error of the statistics by light that the frames do not show: bias and uncertainty.
 
 Between frames, between pixels and between the levels of the frames' numbers a simulation knows
 nothing of the light.  What it makes up changes each statistic by an error e, of which the change d
@@ -120,13 +120,13 @@ class FrameError:
         return np.asarray(np.sqrt(np.maximum(total**2 - self.sd[view] ** 2, 0.01 * total**2)))
 
     def doubt(self, chance: Array, view: int) -> float:
-        """Return what is uncertain in deviations of chance, (statistics,), root mean square."""
+        """Return the RMS uncertainty in deviations of chance; `chance`: (statistics,)."""
         return float(np.sqrt(np.mean((self.sd[view] / chance) ** 2)))
 
 
 @dataclass(frozen=True)
 class Change:
-    """What frames that tell less change, in compressed deviations, (views, statistics)."""
+    """Change of statistics with fewer or coarser frames, compressed, (views, statistics)."""
 
     own: Array
     """Of each statistic, less what chance makes of it."""
@@ -209,7 +209,7 @@ class Pilot:
         return replace(self, declared=bare, streams=dict(zip(self.streams, streams, strict=True)))
 
     def change(self, evidence: Evidence) -> Change:
-        """Return what the same simulations with the frames of `evidence` change."""
+        """Return the change of the statistics with the frames of `evidence`, by the same seeds."""
         less = self.statistics.sample(self._simulated(evidence, self.declared))
         return Change.of(self.sample, less, self.statistics.titles, self.statistics.least)
 
@@ -219,7 +219,7 @@ class Pilot:
 
 
 def between_frames(pilot: Pilot) -> FrameError | None:
-    """Return what the interpolation is worth; None: too few frames to leave any out."""
+    """Return the error of interpolation; None: too few frames to leave any out."""
     half, quarter = (every(pilot.evidence, step) for step in (2, 4))
     if len(half.frames) < _FEWEST:
         return None
@@ -249,7 +249,7 @@ def every(evidence: Evidence, step: int) -> Evidence:
 
 
 def between_levels(pilot: Pilot) -> FrameError | None:
-    """Return what the levels are worth; None where they are fine."""
+    """Return the error of the levels of the frames; None where they are fine."""
     if pilot.evidence.quantum_dn(pilot.declared) < _FINE_DN:
         return None
     return pilot.change(coarser(pilot.evidence)).error(0.0, _LEVELS_DOUBT)

@@ -32,7 +32,7 @@ from adv2e.reports.wording import OF_TABLES
 
 
 def characterise(table: Table, declared: Declared, settings: Settings | None = None) -> Diagnosis:
-    """Return which effects the table asks for beyond the declared model.
+    """Return the diagnosis of a table: effects that the declared model lacks.
 
     Parameters
     ----------

@@ -58,14 +58,14 @@ class _Response:
         self.limited = np.zeros_like(step) if slew is None else (step - self.lag) / slew
 
     def first_pole_time(self, level: Array) -> Array:
-        """Return when the first pole alone has risen to `level`."""
+        """Return the time at which the first pole alone reaches `level`."""
         late = self.limited + np.log(self.lag / (self.step - level)) / self.w1
         if np.isinf(self.slew):
             return late
         return np.where(level <= self.step - self.lag, level / self.slew, late)
 
     def root(self, level: Array) -> Array:
-        """Return when the second pole has risen to `level`: Newton inside a shrinking bracket."""
+        """Return the time at which the second pole reaches `level`, by Newton with a bracket."""
         assert self.w2 is not None
         low = self.first_pole_time(level)
         # once the first is past sqrt(q) of the step, the second goes sqrt(q) of the way from there

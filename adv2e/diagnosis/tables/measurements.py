@@ -1,4 +1,4 @@
-"""What a table holds: latencies against light, or noise event rates against light.
+"""Measurements of a table: latencies against light, or noise event rates against light.
 
 Columns are known by their names; all others are labels, for ``--where`` and ``--judge``.
 
@@ -97,7 +97,7 @@ class Noise:
 
 
 def measurements_of(table: Table) -> Latencies | Noise:
-    """Return what the table holds, by its columns.
+    """Return the latencies or noise rates of a table, by its columns.
 
     Raises
     ------

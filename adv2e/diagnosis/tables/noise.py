@@ -70,7 +70,7 @@ _FEWEST = 1e-8
 
 @dataclass(frozen=True)
 class NoisySources:
-    """What makes noise events in a pixel; rates in Hz, 0 standing for none."""
+    """Sources of noise events (background activity) in a pixel; rates in Hz, 0: none."""
 
     leak_hz: float = 0.0
     photo_leak_hz: float = 0.0
@@ -78,7 +78,7 @@ class NoisySources:
     rms: float = 0.0
     """Photoreceptor noise [ln]."""
     noise_step: float = 0.0
-    """At which that noise is sampled behind one pole, in correlation times at white; 0: not."""
+    """Sampling step of that noise behind one pole, in correlation times at white; 0: none."""
     cutoff_hz: float = 0.0
     dark_cutoff_hz: float = 0.0
     follower_hz: float = 0.0
@@ -254,7 +254,7 @@ def _typical(values: Array, weights: Array) -> Array:
 
 
 def _rare(leak: Array, noise: Array) -> Array:
-    """Return what is left of leak events beside noise that takes the reference anew [Hz]."""
+    """Return the rate of leak events beside noise events, each of which resets the leak [Hz]."""
     leak, noise = np.broadcast_arrays(leak, np.maximum(noise, 0.0))
     left = np.array(leak, dtype=np.float64)
     both = (leak > 0.0) & (noise > 1e-12 * leak)
@@ -339,7 +339,7 @@ _LEAST, _GRID = 0.2, 0.78
 _COUNT = 1 + round((HIGHEST - _LEAST) / _GRID)
 _RULER = Ruler(1.5, 0.05, HIGHEST)
 _APART = _RULER.marks()[0]
-"""By how much OFF is larger than ON, where it is kept."""
+"""Differences between OFF and ON threshold at which rates are kept."""
 _RATIOS, _DEAD_TIMES, _LEAKS = (2.0, -12, 0), (2.0, -8, 6), (8.0, -6, -1)
 """Base, and least and largest exponent, of what is kept: ratios of corners; dead times and leaks in
 units of the slower pole."""

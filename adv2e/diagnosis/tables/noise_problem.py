@@ -40,7 +40,7 @@ _Several = tuple[str, float, float, tuple[float, ...]]
 _WORDS = {"rate_hz": "mean", "median_hz": "median"}
 
 _SHAPE = ((CUTOFF, 3.0, 1e6), (DARK_CUTOFF, 0.03, 3e3), (FOLLOWER, 3.0, 1e5))
-"""What shapes photoreceptor noise beside the thresholds, and between which values it is fitted."""
+"""Corner frequencies of photoreceptor noise, with least and largest fitted value [Hz]."""
 _SHAPE_STARTS = ((3e3, 10.0, 100.0), (1e5, 10.0, 50.0), (1e4, 3.0, 30.0))
 
 
@@ -236,7 +236,7 @@ def _several(name: str, parameters: Sequence[_Several]) -> Candidate:
 
 
 def _number_of(kind: str) -> int:
-    """Return how many events a share of the pixels has; 0: it is no share."""
+    """Return the least number of events of a share of the pixels; 0: `kind` is no share."""
     what, _, number = kind.partition("_share")
     return 0 if what == kind else int(number[1:] or 1)
 

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Settings:
-    """How a table is to be characterised.
+    """Settings of the characterisation of a table.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Declared:
-    """What is known of the camera.
+    """Declared model of the camera.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Declared:
     written: Mapping[str, Any]
 
     def switched_off(self, section: str) -> bool:
-        """Tell whether it was written that an effect is not there."""
+        """Tell whether an effect was declared as absent (null)."""
         return section in self.written and self.written[section] is None
 
     def held(self, path: str, neutral: float | None) -> float | None:
@@ -83,7 +83,7 @@ class Declared:
         return neutral if value is None else float(value)
 
     def value(self, fitted: Mapping[str, float], path: str, neutral: float | None) -> float | None:
-        """Return what was fitted for a key, else what is :meth:`held`."""
+        """Return the fitted value of a key, else the declared one; see :meth:`held`."""
         return fitted[path] if path in fitted else self.held(path, neutral)
 
 
@@ -164,7 +164,7 @@ class Problem(ABC):
         """Return the logarithms that the model with fitted values predicts, (n,), finite."""
 
     def _number(self, values: Mapping[str, float], key: str) -> float:
-        """Return what is fitted or held of a key; nothing stands for none."""
+        """Return the fitted or declared value of a key, 0 where there is none."""
         return self.declared.value(values, key, 0.0) or 0.0
 
 

@@ -1,9 +1,8 @@
-"""Which effects a table asks for: models of increasing size, judged on light held out.
+"""Selection of effects for a table: models of increasing size, judged on held-out light levels.
 
-The search and the acceptance are not those of recordings: a table is a handful of rows, which
-cannot be parted for training, validation and test, and its model a formula, so that every set of
-effects is fitted, without each light level in turn.  Candidates, rejections and the result are the
-same.
+Search and acceptance differ from those for recordings: a table is a handful of rows, too few for
+training, validation and test, and its model is a formula, so that every set of effects is fitted
+with each light level left out in turn.  Candidates, rejections and the result are the same.
 
 The declared model is rejected where its misfit is larger than 95 in 100 of those of tables drawn
 from it.  Only then are effects added: of all sets of one effect, then two, then three, the one
@@ -98,7 +97,7 @@ class FittedSet:
 
 @dataclass(frozen=True)
 class Choice:
-    """What came of it; `alternatives`: sets of the same size that fit as well."""
+    """Result of a selection; `alternatives`: sets of the same size that fit as well."""
 
     before: FittedSet
     after: FittedSet
@@ -123,7 +122,7 @@ class Selector:
 
     @property
     def floors(self) -> Array:
-        """What :attr:`FittedSet.errors` would be of the true model, (levels,)."""
+        """Noise floor: :attr:`FittedSet.errors` of the true model, (levels,)."""
         return np.array([self._mean_square(self.problem.error, unit) for unit in self._units])
 
     def select(self) -> Choice:
@@ -170,22 +169,22 @@ class Selector:
         )
 
     def _determined(self, chosen: tuple[Candidate, ...]) -> bool:
-        """Whether every fold has more rows than parameters."""
+        """Tell whether every fold has more rows than parameters."""
         keys = [one.key for effect in chosen for one in effect.parameters]
         count = len(self.problem.nuisances.parameters) + len(keys)
         return len(set(keys)) == len(keys) and all(fold.sum() > count for fold in self._folds)
 
     def _is_believed(self, after: FittedSet, before: FittedSet) -> bool:
-        """Whether it predicts: what fits the rows that it was fitted to need not predict others."""
+        """Tell whether a model predicts held-out rows, not only the rows that it was fitted to."""
         if after.error**2 <= (1.0 - SKILL) * min(before.error, self.constant) ** 2:
             return True
         near = after.error**2 <= NEAR**2 * float(self.floors.mean())
         return near and self.drawn(after).p >= SIGNIFICANT
 
     def _as_well(self, rival: FittedSet, best: FittedSet) -> bool:
-        """Whether a rival's misfit is larger by no more than chance makes, 997 times in 1000.
+        """Tell whether a rival's misfit is within three standard errors of the best one.
 
-        Misfits are relative to that which the best leaves, should it be above the stated errors.
+        Misfits are in units of the spread that the best leaves, if that exceeds the stated errors.
         """
         freedom = max(int(self._train.sum()) - len(best.point), 1)
         spread = max(1.0, best.misfit / freedom)
@@ -273,7 +272,7 @@ def _rejected(
     after: FittedSet,
     alternatives: list[FittedSet],
 ) -> list[Rejected]:
-    """Return what was not taken, each with the reason; sets of two and more only where best."""
+    """Return the rejected sets with reasons; of two and more effects, the best of each size."""
     out = []
     for size, models in enumerate(tried, 1):
         for model in models if size == 1 else [min(models, key=lambda one: one.error)]:
@@ -294,10 +293,10 @@ def _rejected(
 
 
 def lower(model: FittedSet, than: FittedSet, best_of: int) -> bool:
-    """Whether the held-out error is lower by more than the standard error of the difference.
+    """Tell whether the held-out error is lower by more than the standard error of the difference.
 
-    `best_of`: how many useless ones there might be of which this is the luckiest, whose gain is
-    some sqrt(2 ln n) standard errors.
+    `best_of`: number n of models of which this is the best; the best of n useless ones gains some
+    sqrt(2 ln n) standard errors.
     """
     gain = than.errors - model.errors
     if gain.size < 2:

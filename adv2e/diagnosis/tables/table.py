@@ -108,7 +108,7 @@ class Table:
         return Table(self.name, self.columns, rows, lines, self.decimal_comma)
 
     def matching(self, condition: str, option: str) -> list[bool]:
-        """Return which rows have the value that ``COLUMN=VALUE`` asks for.
+        """Return a mask of the rows that match ``COLUMN=VALUE``, (rows,).
 
         Values that are numbers are compared as numbers.
 

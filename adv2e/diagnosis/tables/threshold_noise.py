@@ -1,4 +1,4 @@
-r"""How often band-limited noise crosses the thresholds of a pixel at rest.
+r"""Rate of noise events: band-limited noise that crosses the thresholds of a pixel at rest.
 
 White noise behind two poles is a signal z, here of standard deviation 1, with time in units of the
 slower pole's time constant and rho = (slower corner)/(faster corner).  Which pole is which does not
@@ -230,10 +230,10 @@ def _exit_from(
 def _drift(
     places: Array, p_on: Array, p_off: Array, time: Array, speed: float
 ) -> tuple[Array, Array]:
-    """Return which level is crossed next, (places, 2 places), and when, from noise at rest.
+    """Return probabilities of the level crossed next, (places, 2 places), and mean waiting times.
 
-    The reference falls at `speed` meanwhile: place after place, with hazards that are exponential
-    in between.
+    The noise is stationary at the start.  The reference falls at `speed`, place after place, with
+    hazards that are exponential in between.
     """
     count = places.size
     share = (np.arange(_SUBSTEPS) + 0.5) / _SUBSTEPS  # of the way to the next lower place
@@ -297,7 +297,7 @@ def _interpolated(here: tuple[NDArray[np.int64], Array], values: Array) -> Array
 
 
 def _spread(here: tuple[NDArray[np.int64], Array], parts: Array) -> Array:
-    """Return where references land from each level, (2 places, places), times `parts` of them."""
+    """Return the distribution of the next reference by level, (2 places, places), times `parts`."""
     first, cubic = here
     to = np.stack([first, first + 1, first + 2, first + 3])
     into = to + np.arange(2 * _PLACES)[:, None] * _PLACES
@@ -307,7 +307,7 @@ def _spread(here: tuple[NDArray[np.int64], Array], parts: Array) -> Array:
 
 
 def _stationary(chain: Array) -> Array:
-    """Return how often which level is crossed; `chain`: which one follows on which."""
+    """Return the stationary distribution of crossed levels; `chain`: transition matrix."""
     balance = chain.T - np.eye(len(chain))
     balance[-1] = 1.0  # one equation follows from the others; the shares add up to 1
     right = np.zeros(len(chain))

@@ -46,14 +46,14 @@ class Axis:
     names: Sequence[tuple[float, str]] = ()
 
     def place(self, values: Floats) -> Floats:
-        """Return where `values` lie; NaN for NaN and for what a logarithm does not have."""
+        """Return the positions of `values` on the axis; NaN where they have none, as log of 0."""
         low, high = (self._scaled(np.float64(end)) for end in (self.low, self.high))
         share = (self._scaled(values) - low) / (high - low)
         places: Floats = self.start + share * (self.end - self.start)
         return places
 
     def at(self, value: float) -> float:
-        """Return where one value lies."""
+        """Return the position of one value on the axis."""
         return float(self.place(np.asarray(value, dtype=np.float64)))
 
     def ticks(self) -> list[tuple[float, str]]:
@@ -146,7 +146,7 @@ def draw_axes(across: Axis, up: Axis, x_label: list[str], y_label: list[str]) ->
 
 
 def _apart(ticks: list[tuple[float, str]]) -> list[tuple[float, str]]:
-    """Return those ticks whose labels do not touch the ones before."""
+    """Return the ticks whose labels do not touch the label before."""
     kept: list[tuple[float, str]] = []
     free = -math.inf
     for x, label in ticks:

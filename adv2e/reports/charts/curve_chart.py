@@ -87,7 +87,7 @@ def _side_by_side(given: Sequence[Curve]) -> Markup:
 
 
 def _is_one(curve: Curve) -> bool:
-    """Tell whether both models are the same: nothing was found, and one is drawn."""
+    """Tell whether both models are the same: no effect was found, and one curve is drawn."""
     pairs = zip(vars(curve.before).values(), vars(curve.after).values(), strict=True)
     return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
@@ -102,7 +102,7 @@ def _unlike(curve: Curve) -> float:
 
 
 def _legend(wording: Wording, *, two: bool) -> Markup:
-    """Return what the lines and bands of all curves are."""
+    """Return the legend of all curves: lines and bands."""
     entries = [("measured", "measured"), ("before", "before: the declared model")]
     if two:
         entries.append(("after", "after: the model found"))
@@ -148,7 +148,7 @@ def curve_chart(curve: Curve) -> Markup:
 
 
 def _description(curve: Curve) -> str:
-    """Return what the picture shows, for those who do not see it."""
+    """Return the alternative text of a curve, for screen readers."""
     known = np.isfinite(curve.measured)
     inside = [
         int(np.sum(known & (curve.measured >= band.low) & (curve.measured <= band.high)))

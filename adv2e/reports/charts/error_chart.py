@@ -15,7 +15,7 @@ _MEANINGS = {
     "after": "model found",
     "floor": "chance alone",
 }
-"""What each bar is of."""
+"""Meaning of each bar: its model, or chance."""
 
 
 def error_chart(row: ErrorRow, *, changed: bool = True) -> Markup:
