@@ -34,7 +34,7 @@ LOW = HIGH + LANES
 """Bounds of the noise at the comparator over the piece."""
 
 _KNOWN = LOW + LANES
-"""1 where the cells between a sample and the next are drawn, a row for each sample."""
+"""Flags, a row for each sample: 1 if the cells between it and the next sample are drawn."""
 
 _BY = _KNOWN + MOST_CELLS * LANES
 _FIRST_BY = _BY // LANES
