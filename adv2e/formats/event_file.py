@@ -268,7 +268,7 @@ class EventFile:
 
     @property
     def inputs(self) -> list[str | Path]:
-        """All files that are read, and the folder they are in: where nothing may be written."""
+        """Files that are read, and their folder, where nothing may be written."""
         shots = self.shots() if self.shots is not None and self.facts.path.is_dir() else ()
         return [self.facts.path, *self.facts.inputs, *(shot.label for shot in shots)]
 

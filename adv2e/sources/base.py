@@ -66,7 +66,7 @@ class Source(ABC):
     whole : Size
         Size of the frames before they are cut.
     light : Light
-        What the numbers of the frames stand for; `encoding` and `full_scale` are those of it.
+        Encoding and white of the frames; `encoding` and `full_scale` are its attributes.
     largest : float or None
         Largest number of the frames that were looked at when it was opened; None: of none.
     largest_read : float

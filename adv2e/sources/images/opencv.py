@@ -168,8 +168,8 @@ def _decode_tiff(data: bytes, label: str) -> Pixels:
 _CUT = re.compile(
     rb"[Pp]remature end|bad Huffman code|found marker|[Ii]nconsistent progression|bad arithmetic"
 )
-"""Messages of libjpeg after which it fills the picture with grey.  Foreign bytes between parts do no
-harm."""
+"""Messages of libjpeg after which it fills the picture with grey.  Foreign bytes between parts do
+no harm."""
 
 
 def _decoded(data: bytes, label: str) -> tuple[Any, int, str]:
