@@ -139,7 +139,7 @@ class OrderedWork:
             self.abandon()
 
     def abandon(self) -> None:
-        """Drop what has not begun and end the threads."""
+        """Drop tasks that have not begun, and end the threads."""
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
         self._pending.clear()

@@ -1,7 +1,7 @@
-"""Why an event came: the numbers and names of the causes, and events that know theirs.
+"""Causes of events: their numbers and names, and events with a cause each.
 
 ====== ==================== ====================================================================
-number name                 what made the event
+number name                 cause of the event
 ====== ==================== ====================================================================
 0      signal               the light
 1      leak                 leak of the reference
@@ -48,10 +48,10 @@ CAUSES = (
 ) = range(len(CAUSES))
 
 CAUSE_BITS = 3
-"""Bits that hold any of the numbers."""
+"""Bits of the largest number of a cause."""
 
 CAUSED_DTYPE = np.dtype([*EVENT_DTYPE.descr, ("cause", "u1")])
-"""The record of an event that knows its cause."""
+"""The record of an event with its cause."""
 
 
 def has_causes(events: Events) -> bool:

@@ -62,7 +62,7 @@ def sources() -> list[Path]:
 
 @cache
 def code_cache() -> CodeCache:
-    """Return where code is kept; found, and made, when code is first wanted."""
+    """Return the cache of compiled code; its folder is made when code is first wanted."""
     digest = hashlib.sha256(f"{sys.version_info[:2]} {version('numba')}".encode())
     for path in sources():
         digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
@@ -70,7 +70,7 @@ def code_cache() -> CodeCache:
 
 
 class Compiled:
-    """A compiled function; what Numba wants to know of one is asked of its `dispatcher`."""
+    """Compiled function; Numba's attributes of it are those of its `dispatcher`."""
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         update_wrapper(self, function)

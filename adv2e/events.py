@@ -128,7 +128,7 @@ def by_time(events: Events) -> Events:
 
 
 def repeated(events: Events) -> int:
-    """Return how many events, sorted by time, repeat another one."""
+    """Return the number of events, sorted by time, that repeat another one."""
     t = events["t"]
     tied = np.zeros(events.size, np.bool_)
     np.equal(t[1:], t[:-1], out=tied[1:])

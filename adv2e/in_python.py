@@ -1,4 +1,4 @@
-"""Public functions as Python users meet them: what they tell names arguments, not options.
+"""Public functions for Python users: their messages name arguments, not options.
 
 Errors and doubts are worded for the command line, below which most of them arise.  The names in
 ``adv2e.__all__`` lead to functions that reword them.
@@ -26,7 +26,7 @@ _OPTION = re.compile(r"'adv2e [^']*'|(?<![\w-])--([a-z][a-z0-9-]*)(?: ([A-Z]+\b|
 
 
 def in_python(text: str) -> str:
-    """Return what is said of options as said of arguments: ``--fps F`` becomes ``fps=F``."""
+    """Return a message with arguments in the place of options: ``--fps F`` becomes ``fps=F``."""
 
     def argument(found: re.Match[str]) -> str:
         if found[1] is None:

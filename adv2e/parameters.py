@@ -23,7 +23,7 @@ _MANY_BITS = 256
 
 @dataclass(frozen=True)
 class Fit:
-    """Where a fit looks for a parameter, in its unit.
+    """Search range of a fit for a parameter, in its unit.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Fit:
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """What is known of one key besides its name, type and default."""
+    """Unit, meaning, range and source of one key, besides its name, type and default."""
 
     unit: str
     meaning: str
@@ -59,10 +59,10 @@ class Parameter:
     choices: tuple[str, ...] | None = None
     source: str = ""
     fit: Fit | None = None
-    """How a diagnosis may fit it; None: it does not."""
+    """Search range for a diagnosis; None: it does not fit this key."""
 
     def complaint(self, value: Any) -> str | None:
-        """Return what is wrong with `value`, or None; each part of a tuple is checked."""
+        """Return the error text for `value`, or None; each part of a tuple is checked."""
         if isinstance(value, tuple):
             return next(filter(None, map(self.complaint, value)), None)
         if self.choices is not None and value not in self.choices:
@@ -109,14 +109,14 @@ def subsection(default: Any, *, meaning: str) -> Any:
 
 @dataclass(frozen=True)
 class Kind:
-    """What the type of a key says."""
+    """Type of a key: scalar, tuple or section, and whether None is allowed."""
 
     kind: type
     """int, float, str, bool, tuple or the class of a section."""
     optional: bool
-    """Whether the value may be None."""
+    """True if the value may be None."""
     parts: tuple[type, ...] = ()
-    """Of a tuple: the kind of each part."""
+    """Types of the parts of a tuple."""
 
     def with_floats(self, value: Any) -> Any:
         """Return `value` with floats for whole numbers, by itself or in a tuple, that may be any.
@@ -136,7 +136,7 @@ class Kind:
 
 @cache
 def kinds_of(section: type[Any]) -> dict[str, Kind]:
-    """Return what the types of a section's keys say, by name.
+    """Return the types of a section's keys, by name.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Times as whole numbers of 64 bits, whatever a file has them in: one conversion, one check.
+"""Timestamps as whole numbers of 64 bits, from the number types of files: conversion and check.
 
-Frames are timed in nanoseconds and events in microseconds.  Half of what 64 bits hold is the limit
-for both, so that no difference and no offset of two times leaves them.
+Frames are timed in nanoseconds and events in microseconds.  Half of the range of 64 bits is the
+limit for both, so that no difference and no offset of two times leaves them.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def to_ticks(times: NDArray[Any], unit_ns: int, tick_ns: int, label: str) -> NDA
 
 
 def in_ticks(times: NDArray[Any], unit_ns: int, tick_ns: int) -> NDArray[np.int64]:
-    """Return what :func:`to_ticks` does of times that were checked."""
+    """Return the ticks of times that were checked, as :func:`to_ticks` does."""
     if unit_ns < tick_ns:
         ticks = tick_ns // unit_ns
         if times.dtype.kind == "f":

@@ -130,7 +130,7 @@ class CodeCache:
 
 
 def _bases() -> list[Path]:
-    """Return where the folder may lie, the best first."""
+    """Return the possible parents of the cache folder, the best first."""
     told = [os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME")]
     if sys.platform == "win32":
         told.append(os.environ.get("LOCALAPPDATA"))
@@ -158,7 +158,7 @@ def _listed(folder: Path) -> dict[str, Any]:
 
 
 def _note_use(folder: Path) -> None:
-    """Remember that the code in `folder` is in use; once a day, remove what nobody has used."""
+    """Note that the code in `folder` is in use; once a day, remove folders out of use."""
     now = time.time()
     with suppress(OSError):  # of no matter to whoever wants to compute
         noted = folder / _USED

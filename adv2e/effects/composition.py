@@ -28,7 +28,7 @@ _COURSES: dict[str, tuple[str, int | None, np.ufunc]] = {
     "on": ("thresholds", 0, np.multiply),
     "off": ("thresholds", 1, np.multiply),
 }
-"""Method that gives each course, which part of what it returns, and how effects combine."""
+"""Method of each course, index of the course in its result, and operation that combines effects."""
 
 
 def overrides(hook: Hooks, method: str) -> bool:
@@ -76,7 +76,7 @@ def _light(hook: Hooks, frames: Frames, shape: tuple[int, ...]) -> Frames:
 
 
 def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
-    """Return what the effects add inside the pixel, as one; None: nothing."""
+    """Return the combined courses of all effects inside the pixel; None: there are none."""
     courses: dict[str, Course] = {}
     for name, (method, part, combine) in _COURSES.items():
         of = [hook for hook in hooks if overrides(hook, method)]
@@ -96,7 +96,7 @@ def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
 
 
 def _cause_of_signal(hooks: Sequence[Hooks]) -> int:
-    """Return the cause of events by what the effects add to the signal."""
+    """Return the cause of events by additions of the effects to the signal."""
     return OWN_EFFECT if any(map(_is_own, _adding(hooks))) else FRAME_COUPLING
 
 
@@ -255,7 +255,7 @@ class _Watched:
 
 @contextmanager
 def blamed(hook: Hooks, source: _Watched | None = None) -> Iterator[None]:
-    """Turn what goes wrong in code that is not the package's own into an error that says where."""
+    """Turn exceptions in code of a user's own effect into a DataError with file and line."""
     try:
         yield
     except Adv2eError:

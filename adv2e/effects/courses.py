@@ -1,4 +1,4 @@
-"""What effects outside the kernel add to the pixels, as functions of time.
+"""Courses: gains, signals, thresholds and events that effects add to the pixels, by time.
 
 Times are in seconds on the recording's clock, that of the frames.  Between the ends of a step every
 course is a straight line.  A course gives one value a time, (n, 1), for all pixels alike, or one a
@@ -20,13 +20,13 @@ LONGEST_US = 100.0
 """Longest step in which the circuit is solved, and courses are followed unless they say more."""
 
 Course = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-"""From times [s], (n,), to values, (n, 1) or (n, pixels)."""
+"""Function from times [s], (n,), to values, (n, 1) or (n, pixels)."""
 
 StepLimit = Callable[[float, float], float]
-"""From two times [s] to the longest step that resolves the courses between them [us]."""
+"""Function from two times [s] to the longest step that resolves the courses between them [us]."""
 
 Injection = Callable[[float, float], NDArray[Any]]
-"""From t0, t1 [s] to the events in [t0, t1), as INJECTED_DTYPE, sorted by time."""
+"""Function from t0, t1 [s] to the events in [t0, t1), as INJECTED_DTYPE, sorted by time."""
 
 INJECTED_DTYPE = np.dtype([("t", "<f8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
 """Events to be injected: time [s], column, row, polarity (1 ON, 0 OFF)."""
@@ -52,7 +52,7 @@ class Additions:
     inject : Injection, optional
         Events that fire whenever their pixel is not in its dead time, as those of hot pixels do.
     cause : int
-        That of events by `signal`.
+        Cause of events by `signal`.
     """
 
     longest_step_us: StepLimit

@@ -49,7 +49,7 @@ _OWN_STREAMS = 1 << 31
 
 @dataclass(frozen=True)
 class View:
-    """What an effect is told of a recording before it begins.
+    """Size, seed and start of a recording, as an effect gets them before it begins.
 
     Attributes
     ----------
@@ -153,11 +153,11 @@ class Hooks:
         return None
 
     def drive(self, times_s: Times) -> NDArray[Any] | None:
-        """Return what is added to the log intensity [ln], (n,) or (n, rows, columns)."""
+        """Return the addition to the log intensity [ln], (n,) or (n, rows, columns)."""
         return None
 
     def signal(self, times_s: Times) -> NDArray[Any] | None:
-        """Return what is added to the signal behind all poles [ln], (n,) or (n, rows, columns)."""
+        """Return the addition to the signal behind all poles [ln], (n,) or (n, rows, columns)."""
         return None
 
     def thresholds(self, times_s: Times) -> tuple[NDArray[Any], NDArray[Any]] | None:

@@ -1,4 +1,4 @@
-"""Events that come nearly in order, handed on in order."""
+"""Reorder buffer: sorts events that come nearly in the order of time."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from adv2e.events import Events, empty_events, sort_events
 
 
 def count_before(events: Events, t_us: int) -> int:
-    """Return how many of the sorted events come before a time [us]."""
+    """Return the number of the sorted events before a time [us]."""
     # NumPy's search would copy the column
     return bisect_left(range(events.size), t_us, key=lambda k: int(events["t"][k]))
 
 
 class InOrder:
-    """Hands events on in order; those at and after the time up to which all are known wait."""
+    """Hands events on in order; events at and after the time up to which all are known wait."""
 
     def __init__(self) -> None:
         self._held: Events | None = None
 
     def add(self, events: Events, end_us: int) -> Iterator[Events]:
-        """Yield what is in its place for good once `events` are in.
+        """Yield the events whose order is final once `events` are in.
 
         Parameters
         ----------

@@ -1,8 +1,8 @@
-"""Files that state more than they hold: how far what is packed may grow when it is read.
+"""Decompression bombs: limit of the growth of compressed data when they are read.
 
-Deflate packs a thousand zeros into one byte, and HDF5 a whole dataset of them into none.  What is
-read into memory at once must not grow so, whoever wrote the file; recordings and images are packed
-to a tenth, a picture of one colour to a hundredth.
+Deflate packs a thousand zeros into one byte, and HDF5 a whole dataset of them into none.  Data that
+are read into memory at once must not grow so, whoever wrote the file; recordings and images are
+compressed to a tenth, a picture of one colour to a hundredth.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from typing import Any
 from adv2e.errors import DataError
 
 FREE = 64 << 20
-"""Whatever is this small may be of any making [bytes]."""
+"""Uncompressed size up to which any growth is allowed [bytes]."""
 
 MOST = 200
-"""Bytes that one byte of a file may stand for."""
+"""Largest growth: uncompressed bytes for one byte of a file."""
 
 
 def check_expansion(stated: int, held: int, label: str) -> None:
-    """Raise DataError if something states more than 64 MiB and 200 times the bytes it holds."""
+    """Raise DataError if the stated size exceeds both 64 MiB and 200 times the bytes held."""
     if stated > FREE and stated > MOST * held:
         raise DataError(
             f"{label}: states {stated:,} bytes and holds {held:,}; what grows more than"
@@ -28,7 +28,7 @@ def check_expansion(stated: int, held: int, label: str) -> None:
 
 
 def expand(reader: Any, data: bytes, label: str, errors: tuple[type[Exception], ...]) -> bytes:
-    """Return what packed data stand for, if that is no more than they can well be.
+    """Return the uncompressed data, if they grow no further than is allowed.
 
     Parameters
     ----------
@@ -36,14 +36,14 @@ def expand(reader: Any, data: bytes, label: str, errors: tuple[type[Exception], 
         As those of :mod:`bz2` are, not used yet.
     data : bytes
     label : str
-        What they are called, for messages.
+        Name of the data, for messages.
     errors : tuple of exceptions
-        What the reader raises.
+        Exceptions of the reader for damaged data.
 
     Raises
     ------
     DataError
-        They are damaged, cut short, or grow more than 200-fold beyond 64 MiB.
+        The data are damaged, cut short, or grow more than 200-fold beyond 64 MiB.
     """
     most = max(FREE, MOST * len(data))
     try:

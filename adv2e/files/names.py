@@ -26,7 +26,7 @@ def shown(name: str | Path) -> str:
 
 
 def beside(path: Path, ending: str) -> Path:
-    """Return what lies beside a file or folder and has its name with an ending, also of ``.``."""
+    """Return the path beside a file or folder with its name and an ending, also of ``.``."""
     whole = path if path.name.strip(".") else path.resolve()
     return whole.parent / f"{whole.name}{ending}"
 

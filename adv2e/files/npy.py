@@ -29,7 +29,7 @@ _LONGEST = 10_000
 
 @dataclass(frozen=True)
 class Header:
-    """What stands before the numbers.
+    """Header of a ``.npy`` file: data type, shape, order, and start of the data.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Header:
     fortran : bool
         The first index runs fastest.
     begin : int
-        Where the numbers begin [bytes].
+        Offset of the first number [bytes].
     """
 
     dtype: np.dtype[Any]

@@ -1,4 +1,4 @@
-"""Files that end: what is to be read is a file, and no pipe, device or socket that never does.
+"""Regular files: an input must end, which a pipe, a device or a socket may never do.
 
 Text that people hand over by the shell, ``-c <(...)`` or ``--timestamps /dev/stdin``, comes through
 descriptors that are open already; there somebody writes, and it is read to its end.
@@ -14,7 +14,7 @@ from typing import BinaryIO, cast
 from adv2e.errors import Adv2eError, DataError
 
 _LONGEST = 64 << 20
-"""Text that comes through a descriptor is no longer [bytes]."""
+"""Most text that is read from a descriptor [bytes]."""
 
 
 def check_ends(path: Path, kind: type[Adv2eError] = DataError) -> None:
@@ -36,7 +36,7 @@ def check_ends(path: Path, kind: type[Adv2eError] = DataError) -> None:
 
 
 def read_text_bytes(path: Path, kind: type[Adv2eError] = DataError) -> bytes:
-    """Return what a small text file holds, or what comes through a descriptor that is open.
+    """Return the bytes of a small text file, or of a descriptor that is open.
 
     Raises
     ------

@@ -27,14 +27,14 @@ from adv2e.files.workspace import Workspace, remove_abandoned
 from adv2e.process import cleanup
 
 Identity = tuple[int, int]
-"""What tells a file or folder from all others, by whatever name: device and inode."""
+"""Identity of a file or folder under any name: device and inode."""
 
 
 @dataclass(eq=False)
 class _Output:
-    """One file or folder: as the user named it, where it will lie, where it is written, and whose.
+    """Output file or folder: as the user named it, its final and its temporary path, its workspace.
 
-    `identity` is that of what was written.
+    `identity` is that of the file or folder that was written.
     """
 
     named: Path
@@ -45,7 +45,7 @@ class _Output:
 
     @property
     def is_placed(self) -> bool:
-        """Whether what was written has the final name."""
+        """True if the output that was written has the final name."""
         return self.identity is not None and _identity_of(self.final) == self.identity
 
 
@@ -61,7 +61,7 @@ class Staging(cleanup.Unfinished):
     overwrite : bool
         Outputs that exist are replaced, at the end.
     inputs : iterable of str or Path
-        What is read, where nothing may be written; see :func:`check_distinct`.
+        Files that are read, where nothing may be written; see :func:`check_distinct`.
     """
 
     def __init__(self, overwrite: bool, inputs: Iterable[str | Path] = ()) -> None:
@@ -124,7 +124,7 @@ class Staging(cleanup.Unfinished):
         return self._add(path, final)
 
     def _final(self, path: Path) -> Path:
-        """Return where `path` leads: a symbolic link stays, and what it points to is replaced."""
+        """Return the path with links resolved: a symbolic link stays, its target is replaced."""
         check_distinct(path, self._inputs)
         final = Path(os.path.realpath(path))
         if not final.name:
@@ -268,7 +268,7 @@ class Staging(cleanup.Unfinished):
 
 
 def _identity_of(path: Path) -> Identity | None:
-    """Return the identity of what has a name; None: nothing has it."""
+    """Return the identity of the file or folder at `path`; None: there is none."""
     try:
         status = path.lstat()
     except OSError:
@@ -277,13 +277,13 @@ def _identity_of(path: Path) -> Identity | None:
 
 
 def nearest_there(path: Path) -> Path:
-    """Return what a file or folder would be made in: the nearest above it that exists."""
+    """Return the nearest folder above a path that exists, in which the path would be made."""
     return next(above for above in path.parents if os.path.lexists(above))
 
 
 @contextmanager
 def writing(name: str | Path) -> Iterator[None]:
-    """Make what the system raises in the body, such as that the disk is full, name the output."""
+    """Turn an OSError in the body, such as a full disk, into an OutputError with the name."""
     try:
         yield
     except BrokenPipeError:  # of standard output: nobody reads any more
@@ -293,7 +293,7 @@ def writing(name: str | Path) -> Iterator[None]:
 
 
 def _reason(error: OSError) -> str:
-    """Return what the system says, which HDF5 wraps in addresses and offsets."""
+    """Return the message of the system, which HDF5 wraps in addresses and offsets."""
     text = error.strerror or str(error)
     inner = re.search(r"error message = '([^']*)'", text)
     return inner[1] if inner else text

@@ -1,4 +1,4 @@
-"""What files and folders hold, told by size and time at a glance, and by a digest for certain."""
+"""Change detection of files and folders: size and time at a glance, SHA-256 for certain."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ _BLOCK = 1 << 20
 
 @dataclass(frozen=True)
 class State:
-    """A file or folder at a glance.
+    """Size, number of files and time of change of a file or folder.
 
     Attributes
     ----------
     bytes : int
-        Of all files.
+        Size of all files.
     files : int
+        Number of files.
     changed_ns : int
-        When the last of them changed.
+        Time of the last change of any file.
     """
 
     bytes: int
@@ -71,7 +72,7 @@ def digest_of(path: Path) -> str:
 
 
 def digest_of_values(*values: Any) -> str:
-    """Return the SHA-256 of what can be written as JSON."""
+    """Return the SHA-256 of values that can be written as JSON."""
     text = json.dumps(values, sort_keys=True, ensure_ascii=True, allow_nan=False)
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 

@@ -1,9 +1,9 @@
-"""Hidden folders in which outputs are written, and what killed runs left of them.
+"""Hidden folders in which outputs are written, and removal of those that killed runs left.
 
 A run holds a lock on a file in its folder for as long as it lives; the system lets go of the lock,
 however the run ends.  So a folder whose file can be locked is abandoned, and the next run beside it
-removes it.  Where files cannot be locked none looks abandoned, and what a run on another machine
-made is left alone: a file system may not know of locks elsewhere.
+removes it.  Where files cannot be locked none looks abandoned, and the folder of a run on another
+machine is left alone: a file system may not know of locks elsewhere.
 
 Such a folder may also come from elsewhere, in an archive, made by anybody.  So nothing in it says
 what to do: no name is read from it, nothing is moved out of it, and it goes only if it holds
@@ -31,7 +31,7 @@ _NAME = re.compile(r"\.adv2e\.[0-9a-f]{8}\.part-?")
 _LOCK, _OLD = "lock", "old"
 _WRITTEN = re.compile(r"lock|new[0-9]+[A-Za-z0-9._-]*", re.ASCII)
 _LONGEST = 1 << 10
-"""Bytes that a lock may hold."""
+"""Most bytes that are read from a lock file."""
 
 
 class Workspace:
@@ -40,7 +40,7 @@ class Workspace:
     Parameters
     ----------
     folder : Path
-        That of the outputs.
+        Folder of the outputs.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -49,15 +49,15 @@ class Workspace:
 
     @property
     def is_made(self) -> bool:
-        """Whether it is there."""
+        """True if the folder was made."""
         return self._lock is not None
 
     def written(self, name: str) -> Path:
-        """Return where an output is written, of a name that begins with its number."""
+        """Return the path at which an output is written; `name` begins with its number."""
         return self.path / f"new{name}"
 
     def aside(self, name: str) -> Path:
-        """Return where what has the final name `name` lies while another takes its place."""
+        """Return the path of the old file of the final name `name` during its replacement."""
         return self.path / _OLD / name
 
     def make(self) -> None:
@@ -73,7 +73,7 @@ class Workspace:
                 )
 
     def put_aside(self, final: Path, *, linked: bool = False) -> None:
-        """Move what has a final name beside the folder into it; `linked`: it may keep its name."""
+        """Move the old file of a final name into the folder; `linked`: it may keep its name."""
         aside = self.aside(final.name)
         aside.parent.mkdir(exist_ok=True)
         if linked:
@@ -83,7 +83,7 @@ class Workspace:
         final.rename(aside)
 
     def put_back(self, final: Path) -> None:
-        """Give what lies aside its final name again, if that is free."""
+        """Give the old file its final name again, if that is free."""
         aside = self.aside(final.name)
         with suppress(OSError):
             if not os.path.lexists(final):
@@ -92,17 +92,17 @@ class Workspace:
                 aside.unlink()
 
     def drop_aside(self) -> None:
-        """Remove what lies aside: something else has its place."""
+        """Remove the old files: their replacements have their names."""
         shutil.rmtree(self.path / _OLD, ignore_errors=True)
 
     def hide(self) -> None:
-        """Rename the folder, so that whoever writes into it by its name does not any longer."""
+        """Rename the folder, so that writers that know it by name do not reach it any longer."""
         hidden = self.path.with_name(self.path.name + "-")
         self.path.rename(hidden)
         self.path = hidden
 
     def remove(self) -> None:
-        """Remove the folder and all in it, but for what lies aside and could not be put back."""
+        """Remove the folder and all in it, but for old files that could not be put back."""
         if self._lock is not None:
             with suppress(OSError):  # it is empty, or not there
                 (self.path / _OLD).rmdir()
@@ -113,7 +113,7 @@ class Workspace:
 
 
 def remove_abandoned(folder: Path) -> None:
-    """Remove what dead runs left in a folder; what is not as they leave it is warned of."""
+    """Remove the workspaces of dead runs in a folder; warn of those with foreign content."""
     with suppress(OSError):
         found = [entry for entry in os.scandir(folder) if _NAME.fullmatch(entry.name)]
         for entry in found:
@@ -131,7 +131,7 @@ def remove_abandoned(folder: Path) -> None:
 
 
 def _remove_if_abandoned(path: Path) -> str:
-    """Return why a folder that looks abandoned is left alone, or nothing."""
+    """Return the reason for which a folder that looks abandoned is left alone, or ''."""
     file = path / _LOCK
     if not os.path.lexists(file):
         path.rmdir()  # if it is empty: the run was killed before it could lock it
@@ -183,13 +183,13 @@ def is_ours(status: os.stat_result) -> bool:
 
 
 def _may_be_dead(told: bytes) -> bool:
-    """Tell whether a lock that is free tells of a dead run, which it does on one machine."""
+    """Tell whether a free lock means that its run is dead: if it was on this machine."""
     pairs = zip(told.split(b"\n"), _machine().split(b"\n"), strict=False)
     return not told or any(there == here != b"" for there, here in pairs)
 
 
 def _machine() -> bytes:
-    """Return what tells machines apart: the name, and what the system drew when it started."""
+    """Return an identifier of the machine: its name, and the random ID of its last boot."""
     name = os.uname().nodename if hasattr(os, "uname") else os.environ.get("COMPUTERNAME", "")
     start = b""
     with suppress(OSError):

@@ -23,12 +23,12 @@ _UNREADABLE = (
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, struct.error, OSError),
     *(NotImplementedError, RuntimeError, UnicodeDecodeError),
 )
-"""What reading an archive raises that is damaged, encrypted or packed in an unknown way."""
+"""Exceptions for an archive that is damaged, encrypted or compressed in an unknown way."""
 
 
 @contextmanager
 def unpacking(trouble: str) -> Iterator[None]:
-    """Make what an archive raises in the body a DataError that says `trouble`, and why."""
+    """Turn exceptions of an archive in the body into a DataError: `trouble`, and the reason."""
     try:
         yield
     except _UNREADABLE as error:
@@ -39,7 +39,7 @@ def unpacking(trouble: str) -> Iterator[None]:
 
 @contextmanager
 def zip_archive(path: Path, kind: str = "a zip archive") -> Iterator[zipfile.ZipFile]:
-    """Open an archive; what is wrong with it, when it is opened or read, is a DataError."""
+    """Open an archive; any fault of it, when it is opened or read, is a DataError."""
     with unpacking(f"{path}: not {kind} that can be read"), zipfile.ZipFile(path) as archive:
         yield archive
 
@@ -124,18 +124,18 @@ class Members:
         )
 
     def label(self, name: str) -> str:
-        """Return what a file is called in messages."""
+        """Return the name of a file for messages."""
         return str(self.path / name) if self._archive is None else f"{self.path}: {self._top}{name}"
 
     def size(self, name: str) -> int:
-        """Return how many bytes a file holds, or states."""
+        """Return the size of a file as the folder or the archive states it [bytes]."""
         if self._archive is None:
             return (self.path / name).stat().st_size
         return self._archive.getinfo(self._top + name).file_size
 
     @contextmanager
     def open(self, name: str) -> Iterator[IO[bytes]]:
-        """Open a file; what is wrong with it, when it is opened or read, is a DataError."""
+        """Open a file; any fault of it, when it is opened or read, is a DataError."""
         if self._archive is None:
             with (self.path / name).open("rb") as file:
                 yield file
@@ -145,7 +145,7 @@ class Members:
             yield file
 
     def read(self, name: str) -> bytes:
-        """Return what a file holds; DataError if it cannot be read."""
+        """Return the bytes of a file; DataError if it cannot be read."""
         try:
             with self.open(name) as file:
                 return file.read()

@@ -175,7 +175,7 @@ def _header(path: Path) -> tuple[list[str], int]:
 
 
 def _value(lines: list[str], key: str) -> str:
-    """Return what follows a key in the header."""
+    """Return the value of a key in the header, or ''."""
     return next((line[len(key) :].strip() for line in lines if line.startswith(key)), "")
 
 
@@ -199,7 +199,7 @@ def _likely(path: Path, begin: int) -> tuple[tuple[int, int], bool]:
 
 @dataclass(frozen=True)
 class _Frame:
-    """Where the samples of a frame are, and when they were taken."""
+    """Frame of a recording: range of its samples in the file, and its timestamp."""
 
     begin: int  # pairs
     end: int
@@ -208,7 +208,7 @@ class _Frame:
 
 
 def _samples(address: NDArray[np.uint32]) -> tuple[Numbers, NDArray[np.bool_]]:
-    """Return which words are samples of frames, and which of these are the signal."""
+    """Return the indices of words that are samples of frames, and which of these are the signal."""
     kind = address >> 10 & 3
     at = np.flatnonzero((address >> 31 == 1) & (kind <= 1))
     return at, kind[at] == 1

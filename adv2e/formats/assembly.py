@@ -1,9 +1,9 @@
-"""From columns as a file holds them to events in the order of time, with a list of what was wrong.
+"""Assembly of events in the order of time from the columns of a file, with a list of problems.
 
-All that the events of a file tell together is known once all were read: how large the sensor is,
-whether they are in order, whether the columns are what they are taken for.  Where they need not
-all be kept (:func:`events_in_order`) the file is therefore read twice.  Events of one time keep the
-order of the file.
+Some facts are known only once all events of a file were read: the size of the sensor, the order of
+timestamps, and whether each column is what it is taken for.  Where the events need not all be kept
+(:func:`events_in_order`) the file is therefore read twice.  Events of one time keep the order of
+the file.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from adv2e.sources.times.units import SETTLED
 from adv2e.ticks import check_us
 
 _STRAY = 1000
-"""One event of so many may have a polarity that is none."""
+"""Events of which one may have an impossible polarity."""
 _MOST_OUTSIDE = 0.01
 """Share of the events that may lie outside the sensor: stray ones."""
 _FEW = 100
-"""So few events may well lie in a small part of the recording."""
+"""Number of events below which they may well lie in a small part of the recording."""
 _APART = 300
 """Events and frames that differ in length by this factor are in doubt."""
 
@@ -214,7 +214,7 @@ class _Column:
 
 
 def storable(x: Column, y: Column) -> NDArray[np.bool_] | None:
-    """Return which coordinates a sensor can have; None: all."""
+    """Return a mask of the coordinates that a sensor can have, (n,) bool; None: all of them."""
     fits = (x >= 0) & (x < MOST_COLUMNS) & (y >= 0) & (y < MOST_COLUMNS)
     return None if fits.all() else fits
 
@@ -347,7 +347,7 @@ def _length(time_us: int) -> str:
 
 
 def _disagreement(events: Events, times_ns: NDArray[np.int64] | None) -> list[str]:
-    """Return what is to be told of events and frames that seem to be on different clocks."""
+    """Return a warning if events and frames seem to be on different clocks, else nothing."""
     if times_ns is None or len(times_ns) < 2 or len(events) < _FEW:
         return []
     begin, end = int(events["t"][0]) * 1000, int(events["t"][-1]) * 1000

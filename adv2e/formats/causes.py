@@ -34,7 +34,7 @@ NAMES = ",".join(CAUSES)
 
 
 def beside(path: Path) -> Path:
-    """Return where the causes of the events in `path` are."""
+    """Return the path of the causes of the events in `path`."""
     return beside_of(path, ".causes.txt")
 
 
@@ -53,7 +53,7 @@ def check_numbers(causes: NDArray[Any], label: str) -> None:
 
 
 def in_hdf5(path: Path) -> Callable[[], NDArray[Any]] | None:
-    """Return what reads the causes in an HDF5 file, None if it has none."""
+    """Return a function that reads the causes in an HDF5 file, None if it has none."""
     from adv2e.formats import hdf5  # noqa: PLC0415 - h5py takes its time
 
     with hdf5.opened(path) as file:
@@ -62,12 +62,12 @@ def in_hdf5(path: Path) -> Callable[[], NDArray[Any]] | None:
 
 
 def found_beside(path: Path) -> Callable[[], NDArray[Any]] | None:
-    """Return what reads the causes beside the events in `path`, None if there are none."""
+    """Return a function that reads the causes beside the events in `path`, None without any."""
     return partial(read_beside, beside(path)) if beside(path).is_file() else None
 
 
 def read_beside(path: Path) -> NDArray[np.uint8]:
-    """Return what a file beside holds.
+    """Return the causes in a file beside the events, (n,) uint8.
 
     Raises
     ------

@@ -31,23 +31,23 @@ MOST_BACK_US = 100_000
 
 CONTINUE, SORT = "continue", "sort"
 SET_BACK = (CONTINUE, SORT)
-"""What the user may say of times that go back."""
+"""Choices of the user for timestamps that go back."""
 
 _WRAPS = ((1 << 32, 0), (1 << 32, -1 << 31), (1 << 31, 0), (1 << 24, 0))
 """Range and lowest number of clocks."""
 _SHARE, _NARROW_SHARE = 64, 16
-"""Of the range, this part lies at its ends; of numbers of 32 bits."""
+"""Divisors of a clock's range for the width of its ends; the second one for 32-bit numbers."""
 
 Times = NDArray[Any]
 
 
 class _Wraps:
-    """Counts how often the numbers of a clock began again.
+    """Counts the wraps (overflows) of a clock.
 
     Parameters
     ----------
     bits : int
-        Of the clock, where the format says it: then any fall by half the range is a wrap.
+        Bits of the clock, where the format says it: then any fall by half the range is a wrap.
     """
 
     def __init__(self, bits: int = 0) -> None:
@@ -72,7 +72,7 @@ class _Wraps:
         return turns
 
     def _across(self, former: Times, latter: Times, slack: float) -> NDArray[np.bool_]:
-        """Tell where times go from the end of the range to its beginning.
+        """Return a mask of the times that go from the end of the range to its beginning (wraps).
 
         Numbers beyond the range are of a clock that somebody counted on for a while.
         """
@@ -128,11 +128,11 @@ class Clock:
     unit_ns : int
         Of the times [ns].
     bits : int
-        Of the clock, where the format says it.
+        Bits of the clock, where the format says it.
     set_back : {'continue', 'sort'}, optional
-        What to do where the user does not say it; default: an error.
+        Treatment of times that go back, where the user does not say it; default: an error.
     items : str
-        What has the times, for messages.
+        Name of the items that have the times, for messages.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class Clock:
         self._most: Any = None
         self._count = 0
         self.resets = 0
-        """How often the clock was set back."""
+        """Number of times that the clock was set back."""
         self._coarse_us = 0.0
         self._wrapped = self._reset = self._step = ""
         self.announced = False
@@ -162,7 +162,7 @@ class Clock:
 
     @property
     def offset(self) -> Any:
-        """What was added to the last time."""
+        """Offset that was added to the last time."""
         return 0 if self._last is None else self._before - self._last
 
     def ticks(self, times: Times, label: str) -> NDArray[np.int64]:
@@ -244,7 +244,7 @@ class Clock:
         return f"{float(ticks) * self._unit_ns / 1e9:.10g}"
 
     def tell(self) -> None:
-        """Tell what was done to the times until now."""
+        """Report the wraps and resets of the clock that were corrected until now."""
         if self._wrapped:
             size = self._wraps.modulus
             unit = next(name for name, ns in UNITS.items() if ns == self._unit_ns)

@@ -1,4 +1,4 @@
-"""What columns of events and sizes of sensors are called, and what columns hold that have no names.
+"""Names of event columns and sensor sizes; guesses for columns without names.
 
 ========== ============================ ============================================
 column     names                        meaning
@@ -32,7 +32,7 @@ from adv2e.errors import DataError
 from adv2e.sources.times.units import UNITS
 
 FEW = 20
-"""So few events tell nothing of their columns."""
+"""Number of events below which nothing can be told about their columns."""
 
 _TIMES = ("t", "ts", "time", "times", "timestamp", "timestamps")
 _NAMES = {
@@ -52,7 +52,7 @@ _COLUMNS_FIRST = (
     *("resolution", "sensor_size", "frame_size", "image_size", "camera_size", "geometry", "size"),
 )
 SIZE_NAMES = (*_ROWS_FIRST, *_COLUMNS_FIRST, *dict.fromkeys(n for pair in _SIDES for n in pair))
-"""What may state the size of a sensor, or a side of it."""
+"""Names of the size of a sensor, or of a side of it."""
 _STATED = re.compile(r"([a-z_][a-z_ ]*)[\s:=(\[]*(\d+)(?:\s*[x,*]?\s*(\d+))?")
 
 _UNIT_WORDS = {
@@ -118,7 +118,7 @@ def named_geometry(values: Mapping[str, Any]) -> tuple[str, tuple[int, int] | No
 
 
 def geometry_in(text: str) -> tuple[str, tuple[int, int] | None]:
-    """Return what :func:`named_geometry` does of the lines of a comment."""
+    """Return the sensor size in the lines of a comment, as :func:`named_geometry` does."""
     found: dict[str, Any] = {}
     for words, first, second in _STATED.findall(text.lower()):
         key = re.sub(r"[\W_]+", "_", words.strip())

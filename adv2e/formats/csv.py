@@ -50,7 +50,7 @@ _MOST_HEADING = 1 << 16  # bytes that a heading lies within
 _BETWEEN = re.compile(r"\s*[,;\t]\s*|\s+")
 _BLANK = bytes.maketrans(b',;\t"', b"    ")
 _TRUTH = ((b"True", b"1"), (b"False", b"0"), (b"true", b"1"), (b"false", b"0"))
-"""What pandas and others make of polarities that are true or false."""
+"""Spellings of boolean polarities, as pandas and others write them, and their numbers."""
 
 _BLOCK = 1 << 15  # events formatted at once
 
@@ -131,7 +131,7 @@ def _rows(begin: bytes) -> NDArray[np.float64]:
 
 
 def causes_of(path: Path) -> Callable[[], NDArray[Any]] | None:
-    """Return what reads the column of causes, None if there is none, as we write it."""
+    """Return a function that reads the column of causes; None without one as written here."""
     with path.open("rb") as file:
         begin = file.read(_MOST_HEADING)
     names, skipped, lines = _heading(path, begin)

@@ -55,5 +55,5 @@ class E2vidWriter(Writer):
                 del self._text[:_BLOCK]
 
     def finish(self) -> None:
-        """Write what is left."""
+        """Write the remaining lines."""
         self._file.write(self._text)

@@ -41,7 +41,7 @@ Progress = Callable[[int, int], None]
 
 
 class Facts:
-    """What an event file states, what the user says of it, and what is wrong with it.
+    """Facts about an event file: those it states, those the user gives, and its problems.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class Facts:
     progress : callable, optional
         Is told how far the reading is.
     rotate180 : bool
-        What is read will be turned by half a turn, as the user says; see :func:`rotated180`.
+        Events and frames will be turned by half a turn, as the user says; see :func:`rotated180`.
     track : str, optional
         Which of several streams the user wants: its number or its name.
     set_back : {'continue', 'sort'}, optional
-        What to do where times go back; see :mod:`adv2e.formats.clock`.
+        Treatment of times that go back; see :mod:`adv2e.formats.clock`.
     crop_events : bool
         Leave out events outside the sensor, however many.
 
@@ -69,19 +69,19 @@ class Facts:
     has_chosen : bool
         The reader looked for the stream that the user wants.
     needs_unit : bool
-        Neither the format nor the file says the unit of its times: what the user says counts.
+        Neither the format nor the file says the unit of its times: that of the user counts.
     problems : list of str
-        What is doubtful and what was done about it.
+        Doubts about the file, and how they were resolved.
     description : dict
-        What the file says of itself, if this program wrote it.
+        Description in the file, if this program wrote it.
     geometry : (int, int) or None
         Width and height [pixels] that the file states.
     stated_by : str
-        What states them, for messages.
+        Name of the place that states the geometry, for messages.
     time_unit : str or None
-        What the user says.
+        Unit of the times that the user gives.
     stated_unit : str or None
-        What the file says: that of times that we wrote.
+        Unit of the times that the file states, if this program wrote it.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class Facts:
             self.problems.append(problem)
 
     def describe(self, text: str, label: str, name: str) -> None:
-        """Take what the file says of itself; if that is broken, note a problem.
+        """Take the description in the file; if it is broken, note a problem.
 
         Parameters
         ----------
@@ -139,7 +139,7 @@ class Facts:
             self.problems.append(f"{label}: not a JSON mapping, ignored")
 
     def describe_from(self, file: Path) -> None:
-        """Take what a file beside it says, as :meth:`describe`."""
+        """Take the description in a file beside it, as :meth:`describe` does."""
         self.inputs.append(file)
         text = file.read_text("utf-8", errors="replace")
         self.describe(text, str(file), file.name)
@@ -149,7 +149,7 @@ class Facts:
     def choose(
         self, events: Sequence[Track], frames: Sequence[Track] = ()
     ) -> tuple[int | None, int | None]:
-        """Return which of several streams are read, as :func:`adv2e.sources.tracks.choose`."""
+        """Return the streams to be read, as :func:`adv2e.sources.tracks.choose` does."""
         event, frame, told = choose(self.track, events, frames, self.path)
         self.has_chosen = True
         self.problems += told
@@ -167,7 +167,7 @@ class Facts:
 
     @property
     def light(self) -> Light:
-        """What the numbers of the frames stand for; see :func:`recorded_light`."""
+        """Encoding and white of the frames; see :func:`recorded_light`."""
         return recorded_light(self.description, str(self.path))
 
     def note_frames(self, unit: Unit, *, whole: bool) -> None:
@@ -268,7 +268,7 @@ class EventFile:
 
     @property
     def inputs(self) -> list[str | Path]:
-        """All files that are read, and the folder they are in: where nothing may be written."""
+        """Files that are read, and their folder, where nothing may be written."""
         shots = self.shots() if self.shots is not None and self.facts.path.is_dir() else ()
         return [self.facts.path, *self.facts.inputs, *(shot.label for shot in shots)]
 

@@ -118,7 +118,7 @@ def open_raw(path: Path, facts: Facts) -> EventFile:
 
 
 def _encoding(header: Header) -> tuple[str, dict[str, str]]:
-    """Return what the header says of the encoding: its name, and options."""
+    """Return the encoding that the header states: its name, and options."""
     name, *options = header.values.get("format", "").split(";")
     version = header.values.get("evt", "")
     pairs = (option.partition("=") for option in options)
@@ -164,7 +164,7 @@ class _Decoder:
         raise NotImplementedError
 
     def problems(self) -> list[str]:
-        """Return what is to be told of all words until now."""
+        """Return the problems of all words until now."""
         return self._kinds.problems()
 
 
@@ -322,7 +322,7 @@ DECODERS: dict[str, type[_Decoder]] = {
     "EVT21": Evt21Decoder,
     "EVT3": Evt3Decoder,
 }
-"""What decodes an encoding."""
+"""Decoders by the name of the encoding."""
 
 
 class Evt2Writer(Writer):

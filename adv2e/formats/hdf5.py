@@ -34,9 +34,9 @@ PART = 1 << 20
 """Events read at once."""
 
 SIDES = "left", "right"
-"""What layouts with several cameras call them."""
+"""Names of the cameras in layouts with several."""
 _SIDES = 3
-"""Numbers that may state the size of a sensor, the last of polarities."""
+"""Most numbers in a dataset with the size of a sensor; the third one counts polarities."""
 
 _LINKS = 16
 """Soft links on the way to one name, as in the library itself."""
@@ -48,12 +48,12 @@ _PLUGINS = {32001: "Blosc", 32004: "LZ4", 32008: "bitshuffle", 32015: "Zstandard
 """Filters of the package hdf5plugin that recordings use."""
 
 _FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError)
-"""What h5py raises for files that are damaged."""
+"""Exceptions of h5py for files that are damaged."""
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
-    """Open a file for reading; whatever the library finds wrong with it is a DataError."""
+    """Open a file for reading; any fault that the library finds is a DataError."""
     try:
         with h5py.File(path, "r") as file:
             yield file
@@ -110,7 +110,7 @@ def is_dataset(file: h5py.File, name: str) -> bool:
 
 
 def sides(file: h5py.File, pattern: str) -> list[str]:
-    """Return which cameras of a pair, left and right, have the dataset of a name with a ``*``."""
+    """Return the cameras of a pair, left and right, with the dataset of a name with a ``*``."""
     return [side for side in SIDES if is_dataset(file, pattern.replace("*", side))]
 
 
@@ -168,7 +168,7 @@ def number(file: h5py.File, name: str) -> int:
 
 
 def describe(file: h5py.File, facts: Facts, *groups: str) -> None:
-    """Take what a file says of itself, if this program wrote it, and of the size of its sensor.
+    """Take the description of a file, if this program wrote it, and the size of its sensor.
 
     The size may stand in attributes or small datasets, of the root and of the `groups`.
     """
@@ -214,7 +214,7 @@ def columns(file: h5py.File, names: tuple[str, ...]) -> list[h5py.Dataset]:
 
 
 def parts(path: Path, names: tuple[str, ...], facts: Facts) -> Iterator[Columns]:
-    """Yield what :func:`columns` returns, a part of the events at a time."""
+    """Yield the columns of :func:`columns`, a part of the events at a time."""
     with opened(path) as file:
         found = columns(file, names)
         for begin in range(0, found[0].size, PART):

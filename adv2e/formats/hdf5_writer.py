@@ -1,4 +1,4 @@
-"""What all layouts of HDF5 share that are written: chunks compressed beforehand, frames kept back.
+"""Base of the writers of HDF5 layouts: chunks compressed in threads, frames written last.
 
 HDF5 compresses in the thread that writes.  Here whole chunks are compressed in threads, into what
 its filters shuffle and deflate would read, and stored as they are, so that any reader of HDF5 opens
@@ -32,7 +32,7 @@ CHUNK = 1 << 16
 """Rows of a chunk."""
 
 FILTERS: dict[str, Any] = {"compression": "gzip", "compression_opts": 1, "track_times": False}
-"""Of a dataset whose chunks are zlib streams."""
+"""Options of a dataset whose chunks are zlib streams."""
 
 _CACHE_BYTES = 512 << 10
 """Memory for the index of chunks and images, as HDF5 counts it, a tenth of what it takes.
@@ -49,7 +49,7 @@ class Column(NamedTuple):
     name: str
     dtype: DTypeLike
     of: Callable[[Values], Values]
-    """Its rows, of some items."""
+    """Function from some items to the rows of the column."""
     width: int = 0
     """Numbers in a row; 0: it has one dimension."""
 
@@ -234,7 +234,7 @@ class Hdf5Writer(Writer):
             stack.id.write_direct_chunk((number, 0, 0), self.next_frame())
 
     def events_before(self, number: int) -> int:
-        """Return how many events are before a frame; those after which it came are read again."""
+        """Return the number of events before a frame; may read the timestamps around it again."""
         known = self._before[number] if number < len(self._before) else None
         if known is not None:
             return known
@@ -248,7 +248,7 @@ class Hdf5Writer(Writer):
         raise NotImplementedError
 
     def finish(self) -> None:
-        """Write what is left, and the attributes."""
+        """Write the remaining events, and the attributes."""
         self._events.flush()
         self.flush()
         self.work.finish()
@@ -266,11 +266,11 @@ class Hdf5Writer(Writer):
         """Hand over what is still to be compressed, after all events."""
 
     def complete(self) -> None:
-        """Write what follows the events, such as the frames."""
+        """Write the datasets behind the events, such as the frames."""
 
 
 class Milliseconds:
-    """For each millisecond the first event at it or after, so that parts of a file are found.
+    """Index of time: for each millisecond the first event at it or after.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from adv2e.formats.registry import FORMATS, Format
 _MOST_MAGIC = max(len(found.magic) for found in FORMATS)
 
 HDF5 = "h5"
-"""What ``--format`` calls HDF5 of any layout."""
+"""Name of HDF5 of any layout for ``--format``."""
 
 
 def layouts() -> list[str]:
@@ -23,7 +23,7 @@ def layouts() -> list[str]:
 
 
 def names() -> list[str]:
-    """Return what ``--format`` takes."""
+    """Return the names that ``--format`` takes."""
     return [HDF5, *(found.name for found in FORMATS if not found.is_hdf5 and found.writer)]
 
 

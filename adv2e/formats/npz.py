@@ -249,7 +249,7 @@ def _whole(label: str, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
 
 
 def causes_of(path: Path) -> Callable[[], NDArray[Any]] | None:
-    """Return what reads the causes of the events, None if the archive has none."""
+    """Return a function that reads the causes of the events, None if the archive has none."""
     with _archive(path) as archive:
         there = f"{_CAUSES}.npy" in archive.namelist()
     return partial(_read_causes, path) if there else None

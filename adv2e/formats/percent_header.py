@@ -62,7 +62,7 @@ class Header:
         return t0_us
 
     def tell(self, facts: Facts, geometry: tuple[int | None, int | None]) -> None:
-        """Tell what the header says of the file, width and height among it."""
+        """Hand the description in the header to `facts`, and the geometry, (width, height)."""
         if "adv2e" in self.values:
             facts.describe(self.values["adv2e"], f"{self.path}: header: adv2e", "the header")
         sizes = {"width": geometry[0], "height": geometry[1]}

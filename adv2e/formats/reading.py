@@ -190,7 +190,7 @@ def _read(path: Path, load: Callable[[], Loaded]) -> Loaded:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Make what the system says of a file in the body a DataError."""
+    """Turn an OSError about a file in the body into a DataError."""
     try:
         yield
     except OSError as error:

@@ -55,12 +55,12 @@ class Recording:
 
     @property
     def light(self) -> Light:
-        """What the numbers of the frames stand for; see :func:`recorded_light`."""
+        """Encoding and white of the frames; see :func:`recorded_light`."""
         return recorded_light(self.metadata, self.path)
 
     @property
     def encoding(self) -> str:
-        """What ``frames.encoding: auto`` means for the frames."""
+        """Encoding of the frames for ``frames.encoding: auto``."""
         return self.light.encoding
 
     def columns(self) -> dict[str, NDArray[Any]]:

@@ -71,12 +71,12 @@ class Format:
 
     @property
     def is_hdf5(self) -> bool:
-        """Whether it is a layout of HDF5."""
+        """True for layouts of HDF5."""
         return ".h5" in self.suffixes
 
     @property
     def is_davis240c(self) -> bool:
-        """Whether it is a whole recording, to which frames belong, with all their bits."""
+        """True for whole recordings (DAVIS 240C), with frames that keep all their bits."""
         return self.name in ("zip", "folder")
 
     def load(self, what: str) -> Any:

@@ -1,4 +1,4 @@
-"""What events and frames go to: it leaves a finished output or none."""
+"""Sink of events and frames: it leaves a finished output or none."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from adv2e.formats.registry import Format
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What is to be written, as :func:`adv2e.formats.writing.open_sink` was told."""
+    """Output that was asked of :func:`adv2e.formats.writing.open_sink`: path, size, options."""
 
     path: Path
     width: int
@@ -64,7 +64,7 @@ class Writer(ABC):
         raise NotImplementedError  # a format that takes frames says how
 
     def finish(self) -> None:  # noqa: B027
-        """Write what is left."""
+        """Write the remaining events and frames."""
 
 
 class Sink:
@@ -109,7 +109,7 @@ class Sink:
     def _place_of_causes(
         self, request: Request, staging: Staging, temporary: list[Path]
     ) -> Path | None:
-        """Return where causes are written beside the output; None: nowhere."""
+        """Return the path of the causes beside the output; None: they are not written there."""
         beside = causes.beside(request.path)
         if request.causes and not self._holds_causes:
             if not temporary:

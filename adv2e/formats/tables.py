@@ -20,14 +20,14 @@ from adv2e.sources.frame import Pixels, Shot
 from adv2e.ticks import NS, US, to_ticks
 
 _COARSE_US = 1 << 24
-"""From here on single precision has steps of more than 1 us."""
+"""Times from which on single precision has steps of more than 1 us [us]."""
 _FEW = 100
-"""So few times may all be even by chance."""
+"""Number of times below which all may be even by chance."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Where a layout has what.
+    """Datasets of a layout: events, frames and timestamps.
 
     Attributes
     ----------

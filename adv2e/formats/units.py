@@ -1,4 +1,4 @@
-"""In which unit the times of events are: one rule for every file.
+"""Unit of the timestamps of events: one rule for every file.
 
 Events come at any rate, so that their times tell less than those of frames
 (:mod:`adv2e.sources.times.units`), which decide where both are whole numbers, or neither is.  Else
@@ -13,7 +13,7 @@ others                                       in the unit that comes nearest to o
 fewer than 100                               us if whole numbers, told as a doubt; else s
 ============================================ ===============================================
 
-What no camera's rate is (`_FEWEST`, `_MOST`) is told, too.
+Event rates that no camera has (`_FEWEST`, `_MOST`) are told, too.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from adv2e.sources.times.units import SETTLED, UNITS, Unit, are_dates
 
 _FEW = 100
-"""So few events tell nothing of their unit."""
+"""Number of events below which nothing can be told about their unit."""
 _FEWEST = (1e-3, 1e3)
 """Events a pixel a second, and a second: both fewer is no camera's rate [Hz]."""
 _MOST = (1e3, 1e7)
@@ -114,6 +114,6 @@ def _are_fine(times: NDArray[Any]) -> bool:
 
 
 def _taken(unit: str, rate_hz: float | None = None) -> str:
-    """Return what is told of events whose unit is a guess."""
+    """Return the note on events whose unit is a guess."""
     rate = "" if rate_hz is None else f", {rate_hz:.3g} events a second"
     return f"no unit is stated: times are taken as {unit}{rate}; {SETTLED}"

@@ -81,15 +81,15 @@ class Counter:
 
 
 def last_before(values: NDArray[Any], which: NDArray[np.bool_], carry: int, at: Numbers) -> Numbers:
-    """Return what held at the words `at`: the last of `values` before each.
+    """Return the state at the words `at`: the last of `values` before each.
 
     Parameters
     ----------
     values : array, (words set in `which`,)
-        What these words say.
+        Values that these words set.
     which : array of bool, (words,)
     carry : int
-        What held before the first of them.
+        State before the first of them.
     at : array of int, (n,)
         None of those set in `which`.
     """
@@ -124,7 +124,7 @@ class Kinds:
             self._counts += np.bincount(kinds[~usual], minlength=16)
 
     def problems(self) -> list[str]:
-        """Return what is to be told of all words until now."""
+        """Return the problems of all words until now."""
         told = []
         if self.early:
             told.append(f"{self.early} events without a time, row or column before them: left out")

@@ -1,4 +1,4 @@
-"""Where events go: files of several formats, and standard output.
+"""Writing of events: files of several formats, and standard output.
 
 >>> from adv2e.events import make_events
 >>> from adv2e.formats.writing import open_sink

@@ -11,10 +11,10 @@ Two solvers, each a strip of pixels at a time through all intervals:
 
 and what they share:
 
-``circuit``         the record of the circuit; ``per_pixel`` what is kept of each pixel
-``first_state``     what differs from pixel to pixel before the first frame
-``comparator``      when a level counts as reached, and how an event fires; ``causes`` says why
-``leak``, ``noise``  what leak takes from the reference; events that come by themselves
+``circuit``         parameters of the circuit; ``per_pixel`` rows of the state of each pixel
+``first_state``     initial state of each pixel: thresholds (mismatch) and reference
+``comparator``      tolerance of a crossing, and how an event fires; ``causes`` says why
+``leak``, ``noise``  fall of the reference by leak; shot noise, hot pixels, photoreceptor noise
 ``quadrature``      Gauss rules for the lag at the end of an interval, or of a dead time
 ``special``         exponential and logarithm that vectorise and give the same bits everywhere
 ``rng``             random numbers as functions of seed, effect, pixel and draw

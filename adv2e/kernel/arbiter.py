@@ -1,4 +1,4 @@
-"""When the readout serves each event; see :mod:`adv2e.effects.readout.arbiter`."""
+"""Readout times of the events of one channel; see :mod:`adv2e.effects.readout.arbiter`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def serve(
     known : float
         Time before which no further event will come [us].
     channel : (4,)
-        When the channel is free; first row of the queue, rows in it, events that wait.
+        Time from which the channel is free; first row of the queue, rows in it, events that wait.
     queue : (rows,) int
         Rows that wait, in a ring, in the order of their first requests.
     asked : (rows,)
@@ -35,7 +35,7 @@ def serve(
     waiting : (pixels,) int8
         Polarity of the event that waits, or -1.
     left : (pixels,)
-        When the last event of each pixel went out.
+        Time at which the last event of each pixel was read out.
 
     Returns
     -------

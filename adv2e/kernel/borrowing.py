@@ -1,8 +1,9 @@
-"""Arrays without a share in their memory.
+"""Views whose reference counts Numba does not update (borrowed references).
 
-Numba counts who refers to an array, in a way that is safe among threads: a function of some
-arithmetic that takes eight arrays takes twice as long for it.  Functions that are called for each
-strip or pixel therefore begin by borrowing their arrays; whoever called them keeps the memory.
+Numba counts the references to each array atomically: a function of some arithmetic that takes eight
+arrays takes twice as long for it.  Functions that are called for each
+strip or pixel therefore begin by borrowing their arrays; their callers
+keep the memory.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Which cause an event has: what moved the signal or the reference most since the reset.
+"""Cause of an event: the part that moved signal or reference most since the last reset.
 
-At a reset the reference becomes the signal, which is the sum of what the light, the noise of the
-photoreceptor and what is added make of it.  From there on each of these moves by itself, and leak
-lowers the reference.  ``adv2e/effects/README.md`` has the rule in full.
+At a reset the reference becomes the signal, which is the sum of three parts: light, photoreceptor
+noise, and additions by effects.  From there on each part moves by itself, and leak lowers the
+reference.  ``adv2e/effects/README.md`` has the rule in full.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from adv2e.kernel import per_pixel
 
 @kernel
 def cause_by_leak(i, polarity, reference, circuit, state):
-    """Return SIGNAL or LEAK for a crossing of pixel i where nothing else moves anything.
+    """Return SIGNAL or LEAK for a crossing of pixel i where there is no other cause.
 
     reference : before the event
     """
@@ -33,7 +33,7 @@ def note_reset(i, reference, circuit, state):
 
 @kernel
 def cause_by_most(i, polarity, reference, light, noise, added, circuit, state):
-    """Return the cause of a crossing of pixel i: what moved most in its direction.
+    """Return the cause of a crossing of pixel i: the part that moved most in its direction.
 
     reference : before the event
     light, noise, added : the parts of the signal there

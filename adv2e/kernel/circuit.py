@@ -18,7 +18,7 @@ EXACT, FIRST_ORDER_HOLD, ZERO_ORDER_HOLD, EULER, PAPER = range(5)
 
 
 class Circuit(NamedTuple):
-    """What is the same for every pixel and interval.  Times in us, rates in 1/us, light in DN."""
+    """Parameters that all pixels and intervals share.  Times in us, rates in 1/us, light in DN."""
 
     update: int  # EXACT ... PAPER
     steps: int  # K

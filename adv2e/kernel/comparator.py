@@ -1,4 +1,4 @@
-"""What both solvers share of a pixel's comparator: when a level counts as reached, and an event."""
+"""Comparator of a pixel, for both solvers: tolerance of a crossing, and writing of an event."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What differs from pixel to pixel before the first frame: thresholds and references.
+"""Per-pixel initial state: thresholds (mismatch) and reference.
 
 The equations are those of :mod:`adv2e.effects.pixel.thresholds` and
 :mod:`adv2e.effects.pixel.initial_reference`.

@@ -78,7 +78,7 @@ def _met(dead, noise, period):
 
 @kernel
 def _crossed(to_level, left, noise, corner, speed):
-    """Return how often photoreceptor noise was expected to cross the threshold in this cycle.
+    """Return the expected number of crossings by photoreceptor noise in this leak cycle.
 
     to_level, left : distance of the threshold [ln] at the start of the cycle and now; speed : of
     the reference [ln/us].

@@ -115,10 +115,10 @@ def fill_first_noise(seed, rms, noise):
 
 @kernel
 def fill_first_seen(seed, rms, follower, corner, noise, seen):
-    """Draw what every pixel's noise is behind the second pole at the start.
+    """Draw every pixel's noise behind the second pole at the start, given that before it.
 
-    The two are stationary together: behind a pole of corner f2 [rad/us], noise of corner f1 has the
-    share c = f2/(f1 + f2) of its variance, and c times that is what both have in common.
+    Both are jointly stationary: behind a pole of corner f2 [rad/us], noise of corner f1 keeps the
+    share c = f2/(f1 + f2) of its variance, and the covariance of both is that same share.
     """
     for i in range(noise.shape[0]):
         share = follower / (follower + corner[i])

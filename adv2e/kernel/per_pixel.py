@@ -1,9 +1,9 @@
-"""What is kept of each pixel from interval to interval: rows of the state, one column a pixel."""
+"""State of each pixel from interval to interval: its rows, one column a pixel."""
 
 from __future__ import annotations
 
 NEVER = 1e300
-"""Time of what does not happen [us]."""
+"""Time of an event that does not happen [us]."""
 
 ROWS = 22
 

@@ -22,7 +22,10 @@ WITHIN_US = 0.01
 """Error of event times that a rule for an interval may make [us]."""
 
 WITHIN_DEAD_US = 0.001
-"""The same for a dead time: its end is a reference, which later events inherit."""
+"""Error of event times that a rule for a dead time may make [us].
+
+It is smaller: the signal at its end becomes the reference, which later events inherit.
+"""
 
 
 class Rules(NamedTuple):

@@ -128,7 +128,7 @@ def exponential(seed, stream, pixel, draw):
 
 @kernel
 def uniforms_of_pixels(seed, stream, first, u, v):
-    """Draw what `uniforms` gives for draw 0 of the pixels first.. into `u` and `v`.
+    """Draw the uniform numbers of :func:`uniforms`, draw 0 of pixels first.., into `u` and `v`.
 
     Vectorises, which a loop that goes on to call a logarithm of the C library does not.
     """

@@ -90,7 +90,8 @@ SIZE = 19 * STRIDE
 _f = np.float32
 _ZERO, _ONE, _TINY = _f(0.0), _f(1.0), _f(1e-30)
 BY_SIGNAL, WHEN_DUE, BY_ITSELF = _f(1.0), _f(2.0), _f(3.0)
-"""Of row HIT: its signal may reach a threshold, something else is due, or bounds do not hold."""
+"""Values of row HIT: the signal may cross a threshold, a noise event or an end of a dead time is
+due, or the bounds do not hold."""
 _REACH = _f(REACH)
 _MORE = _f(0.6)
 _AT_REST = _f(AT_REST)

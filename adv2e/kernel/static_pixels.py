@@ -1,10 +1,10 @@
 """Pixels at rest: constant light, no lag left, so that only leak and noise events move anything.
 
 The distance of the signal from the falling reference is a straight line: no place has to be
-searched for, and when a pixel is to be looked at next is known as soon as it is at rest.  So a
-strip goes block by block, not interval by interval: each from one interval in which something is
-due in it to the next.  What leak takes from the references in between is taken afterwards, interval
-by interval all the same, as the sum must round as it would if the strip were not at rest.
+searched for, and the time at which a pixel has to be solved next is known as soon as it is at
+rest.  So a strip goes block by block, not interval by interval: each from one interval in which a
+pixel of it is due to the next.  The fall of the references in between is subtracted afterwards,
+interval by interval all the same, as the sum must round as it would if the strip were not at rest.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _EARLY, _NEVER = _f(EARLY), _f(screen.NEVER)
 
 @kernel
 def _when(k, now, strip):
-    """When pixel k of the strip is to be looked at, its distance being that at `now`."""
+    """Time at which pixel k of the strip has to be solved, from its distance at `now`."""
     away = strip[screen.AWAY_0 + k]
     left = strip[screen.ON + k] - away
     leaked = (now + left / (strip[screen.FALL + k] + _TINY)) * _EARLY
@@ -59,7 +59,7 @@ def _note_soonest(b, strip):
 
 @kernel
 def begin_rest(now, strip):
-    """Find out when the pixels of a strip are to be looked at that comes to rest at `now`.
+    """Set the times at which pixels have to be solved, for a strip that comes to rest at `now`.
 
     Row FALL holds the fall of the references in a microsecond.
     """

@@ -1,4 +1,4 @@
-"""How the numbers of frames become light, as a configuration says."""
+"""Decoding of the numbers of frames to light, by encoding and white of a configuration."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ class _Axis:
 
 
 class Fitting:
-    """How frames of one size are brought to a sensor of another.
+    """Mapping of frames of one size to a sensor of another: crop, pad or stretch.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Fitting:
     sensor : Sensor
         The section of the configuration.
     label : str
-        What the frames are of, for messages.
+        Name of the source of the frames, for messages.
     margin : int
         Pixels that a sensor that moves needs on each side.
 
@@ -144,13 +144,13 @@ class Fitting:
         )
 
     def moved(self, offset: tuple[float, float]) -> Fitting:
-        """Return the same for a sensor that looks elsewhere: to the right and down [its pixels]."""
+        """Return the mapping for a sensor that is moved to the right and down [its pixels]."""
         moved = copy(self)
         moved._look(*offset)
         return moved
 
     def light(self, light: NDArray[Any], label: str) -> NDArray[np.float32]:
-        """Return what the sensor sees of the light [DN] of a frame, (rows, columns).
+        """Return the light [DN] on the sensor for a frame, (rows, columns).
 
         Raises
         ------
@@ -161,7 +161,7 @@ class Fitting:
         return self.plane(light)
 
     def plane(self, light: NDArray[Any]) -> NDArray[np.float32]:
-        """Return the same of light that is known to be right, or of a share of it."""
+        """Return the light on the sensor without a check of its range; also for shares of light."""
         # `take` would copy all of a part again and again
         single = np.ascontiguousarray(light[self._rows.used, self._columns.used], np.float32)
         seen = np.empty((self.size.height, self.size.width), np.float32)
@@ -172,9 +172,9 @@ class Fitting:
         return seen
 
     def placement(self) -> dict[str, Any]:
-        """Return where a point of the frame lies on the sensor, of that in the middle of its path.
+        """Return the mapping from frame to sensor, the sensor being in the middle of its path.
 
-        Of a point at (column, row) of the frame, from its upper left corner, it is
+        A point at (column, row) of the frame, from its upper left corner, lies at
         ``scale * (column, row) - scale * origin`` on the sensor.
         """
         pairs = zip(self.frames, self.size, self._scales, strict=True)
@@ -183,7 +183,7 @@ class Fitting:
         return {"fit": self._fit, "scale": scale, "origin": origin, "text": self.text()}
 
     def text(self) -> str:
-        """Return what is done, to follow the size that the frames have, after a comma."""
+        """Return the mapping in words, to follow the size of the frames and a comma."""
         if self._fit == "stretch":
             return f"stretched to {self.size}"
         scaled = "" if self._scaled == self.frames else f"scaled to {self._scaled}"
@@ -197,7 +197,7 @@ class Fitting:
 def fitting_of(
     width: int, height: int, sensor: Sensor | None, label: str, along: SensorPath | None = None
 ) -> Fitting | None:
-    """Return how frames are brought to the sensor; None where they stay as they are.
+    """Return the mapping of frames to the sensor; None if frames have the size of the sensor.
 
     A sensor that moves `along` a path sees all of the frames on its way; without a size of its own
     it has one that just fits.

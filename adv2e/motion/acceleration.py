@@ -1,4 +1,4 @@
-r"""How paths bend: what moves faster, slower or elsewhere by the next frame.
+r"""Acceleration along motion paths: the velocity of a pixel changes by the next frame.
 
 **Evenly.**  With f the motion of a pixel to the next frame and p that to the frame before, r times
 as far in time, the velocity changes by e = f + p / r from there to here, and the path through all
@@ -49,9 +49,12 @@ _LIKE_SPANS = 3.0
 _AROUND_PX = 2.0
 _KNOWN_LEAST = 0.2
 _UNEVEN = (0.2, 0.5)
-"""|1 - 2 t| up to which a path bends evenly, and from which on at once."""
+"""Values of |1 - 2 t| up to which a path bends evenly, and from which on at once."""
 _JUMP_PX = (1.5, 3.0)
-"""The same for the jump of velocity: smaller ones are told too badly to say when."""
+"""Jumps of velocity up to which a path bends evenly, and from which on at once [px per interval].
+
+The time of smaller jumps cannot be told from the frames.
+"""
 
 Plane = tuple[Image, Image]
 """Columns and rows [px] at the pixels of a frame."""
@@ -59,16 +62,16 @@ Plane = tuple[Image, Image]
 
 @dataclass(frozen=True)
 class Bend:
-    """How the paths of a frame's pixels leave the straight line.
+    """Deviation of the paths of a frame's pixels from the straight line.
 
     Attributes
     ----------
     even : Plane
-        c [px], of what accelerates evenly.
+        c [px] of pixels that accelerate evenly.
     jump : Plane
-        Change of the velocity of what is hit [px per interval].
+        Change of the velocity of pixels that are hit [px per interval].
     when : (rows, columns) float32
-        Share of the way to the other frame at which it is hit.
+        Share of the way to the other frame at which a pixel is hit.
     """
 
     even: Plane
@@ -118,8 +121,8 @@ def bends(
 def fastest(motion: Motion, bend: Bend | None) -> float:
     """Return the greatest speed on the paths of a frame's pixels [px per interval].
 
-    Velocity is linear in time but for its jump, so it is greatest at an end of what lies before the
-    jump, or behind it.  No path is faster; one that bends in both ways may be slower.
+    Velocity is linear in time but for its jump, so it is greatest at an end of the span before the
+    jump, or of that behind it.  No path is faster; one that bends in both ways may be slower.
     """
     if bend is None:
         return float(np.hypot(motion.u, motion.v).max())
@@ -141,7 +144,7 @@ def _is_like(span: float) -> bool:
 
 
 def _change(to: Motion, side: Side) -> Plane:
-    """Return how velocity changes at a frame; 0 where it is not known."""
+    """Return the change of velocity at a frame [px per interval]; 0 where it is not known."""
     away, span = side.motion, side.span
     known = ((to.score < ONE_SIDED) & (away.score < ONE_SIDED)).astype(np.float32)
     weight = _mean(known)
@@ -161,7 +164,7 @@ def _mean(image: NDArray[Any]) -> Image:
 
 
 def _bend(own: Plane, others: Plane, motion: Motion, spans: tuple[float, float]) -> Bend:
-    """Return the bend of the paths of a frame from how velocity changes there and at the other."""
+    """Return the bend of the paths of a frame from the changes of velocity at both frames."""
     rows, columns = motion.u.shape
     y, x = np.mgrid[:rows, :columns].astype(np.float32)
     x, y = x + motion.u, y + motion.v

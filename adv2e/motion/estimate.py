@@ -54,7 +54,7 @@ Image = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Motion:
-    """Where the pixels of one frame go by the time of the other.
+    """Optical flow: displacement of the pixels of one frame by the time of the other.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Motion:
     score : (rows, columns) float32
         Lower is more credible; from ONE_SIDED on not seen in the other frame, UNKNOWN: none.
     unexplained : float
-        How much the light changes along the motion as it was found, over its change in place.
+        Change of the light along the motion as it was found, over its change in place.
     """
 
     u: Image

@@ -210,7 +210,7 @@ class PixelArray:
     def _solutions(
         self, part: Part, frames: Frames, starts: NDArray[Any]
     ) -> Iterable[tuple[Any, ...]]:
-        """Return what the solver is told besides, for each call of it."""
+        """Return the further arguments of the solver, for each call of it."""
         if self._stepping is not None:
             return self._stepping.runs(part, frames, starts)
         circuit, lengths = self.circuit, np.diff(starts)

@@ -1,4 +1,4 @@
-"""From the configuration of the pixel to what the compiled code takes, and which code that is."""
+"""Circuit parameters for the compiled code from the configuration, and choice of the solver."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ _NO_KNEE = 1e300
 _PER_US = 1e-6
 
 METHODS = ("auto", "stepped")
-"""How the circuit is solved: by the fastest way that covers it, or in steps of time."""
+"""Solvers of the circuit: the fastest one that covers it, or steps of time."""
 
 
 def make_circuit(
     pixel: Pixel, sampling: Sampling, seed: int, causes: bool = False, added: int = FRAME_COUPLING
 ) -> Circuit:
-    """Return what the compiled code needs of the configuration; rates a us, corners in rad a us.
+    """Return the circuit of a configuration; rates [1/us], corners [rad/us].
 
-    With `causes`, events know theirs; `added` is that of what is added to the signal.
+    With `causes`, events have a cause each; `added` is the cause of events by additions to the
+    signal.
     """
     low_pass, follower, leak = pixel.low_pass, pixel.source_follower, pixel.leak
     knee_dn = pixel.log_response.linear_below

@@ -41,7 +41,7 @@ class Parted:
 
 
 def polarity_bits(causes: bool) -> int:
-    """Return how many bits of a packed event, the last ones, say what it is: ON, and the cause."""
+    """Return the number of the last bits of a packed event, for polarity and cause."""
     return 1 + CAUSE_BITS if causes else 1
 
 

@@ -88,10 +88,10 @@ def steps_of(
     brightest: float = _WHITE,
     coarseness: Coarseness = PRECISE,
 ) -> int:
-    """Return how many steps ``exact`` makes of a straight piece of x.
+    """Return the number of steps that ``exact`` makes of a straight piece of x.
 
-    `step_us` is the longest step that resolves what is added, `brightest` the light in the piece if
-    it is above white [DN].
+    `step_us` is the longest step that resolves the added courses, `brightest` the light in the
+    piece if it is above white [DN].
     """
     solved, added = coarseness
     # without a pole the signal is a line, and so is a leak that does not follow the light
@@ -147,7 +147,7 @@ class Stepping:
         self._width = sum(width for width in widths if width > 1)
 
     def first_driven(self, x: NDArray[np.float64]) -> NDArray[Any]:
-        """Return what drives the poles at the first frame, whose log intensity is `x` (pixels,)."""
+        """Return the input of the poles at the first frame, of log intensity `x` (pixels,)."""
         at, circuit = np.array([self._start]), self._circuit
         gain = self._course("gain", at)
         if gain.size:
@@ -158,7 +158,7 @@ class Stepping:
         return np.asarray(x + _at_first(self._course("drive", at)))
 
     def first_light(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what falls on the pixels at the first frame, whose light is `light` [DN]."""
+        """Return the light on the pixels at the first frame [DN], with the gain of effects."""
         gain = self._course("gain", np.array([self._start]))
         return gain[0] * light if gain.size else light
 
@@ -168,7 +168,7 @@ class Stepping:
         return factors[0] if factors.size else np.ones(1)
 
     def first_signal(self) -> NDArray[Any]:
-        """Return what is added to the signal at the first frame, (1,) or (pixels,)."""
+        """Return the addition to the signal at the first frame, (1,) or (pixels,)."""
         return _at_first(self._course("signal", np.array([self._start])))
 
     def runs(self, part: Part, frames: Frames, starts: NDArray[np.float64]) -> Iterator[_Planned]:

@@ -1,1 +1,1 @@
-"""What belongs to the command as a process: signals, standard streams, memory."""
+"""Process of the command: signals, standard streams, cleanup, limits of the machine."""

@@ -1,9 +1,9 @@
-"""What lies on the disk only while the program works on it, for a signal to remove at once.
+"""Removal of unfinished files and folders when a signal ends the program.
 
 A signal can come at any instruction of the main thread, one that just took a lock among them.  An
-exception raised there leaves the lock taken, and whoever waits for the thread that wants it waits
-for ever.  So a signal ends the program where it is, as it does Git: what is listed here is removed,
-which takes no lock, and the process exits.
+exception raised there leaves the lock taken, and a thread that waits for it waits for ever.
+So a signal ends the program where it is, as it does Git: the files listed here are removed, which
+takes no lock, and the process exits.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ class Unfinished:
     """Files or folders that nobody is to find when the program has ended."""
 
     def remove_now(self) -> bool:
-        """Remove them, whoever writes to them; tell whether all are gone."""
+        """Remove them, also while they are written; tell whether all are gone."""
         raise NotImplementedError
 
 

@@ -1,4 +1,4 @@
-"""What fails because the machine gives no more memory or threads, whatever a library makes of it.
+"""Limits of the machine: errors of libraries for lack of memory or threads.
 
 Under ``ulimit -v`` or in a container, libraries cannot be loaded, threads not started and arrays
 not made; the input is not to blame for that, nor a bug.
@@ -19,7 +19,7 @@ _SIGNS = re.compile(
 
 
 def machine_complaint(error: BaseException) -> str:
-    """Return what to say of an exception that the machine's limits made, or ""."""
+    """Return the message for an exception that the machine's limits caused, or ""."""
     told = " ".join(str(error).split())
     of_limits = isinstance(error, MemoryError) or (
         isinstance(error, OSError) and error.errno in (errno.ENOMEM, errno.EAGAIN)

@@ -66,7 +66,7 @@ class _Stop:
 
 @contextmanager
 def stopping_on_signals() -> Iterator[None]:
-    """Do what :func:`stop_on_signals` does, in the body only."""
+    """Install the handlers of :func:`stop_on_signals` for the body only."""
     caught = stop_on_signals()
     try:
         yield
@@ -164,7 +164,7 @@ def _woken() -> Iterator[int]:
 
 
 def _usual() -> dict[int, Callable[[int, FrameType | None], object] | signal.Handlers]:
-    """Return the signals, and what Python does on them by itself."""
+    """Return the signals and Python's own handlers for them."""
     names: dict[str, Callable[[int, FrameType | None], object] | signal.Handlers] = {
         "SIGINT": signal.default_int_handler,
         "SIGTERM": signal.SIG_DFL,
@@ -174,7 +174,7 @@ def _usual() -> dict[int, Callable[[int, FrameType | None], object] | signal.Han
 
 
 def last_words(ending: BaseException) -> str:
-    """Return what is said of an ending by a signal."""
+    """Return the last message of a program that a signal ends."""
     return f"stopped by {ending}" if isinstance(ending, Terminated) else "interrupted"
 
 

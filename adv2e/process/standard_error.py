@@ -68,7 +68,7 @@ def overhearing() -> Iterator[Callable[[], bytes]]:
 
 
 def _said_bytes() -> int:
-    """Return how much was said since it was last forgotten."""
+    """Return the number of bytes that libraries have written since the last reset."""
     if _heard >= 0:
         with suppress(OSError):  # it is no file
             return os.lseek(_heard, 0, os.SEEK_END)

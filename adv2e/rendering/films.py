@@ -61,7 +61,7 @@ class Film:
 
 
 _KEPT = 4
-"""Cells that a sheet holds at most while it does not know the end, for each that it shows."""
+"""Most cells that a sheet holds before the end, for each cell that it shows."""
 
 
 class Sheet:
@@ -106,4 +106,4 @@ class Sheet:
 
 
 PictureOutput = Film | Sheet
-"""What takes cells one by one."""
+"""Output of pictures that takes cells one by one."""

@@ -32,7 +32,7 @@ class Cell:
 
 
 def default_scale(width: int) -> int:
-    """Return how often a pixel is repeated so that a panel is about 640 columns wide."""
+    """Return the whole-number scale at which a panel is about 640 columns wide."""
     return max(1, round(640 / width))
 
 

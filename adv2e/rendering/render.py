@@ -139,7 +139,7 @@ def chosen_style(
     speed: float,
     at_s: Sequence[float],
 ) -> Style:
-    """Return how to draw; parameters, and what is wrong with them, as of :func:`render`."""
+    """Return the style of the pictures; parameters and errors as for :func:`render`."""
     is_film = check_suffix(output) != ".png"
     if at_s and is_film:
         raise UsageError(

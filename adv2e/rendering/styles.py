@@ -53,7 +53,7 @@ _BLACK = (0, 0, 0)
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """How to draw: a name of ``STYLES``, colours (RGB) and the window [us] that is drawn."""
+    """Style of pictures: a name of ``STYLES``, colours (RGB), and the window of events [us]."""
 
     name: str = "white"
     on: Colour = COLOURS["red"]

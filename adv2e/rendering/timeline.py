@@ -132,7 +132,7 @@ class Timeline:
         self._draw_up_to(self._known_us())
 
     def finish(self) -> bool:
-        """Draw what is left, the last event included; False if nothing came to draw."""
+        """Draw the remaining instants, the last event included; False without events and frames."""
         if max(self._last_event_us, self._last_frame_us) == _LONG_AGO:
             return False
         if self._start_us is None:

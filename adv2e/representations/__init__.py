@@ -1,1 +1,1 @@
-"""What networks are given in the place of events: grids and pictures of the events of a window."""
+"""Event representations for networks: grids and pictures of the events of a window."""

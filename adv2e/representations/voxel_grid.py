@@ -112,7 +112,7 @@ def _check_order(events: Events) -> None:
 
 
 def signed_grid(events: Events, bins: int, size: tuple[int, int], window: Window) -> Grid:
-    """Return what :func:`voxel_grid` does, of events that lie inside the window and the sensor."""
+    """Return the grid of :func:`voxel_grid` for events inside the window and the sensor."""
     (width, height), (first, last) = size, window
     place = (bins - 1) * (events["t"] - first) / ((last - first) or 1)
     lower = np.minimum(place.astype(np.int64), max(bins - 2, 0))

@@ -1,4 +1,4 @@
-"""Where frames come from: videos, folders of images, recordings of data sets, stacks."""
+"""Sources of frames: videos, folders of images, recordings of data sets, stacks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".exr", ".hdr", ".pgm", ".
 """Pictures: an input if they are animated, else for what moves a sensor before them."""
 
 STDIN = "-"
-"""What standard input is called."""
+"""Name of standard input."""
 
 OPENERS = {
     **dict.fromkeys(VIDEO_SUFFIXES, "adv2e.sources.video.source"),
@@ -139,7 +139,7 @@ def open_source(
 
 
 def _advice(path: str) -> str:
-    """Return what to do about a path that is not there, where it looks like something else."""
+    """Return advice on a missing path that looks like an address or a pattern, else ''."""
     if "://" in path:
         return "; addresses are not read: download it first"
     if any(character in path for character in "*?%"):

@@ -1,9 +1,9 @@
-"""What every source of frames is: a description, and frames in the order of time.
+"""Base of the sources of frames: a description, and frames in the order of time.
 
 A source states its geometry when it is opened and reads its frames one after another, as often as
-asked, but for a pipe, which gives them once.  Times are integer nanoseconds.  What must hold of any
-source (two frames at least, times that increase, one size and data type, finite values) is checked
-here, once.
+asked, but for a pipe, which gives them once.  Times are integer nanoseconds.  The conditions
+for any source (two frames at least, times that increase, one size and data type, finite values) are
+checked here, once.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Source(ABC):
     whole : Size
         Size of the frames before they are cut.
     light : Light
-        What the numbers of the frames stand for; `encoding` and `full_scale` are those of it.
+        Encoding and white of the frames; `encoding` and `full_scale` are its attributes.
     largest : float or None
         Largest number of the frames that were looked at when it was opened; None: of none.
     largest_read : float
@@ -162,7 +162,7 @@ class Source(ABC):
             self.notes.append(text)
 
     def doubt_of_white(self, largest: float | None) -> str:
-        """Return what is to be told if `largest` is the largest of all numbers; often nothing."""
+        """Return a warning if `largest`, the largest number, is far below white, else ''."""
         known = self._white_told is not None or self.full_scale != full_scale_of(self.dtype)
         decoded = self.kind == "video" and self.dtype == np.uint8
         if largest is None or known or decoded:
@@ -260,7 +260,7 @@ class Source(ABC):
         return pixels
 
     def _wanted(self, pixels: Pixels) -> Pixels:
-        """Return what is wanted of an image, upright; it keeps none of the rest in memory."""
+        """Return the selected part of an image, upright, without the rest in memory."""
         if self.selection.rotate180:
             pixels = rotated180(pixels)
         crop = self.selection.crop

@@ -22,7 +22,7 @@ _SMALLEST = 4
 
 
 def light_of(pattern: str) -> Light:
-    """Return what the numbers of a mosaic stand for."""
+    """Return the encoding of a mosaic: linear light."""
     return Light("linear", f"a mosaic of {pattern}")
 
 

@@ -65,21 +65,21 @@ class Pixels:
 
 
 OVER_BLACK = "transparent pixels are composed over black, in linear light"
-"""What is told, once, of a source that has some."""
+"""Note on a source with transparent pixels, given once."""
 
 
 RECORDED = "frames of a recording"
-"""Why those are linear that cameras recorded beside events."""
+"""Reason for linear frames in recordings of event cameras."""
 
 
 @dataclass(frozen=True)
 class Light:
-    """What the numbers of frames stand for, and why, in a few words.
+    """Encoding and white of the numbers of frames, with the reasons in a few words.
 
     Attributes
     ----------
     encoding : str
-        What ``encoding: auto`` means.
+        Encoding for ``encoding: auto``.
     encoding_reason : str
     full_scale : float, optional
         Number that means white, whatever the files of the frames say of it.
@@ -143,9 +143,9 @@ def rotated180(pixels: Pixels) -> Pixels:
 
 
 def odd_white(pixels: Pixels, first: float | None) -> str:
-    """Return how the white of an image differs from `first`, that of the first; or nothing.
+    """Return a complaint if the white of an image differs from `first`, that of the first image.
 
-    None is that of the data type.  Where all is black, white does not matter.
+    None stands for the white of the data type.  In a black image the white does not matter.
     """
     usual = full_scale_of(pixels.image.dtype)
     white, expected = pixels.white or usual, first or usual
@@ -158,16 +158,16 @@ def odd_white(pixels: Pixels, first: float | None) -> str:
 
 
 def as_pixels(loaded: Image | Pixels) -> Pixels:
-    """Return what a loader gave as pixels."""
+    """Return the result of a loader as pixels."""
     return loaded if isinstance(loaded, Pixels) else Pixels(loaded)
 
 
 def light_of_images(pixels: Pixels, name: str = "images") -> Light:
-    """Return what the numbers of images, or of arrays (`name`), stand for.
+    """Return the encoding of images, or of arrays (`name`), and the reason.
 
-    That is what they state, else what is usual.  8-bit pictures are sRGB, nearly always in colour;
-    grey ones may be a camera's own numbers, and 16-bit ones are written by cameras and by photo
-    editors alike.
+    It is the one that they state, else the usual one.  8-bit pictures are sRGB, nearly always in
+    colour; grey ones may be a camera's own numbers, and 16-bit ones are written by cameras and by
+    photo editors alike.
     """
     if pixels.encoding:
         return Light(pixels.encoding, pixels.says)

@@ -63,7 +63,7 @@ class Sequence:
 
     @property
     def blurred(self) -> bool:
-        """Each is the mean of a whole group."""
+        """True if each frame is the mean of a whole group."""
         return self.kind.startswith("blur")
 
 

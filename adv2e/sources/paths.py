@@ -31,13 +31,13 @@ from itertools import pairwise
 from adv2e.errors import UsageError
 
 Offset = tuple[float, float]
-"""Where the sensor looks: columns to the right of the middle and rows below it [its pixels]."""
+"""Position of the sensor: columns to the right of the middle and rows below it [its pixels]."""
 
 PARTS = 64
 """Parts of a pixel to which positions are rounded."""
 
 STEP_PX = 0.5
-"""How far the sensor moves from frame to frame, at most, where no rate is given [px]."""
+"""Largest motion of the sensor from frame to frame where no rate is given [px]."""
 
 _SAMPLES = 20_000
 
@@ -67,8 +67,8 @@ PATHS: dict[str, tuple[Callable[[float], Offset], float, float]] = {
     "shake": (_shake, 8.0, 1.0),
     "pan": (_pan, 32.0, 1.0),
 }
-"""By name: the path for an extent of 1; usual extent [px], for saccades about that of N-MNIST, and
-duration [s]."""
+"""Paths by name: function for an extent of 1; usual extent [px], for saccades about that of
+N-MNIST; usual duration [s]."""
 
 
 @dataclass(frozen=True)
@@ -108,23 +108,23 @@ class SensorPath:
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Duration of the path [s]."""
         return PATHS[self.kind][2] if self.duration_s is None else self.duration_s
 
     @property
     def margin(self) -> int:
-        """Pixels that it goes beyond the sensor at rest, on each side."""
+        """Margin on each side for the motion [px]."""
         return math.ceil(self.extent / 2)
 
     def at(self, u: float) -> Offset:
-        """Return where the sensor looks at the share `u` of the time."""
+        """Return the position of the sensor at the share `u` of the time [px]."""
         path = PATHS[self.kind][0]
         x, y = (round(self.extent * part * PARTS) / PARTS for part in path(u))
         return x, y
 
     @property
     def intervals(self) -> int:
-        """How many intervals between frames keep each step below `STEP_PX`."""
+        """Number of intervals between frames that keeps each step below `STEP_PX`."""
         path = PATHS[self.kind][0]
         places = [path(k / _SAMPLES) for k in range(_SAMPLES + 1)]
         fastest = max(math.dist(here, there) for here, there in pairwise(places)) * _SAMPLES

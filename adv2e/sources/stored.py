@@ -1,4 +1,4 @@
-"""What the frames beside events stand for, as the file that we wrote with them says.
+"""Encoding of frames that are stored beside events, from the description written with them.
 
 ``frames`` of ``adv2e.json`` (or of the attribute ``adv2e``) tells the encoding of the numbers
 stored and which of them means white; files that were written before it was there tell the encoding,
@@ -25,12 +25,12 @@ MOST_BYTES = 16 << 20
 
 
 def light_stored(description: Any, label: str) -> Light | None:
-    """Return what a description says of the frames stored with it; None: nothing.
+    """Return the encoding that a description states for the frames stored with it; None: none.
 
     Raises
     ------
     DataError
-        It says what cannot be; names `label` and the key.
+        It states an impossible value; names `label` and the key.
     """
     if not isinstance(description, dict):
         return None
@@ -55,10 +55,10 @@ def light_stored(description: Any, label: str) -> Light | None:
 
 
 def recorded_light(description: Any, label: str) -> Light:
-    """Return what the numbers of frames beside events stand for, as a conversion takes them.
+    """Return the encoding of frames beside events, as a conversion takes them.
 
-    Frames that cameras recorded are linear; of those that this program stored, the description
-    says it.
+    Frames that cameras recorded are linear; for frames that this program stored, the description
+    states it.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def _is_white(value: Any) -> bool:
 
 
 def read_light(text: bytes, label: str) -> Light | None:
-    """Return what the text of a description says; None also where it is none of ours.
+    """Return the encoding in the text of a description; None if adv2e did not write it.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def read_light(text: bytes, label: str) -> Light | None:
 
 
 def light_beside(file: Path) -> Light | None:
-    """Return what a description says of the frames beside it; None if there is no such file."""
+    """Return the encoding in a description beside frames; None if there is no such file."""
     if not file.is_file():
         return None
     try:

@@ -22,11 +22,11 @@ class Track:
     ----------
     name : str
     about : str
-        How much it holds, for messages.
+        Amount of its content, for messages.
     is_usual : bool
         It is the one that other programs take unasked.
     is_empty : bool
-        It is known to hold nothing.
+        It is known to be empty.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Track:
         return f"/{name.strip('/')}/" in f"/{'/'.join(self.parts)}/"
 
     def shared(self, other: Track) -> int:
-        """Return how many parts at the beginning of both names are the same."""
+        """Return the number of equal parts at the beginning of both names."""
         same = [a == b for a, b in zip(self.parts, other.parts, strict=False)]
         return [*same, False].index(False)
 
@@ -57,15 +57,15 @@ def counted(count: int, what: str) -> str:
 def choose(
     wanted: str | None, events: Sequence[Track], frames: Sequence[Track], path: str | Path
 ) -> tuple[int | None, int | None, list[str]]:
-    """Return which events and which frames are read, and what is to be told of that.
+    """Return the tracks of events and of frames to be read, and notes on the choice.
 
-    Frames are those of the camera of the events.  Of several that the user leaves open, the usual
-    one is taken, else the first; those that hold nothing come last.
+    Frames are those of the camera of the events.  Of several tracks that the user leaves open, the
+    usual one is taken, else the first; empty ones come last.
 
     Parameters
     ----------
     wanted : str, optional
-        What the user says.
+        Number or name of a track that the user gives.
     events, frames : sequences of Track
     path : path
         The file, for messages.
@@ -129,7 +129,7 @@ def _belongs(frame: Track, camera: list[Track], events: Sequence[Track]) -> bool
 def _nearest(
     tracks: Sequence[Track], beside: Sequence[Track], pool: Sequence[int] | None = None
 ) -> list[int]:
-    """Return which of a pool are of the camera of others, by the most parts that are the same."""
+    """Return the tracks of a pool whose names share the most parts with those of others."""
     pool = range(len(tracks)) if pool is None else pool
     near = {k: sum(map(tracks[k].shared, beside)) for k in pool}
     return [k for k in pool if near[k] == max(near.values())]

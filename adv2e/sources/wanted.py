@@ -1,4 +1,4 @@
-"""What the user says of frames: when they are, and which are wanted."""
+"""Choices of the user for frames: their timestamps, and the selection of frames."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
 
 @dataclass(frozen=True)
 class GivenTimes:
-    """What the user says of times: a rate or a file in place of the source's own, and the unit.
+    """Timestamps that the user gives: a rate or a file in place of the source's own, and the unit.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class GivenTimes:
 
 @dataclass(frozen=True)
 class Selection:
-    """Which frames are wanted and where their time begins.
+    """Selection of frames and zero of their time.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Selection:
         auto, keep: the source's own clock where there is one, else zero at the source's first
         frame.  zero: zero at the first frame wanted.
     allow_damaged : bool
-        What can be decoded of a damaged video is wanted; what is missing is told.
+        Damaged videos are accepted: all frames that can be decoded are wanted; faults are told.
     crop : Rectangle, optional
         Part of each frame that is wanted; default: all of it.
     bayer : {'RGGB', 'BGGR', 'GRBG', 'GBRG'}, optional
@@ -85,7 +85,7 @@ class Selection:
     rotate180 : bool
         Frames are wanted turned by half a turn, before they are cut.
     track : str, optional
-        Which of several tracks is wanted: its number or its name.
+        Track that is wanted, of several: its number or its name.
 
     Raises
     ------

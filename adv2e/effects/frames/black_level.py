@@ -56,7 +56,7 @@ class BlackLevelHooks(Hooks):
             yield t_ns, np.maximum(made, 0)
 
     def _below(self, light: NDArray[Any]) -> NDArray[Any]:
-        """Return how far each pixel is below black [DN]."""
+        """Return the depth of each pixel below black [DN]."""
         clipped = (light <= 0.0).astype(np.uint8)
         # the distance of what is not clipped is 0; exact, as steps would turn with the motion
         away = cv2.distanceTransform(clipped, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)

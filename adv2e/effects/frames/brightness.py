@@ -1,9 +1,9 @@
-"""How bright the light of a frame may be.
+"""Limit of the brightness of a frame.
 
 The corner of the low-pass rises with the light, and with it the steps that a pixel takes: 3 ms for
 each frame interval of 10 ms at a thousand times white, which a frame in other units or a single
-broken number multiplies at will.  What is beyond is refused, wherever the light comes from: the
-numbers of a frame, an encoding, an effect, an interpolation.
+broken number multiplies at will.  Brighter light is refused, whatever its source: the numbers of a
+frame, an encoding, an effect, an interpolation.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ def check_white(largest: float, label: str, full_scale: float | None) -> None:
 
 
 _BITS = {8: (1, 4), 16: (8, 10, 12, 14)}
-"""Bits that cameras put at the lower end of so many."""
+"""Bit depths of cameras, by the width of the integers in whose lower bits they lie."""
 
 _USUAL = 12
 
 
 def doubt_of_white(largest: float, dtype: DTypeLike, label: str) -> str:
-    """Return what is to be told of whole numbers of which none is near white; often nothing."""
+    """Return a warning if the largest whole number is far below white, else ''."""
     whole = 8 * np.dtype(dtype).itemsize
     fitting = [bits for bits in _BITS.get(whole, ()) if largest < 1 << bits]
     if np.dtype(dtype).kind != "u" or not fitting or largest <= 0:

@@ -42,7 +42,7 @@ from numpy.typing import DTypeLike, NDArray
 from adv2e.errors import ConfigError, DataError
 
 UNKNOWN = "unknown: "
-"""How what ``auto`` means begins where a source states an encoding that is not one of these."""
+"""Prefix of an encoding that a source states and that is not one of those here."""
 
 LUMA_WEIGHTS = (0.2126, 0.7152, 0.0722)
 """Shares of red, green and blue light in luma."""
@@ -95,7 +95,7 @@ def _full_scale(dtype: np.dtype[Any]) -> float:
 
 
 def encoding_of_images(dtype: DTypeLike) -> str:
-    """Return what ``encoding: auto`` means for still images and arrays: 8 bits are sRGB."""
+    """Return the encoding of still images and arrays for ``auto``: 8 bits sRGB, else linear."""
     return "srgb" if np.dtype(dtype) == np.uint8 else "linear"
 
 

@@ -91,7 +91,7 @@ def means(times: Array, exposure: float) -> Array:
 
 
 def _covered(first: Array, last: Array, starts: Array, ends: Array) -> Array:
-    """Return how much of first..last lies in each span, (n, spans)."""
+    """Return the overlap of first..last with each span, (n, spans)."""
     return np.asarray(np.clip(np.minimum(ends, last) - np.maximum(starts, first), 0.0, None))
 
 
@@ -157,7 +157,7 @@ class ExposureBlurHooks(Hooks):
         yield from self._block(held, done, len(held))
 
     def _block_end(self, held: list[tuple[int, NDArray[Any]]], begin: int) -> int:
-        """Return where the block that starts at `begin` ends, 0 while frames are missing."""
+        """Return the end of the block that starts at `begin`, 0 while frames are missing."""
         start, newest = held[begin][0] if begin < len(held) else held[-1][0], held[-1][0]
         span = _BLOCK_EXPOSURES * self._exposure
         for end in range(begin + _BLOCK_FRAMES, len(held) - _MARGIN_FRAMES + 1):

@@ -91,7 +91,7 @@ class ArbiterHooks(Hooks):
         yield from order.add(sort_events(self._served(asking.rest(), np.inf)), _FAR_US)
 
     def _served(self, events: Events, known_us: float) -> Events:
-        """Return what leaves the channel before `known_us`, in that order."""
+        """Return the events that leave the channel before `known_us`, in that order."""
         asking_us, pixel, what = self._requests(events)
         most = events.size + int(self._channel[EVENTS])
         times, pixels = np.empty(most), np.empty(most, np.int64)
@@ -110,9 +110,9 @@ class ArbiterHooks(Hooks):
     def _requests(
         self, events: Events
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int8]]:
-        """Return when the events ask [us], in order, their pixels, and what they are.
+        """Return the request times of the events [us], sorted, their pixels, and their codes.
 
-        That is the polarity and, above its bit, the cause.
+        A code is the polarity and, above its bit, the cause.
         """
         pixels = pixels_of(events, self.view.columns)
         drawn = rng.next_uniforms(self.view.seed, rng.REQUEST, pixels, self._numbers)

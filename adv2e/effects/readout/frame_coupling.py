@@ -128,7 +128,7 @@ class FrameCouplingHooks(Hooks):
         self.step_us = parameters.tau_us / _STEPS_PER_TAU
 
     def begin(self, view: View) -> None:
-        """Forget the frames of before."""
+        """Forget the frames of the recording before."""
         super().begin(view)
         # of each leap: its time, and the sum of what all up to it have left at that time
         self._leaps: list[float] = []
@@ -178,7 +178,10 @@ class FrameCouplingHooks(Hooks):
         return np.where(times_s > from_s, self.parameters.amplitude * left, 0.0)
 
     def _left(self, times_s: Times) -> NDArray[np.float64]:
-        """Return what is left of all leaps up to each time, of a leap of one."""
+        """Return the unit step response: the sum over past readouts t_f of exp(-(t - t_f) / tau).
+
+        With a rise time, each decays from the end of its linear rise on.
+        """
         if not self._leaps:
             return np.zeros(len(times_s))
         leaps, sums = np.array(self._leaps), np.array(self._sums)
@@ -193,7 +196,7 @@ class FrameCouplingHooks(Hooks):
         return left
 
     def longest_step_us(self, start_s: float, stop_s: float) -> float:
-        """Return its step, and no limit where what leapt before has decayed."""
+        """Return its step, and no limit where the disturbance has decayed."""
         backs = (0.0, self._width_s) if self._width_s else (0.0,)
         return min(self._step_us(start_s - back, stop_s - back) for back in backs)
 

@@ -1,4 +1,4 @@
-r"""What an AEDAT4 file is made of: packets, each a FlatBuffers table, mostly compressed.
+r"""Packets of an AEDAT4 file, each a FlatBuffers table, mostly compressed.
 
 ============ ========================================================================
 first bytes  ``#!AER-DAT4.0\r\n``
@@ -84,7 +84,7 @@ class Table:
         return number
 
     def _place(self, field: int) -> int:
-        """Return where a field stands; 0: it does not."""
+        """Return the offset of a field; 0: the table does not have it."""
         entry = 4 + 2 * field
         offset = self._number("<H", self._fields + entry) if entry < self._size else 0
         return self._at + offset if offset else 0
@@ -116,7 +116,7 @@ class Table:
 
 
 def unpacked(data: bytes, compression: int, label: str) -> bytes:
-    """Return what a packet holds, without the size that it begins with.
+    """Return the uncompressed content of a packet, without the size at its beginning.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def unpacked(data: bytes, compression: int, label: str) -> bytes:
 
 
 def _decompressor(compression: int, label: str) -> tuple[Any, tuple[type[Exception], ...]]:
-    """Return what uncompresses one packet, and what it raises."""
+    """Return the decompressor for one packet, and its exceptions."""
     if compression in _LZ4:
         return lz4_frame(label).LZ4FrameDecompressor(), (RuntimeError, EOFError)
     if compression in _ZSTD:

@@ -36,7 +36,7 @@ _TYPES = {0: np.uint8, 2: np.uint16}
 
 @dataclass(frozen=True)
 class _Stream:
-    """What the header says of a stream."""
+    """Stream as the header describes it: number, type, source, output, size."""
 
     number: int
     holds: str
@@ -48,7 +48,7 @@ class _Stream:
 
 @dataclass(frozen=True)
 class _Head:
-    """What stands before the packets, which lie from `begin` to `end`."""
+    """Header of a file; its packets lie from `begin` to `end` [bytes]."""
 
     compression: int
     begin: int
@@ -127,7 +127,7 @@ def _chosen(path: Path, head: _Head, facts: Facts) -> tuple[_Stream | None, _Str
 
 
 def _counts(path: Path, head: _Head) -> Counter[int]:
-    """Return how much each stream holds by the data table; nothing where that is not to be had."""
+    """Return the number of elements of each stream by the data table; none if it is damaged."""
     counts: Counter[int] = Counter()
     label = f"{path}: its data table"
     try:
@@ -164,7 +164,7 @@ def _head(path: Path) -> _Head:
 
 
 def _streams(path: Path, text: bytes) -> Iterator[_Stream]:
-    """Yield what the XML in the header says of each stream."""
+    """Yield the streams that the XML in the header describes."""
     if b"<!" in text:  # entities may grow without end
         raise DataError(f"{path}: the description of its streams declares things: damaged")
     try:

@@ -72,7 +72,7 @@ class Aedat4Writer(Writer):
         self._frames.append((t_ns + 500) // 1000, eight_bit(image))
 
     def finish(self) -> None:
-        """Write what is left, and the data table."""
+        """Write the remaining events and frames, and the data table."""
         if self._held:
             self._write_packet()
         self._write_frames(None)

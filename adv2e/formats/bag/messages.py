@@ -133,7 +133,7 @@ def read_stamp(data: bytes, is_cdr: bool, label: str) -> int:
 
 
 def read_event_array(data: bytes, is_cdr: bool, label: str) -> EventMessage:
-    """Return what a dvs_msgs/EventArray holds; DataError if it is damaged."""
+    """Return the events of a dvs_msgs/EventArray; DataError if it is damaged."""
     cursor = _Cursor(data, is_cdr, label)
     cursor.stamp_ns()
     height, width, count = cursor.number("I"), cursor.number("I"), cursor.number("I")
@@ -165,7 +165,7 @@ class PacketReader:
         self._number: int | None = None
 
     def __call__(self, data: bytes, is_cdr: bool, label: str) -> EventMessage:
-        """Return what an event_camera_msgs/EventPacket holds; DataError if that cannot be read."""
+        """Return the events of an event_camera_msgs/EventPacket; DataError if it cannot be read."""
         cursor = _Cursor(data, is_cdr, label)
         stamp_ns = cursor.stamp_ns()
         height, width = cursor.number("I"), cursor.number("I")
@@ -219,7 +219,7 @@ class PacketReader:
         return t + self._shift_us, x, y, p
 
     def end(self) -> None:
-        """Tell what is to be told of all packets."""
+        """Report the problems of all packets."""
         for text in self._decoder.problems() if self._decoder is not None else ():
             self._tell(text)
 

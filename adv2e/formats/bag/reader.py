@@ -121,7 +121,7 @@ class _Topic:
 
     @property
     def track(self) -> Track:
-        """What it is among others."""
+        """Track of the topic: name, number of messages, whether it is a usual one."""
         is_usual = self.holds != COMPRESSED and self.name.endswith(("/image_raw", "/events"))
         return Track(self.name, counted(self.count, "messages"), is_usual, not self.count)
 
@@ -178,7 +178,7 @@ class _Bag:
                 self._reader.close()
 
     def _messages(self, topic: _Topic, start: int | None = None) -> Iterator[tuple[int, bytes]]:
-        """Yield when each message of a topic was recorded [ns], and what it holds."""
+        """Yield time of recording [ns] and content of each message of a topic."""
         with _reading(self._path):
             assert self._reader is not None
             for _, time, data in self._reader.messages(topic.connections, start=start):
@@ -245,7 +245,7 @@ def _opened(path: Path, is_ros1: bool) -> Any:
 
 
 def _expanded(decompress: Any, label: str, data: bytes) -> bytes:
-    """Return what a chunk holds, if that is no more than it can well hold."""
+    """Return the uncompressed chunk; DataError if it grows beyond the limit of :func:`expand`."""
     if data.startswith(b"BZh"):
         return expand(bz2.BZ2Decompressor(), data, label, (OSError, ValueError, EOFError))
     if data.startswith(b"\x04\x22\x4d\x18"):
@@ -258,7 +258,7 @@ def _expanded(decompress: Any, label: str, data: bytes) -> bytes:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Make what the package raises of a bag that is damaged a DataError."""
+    """Turn exceptions of the package for a damaged bag into a DataError."""
     try:
         yield
     except Adv2eError:

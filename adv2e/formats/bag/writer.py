@@ -42,7 +42,7 @@ _EVENTS_TOPIC, _IMAGES_TOPIC = "/dvs/events", "/dvs/image_raw"
 
 
 class _BagWriter(Writer):
-    """What both bags share: messages in the order of time."""
+    """Base of the writers of both bags: messages in the order of time."""
 
     _is_cdr = False
     _most_s = 1 << 32
@@ -101,7 +101,7 @@ class _BagWriter(Writer):
         self._frames.append(t_ns, eight_bit(image))
 
     def finish(self) -> None:
-        """Write what is left, and close the bag."""
+        """Write the remaining events and frames, and close the bag."""
         self._write_held()
         while len(self._frames):
             self._write_frame()
@@ -133,7 +133,7 @@ class _BagWriter(Writer):
         self._bag.write(self._topics[_IMAGES_TOPIC], t_ns, data)
 
     def _abandon(self) -> None:
-        """Close what is open where writing failed."""
+        """Close the open files of a bag where writing failed."""
         raise NotImplementedError
 
 
@@ -176,7 +176,7 @@ class Ros2Writer(_BagWriter):
         return bag
 
     def finish(self) -> None:
-        """Write what is left, and close the bag."""
+        """Write the remaining events and frames, and close the bag."""
         super().finish()
         for file in sorted(self._folder.iterdir()):
             file.rename(self._folder.parent / file.name)

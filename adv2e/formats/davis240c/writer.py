@@ -53,7 +53,7 @@ def _png(image: NDArray[Any]) -> bytes:
 
 
 class _Davis240cWriter(Writer):
-    """What folder and archive share: the frames' names and list."""
+    """Base of the writers of folder and archive: names and list of the frames."""
 
     def __init__(self, request: Request, stack: ExitStack) -> None:
         self._description = request.description
@@ -98,7 +98,7 @@ class FolderWriter(_Davis240cWriter):
         self._work.submit(_png, image, take=(self._folder / name).write_bytes)
 
     def finish(self) -> None:
-        """Write what is left, the list and the description."""
+        """Write the remaining frames, the list and the description."""
         self._work.finish()
         (self._folder / LIST).write_text("".join(self._lines), "ascii", newline="\n")
         text = to_json(self._description)
@@ -151,7 +151,7 @@ class ZipWriter(_Davis240cWriter):
         self._work.submit(_png, image, take=take)
 
     def finish(self) -> None:
-        """Write what is left, the list, the frames and the description."""
+        """Write the remaining events, the list, the frames and the description."""
         self._deflate(self._text)
         self._deflating.finish()
         self._events.close()

@@ -83,7 +83,7 @@ def _pixels(path: Path, image: h5py.Dataset) -> tuple[int, ...]:
 
 
 class _Stamps:
-    """When the images were taken, as their attributes of one name say."""
+    """Timestamps of the images, from their attributes of one name."""
 
     def __init__(self, path: Path, images: list[h5py.Dataset]) -> None:
         exact = all("timestamp_ns" in image.attrs for image in images)

@@ -37,18 +37,18 @@ _SIZE = re.compile(rb"0{0,9}[1-9][0-9]{0,4}")
 
 @dataclass(frozen=True)
 class Form:
-    """How the numbers of an event lie in its line.
+    """Line format of events: number and order of the fields.
 
     Attributes
     ----------
     what : str
-        What a line must be, for messages.
+        Description of a line, for messages.
     fields : int
-        How many numbers it has.
+        Number of fields in a line.
     order : tuple of int
-        Where time, x, y and polarity stand among them.
+        Indices of time, x, y and polarity among them.
     clean : callable
-        Makes of lines as they are as many lines of numbers and blanks.
+        Turns lines of a file into as many lines of numbers and blanks.
     """
 
     what: str = "'time x y polarity'"
@@ -57,7 +57,7 @@ class Form:
     clean: Callable[[bytes], bytes] = bytes
 
     def parse(self, block: bytes, decimals: int, *, exact: bool) -> Any:
-        """Return what :func:`parse_lines` does, piece by piece: so much fits into caches."""
+        """Return the result of :func:`parse_lines`, in pieces that fit into caches."""
         found: list[tuple[Any, Any]] = []
         begin = before = wrong = 0  # bytes and lines of the pieces before
         while (begin < len(block) or not found) and not wrong:
@@ -121,7 +121,7 @@ def lines_of(
 
 
 def _form_of(block: bytes, facts: Facts) -> Form:
-    """Return how lines without a heading lie, and tell it if that is not the usual way."""
+    """Return the format of lines without a heading; report it if it is not the usual one."""
     lines = _COMMENT.sub(b"", block[: block.rfind(b"\n") + 1]).splitlines()
     fields = [line.split() for line in lines if line.strip()][:_JUDGED]
     try:

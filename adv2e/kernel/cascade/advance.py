@@ -26,7 +26,7 @@ _f = np.float32
 
 
 class Scratch(NamedTuple):
-    """Memory for the cascade of whoever works on a strip."""
+    """Memory for the cascade, one for each thread."""
 
     x: NDArray[np.float64]  # log intensity at the start of an interval, how far it goes, and the
     dx: NDArray[np.float64]  # light at its end, where the interval is cut into pieces
@@ -50,7 +50,7 @@ def scratch() -> Scratch:
 
 @kernel
 def _begin_pieces(strip, circuit, scratch):
-    """Keep how the light goes from LIGHT_0 to LIGHT_1."""
+    """Store log intensity at LIGHT_0, its change up to LIGHT_1, and LIGHT_1 in `scratch`."""
     for k in range(STRIP):
         x0 = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
         x1 = exchange.log_of(np.float64(strip[screen.LIGHT_1 + k]), circuit)

@@ -1,6 +1,7 @@
-"""The distance of one pixel's signal from its reference within a substep, and where it is reached.
+"""Distance of one pixel's signal from its reference within a substep, and its first crossing.
 
-With t = 0..1 over the substep it is a polynomial of degree 5 and an exponential of the second pole:
+With t = 0..1 over the substep the distance is a polynomial of degree 5 and an exponential of the
+second pole:
 f(t) = c0 + c1 t + ... + c5 t^5 + swing e^(-b t).
 """
 
@@ -12,10 +13,10 @@ from adv2e.compiled import kernel
 from adv2e.kernel import special
 
 NOWHERE = 2.0
-"""Place of what does not happen in a substep."""
+"""Place of a crossing that does not happen in a substep."""
 
 _NARROW = 1e-7
-"""Part of a substep within which two crossings are not told apart."""
+"""Share of a substep within which two crossings count as one."""
 
 _SLOW = 0.01
 """Corner in a substep below which the exact answer is a difference of large numbers."""
@@ -43,8 +44,8 @@ class Curve(NamedTuple):
 def lag_curve(u0, slope0, bend0, u1, slope1, bend1, q0, d, b):
     """Lag of the second pole: `q0` at the start, for the lag of the first one as its input.
 
-    That one is given by value, slope and curvature at both ends; `d` is what x moves by, `b` the
-    corner of the second pole in the substep, 0: there is none.
+    The lag of the first pole is given by value, slope and curvature at both ends; `d` is the change
+    of x, `b` the corner of the second pole in the substep, 0: there is none.
     """
     p0, p1, p2 = u0, slope0, 0.5 * bend0
     rise, turn, bend = u1 - p0 - p1 - p2, slope1 - p1 - 2.0 * p2, bend1 - 2.0 * p2
@@ -89,7 +90,7 @@ def mirrored(curve):
 
 @kernel
 def at(curve, t):
-    """Value and slope at t, and what is left of the swing."""
+    """Value, slope and remaining exponential term (swing) at t."""
     swing = curve.swing
     if swing != 0.0 and t > 0.0:
         swing *= special.exp_alone(-curve.b * t)
@@ -111,14 +112,14 @@ def value(curve, t):
 
 @kernel
 def bent(curve, swing):
-    """Most curvature behind a place where `swing` is left of the swing."""
+    """Bound of the curvature behind a place where the exponential term is `swing`."""
     most = 2.0 * abs(curve.c2) + 6.0 * abs(curve.c3) + 12.0 * abs(curve.c4) + 20.0 * abs(curve.c5)
     return most + curve.b * curve.b * abs(swing)
 
 
 @kernel
 def _guess(v0, slope0, v1, slope1, width):
-    """Return about where a cubic through values and slopes passes zero, from its start."""
+    """Return the approximate root of the cubic through values and slopes, from its start."""
     t = v0 / (v0 - v1)
     s0, s1 = slope0 * width, slope1 * width
     c2, c3 = 3.0 * (v1 - v0) - 2.0 * s0 - s1, s0 + s1 - 2.0 * (v1 - v0)
@@ -130,7 +131,7 @@ def _guess(v0, slope0, v1, slope1, width):
 
 @kernel
 def _root(curve, low, v_low, slope_low, high, v_high, slope_high):
-    """Where a curve that rises through zero once in [low, high] does so: Newton, else halving."""
+    """Root of a curve that rises through zero once in [low, high]: Newton, else halving."""
     t = low + _guess(v_low, slope_low, v_high, slope_high, high - low)
     if not low <= t <= high:
         t = 0.5 * (low + high)
@@ -151,10 +152,10 @@ def _root(curve, low, v_low, slope_low, high, v_high, slope_high):
 
 @kernel
 def first_reach(curve, start, at_start, end, at_end):
-    """Where a curve is first at or above zero in [start, end]; beyond 1: nowhere.
+    """First place in [start, end] at which a curve is at or above zero; beyond 1: none.
 
-    `at_start` and `at_end` are what `at` returns there.  What is looked at next gets shorter until
-    its curvature says that nothing is hidden in it: no crossing, or one.
+    `at_start` and `at_end` are the results of `at` there.  The span that is searched gets shorter
+    until its curvature excludes more than one crossing.
     """
     t, width = start, end - start
     v, slope, swing = at_start

@@ -31,7 +31,7 @@ _LARGEST_RATIO = math.tanh(0.5 * cascade.LARGEST_STEP)
 
 
 class _Way(NamedTuple):
-    """How a pixel goes through its piece."""
+    """Course of a pixel's light through a piece, and the substeps that it needs."""
 
     x0: float  # log intensity at its start
     dx: float  # by which that changes
@@ -45,7 +45,7 @@ class _Way(NamedTuple):
 
 @kernel
 def _way(k, length, before, circuit, strip):
-    """Return how pixel k of a strip goes through its piece of `length` us.
+    """Return the course of light and the substeps of pixel k in a piece of `length` us.
 
     before : time since the interval's start at the start of the piece, in lengths of the piece
     """
@@ -68,7 +68,7 @@ def _way(k, length, before, circuit, strip):
 
 @kernel
 def _next_place(way, s):
-    """Where the substep of a lone pixel ends that begins at s."""
+    """End of the substep that begins at s, for a pixel with substeps of its own."""
     bend, end = (way.bend, way.knee) if s < way.knee else (way.knee, 1.0)
     after = s + min(max(way.shortest, GROWTH * (s - bend)), way.longest)
     # no short one at the end
@@ -93,9 +93,9 @@ def _after(u0, d, a, c):
 def _first_busy(k, j, count, places, away, dx, fall, on, off, due, strip):
     """Return the first substep from j on in which pixel k may fire, else `count`.
 
-    places : of the ends of substeps in the piece; away : distance of x from the reference at its
-    start; dx, fall : what x and leak move it by over the piece; due : place at which something
-    happens by itself.
+    places : ends of the substeps in the piece; away : distance of x from the reference at its
+    start; dx, fall : change of that distance by x and by leak over the piece; due : place of the
+    next noise event.
     """
     u1 = float(strip[cascade.FIRST + j * STRIDE + k])
     q1 = float(strip[cascade.SECOND + j * STRIDE + k])
@@ -123,19 +123,19 @@ def _solve(
     c : int
         Lane of its noise.
     s_from : float
-        Place before which nothing happens, or to go on from.
+        Place before which there is no event, or from which to go on.
     start : float
-        Time that row DUE counts from [us].
+        Origin of the times in row DUE [us].
     before : float
-        Time since the start of the interval at that of the piece, in lengths of the piece.
+        Time from the start of the interval to that of the piece, in lengths of the piece.
     substeps : int
-        Of the piece, in the rows of the screen; they end at `places` of it.
+        Number of substeps of the piece in the rows of the screen; they end at `places` of it.
     levels : (2,) float
         Factors on both thresholds at the ends of the piece.
     samples, depth : int
-        Of photoreceptor noise: between two samples are 2^depth cells.
+        Samples of photoreceptor noise; between two samples are 2^depth cells.
     path : Path
-        Of that noise.
+        Photoreceptor noise.
 
     Returns
     -------
@@ -259,7 +259,7 @@ def solve_flagged(
     """Events of the flagged pixels, from the j-th of m on, which is solved from place s on.
 
     found : (m,)
-        Places from which on something may happen; beyond 1: nowhere.
+        Places from which on there may be events; beyond 1: none.
 
     Returns the number of events, and j and s where it stopped: j = m, or there was no room left.
     """

@@ -1,9 +1,9 @@
-"""How intervals are cut for :mod:`adv2e.kernel.cascade`, and what is the same for all pixels.
+"""Substeps of the intervals for :mod:`adv2e.kernel.cascade`, the same for all pixels.
 
-What lags from before a bend of the light dies out, in each pixel at the pace of its own corner:
-whatever of it is left after a time t changes little in a part of t.  So substeps grow.  They are as
-short as white needs at the start of an interval, where the light bends, and then a share of the
-time since, however fast white is.
+The lag from before a bend of the light decays, in each pixel at the rate of its own corner
+frequency: the lag that is left after a time t changes little in a part of t.  So substeps grow.
+They are as short as white needs at the start of an interval, where the light bends, and then a
+share of the time since, however fast white is.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from adv2e.kernel.photoreceptor.law import (
 from adv2e.kernel.quadrature import rounded
 
 MOST = 16
-"""Most substeps of a piece: those whose lags are kept at a time."""
+"""Most substeps of a piece, the lags of which are kept at a time."""
 
 WEIGHTS = 8
-"""Of the second pole: what it keeps, six for its input, and the lag behind a ramp."""
+"""Weights of the second pole: of its own lag, six of its input, and the lag behind a ramp."""
 
 LONGEST = 0.8
 """Longest substep at a bend, in time constants at white: with 1.25, events that a leak of 9 Hz made
@@ -46,7 +46,7 @@ _Array = NDArray[np.float64]
 
 
 class Plan(NamedTuple):
-    """How each interval is cut: into pieces of at most MOST substeps."""
+    """Pieces of each interval, and their substeps, at most MOST a piece."""
 
     cut: NDArray[np.int64]  # (intervals,): which of the ways that follow
     pieces: NDArray[np.int64]  # (ways,)
@@ -73,17 +73,17 @@ def plan_for(
     Parameters
     ----------
     lengths : (intervals,)
-        Of the intervals [us].
+        Lengths of the intervals [us].
     fastest : float
         Corner of the first pole at white [rad/us].
     follower : float
         Corner of the second pole [rad/us], 0: there is none.
     factors : (intervals + 1,)
-        On both thresholds.
+        Factors on both thresholds.
     simple : bool
         See :class:`Plan`.
     noise : Noise, optional
-        Of the photoreceptor.
+        Photoreceptor noise.
     """
     distinct, cut = np.unique(lengths, return_inverse=True)
     ways = [_pieces(length, fastest, noise) for length in distinct.tolist()]
@@ -141,10 +141,10 @@ def _pieces(length: float, fastest: float, noise: Noise | None) -> list[_Array]:
 
 
 def weights_of(corners: _Array) -> _Array:
-    """Return what a pole of each of `corners` in a substep takes, (corners, WEIGHTS).
+    """Return the weights of a pole for each of `corners` [rad a substep], (corners, WEIGHTS).
 
-    Of its lag at the start; of value, slope and curvature of its input at the start, and at the
-    end; and of what x moves by.
+    They apply to its lag at the start; to value, slope and curvature of its input at the start, and
+    at the end; and to the change of x.
     """
     b = np.maximum(corners, 1e-300)[:, None]
     upto = np.minimum(1.0, 40.0 / b)

@@ -24,8 +24,8 @@ LARGEST_STEP = 0.3
 """Change of log intensity over a piece above which a pixel is solved by itself [ln units]."""
 
 LARGEST = (np.float32(LARGEST_STEP), np.float32(np.tanh(0.5 * LARGEST_STEP)))
-"""The same on the foot, and as a ratio on the log branch, as :func:`adv2e.kernel.screen.flag`
-takes it."""
+"""LARGEST_STEP as :func:`adv2e.kernel.screen.flag` takes it: on the foot, as a ratio on the log
+branch."""
 
 _BEGIN = screen.SIZE
 LIGHT = _BEGIN  # at the start of the substep [DN]

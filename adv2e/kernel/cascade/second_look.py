@@ -1,7 +1,7 @@
-"""A second look at pixels that may fire beside their noise, side by side in lanes.
+"""Refinement pass: bound the noise of pixels that the screen flagged more tightly, in lanes.
 
-It draws more of the noise where that may matter, and tells where in a piece each pixel may fire
-first.  Most of them do not.
+It draws more of the photoreceptor noise where that may cross a threshold, and finds the earliest
+place in a piece at which each pixel may fire.  Most of them do not.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ _SIZE = _DOWN + (MOST_CELLS + 1) * LANES
 _NOWHERE = 2.0
 _NEVER = 1e30
 _ROUNDING = 1e-6
-"""What a place in single precision may be too late by."""
+"""Largest error of a place in single precision: so much too late at most."""
 
 _MANY = 0.5
-"""Share of the pixels above which a stretch is drawn of all of them: that needs no moving."""
+"""Share of the pixels above which a stretch is drawn for all of them: no copies are needed."""
 
 _f = np.float32
 _ZERO, _ONE = _f(0.0), _f(1.0)
@@ -65,7 +65,7 @@ def memory() -> Look:
 
 @kernel
 def _load(size, pixels, factor, photo_leak, strip, rows):
-    """Fill the lanes with what the strip's rows say of these pixels."""
+    """Load distance, thresholds and leak of these pixels from the strip into the lanes."""
     for c in range(size):
         k = pixels[c]
         rows[_AWAY + c] = strip[screen.AWAY_0 + k]
@@ -83,7 +83,7 @@ def _load(size, pixels, factor, photo_leak, strip, rows):
 
 @kernel
 def _leave_room(size, a, b, room, pixels, places, strip, rows):
-    """Rows _UP and _DOWN from `room` on: what noise needs in the substeps from a on, up to b."""
+    """Rows _UP and _DOWN from `room` on: noise that may cross a threshold in substeps a to b."""
     first, second = cascade.FIRST + a * STRIDE, cascade.SECOND + a * STRIDE
     on = (b - a) * STRIDE
     begin, end, span = _f(places[a]), _f(places[b]), _f(places[b] - places[a])
@@ -124,10 +124,10 @@ def _leave_rooms(size, pixels, substeps, places, samples, strip, look):
 
 @kernel
 def _look_at_cells(size, first, count, shift, scale, third, seen, rows, up, down, found):
-    """Row `found` where noise reaches a threshold in one of `count` cells, from row `first` on.
+    """Fill `found` with the first of `count` cells in which noise may reach a threshold.
 
-    shift, scale : place of the first cell, and what each takes
-    third : of the corner of the second pole in the cell [rad]
+    first : row of the first cell; shift, scale : its place, and the length of each
+    third : a third of the corner of the second pole in the cell [rad]
     """
     for r in range(count):
         at, place = (first + r) * LANES, _f(max(shift + r * scale - _ROUNDING, 0.0))
@@ -142,7 +142,7 @@ def _look_at_cells(size, first, count, shift, scale, third, seen, rows, up, down
 
 @kernel
 def _look_at_stretches(count, samples, levels, third, seen, circuit, path, look):
-    """Draw the first `count` stretches and look at them."""
+    """Draw the first `count` stretches and note the places at which they may reach a threshold."""
     rows = look.rows
     noise.draw_stretches(count, levels, circuit, path)
     for t in range(count):
@@ -167,23 +167,23 @@ def _look_at_stretches(count, samples, levels, third, seen, circuit, path, look)
 def find_places(
     size, pixels, substeps, places, length, samples, levels, factor, circuit, strip, path, look
 ):  # fmt: skip
-    """Fill `look.found` with the places in a piece from which on pixels may fire.
+    """Fill `look.found` with the earliest place in a piece at which each pixel may fire.
 
     Parameters
     ----------
     size : int
         Number of pixels, the samples of which are in `path`.
     pixels : (LANES,) int64
-        Of the strip.
+        Their numbers in the strip.
     substeps, places, length
-        Of the piece, see :func:`adv2e.kernel.cascade.screen.follow`.
+        Substeps of the piece, see :func:`adv2e.kernel.cascade.screen.follow`.
     samples, levels : int
-        Of the piece: between two samples are 2^levels cells.
+        Samples of the piece; between two samples are 2^levels cells.
     factor : float32
         Least factor on the thresholds.
     path : Path
     look : Look
-        A place beyond 1 is nowhere.
+        A place beyond 1: the pixel cannot fire.
     """
     strip, path, look = borrowed(strip, path, look)
     rows, seen = look.rows, noise.seen_from(circuit)

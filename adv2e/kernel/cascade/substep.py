@@ -1,4 +1,4 @@
-"""The events of one pixel within a substep, of which all is known: light, lags, noise and leak."""
+"""Events of one pixel within a substep in which light, lags, noise and leak are known."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NO_NOISE = Cubic(0.0, 0.0, 0.0, 0.0)
 
 
 class Substep(NamedTuple):
-    """What a pixel meets in a substep."""
+    """Light, thresholds and leak of a pixel in a substep."""
 
     t0: float  # its start [us]
     h: float  # its length [us]
@@ -62,7 +62,7 @@ def light_of(x, on_log, circuit):
 def hull(u0, u1, q0, q1, d):
     """Bounds of the signal in a substep, less x at its start; see the bounds of the screens.
 
-    u0, u1, q0, q1 : lags of both poles at its ends; d : what x moves by
+    u0, u1, q0, q1 : lags of both poles at its ends; d : change of x
     """
     turns = u0 * u1 < 0.0
     if not turns and ((u0 + u1 <= 0.0 and q0 <= u0) or (u0 + u1 >= 0.0 and q0 >= u0)):
@@ -77,7 +77,7 @@ def hull(u0, u1, q0, q1, d):
 def may_fire(high, low, fallen0, fallen1, on, off):
     """Tell whether a distance from the reference may reach a level, given its bounds.
 
-    fallen0, fallen1 : what leak adds at both ends of the time
+    fallen0, fallen1 : fall of the reference by leak at both ends of the time
     """
     return high + fallen1 >= on or low + fallen0 <= -off
 
@@ -90,7 +90,7 @@ def noise_at(noise, t):
 
 @kernel
 def fallen(step, t):
-    """Return what leak at its nominal speed has taken from the reference until t."""
+    """Return the fall of the reference until t by leak at its nominal speed."""
     return step.fallen + t * (step.leak1 + t * (step.leak2 + t * step.leak3))
 
 
@@ -102,7 +102,7 @@ def _light_at(x, circuit):
 
 @kernel
 def _shifted(found, sign, level, slope):
-    """Return what `at` finds of a curve or its mirror with a line, `level` there, added to it."""
+    """Return the result of `at` for a curve or its mirror plus a line, which is `level` there."""
     return sign * found[0] + level, sign * found[1] + slope, sign * found[2]
 
 
@@ -112,10 +112,10 @@ def fire_until(
 ):  # fmt: skip
     """Fire the events of pixel i in a substep from t on, until `upto`.
 
-    signal, noise : what the light makes, and the photoreceptor's noise adds to it
+    signal, noise : signal by the light alone, and the photoreceptor noise on top of it
 
-    Returns the number of events, DONE or the place where there is no room left for them, and the
-    reference, as if leak had always had its present speed, and that speed.
+    Returns the number of events; DONE or the place at which the buffer was full; the reference, as
+    if leak had always had its present speed; and that speed.
     """
     jitter, h = circuit.leak_jitter > 0.0, step.h
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]

@@ -1,4 +1,4 @@
-"""What becomes of lanes whose place was found: events, and the ends of dead times."""
+"""Apply a crossing: emit the event, reset the reference, end refractory periods."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ _TRIES = 3
 
 @kernel
 def cross(count, ta, length, circuit, lanes):
-    """Take the thresholds that were found; other places are left as they are."""
+    """Reset the reference, or begin the refractory period, of lanes that found their crossing.
+
+    Lanes with other targets are left as they are.
+    """
     dead = circuit.dead_time / length
     has_dead_time = circuit.dead_time > 0.0
     for j in range(count):
@@ -55,7 +58,7 @@ def cross(count, ta, length, circuit, lanes):
 
 @kernel
 def release(count, length, circuit, rule, lanes):
-    """See lanes that wait through their dead time: the reference at its end is the signal."""
+    """End the refractory periods of lanes that wait: the reference becomes the signal there."""
     evaluate_release(lanes, count, length, circuit, rule)
     for j in range(count):
         seeks = lanes[rows.SEEKS + j]
@@ -95,7 +98,7 @@ def release(count, length, circuit, rule, lanes):
 
 @kernel
 def note_releases(lo, count, pixels, state, lanes):
-    """Keep the references that lanes took at the end of their dead times."""
+    """Store the references that lanes took at the end of their refractory periods."""
     for j in range(count):
         i = lo + pixels[j]
         if state[per_pixel.RESET, i] == per_pixel.NEVER and lanes[rows.HOLD + j] < 0.0:
@@ -104,7 +107,7 @@ def note_releases(lo, count, pixels, state, lanes):
 
 @inlined
 def fire_lane(i, j, when, polarity, cause, t_base, circuit, state, lanes, keys, times, n):
-    """Write an event of pixel i, in lane j, where the lane is; returns the number of events."""
+    """Write an event of pixel i at the place of its lane j; returns the number of events."""
     before = state[per_pixel.LEAK_FACTOR, i]
     n = fire(i, when, polarity, cause, t_base, circuit, state, keys, times, n)
     if circuit.leak_jitter > 0.0:
@@ -114,7 +117,7 @@ def fire_lane(i, j, when, polarity, cause, t_base, circuit, state, lanes, keys, 
 
 @inlined
 def _change_leak(j, share, lanes):
-    """Go on at a leak speed that is `share` of the one before; what has fallen until S stays."""
+    """Change the leak speed to `share` of the one before; the fall until place S stays."""
     lanes[rows.FALL + j] *= share
     lanes[rows.FALL_DN + j] *= share
     fallen = lanes[rows.FALLEN_S + j]
@@ -128,7 +131,7 @@ def _change_leak(j, share, lanes):
 
 @kernel
 def fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n):
-    """Write the events of the thresholds that were found."""
+    """Write the events of the crossings that were found; returns the number of events."""
     keys, times = borrowed(keys, times)
     for j in range(m):
         event = lanes[rows.EVENT + j]

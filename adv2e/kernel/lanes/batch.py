@@ -1,11 +1,11 @@
 """The pixels of a strip that may fire, one a lane, from event to event through one interval.
 
-A lane goes from place to place: the next threshold, the turn of the signal where it may cross a
-threshold before turning, the end of a dead time, the next noise event, and at last the end of its
-piece of the interval.  In each round all lanes look for one place each
-(:mod:`adv2e.kernel.lanes.roots`), take what they found (:mod:`adv2e.kernel.lanes.apply_events`),
-and then decide what comes next: most of them together (:mod:`adv2e.kernel.lanes.next_target`), the
-others one by one (:mod:`adv2e.kernel.lanes.slow_path`).  Pixels get into lanes, and out, by
+A lane goes from place to place: the next crossing, the extremum of the signal where it may cross a
+threshold before that, the end of a dead time, the next noise event, and at last the end of its
+piece of the interval.  In each round all lanes search for one place each
+(:mod:`adv2e.kernel.lanes.roots`), apply it (:mod:`adv2e.kernel.lanes.apply_events`), and then
+choose the next target: most of them together (:mod:`adv2e.kernel.lanes.next_target`), the others
+one by one (:mod:`adv2e.kernel.lanes.slow_path`).  Pixels get into lanes, and out, by
 :mod:`adv2e.kernel.lanes.exchange`, and from piece to piece by :mod:`adv2e.kernel.lanes.pieces`.
 """
 
@@ -25,7 +25,7 @@ from adv2e.kernel.lanes.slow_path import found_stop, go_on
 
 @kernel
 def _waiting(m, lanes):
-    """Return how many lanes have to be looked through for those that wait: all, or none."""
+    """Return the number of lanes to search for ends of dead times: m, or 0 if none waits."""
     waiting = 0
     for j in range(m):
         waiting += lanes[rows.SEEKS + j] == rows.RELEASE
@@ -37,11 +37,11 @@ def decide(
     lo, m, waiting, start, ta, length, t_base, circuit, rule, state, strip, pixels, lanes, keys,
     times, n,
 ):  # fmt: skip
-    """Decide what each of m lanes looks for next; none of them then waits for a dead time to end.
+    """Choose the next target of each of m lanes; none of them then waits for a dead time to end.
 
-    Of those that wait now, all are among the first `waiting` ones.
+    All lanes that wait now are among the first `waiting` ones.
 
-    Returns (lanes that look for something, events so far); at most one event a lane is written.
+    Returns (lanes with a target, events so far); at most one event a lane is written.
     """
     keys, times = borrowed(keys, times)
     while True:
@@ -66,9 +66,9 @@ def decide(
 
 @kernel
 def search(lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys, times, n):
-    """Every lane finds one place; returns the number of events, and of lanes to look through.
+    """Find the target of every lane; returns the number of events, and `waiting` for `decide`.
 
-    At most one event a lane is written.  See `decide` for the latter.
+    At most one event a lane is written.
     """
     count = whole(m)
     guess(lanes, count, length, circuit)

@@ -1,8 +1,9 @@
-"""What lanes look for next, decided for all of them together, without branches.
+"""Next crossing of all lanes together, without branches.
 
-Between two known places the signal is monotone, or it turns where it cannot cross, so the distance
-at both tells whether a threshold is crossed, and that it is crossed once.  Turns, noise events and
-whatever leak makes doubtful are left to :mod:`adv2e.kernel.lanes.slow_path`.
+Between two known places the signal is monotone, or it has its extremum where it cannot cross.  So
+the distance at both places tells whether a threshold is crossed, and that it is crossed once.
+Extrema, noise events and crossings that leak may cause are left to
+:mod:`adv2e.kernel.lanes.slow_path`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from adv2e.kernel.lanes import rows
 
 @kernel
 def sure_of_leak(away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, on, off):
-    """Tell whether a falling signal crosses just what the distances at S and STOP say.
+    """Tell whether the distances at S and STOP show all crossings of a falling signal.
 
     Its distance from the falling reference moves by leak - z, z = w u being the fall of the signal.
 
@@ -48,7 +49,7 @@ def sure_of_leak(away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, o
 
 @kernel
 def choose(count, ta, length, circuit, lanes):
-    """Choose the threshold that comes first for the lanes that are ready, or tell the doubtful."""
+    """Choose the first threshold crossing of lanes that are READY, or mark them DOUBTFUL."""
     dark, per_dn = circuit.dark * length, circuit.per_dn * length
     for j in range(count):
         seeks = lanes[rows.SEEKS + j]

@@ -3,8 +3,8 @@
 Above the light that the quadrature is chosen for, they are shorter by as much as the corner is
 faster.
 
-The screen knows the signal at the end of an interval that is one piece.  For any other, the end of
-each piece is a place like those that lanes look for, before the piece is gone through.
+The screen knows the signal at the end of an interval that is one piece.  In any other interval the
+end of each piece is a target of its lane, before the piece is solved.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ def set_stop(j, place, lag, light, fallen, lanes):
 
 @kernel
 def fallen_at_place(j, lanes):
-    """Fall of the reference until the place that was looked at."""
+    """Fall of the reference until the place that was evaluated."""
     since = lanes[rows.FALL + j] * (lanes[rows.PLACE + j] - lanes[rows.BASE + j])
     return lanes[rows.FALLEN_B + j] + since + lanes[rows.FALL_DN + j] * lanes[rows.SUM_E + j]
 
 
 @kernel
 def end_of_piece(base, x0, dx, knee, mixed, brightest):
-    """Where the piece that begins at `base` ends: at the knee, after about an e-fold, or at 1.
+    """End of the piece that begins at `base`: at the knee, after about an e-fold, or at 1.
 
-    brightest: light at its start or at 1 [DN], whichever is more.  Also tells whether the piece is
-    on the logarithmic branch, as far as the knee decides that.
+    brightest: the larger of the light at its start and at 1 [DN].  Also returns whether the piece
+    is on the logarithmic branch, as far as the knee decides that.
     """
     at_knee = (knee - x0) / (dx if dx != 0.0 else 1.0)
     at_knee = at_knee if at_knee > 0.0 else 0.0
@@ -60,7 +60,7 @@ def end_of_piece(base, x0, dx, knee, mixed, brightest):
 
 @kernel
 def first_place(j, ta, length, lanes):
-    """Return what a lane at the start of its piece looks for first, and where."""
+    """Return the first target of a lane at the start of its piece, and its place."""
     base, end = lanes[rows.BASE + j], lanes[rows.END + j]
     hold = lanes[rows.HOLD + j]
     held = hold >= 0.0
@@ -75,7 +75,7 @@ def first_place(j, ta, length, lanes):
 
 @kernel
 def open_piece(j, ta, length, lanes):
-    """Begin a piece, the signal at whose end was looked at."""
+    """Begin a piece at whose end the signal was evaluated."""
     lag = lanes[rows.LAG_E + j]
     lag = lag if abs(lag) > screen.AT_REST else 0.0
     fallen = fallen_at_place(j, lanes)
@@ -91,7 +91,7 @@ def open_piece(j, ta, length, lanes):
 
 @kernel
 def next_piece(j, circuit, lanes):
-    """Move a lane that is done with a piece on to the next one, to look at its end."""
+    """Move a lane to the next piece; its target is the end of that piece."""
     base, dx, x0 = lanes[rows.END + j], lanes[rows.DX + j], lanes[rows.X0 + j]
     lag, fallen = lanes[rows.U1 + j], lanes[rows.TAIL + j]
     light = lanes[rows.I1 + j]

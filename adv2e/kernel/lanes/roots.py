@@ -135,7 +135,7 @@ def _evaluate_from(
 
 @kernel
 def evaluate(lanes, count, length, circuit, rule):
-    """From the start of the piece on."""
+    """Evaluate lag and light at each place, from the start of the piece on."""
     _evaluate_from(
         rows.BASE, rows.I0, rows.U0, lanes, count, length, circuit, rule.nodes, rule.weights
     )
@@ -143,7 +143,7 @@ def evaluate(lanes, count, length, circuit, rule):
 
 @kernel
 def evaluate_release(lanes, count, length, circuit, rule):
-    """From the last known place on, which is at most a dead time before."""
+    """Evaluate lag and light at ends of dead times, from the last known place on."""
     _evaluate_from(
         rows.S, rows.LIGHT_S, rows.LAG_S, lanes, count, length, circuit, rule.nodes_dead,
         rule.weights_dead,

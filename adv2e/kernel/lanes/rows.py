@@ -95,7 +95,7 @@ def scratch() -> NDArray[np.float64]:
 
 @kernel
 def move(lanes, source, target):
-    """Move what a lane keeps from round to round to another one."""
+    """Move the state of lane `source` that is kept from round to round to lane `target`."""
     for row in range(X0, PLACE + 1, _STRIDE):
         lanes[row + target] = lanes[row + source]
 

@@ -1,8 +1,8 @@
-"""What a lane looks for next, decided by itself: turns, noise events, and what leak makes doubtful.
+"""Next target of one lane (scalar): extremum, noise event, or a crossing that leak may cause.
 
-Where a falling signal may be outrun by leak, or a search has failed, the lane looks at the place
-half-way to the next known one, and decides up to there; down to `TOLERANCE`, if it must.  From a
-place so passed it goes on by twice the step.
+Where leak may be faster than a falling signal, or a search has failed, the lane evaluates the
+signal half-way to the next known place, and decides up to there; by halves down to `TOLERANCE`, if
+it must.  From a place so passed it goes on by twice the step.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _HALF_WAY = -1
 
 @kernel
 def _seek_given(j, what, place, lanes):
-    """Look at a given place next."""
+    """Set the next target of lane j to a given place."""
     lanes[rows.SEEKS + j] = what
     lanes[rows.PLACE + j] = place
     lanes[rows.MOVES + j] = 0.0
@@ -31,7 +31,7 @@ def _seek_given(j, what, place, lanes):
 
 @kernel
 def _seek_root(j, what, length, lanes):
-    """Look for a threshold, or for the turn, between S and STOP next.
+    """Set the next target of lane j to a crossing, or to the extremum, between S and STOP.
 
     A place at S, and one up to a STOP that is near, is known without a search.
     """
@@ -44,7 +44,7 @@ def _seek_root(j, what, length, lanes):
 
 @kernel
 def _moves_before_turn(j, length, circuit, lanes):
-    """How far the signal moves at most before it turns, signed; see the screen's bound."""
+    """Largest change of the signal before its extremum, signed; see the screen's bound."""
     lag, dx = lanes[rows.LAG_S + j], lanes[rows.DX + j]
     if lanes[rows.LOG + j] < 0.5 or abs(lag) >= _STRAIGHT:
         return -lag
@@ -55,7 +55,7 @@ def _moves_before_turn(j, length, circuit, lanes):
 
 @inlined
 def _choose(j, length, circuit, lanes):
-    """Tell what comes first between S and STOP: a threshold, TURN, DONE (nothing), or try HALF."""
+    """Return the first target between S and STOP: a threshold, TURN, DONE (none), or HALF."""
     on, off = lanes[rows.ON + j] + TIE, lanes[rows.OFF + j] + TIE
     away_s, away_p = lanes[rows.AWAY_S + j], lanes[rows.AWAY_P + j]
     lag_s, lag_p = lanes[rows.LAG_S + j], lanes[rows.LAG_P + j]
@@ -92,7 +92,7 @@ def _choose(j, length, circuit, lanes):
 
 @inlined
 def found_stop(i, j, circuit, state, lanes):
-    """Make the place that was looked at, a turn, a half or that of a noise event, the next stop."""
+    """Make the place that was evaluated (extremum, half-way or noise event) the next STOP."""
     seeks = lanes[rows.SEEKS + j]
     lanes[rows.KIND + j] = NONE
     if seeks == rows.INJECTED:
@@ -109,7 +109,7 @@ def found_stop(i, j, circuit, state, lanes):
 
 @inlined
 def _find_stop(i, j, ta, length, circuit, state, lanes):
-    """Set STOP to the end of the piece; tells whether a noise event comes before it."""
+    """Set STOP to the end of the piece; returns whether a noise event comes before it."""
     end = lanes[rows.END + j]
     t_end = ta + end * length
     if lanes[rows.NOISE + j] < t_end:
@@ -126,7 +126,7 @@ def _find_stop(i, j, ta, length, circuit, state, lanes):
 
 @inlined
 def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
-    """Go to STOP, where nothing was crossed before, and fire what is due there.
+    """Move to STOP, before which there is no crossing, and fire a noise event that is due there.
 
     Returns the number of events, and whether there was one.
     """
@@ -153,7 +153,7 @@ def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
 
 @inlined
 def go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
-    """Decide what a doubtful lane looks for next.  Returns the number of events."""
+    """Choose the next target of a DOUBTFUL lane.  Returns the number of events."""
     while True:
         if lanes[rows.KNOWN + j] < 0.5 and _find_stop(i, j, ta, length, circuit, state, lanes):
             return n

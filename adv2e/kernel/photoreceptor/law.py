@@ -26,27 +26,27 @@ CELLS_AT_WHITE = 128
 
 COARSE = 9
 (KEPT_N, GIVEN, KEPT_S, BY_N, BY_N_S, BY_S, BEND, PULL, REACH) = range(COARSE)
-"""Columns of the coarse table, from one sample to the next: what n keeps, what s takes of n, what s
-keeps; the factors of two normal numbers; how far the mean bends between for each of n - s, what it
-is drawn to zero, and how far the rest may reach."""
+"""Columns of the coarse table, from one sample to the next: weight of n in n, of n in s, of s in s;
+factors of two normal numbers; and bounds between them: bend of the mean for each of n - s, pull of
+the mean to zero, reach of the bridge about its mean."""
 
 FINE = 11
 (N_OF_N0, N_OF_S0, N_OF_N1, N_OF_S1, S_OF_N0, S_OF_S0, S_OF_N1, S_OF_S1, NEW_N, NEW_N_S, NEW_S) = (
     range(FINE)
 )
-"""Columns of the fine table, for the middle of 2, 4, 8 ... cells: the means of n and s there by
-what n and s are at both ends, and the factors of two normal numbers."""
+"""Columns of the fine table, for the middle of 2, 4, 8 ... cells: weights of n and s at both ends
+in the means of n and s there, and the factors of two normal numbers."""
 
 _SURE = 6.0
 """Standard deviations that the bridge does not leave: one of a billion does."""
 
 _CLEAR, _LEAST = 4.5, 1.0
-"""How far the bridge may reach, in standard deviations of the noise: so that noise below _CLEAR of
-them stays clear of a threshold, but at least _LEAST.  More samples cost as much as they save."""
+"""Reach of the bridge, in standard deviations of the noise: noise below _CLEAR of them stays clear
+of a threshold; at least _LEAST.  More samples cost as much as they save."""
 
 _FINE = 0.015
-"""Standard deviation of what cells leave out behind two poles, as a share of that of the noise.
-The share of events that this loses is about as small."""
+"""Standard deviation of the noise that cells leave out behind two poles, as a share of that of all
+noise.  The share of events that this loses is about as small."""
 
 _SLOWEST, _BRIGHTEST = 2.0**-12, 1000.0
 _INNER = np.arange(1, 8) / 8.0
@@ -57,10 +57,10 @@ _COUNTS = np.array([
 """Cells of a piece: few different ones, so that many pixels have as many."""
 
 MOST_LEVELS = 8
-"""Of halves, of what is between two samples."""
+"""Most levels of halving between two samples."""
 
 MOST_GROUPS = _COUNTS.size * (MOST_LEVELS + 1)
-"""Of entries that have as many samples and cells."""
+"""Most groups of entries with the same numbers of samples and cells."""
 
 
 class Laws(NamedTuple):
@@ -75,7 +75,7 @@ class Laws(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """What the tables follow from, but for the length."""
+    """Parameters of the noise that the tables depend on, besides the length of a piece."""
 
     dark: float  # corner of the low-pass in darkness [rad/us],
     fastest: float  # at white or in darkness, whichever is faster,
@@ -86,7 +86,7 @@ class Noise(NamedTuple):
 
 
 def noise_of(circuit: Circuit, level: float, longest: float) -> Noise:
-    """Return what tables follow from; cells are at most `longest` us, whatever the circuit says."""
+    """Return the parameters of the noise, with cells of at most `longest` us."""
     fastest = fastest_corner(circuit)
     cell = min(circuit.noise_step / fastest, longest)
     return Noise(circuit.dark, fastest, circuit.follower, circuit.noise_rms, cell, level)
@@ -108,7 +108,7 @@ def laws_for(lengths: NDArray[np.float64], noise: Noise) -> Laws:
 
 
 def no_laws() -> Laws:
-    """Return what stands in the place of tables where there is no noise."""
+    """Return empty tables, for a circuit without photoreceptor noise."""
     none = np.zeros((1, 0), np.int64)
     return Laws(
         0, none, none, none, np.zeros((1, 0, COARSE), np.float32),
@@ -117,7 +117,7 @@ def no_laws() -> Laws:
 
 
 def cells_of(length: float, noise: Noise) -> float:
-    """Return how many cells the fastest pixel needs in `length` us, white being the brightest."""
+    """Return the number of cells that the fastest pixel needs in `length` us, up to white."""
     return float(_needed(length, np.array([noise.fastest]), noise)[0])
 
 
@@ -131,10 +131,10 @@ def _entries(noise: Noise) -> tuple[int, NDArray[np.float64]]:
 
 
 def _needed(length: float, corner: NDArray[Any], noise: Noise) -> NDArray[Any]:
-    """Return how many cells are needed in `length` us.
+    """Return the number of cells that each corner needs in `length` us.
 
-    Behind one pole the noise is a line in each, so that their length is a part of the model.
-    Behind two, it is a cubic but for h^3 w b (w + b)/96 of its variance.
+    Behind one pole the noise is a line in each cell, so that the length of cells is a part of the
+    model.  Behind two, it is a cubic but for h^3 w b (w + b)/96 of its variance.
     """
     if noise.follower == 0.0:
         return np.full(corner.shape, math.ceil(length / noise.cell))
@@ -143,7 +143,7 @@ def _needed(length: float, corner: NDArray[Any], noise: Noise) -> NDArray[Any]:
 
 
 class Step(NamedTuple):
-    """From one instant to another, for each corner: means and covariances, of noise of rms 1."""
+    """Moments from one instant to another, for each corner: of noise of rms 1."""
 
     kept_n: NDArray[Any]
     given: NDArray[Any]
@@ -154,7 +154,7 @@ class Step(NamedTuple):
 
 
 def step_over(h: NDArray[Any], w: NDArray[Any], b: float) -> Step:
-    """Return what (n, s) becomes over `h` us; without a second pole (b = 0), s is 0."""
+    """Return the moments of (n, s) after `h` us; without a second pole (b = 0), s is 0."""
     a, beta = w * h, b * h
     kept_n, kept_s = np.exp(-a), np.exp(-beta)
     apart = np.abs(a - beta)
@@ -168,7 +168,7 @@ def step_over(h: NDArray[Any], w: NDArray[Any], b: float) -> Step:
 
 
 class Bridge(NamedTuple):
-    """What is at an instant between two others, for each corner, of noise of rms 1."""
+    """Moments at an instant, given those before and after it, for each corner; noise of rms 1."""
 
     n: list[NDArray[Any]]  # weights of n and s at the start, and at the end, in the mean of n
     s: list[NDArray[Any]]  # and in that of s
@@ -178,7 +178,7 @@ class Bridge(NamedTuple):
 
 
 def bridge_over(t: float, h: NDArray[Any], w: NDArray[Any], b: float) -> Bridge:
-    """Return what is known at share t of `h` us; without a second pole (b = 0), s is n."""
+    """Return the moments at share t of `h` us, given both ends; without a second pole s is n."""
     first, rest, whole = (step_over(part * h, w, b) for part in (t, 1.0 - t, 1.0))
     if b == 0.0:
         by_end = first.nn * rest.kept_n / whole.nn

@@ -1,7 +1,7 @@
-"""All of the photoreceptor noise of some pixels over a piece, cell by cell, side by side in lanes.
+"""Photoreceptor noise of some pixels over a piece, cell by cell, side by side in lanes.
 
-The samples are drawn once more, and what is between two of them by halves: in the middle of what is
-not known yet it is normal, given both ends.
+The samples are drawn once more, and the cells between two samples by halves: in the middle of a
+span that is not drawn yet the noise is normal, given both ends.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ LANES = 64
 
 NOISE = 0
 SEEN = (MOST_CELLS + 1) * LANES
-"""Rows of a path, one for each end of a cell: noise behind the first pole, and as the comparator
-sees it.  Behind one pole the latter are the former."""
+"""Noise samples at cell boundaries: after pole 1, and at the comparator (after pole 2 if there is
+one; else only the first of both is in use)."""
 
 HIGH = 2 * (MOST_CELLS + 1) * LANES
 LOW = HIGH + LANES
-"""Bounds of the latter over the piece."""
+"""Bounds of the noise at the comparator over the piece."""
 
 _KNOWN = LOW + LANES
-"""1 where what is between a sample and the next is drawn, a row for each sample."""
+"""Flags, a row for each sample: 1 if the cells between it and the next sample are drawn."""
 
 _BY = _KNOWN + MOST_CELLS * LANES
 _FIRST_BY = _BY // LANES
@@ -42,7 +42,7 @@ _MIDDLE = _BY + COARSE * LANES
 """Columns of the tables."""
 
 THERE = _MIDDLE + MOST_LEVELS * FINE * LANES
-"""From here on the same rows of stretches between two samples: each is the first of a lane."""
+"""First of the same rows for stretches between two samples: each stretch is the first of a lane."""
 
 PIXELS, BLOCKS, FROM, SAMPLE = (row * LANES for row in range(4))
 """Whole numbers: of the pixel among all, and of its first block of random numbers; of a stretch
@@ -70,7 +70,7 @@ def path() -> Path:
 
 @kernel
 def seen_from(circuit):
-    """Return the first of the rows of what the comparator sees."""
+    """Return the first row of the noise at the comparator."""
     return SEEN if circuit.follower > 0.0 else NOISE
 
 
@@ -140,7 +140,7 @@ def _middle_of_two(size, at, r, after, first, z, v, rows):
 
 @kernel
 def _halve(size, begin, levels, more, circuit, rows, numbers, path):
-    """Draw what is between two samples, the first of which is in row `begin`, of all lanes.
+    """Draw the noise between two samples, the first of which is in row `begin`, of all lanes.
 
     more : added to the number of each lane's first block of random numbers
     """
@@ -169,7 +169,7 @@ def _halve(size, begin, levels, more, circuit, rows, numbers, path):
 
 @kernel
 def _blocks_between(levels, circuit):
-    """Blocks of random numbers of what is between two samples."""
+    """Return the number of blocks of random numbers for the noise between two samples."""
     a_block = 2 if circuit.follower > 0.0 else 4
     return ((1 << levels) - 2) // a_block + 1
 
@@ -183,12 +183,12 @@ def sample(size, places, piece, samples, levels, circuit, fine, noise, path):
     size : int
         Number of pixels.
     places : (LANES,) int64
-        Where they are among the sorted ones of the strip.
+        Their places among the sorted pixels of the strip.
     samples, levels : int
-        Of their group.
+        Samples and levels of their group.
     fine : (entries, levels, FINE) float32
     noise : Scratch
-        Of the strip.
+        Noise of the strip.
     path : Path
     """
     fine, noise, path = borrowed(fine, noise, path)
@@ -227,7 +227,7 @@ def sample(size, places, piece, samples, levels, circuit, fine, noise, path):
 
 @kernel
 def bounds_of_stretch(j, c, levels, seen, rows):
-    """Bounds of what is seen from sample j of lane c to the next."""
+    """Bounds of the noise at the comparator from sample j of lane c to the next."""
     at, after = (j << levels) * LANES + c, ((j + 1) << levels) * LANES + c
     a, b = rows[seen + at], rows[seen + after]
     high, low = strip.bounds(
@@ -240,20 +240,20 @@ def bounds_of_stretch(j, c, levels, seen, rows):
 
 @kernel
 def bound_stretch(size, j, levels, seen, high, low, rows):
-    """Fill `high` and `low` with bounds of what is seen from sample j to the next; (LANES,)."""
+    """Fill `high` and `low`, (LANES,), with bounds of the noise from sample j to the next."""
     for c in range(size):
         high[c], low[c] = bounds_of_stretch(j, c, levels, seen, rows)
 
 
 @kernel
 def is_known(j, c, rows):
-    """Tell whether what is between sample j of lane c and the next is drawn."""
+    """Tell whether the noise between sample j of lane c and the next is drawn."""
     return rows[_KNOWN + j * LANES + c] > _ZERO
 
 
 @kernel
 def draw_between(size, j, levels, circuit, path):
-    """Draw what is between sample j and the next, of all pixels of a path."""
+    """Draw the noise between sample j and the next, of all pixels of a path."""
     (path,) = borrowed(path)
     if levels > 0:
         more = j * _blocks_between(levels, circuit)
@@ -294,7 +294,7 @@ def draw_stretches(count, levels, circuit, path):
 
 @kernel
 def wait(t, c, j, path):
-    """Make what is between sample j of lane c and the next stretch number t."""
+    """Note the span from sample j of lane c to the next sample as stretch number t."""
     path.numbers[_NUMBERS + FROM + t] = c
     path.numbers[_NUMBERS + SAMPLE + t] = j
 
@@ -307,11 +307,11 @@ def origin(t, path):
 
 @kernel
 def cubic_of(r, c, start, width, corner, seen, rows):
-    """Coefficients of what is seen in cell r of lane c, as a cubic of the place in a substep.
+    """Coefficients of the noise in cell r of lane c, as a cubic of the place in a substep.
 
     The cell begins at place `start` of the substep, and is `width` of it.
-    corner : of the second pole, in the cell [rad]; 0: there is none, and what is seen is a line
-    seen : first of the rows of what is seen
+    corner : of the second pole, in the cell [rad]; 0: there is none, and the noise is a line
+    seen : first row of the noise at the comparator
     """
     at, after = r * LANES + c, (r + 1) * LANES + c
     s0, s1 = float(rows[seen + at]), float(rows[seen + after])
@@ -333,10 +333,10 @@ def cubic_of(r, c, start, width, corner, seen, rows):
 
 @kernel
 def bounds_in_cell(n0, s0, n1, s1, third):
-    """Bounds of what is seen in a cell: those of the Bezier points of its cubic.
+    """Bounds of the noise in a cell: those of the Bezier points of its cubic.
 
-    n0, s0, n1, s1 : noise behind the first pole and as seen, at both ends
-    third : of the corner of the second pole in the cell [rad]
+    n0, s0, n1, s1 : noise behind the first pole and at the comparator, at both ends
+    third : a third of the corner of the second pole in the cell [rad]
     """
     a, b = s0 + third * (n0 - s0), s1 - third * (n1 - s1)
     return max(s0, s1, a, b), min(s0, s1, a, b)
@@ -344,7 +344,7 @@ def bounds_in_cell(n0, s0, n1, s1, third):
 
 @kernel
 def bounds_of_cell(r, c, third, seen, rows):
-    """Bounds of what is seen in cell r of lane c."""
+    """Bounds of the noise at the comparator in cell r of lane c."""
     at, after = r * LANES + c, (r + 1) * LANES + c
     return bounds_in_cell(
         rows[NOISE + at], rows[seen + at], rows[NOISE + after], rows[seen + after], third

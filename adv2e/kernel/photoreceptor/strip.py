@@ -19,8 +19,8 @@ from adv2e.kernel.screen import STRIDE
 from adv2e.kernel.work_queue import STRIP
 
 NOISE, SEEN, HIGH, LOW = (row * STRIDE for row in range(4))
-"""Rows: noise behind the first pole and as the comparator sees it, before the next piece; and
-bounds of the latter over the last one."""
+"""Rows: noise behind the first pole and at the comparator, before the next piece; and bounds of the
+noise at the comparator over the last piece."""
 
 NOISE_0, SEEN_0, NOISE_1, SEEN_1, _HIGH, _LOW, BY = (row * STRIDE for row in range(4, 11))
 """Rows of the sorted pixels: noise at the start and at the end of the piece, bounds; from the last
@@ -34,7 +34,7 @@ _ZERO, _ONE = _f(0.0), _f(1.0)
 
 
 class Scratch(NamedTuple):
-    """Memory for noise of whoever works on a strip."""
+    """Memory for the noise of a strip, one for each thread."""
 
     rows: NDArray[np.float32]
     entries: NDArray[np.int64]  # of each pixel in the tables
@@ -69,7 +69,7 @@ def _find_entries(count, dark, per_dn, lowest, most, strip, entries):
 
 @kernel
 def _sort(lo, count, group, groups, coarse, scratch):
-    """Sort the pixels by group, and what is known of them."""
+    """Sort the pixels by group, and their noise and tables likewise."""
     order, ends, entries, rows = scratch.order, scratch.ends, scratch.entries, scratch.rows
     for g in range(groups + 1):
         ends[g] = 0
@@ -109,7 +109,7 @@ def put_back(count, scratch):
 
 @kernel
 def next_of_two(n, s, keep, given, keep_s, by_n, by_n_s, by_s, z, v):
-    """Return what noise n and s become behind two poles, by two normal numbers; see the law."""
+    """Return the next sample of noise n and s behind two poles, from two normal numbers."""
     return keep * n + by_n * z, given * n + keep_s * s + by_n_s * z + by_s * v
 
 

@@ -1,8 +1,8 @@
 """Any circuit over a tile in steps of time, a strip of pixels at a time.
 
 All pixels of a strip make each step together, in loops without branches; only those that may fire
-in a step are looked at by themselves.  The cost follows from pixels and steps and hardly from what
-is switched on, so this is the way for what :mod:`adv2e.kernel.exact` does not cover.
+in a step are solved by themselves.  The cost follows from pixels and steps and hardly from the
+effects that are on, so this solver is for circuits that :mod:`adv2e.kernel.exact` does not cover.
 
 An interval is cut into continuity samples (one piece, with ``exact``, unless its last one is as
 printed), each piece into equal steps, and these into blocks of at most BLOCK.  A block computes
@@ -54,7 +54,7 @@ class Run(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory of whoever works on a tile."""
+    """Memory for a tile, one for each thread."""
 
     strip: NDArray[np.float64]
     normals: NDArray[np.float64]
@@ -212,7 +212,7 @@ def _level(course, m, i):
 
 @kernel
 def _screen_step(lo, count, n, m, end, h, circuit, run, strip):
-    """Return how many pixels may fire in step m of a run; marks them."""
+    """Return the number of pixels that may fire in step m of a run; marks them in row HIT."""
     on, off = 1.0, 1.0
     if run.on.shape[1] > 1:
         events.step_thresholds(count, lo, run.on, m + 1, rows.ON, rows.ON_STEP, strip)

@@ -1,7 +1,7 @@
 """Events of a strip over one step: all pixels are screened, those that may fire go one by one.
 
-Within the step the signal is the cubic through its values and slopes at both ends, and so is what
-the leak makes of the reference.  Thresholds are lines.  A pixel whose Bezier points stay within its
+Within the step the signal is the cubic through its values and slopes at both ends, and so is the
+reference, which leak lowers.  Thresholds are lines.  A pixel whose Bezier points stay within its
 thresholds cannot fire by its signal; the rest is as :mod:`adv2e.kernel.comparator` has it.
 """
 
@@ -99,9 +99,9 @@ def _fall(k, on, leak, strip):
 
 @kernel
 def screen(n, end, leak, on, off, strip):
-    """Row HIT: who may fire before `end` [us]; REFERENCE: at the end of the step.
+    """Row HIT: pixels that may fire before `end` [us]; REFERENCE: at the end of the step.
 
-    on, off: factors on the rows of thresholds.  Returns the number of those who may.
+    on, off: factors on the rows of thresholds.  Returns the number of pixels that may fire.
     """
     hits = np.int64(0)
     for k in range(n):
@@ -154,7 +154,7 @@ def _at(p0, p1, p2, p3, s):
 
 @kernel
 def _root(p0, p1, p2, p3, a, b):
-    """Where a cubic that rises through zero once in [a, b] does so: Newton, else halving."""
+    """Root of a cubic that rises through zero once in [a, b]: Newton, else halving."""
     s = 0.5 * (a + b)
     for _ in range(_NEWTON):
         v = _at(p0, p1, p2, p3, s)
@@ -174,7 +174,7 @@ def _root(p0, p1, p2, p3, a, b):
 
 @kernel
 def first_reach(p0, p1, p2, p3, start, end):
-    """Where a cubic is first at or above zero in [start, end]; beyond 1: nowhere."""
+    """First place in [start, end] at which a cubic is at or above zero; beyond 1: none."""
     if _at(p0, p1, p2, p3, start) >= 0.0:
         return start
     if p3 == 0.0 and abs(p2) <= _STRAIGHT * abs(p1):

@@ -249,8 +249,9 @@ def see_noise(n, follows, weights, strip):
 
 @kernel
 def second_pole_weights(b, line):
-    """Return what the second pole keeps, and takes of values and slopes at its input, in a step.
+    """Return the weights of the second pole in a step: of its own value, and of its input.
 
+    Five numbers: for its value, the input at both ends, and the slope of the input at both ends.
     b is its corner times the step; with `line` the input is a line, its slopes do not count.
     """
     if b == 0.0:

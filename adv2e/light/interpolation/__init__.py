@@ -25,7 +25,7 @@ class Upsampler(Protocol):
     """Makes the frames inside one input interval."""
 
     def count(self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING) -> int:
-        """Return how many frames :meth:`between` makes of the same interval, at least 1."""
+        """Return the number of frames of :meth:`between` in the same interval, at least 1."""
         ...
 
     def between(
@@ -49,7 +49,7 @@ class Upsampler(Protocol):
 
 
 def make_upsampler(sampling: Sampling, *, threads: int = 1) -> Upsampler:
-    """Return what makes the frames of each input interval.
+    """Return the upsampler for an interpolation: linear, along the motion, or by a network.
 
     `threads` in-between frames are made at a time; they do not depend on it.
 

@@ -52,7 +52,7 @@ class FlowUpsampler:
         self._paths, self._threads = paths, threads
 
     def count(self, a: Array, b: Array, beside: Beside = NOTHING) -> int:
-        """Return how many frames :meth:`between` makes."""
+        """Return the number of frames that :meth:`between` makes."""
         return self._paths.count(a, b, beside)
 
     def between(self, a: Array, b: Array, beside: Beside = NOTHING) -> Iterator[Array]:

@@ -54,7 +54,7 @@ class NetworkUpsampler:
             )
 
     def count(self, a: Array, b: Array, beside: Beside = NOTHING) -> int:
-        """Return how many frames :meth:`between` makes."""
+        """Return the number of frames that :meth:`between` makes."""
         count = self._paths.count(a, b, beside)
         return count if self._network.knows_time else 1 << (count - 1).bit_length()
 

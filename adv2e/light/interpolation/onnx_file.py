@@ -102,14 +102,14 @@ class _Time:
 
 
 class Network:
-    """What makes a frame between two; for many threads at once.
+    """Neural network that interpolates a frame between two; many threads may use it at once.
 
     Attributes
     ----------
     source : mapping
         Name and SHA-256 of the file.
     encoding : str
-        Of the values that it takes and gives.
+        Encoding of the values that it takes and gives.
     size : (int or None, int or None)
         The only rows and columns that it takes.
     multiple : int
@@ -119,7 +119,7 @@ class Network:
     """
 
     PACKAGES = ("onnxruntime",)
-    """What runs it."""
+    """Packages that run the network."""
 
     def __init__(self, path: str, data: bytes) -> None:
         self.source = {"file": shown(Path(path).name), "sha256": hashlib.sha256(data).hexdigest()}
@@ -135,7 +135,7 @@ class Network:
 
     @property
     def text(self) -> str:
-        """What it is, in a few words."""
+        """Description of the network in a few words."""
         when = "at any time" if self.knows_time else "in the middle of two"
         colour = "colour" if self._images[0].channels > 1 else "grey"
         return f"{self.source['file']}: {colour}, {self.encoding}, {when}"
@@ -295,7 +295,7 @@ def _opened(path: str, changed_ns: int, size: int) -> Network:
 def _open(
     label: str, data: bytes
 ) -> tuple[Any, tuple[_Given, ...], tuple[str, ...], Mapping[str, str]]:
-    """Return what runs a network, its inputs, the names of its outputs, and its metadata."""
+    """Return the session of a network, its inputs, the names of its outputs, and its metadata."""
     try:
         import onnxruntime  # noqa: PLC0415 - an extra
     except ImportError:

@@ -34,14 +34,14 @@ _UNEXPLAINED_MOST = 0.5
 
 @dataclass(frozen=True)
 class Way:
-    """How the pixels of both frames of an interval get to the other one.
+    """Motion paths of the pixels from each frame of an interval to the other frame.
 
     Attributes
     ----------
     motion : (Motion, Motion), or None
-        From the first to the second and back; None: not known.
+        From the first frame to the second and back; None: not known.
     bent : (Bend, Bend), or None
-        How their paths bend; None: they are straight.
+        Bends of the paths; None: they are straight.
     count : int
         Frames that the interval gets.
     """
@@ -68,7 +68,7 @@ class Paths:
         self._last: tuple[Array, Array, Way] | None = None
 
     def of(self, a: Array, b: Array, beside: Beside) -> Way:
-        """Return the way from `a` to `b`; that of the interval asked for last is kept."""
+        """Return the motion paths from `a` to `b`; those of the last interval are kept."""
         if self._last is None or self._last[0] is not a or self._last[1] is not b:
             motion = self._motion(a, b)
             bent = None if motion is None else bends(*motion, *self._sides(a, b, beside))
@@ -76,7 +76,7 @@ class Paths:
         return self._last[2]
 
     def count(self, a: Array, b: Array, beside: Beside) -> int:
-        """Return how many frames the interval from `a` to `b` gets; motion is not always needed."""
+        """Return the number of frames for the interval from `a` to `b`; it may need no motion."""
         return self.L if self._max_motion_px is None else self.of(a, b, beside).count
 
     def _count(self, a: Array, b: Array, motion: Pair | None, bent: Bent) -> int:
@@ -90,7 +90,7 @@ class Paths:
         return max(1, min(self.L, math.ceil(max(speeds) / self._max_motion_px)))
 
     def _sides(self, a: Array, b: Array, beside: Beside) -> tuple[Side | None, Side | None]:
-        """Return the motion to what lies beside; none at all where only one side is there."""
+        """Return the motion to the frames before and after; none if only one of them is there."""
         if beside.before is None or beside.after is None:
             return None, None
         before, after = self._motion(beside.before, a), self._motion(b, beside.after)

@@ -28,7 +28,7 @@ OVERLAP = 128
 
 @dataclass(frozen=True)
 class Tile:
-    """One tile: where it begins, and how much its pixels count."""
+    """Tile along one axis: its first pixel, and the weights of its pixels."""
 
     start: int
     weight: Image
@@ -74,7 +74,7 @@ def in_tiles(
     fixed: tuple[int | None, int | None],
     multiple: int,
 ) -> Image:
-    """Return what `ask` makes of pictures, asked tile by tile.
+    """Return the picture that `ask` makes of others, tile by tile.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from adv2e.sources.frame import Image, Pixels
 
 
 class Alpha(Enum):
-    """What the channel beyond the colours of a file is."""
+    """Meaning of the alpha channel of a file."""
 
     STRAIGHT = "straight"
     MULTIPLIED = "multiplied"

@@ -1,4 +1,4 @@
-"""What the headers of images but TIFF and EXR say that OpenCV does not tell, or too late.
+"""Headers of images but TIFF and EXR: facts that OpenCV does not tell, or too late.
 
 Decoders make room for a picture first and fill it with whatever comes: a JPEG of 600 bytes became
 2.7 GB.  A picture of one colour packs well, so that a small file may hold a large one; up to the
@@ -51,16 +51,16 @@ _RAW_PNM = re.compile(rb"P[56]" + 3 * rb"(?:\s|#[^\n\r]*[\n\r])+([0-9]{1,10})" +
 
 @dataclass(frozen=True)
 class Header:
-    """What is to be known of an image beside its pixels.
+    """Facts about an image beside its pixels: size, alpha, white, encoding.
 
     Attributes
     ----------
     width, height : int
         Zero where they are not stated.
     pictures : int
-        How many are in the file.
+        Number of pictures in the file.
     alpha : Alpha
-        What a fourth channel is.
+        Meaning of a fourth channel.
     grey : bool
         OpenCV repeats grey three times.
     white : float, optional
@@ -86,7 +86,7 @@ class Header:
 
 
 def read_header(data: bytes) -> Header:
-    """Return what the bytes of a file say, as far as they can be read."""
+    """Return the header in the bytes of a file, as far as it can be read."""
     try:
         if data.startswith(b"\x89PNG\r\n\x1a\n"):
             return _png(data)

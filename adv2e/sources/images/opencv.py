@@ -33,7 +33,7 @@ IMAGE_SUFFIXES = (
 
 
 class _Quiet:
-    """Keeps OpenCV from printing, in all threads at once: the last to leave sets it back."""
+    """Reference-counted silencing of OpenCV's log, for all threads of the process."""
 
     def __init__(self) -> None:
         # OpenCV 5 has cv2.utils.logging, OpenCV 4 has it only as cv2.setLogLevel
@@ -168,11 +168,12 @@ def _decode_tiff(data: bytes, label: str) -> Pixels:
 _CUT = re.compile(
     rb"[Pp]remature end|bad Huffman code|found marker|[Ii]nconsistent progression|bad arithmetic"
 )
-"""What libjpeg says, and fills the picture with grey.  Foreign bytes between parts do no harm."""
+"""Messages of libjpeg after which it fills the picture with grey.  Foreign bytes between parts do
+no harm."""
 
 
 def _decoded(data: bytes, label: str) -> tuple[Any, int, str]:
-    """Return the image, the orientation that its Exif states, and what is to be told of it."""
+    """Return the image, the orientation that its Exif states, and a warning about it."""
     image: Any = None
     orientation, says = 1, ""
     if data and _is_whole(data):

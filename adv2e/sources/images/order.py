@@ -124,7 +124,7 @@ def _settled(stems: list[str], whole: Key, decimal: Key, *, signed: bool) -> tup
 
 
 def _rests(stems: Sequence[str]) -> list[str]:
-    """Return what is left of each after the words with which all begin."""
+    """Return the rest of each stem after the words with which all begin."""
     same = commonprefix(list(stems))  # noqa: RUF071 - of letters is meant
     begin = len(re.sub(r"[^\W_]*$", "", same))
     return [stem[begin:] for stem in stems]
@@ -162,7 +162,7 @@ def _of_units(number: str, digits: int) -> Decimal:
 
 
 def _unevenness(series: Sequence[Sequence[Any]]) -> float:
-    """Return how far steps are from the usual one: as a share of it, at most 1, on average."""
+    """Return the mean deviation of steps from the median, as a share of it, each at most 1."""
     steps = [after - before for one in series for before, after in pairwise(sorted(one))]
     usual = median(steps) if steps else 0
     return mean(min(1.0, float(abs(step - usual) / usual)) for step in steps) if usual else 1.0

@@ -1,8 +1,8 @@
-"""What the directories of a TIFF say, as far as OpenCV does not: and those of Exif, which is one.
+"""Directories of a TIFF, for facts that OpenCV does not tell; Exif is such a directory, too.
 
 OpenCV turns the picture as its orientation says, and scales 10, 12 and 14 bits to 16.  It reads the
 first page alone, knows no white level, multiplies 8 bits by unassociated alpha but not 16, leaves
-16 bits inverted where white is zero, and makes 8 bits of what it does not know.
+16 bits inverted where white is zero, and makes 8 bits of formats that it does not know.
 
 References
 ----------
@@ -35,30 +35,30 @@ _TYPES = {1: "B", 2: "B", 3: "H", 4: "I", 16: "Q"}
 _TEXT, _FLOAT = 2, 3
 _VALUES = 64
 _IMAGEJ = re.compile(rb"ImageJ=.*\nimages=([0-9]{1,9})\n")
-"""How its description begins where it puts all its pages behind the first, with one directory."""
+"""Description of stacks of ImageJ that have all pages behind the first, with one directory."""
 
 
 @dataclass(frozen=True)
 class _Tag:
     values: tuple[int, ...]
     at: int
-    """Where its values lie in the file."""
+    """Offset of its values in the file [bytes]."""
 
 
 @dataclass(frozen=True)
 class Tiff:
-    """What is to be known of a TIFF beside its pixels.
+    """Facts about a TIFF beside its pixels: white, inversion, alpha.
 
     Attributes
     ----------
     data : bytes
         The file, so that OpenCV leaves colours as they are.
     white : float, optional
-        Number that means white in what OpenCV returns, where it is not that of the data type.
+        Number that means white in the image of OpenCV, where it is not that of the data type.
     inverted : bool
-        Of what OpenCV returns, zero is white.
+        Zero is white in the image of OpenCV.
     alpha : Alpha
-        What a fourth channel is.
+        Meaning of a fourth channel.
     """
 
     data: bytes
@@ -73,7 +73,7 @@ def is_tiff(data: bytes) -> bool:
 
 
 def examine(data: bytes, label: str) -> Tiff | None:
-    """Return what the first directory says; None if it cannot be read.
+    """Return the facts in the first directory; None if it cannot be read.
 
     Raises
     ------

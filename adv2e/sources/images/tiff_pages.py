@@ -53,7 +53,7 @@ class _Tag:
 
 @dataclass(frozen=True)
 class _Page:
-    """Where its directory is, and how far its pixels lie behind those of that."""
+    """Page: offset of its directory, and of its pixels from those in the directory [bytes]."""
 
     directory: int
     shift: int = 0

@@ -1,4 +1,4 @@
-"""How frames that come one after the other lie in a stream."""
+"""Layout of frames in a stream: one after the other, of fixed size."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class Layout:
     pixels : callable
         Returns the pixels of a frame from its bytes and its name for messages.
     light : Light
-        What the numbers stand for.
+        Encoding and white of the numbers.
     rate : FrameRate, optional
-        Where the stream states it.
+        Frame rate, where the stream states it.
     marked : bool
         A line ``FRAME`` stands before each.
     note : str
-        What is to be told of it.
+        Note on the layout.
     """
 
     kind: str

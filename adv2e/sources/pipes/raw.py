@@ -14,7 +14,7 @@ from adv2e.sources.pipes.layout import Layout, check_size, pixels_of, white_of
 
 @dataclass(frozen=True)
 class _Format:
-    """Which channels come, one after the other (0 is red, or grey), their type and their bits."""
+    """Pixel format: order of the channels (0 is red, or grey), data type, bits."""
 
     channels: tuple[int, ...]
     dtype: str
@@ -31,7 +31,7 @@ _FORMATS = {
     "bgr24": _Format((2, 1, 0), "u1", 8),
     "rgb48le": _Format((0, 1, 2), "<u2", 16),
 }
-"""By the names that FFmpeg has for them (``-pix_fmt``)."""
+"""Pixel formats by their names in FFmpeg (``-pix_fmt``)."""
 
 PIXEL_FORMATS = tuple(_FORMATS)
 

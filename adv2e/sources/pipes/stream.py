@@ -61,7 +61,7 @@ class Stream:
         return b"".join(pieces)
 
     def _some(self, most: int) -> bytes:
-        """Return what comes next, no more than that; nothing at the end.
+        """Return the next bytes, at most `most`; none at the end.
 
         Nothing stays in the buffer of the file, where nobody could wait for it.
         """
@@ -89,7 +89,7 @@ class Stream:
 
 
 def _waiting_in(pipe: int) -> int:
-    """Return how many bytes were sent and not read yet."""
+    """Return the number of bytes that were sent and not read yet."""
     import fcntl  # noqa: PLC0415 - Windows has none
     import termios  # noqa: PLC0415
 

@@ -1,1 +1,1 @@
-"""When frames are taken: lists, names, rates, units and gaps."""
+"""Timestamps of frames: lists, names, rates, units and gaps."""

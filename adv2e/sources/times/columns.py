@@ -71,7 +71,7 @@ class Table:
     unit: str | None
 
     def described(self, unit: str) -> str:
-        """Return what the columns were taken for, their times being in `unit`."""
+        """Return the roles of the columns in words, their times being in `unit`."""
         words = ["unused"] * len(self.lines[0].fields)
         words[self.time] = f"time [{unit}]"
         if self.name is not None:
@@ -204,7 +204,7 @@ def _check_widths(lines: list[Line], label: str) -> None:
 
 
 def _heading(text: str, width: int) -> list[str] | None:
-    """Return what a line above the list calls its columns, if it has a word for each."""
+    """Return the names of the columns in a line above the list, if it has one for each."""
     bound = re.sub(r"\s+(?=[(\[])", "", text)  # a unit in brackets belongs to the word before
     for pattern in (r"\s*[,;\t]\s*", r"[\s,;]+"):
         words = re.split(pattern, bound.strip())
@@ -218,7 +218,7 @@ def _has_time(words: list[str]) -> bool:
 
 
 def _role(word: str) -> str:
-    """Return what a heading calls a column: 'time', 'name', 'count', 'other', or '' (nothing)."""
+    """Return the role of a column by its heading: 'time', 'name', 'count', 'other' or ''."""
     word = word.strip("\"'# ").lower()
     for role, form in (("time", _TIME), ("name", _NAME), ("count", _COUNT)):
         if form.fullmatch(word):

@@ -18,16 +18,16 @@ from adv2e.sources.times.rates import FrameRate
 
 _LONG_NS = NS_PER_S
 _USUAL, _UNUSUAL = 3, 30
-"""How many usual steps a long gap has at least, and one of any length."""
+"""Least length of a gap in usual steps: of one above `_LONG_NS`, and of any gap."""
 _NO_NUMBERS = 1000
 """Steps from which on numbers are times: of nanoseconds, microseconds, or decimals of seconds."""
 
 
 def gap_doubts(times_ns: Sequence[int], label: str) -> list[str]:
-    """Return what is to be told of gaps between frames: one line, or none.
+    """Return a warning about gaps between frames: one line, or none.
 
     A gap is a step of over a second and three usual ones, or of thirty usual ones.  `times_ns`
-    increase; `label` is what they are the frames of.
+    increase; `label` is the name of their source.
     """
     if len(times_ns) < 3:
         return []
@@ -49,7 +49,7 @@ def gap_doubts(times_ns: Sequence[int], label: str) -> list[str]:
 
 
 def numbering_doubt(paths: Sequence[str], rate: FrameRate) -> str:
-    """Return what is to be told of frames at a rate given whose numbers have gaps, or ""."""
+    """Return a warning about gaps in the numbers of frames at a given rate, or ""."""
     names = [PurePath(path).name for path in paths]
     numbers = _numbers(names)
     steps = [after - before for before, after in pairwise(numbers)]

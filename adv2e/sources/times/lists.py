@@ -46,7 +46,7 @@ class FrameList:
     whole: bool = False
 
     def told(self, label: str) -> tuple[list[str], list[str]]:
-        """Return what is doubtful of the list of a name, and what else is to be told."""
+        """Return doubts about the list `label`, and notes on it."""
         notes = [f"times from {label}: {self.columns}"]
         if self.order:
             notes.append(f"{label}: {self.order}")

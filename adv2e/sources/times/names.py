@@ -1,4 +1,4 @@
-"""Which picture a name in a list means.
+"""Pictures by the names in a list.
 
 Lists are written elsewhere, on another system even, and folders are moved.  A name is therefore
 matched whole, and where that fails by its end: ``C:/clip/left/0001.png`` is ``left/0001.png`` or

@@ -1,4 +1,4 @@
-"""In which unit the times of frames are: one rule for every list.
+"""Unit of the timestamps of frames: one rule for every list.
 
 The first of these that tells something decides:
 

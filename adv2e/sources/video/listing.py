@@ -35,26 +35,26 @@ _REORDERED = 16
 _HALF_WRAP_NS = 2**32 * NS_PER_S // 90_000
 """Clocks of MPEG streams begin again after twice this; FFmpeg takes going back for that."""
 _IN_DECODING_ORDER = ("avi", "asf")
-"""Formats whose times are those of decoding."""
+"""Formats whose timestamps are those of decoding."""
 _MILLISECONDS = ("matroska", "asf")
-"""Formats whose clock is so coarse that a constant rate is to be found behind it."""
+"""Formats with a clock so coarse that a constant rate has to be recovered from it."""
 _WITHOUT_TIMES = ("h264", "hevc", "m4v", "mpegvideo")
 _LOG = re.compile("ended prematurely|exceeds containing master|packet_obj_size")
-"""What FFmpeg says of Matroska and ASF where parts do not fit, and passes over."""
+"""Messages of FFmpeg about parts of Matroska and ASF that do not fit, which it passes over."""
 _LAST = 50
 """Packets at the end of a file, of sound and others as well, that must be whole."""
 
 
 @dataclass
 class Listing:
-    """Coded pictures of a video, and when they are shown.
+    """Coded pictures of a video and their presentation times.
 
     Attributes
     ----------
     count : int
-        How many pictures are there to be shown.
+        Number of pictures to be shown.
     shown_ns : list of int
-        When, from the first of them, sorted and none twice; fewer where times are missing [ns].
+        Their times from the first on, sorted and none twice; fewer where times are missing [ns].
     origin : int
         When the first of them is, on the clock of the file [ticks].
     by_number : bool
@@ -142,7 +142,7 @@ def _is_shown(packet: Any, codec: str) -> bool:
 
 
 def _arrange(found: Listing, stamps: list[int | None], video: Video) -> None:
-    """Note when pictures are shown, from their times in the order of the file [ticks]."""
+    """Set the presentation times of pictures from their times in the order of the file [ticks]."""
     found.count, stream = len(stamps), video.stream
     tick = Fraction(stream.time_base) * NS_PER_S
     found.tick_ns = round(tick)
@@ -204,7 +204,7 @@ def _states_rate(path: str) -> bool:
 
 
 def _missing(found: Listing, stated: int, last: Any, video: Video) -> Iterator[str]:
-    """Yield what is missing by what the container states, and by how the file ends."""
+    """Yield faults: pictures missing by the container's own numbers, or by the end of the file."""
     if found.count < stated:
         yield f"cut short or damaged: it lists {stated} pictures, and has {found.count}"
     length_ns = _length_ns(video)
@@ -248,7 +248,7 @@ _HEAD_BYTES, _TAIL_BYTES = 1 << 16, 1 << 16
 
 
 def _end(path: Path, video: Video) -> Iterator[str]:
-    """Yield what is missing by the sizes of parts that FFmpeg passes over."""
+    """Yield faults: data missing by the sizes of parts that FFmpeg passes over."""
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
         file.seek(max(0, video.size - _TAIL_BYTES))
@@ -285,7 +285,7 @@ def _end(path: Path, video: Video) -> Iterator[str]:
 
 
 def _broken_boxes(path: Path, size: int) -> Iterator[str]:
-    """Yield what is wrong if the boxes of fragments do not follow one another to the end."""
+    """Yield a fault if the boxes of fragments do not follow one another to the end."""
     place, kinds = 0, []
     data = np.memmap(path, np.uint8, "r")
     while place + 8 <= size:
@@ -305,7 +305,7 @@ def _broken_boxes(path: Path, size: int) -> Iterator[str]:
 
 
 def _end_of_gif(data: bytes) -> Iterator[str]:
-    """Yield what is wrong if its blocks do not follow one another to the end mark."""
+    """Yield a fault if the blocks of a GIF do not follow one another to the end mark."""
     extension, image, end = 0x21, 0x2C, 0x3B
     try:
         place = 13 + _colours(data[10])

@@ -91,7 +91,7 @@ class Converter:
 
 
 def oddly_shown(frame: Any) -> str:
-    """Return how a picture is to be shown that is not done here, or ""."""
+    """Return a note if a picture is to be shown mirrored or tilted, which is not done, or ""."""
     a, b, c, d = _matrix(frame)
     if a * d - b * c < 0:
         return "it is to be shown mirrored, which is not done; re-encode it upright"

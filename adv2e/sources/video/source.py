@@ -33,7 +33,7 @@ _FIELDS = (
 _DECODER_PIXELS, _DECODERS = 1 << 20, 4
 """Pixels of a frame for which one thread decodes fast enough, and the most threads."""
 _NEAR_NS = 2000
-"""By so much may times that come with pictures differ from those listed."""
+"""Largest difference between times that come with pictures and those listed."""
 
 
 def open_source(path: Path, given: GivenTimes, selection: Selection) -> VideoSource:
@@ -64,7 +64,7 @@ class VideoSource(Source):
         self.count = self._count()
 
     def _examine(self, video: Video) -> None:
-        """Tell what is odd of the file; take geometry and light from the first frame."""
+        """Note faults of the file; take geometry and light from the first frame."""
         listing, first = self._listing, self._listing.first
         listing.first = None  # it holds memory of the decoder
         if listing.faults and not self.selection.allow_damaged:
@@ -139,7 +139,7 @@ class VideoSource(Source):
             self.doubts += gap_doubts(listing.shown_ns, self.path)
 
     def _count(self) -> int | None:
-        """Return how many frames are wanted, as far as the file and the times given tell."""
+        """Return the number of frames wanted, as far as the file and the times given tell."""
         listing = self._listing
         count, rate = listing.count, listing.rate
         time_ns = self._given or (rate.time_ns if rate else None)
@@ -233,7 +233,7 @@ class VideoSource(Source):
             )
 
     def _lost(self, count: int, first_ns: int) -> int:
-        """Return how many pictures are missing behind the first that came."""
+        """Return the number of pictures missing behind the first that came."""
         listing = self._listing
         if listing.by_number:
             expected = listing.count
@@ -253,7 +253,7 @@ class _Clock:
         self._previous_ns = -listing.usual_ns
 
     def time_ns(self, number: int, own_ns: int | None) -> int:
-        """Return when a frame is shown; both times are since the first frame [ns]."""
+        """Return the presentation time of a frame, since the first frame like `own_ns` [ns]."""
         listing, rate = self._listing, self._listing.rate
         if rate is not None:
             t_ns = rate.time_ns(number)
