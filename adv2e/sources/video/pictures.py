@@ -32,6 +32,7 @@ class Converter:
 
     def __init__(self) -> None:
         self._scaler = VideoReformatter()
+        self._latest: tuple[Any, ...] = ()
 
     def pixels(self, frame: Any, label: str) -> Pixels:
         """Return a picture as grey or RGB of uint8 or uint16, white 255 or 65535.
@@ -87,7 +88,11 @@ class Converter:
         strides = plane.line_size, shape[2], 1
         # the memory is the picture's own, and goes with it
         image: Any = np.ndarray(shape, np.uint8, buffer=memoryview(plane), strides=strides)
-        return np.ascontiguousarray(image[..., ::-1] if name == "bgr24" else image)
+        copied = np.ascontiguousarray(image[..., ::-1] if name == "bgr24" else image)
+        # else malloc gives their memory back after each small frame, and the system clears it anew:
+        # reading took 1.4 times as long
+        self._latest = whole, copied
+        return copied
 
 
 def oddly_shown(frame: Any) -> str:
