@@ -128,7 +128,8 @@ def first_interrupt(told: str) -> Iterator[Interrupt | None]:
 
 def wait_for(descriptor: int) -> None:
     """Wait until a descriptor can be read; a signal that comes just before is not missed."""
-    if not _can_wait():
+    # as a rule something is there, and nothing has to be set up: a line is read byte by byte
+    if not _can_wait() or select.select([descriptor], [], [], 0)[0]:
         return
     with _woken() as wakes:
         ready: list[int] = []
