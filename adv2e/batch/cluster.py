@@ -11,7 +11,6 @@ If a worker is lost, the scheduler has others do its jobs again.
 from __future__ import annotations
 
 import asyncio
-import atexit
 import hashlib
 import json
 import math
@@ -23,7 +22,7 @@ import uuid
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
@@ -33,7 +32,6 @@ from typing import TYPE_CHECKING, Any
 
 from adv2e import __version__
 from adv2e.batch.processes import EndedError, Workers
-from adv2e.batch.transfer import Scratch, is_url
 from adv2e.batch.work import Job
 from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError
 from adv2e.files.regular import read_text_bytes
@@ -76,10 +74,8 @@ class Proof:
     sha256: str
 
     @classmethod
-    def of(cls, manifest: Path | None) -> Proof:
-        """Return the check for a manifest as it is now; None: DEST is a URL, which all can open."""
-        if manifest is None:
-            return cls(__version__, "", 0, "")
+    def of(cls, manifest: Path) -> Proof:
+        """Return the check for a manifest as it is now."""
         text = manifest.read_bytes()
         return cls(__version__, str(manifest), len(text), hashlib.sha256(text).hexdigest())
 
@@ -87,8 +83,6 @@ class Proof:
         """Return the reason why the process that asks is unfit, or ""."""
         if self.version != __version__:
             return f"has adv2e {__version__}: install {self.version}, as here"
-        if not self.manifest:
-            return ""
         try:
             with Path(self.manifest).open("rb") as file:
                 text = file.read(self.bytes)
@@ -106,8 +100,8 @@ class Cluster:
     ----------
     scheduler : str
         Its address, such as tcp://node1:8786, or the file that it wrote (``--scheduler-file``).
-    manifest : Path, optional
-        That of the batch, which the workers must see, too, unless DEST is a URL.
+    manifest : Path
+        That of the batch, which the workers must see, too.
     at_most : int, optional
         Conversions at a time; default: as many as the workers have threads.
     threads : int
@@ -126,7 +120,7 @@ class Cluster:
     def __init__(
         self,
         scheduler: str,
-        manifest: Path | None,
+        manifest: Path,
         *,
         at_most: int | None = None,
         threads: int = 1,
@@ -138,9 +132,7 @@ class Cluster:
         self._scheduler, self._manifest = scheduler, manifest
         self._at_most, self._threads, self._log = at_most, threads, log
 
-    def __call__(
-        self, jobs: Iterable[Job | None], count: int
-    ) -> Iterator[tuple[Job, dict[str, Any]]]:
+    def __call__(self, jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
         """Yield each job with what :func:`adv2e.batch.work.do` returned, as they end.
 
         Raises
@@ -171,9 +163,9 @@ class Cluster:
                 ) from error
 
     def _run(
-        self, client: Client, workers: _Workers, coming: Iterator[Job | None]
+        self, client: Client, workers: _Workers, coming: Iterator[Job]
     ) -> Iterator[tuple[Job, dict[str, Any]]]:
-        proof = Proof.of(self._manifest and self._manifest.absolute())
+        proof = Proof.of(self._manifest.absolute())
         # those of effects travel, so that workers need not see them
         texts: dict[str, bytes] = {}
         folders: set[str] = set()
@@ -217,14 +209,13 @@ def _anywhere(job: Job) -> Job:
     """Return the job with paths that do not depend on the folder that a process is in."""
 
     def whole(path: str) -> str:
-        return str(Path(path).absolute()) if path and not is_url(path) else path
+        return str(Path(path).absolute()) if path else path
 
     return replace(
         job,
         source=whole(job.source),
         output=whole(job.output),
         export_folder=whole(job.export_folder),
-        parts=tuple(map(whole, job.parts)),
     )
 
 
@@ -367,7 +358,10 @@ def _do(job: Job, proof: Proof, texts: dict[str, bytes]) -> dict[str, Any]:
         return {"error": f"{source}: is another one than where the batch runs{on}"}
     try:
         here = replace(
-            job, effect_files=tuple(_file(name, texts[name]) for name in job.effect_files)
+            job,
+            effect_files=tuple(
+                _file(name, texts[name], worker.local_directory) for name in job.effect_files
+            ),
         )
         found = _workers(worker.state.nthreads).do(here, is_wanted)
     except EndedError:
@@ -394,22 +388,18 @@ def _workers(count: int) -> Workers:
 
 
 @lru_cache(maxsize=64)
-def _file(name: str, text: bytes) -> str:
-    """Return a file of that name on this machine that holds a text: itself, or a copy."""
+def _file(name: str, text: bytes, folder: str) -> str:
+    """Return a file of that name on this machine that holds a text: itself, or a copy in `folder`.
+
+    `folder` is that of the worker, which Dask removes.
+    """
     with suppress(OSError):
         if Path(name).read_bytes() == text:
             return name
-    copy = _folder() / hashlib.sha256(text).hexdigest() / Path(name).name
-    copy.parent.mkdir(exist_ok=True)
+    copy = Path(folder) / hashlib.sha256(text).hexdigest() / Path(name).name
+    copy.parent.mkdir(parents=True, exist_ok=True)
     copy.write_bytes(text)
     return str(copy)
-
-
-@lru_cache
-def _folder() -> Path:
-    stack = ExitStack()
-    atexit.register(stack.close)
-    return stack.enter_context(Scratch())
 
 
 def _sweep(folders: Iterable[str]) -> None:

@@ -31,11 +31,11 @@ from adv2e.files.renaming import sync_one
 _FORM: dict[str, type] = {
     **dict.fromkeys(("name", "status", "at", "adv2e", "settings", "output"), str),
     **dict.fromkeys(("source_sha256", "sha256"), str),
-    **dict.fromkeys(("source", "beside", "export", "remote"), dict),
+    **dict.fromkeys(("source", "beside", "export"), dict),
     "seed": int,
 }
 _ALWAYS = {"name", "status", "at"}
-_DONE = _FORM.keys() - {"beside", "export", "remote"}
+_DONE = _FORM.keys() - {"beside", "export"}
 
 _ANY = "manifest*.jsonl"
 _SHARD = re.compile(r"manifest(?:-[0-9]+-of-([0-9]+))?\.jsonl")

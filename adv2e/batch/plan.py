@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from adv2e import __version__
-from adv2e.batch.divided import parts_folder
 from adv2e.batch.exports import Export
 from adv2e.batch.sequences import Sequence as Found
 from adv2e.errors import UsageError
@@ -113,22 +112,17 @@ def plan(
     wanted: Wanted,
     *,
     overwrite: bool = False,
-    digest: Callable[[Path], str] = digest_of,
 ) -> list[Task]:
-    """Return a task for each sequence; `digest` computes that of a file or folder."""
+    """Return a task for each sequence; files that may be kept are read for their digests."""
     tasks = []
     for sequence in sequences:
         seed = seed_of(wanted.seed, sequence.name)
         output, state = wanted.output(sequence), states[sequence.name]
         record = records.get(sequence.name)
-        why = (
-            "all are made anew"
-            if overwrite
-            else _why(record, state, sequence, output, wanted, digest)
-        )
+        why = "all are made anew" if overwrite else _why(record, state, sequence, output, wanted)
         kept = None
         if record is not None and not why:
-            why = _why_export(record, sequence, wanted, digest)
+            why = _why_export(record, sequence, wanted)
             kept = record if why else None
         tasks.append(Task(sequence, state, output, seed, why, kept))
     return tasks
@@ -140,7 +134,6 @@ def _why(
     sequence: Found,
     output: Path,
     wanted: Wanted,
-    digest: Callable[[Path], str],
 ) -> str:
     if record is None:
         return "new"
@@ -154,22 +147,20 @@ def _why(
         return "the configuration or an option changed"
     if record["output"] != output.relative_to(wanted.dest).as_posix():
         return "it goes to another file"
-    if record["source"] != asdict(state) and digest(sequence.source) != record["source_sha256"]:
+    if record["source"] != asdict(state) and digest_of(sequence.source) != record["source_sha256"]:
         return "its source changed"
     if not output.exists():
         return "its file is gone"
-    if digest(output) != record["sha256"]:
+    if digest_of(output) != record["sha256"]:
         return "its file changed"
     for name, was in record.get("beside", {}).items():
         path = output.parent / name
-        if not path.exists() or digest(path) != was:
+        if not path.exists() or digest_of(path) != was:
             return "a file beside its own changed"
     return ""
 
 
-def _why_export(
-    record: Mapping[str, Any], sequence: Found, wanted: Wanted, digest: Callable[[Path], str]
-) -> str:
+def _why_export(record: Mapping[str, Any], sequence: Found, wanted: Wanted) -> str:
     folder = wanted.export_folder(sequence)
     if wanted.export is None or folder is None:
         return ""
@@ -180,7 +171,7 @@ def _why_export(
         return "an option of the export changed"
     if not folder.exists():
         return "its export is gone"
-    return "" if digest(folder) == made.get("sha256") else "its export changed"
+    return "" if digest_of(folder) == made.get("sha256") else "its export changed"
 
 
 def outputs_in_the_way(
@@ -201,10 +192,6 @@ def outputs_outside(tasks: Sequence[Task], wanted: Wanted) -> list[Path]:
     return [
         path
         for one in tasks
-        for path in (
-            one.output,
-            wanted.export_folder(one.sequence),
-            parts_folder(wanted.dest, one.sequence.name),
-        )
+        for path in (one.output, wanted.export_folder(one.sequence))
         if path and one.why and dest not in path.resolve().parents
     ]

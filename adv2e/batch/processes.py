@@ -90,7 +90,7 @@ def _watch(parent: int) -> None:
     os.kill(os.getpid(), signal.SIGTERM)
 
 
-def run(jobs: Iterable[Job | None], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
+def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
     """Yield each job with what :func:`do` returned, as they end; `count` at a time.
 
     See :data:`adv2e.batch.work.Engine`.

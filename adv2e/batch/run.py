@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,9 +12,8 @@ from typing import Any
 from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.batch import processes
-from adv2e.batch.divided import Jobs, parts_folder, remove_parts
 from adv2e.batch.exports import Export, write_lists
-from adv2e.batch.forecast import Forecast, forecast
+from adv2e.batch.forecast import forecast
 from adv2e.batch.manifest import Manifest, check_alone, manifest_path, read_records
 from adv2e.batch.plan import (
     Task,
@@ -30,12 +28,12 @@ from adv2e.batch.sequences import Sequence as Found
 from adv2e.batch.sequences import find_sequences
 from adv2e.batch.work import Engine, Job
 from adv2e.config import Family, load_family, to_dict
-from adv2e.config.active_effects import active_hooks, user_sources
+from adv2e.config.active_effects import user_sources
 from adv2e.config.effect_files import load_effects
-from adv2e.effects.composition import check_divisible
+from adv2e.conversion.estimate import Estimate
 from adv2e.errors import Adv2eError, OutputError
 from adv2e.files.names import shown
-from adv2e.files.states import digest_of, digest_of_values, state_of
+from adv2e.files.states import digest_of_values, state_of
 from adv2e.light.interpolation import network_of
 
 
@@ -132,11 +130,6 @@ class Batch:
         (I, N): only the I-th of N parts of about the same size.
     overwrite : bool
         Make all anew, and replace files that others made.
-    split : int
-        Parts of the pixels in which each sequence is converted; the bytes do not depend on it.
-    digest : callable, optional
-        `source` or `dest` is a shadow (:class:`adv2e.batch.remote.Remote`), in which no file may be
-        read: this tells the digest of what it stands for, as far as it is known.
 
     Raises
     ------
@@ -153,16 +146,11 @@ class Batch:
         layout: str = "auto",
         shard: tuple[int, int] | None = None,
         overwrite: bool = False,
-        split: int = 1,
-        digest: Callable[[Path], str] | None = None,
     ) -> None:
         self._dest, self._settings, self._overwrite = dest, settings, overwrite
-        self._shard, self._split, self._digest = shard, split, digest
+        self._shard = shard
         self._wanted = settings.wanted(dest)
-        if split > 1:
-            check_divisible(active_hooks(settings.family.config))
-        by_name, fps = digest is not None, settings.options.get("fps")
-        found = find_sequences(source, layout, leave_out=dest, by_name=by_name, fps=fps)
+        found = find_sequences(source, layout, leave_out=dest, fps=settings.options.get("fps"))
         self._sequences, self.passed = found.sequences, found.told()
         self._passed = sum(map(len, found.passed.values()))
         self._states = {one.name: state_of(one.source) for one in self._sequences}
@@ -197,7 +185,6 @@ class Batch:
             records,
             self._wanted,
             overwrite=self._overwrite,
-            digest=self._digest or digest_of,
         )
         for path in outputs_outside(tasks, self._wanted):
             raise OutputError(f"{shown(path)}: a link leads out of {shown(self._dest)}: remove it")
@@ -211,17 +198,15 @@ class Batch:
 
     def forecast(
         self, tasks: Sequence[Task], jobs: int | None, threads: int | None
-    ) -> Forecast | None:
+    ) -> Estimate | None:
         """Return an estimate of the conversion; `jobs` and `threads` as for :meth:`run`."""
-        if self._digest is not None:
-            return None
         waiting = [task for task in tasks if task.why and not task.only_export]
-        count, each = _shares(len(waiting) * self._split, jobs, threads)
+        count, each = _shares(len(waiting), jobs, threads)
 
         def job_of(task: Task) -> Job:
             return _job(task, self._settings, self._wanted, each)
 
-        return forecast(waiting, self._dest, job_of, count)
+        return forecast(waiting, job_of, count)
 
     def run(
         self,
@@ -230,7 +215,6 @@ class Batch:
         threads: int | None = None,
         engine: Engine | None = None,
         begun: Callable[[list[Task]], None] = lambda tasks: None,
-        moved: Callable[[Task, float], None] = lambda task, share: None,
         ended: Callable[[Task, Mapping[str, Any]], None] = lambda task, record: None,
     ) -> Outcome:
         """Convert every sequence of which the file is missing or out of date.
@@ -243,9 +227,8 @@ class Batch:
             Threads of all together; default: all cores.
         engine : callable, optional
             Who converts; default: processes of this machine.
-        begun, moved, ended : callable
-            Told what is planned, which share more of a sequence is done, and each sequence with
-            what the manifest says of it.
+        begun, ended : callable
+            Told what is planned, and each sequence with what the manifest says of it.
 
         Raises
         ------
@@ -258,37 +241,21 @@ class Batch:
         with Manifest(manifest_path(self._dest, self._shard)) as manifest:
             check_alone(manifest.path)
             tasks = self.plan()
-            for task in tasks:
-                if not task.why:  # a batch may have ended before it did that
-                    remove_parts(self._dest, task.sequence.name)
             begun(tasks)
             waiting = {task.sequence.name: task for task in tasks if task.why}
-            count, each = _shares(len(waiting) * self._split, jobs, threads)
+            count, each = _shares(len(waiting), jobs, threads)
             for task in waiting.values():
                 task.output.parent.mkdir(parents=True, exist_ok=True)
                 if not task.only_export:
                     manifest.add({"name": task.sequence.name, "status": "started"})
             work = (_job(task, self._settings, self._wanted, each) for task in waiting.values())
-            queue = Jobs(work, self._dest, self._split)
-            for job, found in (engine or processes.run)(queue, count):
-                wrong = error_of(found)
-                if job.share is not None and not wrong:
-                    queue.part_made(job)
-                    moved(waiting[job.name], 1 / (self._split + 1))
-                    continue
-                if wrong and not queue.give_up(job):
-                    continue
+            for job, found in (engine or processes.run)(work, count):
                 record = _record(waiting[job.name], self._wanted, job, found)
                 manifest.add(record)
                 events += found.get("events", 0)
-                if wrong:
+                if wrong := error_of(found):
                     failed[job.name] = wrong
-                if "error" not in found:
-                    remove_parts(self._dest, job.name)
                 ended(waiting[job.name], record)
-            for name in failed:
-                with suppress(OSError):  # what is in it is for the next call
-                    parts_folder(self._dest, name).rmdir()
             if self._wanted.export is not None and self._wanted.export.kind == "e2vid":
                 write_lists(self._dest, read_records(self._dest).values())
         return Outcome(tasks, failed, events, self._passed)

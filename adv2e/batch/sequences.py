@@ -46,7 +46,6 @@ _DDD = ("ddd", "ddd20")
 _PAGES = (".tif", ".tiff")
 _TEXTS = (".txt", ".csv")
 """Of events, perhaps, and of much else."""
-_RECORDINGS = {"ddd17": (".h5", ".hdf5"), "davis240c": (".zip",)}
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,6 @@ def find_sequences(
     layout: str = "auto",
     *,
     leave_out: Path | None = None,
-    by_name: bool = False,
     fps: Rate | None = None,
 ) -> Found:
     """Return the sequences below a folder; or that of a file.
@@ -102,8 +100,6 @@ def find_sequences(
         One of LAYOUTS.
     leave_out : Path, optional
         Folder in which nothing is looked for: that of the results.
-    by_name : bool
-        Files cannot be read: recordings are told by the layout and their suffix.
     fps : float, Fraction or str, optional
         All frames are at this rate: sequences need no times of their own.
 
@@ -115,7 +111,7 @@ def find_sequences(
     if not root.exists():
         raise DataError(f"{root}: no such file or folder")
     avoided = None if leave_out is None else leave_out.resolve()
-    walk = _Walk(avoided, by_name, layout if by_name else "", fps)
+    walk = _Walk(avoided, fps)
     seen = list(walk.below(root))
     if (root, "images") in seen and len(seen) > 1:
         seen.remove((root, "images"))
@@ -144,8 +140,8 @@ def _nothing(layout: str) -> str:
 class _Walk:
     """A walk through folders, which finds sequences and notes what it passes over."""
 
-    def __init__(self, avoided: Path | None, by_name: bool, trusted: str, fps: Rate | None) -> None:
-        self._avoided, self._by_name, self._trusted, self._fps = avoided, by_name, trusted, fps
+    def __init__(self, avoided: Path | None, fps: Rate | None) -> None:
+        self._avoided, self._fps = avoided, fps
         self.passed: dict[str, list[Path]] = {}
 
     def below(self, root: Path) -> Iterator[tuple[Path, str]]:
@@ -172,7 +168,7 @@ class _Walk:
             shown = sorted(name for name in names if not name.startswith("."))
             images = [name for name in shown if _suffix(name) in IMAGE_SUFFIXES]
             pages = [name for name in images if _suffix(name) in _PAGES]
-            if pages and self._is_stack(here / pages[0]):
+            if pages and _is_stack(here / pages[0]):
                 images = [name for name in images if name not in pages]
             rest = (here / name for name in sorted(set(shown) - set(images)))
             beside = list(self._in_files([file for file in rest if file.is_file()]))
@@ -211,9 +207,7 @@ class _Walk:
         suffix = path.suffix.lower()
         if suffix in VIDEO_SUFFIXES:
             return "videos", ""
-        if suffix in _RECORDINGS.get(self._trusted, ()):
-            return self._trusted, ""
-        if suffix in (".npy", *_PAGES) and not self._by_name:
+        if suffix in (".npy", *_PAGES):
             if path.stem.endswith("_ts"):  # times of a stack
                 return "", ""
             try:
@@ -221,7 +215,7 @@ class _Walk:
             except DataError as error:
                 return "", str(error)
             return "auto", ""
-        if not may_hold_events(path) or self._by_name:
+        if not may_hold_events(path):
             return "", ""
         try:
             found = format_of(path)
@@ -235,14 +229,13 @@ class _Walk:
             return "auto", ""
         return "", "" if suffix in _TEXTS else "events, which are not simulated"
 
-    def _is_stack(self, path: Path) -> bool:
-        """Tell whether a TIFF has several pages."""
-        if self._by_name:
-            return False
-        try:
-            return len(Pages(path)) > 1
-        except DataError:
-            return False
+
+def _is_stack(path: Path) -> bool:
+    """Tell whether a TIFF has several pages."""
+    try:
+        return len(Pages(path)) > 1
+    except DataError:
+        return False
 
 
 def _suffix(name: str) -> str:

@@ -17,10 +17,10 @@ from adv2e.process import bars
 
 if TYPE_CHECKING:
     from adv2e.batch.exports import Export
-    from adv2e.batch.forecast import Forecast
     from adv2e.batch.plan import Task
     from adv2e.batch.work import Engine
     from adv2e.cli.options import Log
+    from adv2e.conversion.estimate import Estimate
     from adv2e.formats.registry import Format
     from adv2e.geometry import Size
 
@@ -110,14 +110,6 @@ _LARGE_SOURCE = 100_000_000
     help="Convert on the workers of this Dask scheduler, such as tcp://node1:8786 or the file that"
     " it wrote. --jobs N bounds how many at a time; each has --threads, 1 by default.",
 )
-@click.option(
-    "--split",
-    type=options.WholeNumber(1, 256),
-    metavar="N",
-    default=1,
-    help="Convert each sequence in N parts of its rows, beside each other, and merge them: for few"
-    " large or long ones. The bytes are the same.",
-)
 @click.option("--dry-run", is_flag=True, help="Show what would be done, and write nothing.")
 @click.option("--overwrite", is_flag=True, help="Make all anew, and replace files of others.")
 @options.threads_option
@@ -139,7 +131,6 @@ def command(
     jobs: int | None,
     shard: str | None,
     scheduler: str | None,
-    split: int,
     dry_run: bool,
     overwrite: bool,
     threads: int | None,
@@ -148,8 +139,6 @@ def command(
     **given: Any,
 ) -> None:
     """Convert every sequence below the folder SOURCE, and make the same tree below DEST.
-
-    Both may be URLs, such as s3://bucket/videos, with the extra 'remote'.
 
     \b
     Examples:
@@ -167,8 +156,13 @@ def command(
     from adv2e.batch.manifest import manifest_path
     from adv2e.batch.plan import parse_shard
     from adv2e.batch.run import Batch, Settings, reasons, table
-    from adv2e.batch.transfer import is_url
 
+    for name in (source, dest):
+        if "://" in name:
+            raise click.UsageError(
+                f"{name}: addresses are not read: mount it as a folder, or copy it (such as by"
+                " rclone)"
+            )
     part = None if shard is None else parse_shard(shard)
     options.check_sets(sets, seed, size)
     if size is not None:
@@ -182,28 +176,10 @@ def command(
     suffix = next(iter(written.suffixes))
     settings = Settings(config_files, sets, effect_files, seed, suffix, given, export)
     with ExitStack() as stack:
-        remote = None
-        if is_url(source) or is_url(dest):
-            from adv2e.batch.remote import Remote
-
-            if split > 1:
-                raise click.UsageError("--split: SOURCE and DEST must be folders, no URLs")
-            if export is not None and is_url(dest):
-                raise click.UsageError("--export makes folders: DEST must be a folder, too, no URL")
-            remote = stack.enter_context(Remote(source, dest))
         work = Batch(
-            remote.source if remote else Path(source),
-            remote.dest if remote else Path(dest),
-            settings,
-            layout=layout,
-            shard=part,
-            overwrite=overwrite,
-            split=split,
-            digest=remote.digest if remote else None,
+            Path(source), Path(dest), settings, layout=layout, shard=part, overwrite=overwrite
         )
-        engine = _engine(scheduler, None if is_url(dest) else Path(dest), part, jobs, threads, log)
-        if remote is not None:
-            engine = remote.engine(engine, manifest_path(remote.dest, part))
+        engine = _engine(scheduler, manifest_path(Path(dest), part), jobs, threads, log)
         if dry_run:
             tasks = work.plan()
             for task in tasks:
@@ -211,17 +187,18 @@ def command(
             click.echo(reasons(tasks))
             for line in work.passed:
                 log(shown(line))
-            if remote is None and any(task.why and not task.only_export for task in tasks):
+            if any(task.why and not task.only_export for task in tasks):
                 coming = work.forecast(tasks, jobs, threads)
-                click.echo(coming.text() if coming else _UNKNOWN)
+                click.echo(coming.text(Path(dest)) if coming else _UNKNOWN)
             return
-        told = _Told(log, progress, stack, lambda tasks: work.forecast(tasks, jobs, threads))
+        told = _Told(
+            log, progress, stack, Path(dest), lambda tasks: work.forecast(tasks, jobs, threads)
+        )
         outcome = work.run(
             jobs=jobs,
             threads=threads,
             engine=engine,
             begun=told.begun,
-            moved=told.moved,
             ended=told.ended,
         )
     lines = table(outcome)
@@ -237,8 +214,7 @@ def command(
 
 def _engine(
     scheduler: str | None,
-    dest: Path | None,
-    shard: tuple[int, int] | None,
+    manifest: Path,
     jobs: int | None,
     threads: int | None,
     log: Log,
@@ -247,9 +223,7 @@ def _engine(
     if scheduler is None:
         return None
     from adv2e.batch.cluster import Cluster
-    from adv2e.batch.manifest import manifest_path
 
-    manifest = dest and manifest_path(dest, shard)
     return Cluster(scheduler, manifest, at_most=jobs, threads=threads or 1, log=log)
 
 
@@ -282,38 +256,32 @@ class _Told:
         log: Log,
         progress: bool,
         stack: ExitStack,
-        forecast: Callable[[list[Task]], Forecast | None],
+        dest: Path,
+        forecast: Callable[[list[Task]], Estimate | None],
     ) -> None:
-        self._log, self._progress, self._stack = log, progress, stack
+        self._log, self._progress, self._stack, self._dest = log, progress, stack, dest
         self._forecast = forecast
         self._bar: Any = None
-        self._done: dict[str, float] = {}
 
     def begun(self, tasks: list[Task]) -> None:
         from adv2e.batch.run import reasons
-        from adv2e.conversion.estimate import is_much
 
         self._log(reasons(tasks))
         total = sum(task.state.bytes for task in tasks if task.why)
         if total > _LARGE_SOURCE:
             coming = self._forecast(tasks)
-            if coming is not None and is_much(coming.bytes, coming.room):
-                self._log(coming.text())
+            if coming is not None and coming.is_much(self._dest):
+                self._log(coming.text(self._dest))
         if self._progress:
             self._bar = self._stack.enter_context(
                 bars.bar(total=total, unit="B", unit_scale=True, desc="batch")
             )
 
-    def moved(self, task: Task, share: float) -> None:
-        name = task.sequence.name
-        self._done[name] = self._done.get(name, 0.0) + share
-        if self._bar is not None:
-            self._bar.update(task.state.bytes * share)
-
     def ended(self, task: Task, record: Mapping[str, Any]) -> None:
         from adv2e.batch.run import error_of
 
-        self.moved(task, 1.0 - self._done.get(task.sequence.name, 0.0))
+        if self._bar is not None:
+            self._bar.update(task.state.bytes)
         name = shown(task.sequence.name)
         wrong = error_of(record)
         if wrong:

@@ -220,13 +220,15 @@ def _tell_of_much(
     source: Source, config: Config, output: Path, given: dict[str, Any], log: Log
 ) -> None:
     """Warn of a very large output, or of one larger than the free disk space, by an estimate."""
-    from adv2e.conversion.estimate import estimate, may_be_much, text_of_much
+    from adv2e.conversion.estimate import estimate, may_be_much
 
     if not may_be_much(source):
         return
     options = {key: given[key] for key in given if key not in ("overwrite", "preview", "progress")}
-    if told := text_of_much(estimate(source.path, output, config, **options), output):
-        log(told)
+    found = estimate(source.path, output, config, **options)
+    folder = output.absolute().parent
+    if found is not None and found.is_much(folder):
+        log(found.text(folder))
 
 
 _ENDED = "capture ended: what came is converted; a second Ctrl-C stops at once and keeps nothing"

@@ -51,13 +51,13 @@ class _Part(NamedTuple):
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimate of the events, bytes and time of a conversion.
+    """Estimate of the events, bytes and time of a conversion, or of many.
 
     Attributes
     ----------
     events, bytes, seconds : float
-    frames, seen : int
-        Number of frames of the source, and of those in the parts.
+    basis : str
+        How much of the source it is made from.
     spent : float
         Time that the estimate took, without compiling [s].
     """
@@ -65,9 +65,23 @@ class Estimate:
     events: float
     bytes: float
     seconds: float
-    frames: int
-    seen: int
+    basis: str
     spent: float = 0.0
+
+    def is_much(self, folder: Path) -> bool:
+        """Tell whether the bytes are :data:`MUCH`, or more than there is room for in a folder."""
+        return self.bytes >= min(MUCH, free_bytes(folder))
+
+    def text(self, folder: Path) -> str:
+        """Return the estimate for people, rounded, and the room in a folder if it is too small."""
+        from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and most runs need none
+
+        size, room = tqdm.format_sizeof(self.bytes), free_bytes(folder)
+        return (
+            f"about {float(f'{self.events:.2g}'):,.0f} events, {size}B and"
+            f" {tqdm.format_interval(self.seconds)}, by {self.basis}"
+            + (f"; there is room for {room / 1e9:.1f} GB" if self.bytes > room else "")
+        )
 
 
 def may_be_much(source: Source) -> bool:
@@ -76,33 +90,6 @@ def may_be_much(source: Source) -> bool:
     if source.waits or source.along is not None:
         return False
     return int(frames * source.width * source.height) >= _LARGE
-
-
-def text_of_much(found: Estimate | None, target: Path) -> str:
-    """Return a warning of a very large output, or one without room on the disk, else ""."""
-    room = free_bytes(target.absolute().parent)
-    if found is None or not is_much(found.bytes, room):
-        return ""
-    text = amount_text(found.events, found.bytes, found.seconds)
-    return f"{text}, by {found.seen} of {found.frames} frames{room_text(found.bytes, room)}"
-
-
-def is_much(size: float, room: int) -> bool:
-    """Tell whether `size` [bytes] needs a warning: from :data:`MUCH` on, or from `room` on."""
-    return size >= min(MUCH, room)
-
-
-def room_text(size: float, room: int) -> str:
-    """Return a warning if `size` exceeds the free disk space `room` [bytes], else ""."""
-    return f"; there is room for {room / 1e9:.1f} GB" if size > room else ""
-
-
-def amount_text(events: float, size: float, seconds: float) -> str:
-    """Return events, bytes and seconds for people, rounded as such numbers are."""
-    from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and most runs need none
-
-    told = f"{float(f'{events:.2g}'):,.0f} events, {tqdm.format_sizeof(size)}B"
-    return f"about {told} and {tqdm.format_interval(seconds)}"
 
 
 def estimate(
@@ -191,8 +178,7 @@ def estimate(
         intervals * sum(one.events for one in parts) / seen,
         fixed_bytes + intervals * sum(one.bytes - fixed_bytes for one in parts) / seen,
         fixed_s + intervals * (whole.seconds - fixed_s) / whole.intervals,
-        opened.count,
-        seen + len(parts),
+        f"{seen + len(parts)} of {opened.count} frames",
         short.seconds + sum(one.seconds for one in parts),
     )
 

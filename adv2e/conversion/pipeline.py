@@ -159,7 +159,6 @@ def convert_reading(
     causes: bool = False,
     progress: bool = False,
     also_read: Iterable[str | Path] = (),
-    of_pixels: Iterator[Events] | None = None,
     log: Callable[[str], None] = lambda text: None,
     doubt: Callable[[str], None] | None = None,
 ) -> Summary:
@@ -183,9 +182,6 @@ def convert_reading(
         Show a progress bar on stderr.
     also_read : iterable of str or Path
         Files that `config` is made of, which must not be written over.
-    of_pixels : iterator of events, optional
-        All that comes of the pixels, where it was made before; see
-        :func:`adv2e.conversion.simulation.events_from_light`.
     log, doubt : callable
         Take lines for people; `doubt` those that ask for a look, by default `log`.
 
@@ -256,7 +252,6 @@ def convert_reading(
             table=table,
             complete=out.complete_until,
             causes=causes,
-            of_pixels=of_pixels,
         )
         for events in chunks:
             out.add(events)

@@ -20,13 +20,13 @@ from adv2e.effects.composition import additions_of, begin, check_causes, map_eve
 from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames, Hooks
-from adv2e.effects.reorder_buffer import InOrder, count_before
+from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import Adv2eWarning, DataError
-from adv2e.events import Events, empty_events
+from adv2e.events import Events
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.intervals import Intervals
 from adv2e.light.sensor import fitting_of
-from adv2e.pixel.array import PixelArray, Share
+from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
 from adv2e.sources.frame import Pixels, check_values, light_of_images
 from adv2e.sources.times.instants import NS_PER_S
@@ -200,7 +200,6 @@ def events_from_light(
     coarseness: Coarseness = PRECISE,
     complete: Callable[[int], None] | None = None,
     causes: bool = False,
-    of_pixels: Iterator[Events] | None = None,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 
@@ -208,8 +207,7 @@ def events_from_light(
     `table` (:func:`adv2e.light.decoding.kernel_table`), the frames are grey values of 8 bits that
     it decodes.  `method`, `coarseness`, `causes`: see :class:`adv2e.pixel.array.PixelArray`.
     `complete` is called now and then with a time [us] before which no event will come any more; not
-    so if effects change events, as they may change times.  `of_pixels` are all events that
-    :func:`share_of_events` gives, where they were made before: only the readout is left to do.
+    so if effects change events, as they may change times.
 
     Raises
     ------
@@ -222,46 +220,18 @@ def events_from_light(
     if _change_events(hooks):
         complete = None
     frames = bounded(begin(hooks, iter(light), config.seed), table)
-    made = (
-        _pixel_events(
-            frames,
-            config,
-            hooks,
-            table,
-            complete,
-            threads=threads,
-            method=method,
-            coarseness=coarseness,
-            causes=causes,
-        )
-        if of_pixels is None
-        else _with_frames(of_pixels, frames, hooks)
+    made = _pixel_events(
+        frames,
+        config,
+        hooks,
+        table,
+        complete,
+        threads=threads,
+        method=method,
+        coarseness=coarseness,
+        causes=causes,
     )
     yield from _limited(map_events(hooks, made, causes), config.max_events)
-
-
-def share_of_events(
-    light: Iterable[tuple[int, NDArray[Any]]],
-    config: Config,
-    share: Share,
-    *,
-    hooks: Sequence[Hooks],
-    threads: int | None = None,
-    table: NDArray[np.float32] | None = None,
-    causes: bool = False,
-) -> Iterator[Events]:
-    """Yield the sorted events of a share of the pixels, as they are before any readout.
-
-    See :func:`events_from_light`, and :func:`adv2e.pixel.array.pixels_of_share`.
-    """
-    if causes:
-        check_causes(hooks)
-    frames = bounded(begin(hooks, iter(light), config.seed), table)
-    made = _pixel_events(
-        frames, config, hooks, table, None, threads=threads, causes=causes, share=share
-    )
-    # a readout may yet drop some
-    yield from made if _change_events(hooks) else _limited(made, config.max_events)
 
 
 def _change_events(hooks: Iterable[Hooks]) -> bool:
@@ -324,18 +294,3 @@ def _pixel_events(
             for hook in hooks:
                 hook.passed(part.times_ns[-1] * 1e-9)
         yield order.rest()
-
-
-def _with_frames(
-    made: Iterator[Events], frames: Frames, hooks: Sequence[Hooks]
-) -> Iterator[Events]:
-    """Yield events that were made before, as far as the frames have come each time."""
-    held = next(made, empty_events())
-    for t_ns, _ in frames:
-        while held.size and (keep := count_before(held, (t_ns + 500) // 1000)):
-            yield held[:keep]
-            held = held[keep:] if keep < held.size else next(made, held[:0])
-        for hook in hooks:
-            hook.passed(t_ns * 1e-9)
-    yield held
-    yield from made

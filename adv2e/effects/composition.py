@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from adv2e.causes import CAUSED_DTYPE, FRAME_COUPLING, OWN_EFFECT, with_cause
 from adv2e.effects.courses import INJECTED_DTYPE, Additions, Course
 from adv2e.effects.hooks import Frames, Hooks, Times, View
-from adv2e.errors import Adv2eError, ConfigError, DataError, UsageError
+from adv2e.errors import Adv2eError, ConfigError, DataError
 from adv2e.events import EVENT_DTYPE, Events
 
 Array = NDArray[Any]
@@ -108,18 +108,6 @@ def check_causes(hooks: Sequence[Hooks]) -> None:
             f"causes: readout.frame_coupling and the effect {own[0].name} both add to the signal,"
             " so their events cannot be told apart: switch one of them off"
         )
-
-
-def check_divisible(hooks: Sequence[Hooks]) -> None:
-    """Raise UsageError where pixels and what is done to their events cannot be told apart."""
-    within = {method for method, *_ in _COURSES.values()} | {"inject"}
-    for hook in hooks:
-        if overrides(hook, "events") and any(overrides(hook, method) for method in within):
-            raise UsageError(
-                f"--split: the effect {hook.name} changes events and acts within the pixel, and"
-                " these would be done in different processes: leave out --split, or make two"
-                " effects of it"
-            )
 
 
 def _adding(hooks: Sequence[Hooks]) -> list[Hooks]:

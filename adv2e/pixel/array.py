@@ -38,23 +38,6 @@ _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP
 """Pixels of the largest tiles; their events are held twice for a moment."""
 
-Share = tuple[int, int]
-"""(I, N): the I-th of N shares of the pixels, I from 1 to N."""
-
-WHOLE: Share = 1, 1
-
-
-def pixels_of_share(pixels: int, share: Share) -> tuple[int, int]:
-    """Return the first pixel of a share, and the one after its last, in the order of rows.
-
-    Shares are whole strips of pixels, about as many each, and together all pixels.  Where there
-    are fewer strips than shares, some of these are empty.
-    """
-    number, count = share
-    strips = -(-pixels // STRIP)
-    begin, end = (-(-strips * k // count) * STRIP for k in (number - 1, number))
-    return min(begin, pixels), min(end, pixels)
-
 
 class _Worker:
     """Memory that one thread works with."""
@@ -90,9 +73,6 @@ class PixelArray:
         Of those steps, where some us of precision may go for speed.
     causes : bool
         Events are of CAUSED_DTYPE: they know why they came.
-    share : (int, int)
-        (I, N): only the pixels of the I-th of N shares, whose events are those that the whole has
-        there; see :func:`pixels_of_share`.
 
     Raises
     ------
@@ -115,7 +95,6 @@ class PixelArray:
         method: str = "auto",
         coarseness: Coarseness = PRECISE,
         causes: bool = False,
-        share: Share = WHOLE,
     ) -> None:
         self.rows, self.columns = first.shape
         self.pixels = self.rows * self.columns
@@ -138,17 +117,14 @@ class PixelArray:
         self._start = start = self._relative(t_ns)
         stepped = driver_of(pixel, self.circuit, additions, method) == "run_stepped"
         self._stepping: Stepping | None = None
-        # all pixels up to the last one have a state, so that each keeps its number
-        begin, end = pixels_of_share(self.pixels, share)
         if stepped:
             self._stepping = Stepping(
-                self.circuit, end, self.columns, additions, pixel.thresholds.drift_per_s,
+                self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
                 self.origin_us, start, coarseness,
             )  # fmt: skip
-        light = first.reshape(-1)[:end]
+        light = first.reshape(-1)
         self.state = initial_state(pixel, self.circuit, light, start, self._stepping, self.threads)
-        self._claimed_before = -(-begin // STRIP)
-        strips = -(-(end - begin) // STRIP)
+        strips = -(-self.pixels // STRIP)
         self._most = -(-(tile or _TILE) // STRIP)
         # full tiles, and one for each thread that finds the rest, or nothing
         self._tiles = strips // self._most + self.threads
@@ -228,7 +204,7 @@ class PixelArray:
     ) -> list[Parted]:
         """Return the events of all tiles; each call finds its tile itself."""
         advance: Any = exact.run_exact if self._stepping is None else driver.run_stepped
-        claimed = nothing_claimed() + self._claimed_before
+        claimed = nothing_claimed()
 
         def run(_: int) -> Parted:
             worker = self._workers.get()

@@ -153,27 +153,21 @@ class Trial:
         clips = [path for path in source.rglob("*") if path.suffix == ".avi"]
         clips += [path.parent for path in source.rglob("images.txt")]
         self._source = source if self._is_batch else self._draw.choice(sorted(clips))
-        self._split: list[str] = []
         if self._is_batch:
             self._options += ["--jobs", str(self._draw.randint(1, 3))]
-            self._split = ["--split", str(self._draw.randint(1, 4))]
 
     def command(self, dest: Path) -> list[str]:
         """Return the command line that makes `dest`."""
         program = [sys.executable, "-m", "adv2e"]
         if self._is_batch:
-            # what is expected is made whole
-            split = self._split if dest.name == "dest" else []
-            return [*program, "batch", str(self._source), str(dest), *self._options, *split]
+            return [*program, "batch", str(self._source), str(dest), *self._options]
         target = str(dest / "out")
         convert = [*program, "convert", str(self._source), "-o", target, "--overwrite"]
         return [*convert, *self._options]
 
     def lose(self, what: str) -> None:
         """Note something that does not hold."""
-        self._record.losses.append(
-            f"trial {self._number}: {what}: {' '.join([*self._options, *self._split])}"
-        )
+        self._record.losses.append(f"trial {self._number}: {what}: {' '.join(self._options)}")
 
     def run(self) -> None:
         """Do it all."""

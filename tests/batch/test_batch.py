@@ -195,3 +195,13 @@ def test_folders_of_pictures_are_converted_and_what_is_passed_over_is_told(batch
             assert ("walk: pictures without times" in outcome.err) is bool(passed)
     assert sorted(made_in(dest)) == ["a.h5", "walk.h5"]
     assert read_events(dest / "walk.h5").frame_times_ns is None
+
+
+def test_addresses_are_refused(batch, source, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for pair in [("s3://bucket/videos", "to"), (source, "s3://bucket/events")]:
+        done = batch(*pair)
+        assert done.status == 2
+        assert "s3://bucket/" in done.err
+        assert "mount it as a folder" in done.err
+    assert not list(tmp_path.iterdir())

@@ -180,24 +180,6 @@ def test_three_workers_of_which_one_is_killed(adv2e, local, machines, place):
     assert again.out == "8 sequences: 0 made (0 events), 8 kept, 0 failed\n"
 
 
-def test_one_sequence_in_parts_while_a_worker_is_killed(adv2e, local, machines, place):
-    clip(Path("source/a.avi"), size=(40, 240))
-    Path("told/wait").touch()
-    first, _ = machines.workers(2)
-
-    def kill():
-        until(lambda: len(told()) == 2)
-        first.kill()
-        Path("told/wait").unlink()
-
-    thread = beside(kill)
-    done = adv2e("batch", *GIVEN, "--scheduler", machines.file, "--split", 3)
-    thread.join()
-    assert done.status == 0, done.err
-    assert made_in(Path("dest")) == local()
-    until(lambda: not strays())
-
-
 def test_a_sequence_that_crashes_is_named_and_the_worker_goes_on(
     adv2e, machines, place, monkeypatch
 ):
@@ -258,15 +240,6 @@ def test_a_batch_that_is_stopped_ends_its_conversions(adv2e, local, machines, pl
     assert made_in(Path("dest")) == local()
 
 
-def test_urls_go_to_the_workers_as_they_are(adv2e, local, machines, place):
-    clip(Path("source/deep/a.avi"))
-    machines.workers(1)
-    urls = (f"file://{place}/source", f"file://{place}/dest")
-    done = adv2e("batch", *urls, *SETTINGS, *QUICK, "--scheduler", machines.file)
-    assert done.status == 0, done.err
-    assert made_in(Path("dest")) == local()
-
-
 def test_a_source_that_the_workers_do_not_see_fails(adv2e, machines, place):
     clip(Path("source/a.avi"))
     clip(Path("source/b.avi"))
@@ -318,12 +291,12 @@ def test_what_a_worker_must_be_and_see(tmp_path):
 
 
 def test_files_that_workers_do_not_see_travel(tmp_path):
-    file = tmp_path / "effect.py"
-    copy = Path(engine._file(str(file), b"text"))
+    file, folder = tmp_path / "effect.py", str(tmp_path / "of worker")
+    copy = Path(engine._file(str(file), b"text", folder))
     assert (copy.name, copy.read_bytes()) == ("effect.py", b"text")
     file.write_bytes(b"text here")
-    assert engine._file(str(file), b"text here") == str(file)
-    assert Path(engine._file(str(file), b"text there")).read_bytes() == b"text there"
+    assert engine._file(str(file), b"text here", folder) == str(file)
+    assert Path(engine._file(str(file), b"text there", folder)).read_bytes() == b"text there"
 
 
 def test_no_worker_is_waited_for_and_told(adv2e, machines, place, monkeypatch):

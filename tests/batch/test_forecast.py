@@ -7,7 +7,6 @@ import pytest
 from trees_of_batch import clip, last_of
 
 from adv2e.batch import forecast as module
-from adv2e.batch.forecast import Forecast
 from adv2e.batch.plan import Task
 from adv2e.batch.sequences import Sequence
 from adv2e.conversion.estimate import Estimate
@@ -30,7 +29,7 @@ def test_the_forecast_is_the_total_on_average(tmp_path, monkeypatch):
     monkeypatch.setattr(
         module,
         "estimate",
-        lambda source, *_, **__: Estimate(made[int(source)], 4 * made[int(source)], 1.0, 9, 9, 0.0),
+        lambda source, *_, **__: Estimate(made[int(source)], 4 * made[int(source)], 1.0, ""),
     )
 
     class Job:
@@ -43,13 +42,14 @@ def test_the_forecast_is_the_total_on_average(tmp_path, monkeypatch):
     tasks = tasks_of(tmp_path, sizes.tolist())
     for _ in range(2000):
         rng.shuffle(tasks)
-        found.append(module.forecast(tasks, tmp_path, Job, 2))
+        found.append(module.forecast(tasks, Job, 2))
     events = np.array([one.events for one in found])
     error = events.std() / np.sqrt(events.size)
     assert events.mean() == pytest.approx(made.sum(), abs=4 * error)
     assert error < 0.02 * made.sum()
     assert found[0].bytes == pytest.approx(4 * found[0].events)
-    assert all(one.looked_at <= 6 for one in found)
+    looked_at = {int(one.basis.split()[3]) for one in found}
+    assert max(looked_at) <= 6
 
 
 @pytest.mark.thorough
@@ -89,7 +89,7 @@ def test_looking_stops_at_a_tenth_of_what_it_tells(tmp_path, monkeypatch):
 
     def estimated(source, *_, share, **__):
         calls.append(share)
-        return Estimate(1.0, 1.0, 1.0, 9, 9, 2.5)
+        return Estimate(1.0, 1.0, 1.0, "", 2.5)
 
     monkeypatch.setattr(module, "config_of", lambda job: None)
     monkeypatch.setattr(module, "estimate", estimated)
@@ -100,7 +100,7 @@ def test_looking_stops_at_a_tenth_of_what_it_tells(tmp_path, monkeypatch):
         def __init__(self, task):
             pass
 
-    found = module.forecast(tasks, tmp_path, Job, 1)
+    found = module.forecast(tasks, Job, 1)
     assert found.seconds == pytest.approx(40)
     assert len(calls) == 2  # 2.5 s is less than a tenth of 40 s, 5 s is not
     assert calls == [pytest.approx(0.1 * 40 / 6)] * 2
@@ -116,13 +116,22 @@ def test_a_batch_tells_of_very_much_before_it_begins(batch, tmp_path, monkeypatc
     assert "by short parts of 1 of 1 sequences" in done.err
 
 
-def test_what_is_far_apart_or_has_no_room_is_told():
-    near = Forecast(1e9, 4e9, 60, 9, 6, apart=2.0, room=5_000_000_000).text()
-    assert (
-        near == "about 1,000,000,000 events, 4.00GB and 01:00, by short parts of 6 of 9 sequences"
+def test_sequences_that_differ_far_are_told(tmp_path, monkeypatch):
+    tasks, made = tasks_of(tmp_path, [100] * 6), [1.0, 2.0, 7.2, 3.0, 3.0, 3.0]
+    monkeypatch.setattr(module, "config_of", lambda job: None)
+    monkeypatch.setattr(
+        module, "estimate", lambda source, *_, **__: Estimate(made[int(source)], 1.0, 1.0, "")
     )
-    assert "some make 7 times as many" in Forecast(1, 1, 1, 9, 6, apart=7.2, room=9).text()
-    assert Forecast(1e9, 4e9, 60, 9, 6, 1.0, 3_000_000_000).text().endswith("room for 3.0 GB")
+
+    class Job:
+        threads, output, options = 1, "", {}
+
+        def __init__(self, task):
+            self.source = task.sequence.name[1:]
+
+    assert "some make 7 times as many" in module.forecast(tasks, Job, 1).basis
+    made[2] = 4.0
+    assert module.forecast(tasks, Job, 1).basis == "short parts of 6 of 6 sequences"
 
 
 def test_the_room_of_a_folder_that_is_not_there_is_that_of_its_disk(tmp_path):

@@ -216,7 +216,7 @@ BATCH = {
     "causes": [NO, ("--causes",)],
     "threads": [NO, ("--threads", "1")],
     "jobs": [NO, ("--jobs", "2")],
-    "shard": [NO, ("--shard", "1/2"), ("--split", "2")],
+    "shard": [NO, ("--shard", "1/2")],
     "dry": [NO, ("--dry-run",)],
     "voice": VOICE,
     "existing": EXISTING,

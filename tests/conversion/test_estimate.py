@@ -7,7 +7,7 @@ from pictures import picture
 
 from adv2e import convert
 from adv2e.conversion import estimate as module
-from adv2e.conversion.estimate import Estimate, amount_text, estimate, may_be_much, text_of_much
+from adv2e.conversion.estimate import Estimate, estimate, may_be_much
 from adv2e.errors import DataError
 from adv2e.formats.frames import open_frames
 
@@ -32,6 +32,12 @@ def folder(path, count):
     return path
 
 
+def seen_of(found):
+    """Return how many frames an estimate is made from, and of how many."""
+    seen, frames = found.basis.removesuffix(" frames").split(" of ")
+    return int(seen), int(frames)
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("make", [video, folder])
 @pytest.mark.parametrize("part", [{}, {"start_s": 0.5, "stop_s": 2.5}])
@@ -41,8 +47,9 @@ def test_the_estimate_is_near_what_is_made(tmp_path, monkeypatch, make, part, na
     source = make(tmp_path / ("in.avi" if make is video else "in"), 120)
     found = estimate(source, name, "adv2e", threads=1, **part)
     made = convert(source, tmp_path / name, "adv2e", threads=1, **part)
-    assert found.frames == made.frames
-    assert 30 < found.seen < 70  # not all
+    seen, frames = seen_of(found)
+    assert frames == made.frames
+    assert 30 < seen < 70  # not all
     assert found.events == pytest.approx(made.events, rel=0.1)
     assert found.bytes == pytest.approx((tmp_path / name).stat().st_size, rel=0.1)
     assert found.seconds > 0
@@ -54,7 +61,7 @@ def test_a_share_of_the_frames_is_enough_or_nothing_is_told(tmp_path, share):
     source = video(tmp_path / "in.avi", 120)
     found = estimate(source, "a.h5", "adv2e", threads=1, share=share)
     made = convert(source, tmp_path / "a.h5", "adv2e", threads=1)
-    assert found.seen <= share * 120
+    assert seen_of(found)[0] <= share * 120
     assert found.events == pytest.approx(made.events, rel=0.5)
     assert estimate(source, "a.h5", "adv2e", threads=1, share=0.05) is None
 
@@ -65,7 +72,7 @@ def test_of_few_frames_all_are_seen(tmp_path, count):
     source = folder(tmp_path / "in", count)
     found = estimate(source, "a.h5", "adv2e", threads=1)
     # not the same events: references are at random
-    assert (found.frames, found.seen) == (count, count)
+    assert seen_of(found) == (count, count)
     made = convert(source, tmp_path / "a.h5", "adv2e", threads=1)
     assert found.events == pytest.approx(made.events, rel=0.5)
 
@@ -76,15 +83,16 @@ def test_only_what_is_very_much_is_told(tmp_path, monkeypatch):
     source.count = module._LARGE // (96 * 64) + 1
     assert may_be_much(source)
     monkeypatch.setattr(module, "free_bytes", lambda folder: 50e9)
-    assert text_of_much(None, tmp_path / "a.h5") == ""
-    assert text_of_much(Estimate(1e9, 9e9, 60, 9000, 60), tmp_path / "a.h5") == ""
-    told = text_of_much(Estimate(4.321e9, 18e9, 4000, 9000, 60), tmp_path / "a.h5")
-    assert told == "about 4,300,000,000 events, 18.0GB and 1:06:40, by 60 of 9000 frames"
-    told = text_of_much(Estimate(4e10, 160e9, 4000, 9000, 60), tmp_path / "a.h5")
-    assert told.endswith("; there is room for 50.0 GB")
+    assert not Estimate(1e9, 9e9, 60, "").is_much(tmp_path)
+    found = Estimate(4.321e9, 18e9, 4000, "60 of 9000 frames")
+    told = "about 4,300,000,000 events, 18.0GB and 1:06:40, by 60 of 9000 frames"
+    assert found.is_much(tmp_path)
+    assert found.text(tmp_path) == told
+    assert Estimate(4e10, 160e9, 4000, "").text(tmp_path).endswith("; there is room for 50.0 GB")
     # however little it is, if there is no room for it
     monkeypatch.setattr(module, "free_bytes", lambda folder: 1e6)
-    assert "room for 0.0 GB" in text_of_much(Estimate(1e6, 4e6, 1, 90, 60), tmp_path / "a.h5")
+    assert Estimate(1e6, 4e6, 1, "").is_much(tmp_path)
+    assert "room for 0.0 GB" in Estimate(1e6, 4e6, 1, "").text(tmp_path)
 
 
 def test_the_command_tells_what_will_be_very_much(adv2e, tmp_path, monkeypatch):
@@ -99,8 +107,9 @@ def test_the_command_tells_what_will_be_very_much(adv2e, tmp_path, monkeypatch):
     assert "of 30 frames" in done.err
 
 
-def test_amounts_are_rounded():
-    assert amount_text(123456, 5.1e6, 75) == "about 120,000 events, 5.10MB and 01:15"
+def test_amounts_are_rounded(tmp_path):
+    told = Estimate(123456, 5.1e6, 75, "").text(tmp_path)
+    assert told.startswith("about 120,000 events, 5.10MB and 01:15")
 
 
 @pytest.mark.thorough
