@@ -17,7 +17,7 @@ import pytest
 import warm
 
 from adv2e.cli import main
-from adv2e.process.memory import collect_seldom
+from adv2e.process.machine import collect_seldom
 
 collect_seldom()  # to search the compiler's objects for cycles took a fourteenth of the run
 

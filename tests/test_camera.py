@@ -9,7 +9,7 @@ from camera import Camera, patchwork
 from camera.settings import BENCH, merged
 
 from adv2e import load_config, simulate
-from adv2e.comparison.smoothed_error import smoothed_errors
+from adv2e.comparison.distances import smoothed_errors
 from adv2e.events import EVENT_DTYPE
 from adv2e.formats.reading import read_events
 

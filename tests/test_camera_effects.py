@@ -10,7 +10,7 @@ from camera.settings import BENCH, merged
 from test_camera import SIZE, STILL, measured
 
 from adv2e import load_config, simulate
-from adv2e.comparison.smoothed_error import smoothed_errors
+from adv2e.comparison.distances import smoothed_errors
 
 pytestmark = pytest.mark.thorough
 

@@ -26,7 +26,7 @@ from typing import Any, BinaryIO
 from adv2e.errors import DataError, OutputError
 from adv2e.files.locks import lock_file, unlock_file
 from adv2e.files.regular import check_ends
-from adv2e.files.renaming import sync_one
+from adv2e.files.workspace import sync_one
 
 _FORM: dict[str, type] = {
     **dict.fromkeys(("name", "status", "at", "adv2e", "settings", "output"), str),

@@ -29,7 +29,7 @@ from adv2e.batch.sequences import find_sequences
 from adv2e.batch.work import Engine, Job
 from adv2e.config import Family, load_family, to_dict
 from adv2e.config.active_effects import user_sources
-from adv2e.config.effect_files import load_effects
+from adv2e.config.user_effects import load_effects
 from adv2e.conversion.estimate import Estimate
 from adv2e.errors import Adv2eError, OutputError
 from adv2e.files.names import shown

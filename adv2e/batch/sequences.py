@@ -35,9 +35,8 @@ from adv2e.sources import VIDEO_SUFFIXES, open_source
 from adv2e.sources.davis240c import is_recording
 from adv2e.sources.gopro import find_sequence
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES
-from adv2e.sources.images.order import natural_key
-from adv2e.sources.images.source import LISTS, UNREAD, found_list
-from adv2e.sources.images.tiff_pages import Pages
+from adv2e.sources.images.source import LISTS, UNREAD, found_list, natural_key
+from adv2e.sources.images.stack import Pages
 from adv2e.sources.times.rates import Rate
 
 LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")

@@ -10,7 +10,7 @@ from typing import Any
 
 from adv2e.batch.exports import Export
 from adv2e.config import Config, from_dict
-from adv2e.config.effect_files import load_effects
+from adv2e.config.user_effects import load_effects
 from adv2e.errors import Adv2eError, is_for_users
 from adv2e.files.states import State, digest_of
 from adv2e.formats.lookup import to_write

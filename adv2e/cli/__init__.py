@@ -22,7 +22,7 @@ from adv2e.cli.exit_status import (
     reporting,
     warnings_for_people,
 )
-from adv2e.process.memory import collect_seldom, return_large_blocks
+from adv2e.process.machine import collect_seldom, return_large_blocks
 from adv2e.process.signals import stopping_on_signals
 
 COMMANDS = {

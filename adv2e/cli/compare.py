@@ -8,7 +8,7 @@ import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
-from adv2e.cli.reading import reading_told
+from adv2e.cli.progress import reading_told
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -125,7 +125,7 @@ def _resimulation(
     from dataclasses import replace
 
     from adv2e.comparison.compare import Resimulation
-    from adv2e.comparison.resimulation import resimulator
+    from adv2e.comparison.floor import resimulator
     from adv2e.errors import DataError
     from adv2e.kernel.rng import LARGEST_SEED
     from adv2e.light.sensor import check_beside

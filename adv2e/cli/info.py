@@ -9,7 +9,7 @@ import click
 
 from adv2e.cli import options
 from adv2e.cli.commands import Command
-from adv2e.cli.reading import reading_told
+from adv2e.cli.progress import reading_told
 from adv2e.geometry import Size
 
 

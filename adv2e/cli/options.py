@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from adv2e.cli import completion
-from adv2e.cli.compiling import compilation_told
 from adv2e.cli.exit_status import VERBOSITY
+from adv2e.cli.progress import compilation_told
 from adv2e.files.names import shown
 from adv2e.geometry import parse_rectangle, parse_size
 
@@ -142,7 +142,7 @@ def own_effects(files: tuple[str, ...]) -> list[type[Hooks]]:
     """Return the effects that files hold."""
     if not files:
         return []
-    from adv2e.config.effect_files import load_effects
+    from adv2e.config.user_effects import load_effects
 
     return [effect for name in files for effect in load_effects(name)]
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.comparison.trains import keys, stride_of
+from adv2e.comparison.distances import keys, stride_of
 from adv2e.events import Events
 from adv2e.representations.voxel_grid import signs
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from adv2e.sources.times.instants import seconds
+from adv2e.sources.times.rates import seconds
 
 _WIDTH = 100
 

@@ -11,9 +11,9 @@ from adv2e.config.build import Key, all_keys, build, keys_of
 from adv2e.config.distributions import Distributions, Number, replaced
 from adv2e.config.files import find, read, shipped
 from adv2e.config.forms import form_text
-from adv2e.config.merge import merge, parse_set
 from adv2e.config.model import Config
 from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
+from adv2e.config.tree import merge, parse_set
 from adv2e.config.user_effects import config_class, user_effects
 from adv2e.config.yaml12 import Origin, Value, key_text
 from adv2e.errors import ConfigError

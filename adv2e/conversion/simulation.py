@@ -29,8 +29,7 @@ from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
 from adv2e.sources.frame import Pixels, check_values, light_of_images
-from adv2e.sources.times.instants import NS_PER_S
-from adv2e.sources.times.rates import FrameRate, parse_rate
+from adv2e.sources.times.rates import NS_PER_S, FrameRate, parse_rate
 from adv2e.ticks import check_time
 
 _FAR_APART_S = 10.0

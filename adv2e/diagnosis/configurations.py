@@ -10,7 +10,7 @@ from typing import Any
 
 from adv2e.config import Config, from_dict, to_dict
 from adv2e.config.model import Frames, Sampling
-from adv2e.config.paths import get_key, set_key
+from adv2e.config.tree import get_key, set_key
 from adv2e.config.user_effects import user_effects
 from adv2e.effects.readout.frame_coupling import FrameCoupling
 from adv2e.errors import ConfigError

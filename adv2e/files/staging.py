@@ -21,9 +21,15 @@ from itertools import takewhile
 from pathlib import Path
 
 from adv2e.errors import OutputError
-from adv2e.files.distinct import are_one, check_distinct
-from adv2e.files.renaming import exchange, move_to_free, sync, sync_one
-from adv2e.files.workspace import Workspace, remove_abandoned
+from adv2e.files.states import are_one, check_distinct
+from adv2e.files.workspace import (
+    Workspace,
+    exchange,
+    move_to_free,
+    remove_abandoned,
+    sync,
+    sync_one,
+)
 from adv2e.process import cleanup
 
 Identity = tuple[int, int]

@@ -1,4 +1,4 @@
-"""Change detection of files and folders: size and time at a glance, SHA-256 for certain."""
+"""Identity and change of files: size and time at a glance, SHA-256 for certain."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from adv2e.errors import OutputError
 from adv2e.files.regular import check_ends
 
 _BLOCK = 1 << 20
@@ -95,3 +96,41 @@ def _files(path: Path) -> Iterator[tuple[str, Path]]:
         here = Path(place)
         for file in sorted(files):
             yield (here / file).relative_to(path).as_posix(), here / file
+
+
+# ---- Outputs and inputs are to be different files, by whatever names they go.
+
+
+def check_distinct(output: str | Path, inputs: Iterable[str | Path]) -> None:
+    """Refuse to write where something is read from, whether it may be replaced or not.
+
+    Parameters
+    ----------
+    output : str or Path
+    inputs : iterable of str or Path
+        All files that are read, and folders; names of nothing do not matter.
+
+    Raises
+    ------
+    OutputError
+        `output` is one of them, or a folder that holds one.
+    """
+    final = Path(output)
+    if not os.path.lexists(final):
+        return
+    within = final.resolve() if final.is_dir() else None
+    for one in map(Path, inputs):
+        if are_one(final, one):
+            raise OutputError(f"{output}: is read and would be lost; choose another name")
+        if within is not None and within in one.resolve().parents and one.exists():
+            raise OutputError(f"{output}: holds the input {one}; choose another name")
+
+
+def are_one(one: Path, other: Path) -> bool:
+    """Tell whether two names lead to one file, also where upper and lower case are the same."""
+    if os.path.normcase(one) == os.path.normcase(other):
+        return True
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False

@@ -21,7 +21,7 @@ from adv2e.formats.clock import Clock
 from adv2e.formats.column_names import FEW
 from adv2e.formats.event_file import MOST_COLUMNS, Column, Columns, EventFile
 from adv2e.formats.recording import Recording
-from adv2e.sources.times.instants import seconds
+from adv2e.sources.times.rates import seconds
 from adv2e.sources.times.units import SETTLED
 from adv2e.ticks import check_us
 

@@ -27,8 +27,8 @@ from pathlib import Path
 import numpy as np
 
 from adv2e.errors import DataError
+from adv2e.formats.binary import blocks
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.formats.words import blocks
 
 _LATER, _LATER_US = 240, 1 << 13
 _SIDE = 34  # pixels of N-MNIST

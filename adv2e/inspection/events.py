@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from adv2e.causes import CAUSES, has_causes
 from adv2e.events import Events, pixels_of
-from adv2e.sources.times.instants import seconds
+from adv2e.sources.times.rates import seconds
 
 GAP_STEPS = 100
 """A gap is longer than this many median steps between events, ..."""

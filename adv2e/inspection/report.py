@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from adv2e.files.names import shown
-from adv2e.sources.times.instants import seconds
+from adv2e.sources.times.rates import seconds
 
 _WIDTH = 12
 

@@ -18,7 +18,7 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import advance as cascade
 from adv2e.kernel.cascade import screen as cascade_screen
 from adv2e.kernel.circuit import EXACT, Circuit
-from adv2e.kernel.event_buffer import with_room
+from adv2e.kernel.comparator import with_room
 from adv2e.kernel.frames import load
 from adv2e.kernel.lanes import batch, exchange, rows
 from adv2e.kernel.photoreceptor import strip as photoreceptor
@@ -296,7 +296,7 @@ def run_exact(
     plan : Plan or None
         How each interval is cut for the cascade; None where lanes do.
     keys, times : (n,)
-        Memory for events; see :mod:`adv2e.kernel.event_buffer`.
+        Memory for events; see :mod:`adv2e.kernel.comparator`.
 
     Returns
     -------

@@ -1,6 +1,9 @@
-"""State of each pixel from interval to interval: its rows, one column a pixel."""
+"""State of each pixel: its rows, one column a pixel, and how it begins."""
 
 from __future__ import annotations
+
+from adv2e.compiled import kernel
+from adv2e.kernel import rng
 
 NEVER = 1e300
 """Time of an event that does not happen [us]."""
@@ -32,3 +35,38 @@ ROWS = 22
     RESET_NOISE,  # photoreceptor noise,
     RESET_ADDED,  # what is added to the signal
 ) = range(ROWS)
+
+
+# ---- Per-pixel initial state: thresholds (mismatch) and reference.
+#
+# The equations are those of :mod:`adv2e.effects.pixel.thresholds` and
+# :mod:`adv2e.effects.pixel.initial_reference`.
+
+
+@kernel
+def _fill_normal_levels(seed, stream, first, mean, mismatch, floor, levels, spare):
+    rng.uniforms_of_pixels(seed, stream, first, levels, spare)
+    for k in range(levels.shape[0]):
+        level = mean + mismatch * rng.normal_of(levels[k], spare[k])
+        levels[k] = level if level > floor else floor
+
+
+@kernel
+def fill_levels(lo, hi, seed, mean_on, mean_off, mismatch, floor, on, off, spare):
+    """Draw the thresholds of the pixels lo..hi into `on` and `off`; `spare` is overwritten."""
+    if mismatch > 0.0:
+        v = spare[lo:hi]
+        _fill_normal_levels(seed, rng.ON_THRESHOLD, lo, mean_on, mismatch, floor, on[lo:hi], v)
+        _fill_normal_levels(seed, rng.OFF_THRESHOLD, lo, mean_off, mismatch, floor, off[lo:hi], v)
+    else:
+        for i in range(lo, hi):
+            on[i] = max(mean_on, floor)
+            off[i] = max(mean_off, floor)
+
+
+@kernel
+def fill_random_reference(seed, on, off, x, reference):
+    """Draw references so that x lies uniformly between the thresholds of each pixel."""
+    for i in range(x.shape[0]):
+        u = rng.uniforms(seed, rng.INITIAL_REFERENCE, i, 0)[0]
+        reference[i] = x[i] - (u * (on[i] + off[i]) - off[i])

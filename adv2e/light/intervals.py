@@ -19,8 +19,8 @@ from adv2e.config.model import Sampling
 from adv2e.effects.frames.brightness import check_light
 from adv2e.errors import DataError
 from adv2e.light.interpolation import make_upsampler
-from adv2e.light.interpolation.sequence import Timed, instant_ns, neighbours
-from adv2e.sources.times.instants import seconds
+from adv2e.light.interpolation.linear import Timed, instant_ns, neighbours
+from adv2e.sources.times.rates import seconds
 
 FRAME_BYTES = 16 << 20
 """Memory for the frames of one part."""

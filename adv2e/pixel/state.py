@@ -16,7 +16,6 @@ from adv2e.effects.pixel.initial_reference import RANDOM, RUNNING
 from adv2e.effects.pixel.thresholds import FLOOR
 from adv2e.kernel import per_pixel
 from adv2e.kernel.circuit import Circuit
-from adv2e.kernel.first_state import fill_levels, fill_random_reference
 from adv2e.kernel.leak import fill_first_factors, fill_running
 from adv2e.kernel.noise import (
     fill_first_candidates,
@@ -24,6 +23,7 @@ from adv2e.kernel.noise import (
     fill_first_noise,
     fill_first_seen,
 )
+from adv2e.kernel.per_pixel import fill_levels, fill_random_reference
 from adv2e.kernel.stepped.signal import log_of_light
 from adv2e.pixel.steps import Stepping
 

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from adv2e.errors import OutputError
 from adv2e.files.staging import Staging
-from adv2e.rendering.films import Film, PictureOutput, Sheet, check_suffix
-from adv2e.rendering.output import replacing
+from adv2e.rendering.films import Film, PictureOutput, Sheet, check_suffix, replacing
 from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import MOST_PICTURES, Caption, Timeline, caption
 

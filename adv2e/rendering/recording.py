@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from adv2e.errors import DataError
-from adv2e.files.distinct import check_distinct
+from adv2e.files.states import check_distinct
 from adv2e.light.pictures import drawn_frame
 from adv2e.process import bars
 from adv2e.rendering.preview import open_preview

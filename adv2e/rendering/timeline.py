@@ -18,9 +18,8 @@ from adv2e.causes import without_causes
 from adv2e.events import Events, empty_events
 from adv2e.files.backlog import Backlog
 from adv2e.light.pictures import eight_bit
-from adv2e.rendering.films import PictureOutput
+from adv2e.rendering.films import NotWritten, PictureOutput
 from adv2e.rendering.layout import Cell
-from adv2e.rendering.output import NotWritten
 from adv2e.rendering.styles import Picture, Style, draw
 
 Caption = Callable[[int, int], str]

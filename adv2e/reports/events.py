@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from adv2e.reports.charts.event_pictures import event_picture, top_of
-from adv2e.reports.markup import Markup, tag
+from adv2e.reports.charts.pictures import event_picture, top_of
+from adv2e.reports.markup import Column, Markup, table, tag
 from adv2e.reports.quantities import estimate_text, number_text
 from adv2e.reports.result import Diagnosis, Snapshot, Total
-from adv2e.reports.tables import Column, table
 
 _NAMES = ("measured", "as declared (before)", "with what was found (after)")
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from adv2e.reports.keys import unit_of
-from adv2e.reports.labels import label_of, part_of
+from adv2e.reports.keys import label_of, part_of, unit_of
 from adv2e.reports.quantities import (
     beside,
     interval_text,

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adv2e.reports.charts.sensor_map import CLIP_SD, Map, colour_bar, map_image
-from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.charts.pictures import CLIP_SD, Map, colour_bar, map_image
+from adv2e.reports.markup import SHOWN, Column, Markup, join, table, tag
 from adv2e.reports.quantities import (
     NO_UNIT,
     NOTHING,
@@ -20,7 +20,6 @@ from adv2e.reports.quantities import (
 )
 from adv2e.reports.result import Detectable, Diagnosis, ResidualMap, Signature
 from adv2e.reports.standing_out import LARGE_Z, kind_rank, standing_out
-from adv2e.reports.tables import SHOWN, Column, table
 
 _CHANCE = math.erfc(LARGE_Z / math.sqrt(2.0))
 """Share that a normal deviation has beyond :data:`LARGE_Z`."""

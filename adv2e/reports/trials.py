@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 
 from adv2e.reports.keys import summary_of, unit_of
-from adv2e.reports.markup import Markup, join, tag
+from adv2e.reports.markup import SHOWN, Column, Markup, join, table, tag
 from adv2e.reports.quantities import NOTHING, unit_text, value_text
 from adv2e.reports.result import Diagnosis, Finding, Rejected
-from adv2e.reports.tables import SHOWN, Column, table
 
 SEPARATIONS = {
     "thresholds": "a scene that returns to where it began, at two contrasts: signed steps then sum"

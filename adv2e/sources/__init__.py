@@ -67,7 +67,7 @@ def open_source(
         Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
     timestamps : path, optional
         File with the time of each frame, ``t`` or ``t name`` a line; see
-        :mod:`adv2e.sources.times.columns`.
+        :mod:`adv2e.sources.times.lists`.
     start_s, stop_s : float, optional
         First and last time wanted, counted from the first frame [s]; both inclusive.
     t0 : {'auto', 'keep', 'zero'}

@@ -35,7 +35,7 @@ from adv2e.sources.frame import (
     rotated180,
 )
 from adv2e.sources.paths import SensorPath
-from adv2e.sources.times.instants import seconds
+from adv2e.sources.times.rates import seconds
 from adv2e.sources.tracks import Track, choose
 from adv2e.sources.wanted import Selection
 from adv2e.ticks import check_time

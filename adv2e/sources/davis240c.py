@@ -20,8 +20,7 @@ from adv2e.sources.frame import RECORDED, Light
 from adv2e.sources.listed import ListedSource
 from adv2e.sources.listings import Listing, listed_source
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST, read_light
-from adv2e.sources.times.lists import decoded, first_name
-from adv2e.sources.times.names import member_of
+from adv2e.sources.times.lists import decoded, first_name, member_of
 from adv2e.sources.wanted import GivenTimes, Selection
 
 

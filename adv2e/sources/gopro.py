@@ -31,9 +31,8 @@ from adv2e.sources.frame import Light
 from adv2e.sources.images.opencv import read_image
 from adv2e.sources.images.source import found_list, image_files
 from adv2e.sources.listed import ListedSource, Picture, timed
-from adv2e.sources.times.instants import Stamp
 from adv2e.sources.times.lists import FrameList
-from adv2e.sources.times.rates import FrameRate
+from adv2e.sources.times.rates import FrameRate, Stamp
 from adv2e.sources.times.units import Unit
 from adv2e.sources.wanted import GivenTimes, Selection
 

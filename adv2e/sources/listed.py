@@ -11,8 +11,7 @@ from adv2e.sources.base import Source
 from adv2e.sources.bayer import in_colour, light_of
 from adv2e.sources.frame import Light, Pixels, Shot, check_values
 from adv2e.sources.times.gaps import gap_doubts, numbering_doubt
-from adv2e.sources.times.lists import FrameList, read_list
-from adv2e.sources.times.names import match
+from adv2e.sources.times.lists import FrameList, match, read_list
 from adv2e.sources.wanted import GivenTimes, Selection
 
 

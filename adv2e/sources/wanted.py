@@ -8,8 +8,7 @@ from pathlib import Path
 
 from adv2e.errors import UsageError
 from adv2e.geometry import Rectangle
-from adv2e.sources.times.instants import NS_PER_S
-from adv2e.sources.times.rates import FrameRate, Rate, parse_rate
+from adv2e.sources.times.rates import NS_PER_S, FrameRate, Rate, parse_rate
 from adv2e.sources.times.units import UNITS
 
 PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")

@@ -13,8 +13,7 @@ from adv2e.files.zips import Members
 from adv2e.sources import davis240c
 from adv2e.sources.frame import Pixels
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
-from adv2e.sources.images.order import in_order
-from adv2e.sources.images.source import LISTS
+from adv2e.sources.images.source import LISTS, in_order
 from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.listings import find_listing, open_listing
 from adv2e.sources.stored import LIST

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import encode_light
-from adv2e.rendering.output import replacing
-from adv2e.rendering.video import VideoFile
+from adv2e.rendering.films import VideoFile, replacing
 
 if TYPE_CHECKING:
     from adv2e.synthetic.scene import Scene

@@ -33,7 +33,7 @@ from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows
 from adv2e.diagnosis.fitting.nuisances import TOLERANCE
 from adv2e.events import Events, empty_events
-from adv2e.sources.times.instants import seconds
+from adv2e.sources.times.rates import seconds
 from experiments import side_by_side
 from experiments.clip import Simulator
 from experiments.recordings import SCORE, Judged, Recording, halves, read

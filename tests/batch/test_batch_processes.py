@@ -16,7 +16,7 @@ from adv2e.batch.processes import run
 from adv2e.batch.run import Batch, Settings
 from adv2e.batch.work import Job
 from adv2e.config import load_config, to_dict
-from adv2e.config.effect_files import load_effects
+from adv2e.config.user_effects import load_effects
 
 ENDING = """
 import os, signal

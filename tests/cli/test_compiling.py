@@ -5,7 +5,7 @@ import io
 import pytest
 
 from adv2e import compiled
-from adv2e.cli.compiling import compilation_told
+from adv2e.cli.progress import compilation_told
 from adv2e.kernel.exact import run_exact
 
 

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adv2e.comparison.compare import WARNING, Resimulation, compare
+from adv2e.comparison.compare import STATISTICS, WARNING, Resimulation, compare
 from adv2e.comparison.distances import MEASURES, distances
 from adv2e.comparison.report import text
-from adv2e.comparison.stream_statistics import STATISTICS
 from adv2e.comparison.windows import Windows
 from adv2e.errors import DataError
 from adv2e.events import empty_events

@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adv2e.comparison.distances import MEASURES, distances, pooled
-from adv2e.comparison.smoothed_error import smoothed_errors
+from adv2e.comparison.distances import MEASURES, distances, pooled, smoothed_errors
 from adv2e.comparison.windows import Windows
 from adv2e.events import cut, empty_events, make_events
 from adv2e.representations.voxel_grid import own_window, smoothed, voxel_grid, z_scored

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from adv2e.comparison.smoothed_error import smoothed_errors, smoothed_norms
+from adv2e.comparison.distances import smoothed_errors, smoothed_norms
 from adv2e.events import empty_events, make_events
 
 WIDTH, HEIGHT = 12, 9

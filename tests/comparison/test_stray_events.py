@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from adv2e.cli import main
-from adv2e.comparison import compact as module
-from adv2e.comparison.compact import compact
-from adv2e.comparison.distances import distances
-from adv2e.comparison.trains import keys
+from adv2e.comparison import distances as module
+from adv2e.comparison.distances import compact, distances, keys
 from adv2e.comparison.windows import Windows, fixed_windows, holding_events
 from adv2e.errors import DataError
 from adv2e.events import cut, make_events, sort_events

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adv2e.comparison.stream_statistics import inter_event_times, stream_statistics
+from adv2e.comparison.compare import inter_event_times, stream_statistics
 from adv2e.events import empty_events, make_events
 
 

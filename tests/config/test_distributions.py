@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.config import from_dict, load_config, load_family, to_annotated_yaml, to_dict
-from adv2e.config.effect_files import load_effects
+from adv2e.config.user_effects import load_effects
 from adv2e.errors import ConfigError, UsageError
 
 ON = "pixel.thresholds.on"

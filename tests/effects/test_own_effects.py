@@ -11,7 +11,7 @@ import pytest
 from adv2e import load_config, simulate
 from adv2e.config import Config, from_dict, to_annotated_yaml, to_dict, to_yaml
 from adv2e.config.active_effects import active_hooks
-from adv2e.config.effect_files import load_effects
+from adv2e.config.user_effects import load_effects
 from adv2e.diagnosis.configurations import as_found, own_of, without_user_effects
 from adv2e.diagnosis.fitting.library import library, names
 from adv2e.diagnosis.hints.collect import Hints

@@ -19,7 +19,8 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
-from adv2e.kernel.cascade import curve, plan
+from adv2e.kernel.cascade import plan
+from adv2e.kernel.cascade import substep as curve
 
 
 def agreement_with_ode(stimulus, circuit, sections):

@@ -8,7 +8,7 @@ from flow_scenes import FIGURE, GROUND, clouds, disk, pan, pixels
 
 from adv2e.config.model import Sampling
 from adv2e.light.interpolation import make_upsampler
-from adv2e.light.interpolation.sequence import Beside, neighbours
+from adv2e.light.interpolation.linear import Beside, neighbours
 from adv2e.motion.acceleration import Bend, Side, bends, fastest
 from adv2e.motion.estimate import Motion
 
@@ -168,14 +168,14 @@ def test_neighbours_of_a_sequence():
 
 
 def test_motion_is_found_once_for_each_pair(monkeypatch):
-    from adv2e.light.interpolation import paths
+    from adv2e.light.interpolation import flow
 
     asked = []
 
     def estimate(a, b):
         asked.append((a[0, 0], b[0, 0]))
 
-    monkeypatch.setattr(paths, "estimate_motion", estimate)
+    monkeypatch.setattr(flow, "estimate_motion", estimate)
     frames = [(k, np.full((40, 40), k, np.float32)) for k in range(6)]
     upsampler = make_upsampler(Sampling(interpolation="flow", L=3))
     for (_, a), (_, b), beside in neighbours(iter(frames)):

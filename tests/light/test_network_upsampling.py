@@ -9,7 +9,7 @@ from onnx_models import image, number
 from adv2e import Config, simulate
 from adv2e.config.model import Frames, Sampling
 from adv2e.errors import ConfigError, DataError
-from adv2e.light.interpolation import make_upsampler, tiles
+from adv2e.light.interpolation import make_upsampler, network
 
 
 def frames(shape=(30, 50), dtype=np.float32, seed=3):
@@ -67,7 +67,7 @@ def test_a_network_without_time_needs_a_power_of_two(tmp_path):
 
 
 def test_tiles_and_padding_change_nothing_for_what_blends(tmp_path, monkeypatch):
-    monkeypatch.setattr(tiles, "LARGEST", 64)
+    monkeypatch.setattr(network, "LARGEST", 64)
     a, b = frames((70, 150))
     for stated in ({"size": (32, 48)}, {"multiple": 16}):
         path = onnx_models.blend(tmp_path / "a.onnx", **stated)

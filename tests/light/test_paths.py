@@ -13,8 +13,8 @@ from adv2e.config.model import Sampling
 from adv2e.conversion.simulation import events_from_light
 from adv2e.errors import ConfigError
 from adv2e.light.interpolation import make_upsampler
-from adv2e.light.interpolation.paths import Paths
-from adv2e.light.interpolation.sequence import NOTHING
+from adv2e.light.interpolation.flow import Paths
+from adv2e.light.interpolation.linear import NOTHING
 from adv2e.light.intervals import Intervals
 from adv2e.motion.estimate import SMALLEST
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from adv2e.light.interpolation import tiles as module
-from adv2e.light.interpolation.tiles import Axis, in_tiles
+from adv2e.light.interpolation import network as module
+from adv2e.light.interpolation.network import Axis, in_tiles
 
 
 @pytest.mark.parametrize("length", [1, 31, 32, 33, 100, 1024, 1025, 1100, 2160, 3840])

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from adv2e.config import Config, load_config, to_dict
-from adv2e.config.paths import get_key
+from adv2e.config.tree import get_key
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted, parted

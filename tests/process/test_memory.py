@@ -7,13 +7,13 @@ import sys
 
 import pytest
 
-from adv2e.process import memory
+from adv2e.process import machine
 
 SCRIPT = """
 import sys
 from pathlib import Path
 import numpy as np
-from adv2e.process.memory import return_large_blocks
+from adv2e.process.machine import return_large_blocks
 if sys.argv[1] == "returned":
     return_large_blocks()
 
@@ -44,5 +44,5 @@ def test_other_systems_have_no_such_setting(monkeypatch):
     def no_library(name):
         raise TypeError
 
-    monkeypatch.setattr(memory.ctypes, "CDLL", no_library)
-    memory.return_large_blocks()
+    monkeypatch.setattr(machine.ctypes, "CDLL", no_library)
+    machine.return_large_blocks()

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import UsageError
-from adv2e.rendering.gif import GifFile, palette
+from adv2e.rendering.films import GifFile, palette
 from adv2e.rendering.styles import Style
 
 

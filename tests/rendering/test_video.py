@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import OutputError
-from adv2e.rendering.video import VideoFile
+from adv2e.rendering.films import VideoFile
 from adv2e.sources.images.opencv import quiet
 
 CODERS = {".mp4": "h264", ".webm": "vp8", ".avi": "huffyuv"}

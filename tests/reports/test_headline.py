@@ -6,9 +6,8 @@ import pytest
 from made_up_diagnosis import everything
 
 from adv2e.diagnosis.fitting.library import names
-from adv2e.reports.keys import Own
-from adv2e.reports.labels import heading_of, label_of, part_of
-from adv2e.reports.next_steps import convert_line, next_steps
+from adv2e.reports.findings import convert_line, next_steps
+from adv2e.reports.keys import Own, heading_of, label_of, part_of
 from adv2e.reports.result import Finding, Signature
 from adv2e.reports.wording import OF_TABLES
 

@@ -21,7 +21,7 @@ from adv2e.reports.charts.curve_chart import (
     points_of,
 )
 from adv2e.reports.charts.error_chart import error_chart
-from adv2e.reports.charts.sensor_map import (
+from adv2e.reports.charts.pictures import (
     colour_bar,
     colours,
     map_image,

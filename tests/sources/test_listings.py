@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.errors import DataError, OutputError
-from adv2e.files.distinct import check_distinct
+from adv2e.files.states import check_distinct
 from adv2e.sources import open_source
 from adv2e.sources.times.lists import parse_list
 

@@ -13,7 +13,7 @@ import pytest
 
 from adv2e.files.names import shown
 from adv2e.formats.reading import read_events
-from adv2e.rendering.gif import GifFile
+from adv2e.rendering.films import GifFile
 from adv2e.rendering.styles import Style
 from adv2e.sources import open_source
 

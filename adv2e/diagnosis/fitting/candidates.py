@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config, to_dict
-from adv2e.config.paths import flat, get_key, set_key
+from adv2e.config.tree import flat, get_key, set_key
 from adv2e.diagnosis.configurations import from_values
 from adv2e.diagnosis.hints.readouts import Pulse, Readouts
 

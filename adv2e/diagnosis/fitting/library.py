@@ -18,7 +18,7 @@ import numpy as np
 
 from adv2e.config import Config, to_dict
 from adv2e.config.build import keys_of
-from adv2e.config.paths import get_key
+from adv2e.config.tree import get_key
 from adv2e.config.user_effects import user_effects
 from adv2e.diagnosis.configurations import coupling_of
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter

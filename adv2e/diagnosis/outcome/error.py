@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_norms
+from adv2e.comparison.distances import SIGMAS_US, smoothed_norms
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.reports.result import ErrorRow, Estimate
 

@@ -26,7 +26,7 @@ from adv2e.effects.hooks import Hooks
 from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
 from adv2e.events import Events
 from adv2e.light.interpolation import make_upsampler
-from adv2e.light.interpolation.sequence import Timed, instant_ns, neighbours
+from adv2e.light.interpolation.linear import Timed, instant_ns, neighbours
 from adv2e.pixel.steps import PRECISE, Coarseness
 
 Instants = tuple[list[int], NDArray[np.float32]]

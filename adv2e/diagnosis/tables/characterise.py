@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from adv2e import __version__
 from adv2e.config import to_dict
-from adv2e.config.paths import set_key
+from adv2e.config.tree import set_key
 from adv2e.diagnosis.tables.latency_problem import LatencyProblem
 from adv2e.diagnosis.tables.measurements import Latencies, measurements_of
 from adv2e.diagnosis.tables.noise_problem import NoiseProblem

@@ -44,8 +44,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.motion.estimate import Motion, estimate_motion
-from adv2e.motion.smear import smear, spread
-from adv2e.motion.warping import ONE_SIDED, UNKNOWN
+from adv2e.motion.warping import ONE_SIDED, UNKNOWN, smear, spread
 
 Image = NDArray[np.float32]
 

@@ -34,11 +34,11 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.events import Events
+from adv2e.formats.binary import DECODERS
 from adv2e.formats.event_file import Columns
-from adv2e.formats.evt import DECODERS
 from adv2e.sources.frame import Pixels
 from adv2e.sources.images.opencv import decode_image
-from adv2e.sources.times.instants import NS_PER_S
+from adv2e.sources.times.rates import NS_PER_S
 
 EVENT_ARRAY = "dvs_msgs/msg/EventArray"
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"

@@ -35,7 +35,7 @@ from adv2e.formats.bag.messages import (
 )
 from adv2e.formats.sink import Request, Writer, to_json
 from adv2e.light.pictures import eight_bit
-from adv2e.sources.times.instants import NS_PER_S
+from adv2e.sources.times.rates import NS_PER_S
 
 _MESSAGE = 10_000  # events
 _EVENTS_TOPIC, _IMAGES_TOPIC = "/dvs/events", "/dvs/image_raw"

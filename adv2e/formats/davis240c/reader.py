@@ -25,9 +25,7 @@ from adv2e.formats.text.reader import lines_of
 from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
-from adv2e.sources.times.columns import has_lines
-from adv2e.sources.times.lists import FrameList, decoded, parse_list
-from adv2e.sources.times.names import members_of
+from adv2e.sources.times.lists import FrameList, decoded, has_lines, members_of, parse_list
 
 
 def open_davis240c(path: Path, facts: Facts) -> EventFile:

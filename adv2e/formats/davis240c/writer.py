@@ -34,7 +34,7 @@ from adv2e.files.staging import Staging
 from adv2e.formats.sink import Request, Writer, to_json
 from adv2e.formats.text.writer import text_blocks
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
-from adv2e.sources.times.instants import NS_PER_S
+from adv2e.sources.times.rates import NS_PER_S
 
 _BLOCK = 1 << 20  # bytes of text deflated at once: the archive must not depend on who calls how
 _LEVEL = 4  # of deflate: a fifth more bytes than level 6, in a third of its time

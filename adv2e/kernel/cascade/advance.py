@@ -13,7 +13,7 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import pixel as alone
 from adv2e.kernel.cascade import screen as cascade
 from adv2e.kernel.cascade import second_look
-from adv2e.kernel.event_buffer import with_room
+from adv2e.kernel.comparator import with_room
 from adv2e.kernel.lanes import exchange
 from adv2e.kernel.photoreceptor import path as noise_path
 from adv2e.kernel.photoreceptor import strip as photoreceptor

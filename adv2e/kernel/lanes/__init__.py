@@ -2,10 +2,10 @@
 
 ``rows``          state of the lanes: a flat array with a row for each number
 ``exchange``      pixels into lanes and out of them
-``pieces``        intervals cut at the knee of the log map, below an e-fold, and in bright light
-``roots``         places within a piece (thresholds, turns, given places) for all lanes at a time
+``roots``         intervals cut into pieces (at the knee of the log map, below an e-fold, in bright
+                  light), and places within a piece (thresholds, turns, given places), for all lanes
 ``apply_events``  crossings: events, resets of the reference, ends of refractory periods
-``next_target``   next crossing of all lanes together
-``slow_path``     next target of one lane: extremum, noise event, crossing that leak may cause
+``next_target``   next crossing of all lanes together; next target of one lane: extremum, noise
+                  event, crossing that leak may cause
 ``batch``         all lanes of a strip through an interval, by these
 """

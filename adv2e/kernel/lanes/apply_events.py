@@ -8,8 +8,7 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.causes import cause_by_leak, note_reset
 from adv2e.kernel.comparator import TIE, fire
 from adv2e.kernel.lanes import rows
-from adv2e.kernel.lanes.pieces import fallen_at_place
-from adv2e.kernel.lanes.roots import evaluate_release
+from adv2e.kernel.lanes.roots import evaluate_release, fallen_at_place
 
 _TRIES = 3
 

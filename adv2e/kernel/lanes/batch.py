@@ -5,8 +5,8 @@ threshold before that, the end of a dead time, the next noise event, and at last
 piece of the interval.  In each round all lanes search for one place each
 (:mod:`adv2e.kernel.lanes.roots`), apply it (:mod:`adv2e.kernel.lanes.apply_events`), and then
 choose the next target: most of them together (:mod:`adv2e.kernel.lanes.next_target`), the others
-one by one (:mod:`adv2e.kernel.lanes.slow_path`).  Pixels get into lanes, and out, by
-:mod:`adv2e.kernel.lanes.exchange`, and from piece to piece by :mod:`adv2e.kernel.lanes.pieces`.
+one by one (:mod:`adv2e.kernel.lanes.next_target`).  Pixels get into lanes, and out, by
+:mod:`adv2e.kernel.lanes.exchange`, and from piece to piece by :mod:`adv2e.kernel.lanes.roots`.
 """
 
 from __future__ import annotations
@@ -16,11 +16,9 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.lanes import rows
 from adv2e.kernel.lanes.apply_events import cross, fire_found, note_releases, release
 from adv2e.kernel.lanes.exchange import sort_out
-from adv2e.kernel.lanes.next_target import choose
-from adv2e.kernel.lanes.pieces import next_piece, open_piece
-from adv2e.kernel.lanes.roots import evaluate, guess, refine
+from adv2e.kernel.lanes.next_target import choose, found_stop, go_on
+from adv2e.kernel.lanes.roots import evaluate, guess, next_piece, open_piece, refine
 from adv2e.kernel.lanes.rows import whole
-from adv2e.kernel.lanes.slow_path import found_stop, go_on
 
 
 @kernel

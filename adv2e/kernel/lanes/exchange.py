@@ -5,7 +5,7 @@ from __future__ import annotations
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, screen, special
 from adv2e.kernel.lanes import rows
-from adv2e.kernel.lanes.pieces import end_of_piece, first_place
+from adv2e.kernel.lanes.roots import end_of_piece, first_place
 from adv2e.kernel.lanes.rows import move, whole
 from adv2e.kernel.leak import leak_over
 from adv2e.kernel.noise import next_noise

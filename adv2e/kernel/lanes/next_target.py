@@ -3,14 +3,192 @@
 Between two known places the signal is monotone, or it has its extremum where it cannot cross.  So
 the distance at both places tells whether a threshold is crossed, and that it is crossed once.
 Extrema, noise events and crossings that leak may cause are left to
-:mod:`adv2e.kernel.lanes.slow_path`.
+:mod:`adv2e.kernel.lanes.next_target`.
 """
 
 from __future__ import annotations
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
+from adv2e.kernel import per_pixel
+from adv2e.kernel.causes import note_reset
 from adv2e.kernel.comparator import TIE
 from adv2e.kernel.lanes import rows
+from adv2e.kernel.lanes.apply_events import fire_lane
+from adv2e.kernel.lanes.roots import BEFORE_END, fallen_at_place, set_stop
+from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
+
+# ---- Next target of one lane (scalar): extremum, noise event, or a crossing that leak may cause.
+#
+# Where leak may be faster than a falling signal, or a search has failed, the lane evaluates the
+# signal half-way to the next known place, and decides up to there; by halves down to `TOLERANCE`,
+# if it must.  From a place so passed it goes on by twice the step.
+
+
+_STRAIGHT = 0.9
+_HALF_WAY = -1
+
+
+@kernel
+def _seek_given(j, what, place, lanes):
+    """Set the next target of lane j to a given place."""
+    lanes[rows.SEEKS + j] = what
+    lanes[rows.PLACE + j] = place
+    lanes[rows.MOVES + j] = 0.0
+
+
+@kernel
+def _seek_root(j, what, length, lanes):
+    """Set the next target of lane j to a crossing, or to the extremum, between S and STOP.
+
+    A place at S, and one up to a STOP that is near, is known without a search.
+    """
+    away, on, off = lanes[rows.AWAY_S + j], lanes[rows.ON + j] + TIE, lanes[rows.OFF + j] + TIE
+    beyond = (what == rows.SEEK_ON and away >= on) or (what == rows.SEEK_OFF and away <= -off)
+    near = (lanes[rows.STOP + j] - lanes[rows.S + j]) * length <= rows.TOLERANCE
+    _seek_given(j, what, lanes[rows.S + j] if beyond else lanes[rows.STOP + j], lanes)
+    lanes[rows.MOVES + j] = 0.0 if beyond or near else 1.0
+
+
+@kernel
+def _moves_before_turn(j, length, circuit, lanes):
+    """Largest change of the signal before its extremum, signed; see the screen's bound."""
+    lag, dx = lanes[rows.LAG_S + j], lanes[rows.DX + j]
+    if lanes[rows.LOG + j] < 0.5 or abs(lag) >= _STRAIGHT:
+        return -lag
+    rate = (circuit.dark + circuit.per_dn * lanes[rows.LIGHT_S + j]) * length
+    meet = abs(lag) / (rate * abs(lag) + abs(dx))
+    return dx * min(meet, 1.0) - lag
+
+
+@inlined
+def _choose(j, length, circuit, lanes):
+    """Return the first target between S and STOP: a threshold, TURN, DONE (none), or HALF."""
+    on, off = lanes[rows.ON + j] + TIE, lanes[rows.OFF + j] + TIE
+    away_s, away_p = lanes[rows.AWAY_S + j], lanes[rows.AWAY_P + j]
+    lag_s, lag_p = lanes[rows.LAG_S + j], lanes[rows.LAG_P + j]
+    drift = lanes[rows.FALLEN_P + j] - lanes[rows.FALLEN_S + j]
+    span = lanes[rows.STOP + j] - lanes[rows.S + j]
+    rate_s = (circuit.dark + circuit.per_dn * lanes[rows.LIGHT_S + j]) * length
+    rate_p = (circuit.dark + circuit.per_dn * lanes[rows.LIGHT_P + j]) * length
+    light = max(lanes[rows.LIGHT_S + j], lanes[rows.LIGHT_P + j])
+    leak = 1.01 * (lanes[rows.FALL + j] + lanes[rows.FALL_DN + j] * light)
+    dx = lanes[rows.DX + j]
+    if away_s >= on or away_s <= -off:  # by rounding
+        return rows.SEEK_ON if away_s >= on else rows.SEEK_OFF
+    by_end = rows.SEEK_ON if away_p >= on else (rows.SEEK_OFF if away_p <= -off else rows.DONE)
+    if span * length <= rows.TOLERANCE:
+        return by_end
+    if lanes[rows.SEEKS + j] == rows.STUCK:
+        return rows.HALF
+    if lag_s * lag_p < 0.0:
+        reach = away_s + _moves_before_turn(j, length, circuit, lanes)
+        if lag_s > 0.0:  # falls, then rises
+            return rows.TURN if reach <= -off or away_s + drift >= on else by_end
+        # rises, then falls: what holds from the turn on, where u = 0, decides
+        sure = drift == 0.0 or sure_of_leak(
+            -per_pixel.NEVER, away_p, 0.0, lag_p, span, dx, rate_s, rate_p, leak, on, off
+        )
+        return by_end if sure and reach + drift < on else rows.TURN
+    falls = drift > 0.0 and lag_s + lag_p > 0.0
+    if falls and not sure_of_leak(
+        away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, on, off
+    ):
+        return rows.HALF
+    return by_end
+
+
+@inlined
+def found_stop(i, j, circuit, state, lanes):
+    """Make the place that was evaluated (extremum, half-way or noise event) the next STOP."""
+    seeks = lanes[rows.SEEKS + j]
+    lanes[rows.KIND + j] = NONE
+    if seeks == rows.INJECTED:
+        lanes[rows.KIND + j] = next_noise(i, circuit, state)[0]
+    elif seeks == rows.HALF:
+        lanes[rows.KIND + j] = _HALF_WAY
+    lag = 0.0 if seeks == rows.TURN else lanes[rows.LAG_E + j]
+    set_stop(
+        j, lanes[rows.PLACE + j], lag, lanes[rows.LIGHT_E + j], fallen_at_place(j, lanes), lanes
+    )
+    lanes[rows.KNOWN + j] = 1.0
+    lanes[rows.SEEKS + j] = rows.DOUBTFUL
+
+
+@inlined
+def _find_stop(i, j, ta, length, circuit, state, lanes):
+    """Set STOP to the end of the piece; returns whether a noise event comes before it."""
+    end = lanes[rows.END + j]
+    t_end = ta + end * length
+    if lanes[rows.NOISE + j] < t_end:
+        now = ta + lanes[rows.S + j] * length
+        kind, t = noise_within(i, now, t_end, circuit, state)
+        lanes[rows.NOISE + j] = next_noise(i, circuit, state)[1]
+        if kind != NONE:
+            place = min(max((t - ta) / length, lanes[rows.S + j]), end * BEFORE_END)
+            _seek_given(j, rows.INJECTED, place, lanes)
+            return True
+    set_stop(j, end, lanes[rows.U1 + j], lanes[rows.I1 + j], lanes[rows.TAIL + j], lanes)
+    return False
+
+
+@inlined
+def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
+    """Move to STOP, before which there is no crossing, and fire a noise event that is due there.
+
+    Returns the number of events, and whether there was one.
+    """
+    lanes[rows.KNOWN + j] = 0.0
+    lanes[rows.S + j] = lanes[rows.STOP + j]
+    lanes[rows.LAG_S + j] = lanes[rows.LAG_P + j]
+    lanes[rows.LIGHT_S + j] = lanes[rows.LIGHT_P + j]
+    lanes[rows.FALLEN_S + j] = lanes[rows.FALLEN_P + j]
+    lanes[rows.AWAY_S + j] = lanes[rows.AWAY_P + j]
+    kind = int(lanes[rows.KIND + j])
+    if kind in (NONE, _HALF_WAY):
+        return n, False
+    polarity = take_noise(i, kind, lanes[rows.LIGHT_S + j], circuit, state)
+    lanes[rows.NOISE + j] = next_noise(i, circuit, state)[1]
+    if polarity == 0:
+        return n, False
+    when = ta + lanes[rows.S + j] * length
+    n = fire_lane(i, j, when, polarity, kind, t_base, circuit, state, lanes, keys, times, n)
+    lanes[rows.REFERENCE + j] += lanes[rows.AWAY_S + j]
+    lanes[rows.AWAY_S + j] = 0.0
+    note_reset(i, lanes[rows.REFERENCE + j] - lanes[rows.FALLEN_S + j], circuit, state)
+    return n, True
+
+
+@inlined
+def go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
+    """Choose the next target of a DOUBTFUL lane.  Returns the number of events."""
+    while True:
+        if lanes[rows.KNOWN + j] < 0.5 and _find_stop(i, j, ta, length, circuit, state, lanes):
+            return n
+        what = _choose(j, length, circuit, lanes)
+        if what == rows.HALF:
+            _seek_given(j, rows.HALF, 0.5 * (lanes[rows.S + j] + lanes[rows.STOP + j]), lanes)
+            return n
+        if what != rows.DONE:
+            _seek_root(j, what, length, lanes)
+            return n
+        if lanes[rows.KNOWN + j] < 0.5:
+            lanes[rows.SEEKS + j] = rows.DONE
+            return n
+        lanes[rows.SEEKS + j] = rows.DOUBTFUL
+        span = lanes[rows.STOP + j] - lanes[rows.S + j]
+        n, fired = _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n)
+        if fired and circuit.dead_time > 0.0:
+            release = lanes[rows.S + j] + circuit.dead_time / length
+            lanes[rows.HOLD + j] = ta + release * length
+            _seek_given(
+                j, rows.RELEASE if release < lanes[rows.END + j] else rows.DONE, release, lanes
+            )
+            return n
+        place = lanes[rows.S + j] + 2.0 * span
+        until = min(lanes[rows.END + j], (lanes[rows.NOISE + j] - ta) / length)
+        if lanes[rows.KIND + j] == _HALF_WAY and span * length > rows.TOLERANCE and place < until:
+            _seek_given(j, rows.HALF, place, lanes)
+            return n
 
 
 @kernel

@@ -1,7 +1,7 @@
 """In-between frames, so that no pixel jumps too far between samples.
 
 Each input interval is cut into L equal parts, or into fewer where little moves
-(:mod:`.paths`).  The frame at l/L of it is made from the light of the two frames around it: linear
+(:mod:`.flow`).  The frame at l/L of it is made from the light of the two frames around it: linear
 in time for every pixel (:mod:`.linear`), along the motion (:mod:`.flow`), or by a network
 (:mod:`.network`).
 """
@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from numpy.typing import NDArray
 
 from adv2e.config.model import Sampling
-from adv2e.light.interpolation.linear import LinearUpsampler
-from adv2e.light.interpolation.sequence import NOTHING, Beside
+from adv2e.light.interpolation.linear import NOTHING, Beside, LinearUpsampler
 
 if TYPE_CHECKING:
     from adv2e.light.interpolation.onnx_file import Network
@@ -63,7 +62,7 @@ def make_upsampler(sampling: Sampling, *, threads: int = 1) -> Upsampler:
     if sampling.interpolation == "linear" or sampling.L == 1:
         return LinearUpsampler(sampling.L)
     # imported late: compiled code
-    from adv2e.light.interpolation.paths import Paths  # noqa: PLC0415
+    from adv2e.light.interpolation.flow import Paths  # noqa: PLC0415
 
     paths = Paths(sampling.L, sampling.max_motion_px)
     network = network_of(sampling)

@@ -9,7 +9,7 @@ import numpy as np
 
 from adv2e.geometry import Size
 from adv2e.sources.frame import Light, Pixels
-from adv2e.sources.pipes.layout import Layout, check_size, pixels_of, white_of
+from adv2e.sources.pipes.stream import Layout, check_size, pixels_of, white_of
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,11 @@ from adv2e.process.signals import first_interrupt
 from adv2e.sources.base import Source
 from adv2e.sources.bayer import in_colour, light_of
 from adv2e.sources.frame import Shot
-from adv2e.sources.pipes.layout import Layout
 from adv2e.sources.pipes.raw import PIXEL_FORMATS, raw_layout
-from adv2e.sources.pipes.stream import NAME, Stream, standard_input
+from adv2e.sources.pipes.stream import NAME, Layout, Stream, standard_input
 from adv2e.sources.pipes.y4m import LONGEST_LINE, MAGIC, y4m_layout
-from adv2e.sources.times.instants import Stamp
 from adv2e.sources.times.lists import read_list
+from adv2e.sources.times.rates import Stamp
 from adv2e.sources.wanted import GivenTimes, Selection
 
 _A_MOMENT_S = 0.2

@@ -14,11 +14,9 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.sources.frame import Light, Pixels
-from adv2e.sources.pipes.layout import Layout, check_size, pixels_of, white_of
-from adv2e.sources.pipes.stream import NAME, Stream
+from adv2e.sources.pipes.stream import NAME, Layout, Stream, check_size, pixels_of, white_of
 from adv2e.sources.times.rates import FrameRate, parse_rate
-from adv2e.sources.video.colours import UNSTATED, encoding_of
-from adv2e.sources.video.ycbcr import rgb_of_planes
+from adv2e.sources.video.pictures import UNSTATED, encoding_of, rgb_of_planes
 
 MAGIC = b"YUV4MPEG2 "
 LONGEST_LINE = 1024

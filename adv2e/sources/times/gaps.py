@@ -13,8 +13,7 @@ from itertools import pairwise
 from pathlib import PurePath
 from statistics import median
 
-from adv2e.sources.times.instants import NS_PER_S, seconds
-from adv2e.sources.times.rates import FrameRate
+from adv2e.sources.times.rates import NS_PER_S, FrameRate, seconds
 
 _LONG_NS = NS_PER_S
 _USUAL, _UNUSUAL = 3, 30

@@ -20,8 +20,7 @@ from typing import Any
 import av
 import numpy as np
 
-from adv2e.sources.times.instants import NS_PER_S, seconds
-from adv2e.sources.times.rates import FrameRate, constant_rate, rates_near
+from adv2e.sources.times.rates import NS_PER_S, FrameRate, constant_rate, rates_near, seconds
 from adv2e.sources.video.opening import Video, overheard
 
 _TINY_BYTES = 8

@@ -7,6 +7,7 @@ by several codes of 10 bits: with matrix and range of the pictures, to whole num
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -14,9 +15,101 @@ import numpy as np
 from av.video.reformatter import VideoReformatter
 from numpy.typing import NDArray
 
+from adv2e.effects.frames.encoding import UNKNOWN
 from adv2e.errors import DataError
 from adv2e.sources.frame import Pixels
-from adv2e.sources.video.ycbcr import SHARES, rgb_of_planes
+
+# ---- Transfers by which videos state their light, and the encoding of frames behind each.
+#
+# References
+# ----------
+# .. [1] ITU-T H.273 (07/2021), table 3 (transfer).
+
+
+UNSTATED = 2
+
+_ENCODINGS = {
+    **dict.fromkeys((1, 6, 11, 12, 14, 15), "bt709"),
+    4: "gamma:2.2",
+    5: "gamma:2.8",
+    8: "linear",
+    13: "srgb",
+    16: "pq",
+    18: "hlg",
+}
+_NAMES = {
+    **{1: "BT.709", 4: "gamma 2.2", 5: "gamma 2.8", 6: "BT.601", 7: "SMPTE 240M", 8: "linear"},
+    **{9: "logarithmic 100:1", 10: "logarithmic 316:1", 11: "xvYCC", 12: "BT.1361", 13: "sRGB"},
+    **{14: "BT.2020", 15: "BT.2020", 16: "PQ", 17: "SMPTE ST 428-1", 18: "HLG"},
+}
+
+
+def is_stated(code: int) -> bool:
+    """Tell whether a code says anything: the reserved ones do not."""
+    return code not in (0, UNSTATED, 3)
+
+
+def encoding_of(transfer: int) -> tuple[str, str]:
+    """Return the encoding of frames behind a transfer, and how that is known, in a few words.
+
+    A transfer that cannot be decoded gives what `LightDecoder` refuses by name.
+    """
+    if not is_stated(transfer):
+        return "srgb", "usual for video that states no curve"
+    name = _NAMES.get(transfer, f"number {transfer}")
+    if transfer not in _ENCODINGS:
+        return UNKNOWN + name, f"the video states {name}, which is not known here"
+    return _ENCODINGS[transfer], f"the video states {name}"
+
+
+# ---- Luma and two chromas to colours: with the matrix and the range of the pictures.
+#
+# Each chroma sample stands for all the pixels that it covers.
+#
+# References
+# ----------
+# .. [1] ITU-T H.273 (07/2021), 8.3 (matrix coefficients).
+
+
+SHARES = {
+    **dict.fromkeys((0, 2, 3, 5, 6), (0.299, 0.114)),
+    **{1: (0.2126, 0.0722), 4: (0.30, 0.11), 7: (0.212, 0.087), 9: (0.2627, 0.0593)},
+}
+"""Shares of red and blue in luma by the code of the matrix; not stated is BT.601, as in FFmpeg."""
+
+
+def rgb_of_planes(
+    planes: Sequence[NDArray[np.float32]], matrix: int, bits: int, *, full: bool
+) -> NDArray[np.float32]:
+    """Return red, green and blue, 0 to 1 but for codes beyond, of codes of so many bits."""
+    top = (1 << bits) - 1
+    luma, chroma = 1 / top, 1 / top
+    black = 0
+    if not full:
+        black, luma, chroma = 16 << bits - 8, 1 / (219 << bits - 8), 1 / (224 << bits - 8)
+    whole = [planes[0], *(_spread(plane, planes[0].shape) for plane in planes[1:3])]
+    to_rgb = _to_rgb(matrix) * [luma, chroma, chroma]
+    offset = to_rgb @ np.array([black, 1 << bits - 1, 1 << bits - 1])
+    turned = np.column_stack([to_rgb, -offset]).astype(np.float32)
+    return np.asarray(cv2.transform(cv2.merge(whole), turned))
+
+
+def _spread(plane: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return chroma for every pixel."""
+    for axis in (0, 1):
+        plane = np.repeat(plane, -(-shape[axis] // plane.shape[axis]), axis)
+    return plane[: shape[0], : shape[1]]
+
+
+def _to_rgb(matrix: int) -> NDArray[np.float64]:
+    """Return red, green and blue of luma 0..1 and two chromas of -0.5..0.5."""
+    red, blue = SHARES[matrix]
+    green = 1 - red - blue
+    to_red, to_blue = 2 * (1 - red), 2 * (1 - blue)
+    return np.array(
+        [[1, 0, to_red], [1, -blue * to_blue / green, -red * to_red / green], [1, to_blue, 0]]
+    )
+
 
 _FULL = 2
 _TURNS: dict[tuple[int, ...], int] = {

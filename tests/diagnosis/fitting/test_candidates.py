@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adv2e.config import Config, load_config, load_family, shipped, to_dict
-from adv2e.config.paths import flat, get_key, set_key
+from adv2e.config.tree import flat, get_key, set_key
 from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
 from adv2e.diagnosis.fitting.library import library, names
 from adv2e.diagnosis.hints.collect import Hints

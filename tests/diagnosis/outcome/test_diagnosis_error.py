@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_up.streams import HEIGHT, WIDTH, random_stream, stream_of
 
-from adv2e.comparison.smoothed_error import SIGMAS_US, smoothed_errors, smoothed_norms
+from adv2e.comparison.distances import SIGMAS_US, smoothed_errors, smoothed_norms
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.splits import Split
 from adv2e.diagnosis.outcome.error import (

@@ -9,7 +9,7 @@ from adv2e import load_config, simulate
 from adv2e.diagnosis.tables.noise import NoisySources, _laws, noise_rates
 from adv2e.diagnosis.tables.threshold_noise import event_rates
 from adv2e.effects.pixel.thresholds import FLOOR
-from adv2e.kernel.first_state import fill_levels
+from adv2e.kernel.per_pixel import fill_levels
 
 ROWS, COLUMNS = 30, 40
 

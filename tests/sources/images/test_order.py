@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adv2e.sources import open_source
-from adv2e.sources.images.order import in_order
+from adv2e.sources.images.source import in_order
 
 DECIMALS = ["3081.75", "3081.8", "3081.85", "3081.9", "3081.95", "3082.0", "3082.05"]
 

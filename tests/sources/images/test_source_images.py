@@ -8,7 +8,7 @@ import pytest
 
 from adv2e.errors import DataError, MissingExtraError, UsageError
 from adv2e.sources import open_source
-from adv2e.sources.images.order import natural_key
+from adv2e.sources.images.source import natural_key
 
 
 def images_of(source):

@@ -6,8 +6,8 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.sources import open_source
-from adv2e.sources.times.instants import Stamp
-from adv2e.sources.times.names import match, member_of
+from adv2e.sources.times.lists import match, member_of
+from adv2e.sources.times.rates import Stamp
 
 LEFT = ["/data/rec/left/0000.png", "/data/rec/left/0001.png"]
 

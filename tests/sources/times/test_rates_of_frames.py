@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from adv2e.errors import UsageError
 from adv2e.sources import open_source
-from adv2e.sources.times.instants import parse_ns, seconds
-from adv2e.sources.times.rates import FrameRate, constant_rate, parse_rate
+from adv2e.sources.times.rates import FrameRate, constant_rate, parse_ns, parse_rate, seconds
 from adv2e.ticks import NS, S, to_ticks
 
 
