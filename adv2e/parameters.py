@@ -33,12 +33,18 @@ class Fit:
         Where the search begins when nothing is known.
     log : bool
         Steps are factors rather than differences; `low` is above zero then.
+    starts : tuple of float
+        Where fits of the key alone begin.
+    factors : tuple of float
+        The same, as multiples of the value that is declared.
     """
 
     low: float
     high: float
     start: float
     log: bool = False
+    starts: tuple[float, ...] = ()
+    factors: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high or self.low == self.high:
@@ -58,6 +64,8 @@ class Parameter:
     at_most: float | None = None
     choices: tuple[str, ...] | None = None
     source: str = ""
+    label: str = ""
+    """Name of the key beside its effect in a sentence; empty: its own, where there are several."""
     fit: Fit | None = None
     """Search range for a diagnosis; None: it does not fit this key."""
 

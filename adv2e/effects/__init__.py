@@ -2,7 +2,9 @@
 
 A stage is a subpackage: what happens to the frames before the pixel sees them, what happens inside
 the pixel, and what happens to events on their way out.  This table is the one place that says
-which effects there are; their keys are declared in their modules.
+which effects there are.  All else stands in the module of each: physics, equation and sources in
+its docstring; its keys with unit, range and where a fit begins; ``LABELS``, its name in a sentence;
+and ``SEPARATED_BY``, the recording that tells it from others.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import importlib
 import inspect
 from dataclasses import dataclass
+from types import ModuleType
 
 STAGES = {
     "frames": "on the frames, before the pixel",
@@ -38,11 +41,15 @@ class Effect:
         """Paths of its keys: one section named after it, or single keys."""
         return self.own_paths or (f"{self.stage}.{self.name}",)
 
+    @property
+    def module(self) -> ModuleType:
+        """Its module, imported when it is asked for."""
+        name = self.own_module or self.name
+        return importlib.import_module(f"adv2e.effects.{self.stage}.{name}")
+
     def text(self) -> str:
         """Return the docstring of its module: physics, equation, references."""
-        name = self.own_module or self.name
-        module = importlib.import_module(f"adv2e.effects.{self.stage}.{name}")
-        return inspect.getdoc(module) or ""
+        return inspect.getdoc(self.module) or ""
 
     def summary(self) -> str:
         """Return the first line of its docstring."""
@@ -80,6 +87,22 @@ EFFECTS = (
     Effect("readout", "timestamp_tick", ("readout.tick_us",)),
 )
 """All effects, in signal order."""
+
+
+def label_of(name: str) -> str:
+    """Return the name of an effect in a sentence: ``LABELS`` of its module, or as it is called."""
+    return _declared(name, "LABELS") or name.replace("_", " ")
+
+
+def separated_by(name: str) -> str:
+    """Return the recording that singles an effect out: ``SEPARATED_BY`` of its module, or ""."""
+    return _declared(name, "SEPARATED_BY")
+
+
+def _declared(name: str, table: str) -> str:
+    effect = named().get(name)
+    found: str = getattr(effect.module, table, {}).get(name, "") if effect else ""
+    return found
 
 
 def named() -> dict[str, Effect]:

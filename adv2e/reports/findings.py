@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from adv2e.effects import label_of, separated_by
 from adv2e.reports.charts.error_chart import error_chart
 from adv2e.reports.headline import declared_text
-from adv2e.reports.keys import heading_of, label_of, meaning_of, summary_of, unit_of
+from adv2e.reports.keys import heading_of, meaning_of, summary_of, unit_of
 from adv2e.reports.markup import Column, Markup, join, table, tag
 from adv2e.reports.quantities import (
     NO_UNIT,
@@ -24,7 +25,6 @@ from adv2e.reports.quantities import (
 )
 from adv2e.reports.result import Diagnosis, Interval, ListInterval
 from adv2e.reports.standing_out import of_each_kind
-from adv2e.reports.trials import SEPARATIONS
 from adv2e.reports.wording import OF_TABLES
 
 _LEAST_P = 0.01
@@ -234,7 +234,7 @@ def _own_effect(found: Diagnosis) -> Step:
 
 def _separate(found: Diagnosis) -> Step:
     names = [one.name for one in found.effects[-1:]] + found.alternatives
-    known = [f"{label_of(name)}: {SEPARATIONS[name]}" for name in names if name in SEPARATIONS]
+    known = [f"{label_of(name)}: {way}" for name in names if (way := separated_by(name))]
     if not known:
         return Step("Record a scene in which these effects differ.")
     return Step(f"Record what tells them apart. For {known[0]}.")

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from adv2e.config import Config, all_keys
-from adv2e.effects import EFFECTS
+from adv2e.effects import EFFECTS, label_of
 from adv2e.parameters import Parameter
 
 
@@ -74,46 +74,7 @@ def summary_of(name: str, paths: Sequence[str] = (), own: Own = NO_OWN) -> str:
 # ---- Names of effects and their keys in sentences for people.
 
 
-_EFFECTS = {
-    "black_level": "black level of the frames",
-    "clock_drift": "drift of the frames' clock",
-    "clock_offset": "offset of the frames' clock",
-    "event_loss": "lost events",
-    "exposure_blur": "exposure of the frames",
-    "flicker": "flicker of lamps",
-    "frame_coupling": "disturbance by the readout of frames",
-    "frame_encoding": "encoding of the frames",
-    "initial_reference": "reference at the first frame",
-    "low_pass": "low-pass of the photoreceptor",
-    "misregistration": "shift of the frames",
-    "photo_leak": "leak that grows with light",
-    "readout": "time that the readout takes",
-    "refractory": "dead time",
-    "reset_overshoot": "overshoot of the reset",
-    "source_follower": "second low-pass (source follower)",
-    "threshold_drift": "drift of the thresholds",
-    "threshold_mismatch": "spread of the thresholds",
-    "thresholds": "contrast threshold",
-    "timestamp_tick": "tick of the time stamps",
-}
-"""Effects whose own name says less."""
-
-_PARTS = {
-    "pixel.low_pass.cutoff_hz": "corner at white",
-    "pixel.low_pass.dark_cutoff_hz": "corner in the dark",
-    "pixel.thresholds.on": "ON",
-    "pixel.thresholds.off": "OFF",
-    "readout.arbiter.event_ns": "an event",
-    "readout.arbiter.row_ns": "a row",
-}
-"""Keys that are always named beside their effect."""
-
 _UNIT = re.compile("_(us|ns|hz|rad|dn|px|ppm|per_s)$")
-
-
-def label_of(effect: str) -> str:
-    """Return the name of an effect in a sentence."""
-    return _EFFECTS.get(effect, effect.replace("_", " "))
 
 
 def heading_of(effect: str) -> str:
@@ -125,6 +86,7 @@ def heading_of(effect: str) -> str:
 
 def part_of(path: str, *, alone: bool) -> str:
     """Return the name of a key beside its effect, "" if it is the only key, and clear."""
-    if path in _PARTS or alone:
-        return _PARTS.get(path, "")
+    label = BUILT_IN[path].label if path in BUILT_IN else ""
+    if label or alone:
+        return label
     return _UNIT.sub("", path.rpartition(".")[2]).replace("_", " ")

@@ -11,11 +11,11 @@ import pytest
 from camera.catalogue import LIBRARY
 from made_up_diagnosis import HOSTILE, everything, nothing, strange
 
+from adv2e.effects import separated_by
 from adv2e.reports.findings import MARKS
 from adv2e.reports.page import page
 from adv2e.reports.result import Estimate, Rejected, ResidualMap, Signature, Snapshot, Total
 from adv2e.reports.summary import details_text
-from adv2e.reports.trials import SEPARATIONS
 from adv2e.reports.wording import OF_TABLES
 
 EMPTY = {"br", "img", "meta"}
@@ -197,7 +197,7 @@ def test_the_page_says_what_was_found(full):
         "5,500 to 6,500",
         "µs",
         "dead time after an event",
-        SEPARATIONS["reset_overshoot"],
+        separated_by("reset_overshoot"),
         "no line in the spectrum beyond chance",
         "frames.flicker.depth = 0.002",
         "0.2 %",
@@ -394,4 +394,4 @@ def test_the_same_diagnosis_gives_the_same_page(full):
 
 
 def test_every_effect_of_the_library_has_its_separation():
-    assert set(SEPARATIONS) == set(LIBRARY)
+    assert all(map(separated_by, LIBRARY))

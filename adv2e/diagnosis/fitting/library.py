@@ -1,6 +1,7 @@
 """The effects that may be missing, and where their fits start.
 
-In which ranges they are physical is declared with their parameters (:class:`adv2e.parameters.Fit`).
+In which ranges they are physical, and where a fit of one begins, is declared with their parameters
+(:class:`adv2e.parameters.Fit`).  Here stands what depends on the recording or on several keys.
 
 Some effects are there several times: with one key alone, or more of them; the plainest that does as
 well is taken.
@@ -104,9 +105,10 @@ def _parameter(
 
 
 def _of_one(name: str, parameter: FitParameter | str, *starts: float, **options: Any) -> Candidate:
-    """Return an effect with one key."""
+    """Return an effect with one key; without `starts`, it begins where that is declared."""
     if isinstance(parameter, str):
         parameter = _parameter(parameter)
+    starts = starts or _fit_of(parameter.key).starts
     return Candidate(name, (parameter,), tuple((start,) for start in starts), **options)
 
 
@@ -114,6 +116,11 @@ def _now(values: dict[str, Any], key: str) -> float:
     """Return the value of a key, or the start of its fit where it has none above zero."""
     held = get_key(values, key)
     return float(held) if isinstance(held, (int, float)) and held > 0 else _fit_of(key).start
+
+
+def _multiples(key: str, value: float) -> list[float]:
+    """Return where the fit of a key begins that is declared with a value."""
+    return [factor * value for factor in _fit_of(key).factors]
 
 
 def _of_the_user(config: Config) -> Iterator[Candidate]:
@@ -148,8 +155,8 @@ def _of_the_thresholds(values: dict[str, Any], hints: Hints) -> Iterator[Candida
     on, off = _parameter("pixel.thresholds.on"), _parameter("pixel.thresholds.off")
     a, b = _now(values, on.key), _now(values, off.key)
     far_on, far_off = (_far_off(ratio) for ratio in hints.too_many)
-    yield _of_one("thresholds", on, *(a * factor for factor in (0.8, 1.25, *far_on)))
-    yield _of_one("thresholds", off, *(b * factor for factor in (0.8, 1.25, *far_off)))
+    yield _of_one("thresholds", on, *_multiples(on.key, a), *(a * far for far in far_on))
+    yield _of_one("thresholds", off, *_multiples(off.key, b), *(b * far for far in far_off))
     near = (0.8 * a, 0.8 * b), (1.25 * a, 1.25 * b), (1.25 * a, 0.8 * b)
     far = ((f * a, g * b) for f, g in zip_longest(far_on, far_off, fillvalue=1.0))
     yield Candidate("thresholds", (on, off), (*near, *far))
@@ -158,8 +165,7 @@ def _of_the_thresholds(values: dict[str, Any], hints: Hints) -> Iterator[Candida
     other = SETTLED if get_key(values, key) == RANDOM else RANDOM
     yield Candidate("initial_reference", (), ((),), ((key, other),), of_chance=True)
     key = "pixel.thresholds.mismatch"
-    spread = _now(values, key)
-    yield _of_one("threshold_mismatch", key, 0.5 * spread, 2.0 * spread, 4.0 * spread)
+    yield _of_one("threshold_mismatch", key, *_multiples(key, _now(values, key)))
     drift = 0.2 / hints.seconds
     drifts = _parameter("pixel.thresholds.drift_per_s", drift)
     # they must not reach zero before the end
@@ -182,15 +188,15 @@ def _of_the_photoreceptor(values: dict[str, Any]) -> Iterator[Candidate]:
     off = get_key(values, "pixel.low_pass") is None
     # of a low-pass that is off, the other corner is nothing that was declared
     extra = ((dark, b),) if off else ()
-    yield _of_one("low_pass", white, 0.25 * a, 0.6 * a, 2.0 * a, extra=extra)
+    yield _of_one("low_pass", white, *_multiples(white, a), extra=extra)
     if not off:
-        yield _of_one("low_pass", dark, 0.3 * b, 3.0 * b)
+        yield _of_one("low_pass", dark, *_multiples(dark, b))
     both = _parameter(white), _parameter(dark)
     yield Candidate("low_pass", both, ((0.4 * a, 0.5 * b), (2.0 * a, 2.0 * b)))
-    yield _of_one("dark_current", "pixel.dark_current.dn", 0.5, 3.0, 15.0)
-    yield _of_one("source_follower", "pixel.source_follower.cutoff_hz", 20.0, 60.0, 200.0, 600.0)
+    yield _of_one("dark_current", "pixel.dark_current.dn")
+    yield _of_one("source_follower", "pixel.source_follower.cutoff_hz")
     if not off:  # they act on it
-        yield _of_one("slew_limit", "pixel.slew_limit.per_s", 10.0, 30.0, 90.0)
+        yield _of_one("slew_limit", "pixel.slew_limit.per_s")
         least = min(_now(values, f"pixel.thresholds.{sign}") for sign in ("on", "off"))
         rms = (factor * least for factor in (0.12, 0.2, 0.3))
         yield _of_one("photoreceptor_noise", "pixel.photoreceptor_noise.rms", *rms)
@@ -198,19 +204,20 @@ def _of_the_photoreceptor(values: dict[str, Any]) -> Iterator[Candidate]:
 
 def _of_the_comparator(hints: Hints) -> Iterator[Candidate]:
     period, seen = "pixel.refractory.period_us", hints.shortest_us
-    read_off = () if seen is None else (max(seen, _fit_of(period).low),)
-    yield _of_one("refractory", period, 1500.0, 5000.0, 15000.0, *read_off)
+    fit = _fit_of(period)
+    read_off = () if seen is None else (max(seen, fit.low),)
+    yield _of_one("refractory", period, *fit.starts, *read_off)
     overshoot = _parameter("pixel.reset_overshoot.fraction", 0.1)
-    yield _of_one("reset_overshoot", overshoot, -0.1, 0.1, 0.25)
-    yield _of_one("leak", "pixel.leak.rate_hz", 0.6, 2.0, 6.0)
+    yield _of_one("reset_overshoot", overshoot)
+    yield _of_one("leak", "pixel.leak.rate_hz")
     alone = (("pixel.leak.rate_hz", 0.0),)
-    yield _of_one("photo_leak", "pixel.leak.photo_rate_hz", 1.5, 5.0, 15.0, defaults=alone)
-    yield _of_one("shot_noise", "pixel.shot_noise.rate_hz", 0.3, 3.0, 10.0)
+    yield _of_one("photo_leak", "pixel.leak.photo_rate_hz", defaults=alone)
+    yield _of_one("shot_noise", "pixel.shot_noise.rate_hz")
     share = _parameter("pixel.hot_pixels.fraction", of_pixels=True)
     rate = _parameter("pixel.hot_pixels.rate_hz")
     yield Candidate("hot_pixels", (share, rate), ((0.003, 40.0), (0.01, 150.0)))
     dead = _parameter("pixel.dead_pixels.fraction", of_pixels=True)
-    yield _of_one("dead_pixels", dead, 0.005, 0.03)
+    yield _of_one("dead_pixels", dead)
 
 
 def _of_the_readout(values: dict[str, Any], hints: Hints) -> Iterator[Candidate]:
@@ -226,7 +233,7 @@ def _of_the_readout(values: dict[str, Any], hints: Hints) -> Iterator[Candidate]
             for one, ns, sd_ns in zip(times, service[:2], service[2:], strict=True)
         )
     yield Candidate("readout", times, starts, known=known)
-    yield _of_one("event_loss", _parameter("readout.loss.fraction", 0.1), 0.05, 0.2, 0.45)
+    yield _of_one("event_loss", _parameter("readout.loss.fraction", 0.1))
     tick_us = float(hints.tick_us) if hints.tick_us > 1 else 0.0
     if tick_us != (get_key(values, "readout.tick_us") or 0.0):
         yield Candidate("timestamp_tick", (), ((),), (("readout.tick_us", tick_us),))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from adv2e.diagnosis.selection.search import PER_LOOK, Outcome
-from adv2e.reports.keys import label_of
+from adv2e.effects import label_of
 from adv2e.reports.result import ErrorRow, Verdict
 
 _PARTLY = 0.8

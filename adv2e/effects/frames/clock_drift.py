@@ -20,6 +20,13 @@ from __future__ import annotations
 
 from adv2e.effects.hooks import Frames, Hooks
 
+LABELS = {
+    "clock_drift": "drift of the frames' clock",
+}
+SEPARATED_BY = {
+    "clock_drift": "a long recording: the delay between frames and events grows steadily",
+}
+
 
 class ClockDriftHooks(Hooks):
     """Stretches the times of the frames by `ppm`."""

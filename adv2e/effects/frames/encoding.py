@@ -41,6 +41,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from adv2e.errors import ConfigError, DataError
 
+LABELS = {
+    "frame_encoding": "encoding of the frames",
+}
+SEPARATED_BY = {
+    "frame_encoding": "one motion over dark and bright parts: the ratio of events between them",
+}
+
 UNKNOWN = "unknown: "
 """Prefix of an encoding that a source states and that is not one of those here."""
 

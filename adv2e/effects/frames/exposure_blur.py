@@ -48,6 +48,13 @@ from numpy.typing import NDArray
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.kernel.frame_effects import sharpen
 
+LABELS = {
+    "exposure_blur": "exposure of the frames",
+}
+SEPARATED_BY = {
+    "exposure_blur": "small, fast features at two exposure times",
+}
+
 Array = NDArray[np.float64]
 
 _ITERATIONS = 50

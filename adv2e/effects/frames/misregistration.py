@@ -33,6 +33,13 @@ from numpy.typing import NDArray
 
 from adv2e.effects.hooks import Frames, Hooks
 
+LABELS = {
+    "misregistration": "shift of the frames",
+}
+SEPARATED_BY = {
+    "misregistration": "motion in two opposite directions: a shift stays, a delay turns round",
+}
+
 _LEAST_DN = 0.05
 _REACH = 12
 """Pixels to each side that count: those beyond weigh less than 2e-5."""

@@ -22,6 +22,10 @@ from dataclasses import dataclass
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.parameters import Fit, Section, parameter
 
+SEPARATED_BY = {
+    "dark_current": "lag over more than one and a half decades of light: it levels off in the dark",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class DarkCurrent(Section):
@@ -31,7 +35,7 @@ class DarkCurrent(Section):
         unit="DN",
         meaning="light that the dark current equals",
         at_least=0,
-        fit=Fit(0.02, 200.0, 3.0, log=True),
+        fit=Fit(0.02, 200.0, 3.0, log=True, starts=(0.5, 3.0, 15.0)),
     )
 
 

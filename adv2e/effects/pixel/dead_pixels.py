@@ -21,6 +21,10 @@ from adv2e.events import Events
 from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter
 
+SEPARATED_BY = {
+    "dead_pixels": "a texture moved across the whole sensor: some pixels stay silent",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class DeadPixels(Section):
@@ -31,7 +35,7 @@ class DeadPixels(Section):
         meaning="share of the pixels that is dead",
         at_least=0,
         at_most=1,
-        fit=Fit(2e-4, 0.9, 0.03, log=True),
+        fit=Fit(2e-4, 0.9, 0.03, log=True, starts=(0.005, 0.03)),
     )
 
 

@@ -25,6 +25,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+LABELS = {
+    "initial_reference": "reference at the first frame",
+}
+
 Array = NDArray[np.float64]
 
 RUNNING, SETTLED, RANDOM = REFERENCES = ("running", "settled", "random")

@@ -48,6 +48,15 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
+LABELS = {
+    "photo_leak": "leak that grows with light",
+}
+SEPARATED_BY = {
+    "leak": "a scene at rest: regular ON events at every brightness, also in the dark",
+    "photo_leak": "a scene at rest with bright and dark parts: regular ON events whose rate is"
+    " proportional to the light",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Leak(Section):
@@ -59,14 +68,14 @@ class Leak(Section):
         meaning="ON events a pixel a second from junction leakage, where no noise comes between",
         at_least=0,
         source="v2e: 0.01-0.1 Hz",
-        fit=Fit(1e-3, 500.0, 2.0, log=True),
+        fit=Fit(1e-3, 500.0, 2.0, log=True, starts=(0.6, 2.0, 6.0)),
     )
     photo_rate_hz: float = parameter(
         0.0,
         unit="Hz",
         meaning="ON events a pixel a second from parasitic photocurrent, at white",
         at_least=0,
-        fit=Fit(1e-2, 1000.0, 5.0, log=True),
+        fit=Fit(1e-2, 1000.0, 5.0, log=True, starts=(1.5, 5.0, 15.0)),
     )
     jitter: float = parameter(
         0.1,

@@ -36,6 +36,14 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
+LABELS = {
+    "low_pass": "low-pass of the photoreceptor",
+}
+SEPARATED_BY = {
+    "low_pass": "the same motion in bright and dim light: its lag falls with the light, and so"
+    " does the tail after the motion stops",
+}
+
 UPDATES = ("exact", "first_order_hold", "zero_order_hold", "euler", "paper")
 
 
@@ -49,7 +57,8 @@ class LowPass(Section):
         meaning="corner (-3 dB) at white",
         above=0,
         source="v2e default",
-        fit=Fit(1.0, 1e5, 300.0, log=True),
+        fit=Fit(1.0, 1e5, 300.0, log=True, factors=(0.25, 0.6, 2.0)),
+        label="corner at white",
     )
     dark_cutoff_hz: float = parameter(
         21.8,
@@ -57,7 +66,8 @@ class LowPass(Section):
         meaning="corner at zero light; linear in light between the two",
         at_least=0,
         source="v2e: 300 Hz (0 + 20)/275",
-        fit=Fit(0.05, 1e4, 20.0, log=True),
+        fit=Fit(0.05, 1e4, 20.0, log=True, factors=(0.3, 3.0)),
+        label="corner in the dark",
     )
     update: str = parameter(
         "exact", unit="-", meaning="how the filter's equation is solved", choices=UPDATES

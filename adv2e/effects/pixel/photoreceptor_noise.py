@@ -36,6 +36,11 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
+SEPARATED_BY = {
+    "photoreceptor_noise": "a scene at rest: ON and OFF events that alternate, at a rate that"
+    " falls steeply with the threshold",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class PhotoreceptorNoise(Section):

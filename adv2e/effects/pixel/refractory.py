@@ -19,6 +19,14 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
+LABELS = {
+    "refractory": "dead time",
+}
+SEPARATED_BY = {
+    "refractory": "fast, high-contrast edges: no two events of a pixel are nearer than a fixed"
+    " time, at every brightness, and more is lost the steeper the edge",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Refractory(Section):
@@ -30,5 +38,5 @@ class Refractory(Section):
         meaning="dead time after an event",
         above=0,
         source="v2e default 0.5 ms",
-        fit=Fit(1.0, 2e6, 5000.0, log=True),
+        fit=Fit(1.0, 2e6, 5000.0, log=True, starts=(1500.0, 5000.0, 15000.0)),
     )

@@ -27,6 +27,14 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
+LABELS = {
+    "reset_overshoot": "overshoot of the reset",
+}
+SEPARATED_BY = {
+    "reset_overshoot": "edges of different steepness: the first event after a reset comes late or"
+    " early by the same contrast, whatever the steepness",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class ResetOvershoot(Section):
@@ -37,5 +45,5 @@ class ResetOvershoot(Section):
         meaning="share of the threshold by which the new reference is carried on",
         above=-1,
         at_most=0.9,
-        fit=Fit(-0.9, 0.9, 0.1),
+        fit=Fit(-0.9, 0.9, 0.1, starts=(-0.1, 0.1, 0.25)),
     )

@@ -29,6 +29,10 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
+SEPARATED_BY = {
+    "shot_noise": "a scene at rest: ON and OFF events without order, fewer in bright light",
+}
+
 FALL_AT_WHITE = 0.75
 """Share of the dark rate that is gone at white."""
 
@@ -43,5 +47,5 @@ class ShotNoise(Section):
         meaning="ON and OFF events a pixel a second in the dark; 1 to 10 in dim light",
         at_least=0,
         source="Joubert 2021: 0.01 at 161 lux, 12 at 0.1 lux",
-        fit=Fit(1e-3, 500.0, 3.0, log=True),
+        fit=Fit(1e-3, 500.0, 3.0, log=True, starts=(0.3, 3.0, 10.0)),
     )

@@ -23,6 +23,11 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
+SEPARATED_BY = {
+    "slew_limit": "steps of several sizes (more than a factor of e) at the same light: latency"
+    " grows with the size of the step",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class SlewLimit(Section):
@@ -32,5 +37,5 @@ class SlewLimit(Section):
         unit="ln/s",
         meaning="fastest change of the filtered signal",
         above=0,
-        fit=Fit(0.5, 1e4, 30.0, log=True),
+        fit=Fit(0.5, 1e4, 30.0, log=True, starts=(10.0, 30.0, 90.0)),
     )

@@ -21,6 +21,14 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
+LABELS = {
+    "source_follower": "second low-pass (source follower)",
+}
+SEPARATED_BY = {
+    "source_follower": "fast and slow edges in bright light: it delays and weakens fast changes"
+    " at every brightness, while a clock offset shifts slow ones as much",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class SourceFollower(Section):
@@ -30,5 +38,5 @@ class SourceFollower(Section):
         unit="Hz",
         meaning="corner (-3 dB)",
         above=0,
-        fit=Fit(2.0, 1e5, 200.0, log=True),
+        fit=Fit(2.0, 1e5, 200.0, log=True, starts=(20.0, 60.0, 200.0, 600.0)),
     )

@@ -24,6 +24,17 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
+LABELS = {
+    "thresholds": "contrast threshold",
+    "threshold_mismatch": "spread of the thresholds",
+}
+SEPARATED_BY = {
+    "thresholds": "a scene that returns to where it began, at two contrasts: signed steps then"
+    " sum to zero only with the right thresholds, at every speed and brightness",
+    "threshold_mismatch": "two different textures: what stays at the same pixels is the sensor,"
+    " what moves with the texture is the scene",
+}
+
 FLOOR = 0.01
 """Least threshold of a pixel [ln units]."""
 
@@ -38,7 +49,8 @@ class Thresholds(Section):
         meaning="rise that fires an ON event",
         at_least=FLOOR,
         source="v2e default",
-        fit=Fit(0.01, 5.0, 0.2, log=True),
+        fit=Fit(0.01, 5.0, 0.2, log=True, factors=(0.8, 1.25)),
+        label="ON",
     )
     off: float = parameter(
         0.2,
@@ -46,7 +58,8 @@ class Thresholds(Section):
         meaning="fall that fires an OFF event",
         at_least=FLOOR,
         source="v2e default",
-        fit=Fit(0.01, 5.0, 0.2, log=True),
+        fit=Fit(0.01, 5.0, 0.2, log=True, factors=(0.8, 1.25)),
+        label="OFF",
     )
     mismatch: float = parameter(
         0.03,
@@ -54,7 +67,7 @@ class Thresholds(Section):
         meaning="standard deviation over pixels, ON and OFF independent",
         at_least=0,
         source="v2e default",
-        fit=Fit(1e-3, 0.5, 0.02, log=True),
+        fit=Fit(1e-3, 0.5, 0.02, log=True, factors=(0.5, 2.0, 4.0)),
     )
     drift_per_s: float = parameter(
         0.0,

@@ -38,6 +38,14 @@ from adv2e.kernel import rng
 from adv2e.kernel.arbiter import EVENTS, NOBODY, serve
 from adv2e.parameters import Fit, Section, parameter
 
+LABELS = {
+    "readout": "time that the readout takes",
+}
+SEPARATED_BY = {
+    "readout": "strong motion of the whole picture: delays grow with the rate of all pixels, and"
+    " events come row by row",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Arbiter(Section):
@@ -49,12 +57,14 @@ class Arbiter(Section):
         at_least=0,
         source="Brandli et al.: 83 ns (12 million events a second)",
         fit=Fit(1.0, 1e6, 300.0, log=True),
+        label="an event",
     )
     row_ns: float = parameter(
         unit="ns",
         meaning="time that the selection of a row takes",
         at_least=0,
         fit=Fit(1.0, 1e7, 3000.0, log=True),
+        label="a row",
     )
 
 

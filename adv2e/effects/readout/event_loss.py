@@ -22,6 +22,14 @@ from adv2e.events import Events, pixels_of
 from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter
 
+LABELS = {
+    "event_loss": "lost events",
+}
+SEPARATED_BY = {
+    "event_loss": "motion of a small and of a large part of the picture: a share that is lost"
+    " everywhere does not depend on the rate",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class EventLoss(Section):
@@ -32,7 +40,7 @@ class EventLoss(Section):
         meaning="probability with which an event is lost",
         at_least=0,
         at_most=1,
-        fit=Fit(1e-3, 0.95, 0.2),
+        fit=Fit(1e-3, 0.95, 0.2, starts=(0.05, 0.2, 0.45)),
     )
 
 
