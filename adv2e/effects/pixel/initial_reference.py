@@ -1,4 +1,4 @@
-"""What each pixel remembers when the first frame comes.
+"""Initial reference: the value that each pixel holds when the first frame comes.
 
 running     The scene has rested before a camera that was on.  Leak has gone on in it, and every
             pixel is somewhere in its leak cycle (see the effect leak).  Without leak this is
